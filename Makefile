@@ -1,0 +1,119 @@
+# Needs GNU make, bash and Python 3.11 or newer. Everything else goes into .venv, through pip as it is configured.
+
+SHELL := bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.DELETE_ON_ERROR:
+MAKEFLAGS += --no-builtin-rules
+
+PYTHON ?= python3
+# A PYTHON that somebody names is the only one tried; otherwise newer names are, where python3 is too old.
+CANDIDATES := $(PYTHON) $(if $(filter file,$(origin PYTHON)),python3.13 python3.12 python3.11)
+LOCK_PYTHON ?= python3.11
+
+CONSTRAINTS := tests/constraints.txt
+VENV := .venv
+VENV_PYTHON := $(VENV)/bin/python
+BLOCKSIM := $(VENV)/bin/blocksim
+PIP_INSTALL := $(VENV_PYTHON) -m pip install -qq --disable-pip-version-check --constraint $(CONSTRAINTS)
+
+# The stamps say what is installed, and for which folder: an editable install does not survive a move of the checkout.
+FOLDER := $(shell pwd | cksum | cut -d ' ' -f 1)
+RUN_STAMP := $(VENV)/.installed-run-$(FOLDER)
+DEV_STAMP := $(VENV)/.installed-dev-$(FOLDER)
+INSTALL_DECIDES := pyproject.toml $(CONSTRAINTS) blocksim/__init__.py
+# Without a Python (none yet, or it was upgraded away) the stamps are void.
+VOID := $(if $(realpath $(VENV_PYTHON)),,void)
+
+SCENARIO := scenarios/three_blocks.toml
+SMOKE := results/make-smoke
+
+.PHONY: help
+help: ## List the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+.PHONY: run
+run: $(RUN_STAMP) ## Let the three blocks collapse and compare with the measurement (sets up .venv first)
+	$(BLOCKSIM) run $(SCENARIO)
+	$(BLOCKSIM) compare $(SCENARIO)
+
+.PHONY: test
+test: $(DEV_STAMP) ## Run the tests (sets up .venv first)
+	$(VENV_PYTHON) -m pytest -m "not long"
+
+.PHONY: test-long
+test-long: $(DEV_STAMP) ## Run the tests that take long
+	$(VENV_PYTHON) -m pytest -m long
+
+.PHONY: smoke
+smoke: $(RUN_STAMP) ## Short run, 2 x 2 sweep and compare, for your CI: does this installation work?
+	@rm -rf $(SMOKE); step() { echo "$$*"; "$$@"; }; \
+	step $(BLOCKSIM) run $(SCENARIO) --set time.end=0.05 --out $(SMOKE)/run --overwrite --quiet; \
+	step $(BLOCKSIM) sweep $(SCENARIO) --set time.end=0.05 --out $(SMOKE)/sweep --overwrite --quiet \
+	    --vary friction.block_block.kinetic=0.19,0.2 --vary contact.stiffness_scale=0.001,0.01; \
+	code=0; step $(BLOCKSIM) compare $(SMOKE)/run || code=$$?; \
+	if [ $$code -gt 1 ]; then echo "smoke: compare failed with exit code $$code" >&2; exit $$code; fi; \
+	echo "smoke: ok in $$SECONDS s (nothing has landed after 0.05 s, so \"outside\" is right here)"
+
+.PHONY: bench
+bench: $(RUN_STAMP) ## Measure the speed
+	$(BLOCKSIM) bench
+
+.PHONY: lint
+lint: $(DEV_STAMP) ## Check style, types and the direction of imports
+	$(VENV_PYTHON) -m ruff check
+	$(VENV_PYTHON) -m ruff format --check
+	$(VENV_PYTHON) -m mypy
+	$(VENV_PYTHON) $(VENV)/bin/lint-imports --no-logo
+
+.PHONY: format
+format: $(DEV_STAMP) ## Bring the code into shape
+	$(VENV_PYTHON) -m ruff format
+	$(VENV_PYTHON) -m ruff check --fix
+
+.PHONY: setup
+setup: $(DEV_STAMP) ## Create or update .venv, with the tools for developers
+
+.PHONY: lock
+lock: ## Rewrite the constraints with the newest versions that fit pyproject.toml
+	@folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
+	echo "Resolving in a fresh environment, with the oldest Python that is supported"; \
+	$(LOCK_PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11) and "lock: needs Python 3.11")'; \
+	$(LOCK_PYTHON) -m venv "$$folder/venv"; \
+	"$$folder/venv/bin/python" -m pip install -qq --disable-pip-version-check ".[dev]"; \
+	{ echo "# Exact versions of everything that make installs, for Python 3.11 to 3.13. Written by: make lock"; \
+	  "$$folder/venv/bin/python" -m pip freeze --disable-pip-version-check --exclude blocksim \
+	      --exclude setuptools --exclude wheel; } >"$$folder/constraints.txt"; \
+	cp "$$folder/constraints.txt" $(CONSTRAINTS); \
+	echo "Wrote $(CONSTRAINTS); see the difference, then make test"
+
+.PHONY: clean
+clean: ## Remove .venv, caches and what make smoke left; your results stay
+	rm -rf $(VENV) $(SMOKE) .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find blocksim tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+.PHONY: void
+void: ;
+
+$(VENV_PYTHON):
+	@for python in $(CANDIDATES); do \
+	    if $$python -c 'import ensurepip, sys, venv; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+	        echo "Creating $(VENV) with $$($$python --version)"; \
+	        exec $$python -m venv --clear $(VENV); \
+	    fi; \
+	    tried="$${tried-}  $$python: $$($$python --version 2>/dev/null || echo 'does not run')"$$'\n'; \
+	done; \
+	printf '%s\n%s%s\n' >&2 "blocksim needs Python 3.11 or newer with its venv module. Tried:" "$$tried" \
+	    "Install one (Debian, Ubuntu: python3-venv too) or name it: make PYTHON=/path/to/python3.12 run"; \
+	exit 1
+
+$(RUN_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
+	@echo "Installing blocksim into $(VENV), a minute or so (versions: $(CONSTRAINTS))"
+	@$(PIP_INSTALL) --editable .
+	@touch $@
+
+$(DEV_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
+	@echo "Installing blocksim and its developers' tools into $(VENV), a minute or so (versions: $(CONSTRAINTS))"
+	@$(PIP_INSTALL) --editable ".[dev]"
+	@touch $(RUN_STAMP) $@

@@ -1,0 +1,213 @@
+"""Comma-separated tables with `#` comment lines; every cell knows where it stands in the file."""
+
+import difflib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NoReturn
+
+from blocksim.errors import InputMissingError, InvalidInputError, Problem
+
+LARGEST_FILE = 1_000_000  # bytes
+LONGEST_LINE = 1_000  # characters
+MOST_PROBLEMS_SHOWN = 20
+
+CELL = re.compile(r'[ ]*("(?:[^"]|"")*"|[^",]*)[ ]*(,|$)')
+NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of the file, counted from 1, and as it may be shown on a terminal."""
+
+    where: str
+    number: int
+    text: str
+
+    def problem(self, message: str, key: str = "", start: int = 0, length: int | None = None) -> Problem:
+        """Locate a mistake in this line; without `length` the whole line is marked."""
+        shown = self.text if len(self.text) <= LONGEST_LINE else self.text[:80] + " ..."
+        return Problem(
+            where=self.where,
+            message=message,
+            key=key,
+            line_number=self.number,
+            line_text=shown,
+            caret_start=start,
+            caret_length=len(shown) if length is None else length,
+        )
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell: its text without quotes and surrounding blanks, and its place."""
+
+    column: str
+    text: str
+    line: Line
+    start: int
+    length: int
+
+    def problem(self, message: str) -> Problem:
+        """Locate a mistake in this cell."""
+        return self.line.problem(message, self.column, self.start, self.length)
+
+    def number(self) -> float:
+        """Return the finite number in this cell; raises ValueError with a message for the user."""
+        if not NUMBER.fullmatch(self.text):
+            message = f"'{self.text}' is not a number, write it as 71.69 or 7.169e1"
+            raise ValueError(message)
+        value = float(self.text)
+        if abs(value) == float("inf"):
+            message = f"'{self.text}' is too large"
+            raise ValueError(message)
+        return value
+
+
+@dataclass
+class Table:
+    """The rows of one file, its comment lines, and the mistakes found so far."""
+
+    where: str
+    notes: tuple[str, ...]
+    header: Line
+    rows: list[dict[str, Cell]] = field(default_factory=list)
+    problems: list[Problem] = field(default_factory=list)
+
+
+def read_table(path: Path, columns: Sequence[str]) -> Table:
+    """Read a table that has exactly these columns, in any order.
+
+    Rows of the wrong shape are left out and noted in `problems`. Raises InputMissingError when the file
+    cannot be read and InvalidInputError when it is no text or its header is wrong.
+    """
+    lines = _lines(path)
+    notes = tuple(line.text.strip()[1:].strip() for line in lines if _is_comment(line))
+    content = [line for line in lines if line.text.strip() and not _is_comment(line)]
+    if not content:
+        raise_problems([Problem(where=str(path), message=f"the table is empty, {_expected(columns)}")])
+    names = _header(content[0], columns)
+    table = Table(where=str(path), notes=notes, header=content[0])
+    for line in content[1:]:
+        cells = _cells(line)
+        complaint = _shape_complaint(line, cells, len(names))
+        if complaint or cells is None:
+            table.problems.append(line.problem(complaint))
+        else:
+            named = zip(names, cells, strict=True)
+            table.rows.append({name: Cell(name, *place) for name, place in named})
+    return table
+
+
+def raise_problems(problems: Sequence[Problem]) -> NoReturn:
+    """Raise one InvalidInputError that shows the problems by line; a flood is cut and counted."""
+    by_line = sorted(problems, key=lambda problem: (problem.line_number or 0, problem.caret_start))
+    shown = [problem.render() for problem in by_line[:MOST_PROBLEMS_SHOWN]]
+    if len(by_line) > len(shown):
+        shown.append(f"... and {len(by_line) - len(shown)} more problems")
+    raise InvalidInputError("\n".join(shown))
+
+
+def suggestion(found: str, allowed: Sequence[str]) -> str:
+    """Say what was meant, or what is allowed where nothing comes close."""
+    close = difflib.get_close_matches(found.lower(), allowed, n=1)
+    return f"did you mean '{close[0]}'?" if close else "allowed: " + ", ".join(allowed)
+
+
+def _lines(path: Path) -> list[Line]:
+    text = _text(path).replace("\r\n", "\n").replace("\r", "\n")
+    return [Line(str(path), number, _printable(line)) for number, line in enumerate(text.split("\n"), 1)]
+
+
+def _text(path: Path) -> str:
+    raw = _bytes(path)
+    if len(raw) > LARGEST_FILE:
+        raise_problems([Problem(str(path), f"the file is too large for a table, limit {LARGEST_FILE} bytes")])
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = "\0"
+    if "\0" in text:
+        raise_problems([Problem(str(path), "not a text file (a table is UTF-8 text)")])
+    return text
+
+
+def _bytes(path: Path) -> bytes:
+    if path.is_dir():
+        raise InputMissingError(Problem(str(path), "is a folder, not a table").render())
+    try:
+        with path.open("rb") as file:
+            return file.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise InputMissingError(Problem(str(path), "no such file").render()) from None
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputMissingError(Problem(str(path), f"cannot be read: {reason}").render()) from None
+
+
+def _printable(line: str) -> str:
+    """Turn tabs and control characters into blanks: they would shift the caret or steer a terminal."""
+    return "".join(character if character.isprintable() else " " for character in line)
+
+
+def _is_comment(line: Line) -> bool:
+    return line.text.lstrip().startswith("#")
+
+
+def _cells(line: Line) -> list[tuple[str, Line, int, int]] | None:
+    """Split a line at its commas; None when its quotes do not match."""
+    cells = []
+    position = 0
+    while len(line.text) <= LONGEST_LINE:
+        match = CELL.match(line.text, position)
+        if match is None:
+            return None
+        content = match[1].strip()
+        text = content[1:-1].replace('""', '"').strip() if content.startswith('"') else content
+        cells.append((text, line, match.start(1), len(content)))
+        position = match.end()
+        if match[2] == "":
+            return cells
+    return None
+
+
+def _shape_complaint(line: Line, cells: list[tuple[str, Line, int, int]] | None, count: int) -> str:
+    """Return what is wrong with the shape of a row, or nothing."""
+    if len(line.text) > LONGEST_LINE:
+        return f"the line has {len(line.text)} characters, at most {LONGEST_LINE} are read"
+    if cells is None:
+        return "quotes do not match"
+    if len(cells) > count:
+        return f"{len(cells)} cells where the header has {count} columns (decimals are written with a point)"
+    if len(cells) < count:
+        return f"{len(cells)} cells where the header has {count} columns"
+    return ""
+
+
+def _header(line: Line, columns: Sequence[str]) -> list[str]:
+    """Return the column names in the file's order; raises InvalidInputError for any but the expected ones."""
+    cells = _cells(line)
+    if cells is None:
+        raise_problems([line.problem(_shape_complaint(line, cells, 0))])
+    names = [text for text, *_ in cells]
+    problems = [
+        line.problem(_column_complaint(text, names[:index], columns), text, start, length)
+        for index, (text, _, start, length) in enumerate(cells)
+        if text not in columns or text in names[:index]
+    ]
+    missing = [column for column in columns if column not in names]
+    if missing:
+        plural = "s" if len(missing) > 1 else ""
+        problems.append(line.problem(f"missing column{plural} {', '.join(missing)}; {_expected(columns)}"))
+    if problems:
+        raise_problems(problems)
+    return names
+
+
+def _column_complaint(name: str, before: Sequence[str], columns: Sequence[str]) -> str:
+    return "column given twice" if name in before else f"unknown column, {suggestion(name, columns)}"
+
+
+def _expected(columns: Sequence[str]) -> str:
+    return f"its first line must be {','.join(columns)}"

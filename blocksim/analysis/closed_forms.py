@@ -1,0 +1,235 @@
+"""Closed forms that the simulation is checked against, derived from Newton's laws; SI, angles in radians.
+
+Equation numbers are those of the paper (Tran and Nguyen 2020). Restitution `e` is the ratio of the normal
+velocities after and before an impact (Eq. 11).
+"""
+
+from dataclasses import dataclass
+from math import atan, atan2, cos, hypot, pi, sin, sqrt, tan
+
+import numpy as np
+
+GRAVITY = 9.81  # m/s^2, the scenarios' default
+QUADRATURE_POINTS = 64  # rocking_quarter_time: round-off is reached with about 20
+
+
+# Falling and rebounding
+
+
+def fall_distance(time: float, gravity: float = GRAVITY) -> float:
+    """Return the distance (m) fallen from rest after `time` (s): g t^2/2, Eq. 10, first form."""
+    return 0.5 * gravity * time**2
+
+
+def fall_time(height: float, gravity: float = GRAVITY) -> float:
+    """Return the time (s) to fall `height` (m) from rest: sqrt(2 h/g), from Eq. 10, first form."""
+    return sqrt(2.0 * height / gravity)
+
+
+def rebound_speed(height: float, restitution: float, impacts: int, gravity: float = GRAVITY) -> float:
+    """Return the upward speed (m/s) just after impact number `impacts` of a body dropped from `height` (m).
+
+    It arrives with sqrt(2 g h0) and every impact multiplies the speed by e.
+    """
+    return sqrt(2.0 * gravity * height) * restitution**impacts
+
+
+def rebound_height(
+    time: float, height: float, restitution: float, impacts: int, gravity: float = GRAVITY
+) -> float:
+    """Return the height (m) at `time` (s) after impact number `impacts`: v t - g t^2/2, v the rebound speed.
+
+    This is what Eq. 10, second form, is meant to give; see `remaining_rise` for what it does give.
+    """
+    return rebound_speed(height, restitution, impacts, gravity) * time - fall_distance(time, gravity)
+
+
+def remaining_rise(
+    time: float, height: float, restitution: float, impacts: int, gravity: float = GRAVITY
+) -> float:
+    """Return (v - g t)^2/(2 g) (m), Eq. 10, second form, as printed.
+
+    With the speed v - g t at that moment this is how far the body will STILL rise, not how high it is: it is
+    largest at the impact and zero at the apex. Height and remaining rise add up to the apex height.
+    """
+    return (rebound_speed(height, restitution, impacts, gravity) - gravity * time) ** 2 / (2.0 * gravity)
+
+
+def apex_height(height: float, restitution: float, impacts: int) -> float:
+    """Return the apex (m) after impact number `impacts`: h_p = h0 e^(2p), Eq. 12."""
+    return height * restitution ** (2 * impacts)
+
+
+def flight_time(height: float, restitution: float, impacts: int, gravity: float = GRAVITY) -> float:
+    """Return the time (s) from impact number `impacts` to the next: t_p = 2 e^p sqrt(2 h0/g), Eq. 12."""
+    return 2.0 * restitution**impacts * sqrt(2.0 * height / gravity)
+
+
+# Sliding
+
+
+def sliding_speed(time: float, speed: float, friction: float, gravity: float = GRAVITY) -> float:
+    """Return the speed (m/s) on level ground at `time` (s): V0 - mu g t (Eq. 13, N = M g), 0 once at rest."""
+    return max(speed - friction * gravity * time, 0.0)
+
+
+def sliding_stop_time(speed: float, friction: float, gravity: float = GRAVITY) -> float:
+    """Return the time (s) to stop on level ground: V0/(mu g), where Eq. 13 reaches zero."""
+    return speed / (friction * gravity)
+
+
+def sliding_stop_distance(speed: float, friction: float, gravity: float = GRAVITY) -> float:
+    """Return the distance (m) to stop on level ground: V0^2/(2 mu g), the integral of Eq. 13."""
+    return speed**2 / (2.0 * friction * gravity)
+
+
+def incline_acceleration(slope: float, friction: float, gravity: float = GRAVITY) -> float:
+    """Return the acceleration (m/s^2) on a `slope` from rest: g (sin a - mu cos a), 0 if friction holds."""
+    return max(gravity * (sin(slope) - friction * cos(slope)), 0.0)
+
+
+def sliding_slope(friction: float) -> float:
+    """Return the slope (rad) above which a block slides: arctan(mu)."""
+    return atan(friction)
+
+
+def toppling_slope(width: float, height: float) -> float:
+    """Return the slope (rad) at which a block's weight passes its lower edge: arctan(width/height)."""
+    return atan2(width, height)
+
+
+# Resting
+
+
+def static_overlap(mass: float, face_stiffness: float, gravity: float = GRAVITY) -> float:
+    """Return the overlap (m) of a block resting on a linear face contact of `face_stiffness` (N/m): m g/K."""
+    return mass * gravity / face_stiffness
+
+
+def hertz_static_overlap(mass: float, modulus: float, radius: float, gravity: float = GRAVITY) -> float:
+    """Return the overlap (m) of a block resting on two Hertzian corners, E* `modulus` (Pa), R* `radius` (m).
+
+    Each corner carries m g/2 = (4/3) E* sqrt(R*) delta^(3/2).
+    """
+    return float((3.0 * mass * gravity / (8.0 * modulus * sqrt(radius))) ** (2.0 / 3.0))
+
+
+def equal_offset_limit(count: int, width: float) -> float:
+    """Return the largest offset (m) of each block from the one below that stands: width/count.
+
+    Above the lowest block lie count - 1 blocks whose common centre is offset by count d/2 from its centre,
+    and must not pass its edge at width/2. The interfaces above carry fewer blocks and are safer.
+    """
+    return width / count
+
+
+def harmonic_offsets(count: int, width: float) -> tuple[float, ...]:
+    """Return the overhang (m) of each block over its support, topmost first: width/(2 i), i = 1 ... count.
+
+    The i uppermost blocks balance on the edge below them. The last support is a table; the sum is the
+    overhang.
+    """
+    return tuple(width / (2.0 * index) for index in range(1, count + 1))
+
+
+def harmonic_overhang(count: int, width: float) -> float:
+    """Return the largest overhang (m) of `count` blocks, one on each level, beyond a table's edge."""
+    return float(sum(harmonic_offsets(count, width)))
+
+
+# Impacts of one corner on the ground (normal along y, tangent along x)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Velocity of the centre (m/s) and spin (rad/s, counter-clockwise positive)."""
+
+    vx: float
+    vy: float
+    spin: float
+
+
+def lowest_corner(width: float, height: float, tilt: float) -> tuple[float, float]:
+    """Return the vector (m) from the centre of a rectangle turned by `tilt` to its lowest corner."""
+    corners = [(sx * width / 2.0, sy * height / 2.0) for sx in (-1.0, 1.0) for sy in (-1.0, 1.0)]
+    turned = [(x * cos(tilt) - y * sin(tilt), x * sin(tilt) + y * cos(tilt)) for x, y in corners]
+    return min(turned, key=lambda corner: corner[1])
+
+
+def frictionless_impact(
+    mass: float, inertia: float, arm: tuple[float, float], before: Motion, restitution: float
+) -> Motion:
+    """Return the motion after a frictionless impact at the corner `arm` (m from the centre).
+
+    The impulse J along y changes the corner's normal velocity by J (1/m + r_x^2/I), which must be -(1 + e)
+    times what it was before; for a block falling with v that is J = (1 + e) v/(1/m + r_x^2/I).
+    """
+    approach = before.vy + before.spin * arm[0]
+    impulse = -(1.0 + restitution) * approach / (1.0 / mass + arm[0] ** 2 / inertia)
+    return Motion(before.vx, before.vy + impulse / mass, before.spin + arm[0] * impulse / inertia)
+
+
+def sticking_impact(
+    mass: float, inertia: float, arm: tuple[float, float], before: Motion, restitution: float
+) -> Motion:
+    """Return the motion after an impact at the corner `arm` (m) with enough friction to stop the corner.
+
+    The impulse solves W J = u' - u: W is the corner's 2 x 2 inverse-mass matrix, u and u' = (0, -e u_y) are
+    its velocities before and after. With e > 0 and a fast tangential approach Newton's rule can gain energy
+    here (Kane 1984); with e = 0 it cannot.
+    """
+    x, y = arm
+    corner = np.array([before.vx - before.spin * y, before.vy + before.spin * x])
+    inverse_mass = np.array(
+        [[1.0 / mass + y * y / inertia, -x * y / inertia], [-x * y / inertia, 1.0 / mass + x * x / inertia]]
+    )
+    wanted = np.array([0.0, -restitution * corner[1]])
+    along, up = (float(part) for part in np.linalg.solve(inverse_mass, wanted - corner))
+    return Motion(
+        before.vx + along / mass, before.vy + up / mass, before.spin + (x * up - y * along) / inertia
+    )
+
+
+# Rocking of a block on its base (G. W. Housner 1963, Bull. Seismol. Soc. Am. 53, 403-417)
+
+
+def rocking_quarter_time(width: float, height: float, tilt: float, gravity: float = GRAVITY) -> float:
+    """Return the time (s) from rest at `tilt` (rad) on one corner to standing flat: a quarter period.
+
+    With R the half diagonal, alpha = arctan(width/height) and I = 4 m R^2/3 about the corner, energy gives
+    tilt'^2 = 2 p^2 (cos(alpha - tilt0) - cos(alpha - tilt)), p^2 = 3 g/(4 R). The integral of dtilt/tilt' is
+    taken by Gauss-Legendre quadrature in s with tilt = tilt0 (1 - s^2), which removes the singularity at
+    release; the difference of cosines is written as a product of sines, which keeps its digits. Needs 0 <
+    tilt < alpha.
+    """
+    alpha = atan2(width, height)
+    nodes, weights = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
+    s = 0.5 * (nodes + 1.0)
+    fallen = tilt * s**2
+    drop = 2.0 * np.sin(alpha - tilt + 0.5 * fallen) * np.sin(0.5 * fallen)
+    frequency = sqrt(3.0 * gravity / (4.0 * 0.5 * hypot(width, height)))
+    return float(0.5 * np.sum(weights * 2.0 * tilt * s / np.sqrt(2.0 * drop)) / frequency)
+
+
+def housner_ratio(width: float, height: float) -> float:
+    """Return spin after over spin before a rocking block's impact on its base: 1 - 1.5 sin^2 alpha.
+
+    Angular momentum about the new corner is kept: I w' = (I - 2 m R^2 sin^2 alpha) w with I = 4 m R^2/3.
+    """
+    return 1.0 - 1.5 * sin(toppling_slope(width, height)) ** 2
+
+
+# Solids
+
+
+def rectangle_inertia(mass: float, width: float, height: float) -> float:
+    """Return the moment of inertia (kg m^2) of a uniform rectangle about its centre: m (w^2 + h^2)/12."""
+    return mass * (width**2 + height**2) / 12.0
+
+
+def friction_coefficient(angle: float) -> float:
+    """Return the friction coefficient of a measured friction angle (rad): its tangent."""
+    if not 0.0 <= angle < pi / 2.0:
+        message = f"a friction angle lies between 0 and a right angle, not at {angle} rad"
+        raise ValueError(message)
+    return tan(angle)

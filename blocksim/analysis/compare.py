@@ -1,0 +1,208 @@
+"""Comparison of the final positions of one run with the repeats of an experiment.
+
+The rules, in the order in which they are tried:
+
+* rotation: inside when within 5 degrees of the mean of the repeats;
+* repeats that are all equal (also a single one): inside when within the reading uncertainty of 0.5 mm,
+  because a range of no width only says that the scatter is below what can be read, and a simulated block that
+  stays where it is still settles into its contacts by a fraction of a millimetre;
+* everything else: inside when within [minimum, maximum] of the repeats, ends included. This is the rule of
+  the paper, and such ranges are not widened.
+
+Beside the verdict stand the numbers of a validation in the manner of ASME V&V 20: the error E = S - D, the
+standard uncertainty of the measured mean u_D = sqrt(s^2/n + reading^2), and the half-width of the 95 %
+prediction interval for one more test, t_(n-1, 0.975) s sqrt(1 + 1/n).
+"""
+
+from collections import Counter
+from collections.abc import Hashable
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from math import inf, isfinite, nan, sqrt
+from typing import Any
+
+import pandas as pd
+
+from blocksim.analysis.experiment import QUANTITIES, ExperimentTable
+from blocksim.analysis.student import quantile
+from blocksim.errors import InvalidInputError
+
+ROTATION_TOLERANCE = 5.0  # deg, either side of the measured mean
+READING = 0.5  # mm, uncertainty of one reading of a position
+CONFIDENCE = 0.95
+
+
+class Verdict(StrEnum):
+    """Whether a simulated value agrees with the repeats."""
+
+    INSIDE = "inside"
+    OUTSIDE = "outside"
+    NO_DATA = "no data"
+
+
+@dataclass(frozen=True)
+class ComparisonRow:
+    """One quantity of one block, in `unit` (mm or deg); NaN where there is no such number.
+
+    `minimum` and `maximum` are measured, `lower` and `upper` are the limits judged by (see the module's
+    rules), `error` is simulated - mean, `distance` how far the simulated value lies beyond the nearer limit
+    (0 inside). `u_data` and `prediction` (half-width for one more test) are given for lengths.
+    """
+
+    block: str
+    quantity: str
+    unit: str
+    simulated: float
+    mean: float
+    s: float
+    n: int
+    minimum: float
+    maximum: float
+    lower: float
+    upper: float
+    error: float
+    distance: float
+    u_data: float
+    prediction: float
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All compared quantities of one run; `source` is the measured table, `messages` say what is missing."""
+
+    rows: tuple[ComparisonRow, ...]
+    source: str
+    messages: tuple[str, ...] = ()
+
+    @property
+    def inside(self) -> bool:
+        """Whether every quantity with data is inside; there is always at least one."""
+        return all(row.verdict is not Verdict.OUTSIDE for row in self.rows)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row a quantity, columns as in ComparisonRow."""
+        frame = pd.DataFrame([asdict(row) for row in self.rows])
+        frame["verdict"] = [row.verdict.value for row in self.rows]
+        return frame
+
+    def to_dict(self) -> dict[str, object]:
+        """Return plain values for JSON; a missing number is None."""
+        rows = [{key: _plain(value) for key, value in asdict(row).items()} for row in self.rows]
+        return {
+            "inside": self.inside,
+            "experiment": self.source,
+            "rows": rows,
+            "messages": list(self.messages),
+        }
+
+
+def compare_final(final: pd.DataFrame, table: ExperimentTable) -> Comparison:
+    """Compare a run's final table (`block`, `x_mm`, `rotation_deg`, ...) with the measured repeats.
+
+    Raises InvalidInputError when the final table lacks a measured block or quantity, or names a block twice.
+    A block that was not measured has rows with the verdict "no data" and a message.
+    """
+    simulated = _simulated(final, table)
+    measured = {(row["block"], row["quantity"]): row for row in table.statistics().to_dict(orient="records")}
+    rows = [
+        _row(block, quantity, value, measured.get((block, quantity)))
+        for block, values in simulated.items()
+        for quantity, value in values.items()
+    ]
+    unmeasured = [block for block in simulated if block not in table.blocks]
+    messages = [f"block '{block}' is not in {table.source}, it is not compared" for block in unmeasured]
+    return Comparison(rows=tuple(rows), source=table.source, messages=tuple(messages))
+
+
+def limits(quantity: str, mean: float, minimum: float, maximum: float) -> tuple[float, float]:
+    """Return the lowest and the highest value that count as inside (mm or deg)."""
+    if quantity == "rotation":
+        return mean - ROTATION_TOLERANCE, mean + ROTATION_TOLERANCE
+    if minimum == maximum:
+        return minimum - READING, maximum + READING
+    return minimum, maximum
+
+
+def data_uncertainty(s: float, n: int) -> float:
+    """Return the standard uncertainty u_D of the mean of `n` lengths (mm); NaN for a single one."""
+    return sqrt(s**2 / n + READING**2)
+
+
+def prediction_half_width(s: float, n: int) -> float:
+    """Return half width of the 95 % prediction interval for one more test (unit of `s`); NaN for n = 1."""
+    if n < 2:  # noqa: PLR2004 - no scatter without a second repeat
+        return nan
+    return quantile(0.5 * (1.0 + CONFIDENCE), n - 1) * s * sqrt(1.0 + 1.0 / n)
+
+
+def _simulated(final: pd.DataFrame, table: ExperimentTable) -> dict[str, dict[str, float]]:
+    """Return the measured quantities of the final table by block name, in the run's order."""
+    columns = {quantity: QUANTITIES[quantity].final_column for quantity in table.quantities}
+    missing = [column for column in ["block", *columns.values()] if column not in final.columns]
+    if missing:
+        message = f"the final table has no column {', '.join(missing)}, which {table.source} is compared with"
+        raise InvalidInputError(message)
+    names = [str(name) for name in final["block"]]
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        message = f"the final table has more than one row for block {_quoted(twice)}"
+        raise InvalidInputError(message)
+    absent = [block for block in table.blocks if block not in names]
+    if absent:
+        message = f"{table.source} measures block {_quoted(absent)}, but the run has only {_quoted(names)}"
+        raise InvalidInputError(message)
+    values = {quantity: final[column].astype(float).tolist() for quantity, column in columns.items()}
+    return {name: {quantity: values[quantity][i] for quantity in columns} for i, name in enumerate(names)}
+
+
+def _row(block: str, quantity: str, value: float, measured: dict[Hashable, Any] | None) -> ComparisonRow:
+    """Judge one quantity of one block; `measured` is its row of the statistics, None where there is none."""
+    unit = QUANTITIES[quantity].unit
+    if measured is None:
+        return _row_without_data(block, quantity, value)
+    mean, s, n = float(measured["mean"]), float(measured["s"]), int(measured["n"])
+    minimum, maximum = float(measured["minimum"]), float(measured["maximum"])
+    lower, upper = limits(quantity, mean, minimum, maximum)
+    distance = max(lower - value, value - upper, 0.0) if isfinite(value) else inf
+    return ComparisonRow(
+        block=block,
+        quantity=quantity,
+        unit=unit,
+        simulated=value,
+        mean=mean,
+        s=s,
+        n=n,
+        minimum=minimum,
+        maximum=maximum,
+        lower=lower,
+        upper=upper,
+        error=value - mean,
+        distance=distance,
+        u_data=data_uncertainty(s, n) if unit == "mm" else nan,
+        prediction=prediction_half_width(s, n) if unit == "mm" else nan,
+        verdict=Verdict.INSIDE if distance == 0.0 else Verdict.OUTSIDE,
+    )
+
+
+def _row_without_data(block: str, quantity: str, value: float) -> ComparisonRow:
+    unknown = dict.fromkeys(
+        ("mean", "s", "minimum", "maximum", "lower", "upper", "error", "distance", "u_data", "prediction"),
+        nan,
+    )
+    unit = QUANTITIES[quantity].unit
+    return ComparisonRow(block, quantity, unit, simulated=value, n=0, verdict=Verdict.NO_DATA, **unknown)
+
+
+def _plain(value: object) -> object:
+    """Return what JSON can carry."""
+    if isinstance(value, Verdict):
+        return value.value
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def _quoted(names: list[str]) -> str:
+    """List names for a message, a long list cut short."""
+    most = 8
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(f"'{name}'" for name in names[:most]) + more

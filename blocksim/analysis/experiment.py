@@ -1,0 +1,179 @@
+"""Measured tables: the repeats of a laboratory experiment, as a tidy table and as statistics."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+
+from blocksim.analysis.cells import Cell, Table, raise_problems, read_table, suggestion
+from blocksim.analysis.units import unit_factor
+
+COLUMNS = ("block", "quantity", "unit", "replicate", "value")
+LONGEST_NAME = 100  # characters in a block name
+LARGEST_VALUE = 1e9  # mm or degrees: squares and sums stay far from overflow
+LARGEST_REPLICATE = 1_000_000
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What may be measured of a block: the unit it is kept in and its column in the final table."""
+
+    unit: str
+    final_column: str
+    meaning: str
+
+
+QUANTITIES = {
+    "x": Quantity("mm", "x_mm", "centre along the ground"),
+    "y": Quantity("mm", "y_mm", "centre above the ground"),
+    "rotation": Quantity("deg", "rotation_deg", "angle turned, counter-clockwise positive"),
+    "left": Quantity("mm", "left_mm", "leftmost point"),
+    "right": Quantity("mm", "right_mm", "rightmost point"),
+}
+
+
+class Measurement(NamedTuple):
+    """One row of a table: `value` in mm or degrees, as `unit` says."""
+
+    block: str
+    quantity: str
+    unit: str
+    replicate: int
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class ExperimentTable:
+    """The measured repeats of one experiment.
+
+    `data` is long: block (str), quantity (key of QUANTITIES), unit (mm or deg), replicate (int), value
+    (float), one row a measurement in the file's order. `source` is the path as it was given, `notes` the
+    comment lines.
+    """
+
+    data: pd.DataFrame
+    source: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def blocks(self) -> tuple[str, ...]:
+        """The measured blocks, in order of first appearance."""
+        return tuple(str(name) for name in self.data["block"].unique())
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The measured quantities, in order of first appearance."""
+        return tuple(str(name) for name in self.data["quantity"].unique())
+
+    @property
+    def replicates(self) -> tuple[int, ...]:
+        """The numbers of the repeats, ascending; a block need not appear in all of them."""
+        return tuple(sorted(int(number) for number in self.data["replicate"].unique()))
+
+    def values(self, block: str, quantity: str) -> pd.Series:
+        """Return the repeats (mm or deg) of one quantity of one block by replicate; empty if unmeasured."""
+        chosen = self.data[(self.data["block"] == block) & (self.data["quantity"] == quantity)]
+        return chosen.set_index("replicate")["value"].sort_index()
+
+    def statistics(self) -> pd.DataFrame:
+        """Return block, quantity, unit, mean, s, n, minimum, maximum; pairs in order of first appearance.
+
+        `s` is the sample standard deviation (divisor n - 1), NaN for a single repeat.
+        """
+        grouped = self.data.groupby(["block", "quantity", "unit"], sort=False)["value"]
+        return grouped.agg(mean="mean", s="std", n="count", minimum="min", maximum="max").reset_index()
+
+
+def load_table(path: Path | str) -> ExperimentTable:
+    """Read a measured table (`block,quantity,unit,replicate,value`, `#` starts a comment line).
+
+    Lengths are converted to mm and angles to degrees. Raises InputMissingError when the file cannot be read
+    and InvalidInputError with every mistake, located by line and column.
+    """
+    table = read_table(Path(path), COLUMNS)
+    measurements = []
+    first_lines: dict[tuple[str, str, int], int] = {}
+    for row in table.rows:
+        measurement = _measurement(row, table)
+        if measurement is not None:
+            _note_repetition(measurement, row["replicate"], first_lines, table)
+            measurements.append(measurement)
+    if not table.rows and not table.problems:
+        table.problems.append(table.header.problem("the table has a header and no rows"))
+    if table.problems:
+        raise_problems(table.problems)
+    return ExperimentTable(data=pd.DataFrame(measurements), source=str(path), notes=table.notes)
+
+
+def _measurement(row: dict[str, Cell], table: Table) -> Measurement | None:
+    """Check one row; None after noting its problems."""
+    before = len(table.problems)
+    name = row["quantity"].text
+    quantity = QUANTITIES.get(name)
+    _check_name(row["block"], table)
+    if quantity is None:
+        complaint = f"unknown quantity '{name}', {suggestion(name, tuple(QUANTITIES))}"
+        table.problems.append(row["quantity"].problem(complaint))
+    replicate = _replicate(row["replicate"], table)
+    factor = 1.0 if quantity is None else _factor(row["unit"], quantity, table)
+    value = _value(row["value"], factor, table)
+    if quantity is None or len(table.problems) > before:
+        return None
+    return Measurement(row["block"].text, name, quantity.unit, replicate, value)
+
+
+def _note_repetition(
+    measurement: Measurement, cell: Cell, first_lines: dict[tuple[str, str, int], int], table: Table
+) -> None:
+    """Note a problem when the same repeat of the same quantity was read before."""
+    key = (measurement.block, measurement.quantity, measurement.replicate)
+    first = first_lines.setdefault(key, cell.line.number)
+    if first != cell.line.number:
+        what = f"block '{key[0]}', {key[1]}, replicate {key[2]}"
+        table.problems.append(cell.problem(f"{what} is already given in line {first}"))
+
+
+def _check_name(cell: Cell, table: Table) -> None:
+    if not cell.text:
+        table.problems.append(cell.problem("the block has no name"))
+    elif len(cell.text) > LONGEST_NAME:
+        table.problems.append(
+            cell.problem(f"the name has {len(cell.text)} characters, at most {LONGEST_NAME}")
+        )
+
+
+def _replicate(cell: Cell, table: Table) -> int:
+    """Return the number of the repeat; 0 after noting a problem."""
+    is_number = cell.text.isascii() and cell.text.isdigit() and len(cell.text) <= len(str(LARGEST_REPLICATE))
+    if is_number and 1 <= int(cell.text) <= LARGEST_REPLICATE:
+        return int(cell.text)
+    table.problems.append(
+        cell.problem(f"'{cell.text}' is not the number of a repeat, count them 1, 2, 3, ...")
+    )
+    return 0
+
+
+def _factor(cell: Cell, quantity: Quantity, table: Table) -> float:
+    """Return the factor to mm or deg; 1 after noting a problem."""
+    factor = unit_factor(cell.text, quantity.unit)
+    if factor is not None:
+        return factor
+    kind, allowed = ("an angle", "deg or rad") if quantity.unit == "deg" else ("a length", "mm, cm or m")
+    found = f"'{cell.text}' is not the unit of {kind}" if cell.text else "no unit"
+    table.problems.append(cell.problem(f"{found}, write {allowed}"))
+    return 1.0
+
+
+def _value(cell: Cell, factor: float, table: Table) -> float:
+    """Return the value in mm or deg; 0 after noting a problem."""
+    try:
+        value = cell.number() * factor
+    except ValueError as error:
+        table.problems.append(cell.problem(str(error)))
+        return 0.0
+    if abs(value) > LARGEST_VALUE:
+        table.problems.append(
+            cell.problem(f"'{cell.text}' is too large, at most {LARGEST_VALUE:g} mm or degrees")
+        )
+    return value

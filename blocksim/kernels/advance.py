@@ -1,0 +1,101 @@
+"""The time loop between two outputs, in one compiled call."""
+
+import math
+
+from blocksim.kernels.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL, REACHED, Records, World
+from blocksim.kernels.broad_phase import rebuild_pairs
+from blocksim.kernels.contact import pair_forces, release_pair
+from blocksim.kernels.energy import contact_summary
+from blocksim.kernels.integrate import accelerate_and_kick, kick_and_drift, kinetic_energy, renew_rotations
+from blocksim.kernels.jit import kernel
+from blocksim.kernels.surface import block_points, ground_points
+
+
+@kernel
+def contact_points(world: World, p: int) -> int:
+    """Find the contact points of pair p and return how many there are."""
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    if pair.b == world.bodies.size - 1:
+        return ground_points(a, pair.corners, world.candidates[p], world.points)
+    b = world.bodies[pair.b]
+    return block_points(a, b, pair.corners, world.candidates[p], world.slots[p], world.points)
+
+
+@kernel
+def contact_forces(world: World, step: float) -> None:
+    """Evaluate all contacts at the present positions and kick all bodies for the second half of the step.
+
+    `step` is the length (s) of the drift that led here, zero before the first step.
+    """
+    for p in range(world.clock[0].pair_count):
+        count = contact_points(world, p)
+        if count > 0:
+            pair_forces(world, p, count, step)
+        elif world.pairs[p].active > 0:
+            release_pair(world, p)
+    accelerate_and_kick(world.bodies, world.controls[0], step)
+
+
+@kernel
+def fastest_point(bodies: Records) -> float:
+    """Return an upper bound (m/s) of the speed of any point of any body; infinite when a state is not finite."""
+    fastest = 0.0
+    for i in range(bodies.size - 1):
+        body = bodies[i]
+        speed = math.sqrt(body.vx**2 + body.vy**2) + body.radius * abs(body.spin)
+        if not math.isfinite(speed + body.x + body.y + body.angle):
+            return math.inf
+        fastest = max(fastest, speed)
+    return fastest
+
+
+@kernel
+def check(world: World) -> int:
+    """Look whether the run may go on: finite, overlap below its limit, not at rest for the hold time."""
+    controls = world.controls[0]
+    clock = world.clock[0]
+    ledger = world.ledger[0]
+    renew_rotations(world.bodies)
+    ledger.largest_kinetic = max(ledger.largest_kinetic, kinetic_energy(world))
+    fastest = fastest_point(world.bodies)
+    if math.isinf(fastest):
+        return NOT_FINITE
+    if contact_summary(world)[3] > controls.max_overlap:
+        return OVERLAP_LIMIT
+    clock.checks_at_rest = clock.checks_at_rest + 1 if fastest < controls.rest_speed else 0
+    return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
+
+
+@kernel
+def prepare(world: World) -> int:
+    """Make the first pair list and the first accelerations; needed once before the first step."""
+    if not rebuild_pairs(world):
+        return PAIRS_FULL
+    contact_forces(world, 0.0)
+    world.ledger[0].largest_kinetic = kinetic_energy(world)
+    return REACHED
+
+
+@kernel
+def advance(world: World, last_step: int) -> int:
+    """Step until `last_step` or until something ends the run; return one of the status codes of arrays.py.
+
+    Checks fall on fixed step numbers and `pairs_due` is part of the state, so the bits of a run do not depend on where
+    outputs interrupt it. PAIRS_FULL returns before anything has moved: give the lists more room and call again.
+    """
+    controls = world.controls[0]
+    clock = world.clock[0]
+    next_check = (clock.steps // controls.check_every + 1) * controls.check_every
+    while clock.steps < last_step:
+        if clock.pairs_due and not rebuild_pairs(world):
+            return PAIRS_FULL
+        clock.pairs_due = kick_and_drift(world.bodies, controls, world.ledger[0])
+        contact_forces(world, controls.step)
+        clock.steps += 1
+        if clock.steps == next_check:
+            next_check += controls.check_every
+            status = check(world)
+            if status != REACHED:
+                return status
+    return REACHED

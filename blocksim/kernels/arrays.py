@@ -1,0 +1,107 @@
+"""The arrays that the kernels read and write, with unit and sign of every field. Written once, here.
+
+SI units; angles in radians, counter-clockwise positive. `x` runs along the ground and `y` away from it: the ground
+is the half-plane y < 0, and a tilted ground is tilted gravity. Everything is an array of records (one body, pair or
+contact slot lies together in memory, and a compiled function that takes a record takes one pointer).
+
+`n` bodies plus one record for the ground, the last: it never moves and has no inverse mass. `p` candidate pairs
+(capacity) with 8 contact slots each: slots 0-3 are the corners of body `a` against body `b`, slots 4-7 the corners of
+`b` against `a`. Corners count counter-clockwise from the lower left one of the unrotated rectangle; faces are 0: +x,
+1: +y, 2: -x, 3: -y of the body that is touched. The contact normal always points from `b` to `a` and the tangent is the
+normal turned by +90 degrees, whichever of the two owns the corner.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Records = np.recarray[Any, np.dtype[np.record]]
+Record = Any  # one element of Records: a pointer in compiled code, numpy.record without the compiler
+
+SLOTS = 8
+NO_FACE = -1
+
+# status codes that `advance` returns
+REACHED, AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL = range(5)
+
+
+def record_type(floats: str, integers: str = "") -> np.dtype[np.void]:
+    """Return a dtype of 8-byte fields from space-separated names."""
+    fields = [(name, np.float64) for name in floats.split()] + [(name, np.int64) for name in integers.split()]
+    return np.dtype(fields, align=True)
+
+
+BODY = record_type(
+    "x y angle "  # m, m, rad: centre and total turned angle of the body axes, never wrapped
+    "cos sin "  # of angle, advanced beside it and renewed at fixed steps
+    "vx vy spin "  # m/s, m/s, rad/s
+    "ax ay spin_rate "  # m/s2, m/s2, rad/s2: of the last force evaluation
+    "fx fy torque "  # N, N, N m: contact totals of the evaluation under way
+    "half_x half_y radius "  # m: half sides along the body's own axes, half diagonal
+    "inverse_mass inverse_inertia "  # 1/kg, 1/(kg m2): zero for fixed bodies and the ground
+    "mass inertia "  # kg, kg m2 about the centre, out of the plane: kept for fixed bodies too
+    "list_x list_y list_angle",  # m, m, rad: where the body was when the pair list was made
+    "contact_class",  # index into the interaction table; class 0 is the ground
+)
+PAIR = record_type("", "a b corners active")  # bodies, sorted; number of candidate corners; of slots in contact
+SLOT = record_type(
+    "spring depth "  # m: shear spring, overlap
+    "normal_force shear_force "  # N: pushing apart, resisting slip
+    "normal_loss shear_loss",  # N: what of them is not spring force (dashpot, and what clipping took)
+    "face",  # touched face, NO_FACE without contact
+)
+INTERACTION = record_type(
+    "normal_stiffness shear_stiffness "  # N/m of one contact point
+    "normal_damping shear_damping "  # damping ratios
+    "static_friction kinetic_friction transition_speed"  # -, -, m/s
+)
+POINT = record_type(
+    "x y nx ny depth "  # m: contact point; normal; m: overlap
+    "normal_arm_a normal_arm_b shear_arm_a shear_arm_b "  # m: lever arms of normal and tangent about both bodies
+    "closing slipping "  # m: relative displacement of the last drift, against the normal and along the tangent
+    "closing_rate slip_rate "  # m/s: the same as rates at the end of the drift, predicted
+    "weight drawn "  # first steps of a contact: weight of the dashpot, share of the drift that draws the shear spring
+    "stiffness rate before force "  # N/m, m/s, N, N: of the pass under way; force of the step before; force now
+    "spring_force normal_force limit free_rate",  # N: normal spring; N: normal total; N, N: Coulomb limit; m/s: rate without this step's change of the pair's own forces
+    "slot face",
+)
+OPERATOR = record_type(
+    "e_one e_mixed e_two "  # N s/m: dashpot force of points one and two per free rate of each
+    "h_one h_mixed h_two",  # m/(s N): half a step times the inverse masses, change of rate per change of force
+    "left pattern",  # steps until it is made anew; bits of the points that have a dashpot
+)
+NORMAL, SHEAR = 0, 1
+CONTROLS = record_type(
+    "step gravity_x gravity_y "  # s, m/s2
+    "skin max_overlap rest_speed",  # m: reach of the pair list beyond contact; m; m/s
+    "law check_every rest_checks",  # law code; steps between checks; checks in a row that must find rest (0: never)
+)
+CLOCK = record_type("", "steps checks_at_rest pair_count rebuilds pairs_due")  # pairs_due: 1 when the list is stale
+LEDGER = record_type("dashpot friction broken travel_work largest_kinetic")  # J
+
+
+class World(NamedTuple):
+    """Everything `advance` needs; everything that changes during a run is in here."""
+
+    bodies: Records  # (n + 1,) BODY, the ground last
+    pairs: Records  # (p,) PAIR
+    slots: Records  # (p, 8) SLOT
+    candidates: Integers  # (p, 8) slots whose corners lie within the skin of the other body, sorted, `corners` of them
+    operators: Records  # (p, 2) OPERATOR, dashpots along the normals and the tangents
+    spare_pairs: Records  # (p,) PAIR, the list being built
+    spare_slots: Records  # (p, 8) SLOT
+    spare_candidates: Integers  # (p, 8)
+    interactions: Records  # (c, c) INTERACTION
+    points: Records  # (8,) POINT, work space of one pair
+    matrices: Floats  # (4, 8, 8) work space of one pair
+    controls: Records  # (1,) CONTROLS
+    clock: Records  # (1,) CLOCK
+    ledger: Records  # (1,) LEDGER
+
+
+def zeros(shape: int | tuple[int, ...], dtype: np.dtype[np.void]) -> Records:
+    """Return an array of zeroed records."""
+    return np.zeros(shape, dtype=dtype).view(np.recarray)

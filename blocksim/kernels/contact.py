@@ -1,0 +1,218 @@
+"""Forces at the contact points of one pair: springs, dashpots, clipping, friction with history, energy booking.
+
+The normal pass comes first, the tangential pass uses its forces for the Coulomb limit. Losses are booked where the
+forces are applied, by the trapezoid rule over the drift between two evaluations, which is exactly the work that the
+kicks do.
+"""
+
+import math
+
+from blocksim.kernels.arrays import NO_FACE, NORMAL, SHEAR, SLOTS, Record, Records, World
+from blocksim.kernels.broad_phase import clear_slot
+from blocksim.kernels.damping import add_dashpots
+from blocksim.kernels.friction import coulomb_limit
+from blocksim.kernels.jit import kernel
+from blocksim.kernels.kinematics import DELASSUS, normal_masses, resolve_point, shear_masses, weigh_first_step
+from blocksim.kernels.laws import elastic_force, tangent_stiffness
+
+
+@kernel
+def release_slot(slot: Record, ledger: Record, shear_stiffness: float) -> None:
+    """End the contact of one slot: book what its springs still hold and clear its history."""
+    ledger.broken += 0.5 * shear_stiffness * slot.spring * slot.spring
+    # last half of the trapezoid of the dashpot work, on the way from the last overlap to zero
+    ledger.dashpot -= 0.5 * slot.normal_loss * slot.depth
+    clear_slot(slot)
+
+
+@kernel
+def release_ended(slots: Records, points: Records, count: int, ledger: Record, shear_stiffness: float) -> None:
+    """Release the slots of a pair whose corner is no longer in contact or touches another face than before."""
+    for k in range(SLOTS):
+        slot = slots[k]
+        if slot.face != NO_FACE:
+            stays = False
+            for i in range(count):
+                if points[i].slot == k and points[i].face == slot.face:
+                    stays = True
+            if not stays:
+                release_slot(slot, ledger, shear_stiffness)
+
+
+@kernel
+def push_spring(point: Record, slot: Record, law: int, stiffness: float) -> None:
+    """Set the normal spring force of a point and what its dashpot needs."""
+    point.before = slot.normal_force
+    point.rate = point.closing_rate
+    point.stiffness = tangent_stiffness(law, stiffness, point.depth)
+    point.force = elastic_force(law, stiffness, point.depth)
+    point.spring_force = point.force
+
+
+@kernel
+def clip_tension(point: Record, slot: Record) -> float:
+    """Contacts do not pull. Return the energy (J) that dashpot and clipping have taken during the last drift."""
+    force = max(point.force, 0.0)
+    loss = force - point.spring_force
+    dissipated = 0.5 * (slot.normal_loss + loss) * point.closing
+    point.normal_force = force
+    slot.normal_force = force
+    slot.normal_loss = loss
+    slot.depth = point.depth
+    return dissipated
+
+
+@kernel
+def draw_spring(point: Record, slot: Record, values: Record) -> float:
+    """Stretch the shear spring by the last drift; the point slides where the spring alone exceeds the Coulomb limit.
+
+    A sliding point gets no dashpot: its stiffness is set to zero. Return the energy (J) lost to friction.
+    """
+    stiffness = values.shear_stiffness
+    old = slot.spring
+    spring = old + point.slipping * point.drawn
+    point.limit = coulomb_limit(values, point.normal_force, point.slip_rate, stiffness * abs(spring))
+    point.stiffness = stiffness
+    if stiffness * abs(spring) > point.limit:
+        spring = math.copysign(point.limit / stiffness, spring)
+        point.stiffness = 0.0
+    slot.spring = spring
+    point.before = slot.shear_force
+    point.rate = point.slip_rate
+    point.force = stiffness * spring
+    return 0.5 * stiffness * (old + spring) * (point.slipping - (spring - old))
+
+
+@kernel
+def clip_to_cone(point: Record, slot: Record, values: Record) -> float:
+    """Clip spring and dashpot together to the Coulomb cone. Return the energy (J) lost to what is not spring force."""
+    force = point.force
+    if abs(force) > point.limit:
+        limit = coulomb_limit(values, point.normal_force, point.slip_rate, abs(force))
+        force = min(max(force, -limit), limit)
+    loss = force - values.shear_stiffness * slot.spring
+    dissipated = 0.5 * (slot.shear_loss + loss) * point.slipping
+    point.force = force
+    slot.shear_force = force
+    slot.shear_loss = loss
+    return dissipated
+
+
+@kernel
+def start_contacts(world: World, p: int, count: int, shear_stiffness: float) -> None:
+    """The set of contacts has changed: release what ended, weigh first steps, make the operators anew."""
+    slots = world.slots[p]
+    release_ended(slots, world.points, count, world.ledger[0], shear_stiffness)
+    for i in range(count):
+        point = world.points[i]
+        slot = slots[point.slot]
+        if slot.face == NO_FACE:
+            slot.face = point.face
+            point.before = 0.0
+            weigh_first_step(point)
+    world.operators[p, NORMAL].left = 0
+    world.operators[p, SHEAR].left = 0
+    world.pairs[p].active = count
+
+
+@kernel
+def normal_pass(world: World, p: int, count: int, a: Record, b: Record, values: Record, step: float) -> None:
+    """Kinematics, then springs and dashpots along the normals."""
+    points = world.points
+    law = world.controls[0].law
+    continuing = 0
+    for i in range(count):
+        point = points[i]
+        slot = world.slots[p, point.slot]
+        resolve_point(point, a, b, step)
+        push_spring(point, slot, law, values.normal_stiffness)
+        continuing += 1 if slot.face == point.face else 0
+    if continuing != count or count != world.pairs[p].active:
+        start_contacts(world, p, count, values.shear_stiffness)
+    if values.normal_damping > 0.0:
+        operator = world.operators[p, NORMAL]
+        if operator.left == 0:
+            normal_masses(points, count, a, b, world.matrices[DELASSUS])
+        pattern = (1 << count) - 1
+        add_dashpots(points, count, pattern, values.normal_damping, step, operator, world.matrices)
+
+
+@kernel
+def shear_pass(world: World, p: int, count: int, a: Record, b: Record, values: Record, step: float) -> None:
+    """Clip the normal forces; springs with history along the tangents and dashpots where a point sticks."""
+    points = world.points
+    ledger = world.ledger[0]
+    sticking = 0
+    dashpot_work = 0.0
+    friction_work = 0.0
+    for i in range(count):
+        point = points[i]
+        slot = world.slots[p, point.slot]
+        dashpot_work += clip_tension(point, slot)
+        friction_work += draw_spring(point, slot, values)
+        sticking += 1 << i if point.stiffness > 0.0 else 0
+    ledger.dashpot += dashpot_work
+    ledger.friction += friction_work
+    if sticking > 0 and values.shear_damping > 0.0:
+        operator = world.operators[p, SHEAR]
+        if operator.pattern != sticking:
+            operator.left = 0
+        if operator.left == 0:
+            shear_masses(points, count, a, b, world.matrices[DELASSUS])
+        add_dashpots(points, count, sticking, values.shear_damping, step, operator, world.matrices)
+
+
+@kernel
+def force_pass(world: World, p: int, count: int, a: Record, b: Record, values: Record) -> None:
+    """Clip the shear forces and add all forces of the pair to the totals of both bodies.
+
+    `force` is the resistance to slip of a ahead of b, along the tangent (-ny, nx).
+    """
+    fx = 0.0
+    fy = 0.0
+    torque_a = 0.0
+    torque_b = 0.0
+    dashpot_work = 0.0
+    for i in range(count):
+        point = world.points[i]
+        dashpot_work += clip_to_cone(point, world.slots[p, point.slot], values)
+        fx += point.nx * point.normal_force + point.ny * point.force
+        fy += point.ny * point.normal_force - point.nx * point.force
+        torque_a += point.normal_arm_a * point.normal_force - point.shear_arm_a * point.force
+        torque_b += point.normal_arm_b * point.normal_force - point.shear_arm_b * point.force
+    world.ledger[0].dashpot += dashpot_work
+    a.fx += fx
+    a.fy += fy
+    a.torque += torque_a
+    b.fx -= fx
+    b.fy -= fy
+    b.torque -= torque_b
+
+
+@kernel
+def pair_forces(world: World, p: int, count: int, step: float) -> None:
+    """Add the forces of the `count` contact points found for pair p to the totals of its bodies.
+
+    `step` is the length (s) of the drift that led here, zero for a first evaluation before any motion.
+    """
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    values = world.interactions[a.contact_class, b.contact_class]
+    normal_pass(world, p, count, a, b, values, step)
+    shear_pass(world, p, count, a, b, values, step)
+    force_pass(world, p, count, a, b, values)
+
+
+@kernel
+def release_pair(world: World, p: int) -> None:
+    """End all contacts of a pair."""
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    values = world.interactions[a.contact_class, b.contact_class]
+    for k in range(SLOTS):
+        slot = world.slots[p, k]
+        if slot.face != NO_FACE:
+            release_slot(slot, world.ledger[0], values.shear_stiffness)
+    pair.active = 0

@@ -1,0 +1,69 @@
+"""Rectangles seen from one another: rotation, separation, corners."""
+
+import math
+
+from blocksim.kernels.arrays import Record
+from blocksim.kernels.jit import kernel
+
+SMALL_TURN = 0.05
+
+
+@kernel
+def turn(cos: float, sin: float, angle: float) -> tuple[float, float]:
+    """Return (cos, sin) rotated by `angle` (rad) and set back to unit length.
+
+    Small angles use the power series to the seventh order (remainder below 1e-14 at 0.05 rad), which costs a tenth
+    of the library functions; the length is corrected by one Newton step of 1/sqrt.
+    """
+    if abs(angle) < SMALL_TURN:
+        square = angle * angle
+        cos_turn = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)))
+        sin_turn = angle * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0))))
+    else:
+        cos_turn = math.cos(angle)
+        sin_turn = math.sin(angle)
+    new_cos = cos * cos_turn - sin * sin_turn
+    new_sin = sin * cos_turn + cos * sin_turn
+    scale = 1.5 - 0.5 * (new_cos * new_cos + new_sin * new_sin)
+    return new_cos * scale, new_sin * scale
+
+
+@kernel
+def relative_pose(body: Record, other: Record) -> tuple[float, float, float, float]:
+    """Return the centre of `body` and the cosine and sine of its rotation, all in the frame of `other`."""
+    dx = body.x - other.x
+    dy = body.y - other.y
+    return (
+        other.cos * dx + other.sin * dy,
+        other.cos * dy - other.sin * dx,
+        body.cos * other.cos + body.sin * other.sin,
+        body.sin * other.cos - body.cos * other.sin,
+    )
+
+
+@kernel
+def separation(body: Record, other: Record) -> float:
+    """Return the largest gap (m) between two rectangles along their four face normals; negative when they overlap.
+
+    Separating axis theorem: never more than the distance between the rectangles.
+    """
+    px, py, c, s = relative_pose(body, other)
+    c_abs = abs(c)
+    s_abs = abs(s)
+    gap_x = abs(px) - other.half_x - c_abs * body.half_x - s_abs * body.half_y
+    gap_y = abs(py) - other.half_y - s_abs * body.half_x - c_abs * body.half_y
+    gap_u = abs(c * px + s * py) - body.half_x - c_abs * other.half_x - s_abs * other.half_y
+    gap_v = abs(c * py - s * px) - body.half_y - s_abs * other.half_x - c_abs * other.half_y
+    return max(max(gap_x, gap_y), max(gap_u, gap_v))
+
+
+@kernel
+def ground_gap(body: Record) -> float:
+    """Return the height (m) of the lowest corner of a body over the ground."""
+    return body.y - abs(body.sin) * body.half_x - abs(body.cos) * body.half_y
+
+
+@kernel
+def to_world(body: Record, px: float, py: float) -> tuple[float, float]:
+    """Return the world position of a point given in the frame of a body."""
+    return body.x + body.cos * px - body.sin * py, body.y + body.sin * px + body.cos * py

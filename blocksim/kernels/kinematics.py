@@ -1,0 +1,79 @@
+"""Rates, displacements and inverse masses at the contact points of one pair, along the normals or the tangents."""
+
+from blocksim.kernels.arrays import Floats, Record, Records
+from blocksim.kernels.jit import kernel
+
+DELASSUS = 0  # index into the work matrices
+
+
+@kernel
+def resolve_point(point: Record, a: Record, b: Record, step: float) -> None:
+    """Fill lever arms, displacements of the last drift and rates at its end of one point; full weights.
+
+    Velocities are those of the last drift; the rates at its end are predicted with the last accelerations. Closing
+    counts positive against the normal, slip positive when a moves ahead of b along the tangent (-ny, nx).
+    """
+    half = 0.5 * step
+    nx = point.nx
+    ny = point.ny
+    rxa = point.x - a.x
+    rya = point.y - a.y
+    rxb = point.x - b.x
+    ryb = point.y - b.y
+    ux = a.vx - b.vx - rya * a.spin + ryb * b.spin
+    uy = a.vy - b.vy + rxa * a.spin - rxb * b.spin
+    cx = ux + half * (a.ax - b.ax - rya * a.spin_rate + ryb * b.spin_rate)
+    cy = uy + half * (a.ay - b.ay + rxa * a.spin_rate - rxb * b.spin_rate)
+    point.normal_arm_a = rxa * ny - rya * nx
+    point.normal_arm_b = rxb * ny - ryb * nx
+    point.shear_arm_a = rxa * nx + rya * ny
+    point.shear_arm_b = rxb * nx + ryb * ny
+    point.closing = -step * (nx * ux + ny * uy)
+    point.slipping = step * (nx * uy - ny * ux)
+    point.closing_rate = -(nx * cx + ny * cy)
+    point.slip_rate = nx * cy - ny * cx
+    point.weight = 1.0
+    point.drawn = 1.0
+
+
+@kernel
+def weigh_first_step(point: Record) -> None:
+    """Set the dashpot weight and the drawn share of the shear spring of a point that was not in contact before.
+
+    The kick at time t covers [t - dt/2, t + dt/2]. A contact with overlap d = theta v dt began at t - theta dt, so the
+    share of the kick spent in contact is 1/2 + theta (more than one where the kick before missed its beginning), and
+    the last drift drew the shear spring for theta dt only. A contact that comes deeper than it closed was there before
+    under another corner: it keeps the full weight.
+    """
+    if point.closing >= point.depth:
+        share = point.depth / point.closing
+        point.weight = 0.5 + share
+        point.drawn = share
+
+
+@kernel
+def normal_masses(points: Records, count: int, a: Record, b: Record, out: Floats) -> None:
+    """Write the inverse masses (1/kg) J M^-1 J^T that the points see of one another along their normals."""
+    inverse_mass = a.inverse_mass + b.inverse_mass
+    for i in range(count):
+        one = points[i]
+        for j in range(i + 1):
+            two = points[j]
+            translation = (one.nx * two.nx + one.ny * two.ny) * inverse_mass
+            rotation_a = one.normal_arm_a * two.normal_arm_a * a.inverse_inertia
+            out[i, j] = translation + rotation_a + one.normal_arm_b * two.normal_arm_b * b.inverse_inertia
+            out[j, i] = out[i, j]
+
+
+@kernel
+def shear_masses(points: Records, count: int, a: Record, b: Record, out: Floats) -> None:
+    """Write the inverse masses (1/kg) that the points see along their tangents, which enclose the normals' angles."""
+    inverse_mass = a.inverse_mass + b.inverse_mass
+    for i in range(count):
+        one = points[i]
+        for j in range(i + 1):
+            two = points[j]
+            translation = (one.nx * two.nx + one.ny * two.ny) * inverse_mass
+            rotation_a = one.shear_arm_a * two.shear_arm_a * a.inverse_inertia
+            out[i, j] = translation + rotation_a + one.shear_arm_b * two.shear_arm_b * b.inverse_inertia
+            out[j, i] = out[i, j]

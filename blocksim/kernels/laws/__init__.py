@@ -1,0 +1,30 @@
+"""Contact laws and the one place that knows them all.
+
+A law is one file with `elastic_force(stiffness, depth)` and `tangent_stiffness(stiffness, depth)` and
+`stored_energy(stiffness, depth)`, one code here and one line in each dispatcher below. Dispatch on an integer code
+keeps numba's disk cache valid, which jitted functions passed as arguments do not.
+"""
+
+from blocksim.kernels.jit import kernel
+from blocksim.kernels.laws import linear
+
+LINEAR = 0
+LAW_CODES = {"linear": LINEAR}
+
+
+@kernel
+def elastic_force(law: int, stiffness: float, depth: float) -> float:
+    """Return the normal spring force (N) at an overlap (m)."""
+    return linear.elastic_force(stiffness, depth)
+
+
+@kernel
+def tangent_stiffness(law: int, stiffness: float, depth: float) -> float:
+    """Return the slope of the normal spring force (N/m) at an overlap (m)."""
+    return linear.tangent_stiffness(stiffness, depth)
+
+
+@kernel
+def stored_energy(law: int, stiffness: float, depth: float) -> float:
+    """Return the energy (J) stored in the normal spring at an overlap (m)."""
+    return linear.stored_energy(stiffness, depth)

@@ -1,0 +1,191 @@
+"""Narrow phase of the `surface` model: corners of one body against the exact rectangle of another, or the ground."""
+
+from blocksim.kernels.arrays import NO_FACE, SLOTS, Integers, Record, Records
+from blocksim.kernels.geometry import relative_pose, to_world
+from blocksim.kernels.jit import kernel
+
+# A corner can touch a face only where the face normal, reversed, lies between the outward normals of the two sides
+# that meet in the corner (the vertex-face pairs of the Minkowski difference of two convex bodies). The tolerance
+# (sine of an angle) lets both ends of a nearly parallel face contact count. Without this rule the corner of an
+# aligned stack, which lies nearer to the side of the block below than to its top, would touch the wrong face.
+CONE_TOLERANCE = 0.2
+
+PARALLEL = 0.9
+
+
+@kernel
+def face_below_corner(
+    px: float, py: float, touched: Record, sx: float, sy: float, c: float, s: float
+) -> tuple[int, float]:
+    """Return the face (or NO_FACE) that a corner touches and its overlap (m).
+
+    (px, py) is the corner in the frame of the touched rectangle, (sx, sy) = +-1 says which corner of its owner it
+    is, (c, s) the rotation of the owner against the touched rectangle. Of the admissible faces the nearest counts.
+    """
+    face = NO_FACE
+    depth = 0.0
+    side = 1.0 if px >= 0.0 else -1.0
+    if -sx * side * c >= -CONE_TOLERANCE and sy * side * s >= -CONE_TOLERANCE:
+        face = 0 if side > 0.0 else 2
+        depth = touched.half_x - abs(px)
+    side = 1.0 if py >= 0.0 else -1.0
+    if -sx * side * s >= -CONE_TOLERANCE and -sy * side * c >= -CONE_TOLERANCE:
+        if face == NO_FACE or touched.half_y - abs(py) < depth:
+            face = 1 if side > 0.0 else 3
+            depth = touched.half_y - abs(py)
+    return face, depth
+
+
+@kernel
+def face_normal(face: int, body: Record) -> tuple[float, float]:
+    """Return the outward normal of a face of a body, in world axes."""
+    if face == 0:
+        return body.cos, body.sin
+    if face == 1:
+        return -body.sin, body.cos
+    if face == 2:
+        return -body.cos, -body.sin
+    return body.sin, -body.cos
+
+
+@kernel
+def corner_signs(corner: int) -> tuple[float, float]:
+    """Return +-1 for the side of a body that a corner lies on, along its own x and y."""
+    return 1.0 if corner == 1 or corner == 2 else -1.0, 1.0 if corner >= 2 else -1.0
+
+
+@kernel
+def add_corner(
+    owner: Record, touched: Record, corner: int, x0: float, y0: float, c: float, s: float, points: Records, count: int
+) -> int:
+    """Append a corner of `owner` if it lies inside `touched`; return the new point count.
+
+    (x0, y0, c, s) is the pose of the owner in the frame of the touched body. The normal points out of `touched`.
+    """
+    sx, sy = corner_signs(corner)
+    px = x0 + sx * c * owner.half_x - sy * s * owner.half_y
+    py = y0 + sx * s * owner.half_x + sy * c * owner.half_y
+    if abs(px) > touched.half_x or abs(py) > touched.half_y:
+        return count
+    face, depth = face_below_corner(px, py, touched, sx, sy, c, s)
+    if depth <= 0.0:
+        return count
+    point = points[count]
+    point.slot = corner
+    point.face = face
+    point.x, point.y = to_world(touched, px, py)
+    point.nx, point.ny = face_normal(face, touched)
+    point.depth = depth
+    return count + 1
+
+
+@kernel
+def ground_points(owner: Record, corners: int, candidates: Integers, points: Records) -> int:
+    """Collect the candidate corners of `owner` below y = 0. Return how many there are."""
+    count = 0
+    for m in range(corners):
+        sx, sy = corner_signs(candidates[m])
+        x, y = to_world(owner, sx * owner.half_x, sy * owner.half_y)
+        if y < 0.0:
+            point = points[count]
+            point.slot = candidates[m]
+            point.face = 1
+            point.x = x
+            point.y = y
+            point.nx = 0.0
+            point.ny = 1.0
+            point.depth = -y
+            count += 1
+    return count
+
+
+@kernel
+def lies_near(owner: Record, touched: Record, corner: int, reach: float) -> bool:
+    """Tell whether a corner of `owner` lies inside `touched` grown by `reach` (m) on every side."""
+    x0, y0, c, s = relative_pose(owner, touched)
+    sx, sy = corner_signs(corner)
+    px = x0 + sx * c * owner.half_x - sy * s * owner.half_y
+    py = y0 + sx * s * owner.half_x + sy * c * owner.half_y
+    return abs(px) <= touched.half_x + reach and abs(py) <= touched.half_y + reach
+
+
+@kernel
+def outward_along(body: Record, corner: int, tx: float, ty: float) -> float:
+    """Return the component along (tx, ty) of the way (m) from the centre of a body to one of its corners."""
+    sx, sy = corner_signs(corner)
+    x, y = to_world(body, sx * body.half_x, sy * body.half_y)
+    return tx * (x - body.x) + ty * (y - body.y)
+
+
+@kernel
+def same_end(of_a: Record, of_b: Record, a: Record, b: Record) -> bool:
+    """Tell whether a corner of a and a corner of b (both points) mark the same end of one face contact."""
+    if of_a.nx * of_b.nx + of_a.ny * of_b.ny < PARALLEL:
+        return False
+    end_a = outward_along(a, of_a.slot, -of_a.ny, of_a.nx)
+    end_b = outward_along(b, of_b.slot - SLOTS // 2, -of_a.ny, of_a.nx)
+    return end_a * end_b > 0.0
+
+
+@kernel
+def drop_point(points: Records, gone: int, count: int) -> int:
+    """Remove one point, keep the order of the others, return the new count."""
+    for i in range(gone, count - 1):
+        target = points[i]
+        source = points[i + 1]
+        target.slot = source.slot
+        target.face = source.face
+        target.x = source.x
+        target.y = source.y
+        target.nx = source.nx
+        target.ny = source.ny
+        target.depth = source.depth
+    return count - 1
+
+
+@kernel
+def drop_twins(a: Record, b: Record, slots: Records, points: Records, count: int) -> int:
+    """Keep one of two coinciding corners, so that a face contact always has two points and the stiffness of two.
+
+    Where two blocks are exactly aligned, a corner of each lies in the other. The one already in contact stays,
+    otherwise the deeper one, otherwise that of `a`. `slots` are the slots of this pair.
+    """
+    i = 0
+    while i < count and points[i].slot < SLOTS // 2:
+        for j in range(i + 1, count):
+            if points[j].slot >= SLOTS // 2 and same_end(points[i], points[j], a, b):
+                old_i = slots[points[i].slot].face != NO_FACE
+                old_j = slots[points[j].slot].face != NO_FACE
+                keep_i = old_i if old_i != old_j else points[i].depth >= points[j].depth
+                count = drop_point(points, j if keep_i else i, count)
+                i -= 0 if keep_i else 1
+                break
+        i += 1
+    return count
+
+
+@kernel
+def block_points(
+    a: Record, b: Record, corners: int, candidates: Integers, slots: Records, points: Records
+) -> int:
+    """Fill `points` with the contact points of two blocks and return how many there are (at most SLOTS)."""
+    x0, y0, c, s = relative_pose(a, b)
+    count = 0
+    of_a = 0
+    for m in range(corners):
+        if candidates[m] < SLOTS // 2:
+            count = add_corner(a, b, candidates[m], x0, y0, c, s, points, count)
+            of_a = count
+        else:
+            before = count
+            xb = -c * x0 - s * y0
+            yb = s * x0 - c * y0
+            count = add_corner(b, a, candidates[m] - SLOTS // 2, xb, yb, c, -s, points, count)
+            if count > before:
+                point = points[before]
+                point.slot = candidates[m]
+                point.nx = -point.nx
+                point.ny = -point.ny
+    if of_a > 0 and count > of_a:
+        count = drop_twins(a, b, slots, points, count)
+    return count

@@ -1,0 +1,36 @@
+"""Scenarios: declared in TOML, checked, and given to the other rooms as frozen objects in SI."""
+
+from blocksim.scenario.document import Document
+from blocksim.scenario.load import load_scenario, scenario_from_mapping
+from blocksim.scenario.models.contact import Contact, Friction, PairFriction, Restitution
+from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.stepping import Output, Time
+from blocksim.scenario.models.study import Experiment, Sweep
+from blocksim.scenario.placement import PlacedBody, place_bodies
+from blocksim.scenario.resolved import scenario_hash, scenario_to_toml
+from blocksim.scenario.schema import json_schema
+
+__all__ = [
+    "Block",
+    "BodySpec",
+    "Contact",
+    "Document",
+    "Experiment",
+    "Friction",
+    "Ground",
+    "Material",
+    "Output",
+    "PairFriction",
+    "PlacedBody",
+    "Restitution",
+    "Scenario",
+    "Sweep",
+    "Time",
+    "json_schema",
+    "load_scenario",
+    "place_bodies",
+    "scenario_from_mapping",
+    "scenario_hash",
+    "scenario_to_toml",
+]

@@ -1,0 +1,178 @@
+"""A scenario file as read: its data, the values set over it, and where everything stands."""
+
+import difflib
+import functools
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Self, cast
+
+from blocksim.errors import InputMissingError, Problem, ScenarioError
+from blocksim.scenario.check import examine
+from blocksim.scenario.findings import Finding
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.overrides import (
+    Data,
+    Override,
+    TooDeepError,
+    UnfitOverrideError,
+    frozen,
+    parse_override,
+    with_value,
+)
+from blocksim.scenario.quantities import shown
+from blocksim.scenario.source import Source, clipped, override_problem
+
+MAX_BYTES = 1_000_000
+MAX_PROBLEMS = 50
+Pair = tuple[str | Sequence[str | int], object]
+TOO_DEEP = "tables or lists are nested too deeply for a scenario"
+
+
+@dataclass(frozen=True)
+class Document:
+    """Raw data of one scenario with its text, so that mistakes can be shown where they stand.
+
+    Relative paths inside are resolved against `folder`.
+    """
+
+    data: Data
+    source: Source
+    folder: Path = Path()
+    overrides: tuple[Override, ...] = ()
+
+    @classmethod
+    def read(cls, path: Path | str) -> Self:
+        """Read a TOML file.
+
+        Raises InputMissingError where it cannot be read, ScenarioError where it is no TOML.
+        """
+        path = Path(path)
+        return cls.parse(_decoded(_content(path), str(path)), str(path), path.parent)
+
+    @classmethod
+    def parse(cls, text: str, where: str = "scenario", folder: Path = Path()) -> Self:
+        """Take the text of a TOML file, named `where` in messages.
+
+        Raises ScenarioError where it is no TOML.
+        """
+        source = Source(where, text.replace("\r\n", "\n"))
+        try:
+            data = cast("Data", frozen(tomllib.loads(source.text)))
+        except tomllib.TOMLDecodeError as error:
+            raise ScenarioError([source.syntax_problem(error)]) from None
+        except (RecursionError, TooDeepError):
+            raise _unusable(where, TOO_DEEP) from None
+        except ValueError as error:  # whole numbers with thousands of digits
+            raise _unusable(where, f"not valid TOML: {error}") from None
+        if not data:
+            raise _unusable(where, "the file is empty; a scenario starts with schema = 1 and a name")
+        return cls(data, source, folder)
+
+    @classmethod
+    def from_mapping(cls, data: Mapping[str, object], folder: Path = Path()) -> Self:
+        """Take data from Python in the form of a file; raises ScenarioError where it is nested too deeply."""
+        try:
+            return cls(cast("Data", frozen(data)), Source("scenario"), folder)
+        except TooDeepError:
+            raise _unusable("scenario", TOO_DEEP) from None
+
+    def with_values(self, values: Mapping[str, object]) -> Self:
+        """Set values by dotted key; raises ScenarioError where a key leads nowhere."""
+        texts = [(f"value {key}", f"{key} = {shown(value)}") for key, value in values.items()]
+        return self._with(texts, [functools.partial(_pair, key, value) for key, value in values.items()])
+
+    def with_settings(self, settings: Sequence[str]) -> Self:
+        """Set values as --set takes them ("contact.stiffness_scale=0.1"); raises ScenarioError."""
+        texts = [(f"--set {clipped(text, 0)[0]}", text) for text in settings]
+        return self._with(texts, [functools.partial(parse_override, text) for text in settings])
+
+    def _with(self, texts: Sequence[tuple[str, str]], pairs: Sequence[Callable[[], Pair]]) -> Self:
+        """Set one value after the other, and tell all that cannot be set together."""
+        data, overrides, problems = self.data, list(self.overrides), []
+        for (label, text), pair in zip(texts, pairs, strict=True):
+            try:
+                key, value = pair()
+                data, path = with_value(data, key, value)
+                overrides.append(Override(label, text, path))
+            except (UnfitOverrideError, TooDeepError) as error:
+                problems.append(override_problem(Override(label, text, ()), (), str(error), "key"))
+        if problems:
+            raise ScenarioError(problems)
+        return replace(self, data=data, overrides=tuple(overrides))
+
+    def build(self) -> Scenario:
+        """Validate; raises ScenarioError with every mistake, those in the file first and by line."""
+        scenario, findings = examine(self.data, self.folder)
+        if scenario is None:
+            raise ScenarioError(self._problems(findings))
+        return scenario
+
+    def _problems(self, findings: Sequence[Finding]) -> list[Problem]:
+        problems = list(dict.fromkeys(self.problem(finding) for finding in findings))
+        problems.sort(key=lambda p: (p.line_number is None, p.line_number or 0, p.caret_start))
+        if len(problems) > MAX_PROBLEMS:
+            more = Problem(self.source.where, "and more mistakes")
+            return [*problems[:MAX_PROBLEMS], more]
+        return problems
+
+    def problem(self, finding: Finding) -> Problem:
+        """Show a finding where it can be mended: in a value set from outside, or else in the text."""
+        override = next((o for o in reversed(self.overrides) if self._is_cause(o, finding)), None)
+        if override is not None:
+            return override_problem(override, finding.path, finding.message, finding.at)
+        return self.source.problem(finding.path, finding.message, finding.at)
+
+    def _is_cause(self, override: Override, finding: Finding) -> bool:
+        path, found = override.path, finding.path
+        inside = found[: len(path)] == path
+        on_the_way = path[: len(found)] == found and found not in self.source.places
+        beside = finding.relation and path[:-1] == found[:-1]
+        return inside or (bool(found) and on_the_way) or beside
+
+
+def _pair(key: str, value: object) -> Pair:
+    return key, value
+
+
+def _unusable(where: str, message: str) -> ScenarioError:
+    return ScenarioError([Problem(where, message)])
+
+
+def _content(path: Path) -> bytes:
+    """Read a file, but never much more than a scenario can be."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise InputMissingError(f"{path}: no such file{_similar_file(path)}") from None
+    except IsADirectoryError:
+        message = f"{path}: this is a folder; a scenario file is needed{_similar_file(path / path.name)}"
+        raise InputMissingError(message) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise InputMissingError(f"{path}: cannot be read: {reason}") from None
+    if len(content) > MAX_BYTES:
+        raise _unusable(str(path), f"larger than {MAX_BYTES // 1_000_000} MB; this is not a scenario")
+    return content
+
+
+def _similar_file(path: Path) -> str:
+    """Suggest the scenario beside the missing one whose name is most like it."""
+    try:
+        names = sorted(entry.name for entry in path.parent.glob("*.toml"))
+    except OSError:
+        names = []
+    similar = difflib.get_close_matches(path.name, names, n=1)
+    return f", did you mean '{path.parent / similar[0]}'?" if similar else ""
+
+
+def _decoded(content: bytes, where: str) -> str:
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise _unusable(where, "not a text file in UTF-8") from None
+    if "\0" in text:
+        raise _unusable(where, "not a text file")
+    return text

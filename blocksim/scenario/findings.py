@@ -1,0 +1,147 @@
+"""Mistakes in the data of a scenario, in a person's words, with the path of the guilty key."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, Literal, cast
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from blocksim.scenario.keys import MISSING, KeyPath, field_at, follow, keys_of, table_at
+from blocksim.scenario.quantities import shown
+from blocksim.scenario.spelling import nearest
+from blocksim.scenario.structures import KINDS
+
+TWO_VALUES = "two values are needed, one along x and one along y"
+MIN_BEGINNING = 3
+"""Letters that a word needs before its continuation is suggested."""
+MAX_FINDINGS = 200
+"""Mistakes that are looked at closely; a file of a million mistakes must not take minutes."""
+MAX_COMPARED = 1000
+"""Words that a misspelt one is compared with, for the same reason."""
+MAX_LISTED = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One mistake: where in the data, what is wrong, and which part of the line a caret belongs under.
+
+    `relation` is true where single values are fine and only do not go together; `meant` is the path that a
+    misspelt key was probably meant to be.
+    """
+
+    path: KeyPath
+    message: str
+    at: Literal["key", "value"] = "value"
+    relation: bool = False
+    meant: KeyPath = ()
+
+
+def findings_of(error: ValidationError, data: object) -> list[Finding]:
+    """Translate the errors of pydantic; a key is not missing where it is only misspelt."""
+    entries = [e for e in error.errors(include_url=False) if e["type"] != "default_factory_not_called"]
+    findings = [_finding(entry, data) for entry in entries[:MAX_FINDINGS]]
+    meant = {finding.meant for finding in findings if finding.meant}
+    return [finding for finding in findings if finding.path not in meant]
+
+
+def _finding(entry: ErrorDetails, data: object) -> Finding:
+    path = _path(entry["loc"])
+    match entry["type"]:
+        case "missing":
+            return _missing(path, data)
+        case "union_tag_not_found":
+            return Finding((*path, "kind"), f"this key is missing: {_kinds()} is needed", at="key")
+        case "union_tag_invalid":
+            kind = follow(data, (*path, "kind"))
+            hint = did_you_mean(str(kind), KINDS) or f"use {_kinds()}"
+            return Finding((*path, "kind"), f"{shown(kind)} is no kind of structure, {hint}")
+        case "extra_forbidden":
+            return _unknown_key(path, data)
+        case "blocksim":
+            context = entry["ctx"]
+            key = context["key"]
+            known = (*path, key) if key else path
+            return Finding(_existing(known, data), context["message"], relation=bool(key))
+        case _:
+            return Finding(_existing(path, data), _wrong_type(entry, path))
+
+
+def _path(loc: Sequence[str | int]) -> KeyPath:
+    """Drop what pydantic adds to the path of the file: the tag of a union, and the sweep's inner table."""
+    path = tuple(loc)
+    if path[:1] == ("structures",):
+        return (*path[:2], *path[3:])
+    return (path[0], *path[2:]) if path[:2] == ("sweep", "vary") else path
+
+
+def _existing(path: KeyPath, data: object) -> KeyPath:
+    """Cut a path down to what stands in the file: a bare number may have become a table."""
+    while path and follow(data, path) is MISSING:
+        path = path[:-1]
+    return path
+
+
+def _missing(path: KeyPath, data: object) -> Finding:
+    if isinstance(path[-1], int):
+        return Finding(path[:-1], f"this list is too short; {TWO_VALUES}")
+    field = field_at(path, data)
+    told = f": {field.description}" if field is not None else ""
+    wanted = next((m.wanted for m in field.metadata if hasattr(m, "wanted")), "") if field is not None else ""
+    needed = f"; {wanted} is needed" if wanted else ""
+    return Finding(path, f"this key is missing{told}{needed}", at="key")
+
+
+def _unknown_key(path: KeyPath, data: object) -> Finding:
+    table = table_at(path[:-1], data)
+    known = keys_of(table) if table is not None else ()
+    meant = similar_word(str(path[-1]), known)
+    hint = f"did you mean {meant!r}?" if meant else f"allowed are: {', '.join(known)}"
+    return Finding(path, f"unknown key, {hint}", at="key", meant=(*path[:-1], meant) if meant else ())
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Suggest the known word that may have been meant, or nothing."""
+    similar = similar_word(word, known)
+    return f"did you mean {similar!r}?" if similar else ""
+
+
+def did_you_mean_or_list(word: str, known: Iterable[object]) -> str:
+    """Suggest the known word that may have been meant, or list the first known words."""
+    names = [str(name) for name in known]
+    listed = ", ".join(names[:MAX_LISTED]) + (", …" if len(names) > MAX_LISTED else "")
+    return did_you_mean(word, names) or (f"there is: {listed}" if names else "there is none")
+
+
+def similar_word(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word that is nearly the one found, or begins like it."""
+    known = tuple(islice(known, MAX_COMPARED))
+    similar = nearest(word, known, most=max(1, len(word) // 3))
+    if similar is None and len(word) >= MIN_BEGINNING:
+        similar = next((other for other in known if other.startswith(word) or word.startswith(other)), None)
+    return similar
+
+
+def _kinds() -> str:
+    return " or ".join(shown(kind) for kind in KINDS)
+
+
+def _wrong_type(entry: ErrorDetails, path: KeyPath) -> str:
+    value = cast("Any", entry["input"])
+    match entry["type"]:
+        case "model_type" | "dict_type" | "model_attributes_type":
+            double = f"; write [{path[-1]}] with single brackets" if isinstance(value, list | tuple) else ""
+            return f"{shown(value)} is not a table{double}"
+        case "tuple_type":
+            double = f"; write [[{path[-1]}]] with double brackets" if isinstance(value, Mapping) else ""
+            return f"{shown(value)} is not a list{double}"
+        case "too_long":
+            return f"this list is too long; {TWO_VALUES}"
+        case "string_type":
+            quote = "; quote the whole dotted key" if isinstance(value, Mapping) else ""
+            return f"{shown(value)} is not a text in quotes{quote}"
+        case "bool_type":
+            return f"{shown(value)} is neither true nor false"
+        case _:
+            return f"{shown(value)}: {entry['msg'][0].lower()}{entry['msg'][1:]}"

@@ -1,0 +1,155 @@
+"""Dotted keys: reading and writing them, following them into data and into the models."""
+
+import re
+import tomllib
+import types
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+
+from blocksim.scenario.models.base import Table
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.structures import KINDS, Structure
+
+KeyPath = tuple[str | int, ...]
+"""A place in a scenario, such as ("structures", 0, "overlap")."""
+
+MISSING = object()
+"""What `follow` returns where there is nothing."""
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_BASIC = re.compile(r'"(?:[^"\\\n]|\\[^\n])*"')
+_LITERAL = re.compile(r"'[^'\n]*'")
+_BLANK = re.compile(r"[ \t]*")
+
+
+def read_key(text: str, start: int = 0) -> tuple[tuple[str, ...], int]:
+    """Read a TOML key, dotted and quoted or not, from `start`: its parts, and where it ends.
+
+    Raises ValueError.
+    """
+    parts: list[str] = []
+    while True:
+        start = skip_blank(text, start)
+        found = next((m for p in (_BASIC, _LITERAL, _BARE) if (m := p.match(text, start))), None)
+        if found is None:
+            message = "not a key"
+            raise ValueError(message)
+        parts.append(_unquoted(found[0]))
+        after = skip_blank(text, found.end())
+        if not text.startswith(".", after):
+            return tuple(parts), found.end()
+        start = after + 1
+
+
+def _unquoted(part: str) -> str:
+    if part[0] == '"':
+        return str(tomllib.loads(f"v = {part}")["v"])
+    return part[1:-1] if part[0] == "'" else part
+
+
+def skip_blank(text: str, start: int) -> int:
+    """Return the index of the first character from `start` that is neither space nor tab."""
+    found = _BLANK.match(text, start)
+    return start if found is None else found.end()
+
+
+def parse_key(text: str) -> tuple[str, ...]:
+    """Read a whole text as one dotted key; raises ValueError."""
+    parts, end = read_key(text)
+    if skip_blank(text, end) != len(text):
+        message = "not a key"
+        raise ValueError(message)
+    return parts
+
+
+def format_key(path: Sequence[str | int]) -> str:
+    """Write a path as a dotted key, with quotes where TOML wants them."""
+    return ".".join(str(part) if _BARE.fullmatch(str(part)) else _quoted(str(part)) for part in path)
+
+
+def _quoted(part: str) -> str:
+    escaped = part.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
+
+
+def follow(data: object, path: Sequence[str | int]) -> object:
+    """Return what stands at a path of nested mappings and sequences, or MISSING."""
+    for part in path:
+        if isinstance(data, Mapping):
+            data = data.get(part, MISSING)
+        elif isinstance(data, list | tuple) and isinstance(part, int) and 0 <= part < len(data):
+            data = data[part]
+        else:
+            return MISSING
+    return data
+
+
+def table_at(path: Sequence[str | int], data: object) -> type[Table] | None:
+    """Return the model of the table at a path; `data` tells the kinds of structures."""
+    annotation: object = Scenario
+    for depth, part in enumerate(path):
+        annotation = _inside(annotation, part, follow(data, path[:depth]))
+    return _table(annotation, follow(data, path))
+
+
+def field_at(path: Sequence[str | int], data: object) -> FieldInfo | None:
+    """Return the model field at a path, or None where the models know no such key."""
+    table = table_at(path[:-1], data) if path else None
+    return None if table is None else _fields(table).get(path[-1])
+
+
+def is_known(path: Sequence[str | int], data: object) -> bool:
+    """Tell whether the models have a place for this path (blocks and materials must be in `data`)."""
+    if len(path) in (1, 2) and path[0] in ("materials", "blocks", "structures", "bodies"):
+        return follow(data, path) is not MISSING
+    return field_at(path, data) is not None or (
+        isinstance(path[-1], int)
+        and follow(data, path) is not MISSING
+        and field_at(path[:-1], data) is not None
+    )
+
+
+def keys_of(table: type[Table]) -> tuple[str, ...]:
+    """Return the keys that a table may have, as written in the file."""
+    return tuple(str(key) for key in _fields(table))
+
+
+def _fields(table: type[Table]) -> dict[str | int, FieldInfo]:
+    return {info.alias or name: info for name, info in table.model_fields.items()}
+
+
+def _inside(annotation: object, part: str | int, node: object) -> object:
+    """Return the annotation of the element `part` of something annotated so."""
+    for option in _options(annotation):
+        arguments = get_args(option)
+        if get_origin(option) is dict:
+            return arguments[1]
+        if get_origin(option) is tuple and isinstance(part, int):
+            return arguments[0]
+    table = _table(annotation, node)
+    field = None if table is None else _fields(table).get(part)
+    return None if field is None else field.annotation
+
+
+def _table(annotation: object, node: object) -> type[Table] | None:
+    tables = [
+        option for option in _options(annotation) if isinstance(option, type) and issubclass(option, Table)
+    ]
+    if tables and all(issubclass(table, Structure) for table in tables):
+        kind = node.get("kind") if isinstance(node, Mapping) else None
+        return KINDS.get(kind) if isinstance(kind, str) else None
+    return tables[0] if tables else None
+
+
+def _options(annotation: Any) -> Iterator[Any]:
+    """Yield the alternatives of a type expression, without metadata."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        yield from _options(get_args(annotation)[0])
+    elif origin in (Union, types.UnionType):
+        for option in get_args(annotation):
+            yield from _options(option)
+    else:
+        yield annotation

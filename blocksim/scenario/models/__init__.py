@@ -1,0 +1,1 @@
+"""The tables of a scenario as frozen pydantic models; attributes are SI floats."""

@@ -1,0 +1,73 @@
+"""What every table of a scenario has in common, and field types that are no quantities."""
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from blocksim.scenario.quantities import invalid, shown
+from blocksim.scenario.spelling import nearest
+
+
+class Table(BaseModel):
+    """One TOML table: frozen, no unknown keys, no silent conversions."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        strict=True,
+        extra="forbid",
+        allow_inf_nan=False,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class OneOf:
+    """Annotation of a literal field: the words that work now, and those that are planned."""
+
+    available: tuple[str | int, ...]
+    planned: tuple[str, ...] = ()
+
+    @property
+    def wanted(self) -> str:
+        """Say what is allowed."""
+        return " or ".join(shown(word) for word in self.available)
+
+    def read(self, value: object) -> object:
+        """Pass an available word; raises a pydantic error that says which words are."""
+        if type(value) in (str, int) and value in self.available:
+            return value
+        if isinstance(value, str) and value in self.planned:
+            message = f"{shown(value)} is not available yet; use {self.wanted}"
+            raise invalid(message)
+        words = [word for word in self.available if isinstance(word, str)]
+        similar = nearest(value, words, most=2) if isinstance(value, str) else None
+        hint = f"did you mean {shown(similar)}?" if similar else f"use {self.wanted}"
+        message = f"{shown(value)} is not known here, {hint}"
+        raise invalid(message)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Check the word first, then let pydantic see its literal."""
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+
+def _identifier(value: object) -> object:
+    if not isinstance(value, str):
+        message = f"{shown(value)} is not a text in quotes"
+        raise invalid(message)
+    allowed = value.isascii() and all(c.isalnum() or c in "._-" for c in value)
+    if not allowed or not 1 <= len(value) <= MAX_NAME or value[0] in ".-":
+        message = (
+            f"{shown(value)} is not a name; 1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
+        )
+        raise invalid(message)
+    return value
+
+
+MAX_NAME = 100
+Identifier = Annotated[
+    str,
+    BeforeValidator(_identifier),
+    Field(json_schema_extra={"pattern": r"^[A-Za-z0-9_][A-Za-z0-9._-]{0,99}$"}),
+]
+"""A name that can be a folder or a table cell on every system."""

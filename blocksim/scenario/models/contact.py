@@ -1,0 +1,124 @@
+"""How bodies touch: friction and contact."""
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from blocksim.scenario import quantities as q
+from blocksim.scenario.models.base import OneOf, Table
+
+
+def or_bare(table: JsonSchemaValue, bare: JsonSchemaValue) -> JsonSchemaValue:
+    """Let the JSON Schema accept the short form beside the table."""
+    return {"anyOf": [bare, table]}
+
+
+class PairFriction(Table):
+    """Coulomb friction of one material pair, falling from static to kinetic with the sliding speed.
+
+    mu(v) = kinetic + (static - kinetic) exp(-|v| / transition_speed). A bare number or friction angle in the
+    file means static = kinetic.
+    """
+
+    static: q.Friction = Field(description="friction coefficient at rest")
+    kinetic: q.Friction = Field(
+        default_factory=lambda known: known.get("static", math.inf),
+        description="friction coefficient in fast sliding (default: static)",
+    )
+    transition_speed: q.PositiveSpeed = Field(default=0.005, description="sliding speed of the change-over")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _table(cls, value: object) -> object:
+        if isinstance(value, Mapping | PairFriction):
+            return value
+        if isinstance(value, int | float | str) and not isinstance(value, bool):
+            return {"static": value}
+        message = f"{q.shown(value)} is no friction; write a number, an angle, or {{ static, kinetic }}"
+        raise q.invalid(message)
+
+    @model_validator(mode="after")
+    def _kinetic_not_above_static(self) -> Self:
+        if self.kinetic > self.static:
+            message = f"kinetic friction {self.kinetic:g} is above static friction {self.static:g}"
+            raise q.invalid(message, "kinetic")
+        return self
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Accept a bare number or angle."""
+        return or_bare(handler(schema), q.FrictionCoefficient().json_schema())
+
+
+class Friction(Table):
+    """Friction between blocks, and between blocks and the ground; the defaults are the paper's."""
+
+    block_block: PairFriction = Field(
+        default=PairFriction(static=0.31, kinetic=0.31), description="friction between two blocks"
+    )
+    block_ground: PairFriction = Field(
+        default=PairFriction(static=0.38, kinetic=0.38), description="friction between a block and the ground"
+    )
+
+
+class Restitution(Table):
+    """Coefficients of restitution; a bare number in the file sets both."""
+
+    block_block: q.Share = Field(default=0.2, description="restitution between two blocks (assumed)")
+    block_ground: q.Share = Field(
+        default=0.2, description="restitution between a block and the ground (assumed)"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _both(cls, value: object) -> object:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return {"block_block": value, "block_ground": value}
+        if isinstance(value, Mapping | Restitution):
+            return value
+        message = f"{q.shown(value)} is no restitution; write a number or {{ block_block, block_ground }}"
+        raise q.invalid(message)
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Accept a bare number."""
+        bare: dict[str, Any] = {"type": "number", "minimum": 0, "maximum": 1}
+        return or_bare(handler(schema), bare)
+
+
+class Contact(Table):
+    """Contact model, force law and their numbers."""
+
+    model: Annotated[Literal["surface"], OneOf(("surface",), planned=("particles", "kernel"))] = Field(
+        default="surface", description="how contacts are found"
+    )
+    law: Annotated[Literal["linear"], OneOf(("linear",), planned=("hertz-mindlin",))] = Field(
+        default="linear", description="how the force grows with the overlap"
+    )
+    restitution: Restitution = Field(default=Restitution(), description="rebound speed over impact speed")
+    stiffness_scale: q.PositiveNumber = Field(
+        default=1.0, description="factor on the stiffness of every contact"
+    )
+    normal_stiffness: q.Stiffness | None = Field(
+        default=None, description="stiffness of one contact point (default: from the materials)"
+    )
+    shear_stiffness_ratio: q.PositiveNumber | None = Field(
+        default=None, description="shear over normal stiffness (default: Mindlin, from Poisson's ratio)"
+    )
+    shear_damping_ratio: q.NonNegativeNumber | None = Field(
+        default=None, description="damping ratio in shear (default: the normal one)"
+    )
+    max_overlap: q.PositiveLength | None = Field(
+        default=None, description="overlap that stops the run (default: 5 % of the smallest side)"
+    )
+    particle_spacing: q.PositiveLength = Field(
+        default=0.001, description="spacing of the boundary particles (particles, kernel)"
+    )

@@ -1,0 +1,129 @@
+"""What there is: materials, blocks, single bodies and the ground."""
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from blocksim.scenario import quantities as q
+from blocksim.scenario.models.base import Identifier, OneOf, Table
+
+STANDARD_GRAVITY = 9.81
+"""m/s²; turns a unit weight into a density, as in the paper, whatever gravity the scenario has."""
+
+Side = Literal["width", "height", "length"]
+SIDES: tuple[Side, ...] = ("width", "height", "length")
+
+
+class Material(Table):
+    """An elastic material; exactly one of density and unit weight is given."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": ["density"]}, {"required": ["unit_weight"]}]}
+    )
+
+    given_density: q.Density | None = Field(
+        default=None, alias="density", description="mass per volume; give this or unit_weight"
+    )
+    unit_weight: q.UnitWeight | None = Field(
+        default=None, description="weight per volume, divided by 9.81 m/s^2; give this or density"
+    )
+    young_modulus: q.Pressure = Field(description="Young's modulus E")
+    poisson_ratio: q.PoissonRatio = Field(description="Poisson's ratio")
+
+    @model_validator(mode="after")
+    def _one_density(self) -> Self:
+        if self.given_density is None and self.unit_weight is None:
+            message = 'the density is missing: give density (such as "2700 kg/m^3") or unit_weight'
+            raise q.invalid(message)
+        if self.given_density is not None and self.unit_weight is not None:
+            message = "density and unit_weight are both given; give one of them"
+            raise q.invalid(message, "unit_weight")
+        return self
+
+    @property
+    def density(self) -> float:
+        """Mass per volume in kg/m³."""
+        if self.given_density is not None:
+            return self.given_density
+        return (self.unit_weight or math.nan) / STANDARD_GRAVITY
+
+
+class Block(Table):
+    """A rectangular block by its three printed sides, and how it is turned into the plane.
+
+    The names of the sides are only names: `upright` says which of them stands upright and `along` which lies
+    along x; the third is the depth.
+    """
+
+    width: q.PositiveLength = Field(description="the block's width")
+    height: q.PositiveLength = Field(description="the block's height")
+    length: q.PositiveLength = Field(description="the block's length")
+    upright: Annotated[Side, OneOf(SIDES)] = Field(
+        default="height", description="the side that stands upright"
+    )
+    along: Annotated[Side, OneOf(SIDES)] = Field(
+        default_factory=lambda known: "length" if known.get("upright") == "width" else "width",
+        description="the side that lies along x (default: width, or length where width stands upright)",
+    )
+    material: str = Field(description="the name of the block's material")
+
+    @model_validator(mode="after")
+    def _two_sides(self) -> Self:
+        if self.along == self.upright:
+            others = " or ".join(q.shown(side) for side in SIDES if side != self.upright)
+            message = f"{q.shown(self.upright)} stands upright already; {others} can lie along x"
+            raise q.invalid(message, "along")
+        return self
+
+    @property
+    def size_x(self) -> float:
+        """Extent along x in m."""
+        return self._side(self.along)
+
+    @property
+    def size_y(self) -> float:
+        """Extent upright in m."""
+        return self._side(self.upright)
+
+    @property
+    def depth(self) -> float:
+        """Extent out of the plane in m."""
+        (third,) = set(SIDES) - {self.along, self.upright}
+        return self._side(third)
+
+    def _side(self, name: Side) -> float:
+        return {"width": self.width, "height": self.height, "length": self.length}[name]
+
+
+class BodySpec(Table):
+    """One body placed by hand."""
+
+    block: str = Field(description="the name of a block")
+    x: q.Length = Field(description="centre along the ground")
+    y: q.Length = Field(description="centre above the ground")
+    angle: q.Angle = Field(default=0.0, description="turned counter-clockwise by this angle")
+    velocity: tuple[q.Speed, q.Speed] = Field(
+        default=(0.0, 0.0), description="velocity of the centre along x and y"
+    )
+    spin: q.Spin = Field(default=0.0, description="angular velocity, counter-clockwise positive")
+    fixed: bool = Field(default=False, description="true for a body that never moves")
+    name: Identifier | None = Field(default=None, description="name in tables (default: its number, from 1)")
+
+    @model_validator(mode="after")
+    def _fixed_stands_still(self) -> Self:
+        if self.fixed and (self.velocity != (0.0, 0.0) or self.spin != 0.0):
+            message = "a fixed body cannot have a velocity or a spin"
+            raise q.invalid(message, "fixed")
+        return self
+
+
+class Ground(Table):
+    """The half-plane below y = 0; a tilt turns gravity, x stays along the ground."""
+
+    tilt: q.TiltAngle = Field(
+        default=0.0, description="slope of the ground, positive where its +x end is raised"
+    )
+    material: str | None = Field(
+        default=None, description="the name of its material (default: the blocks' own)"
+    )

@@ -1,0 +1,45 @@
+"""The whole scenario."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from blocksim.scenario import quantities as q
+from blocksim.scenario.models.base import Identifier, OneOf, Table
+from blocksim.scenario.models.contact import Contact, Friction
+from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material
+from blocksim.scenario.models.stepping import Output, Time
+from blocksim.scenario.models.study import Experiment, Sweep
+from blocksim.scenario.structures import AnyStructure
+
+SCHEMA_VERSION = 1
+
+
+class Scenario(Table):
+    """Everything that decides one simulation, in SI.
+
+    Build it with `load_scenario` or `scenario_from_mapping`, which also check what no single table can know:
+    that named blocks and materials exist and that no bodies overlap.
+    """
+
+    schema_version: Annotated[Literal[1], OneOf((SCHEMA_VERSION,))] = Field(
+        alias="schema", description="version of the file format"
+    )
+    name: Identifier = Field(description="name of the scenario and of its results folder")
+    description: str = Field(default="", description="free text")
+    gravity: q.NonNegativeAcceleration = Field(default=9.81, description="acceleration of gravity")
+    materials: dict[str, Material] = Field(description="materials by name, as in [materials.aluminium]")
+    blocks: dict[str, Block] = Field(description="blocks by name, as in [blocks.brick]")
+    structures: tuple[AnyStructure, ...] = Field(default=(), description="generators of bodies")
+    bodies: tuple[BodySpec, ...] = Field(default=(), description="single bodies")
+    ground: Ground = Field(default=Ground(), description="the ground below y = 0")
+    friction: Friction = Field(default=Friction(), description="friction of the material pairs")
+    contact: Contact = Field(default=Contact(), description="contact model and its numbers")
+    time: Time = Field(default=Time(), description="time stepping")
+    output: Output = Field(default=Output(), description="what is recorded")
+    experiment: Experiment | None = Field(default=None, description="measurements to compare with")
+    sweep: Sweep | None = Field(default=None, description="what `blocksim sweep` varies")
+    provenance: dict[str, str] = Field(
+        default={},
+        description="where values come from: dotted key and text, for calibrated or assumed values",
+    )

@@ -1,0 +1,145 @@
+"""Setting single values of a scenario by their dotted key, as --set and sweeps do."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from blocksim.scenario.findings import did_you_mean_or_list
+from blocksim.scenario.keys import MISSING, KeyPath, format_key, parse_key, read_key, skip_blank
+from blocksim.scenario.models.contact import Friction
+from blocksim.scenario.quantities import shown
+
+Data = Mapping[str, object]
+
+MAX_DEPTH = 16
+_NAMED = (("materials",), ("blocks",))
+_FRICTION = Friction()
+
+
+class UnfitOverrideError(ValueError):
+    """A dotted key or a value cannot be set; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Override:
+    """One value set from outside: its name in messages, how it was written, and the path that it sets."""
+
+    label: str
+    text: str
+    path: KeyPath
+
+    @property
+    def key_length(self) -> int:
+        """Number of characters of `text` that are the key."""
+        try:
+            return read_key(self.text)[1]
+        except ValueError:
+            return max(1, len(self.text.partition("=")[0]))
+
+
+class TooDeepError(ValueError):
+    """Tables or lists are nested deeper than any scenario needs."""
+
+
+def frozen(value: object, depth: int = 0) -> object:
+    """Copy nested data with tuples for lists; raises TooDeepError."""
+    if depth > MAX_DEPTH:
+        message = f"nested more than {MAX_DEPTH} levels deep"
+        raise TooDeepError(message)
+    if isinstance(value, Mapping):
+        return {key: frozen(entry, depth + 1) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(frozen(entry, depth + 1) for entry in value)
+    return value
+
+
+def parse_override(text: str) -> tuple[tuple[str, ...], object]:
+    """Split "key=value": the parts of the key, and the value as TOML or as a bare word.
+
+    Raises UnfitOverrideError.
+    """
+    try:
+        path, end = read_key(text)
+    except ValueError:
+        message = "write KEY=VALUE with a dotted key, such as contact.stiffness_scale=0.1"
+        raise UnfitOverrideError(message) from None
+    equals = skip_blank(text, end)
+    value = text[equals + 1 :].strip()
+    if text[equals : equals + 1] != "=" or not value:
+        message = "write KEY=VALUE, such as contact.stiffness_scale=0.1"
+        raise UnfitOverrideError(message)
+    return path, parse_value(value)
+
+
+def parse_value(text: str) -> object:
+    """Read a TOML value; what neither is one nor starts like one ("5 mm/s", "linear") is text."""
+    try:
+        found = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        found = {}
+    if set(found) == {"value"}:
+        return found["value"]
+    if text[0] in "\"'[{":
+        message = f"{text[:40]} is not a TOML value"
+        raise UnfitOverrideError(message)
+    return text
+
+
+def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tuple[Data, KeyPath]:
+    """Return data with one value set, and the path that was set; raises UnfitOverrideError.
+
+    Tables on the way are made where they are missing. A bare friction c becomes { static = c }, whose kinetic
+    part follows the static one until it is set; a bare restitution becomes a table of both.
+    """
+    try:
+        parts = parse_key(key) if isinstance(key, str) else tuple(key)
+    except ValueError:
+        message = f"{shown(key)} is not a dotted key"
+        raise UnfitOverrideError(message) from None
+    path: list[str | int] = []
+    result = _put(data, parts, frozen(value), path)
+    assert isinstance(result, Mapping)  # noqa: S101 - data is a mapping, so is its copy
+    return result, tuple(path)
+
+
+def _put(node: object, parts: Sequence[str | int], value: object, done: list[str | int]) -> object:
+    """Copy `node` with the value at `parts` below it; `done` collects the path that was taken."""
+    if not parts:
+        return value
+    if isinstance(node, tuple | list):
+        index = _index(node, parts[0], done)
+        done.append(index)
+        return (*node[:index], _put(node[index], parts[1:], value, done), *node[index + 1 :])
+    if not isinstance(node, Mapping):
+        message = f"{format_key(done)} is {shown(node)}, not a table"
+        raise UnfitOverrideError(message)
+    part = str(parts[0])
+    child = node.get(part, MISSING)
+    if child is MISSING and tuple(done) in _NAMED and len(parts) > 1:
+        hint = did_you_mean_or_list(part, node)
+        message = f"there is no {shown(part)} in {done[0]}, {hint}"
+        raise UnfitOverrideError(message)
+    done.append(part)
+    return {
+        **node,
+        part: _put(_opened(tuple(done), child) if len(parts) > 1 else child, parts[1:], value, done),
+    }
+
+
+def _index(entries: Sequence[object], part: str | int, done: Sequence[str | int]) -> int:
+    if str(part).isdecimal() and len(str(part)) < MAX_DEPTH and int(part) < len(entries):
+        return int(part)
+    message = f"{format_key(done)} is a list of {len(entries)}, numbered from 0; there is no {shown(part)}"
+    raise UnfitOverrideError(message)
+
+
+def _opened(path: KeyPath, child: object) -> object:
+    """Turn a bare number, or nothing, into the table that it stands for, before something inside is set."""
+    bare = child is not MISSING and not isinstance(child, Mapping | tuple | list)
+    if path == ("contact", "restitution") and bare:
+        return {"block_block": child, "block_ground": child}
+    if path[:-1] == ("friction",) and path[-1] in Friction.model_fields:
+        if child is MISSING:
+            return {"static": getattr(_FRICTION, str(path[-1])).static}
+        return {"static": child} if bare else child
+    return {} if child is MISSING else child

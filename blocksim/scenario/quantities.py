@@ -1,0 +1,283 @@
+"""Numbers with a unit as people write them in a scenario, and as SI floats inside.
+
+Every quantity type accepts a number, taken as SI, or a string with a unit ("32 mm"), checked for its
+dimension and its allowed range. An angle needs its unit unless it is zero.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Annotated, Any
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from blocksim.scenario import units
+from blocksim.scenario.units import Dimension
+
+_NUMBER = r"[+-]?(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_TEXT = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
+_MAX_LENGTH = 80
+_MAX_SHOWN = 40
+
+
+def shown(value: object) -> str:
+    """Write a value as it stands in a TOML file, shortened, for a message."""
+    match value:
+        case bool():
+            text = str(value).lower()
+        case str():
+            short = value if len(value) <= _MAX_SHOWN else value[:_MAX_SHOWN] + "…"
+            escaped = short.replace("\\", "\\\\").replace('"', '\\"')
+            text = f'"{"".join(c if c.isprintable() else repr(c)[1:-1] for c in escaped)}"'
+        case int() if abs(value) > 10**_MAX_SHOWN:
+            text = "a huge whole number"
+        case list() | tuple():
+            text = "a list"
+        case dict():
+            text = "a table"
+        case _:
+            text = str(value)[:_MAX_SHOWN]
+    return text
+
+
+def invalid(message: str, key: str = "") -> PydanticCustomError:
+    """Build the error that carries a finished message through pydantic; `key` names the guilty key."""
+    return PydanticCustomError("blocksim", "{message}", {"message": message, "key": key})
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A sort of quantity: its dimension, the unit it has inside, and an example for messages."""
+
+    dimension: Dimension
+    unit: str
+    example: str
+
+    @property
+    def name(self) -> str:
+        """Say what it is, with its article: "a length"."""
+        return units.NAMES[self.dimension]
+
+    def in_words(self, value: float) -> str:
+        """Write a bound for a message: 0 without a unit, angles in degrees."""
+        if value == 0 or not self.unit:
+            return f"{value:g}"
+        return f"{math.degrees(value):g} deg" if self.unit == "rad" else f"{value:g} {self.unit}"
+
+
+NUMBER = Kind(units.NUMBER, "", "")
+LENGTH = Kind(units.LENGTH, "m", "32 mm")
+TIME = Kind(units.TIME, "s", "2 s")
+ANGLE = Kind(units.ANGLE, "rad", "20 deg")
+SPEED = Kind(units.SPEED, "m/s", "5 mm/s")
+SPIN = Kind(units.SPIN, "rad/s", "90 deg/s")
+ACCELERATION = Kind(units.ACCELERATION, "m/s^2", "9.81 m/s^2")
+PRESSURE = Kind(units.PRESSURE, "Pa", "69 GPa")
+DENSITY = Kind(units.DENSITY, "kg/m^3", "2700 kg/m^3")
+UNIT_WEIGHT = Kind(units.UNIT_WEIGHT, "N/m^3", "26.7 kN/m^3")
+STIFFNESS = Kind(units.STIFFNESS, "N/m", "1e6 N/m")
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Annotation of a float field: which kind of quantity it is and which values are allowed (SI)."""
+
+    kind: Kind
+    above: float | None = None
+    at_least: float | None = None
+    below: float | None = None
+    at_most: float | None = None
+
+    @property
+    def wanted(self) -> str:
+        """Say what is allowed: 'a length above 0 such as "32 mm"'."""
+        low, high = self._low(), self._high()
+        span = f" {low} and {high}" if low and high else f" {low}{high}"
+        example = f' such as "{self.kind.example}"' if self.kind.example else ""
+        return f"{self.kind.name}{span.rstrip()}{example}"
+
+    def _low(self) -> str:
+        if self.above is not None:
+            return f"above {self.kind.in_words(self.above)}"
+        return f"of at least {self.kind.in_words(self.at_least)}" if self.at_least is not None else ""
+
+    def _high(self) -> str:
+        if self.below is not None:
+            return f"below {self.kind.in_words(self.below)}"
+        return f"at most {self.kind.in_words(self.at_most)}" if self.at_most is not None else ""
+
+    def read(self, value: object) -> float:
+        """Turn what stands in the file into an SI float; the pydantic error raised says what is allowed."""
+        number = self._text(value) if isinstance(value, str) else self._number(value)
+        if not math.isfinite(number):
+            message = f"{shown(value)} is not a finite number; {self.wanted} is needed"
+            raise invalid(message)
+        return self._within(number, value)
+
+    def _number(self, value: object) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            message = f"{shown(value)} is not a number; {self.wanted} is needed"
+            raise invalid(message)
+        try:
+            number = float(value)
+        except OverflowError:
+            return math.inf
+        if self.kind is ANGLE and number != 0 and math.isfinite(number):
+            message = f'{shown(value)} has no unit; write "{number:g} deg" (or "{number:g} rad")'
+            raise invalid(message)
+        return number
+
+    def _text(self, text: str) -> float:
+        try:
+            number, dimension = parse_quantity(text, self.kind)
+        except ValueError as error:
+            message = f"{shown(text)} is not {self.kind.name}: {error}"
+            raise invalid(message) from None
+        if dimension != self.kind.dimension:
+            name = units.NAMES.get(dimension, f"not {self.kind.name}")
+            message = f"{shown(text)} is {name}; {self.wanted} is needed"
+            raise invalid(message)
+        return number
+
+    def _within(self, number: float, value: object) -> float:
+        too_small = (self.above is not None and number <= self.above) or (
+            self.at_least is not None and number < self.at_least
+        )
+        too_large = (self.below is not None and number >= self.below) or (
+            self.at_most is not None and number > self.at_most
+        )
+        if too_small or too_large:
+            message = f"{shown(value)} is too {'small' if too_small else 'large'}; {self.wanted} is needed"
+            raise invalid(message)
+        return number
+
+    def __get_pydantic_core_schema__(self, _source: object, _handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Read the value first, then let pydantic see a float."""
+        return core_schema.no_info_before_validator_function(
+            self.read, core_schema.float_schema(strict=True, allow_inf_nan=False)
+        )
+
+    def __get_pydantic_json_schema__(
+        self, _core_schema: CoreSchema, _handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Describe what may stand in the file."""
+        return self.json_schema()
+
+    def json_schema(self) -> dict[str, Any]:
+        """JSON Schema of what may stand in the file: a number in SI or a string with a unit."""
+        bounds = {
+            "exclusiveMinimum": self.above,
+            "minimum": self.at_least,
+            "exclusiveMaximum": self.below,
+            "maximum": self.at_most,
+        }
+        number: dict[str, Any] = {"type": "number"}
+        number |= {name: bound for name, bound in bounds.items() if bound is not None}
+        if self.kind is NUMBER:
+            return number
+        if self.kind is ANGLE:
+            number = {"const": 0}
+        return {"anyOf": [number, _text_schema(self.kind.example)]}
+
+
+def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
+    """Read "number unit" into an SI float and its dimension; raises ValueError whose text says what is wrong.
+
+    `wanted` only decides which unit is suggested for a misspelt one.
+    """
+    found = _TEXT.fullmatch(text) if len(text) <= _MAX_LENGTH else None
+    if wanted is NUMBER and (found is None or found[2] is None):
+        message = "write a number without quotes"
+        raise ValueError(message)
+    if found is None:
+        message = f'write a number and a unit, such as "{wanted.example}"'
+        raise ValueError(message)
+    number, unit = found.groups()
+    if unit is None:
+        message = f'the unit is missing, write it as in "{wanted.example}"'
+        raise ValueError(message)
+    try:
+        worth = units.parse_unit(unit)
+    except units.UnitError as error:
+        raise ValueError(_unit_mistake(unit, error.unknown, wanted)) from None
+    return _times(number, worth.factor), worth.dimension
+
+
+def _unit_mistake(unit: str, unknown: str, wanted: Kind) -> str:
+    if not unknown:
+        return f"{shown(unit)[1:-1]!r} is not a unit"
+    similar = units.similar_unit(unknown, unit, wanted.dimension)
+    hint = f"did you mean {similar!r}?" if similar else f'write it as in "{wanted.example}"'
+    return f"unknown unit {unknown!r}, {hint}"
+
+
+def _times(number: str, factor: Fraction) -> float:
+    """Return the float nearest to the exact product."""
+    rough = float(number)
+    if rough == 0 or math.isinf(rough):  # before "1e999999999" becomes a whole number of a billion digits
+        return rough
+    try:
+        return float(Fraction(number) * factor)
+    except OverflowError:
+        return math.copysign(math.inf, rough)
+
+
+def _text_schema(example: str) -> dict[str, Any]:
+    return {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*[A-Za-zµμ°]", "examples": [example]}
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionCoefficient:
+    """Annotation of a float field: a coefficient, or a friction angle ("21 deg") whose tangent is meant."""
+
+    wanted = 'a number of at least 0 such as 0.31, or a friction angle below 90 deg such as "21 deg",'
+
+    def read(self, value: object) -> float:
+        """Turn a coefficient or a friction angle into a coefficient."""
+        if isinstance(value, str):
+            return math.tan(Quantity(ANGLE, at_least=0.0, below=math.pi / 2).read(value))
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            message = f"{shown(value)} is not a number; {self.wanted} is needed"
+            raise invalid(message)
+        return Quantity(NUMBER, at_least=0.0).read(value)
+
+    def __get_pydantic_core_schema__(self, _source: object, _handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Read the value first, then let pydantic see a float."""
+        return core_schema.no_info_before_validator_function(
+            self.read, core_schema.float_schema(strict=True, allow_inf_nan=False)
+        )
+
+    def __get_pydantic_json_schema__(
+        self, _core_schema: CoreSchema, _handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Describe what may stand in the file."""
+        return self.json_schema()
+
+    def json_schema(self) -> dict[str, Any]:
+        """JSON Schema of what may stand in the file: a number or an angle with its unit."""
+        return {"anyOf": [{"type": "number", "minimum": 0}, _text_schema("21 deg")]}
+
+
+PositiveNumber = Annotated[float, Quantity(NUMBER, above=0.0)]
+NonNegativeNumber = Annotated[float, Quantity(NUMBER, at_least=0.0)]
+Share = Annotated[float, Quantity(NUMBER, at_least=0.0, at_most=1.0)]
+PositiveShare = Annotated[float, Quantity(NUMBER, above=0.0, at_most=1.0)]
+PoissonRatio = Annotated[float, Quantity(NUMBER, above=-1.0, below=0.5)]
+Friction = Annotated[float, FrictionCoefficient()]
+Length = Annotated[float, Quantity(LENGTH)]
+PositiveLength = Annotated[float, Quantity(LENGTH, above=0.0)]
+Time = Annotated[float, Quantity(TIME)]
+PositiveTime = Annotated[float, Quantity(TIME, above=0.0)]
+NonNegativeTime = Annotated[float, Quantity(TIME, at_least=0.0)]
+Angle = Annotated[float, Quantity(ANGLE)]
+TiltAngle = Annotated[float, Quantity(ANGLE, above=-math.pi / 2, below=math.pi / 2)]
+Speed = Annotated[float, Quantity(SPEED)]
+PositiveSpeed = Annotated[float, Quantity(SPEED, above=0.0)]
+Spin = Annotated[float, Quantity(SPIN)]
+NonNegativeAcceleration = Annotated[float, Quantity(ACCELERATION, at_least=0.0)]
+Pressure = Annotated[float, Quantity(PRESSURE, above=0.0)]
+Density = Annotated[float, Quantity(DENSITY, above=0.0)]
+UnitWeight = Annotated[float, Quantity(UNIT_WEIGHT, above=0.0)]
+Stiffness = Annotated[float, Quantity(STIFFNESS, above=0.0)]

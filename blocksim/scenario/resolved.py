@@ -1,0 +1,65 @@
+"""A scenario written out again, complete and exact, and its fingerprint."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.study import Sweep
+from blocksim.scenario.quantities import ANGLE, Quantity
+
+HEADER = "# Resolved by blocksim: every value that was used, in SI units (m, kg, s, N, Pa), angles in rad.\n"
+UNHASHED = {"description", "experiment", "sweep", "provenance"}
+
+
+def scenario_to_toml(scenario: Scenario, experiment_table: str | None = None) -> str:
+    """Write every key with its value; loading the text gives an equal scenario, floats to the last bit.
+
+    `experiment_table` replaces the path of the experiment's table, for a copy kept beside the resolved file.
+    """
+    data = _plain(scenario)
+    if experiment_table is not None and "experiment" in data:
+        data["experiment"] = {"table": experiment_table}
+    return HEADER + tomli_w.dumps(data)
+
+
+def scenario_hash(scenario: Scenario) -> str:
+    """Return the SHA-256 (hex) of all that decides the motion and the output, in any order of the file."""
+    data = scenario.model_dump(mode="json", exclude=UNHASHED)
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _plain(table: BaseModel) -> dict[str, Any]:
+    """Turn a table into what its TOML looks like; keys without a value are left out."""
+    if isinstance(table, Sweep):
+        return {"mode": table.mode, **{key: _value(list(values)) for key, values in table.vary.items()}}
+    fields = type(table).model_fields
+    entries = {info.alias or name: _field(info, getattr(table, name)) for name, info in fields.items()}
+    return {key: entry for key, entry in entries.items() if entry is not None}
+
+
+def _field(info: FieldInfo, value: object) -> object:
+    """Write one field; an angle needs its unit, because a bare one would be refused."""
+    is_angle = any(isinstance(mark, Quantity) and mark.kind is ANGLE for mark in info.metadata)
+    return f"{value!r} rad" if is_angle else _value(value)
+
+
+def _value(value: object) -> object:
+    match value:
+        case BaseModel():
+            return _plain(value)
+        case Mapping():
+            return {key: _value(entry) for key, entry in value.items()}
+        case tuple() | list():
+            return [_value(entry) for entry in value]
+        case Path():
+            return value.as_posix()
+        case _:
+            return value

@@ -1,0 +1,20 @@
+"""The kinds of structure; a new kind is one file beside this one and one line in `AnyStructure`."""
+
+from typing import Annotated, get_args
+
+from pydantic import Field
+
+from blocksim.scenario.structures.base import Pose, Structure, UnfitError
+from blocksim.scenario.structures.stack import Stack
+from blocksim.scenario.structures.staircase import Staircase
+
+_Union = Staircase | Stack
+AnyStructure = Annotated[_Union, Field(discriminator="kind")]
+"""Any structure of a scenario, told apart by its `kind`."""
+
+KINDS: dict[str, type[Structure]] = {
+    word: cls for cls in get_args(_Union) for word in get_args(cls.model_fields["kind"].annotation)
+}
+"""Kind as written in a scenario, and its class."""
+
+__all__ = ["KINDS", "AnyStructure", "Pose", "Stack", "Staircase", "Structure", "UnfitError"]

@@ -1,0 +1,105 @@
+"""The one place for colours, fonts and sizes, and for making a picture file."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from blocksim.errors import InvalidInputError, OutputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Okabe & Ito (2008), told apart with every common colour blindness; vermilion is for measured values.
+BLOCK_COLOURS = ("#56B4E9", "#E69F00", "#009E73", "#F0E442", "#0072B2", "#CC79A7")
+MEASURED_COLOUR = "#D55E00"
+INK = "#222222"
+FAINT_INK = "#777777"
+GROUND_COLOUR = "#D9D9D9"
+
+POINTS_PER_INCH = 72.0
+DOTS_PER_INCH = 150
+FONT_SIZE = 8.0  # points
+TITLE_SIZE = 10.0
+SMALLEST_FONT = 4.0  # smaller text is left out
+LINE_WIDTH = 0.8  # points
+
+# A fixed salt and no dates: the same picture is the same file.
+SETTINGS: dict[Any, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": FONT_SIZE,
+    "axes.titlesize": FONT_SIZE,
+    "axes.linewidth": LINE_WIDTH,
+    "axes.edgecolor": FAINT_INK,
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "text.parse_math": False,
+    "xtick.color": FAINT_INK,
+    "xtick.labelcolor": INK,
+    "svg.hashsalt": "blocksim",
+    "savefig.dpi": DOTS_PER_INCH,
+}
+METADATA: dict[str, dict[str, str | None]] = {
+    ".png": {"Software": "blocksim"},
+    ".svg": {"Date": None, "Creator": "blocksim"},
+    ".pdf": {"CreationDate": None, "Creator": "blocksim", "Producer": None},
+}
+
+
+def block_colour(index: int) -> str:
+    """Return the fill of block number `index` (from 0); the palette repeats."""
+    return BLOCK_COLOURS[index % len(BLOCK_COLOURS)]
+
+
+def text_colour(fill: str) -> str:
+    """Return black or white, whichever reads better on `fill` (#rrggbb)."""
+    red, green, blue = (int(fill[start : start + 2], 16) / 255.0 for start in (1, 3, 5))
+    bright = 0.4
+    return INK if 0.299 * red + 0.587 * green + 0.114 * blue > bright else "#FFFFFF"
+
+
+def picture_suffix(path: Path) -> str:
+    """Return the suffix in lower case; raises InvalidInputError for a format that is not written."""
+    suffix = path.suffix.lower()
+    if suffix not in METADATA:
+        message = f"{path}: '{path.suffix}' is no picture format, write {', '.join(METADATA)}"
+        raise InvalidInputError(message)
+    return suffix
+
+
+@contextmanager
+def styled_figure(width: float, height: float) -> Iterator["Figure"]:
+    """Give an empty figure of `width` x `height` inches, in this style; needs no display."""
+    from matplotlib import rc_context, rcParamsDefault  # noqa: PLC0415 - half a second, only for pictures
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    # A user's own matplotlibrc must not change the file, but the backend is none of our business.
+    settings: dict[Any, Any] = {
+        key: value for key, value in rcParamsDefault.items() if not key.startswith("backend")
+    }
+    with rc_context(settings | SETTINGS):
+        figure = Figure(figsize=(width, height))
+        FigureCanvasAgg(figure)
+        yield figure
+
+
+def save_figure(figure: "Figure", path: Path) -> None:
+    """Write the figure as PNG, SVG or PDF after its suffix; raises OutputError when it cannot be written."""
+    suffix = picture_suffix(path)
+    buffer = BytesIO()
+    figure.savefig(buffer, format=suffix[1:], metadata=METADATA[suffix])
+    try:
+        path.write_bytes(buffer.getvalue())
+    except OSError as error:
+        message = f"{path}: cannot be written: {error.strerror}"
+        raise OutputError(message) from None
+
+
+def fitting_font(text: str, room: tuple[float, float], largest: float = FONT_SIZE) -> float:
+    """Return the font size (points) that fits `text` into `room` (width, height; points); 0 if unreadable."""
+    letter = 0.64  # width of a digit in units of the font size
+    size = min(largest, room[0] / (letter * max(len(text), 1)), room[1] / 1.2)
+    return size if size >= SMALLEST_FONT else 0.0

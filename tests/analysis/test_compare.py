@@ -1,0 +1,162 @@
+"""Verdicts about a run against the repeats of an experiment."""
+
+import json
+from math import isnan, sqrt
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from blocksim.analysis.compare import Comparison, ComparisonRow, Verdict, compare_final
+from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.errors import InvalidInputError
+
+TABLE = load_table(Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks.csv")
+UP = 1e-9  # mm: the smallest step beyond a limit that must count
+
+
+def final_table(
+    x: tuple[float, ...] = (16.0, 74.0, 131.0), rotation: tuple[float, ...] = (0.0, -90.0, -90.0)
+) -> pd.DataFrame:
+    names = [str(number) for number in range(1, len(x) + 1)]
+    return pd.DataFrame({"block": names, "x_mm": x, "rotation_deg": rotation})
+
+
+def row(comparison: Comparison, block: str, quantity: str) -> ComparisonRow:
+    return next(row for row in comparison.rows if (row.block, row.quantity) == (block, quantity))
+
+
+def table_of(*values: float) -> ExperimentTable:
+    return ExperimentTable(
+        data=pd.DataFrame(
+            {
+                "block": "1",
+                "quantity": "x",
+                "unit": "mm",
+                "replicate": range(1, len(values) + 1),
+                "value": values,
+            }
+        ),
+        source="made up",
+    )
+
+
+def test_the_paper_s_own_result_is_inside() -> None:
+    assert compare_final(final_table(x=(16.0, 76.05, 130.0)), TABLE).inside
+
+
+def test_one_block_short_of_its_range_is_outside_by_that_much() -> None:
+    comparison = compare_final(final_table(x=(16.0, 67.0, 128.8)), TABLE)
+    assert not comparison.inside
+    short = row(comparison, "2", "x")
+    assert short.verdict is Verdict.OUTSIDE
+    assert short.distance == pytest.approx(71.69 - 67.0)
+    assert short.error == pytest.approx(67.0 - 74.406667, abs=1e-6)
+    assert row(comparison, "3", "x").verdict is Verdict.INSIDE
+
+
+@pytest.mark.parametrize(
+    ("value", "verdict"),
+    [(71.69, "inside"), (78.53, "inside"), (71.69 - UP, "outside"), (78.53 + UP, "outside")],
+)
+def test_the_ends_of_a_range_are_inside_and_it_is_not_widened(value: float, verdict: str) -> None:
+    assert row(compare_final(final_table(x=(16.0, value, 131.0)), TABLE), "2", "x").verdict.value == verdict
+
+
+@pytest.mark.parametrize(
+    ("value", "verdict"),
+    [(16.1, "inside"), (15.5, "inside"), (16.5, "inside"), (15.5 - UP, "outside"), (16.5 + UP, "outside")],
+)
+def test_equal_repeats_are_judged_at_the_reading_uncertainty(value: float, verdict: str) -> None:
+    assert row(compare_final(final_table(x=(value, 74.0, 131.0)), TABLE), "1", "x").verdict.value == verdict
+
+
+@pytest.mark.parametrize(
+    ("angle", "verdict"),
+    [(-85.0, "inside"), (-95.0, "inside"), (-84.9, "outside"), (-95.1, "outside"), (270.0, "outside")],
+)
+def test_rotation_is_judged_within_five_degrees_and_not_wrapped(angle: float, verdict: str) -> None:
+    comparison = compare_final(final_table(rotation=(0.0, angle, -90.0)), TABLE)
+    assert row(comparison, "2", "rotation").verdict.value == verdict
+
+
+def test_a_failed_run_is_outside_and_still_json() -> None:
+    comparison = compare_final(final_table(x=(16.0, float("nan"), 131.0)), TABLE)
+    assert not comparison.inside
+    plain = json.loads(json.dumps(comparison.to_dict(), allow_nan=False))
+    assert plain["rows"][2]["verdict"] == "outside"
+    assert plain["rows"][2]["simulated"] is None
+
+
+def test_uncertainties_of_the_measured_centres() -> None:
+    second = row(compare_final(final_table(), TABLE), "2", "x")
+    values = TABLE.values("2", "x").to_numpy()
+    assert second.u_data == pytest.approx(np.hypot(stats.sem(values), 0.5))
+    half = stats.t.ppf(0.975, 5) * np.std(values, ddof=1) * sqrt(7 / 6)
+    assert second.prediction == pytest.approx(half)
+    assert second.prediction == pytest.approx(7.2, abs=0.05)
+    assert row(compare_final(final_table(), TABLE), "3", "x").prediction == pytest.approx(7.9, abs=0.05)
+
+
+def test_rotations_and_single_repeats_have_no_uncertainty_of_the_mean() -> None:
+    assert isnan(row(compare_final(final_table(), TABLE), "2", "rotation").u_data)
+    single = compare_final(final_table(x=(5.0,), rotation=(0.0,)), table_of(5.2)).rows[0]
+    assert isnan(single.prediction)
+    assert isnan(single.u_data)
+    assert single.verdict is Verdict.INSIDE
+
+
+def test_an_unmeasured_block_is_named_and_not_judged() -> None:
+    final = final_table(x=(16.0, 74.0, 131.0, 500.0), rotation=(0.0, -90.0, -90.0, 0.0))
+    comparison = compare_final(final, TABLE)
+    assert comparison.inside
+    assert row(comparison, "4", "x").verdict is Verdict.NO_DATA
+    assert comparison.messages == (f"block '4' is not in {TABLE.source}, it is not compared",)
+
+
+def test_a_block_that_the_run_lacks_is_an_error() -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        compare_final(final_table(x=(16.0, 74.0), rotation=(0.0, -90.0)), TABLE)
+    assert str(caught.value) == f"{TABLE.source} measures block '3', but the run has only '1', '2'"
+
+
+def test_a_quantity_that_the_run_lacks_is_an_error() -> None:
+    with pytest.raises(InvalidInputError, match="the final table has no column rotation_deg"):
+        compare_final(final_table().drop(columns="rotation_deg"), TABLE)
+
+
+def test_a_block_that_the_run_has_twice_is_an_error() -> None:
+    final = pd.concat([final_table(), final_table()])
+    with pytest.raises(InvalidInputError, match="more than one row for block '1', '2', '3'"):
+        compare_final(final, TABLE)
+
+
+def test_block_numbers_read_as_integers_are_recognised() -> None:
+    final = final_table()
+    final["block"] = final["block"].astype(int)
+    assert compare_final(final, TABLE).inside
+
+
+def test_frame_and_dictionary_say_the_same() -> None:
+    comparison = compare_final(final_table(), TABLE)
+    frame, plain = comparison.to_frame(), comparison.to_dict()
+    assert list(frame["verdict"]) == ["inside"] * 6
+    assert list(frame.columns[:5]) == ["block", "quantity", "unit", "simulated", "mean"]
+    assert plain["inside"] is True
+    assert plain["experiment"] == TABLE.source
+    assert len(frame) == len(TABLE.blocks) * len(TABLE.quantities)
+
+
+finite = st.floats(-1e4, 1e4)
+
+
+@given(repeats=st.lists(finite, min_size=2, max_size=6, unique=True), value=finite)
+def test_distance_is_what_it_takes_to_come_inside(repeats: list[float], value: float) -> None:
+    judged = compare_final(final_table(x=(value,), rotation=(0.0,)), table_of(*repeats)).rows[0]
+    nearest = min(max(value, min(repeats)), max(repeats))
+    assert judged.distance == pytest.approx(abs(value - nearest), abs=1e-9)
+    assert (judged.verdict is Verdict.INSIDE) == (min(repeats) <= value <= max(repeats))

@@ -1,0 +1,279 @@
+"""Measured tables: the numbers printed in the paper, and what a person reads when a table is broken."""
+
+from decimal import ROUND_HALF_EVEN, ROUND_HALF_UP, Decimal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.errors import InvalidInputError
+
+EXPERIMENTS = Path(__file__).parents[2] / "scenarios" / "experiments"
+HEADER = "block,quantity,unit,replicate,value\n"
+HUNDREDTH = Decimal("0.01")
+
+
+@pytest.fixture(name="centres", scope="module")
+def fixture_centres() -> ExperimentTable:
+    return load_table(EXPERIMENTS / "three_blocks.csv")
+
+
+@pytest.fixture(name="edges", scope="module")
+def fixture_edges() -> ExperimentTable:
+    return load_table(EXPERIMENTS / "three_blocks_edges.csv")
+
+
+def mean_of(table: ExperimentTable, block: str, quantity: str) -> float:
+    rows = table.statistics().set_index(["block", "quantity"])["mean"].to_dict()
+    return float(rows[block, quantity])
+
+
+def midpoints(edges: ExperimentTable, block: str, rounding: str) -> list[Decimal]:
+    """Return the midpoints of the edges as a person with pencil and paper gets them."""
+    pairs = zip(edges.values(block, "left"), edges.values(block, "right"), strict=True)
+    sums = [Decimal(str(left)) + Decimal(str(right)) for left, right in pairs]
+    return [(total / 2).quantize(HUNDREDTH, rounding) for total in sums]
+
+
+@pytest.mark.parametrize(("block", "printed"), [("1", 16.0), ("2", 74.41), ("3", 131.33)])
+def test_centres_average_to_what_table_3_prints(centres: ExperimentTable, block: str, printed: float) -> None:
+    assert mean_of(centres, block, "x") == pytest.approx(printed, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("block", "quantity", "printed"),
+    [
+        ("1", "left", 0.0),
+        ("2", "left", 49.01),
+        ("3", "left", 111.15),
+        ("1", "right", 32.0),
+        ("2", "right", 99.8),
+        ("3", "right", 151.51),
+    ],
+)
+def test_edges_average_to_what_table_2_prints(
+    edges: ExperimentTable, block: str, quantity: str, printed: float
+) -> None:
+    assert mean_of(edges, block, quantity) == pytest.approx(
+        printed, abs=0.005 + 1e-9
+    )  # 151.505 became 151.51
+
+
+@pytest.mark.parametrize("block", ["1", "2", "3"])
+def test_every_centre_is_the_midpoint_of_its_edges_rounded_half_up(
+    centres: ExperimentTable, edges: ExperimentTable, block: str
+) -> None:
+    printed = [Decimal(str(value)) for value in centres.values(block, "x")]
+    assert printed == midpoints(edges, block, ROUND_HALF_UP)
+
+
+def test_centres_are_not_the_midpoints_rounded_half_even(
+    centres: ExperimentTable, edges: ExperimentTable
+) -> None:
+    differing = [
+        (block, replicate)
+        for block in centres.blocks
+        for replicate, (value, even) in enumerate(
+            zip(centres.values(block, "x"), midpoints(edges, block, ROUND_HALF_EVEN), strict=True), 1
+        )
+        if Decimal(str(value)) != even
+    ]
+    assert differing == [("2", 1), ("2", 5), ("3", 2), ("3", 4)]
+
+
+def test_statistics_of_the_paper_match_numpy_and_the_design(centres: ExperimentTable) -> None:
+    statistics = centres.statistics().set_index(["block", "quantity"]).to_dict(orient="index")
+    second, third = statistics["2", "x"], statistics["3", "x"]
+    assert (second["n"], second["minimum"], second["maximum"]) == (6, 71.69, 78.53)
+    assert (third["n"], third["minimum"], third["maximum"]) == (6, 128.55, 136.05)
+    assert second["s"] == pytest.approx(np.std(centres.values("2", "x"), ddof=1), rel=1e-12)
+    assert second["s"] == pytest.approx(2.60, abs=0.005)
+    assert third["s"] == pytest.approx(2.84, abs=0.005)
+
+
+def test_rotations_say_that_the_paper_states_them_once(centres: ExperimentTable) -> None:
+    assert [mean_of(centres, block, "rotation") for block in centres.blocks] == [0.0, -90.0, -90.0]
+    assert any("ONCE for all six repeats" in note for note in centres.notes)
+
+
+def test_table_knows_its_blocks_quantities_and_repeats(centres: ExperimentTable) -> None:
+    assert centres.blocks == ("1", "2", "3")
+    assert centres.quantities == ("x", "rotation")
+    assert centres.replicates == (1, 2, 3, 4, 5, 6)
+    assert centres.values("9", "x").empty
+
+
+def test_units_become_millimetres_and_degrees(tmp_path: Path) -> None:
+    rows = "1,x,cm,1,2.5\n1,y,m,1,-0.001\n1,rotation,rad,1,-1.5707963267948966\n1,left,in,1,1\n"
+    table = load_table(write(tmp_path, HEADER + rows))
+    assert list(table.data["value"]) == pytest.approx([25.0, -1.0, -90.0, 25.4], rel=1e-15)
+    assert list(table.data["unit"]) == ["mm", "mm", "deg", "mm"]
+
+
+def test_values_already_in_millimetres_keep_their_bits(tmp_path: Path) -> None:
+    table = load_table(write(tmp_path, HEADER + "1,x,mm,1,71.69\n1,rotation,deg,1,-89.9\n"))
+    assert list(table.data["value"]) == [71.69, -89.9]
+
+
+def test_spreadsheet_habits_are_understood(tmp_path: Path) -> None:
+    text = (
+        '\ufeff# a "note"\r\n\r\nvalue , block,quantity,unit,replicate\r\n 1.5e1, "left, ""L""" ,x,mm, 2\r\n'
+    )
+    table = load_table(write(tmp_path, text))
+    assert table.blocks == ('left, "L"',)
+    assert list(table.values('left, "L"', "x").items()) == [(2, 15.0)]
+    assert table.notes == ('a "note"',)
+
+
+def test_a_single_repeat_has_no_scatter(tmp_path: Path) -> None:
+    statistics = load_table(write(tmp_path, HEADER + "1,x,mm,1,3\n")).statistics()
+    assert np.isnan(statistics["s"].iloc[0])
+    assert list(statistics["n"]) == [1]
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "table.csv"
+    path.write_bytes(text.encode())
+    return path
+
+
+GOOD = "1,x,mm,1,16\n"
+BROKEN = {
+    "unit of another kind": (
+        HEADER + "1,x,kg,1,16\n",
+        (
+            "table.csv:2: unit: 'kg' is not the unit of a length, write mm, cm or m\n"
+            "    2 | 1,x,kg,1,16\n"
+            "      |     ^^"
+        ),
+    ),
+    "unit that does not exist": (
+        HEADER + "1,x,millimetrs,1,16\n",
+        (
+            "table.csv:2: unit: 'millimetrs' is not the unit of a length, write mm, cm or m\n"
+            "    2 | 1,x,millimetrs,1,16\n"
+            "      |     ^^^^^^^^^^"
+        ),
+    ),
+    "no unit": (
+        HEADER + "1,rotation,,1,16\n",
+        "table.csv:2: unit: no unit, write deg or rad\n    2 | 1,rotation,,1,16\n      |            ^",
+    ),
+    "pure number as an angle": (
+        HEADER + "1,rotation,1,1,16\n",
+        (
+            "table.csv:2: unit: '1' is not the unit of an angle, write deg or rad\n"
+            "    2 | 1,rotation,1,1,16\n"
+            "      |            ^"
+        ),
+    ),
+    "unit that would take pint hours": (
+        HEADER + "1,x,mm**9**9**9,1,16\n",
+        (
+            "table.csv:2: unit: 'mm**9**9**9' is not the unit of a length, write mm, cm or m\n"
+            "    2 | 1,x,mm**9**9**9,1,16\n"
+            "      |     ^^^^^^^^^^^"
+        ),
+    ),
+    "word for a number": (
+        HEADER + "1,x,mm,1,about 16\n",
+        (
+            "table.csv:2: value: 'about 16' is not a number, write it as 71.69 or 7.169e1\n"
+            "    2 | 1,x,mm,1,about 16\n"
+            "      |          ^^^^^^^^"
+        ),
+    ),
+    "nan": (
+        HEADER + "1,x,mm,1,nan\n",
+        (
+            "table.csv:2: value: 'nan' is not a number, write it as 71.69 or 7.169e1\n"
+            "    2 | 1,x,mm,1,nan\n"
+            "      |          ^^^"
+        ),
+    ),
+    "infinite after reading": (
+        HEADER + "1,x,mm,1,1e999\n",
+        "table.csv:2: value: '1e999' is too large\n    2 | 1,x,mm,1,1e999\n      |          ^^^^^",
+    ),
+    "too far away": (
+        HEADER + "1,x,m,1,1e7\n",
+        (
+            "table.csv:2: value: '1e7' is too large, at most 1e+09 mm or degrees\n"
+            "    2 | 1,x,m,1,1e7\n"
+            "      |         ^^^"
+        ),
+    ),
+    "mistyped quantity": (
+        HEADER + "1,rotaton,deg,1,16\n",
+        (
+            "table.csv:2: quantity: unknown quantity 'rotaton', did you mean 'rotation'?\n"
+            "    2 | 1,rotaton,deg,1,16\n"
+            "      |   ^^^^^^^"
+        ),
+    ),
+    "foreign quantity": (
+        HEADER + "1,mass,kg,1,16\n",
+        (
+            "table.csv:2: quantity: unknown quantity 'mass', allowed: x, y, rotation, left, right\n"
+            "    2 | 1,mass,kg,1,16\n"
+            "      |   ^^^^"
+        ),
+    ),
+    "repeat is no number": (
+        HEADER + "1,x,mm,first,16\n",
+        (
+            "table.csv:2: replicate: 'first' is not the number of a repeat, count them 1, 2, 3, ...\n"
+            "    2 | 1,x,mm,first,16\n"
+            "      |        ^^^^^"
+        ),
+    ),
+    "repeat zero": (
+        HEADER + "1,x,mm,0,16\n",
+        (
+            "table.csv:2: replicate: '0' is not the number of a repeat, count them 1, 2, 3, ...\n"
+            "    2 | 1,x,mm,0,16\n"
+            "      |        ^"
+        ),
+    ),
+    "nameless block": (
+        HEADER + " ,x,mm,1,16\n",
+        "table.csv:2: block: the block has no name\n    2 |  ,x,mm,1,16\n      |  ^",
+    ),
+    "measured twice": (
+        HEADER + GOOD + "2,x,mm,1,70\n1,x,cm,1,1.7\n",
+        (
+            "table.csv:4: replicate: block '1', x, replicate 1 is already given in line 2\n"
+            "    4 | 1,x,cm,1,1.7\n"
+            "      |        ^"
+        ),
+    ),
+    "several mistakes, by line": (
+        HEADER + "1,x,mm,1,a\n1,z,mm,2,b\n1,x,mm\n",
+        (
+            "table.csv:2: value: 'a' is not a number, write it as 71.69 or 7.169e1\n"
+            "    2 | 1,x,mm,1,a\n"
+            "      |          ^\n"
+            "table.csv:3: quantity: unknown quantity 'z', allowed: x, y, rotation, left, right\n"
+            "    3 | 1,z,mm,2,b\n"
+            "      |   ^\n"
+            "table.csv:3: value: 'b' is not a number, write it as 71.69 or 7.169e1\n"
+            "    3 | 1,z,mm,2,b\n"
+            "      |          ^\n"
+            "table.csv:4: 3 cells where the header has 5 columns\n"
+            "    4 | 1,x,mm\n"
+            "      | ^^^^^^"
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), BROKEN.values(), ids=BROKEN.keys())
+def test_a_broken_table_is_explained_where_it_is_broken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, message: str
+) -> None:
+    write(tmp_path, text)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InvalidInputError) as caught:
+        load_table("table.csv")
+    assert str(caught.value) == message

@@ -1,0 +1,121 @@
+"""The table of sizes and materials."""
+
+from math import radians, tan
+from pathlib import Path
+
+import pytest
+
+from blocksim.analysis.properties import load_properties
+from blocksim.errors import InputMissingError, InvalidInputError
+
+SHIPPED = Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks_properties.csv"
+HEADER = "property,unit,value\n"
+
+
+def test_table_1_and_the_sizes_arrive_in_si() -> None:
+    assert dict(load_properties(SHIPPED).values) == pytest.approx(
+        {
+            "width": 0.032,
+            "height": 0.025,
+            "length": 0.050,
+            "overlap": 0.010,
+            "unit_weight": 26.7e3,
+            "young_modulus": 69e9,
+            "poisson_ratio": 0.3,
+            "friction_block_block": 0.31,
+            "friction_block_ground": 0.38,
+            "ground_friction_angle": radians(21),
+        },
+        rel=1e-14,
+    )
+
+
+def test_measured_friction_angle_and_coefficient_agree() -> None:
+    values = load_properties(SHIPPED).values
+    assert round(tan(values["ground_friction_angle"]), 2) == values["friction_block_ground"]
+
+
+def test_properties_cannot_be_changed_by_accident() -> None:
+    values = load_properties(SHIPPED).values
+    with pytest.raises(TypeError):
+        values["width"] = 1.0  # type: ignore[index]
+
+
+BROKEN = {
+    "mistyped": (
+        "widht,mm,32\n",
+        (
+            "table.csv:2: property: unknown property 'widht', did you mean 'width'?\n"
+            "    2 | widht,mm,32\n"
+            "      | ^^^^^"
+        ),
+    ),
+    "unit": (
+        "unit_weight,kg/m^3,26.7\n",
+        (
+            "table.csv:2: unit: 'kg/m^3' is no unit of unit_weight, write for example N/m^3\n"
+            "    2 | unit_weight,kg/m^3,26.7\n"
+            "      |             ^^^^^^"
+        ),
+    ),
+    "no unit": (
+        "width,,32\n",
+        (
+            "table.csv:2: unit: nothing is no unit of width, write for example m\n"
+            "    2 | width,,32\n"
+            "      |       ^"
+        ),
+    ),
+    "number": (
+        "width,mm,32mm\n",
+        (
+            "table.csv:2: value: '32mm' is not a number, write it as 71.69 or 7.169e1\n"
+            "    2 | width,mm,32mm\n"
+            "      |          ^^^^"
+        ),
+    ),
+    "impossible": (
+        "poisson_ratio,1,0.5\n",
+        (
+            "table.csv:2: value: 0.5 is impossible, it must be above -1 and below 0.5\n"
+            "    2 | poisson_ratio,1,0.5\n"
+            "      |                 ^^^"
+        ),
+    ),
+    "negative": (
+        "width,mm,-32\n",
+        (
+            "table.csv:2: value: -0.032 m is impossible, it must be above 0 m\n"
+            "    2 | width,mm,-32\n"
+            "      |          ^^^"
+        ),
+    ),
+    "twice": (
+        "width,mm,32\nwidth,mm,33\n",
+        "table.csv:3: property: 'width' is given twice\n    3 | width,mm,33\n      | ^^^^^",
+    ),
+    "empty": (
+        "",
+        (
+            "table.csv:1: the table has a header and no rows\n"
+            "    1 | property,unit,value\n"
+            "      | ^^^^^^^^^^^^^^^^^^^"
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize(("rows", "message"), BROKEN.values(), ids=BROKEN.keys())
+def test_a_broken_table_is_explained_where_it_is_broken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: str, message: str
+) -> None:
+    (tmp_path / "table.csv").write_text(HEADER + rows)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InvalidInputError) as caught:
+        load_properties("table.csv")
+    assert str(caught.value) == message
+
+
+def test_a_missing_table_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputMissingError, match="no such file"):
+        load_properties(tmp_path / "none.csv")

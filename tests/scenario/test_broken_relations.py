@@ -1,0 +1,218 @@
+"""Values that are fine by themselves and do not go together. Every message in full."""
+
+from collections.abc import Callable
+
+import pytest
+
+WIDTH = 'width = "40 mm"'
+
+CASES = {
+    "density and unit weight": (
+        "density = 7850",
+        'density = 7850\nunit_weight = "77 kN/m^3"',
+        """
+bad.toml:6: materials.steel.unit_weight: density and unit_weight are both given; give one of them
+    6 | unit_weight = "77 kN/m^3"
+      |               ^^^^^^^^^^^
+""",
+    ),
+    "upright and along the same": (
+        'material = "steel"',
+        'material = "steel"\nupright = "length"\nalong = "length"',
+        """
+bad.toml:15: blocks.brick.along: "length" stands upright already; "width" or "height" can lie along x
+   15 | along = "length"
+      |         ^^^^^^^^
+""",
+    ),
+    "unknown side": (
+        'material = "steel"',
+        'material = "steel"\nupright = "hight"',
+        """
+bad.toml:14: blocks.brick.upright: "hight" is not known here, did you mean "height"?
+   14 | upright = "hight"
+      |           ^^^^^^^
+""",
+    ),
+    "kinetic above static": (
+        None,
+        "\n[friction.block_block]\nstatic = 0.2\nkinetic = 0.3\n",
+        """
+bad.toml:22: friction.block_block.kinetic: kinetic friction 0.3 is above static friction 0.2
+   22 | kinetic = 0.3
+      |           ^^^
+""",
+    ),
+    "unknown material": (
+        'material = "steel"',
+        'material = "steal"',
+        """
+bad.toml:13: blocks.brick.material: unknown material "steal", did you mean 'steel'?
+   13 | material = "steal"
+      |            ^^^^^^^
+""",
+    ),
+    "unknown material of the ground": (
+        None,
+        '\n[ground]\nmaterial = "granite"\n',
+        """
+bad.toml:21: ground.material: unknown material "granite", there is: steel
+   21 | material = "granite"
+      |            ^^^^^^^^^
+""",
+    ),
+    "unknown block": (
+        'block = "brick"',
+        'block = "stone"',
+        """
+bad.toml:17: structures.0.block: unknown block "stone", there is: brick
+   17 | block = "stone"
+      |         ^^^^^^^
+""",
+    ),
+    "unknown kind of structure": (
+        'kind = "stack"',
+        'kind = "piramid"',
+        """
+bad.toml:16: structures.0.kind: "piramid" is no kind of structure, use "staircase" or "stack"
+   16 | kind = "piramid"
+      |        ^^^^^^^^^
+""",
+    ),
+    "misspelt kind of structure": (
+        'kind = "stack"',
+        'kind = "stak"',
+        """
+bad.toml:16: structures.0.kind: "stak" is no kind of structure, did you mean 'stack'?
+   16 | kind = "stak"
+      |        ^^^^^^
+""",
+    ),
+    "contact model not there yet": (
+        None,
+        '\n[contact]\nmodel = "particles"\n',
+        """
+bad.toml:21: contact.model: "particles" is not available yet; use "surface"
+   21 | model = "particles"
+      |         ^^^^^^^^^^^
+""",
+    ),
+    "unknown contact law": (
+        None,
+        '\n[contact]\nlaw = "lineal"\n',
+        """
+bad.toml:21: contact.law: "lineal" is not known here, did you mean "linear"?
+   21 | law = "lineal"
+      |       ^^^^^^^^
+""",
+    ),
+    "scheme not there yet": (
+        None,
+        '\n[time]\nscheme = "nonsmooth"\n',
+        """
+bad.toml:21: time.scheme: "nonsmooth" is not available yet; use "explicit"
+   21 | scheme = "nonsmooth"
+      |          ^^^^^^^^^^^
+""",
+    ),
+    "overlap longer than the block": (
+        'kind = "stack"\nblock = "brick"\ncount = 3',
+        'kind = "staircase"\nblock = "brick"\ncount = 3\noverlap = "41 mm"',
+        """
+bad.toml:19: structures.0.overlap: 41 mm is more than the block's 40 mm along x
+   19 | overlap = "41 mm"
+      |           ^^^^^^^
+""",
+    ),
+    "body inside a stack": (
+        None,
+        '\n[[bodies]]\nblock = "brick"\nx = "45 mm"\ny = "15 mm"\n',
+        """
+bad.toml:20: bodies.0: bodies 1 and 4 overlap by 15 mm; they may touch, no more
+   20 | [[bodies]]
+      |   ^^^^^^
+bad.toml:20: bodies.0: bodies 2 and 4 overlap by 5 mm; they may touch, no more
+   20 | [[bodies]]
+      |   ^^^^^^
+""",
+    ),
+    "tilted body overlapping": (
+        None,
+        '\n[[bodies]]\nblock = "brick"\nx = "60 mm"\ny = "40 mm"\nangle = "45 deg"\n',
+        """
+bad.toml:20: bodies.0: bodies 2 and 4 overlap by 1.2132 mm; they may touch, no more
+   20 | [[bodies]]
+      |   ^^^^^^
+""",
+    ),
+    "body below the ground": (
+        None,
+        '\n[[bodies]]\nblock = "brick"\nx = "1 m"\ny = "9 mm"\n',
+        """
+bad.toml:20: bodies.0: body 4 reaches 1 mm below the ground (y = 0)
+   20 | [[bodies]]
+      |   ^^^^^^
+""",
+    ),
+    "corner below the ground": (
+        None,
+        '\n[[bodies]]\nblock = "brick"\nx = "1 m"\ny = "10 mm"\nangle = "1 deg"\n',
+        """
+bad.toml:20: bodies.0: body 4 reaches 0.347525 mm below the ground (y = 0)
+   20 | [[bodies]]
+      |   ^^^^^^
+""",
+    ),
+    "two structures in one place": (
+        None,
+        '\n[[structures]]\nkind = "stack"\nblock = "brick"\ncount = 1\nleft = "30 mm"\n',
+        """
+bad.toml:20: structures.1: bodies 1 and 4 overlap by 10 mm; they may touch, no more
+   20 | [[structures]]
+      |   ^^^^^^^^^^
+""",
+    ),
+    "body named like another's number": (
+        None,
+        '\n[[bodies]]\nblock = "brick"\nx = "1 m"\ny = "1 m"\nname = "2"\n',
+        """
+bad.toml:24: bodies.0.name: two bodies are named "2"; a body without a name has its number
+   24 | name = "2"
+      |        ^^^
+""",
+    ),
+    "fixed body that moves": (
+        None,
+        '\n[[bodies]]\nblock = "brick"\nx = "1 m"\ny = "1 m"\nspin = "1 rad/s"\nfixed = true\n',
+        """
+bad.toml:25: bodies.0.fixed: a fixed body cannot have a velocity or a spin
+   25 | fixed = true
+      |         ^^^^
+""",
+    ),
+    "too many bodies": (
+        "count = 3",
+        'count = 100_000\n[[structures]]\nkind = "stack"\nblock = "brick"\ncount = 1',
+        """
+bad.toml:15: structures: 100001 bodies are too many; at most 100000 are possible
+   15 | [[structures]]
+      |   ^^^^^^^^^^
+""",
+    ),
+    "mass beyond all numbers": (
+        WIDTH,
+        "width = 1e308",
+        """
+bad.toml:9: blocks.brick: a block of inf kg and inf kg m^2 cannot be simulated; check its sides and density
+    9 | [blocks.brick]
+      |  ^^^^^^^^^^^^
+""",
+    ),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "message"), CASES.values(), ids=CASES)
+def test_relations(
+    refusal_of_edit: Callable[[str | None, str], tuple[int, str]], old: str | None, new: str, message: str
+) -> None:
+    assert refusal_of_edit(old, new) == (65, message.strip("\n"))

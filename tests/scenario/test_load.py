@@ -1,0 +1,169 @@
+"""Loading: from files and from Python, with values set from outside."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pytest
+
+from blocksim.scenario import Document, Scenario, load_scenario, scenario_from_mapping
+
+
+@pytest.fixture
+def file(tmp_path: Path, valid_text: str) -> Path:
+    path = tmp_path / "case.toml"
+    path.write_text(valid_text)
+    return path
+
+
+def test_every_shipped_scenario_loads_under_its_own_name(shipped: Path) -> None:
+    assert load_scenario(shipped).name == shipped.stem
+
+
+def test_the_literal_reading_differs_from_the_nominal_one_in_one_value_only() -> None:
+    folder = Path(__file__).parents[2] / "scenarios"
+    literal = load_scenario(folder / "three_blocks_literal.toml")
+    told = {"name": literal.name, "description": literal.description}
+    nominal = load_scenario(folder / "three_blocks_nominal.toml", {"blocks.brick.upright": "height", **told})
+    assert nominal.model_copy(update={"ground": literal.ground}) == literal
+
+
+def test_a_file_may_have_a_byte_order_mark_and_windows_line_ends(tmp_path: Path, file: Path) -> None:
+    other = tmp_path / "windows.toml"
+    other.write_bytes(b"\xef\xbb\xbf" + file.read_bytes().replace(b"\n", b"\r\n"))
+    assert load_scenario(other) == load_scenario(str(file))
+
+
+def test_python_data_mean_the_same_as_the_file(file: Path, valid_text: str) -> None:
+    assert scenario_from_mapping(tomllib.loads(valid_text)) == load_scenario(file)
+
+
+def test_the_defaults_are_the_documented_ones(file: Path) -> None:
+    scenario = load_scenario(file)
+    assert scenario.gravity == 9.81
+    assert (scenario.friction.block_block.static, scenario.friction.block_block.kinetic) == (0.31, 0.31)
+    assert (scenario.friction.block_ground.static, scenario.friction.block_ground.kinetic) == (0.38, 0.38)
+    assert scenario.friction.block_ground.transition_speed == 0.005
+    assert (scenario.contact.model, scenario.contact.law) == ("surface", "linear")
+    assert (scenario.contact.restitution.block_block, scenario.contact.restitution.block_ground) == (0.2, 0.2)
+    assert scenario.contact.stiffness_scale == 1.0
+    assert scenario.contact.normal_stiffness is scenario.contact.shear_stiffness_ratio is None
+    assert scenario.contact.shear_damping_ratio is scenario.contact.max_overlap is None
+    assert (scenario.time.end, scenario.time.step, scenario.time.safety) == (2.0, "auto", 0.05)
+    assert (scenario.time.stop_at_rest, scenario.time.rest_speed, scenario.time.rest_hold) == (
+        True,
+        1e-4,
+        0.05,
+    )
+    assert (scenario.output.every, scenario.output.contacts) == (0.001, False)
+    assert scenario.experiment is None
+    assert scenario.sweep is None
+
+
+@pytest.mark.parametrize(
+    ("overrides", "attribute", "value"),
+    [
+        (["time.end=5"], "time.end", 5.0),
+        (["time.end = 5 ms"], "time.end", 0.005),
+        (['time.end="5 ms"'], "time.end", 0.005),
+        (["time.stop_at_rest=false"], "time.stop_at_rest", False),
+        (["name=other"], "name", "other"),
+        (["description=what = this?"], "description", "what = this?"),
+        (["time.end=1", "time.end=3"], "time.end", 3.0),
+        (["contact.restitution=0.4"], "contact.restitution.block_block", 0.4),
+        (["contact.restitution.block_block=0.4"], "contact.restitution.block_ground", 0.2),
+        (
+            ["contact.restitution=0.4", "contact.restitution.block_block=0.3"],
+            "contact.restitution.block_ground",
+            0.4,
+        ),
+        (["contact={ restitution = { block_ground = 0.1 } }"], "contact.restitution.block_ground", 0.1),
+        ({"time.end": 5}, "time.end", 5.0),
+        ({"ground.tilt": "0.25 rad", "time.end": 7.0}, "ground.tilt", 0.25),
+    ],
+)
+def test_overrides(
+    file: Path, overrides: Mapping[str, object] | Sequence[str], attribute: str, value: object
+) -> None:
+    found: object = load_scenario(file, overrides)
+    for name in attribute.split("."):
+        found = getattr(found, name)
+    assert found == value
+
+
+def test_an_element_of_a_list_is_set_by_its_number(file: Path) -> None:
+    scenario = load_scenario(file, ["structures.0.count=7", "structures.0.offset=1 mm"])
+    assert [structure.count for structure in scenario.structures] == [7]
+
+
+def test_a_quoted_key_is_set(file: Path) -> None:
+    assert load_scenario(file, ['provenance."time.end"=assumed']).provenance == {"time.end": "assumed"}
+
+
+@pytest.mark.parametrize(
+    "given", ["", "\n[friction]\nblock_block = 0.31\n", "\n[friction]\nblock_block.static = 0.31\n"]
+)
+def test_setting_the_kinetic_friction_keeps_the_static_one(
+    tmp_path: Path, valid_text: str, given: str
+) -> None:
+    path = tmp_path / "friction.toml"
+    path.write_text(valid_text + given)
+    pair = load_scenario(path, {"friction.block_block.kinetic": 0.2}).friction.block_block
+    assert (pair.static, pair.kinetic) == (0.31, 0.2)
+
+
+def test_setting_the_static_part_of_a_bare_friction_sets_both(file: Path) -> None:
+    pair = load_scenario(
+        file, {"friction.block_ground": "21 deg", "friction.block_ground.static": 0.25}
+    ).friction
+    assert (pair.block_ground.static, pair.block_ground.kinetic) == (0.25, 0.25)
+
+
+def test_setting_values_leaves_the_document_as_it_was(file: Path) -> None:
+    document = Document.read(file)
+    before = document.build()
+    changed = document.with_values({"structures.0.count": 9, "blocks.brick.width": 1})
+    assert document.build() == before
+    assert changed.build() != before
+
+
+def test_a_scenario_cannot_be_changed(file: Path) -> None:
+    scenario: Scenario = load_scenario(file)
+    with pytest.raises(ValueError, match="frozen"):
+        scenario.name = "other"  # type: ignore[misc]
+
+
+def test_the_experiment_table_is_found_beside_the_scenario(
+    tmp_path: Path, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "table.csv").touch()
+    monkeypatch.chdir("/")
+    experiment = load_scenario(file, {"experiment.table": "table.csv"}).experiment
+    assert experiment is not None
+    assert experiment.table == (tmp_path / "table.csv").resolve()
+
+
+def test_sweep_values_are_spread_evenly_with_both_ends(file: Path) -> None:
+    sweep = load_scenario(
+        file,
+        {
+            "sweep": {
+                "structures.0.offset": {"from": "1 mm", "to": "4 mm", "count": 4},
+                "ground.tilt": {"from": "0 rad", "to": "0.5 rad", "count": 3},
+                "contact.stiffness_scale": [0.1, 1],
+                "time.step": ["auto", "1 us"],
+            }
+        },
+    ).sweep
+    assert sweep is not None
+    assert sweep.mode == "grid"
+    assert sweep.vary["structures.0.offset"] == pytest.approx((0.001, 0.002, 0.003, 0.004), abs=1e-18)
+    assert sweep.vary["structures.0.offset"][-1] == 0.004
+    assert sweep.vary["ground.tilt"] == ("0.0 rad", "0.25 rad", "0.5 rad")
+    assert sweep.vary["contact.stiffness_scale"] == (0.1, 1)
+    assert sweep.vary["time.step"] == ("auto", "1 us")
+
+
+def test_sweep_values_that_only_fit_together_are_accepted(file: Path) -> None:
+    sweep = {"mode": "list", "friction.block_block.static": [0.2], "friction.block_block.kinetic": [0.4]}
+    assert load_scenario(file, {"friction.block_block.kinetic": 0.25, "sweep": sweep}).sweep is not None

@@ -1,0 +1,72 @@
+"""Where bodies are at the start."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from blocksim.scenario import load_scenario, place_bodies, scenario_from_mapping
+
+MATERIAL = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
+BRICK = {"width": "32 mm", "height": "25 mm", "length": "50 mm", "material": "aluminium"}
+
+
+def scenario_data(**tables: object) -> dict[str, object]:
+    return {
+        "schema": 1,
+        "name": "a",
+        "materials": {"aluminium": MATERIAL},
+        "blocks": {"brick": BRICK},
+        **tables,
+    }
+
+
+def test_the_three_blocks_stand_as_in_the_experiment() -> None:
+    path = Path(__file__).parents[2] / "scenarios" / "three_blocks_nominal.toml"
+    bodies = place_bodies(load_scenario(path))
+    assert [body.name for body in bodies] == ["1", "2", "3"]
+    assert [body.x for body in bodies] == pytest.approx([0.016, 0.038, 0.060], abs=1e-15)
+    assert [body.y for body in bodies] == pytest.approx([0.025, 0.075, 0.125], abs=1e-15)
+    assert {(body.size_x, body.size_y, body.depth, body.angle) for body in bodies} == {
+        (0.032, 0.05, 0.025, 0.0)
+    }
+    assert bodies[0].density == pytest.approx(2721.7, abs=0.05)
+    assert bodies[0].mass == pytest.approx(0.10887, abs=5e-6)
+    assert bodies[0].inertia == pytest.approx(0.10887 * (0.032**2 + 0.05**2) / 12, rel=1e-4)
+
+
+def test_the_inertia_of_the_flat_block_is_the_one_of_the_verification_table() -> None:
+    (body,) = place_bodies(load_scenario(Path(__file__).parents[2] / "scenarios" / "slide.toml"))
+    assert body.inertia == pytest.approx(1.496e-5, abs=5e-9)
+
+
+def test_structures_come_before_bodies_and_numbers_run_on() -> None:
+    stack = {"kind": "stack", "block": "brick", "count": 2}
+    spec = {
+        "block": "brick",
+        "x": "1 m",
+        "y": "1 m",
+        "angle": "30 deg",
+        "velocity": ["1 m/s", 0],
+        "spin": "180 deg/s",
+    }
+    bodies = place_bodies(
+        scenario_from_mapping(
+            scenario_data(
+                bodies=[spec, {"block": "brick", "x": 2, "y": 2, "name": "wall", "fixed": True}],
+                structures=[stack, {**stack, "left": "0.1 m"}],
+            )
+        )
+    )
+    assert [body.name for body in bodies] == ["1", "2", "3", "4", "5", "wall"]
+    moving, wall = bodies[4:]
+    assert (moving.x, moving.y, moving.angle) == (1.0, 1.0, math.radians(30))
+    assert (moving.vx, moving.vy, moving.spin, moving.fixed) == (1.0, 0.0, math.pi, False)
+    assert (wall.x, wall.fixed, wall.spin) == (2.0, True, 0.0)
+
+
+def test_a_unit_weight_is_divided_by_standard_gravity_whatever_the_gravity() -> None:
+    light = {"unit_weight": 981, "young_modulus": 1e9, "poisson_ratio": 0.3}
+    data = scenario_data(gravity=1.62, bodies=[{"block": "brick", "x": 0, "y": 1}])
+    (body,) = place_bodies(scenario_from_mapping({**data, "materials": {"aluminium": light}}))
+    assert body.density == 100.0

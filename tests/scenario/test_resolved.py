@@ -1,0 +1,254 @@
+"""The resolved file means the same to the last bit, and the hash tells scenarios apart."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import BaseModel
+
+from blocksim.scenario import (
+    Document,
+    Scenario,
+    load_scenario,
+    scenario_from_mapping,
+    scenario_hash,
+    scenario_to_toml,
+)
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+def again(scenario: Scenario) -> Scenario:
+    return Document.parse(scenario_to_toml(scenario)).build()
+
+
+def test_a_shipped_scenario_is_written_and_loaded_bit_equal(shipped: Path) -> None:
+    scenario = load_scenario(shipped)
+    assert again(scenario) == scenario
+    assert repr(again(scenario)) == repr(scenario)
+    assert scenario_hash(again(scenario)) == scenario_hash(scenario)
+
+
+def test_writing_twice_gives_the_same_text(shipped: Path) -> None:
+    text = scenario_to_toml(load_scenario(shipped))
+    assert scenario_to_toml(Document.parse(text).build()) == text
+
+
+def decades(low: int, high: int) -> st.SearchStrategy[float]:
+    return st.floats(10.0**low, 10.0**high)
+
+
+FRACTION = st.floats(0, 1)
+ANGLE = st.floats(-1.5, 1.5).map(lambda angle: f"{angle!r} rad")
+FRICTIONS = st.one_of(
+    st.floats(0, 5),
+    st.floats(0, 89).map(lambda angle: f"{angle!r} deg"),
+    st.tuples(st.floats(0, 5), FRACTION, decades(-6, 2)).map(
+        lambda v: {"static": v[0], "kinetic": v[0] * v[1], "transition_speed": v[2]}
+    ),
+)
+TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=30)
+SCENARIOS = st.fixed_dictionaries(
+    {
+        "schema": st.just(1),
+        "name": st.from_regex(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,20}", fullmatch=True),
+        "materials": st.fixed_dictionaries(
+            {
+                "m": st.fixed_dictionaries(
+                    {"young_modulus": decades(3, 12), "poisson_ratio": st.floats(-0.99, 0.49)}
+                ).flatmap(
+                    lambda table: st.tuples(st.sampled_from(["density", "unit_weight"]), decades(1, 5)).map(
+                        lambda chosen: {**table, chosen[0]: chosen[1]}
+                    )
+                )
+            }
+        ),
+        "blocks": st.fixed_dictionaries(
+            {
+                "b": st.fixed_dictionaries(
+                    {"width": decades(-3, 1), "height": decades(-3, 1), "length": decades(-3, 1)},
+                    optional={"upright": st.sampled_from(["width", "height", "length"])},
+                ).map(lambda table: {**table, "material": "m"})
+            }
+        ),
+        "bodies": st.fixed_dictionaries(
+            {
+                "x": st.floats(-1e3, 1e3),
+                "y": st.floats(50, 1e3),
+                "angle": ANGLE,
+                "spin": st.floats(-1e3, 1e3),
+            },
+            optional={"velocity": st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=2)},
+        ).map(lambda table: [{**table, "block": "b"}]),
+    },
+    optional={
+        "description": TEXT,
+        "gravity": st.floats(0, 100),
+        "ground": st.fixed_dictionaries({"tilt": ANGLE}),
+        "friction": st.fixed_dictionaries({}, optional={"block_block": FRICTIONS, "block_ground": FRICTIONS}),
+        "contact": st.fixed_dictionaries(
+            {},
+            optional={
+                "restitution": FRACTION,
+                "stiffness_scale": decades(-6, 1),
+                "normal_stiffness": decades(3, 10),
+                "shear_damping_ratio": st.floats(0, 3),
+                "max_overlap": decades(-6, -3),
+            },
+        ),
+        "time": st.fixed_dictionaries(
+            {"end": decades(-3, 2)}, optional={"step": decades(-9, -3), "rest_hold": st.floats(0, 1)}
+        ),
+        "provenance": st.fixed_dictionaries({"time.end": TEXT}),
+    },
+)
+
+
+@given(SCENARIOS)
+def test_any_scenario_is_written_and_loaded_bit_equal(data: dict[str, Any]) -> None:
+    scenario = scenario_from_mapping(data)
+    assert repr(again(scenario)) == repr(scenario)
+    assert scenario_hash(again(scenario)) == scenario_hash(scenario)
+
+
+def test_a_sweep_is_written_as_lists_of_values(valid_text: str) -> None:
+    tilts = '"ground.tilt" = { from = "1 deg", to = "2 deg", count = 2 }'
+    scenario = Document.parse(f'{valid_text}\n[sweep]\nmode = "list"\n{tilts}\n"time.end" = [1, 2]\n').build()
+    assert again(scenario) == scenario
+    assert f'"ground.tilt" = [\n    "{math.radians(1)!r} rad",\n' in scenario_to_toml(scenario)
+
+
+def test_the_experiment_table_can_be_renamed(tmp_path: Path) -> None:
+    scenario = load_scenario(REPOSITORY / "scenarios" / "three_blocks_nominal.toml")
+    (tmp_path / "copy.csv").touch()
+    (tmp_path / "scenario.toml").write_text(scenario_to_toml(scenario, experiment_table="copy.csv"))
+    experiment = load_scenario(tmp_path / "scenario.toml").experiment
+    assert experiment is not None
+    assert experiment.table == tmp_path / "copy.csv"
+
+
+HASHED = {
+    "name": "other",
+    "gravity": 9.8,
+    "materials.m.density": 2.0,
+    "materials.m.young_modulus": 2.0,
+    "materials.m.poisson_ratio": 0.1,
+    "blocks.b.width": 2.0,
+    "blocks.b.height": 2.0,
+    "blocks.b.length": 2.0,
+    "blocks.b.upright": "length",
+    "blocks.b.along": "length",
+    "blocks.b.material": "n",
+    "structures.0.block": "c",
+    "structures.0.kind": "staircase",
+    "structures.0.count": 2,
+    "structures.0.left": 0.1,
+    "structures.0.offset": 0.1,
+    "bodies.0.block": "c",
+    "bodies.0.x": 11,
+    "bodies.0.y": 11,
+    "bodies.0.angle": "1 deg",
+    "bodies.0.velocity": [0, 1],
+    "bodies.0.spin": 1,
+    "bodies.0.fixed": True,
+    "bodies.0.name": "x",
+    "ground.tilt": "1 deg",
+    "ground.material": "n",
+    "friction.block_block.static": 0.32,
+    "friction.block_block.kinetic": 0.1,
+    "friction.block_block.transition_speed": 0.1,
+    "friction.block_ground.static": 0.39,
+    "friction.block_ground.kinetic": 0.1,
+    "friction.block_ground.transition_speed": 0.1,
+    "contact.restitution.block_block": 0.1,
+    "contact.restitution.block_ground": 0.1,
+    "contact.stiffness_scale": 0.1,
+    "contact.normal_stiffness": 1.0,
+    "contact.shear_stiffness_ratio": 0.82,
+    "contact.shear_damping_ratio": 0.1,
+    "contact.max_overlap": 0.1,
+    "contact.particle_spacing": 0.1,
+    "time.end": 1.0,
+    "time.step": 1e-6,
+    "time.safety": 0.1,
+    "time.force_step": True,
+    "time.stop_at_rest": False,
+    "time.rest_speed": 1.0,
+    "time.rest_hold": 1.0,
+    "output.every": 1.0,
+    "output.contacts": True,
+}
+SINGLE_CHOICE = {"schema", "contact.model", "contact.law", "time.scheme", "materials.m.unit_weight"}
+
+
+@pytest.fixture
+def data() -> dict[str, Any]:
+    material = {"density": 1, "young_modulus": 1, "poisson_ratio": 0}
+    block = {"width": 1, "height": 1, "length": 1, "material": "m"}
+    return {
+        "schema": 1,
+        "name": "a",
+        "materials": {"m": material, "n": material},
+        "blocks": {"b": block, "c": block},
+        "structures": [{"kind": "stack", "block": "b", "count": 1}],
+        "bodies": [{"block": "b", "x": 10, "y": 10}],
+    }
+
+
+def leaves(table: BaseModel, path: str = "") -> Iterator[str]:
+    """Yield the dotted key of every single value below a table."""
+    for name, info in type(table).model_fields.items():
+        value = getattr(table, name)
+        key = path + (info.alias or name)
+        if isinstance(value, BaseModel):
+            yield from leaves(value, key + ".")
+        elif isinstance(value, dict):
+            for inner, entry in value.items():
+                yield from leaves(entry, f"{key}.{inner}.")
+        elif value and isinstance(value, tuple) and isinstance(value[0], BaseModel):
+            yield from leaves(value[0], key + ".0.")
+        else:
+            yield key
+
+
+@pytest.mark.parametrize("key", HASHED)
+def test_the_hash_changes_with_every_value_that_decides_the_motion(data: dict[str, Any], key: str) -> None:
+    document = Document.from_mapping(data)
+    values = {key: HASHED[key]} | ({"structures.0.overlap": 1.0} if HASHED[key] == "staircase" else {})
+    assert scenario_hash(document.with_values(values).build()) != scenario_hash(document.build())
+
+
+def test_every_key_is_either_hashed_or_known_not_to_matter(data: dict[str, Any]) -> None:
+    found = set(leaves(scenario_from_mapping(data)))
+    unmoved = {"description", "experiment", "sweep"}
+    others = {key for key in found if key.startswith(("materials.n.", "blocks.c."))}
+    assert found - others - SINGLE_CHOICE - unmoved == set(HASHED)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"description": "text"},
+        {"experiment.table": __file__},
+        {"sweep": {"time.end": [1, 2]}},
+        {"provenance": {"time.end": "measured"}},
+        {"time.end": "2000 ms"},
+        {"friction.block_block": 0.31},
+        {"blocks.b.along": "width"},
+    ],
+)
+def test_the_hash_ignores_what_does_not_move_anything(
+    data: dict[str, Any], values: dict[str, object]
+) -> None:
+    document = Document.from_mapping(data)
+    assert scenario_hash(document.with_values(values).build()) == scenario_hash(document.build())
+
+
+def test_the_hash_is_the_same_in_every_process() -> None:
+    scenario = load_scenario(REPOSITORY / "scenarios" / "slide.toml")
+    assert len(scenario_hash(scenario)) == 64
+    assert scenario_hash(scenario) == scenario_hash(again(scenario))

@@ -1,0 +1,89 @@
+"""The JSON Schema accepts what loading accepts, and refuses typos."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from blocksim.scenario import json_schema, load_scenario, scenario_to_toml
+
+
+@pytest.fixture(scope="module")
+def validator() -> Draft202012Validator:
+    return Draft202012Validator(json_schema())
+
+
+def test_it_is_a_schema() -> None:
+    schema = json_schema()
+    Draft202012Validator.check_schema(schema)
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+
+
+def test_shipped_scenarios_are_valid_as_written_and_resolved(
+    validator: Draft202012Validator, shipped: Path
+) -> None:
+    validator.validate(tomllib.loads(shipped.read_text()))
+    validator.validate(tomllib.loads(scenario_to_toml(load_scenario(shipped))))
+
+
+@pytest.mark.parametrize(
+    "addition",
+    [
+        '[friction]\nblock_block = { static = 0.3, kinetic = "11 deg", transition_speed = "5 mm/s" }',
+        '[friction]\nblock_ground = "21 deg"',
+        "[contact]\nrestitution = 0.5",
+        "[contact]\nrestitution = { block_block = 0.5 }",
+        '[time]\nend = "2 s"\nstep = "auto"',
+        '[time]\nstep = "1e-6 s"',
+        '[[bodies]]\nblock = "brick"\nx = 1\ny = "1 m"\nangle = 0\nvelocity = ["1 m/s", 0]',
+        '[sweep]\nmode = "grid"\n"time.end" = [1, "2 s"]',
+        '[sweep]\n"ground.tilt" = { from = "1 deg", to = "2 deg", count = 3 }',
+        '[provenance]\n"time.end" = "assumed"',
+    ],
+)
+def test_every_form_of_a_value_is_valid(
+    validator: Draft202012Validator, valid_text: str, addition: str
+) -> None:
+    validator.validate(tomllib.loads(f"{valid_text}\n{addition}\n"))
+
+
+@pytest.mark.parametrize(
+    "addition",
+    [
+        "[tiem]\nend = 1",
+        "[time]\nedn = 1",
+        "[time]\nend = 0",
+        "[time]\nend = true",
+        '[time]\nend = "soon"',
+        "[friction]\nblock_blok = 0.3",
+        "[friction]\nblock_block = { static = 0.3, kinetik = 0.2 }",
+        "[contact]\nrestitution = 1.5",
+        '[contact]\nmodel = "particles"',
+        "[ground]\ntilt = 30",
+        '[[bodies]]\nblock = "brick"\nx = 1',
+        '[[bodies]]\nblock = "brick"\nx = 1\ny = 1\nvelocity = [1]',
+        '[[structures]]\nkind = "piramid"\nblock = "brick"\ncount = 1',
+        '[[structures]]\nkind = "stack"\nblock = "brick"\ncount = 1\noverlap = 1',
+        '[[structures]]\nkind = "stack"\nblock = "brick"\ncount = 0',
+        '[sweep]\n"time.end" = 3',
+        "[materials.wood]\nyoung_modulus = 1\npoisson_ratio = 0",
+        "[materials.wood]\ndensity = 1\nunit_weight = 1\nyoung_modulus = 1\npoisson_ratio = 0",
+    ],
+)
+def test_mistakes_are_refused(validator: Draft202012Validator, valid_text: str, addition: str) -> None:
+    assert not validator.is_valid(tomllib.loads(f"{valid_text}\n{addition}\n"))
+
+
+def test_every_key_is_described() -> None:
+    schema = json_schema()
+    tables: dict[str, Any] = {"Scenario": schema, **schema["$defs"]}
+    missing = [
+        f"{name}.{key}"
+        for name, table in tables.items()
+        for option in [table, *table.get("anyOf", [])]
+        for key, entry in option.get("properties", {}).items()
+        if not entry.get("description")
+    ]
+    assert missing == []

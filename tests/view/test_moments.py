@@ -1,0 +1,102 @@
+"""Which frames a strip shows."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from blocksim.errors import InvalidInputError
+from blocksim.view.moments import drawable_frames, moments_at, moments_by_motion, path_travelled
+
+Floats = NDArray[np.float64]
+
+
+@dataclass
+class OneBlock:
+    """Frames of one unit square at the given places."""
+
+    time: Floats
+    x: Floats
+    angle: Floats
+    y: Floats = field(init=False)
+    size_x: Floats = field(default_factory=lambda: np.array([1.0]))
+    size_y: Floats = field(default_factory=lambda: np.array([1.0]))
+    names: tuple[str, ...] = ("1",)
+
+    def __post_init__(self) -> None:
+        self.y = np.zeros_like(self.x)
+
+
+def moving(places: list[float], angles: list[float] | None = None) -> OneBlock:
+    x = np.array(places)[:, None]
+    angle = np.zeros_like(x) if angles is None else np.array(angles)[:, None]
+    return OneBlock(time=np.array([0.1 * step for step in range(len(places))]), x=x, angle=angle)
+
+
+def test_panels_are_even_in_the_way_and_not_in_time() -> None:
+    frames = moving([0.0] * 50 + [1.0, 2.0, 3.0, 4.0] + [4.0] * 100)
+    chosen = moments_by_motion(frames, drawable_frames(frames), 5)
+    assert list(frames.x[chosen, 0]) == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert (chosen[0], chosen[-1]) == (0, 153)
+
+
+def test_turning_on_the_spot_counts_as_motion() -> None:
+    frames = moving([0.0] * 5, [0.0, 0.0, 0.5, 1.0, 1.0])
+    path = path_travelled(frames, drawable_frames(frames))
+    assert list(path) == pytest.approx([0.0, 0.0, np.sqrt(0.125), np.sqrt(0.5), np.sqrt(0.5)])
+
+
+def test_going_back_and_forth_does_not_cancel() -> None:
+    frames = moving([0.0, 1.0, 0.0])
+    assert path_travelled(frames, drawable_frames(frames))[-1] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("places", "expected"), [([1.0], [0]), ([1.0] * 9, [0, 8]), ([0.0, 1.0, 2.0], [0, 1, 2])]
+)
+def test_short_or_still_runs_show_no_frame_twice(places: list[float], expected: list[int]) -> None:
+    frames = moving(places)
+    assert list(moments_by_motion(frames, drawable_frames(frames), 8)) == expected
+
+
+def test_one_violent_step_is_shown_once() -> None:
+    frames = moving([0.0, 0.1, 100.0, 100.1])
+    chosen = moments_by_motion(frames, drawable_frames(frames), 8)
+    assert len(set(chosen)) == len(chosen)
+    assert 2 in chosen
+
+
+def test_a_failed_run_is_drawn_as_far_as_it_has_numbers() -> None:
+    frames = moving([0.0, 1.0, float("nan"), 3.0])
+    frames.angle[3] = np.inf
+    assert list(drawable_frames(frames)) == [0, 1]
+
+
+def test_a_run_without_a_number_or_a_block_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="no frame to draw"):
+        drawable_frames(moving([float("nan")]))
+    nobody = moving([0.0])
+    nobody.names = ()
+    with pytest.raises(InvalidInputError, match="no block to draw"):
+        drawable_frames(nobody)
+
+
+def test_times_find_their_nearest_frames_in_the_order_given() -> None:
+    frames = moving([0.0, 1.0, 2.0, 3.0])
+    assert list(moments_at(frames, drawable_frames(frames), [0.29, 0.0, 0.14])) == [3, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("times", "message"),
+    [
+        ([0.1, 0.5], "time 0.5 s lies outside the recorded span, 0 to 0.3 s"),
+        ([-0.1], "time -0.1 s lies outside the recorded span"),
+        ([float("nan")], "time nan s lies outside the recorded span"),
+        ([], "no times to draw were given"),
+    ],
+)
+def test_times_that_were_not_recorded_are_refused(times: list[float], message: str) -> None:
+    frames = moving([0.0, 1.0, 2.0, 3.0])
+    with pytest.raises(InvalidInputError, match=message):
+        moments_at(frames, drawable_frames(frames), times)

@@ -1,0 +1,41 @@
+"""Colours and letters that can be read."""
+
+from itertools import combinations
+
+import pytest
+
+from blocksim.view.style import (
+    BLOCK_COLOURS,
+    MEASURED_COLOUR,
+    SMALLEST_FONT,
+    block_colour,
+    fitting_font,
+    text_colour,
+)
+
+
+def luminance(colour: str) -> float:
+    """Return the relative luminance of the web accessibility guidelines (WCAG 2)."""
+    parts = [int(colour[start : start + 2], 16) / 255 for start in (1, 3, 5)]
+    red, green, blue = (
+        part / 12.92 if part <= 0.03928 else ((part + 0.055) / 1.055) ** 2.4 for part in parts
+    )
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+@pytest.mark.parametrize("fill", BLOCK_COLOURS)
+def test_block_names_stand_out_from_their_blocks(fill: str) -> None:
+    light, dark = sorted((luminance(fill), luminance(text_colour(fill))), reverse=True)
+    assert (light + 0.05) / (dark + 0.05) > 3.0
+
+
+def test_the_palette_repeats_and_keeps_measured_values_apart() -> None:
+    assert block_colour(len(BLOCK_COLOURS)) == block_colour(0)
+    assert all(first != second for first, second in combinations((*BLOCK_COLOURS, MEASURED_COLOUR), 2))
+
+
+def test_text_shrinks_to_its_room_and_vanishes_when_unreadable() -> None:
+    assert fitting_font("1", (100.0, 100.0)) == 8.0
+    assert SMALLEST_FONT <= fitting_font("block_12", (30.0, 100.0)) < 8.0
+    assert fitting_font("block_12", (10.0, 100.0)) == 0.0
+    assert fitting_font("", (10.0, 100.0)) > 0.0
