@@ -26,7 +26,7 @@ def contact_points(world: World, p: int) -> int:
 def contact_forces(world: World, step: float) -> None:
     """Evaluate all contacts at the present positions and kick all bodies for the second half of the step.
 
-    `step` is the length (s) of the drift that led here, zero before the first step.
+    `step` is the length (s) of the drift that led here, zero at the start.
     """
     for p in range(world.clock[0].pair_count):
         count = contact_points(world, p)
@@ -68,31 +68,25 @@ def check(world: World) -> int:
 
 
 @kernel
-def prepare(world: World) -> int:
-    """Make the first pair list and the first accelerations; needed once before the first step."""
-    if not rebuild_pairs(world):
-        return PAIRS_FULL
-    contact_forces(world, 0.0)
-    world.ledger[0].largest_kinetic = kinetic_energy(world)
-    return REACHED
-
-
-@kernel
 def advance(world: World, last_step: int) -> int:
     """Step until `last_step` or until something ends the run; return one of the status codes of arrays.py.
 
-    Checks fall on fixed step numbers and `pairs_due` is part of the state, so the bits of a run do not depend on where
-    outputs interrupt it. PAIRS_FULL returns before anything has moved: give the lists more room and call again.
+    The first call also evaluates the contacts at the start, as if after a step of no length; `advance(world, 0)` does
+    only that. Checks fall on fixed step numbers and all flags are part of the state, so the bits of a run do not
+    depend on where outputs interrupt it. PAIRS_FULL returns before anything has moved: give the lists more room and
+    call again.
     """
     controls = world.controls[0]
     clock = world.clock[0]
     next_check = (clock.steps // controls.check_every + 1) * controls.check_every
-    while clock.steps < last_step:
+    while clock.steps < last_step or clock.is_started == 0:
         if clock.pairs_due and not rebuild_pairs(world):
             return PAIRS_FULL
-        clock.pairs_due = kick_and_drift(world.bodies, controls, world.ledger[0])
-        contact_forces(world, controls.step)
-        clock.steps += 1
+        step = controls.step if clock.is_started else 0.0
+        clock.pairs_due = kick_and_drift(world.bodies, controls, step, world.ledger[0])
+        contact_forces(world, step)
+        clock.steps += clock.is_started
+        clock.is_started = 1
         if clock.steps == next_check:
             next_check += controls.check_every
             status = check(world)

@@ -79,7 +79,7 @@ CONTROLS = record_type(
     "skin max_overlap rest_speed",  # m: reach of the pair list beyond contact; m; m/s
     "law check_every rest_checks",  # law code; steps between checks; checks in a row that must find rest (0: never)
 )
-CLOCK = record_type("", "steps checks_at_rest pair_count rebuilds pairs_due")  # pairs_due: 1 when the list is stale
+CLOCK = record_type("", "steps checks_at_rest pair_count rebuilds pairs_due is_started")  # the last two: flags
 LEDGER = record_type("dashpot friction broken travel_work largest_kinetic")  # J
 
 

@@ -1,6 +1,6 @@
 """Candidate pairs: rebuilt when a body has used up its part of the skin, contact history carried over."""
 
-from blocksim.kernels.arrays import NO_FACE, NORMAL, SHEAR, SLOTS, Record, Records, World
+from blocksim.kernels.arrays import NO_FACE, NORMAL, SHEAR, SLOTS, Record, World
 from blocksim.kernels.geometry import ground_gap, separation
 from blocksim.kernels.jit import kernel
 from blocksim.kernels.surface import corner_signs, lies_near

@@ -1,8 +1,11 @@
 """Energy ledger: what the scene holds now. Losses are booked where the forces are applied (contact.py)."""
 
-from blocksim.kernels.arrays import NO_FACE, SLOTS, World
+from blocksim.kernels.arrays import NO_FACE, SLOTS, Floats, World
+from blocksim.kernels.integrate import kinetic_energy
 from blocksim.kernels.jit import kernel
 from blocksim.kernels.laws import stored_energy
+
+LEDGER_ROW = ("kinetic", "potential", "stored_normal", "stored_shear", "dashpot", "friction", "broken")
 
 
 @kernel
@@ -36,3 +39,19 @@ def contact_summary(world: World) -> tuple[float, float, int, float]:
                     count += 1
                     largest = max(largest, slot.depth)
     return normal, shear, count, largest
+
+
+@kernel
+def measure(world: World, row: Floats) -> None:
+    """Write one row of the ledger: energies (J) as in `LEDGER_ROW`, number of contacts, largest overlap (m)."""
+    ledger = world.ledger[0]
+    normal, shear, count, largest = contact_summary(world)
+    row[0] = kinetic_energy(world)
+    row[1] = potential_energy(world)
+    row[2] = normal
+    row[3] = shear
+    row[4] = ledger.dashpot
+    row[5] = ledger.friction
+    row[6] = ledger.broken
+    row[7] = count
+    row[8] = largest

@@ -5,7 +5,6 @@ import math
 from blocksim.kernels.arrays import Record
 from blocksim.kernels.jit import kernel
 
-
 # beyond this multiple of the transition speed the static share is below double precision
 FULLY_KINETIC = 40.0
 

@@ -10,14 +10,13 @@ PAIR_SHARE = 0.4  # of the skin, that a body may move before the pair list is ma
 
 
 @kernel
-def kick_and_drift(bodies: Records, controls: Record, ledger: Record) -> bool:
+def kick_and_drift(bodies: Records, controls: Record, step: float, ledger: Record) -> bool:
     """Advance velocities by half a step, then positions and rotations by a full one; return whether pairs are due.
 
     Uses the accelerations of the last force evaluation. Books the weights' travel for the energy in play. The pair
     list is due when a corner may have moved 0.4 skins since it was made: two bodies use up 0.8 skins, the rest covers
     the drift that led here.
     """
-    step = controls.step
     half = 0.5 * step
     limit = PAIR_SHARE * controls.skin
     travel_work = 0.0

@@ -2,8 +2,8 @@
 
 import math
 
-from blocksim.kernels.jit import kernel
 from blocksim.kernels.arrays import Floats
+from blocksim.kernels.jit import kernel
 
 # eigenvalues below this share of the largest count as zero: tangents of points on one face are parallel, so that
 # their matrix has rank one up to the difference of two overlaps

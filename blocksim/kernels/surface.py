@@ -165,9 +165,7 @@ def drop_twins(a: Record, b: Record, slots: Records, points: Records, count: int
 
 
 @kernel
-def block_points(
-    a: Record, b: Record, corners: int, candidates: Integers, slots: Records, points: Records
-) -> int:
+def block_points(a: Record, b: Record, corners: int, candidates: Integers, slots: Records, points: Records) -> int:
     """Fill `points` with the contact points of two blocks and return how many there are (at most SLOTS)."""
     x0, y0, c, s = relative_pose(a, b)
     count = 0

@@ -62,8 +62,8 @@ def build_world(scenario: Scenario) -> World:
         points=zeros(SLOTS, POINT),
         matrices=np.zeros((4, SLOTS, SLOTS)),
         controls=_controls(scenario, bodies, choose_step(scenario, bodies, table)),
-        clock=zeros(1, CLOCK),
-        ledger=zeros(1, LEDGER),
+        clock=_clock(),
+        ledger=_ledger(bodies),
     )
 
 
@@ -137,6 +137,19 @@ def _bodies(placed: tuple[PlacedBody, ...], classes: tuple[ContactClass, ...]) -
         record.inverse_inertia = 0.0 if body.fixed else 1.0 / inertia
         record.contact_class = classes.index(ContactClass(body.material, body.depth), 1)
     return bodies
+
+
+def _clock() -> Records:
+    clock = zeros(1, CLOCK)
+    clock.pairs_due = 1  # there is no list yet
+    return clock
+
+
+def _ledger(bodies: Records) -> Records:
+    ledger = zeros(1, LEDGER)
+    speed_squared = bodies.vx**2 + bodies.vy**2
+    ledger.largest_kinetic = 0.5 * float(np.sum(bodies.mass * speed_squared + bodies.inertia * bodies.spin**2))
+    return ledger
 
 
 def _controls(scenario: Scenario, bodies: Records, step: float) -> Records:

@@ -1,0 +1,78 @@
+"""How a run is going: a live line on a terminal, a plain line every now and then elsewhere."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from blocksim.cli.output import note
+from blocksim.simulation import Progress as Where
+from blocksim.simulation.compilation import compile_kernels, is_compiled
+
+PLAIN_SECONDS = 2.0
+LIVE_SECONDS = 0.1
+
+
+@contextmanager
+def watching(*, quiet: bool) -> Iterator[Callable[[Where], None]]:
+    """Give a function that shows where a run stands; on a terminal the line disappears at the end."""
+    console = Console(stderr=True)
+    if quiet:
+        yield lambda _: None
+    elif console.is_terminal:
+        with _live_line(console) as show:
+            yield show
+    else:
+        yield _plain_lines()
+
+
+def tell_compilation(*, quiet: bool) -> None:
+    """Compile the kernels where that is still to be done, and say so: it is not part of the simulation."""
+    if quiet or is_compiled():
+        compile_kernels()
+        return
+    note("Compiling the solver, once after installation (about half a minute) ...")
+    note(f"Compiled in {compile_kernels():.0f} s.")
+
+
+@contextmanager
+def _live_line(console: Console) -> Iterator[Callable[[Where], None]]:
+    columns = (
+        TextColumn("{task.completed:.3f} of at most {task.total:g} s simulated"),
+        BarColumn(bar_width=None),
+        TextColumn("{task.fields[speed]} steps/s, energy off by {task.fields[residual]}"),
+        TimeRemainingColumn(),
+    )
+    began = time.monotonic()
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("", total=1.0, speed="", residual="")
+        shown_at = 0.0
+
+        def show(where: Where) -> None:
+            nonlocal shown_at
+            now = time.monotonic()
+            if now - shown_at > LIVE_SECONDS:
+                shown_at = now
+                speed = f"{where.steps / max(now - began, 1e-9):.1e}"
+                residual = f"{where.relative_residual:.0e}"
+                progress.update(task, completed=where.time, total=where.end, speed=speed, residual=residual)
+
+        yield show
+
+
+def _plain_lines() -> Callable[[Where], None]:
+    shown_at = time.monotonic()
+
+    def show(where: Where) -> None:
+        nonlocal shown_at
+        now = time.monotonic()
+        if now - shown_at > PLAIN_SECONDS:
+            shown_at = now
+            note(
+                f"{where.time:.3f} of at most {where.end:g} s simulated, {where.steps} steps, "
+                f"energy off by {where.relative_residual:.0e}"
+            )
+
+    return show

@@ -1,0 +1,20 @@
+"""Reading a scenario for a command, so that mistakes found later still point into the file."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from blocksim.errors import ScenarioError
+from blocksim.scenario import Document, Scenario
+from blocksim.scenario.findings import Finding
+from blocksim.world.build import StepTooLargeError
+
+
+@contextmanager
+def read_scenario(path: Path, settings: Sequence[str]) -> Iterator[Scenario]:
+    """Give the validated scenario; a step that turns out to be too large is shown where it was written."""
+    document = Document.read(path).with_settings(settings)
+    try:
+        yield document.build()
+    except StepTooLargeError as error:
+        raise ScenarioError([document.problem(Finding(("time", "step"), str(error)))]) from None

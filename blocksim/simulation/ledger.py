@@ -1,0 +1,68 @@
+"""The energy ledger of a run: where the energy went, and how much of it is unaccounted for."""
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.kernels.arrays import World
+from blocksim.kernels.energy import LEDGER_ROW, measure
+
+SMALLEST_HEIGHT = 1e-3  # m; the energy in play is at least that of lifting everything by this much
+STANDARD_GRAVITY = 9.81
+ROW_LENGTH = len(LEDGER_ROW) + 2
+
+
+@dataclass(frozen=True)
+class EnergyLedger:
+    """All in J. The residual is what total + losses has drifted since the start."""
+
+    kinetic: float
+    potential: float
+    stored_normal: float
+    stored_shear: float
+    dashpot: float
+    friction: float
+    broken: float
+    start: float
+    in_play: float
+
+    @property
+    def residual(self) -> float:
+        """Energy now plus all losses, minus the energy at the start (J)."""
+        now = self.kinetic + self.potential + self.stored_normal + self.stored_shear
+        return now + self.dashpot + self.friction + self.broken - self.start
+
+    @property
+    def relative_residual(self) -> float:
+        """Size of the residual as a share of the energy in play."""
+        return abs(self.residual) / self.in_play
+
+    def to_dict(self) -> dict[str, float]:
+        """Return all entries, the residual and its share."""
+        return {**asdict(self), "residual": self.residual, "relative_residual": self.relative_residual}
+
+
+def energy_row(world: World) -> NDArray[np.float64]:
+    """Return the measured row of the present state (see `measure`)."""
+    row = np.zeros(ROW_LENGTH)
+    measure(world, row)
+    return row
+
+
+def start_energy(world: World) -> float:
+    """Return the energy (J) of a world that has not moved yet."""
+    return float(energy_row(world)[: len(LEDGER_ROW)].sum())
+
+
+def energy_ledger(world: World, start: float) -> EnergyLedger:
+    """Return the ledger of the present state; `start` is the energy (J) at the start.
+
+    Energy in play: largest kinetic energy + sum of the weights' travel |m g v| dt, at least m_total g 1 mm.
+    """
+    ledger = world.ledger[0]
+    row = energy_row(world)
+    weight = float(np.sum(world.bodies.mass)) * STANDARD_GRAVITY
+    in_play = max(float(ledger.largest_kinetic + ledger.travel_work), weight * SMALLEST_HEIGHT)
+    entries = {name: float(value) for name, value in zip(LEDGER_ROW, row, strict=False)}
+    return EnergyLedger(**entries, start=start, in_play=in_play)
