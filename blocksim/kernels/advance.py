@@ -7,7 +7,7 @@ from blocksim.kernels.broad_phase import rebuild_pairs
 from blocksim.kernels.contact import pair_forces, release_pair
 from blocksim.kernels.energy import contact_summary
 from blocksim.kernels.integrate import accelerate_and_kick, kick_and_drift, kinetic_energy, renew_rotations
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.surface import block_points, ground_points
 
 
@@ -37,7 +37,7 @@ def contact_forces(world: World, step: float) -> None:
     accelerate_and_kick(world.bodies, world.controls[0], step)
 
 
-@kernel
+@rare_kernel
 def fastest_point(bodies: Records) -> float:
     """Return an upper bound (m/s) of the speed of any point of any body; infinite when a state is not finite."""
     fastest = 0.0
@@ -50,7 +50,7 @@ def fastest_point(bodies: Records) -> float:
     return fastest
 
 
-@kernel
+@rare_kernel
 def check(world: World) -> int:
     """Look whether the run may go on: finite, overlap below its limit, not at rest for the hold time."""
     controls = world.controls[0]
@@ -67,7 +67,7 @@ def check(world: World) -> int:
     return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
 
 
-@kernel
+@rare_kernel
 def advance(world: World, last_step: int) -> int:
     """Step until `last_step` or until something ends the run; return one of the status codes of arrays.py.
 

@@ -65,7 +65,8 @@ POINT = record_type(
     "closing_rate slip_rate "  # m/s: the same as rates at the end of the drift, predicted
     "weight drawn "  # first steps of a contact: weight of the dashpot, share of the drift that draws the shear spring
     "stiffness rate before force "  # N/m, m/s, N, N: of the pass under way; force of the step before; force now
-    "spring_force normal_force limit free_rate",  # N: normal spring; N: normal total; N, N: Coulomb limit; m/s: rate without this step's change of the pair's own forces
+    "spring_force normal_force limit "  # N: normal spring; normal total; Coulomb limit of the tangential force
+    "free_rate",  # m/s: rate without this step's change of the pair's own forces
     "slot face",
 )
 OPERATOR = record_type(

@@ -2,11 +2,11 @@
 
 from blocksim.kernels.arrays import NO_FACE, NORMAL, SHEAR, SLOTS, Record, World
 from blocksim.kernels.geometry import ground_gap, separation
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.surface import corner_signs, lies_near
 
 
-@kernel
+@rare_kernel
 def clear_slot(slot: Record) -> None:
     """Forget all contact history of a slot."""
     slot.face = NO_FACE
@@ -18,14 +18,14 @@ def clear_slot(slot: Record) -> None:
     slot.shear_loss = 0.0
 
 
-@kernel
+@rare_kernel
 def corner_height(body: Record, corner: int) -> float:
     """Return the height (m) of one corner over the ground."""
     sx, sy = corner_signs(corner)
     return body.y + body.sin * sx * body.half_x + body.cos * sy * body.half_y
 
 
-@kernel
+@rare_kernel
 def are_near(body: Record, other: Record, reach: float) -> bool:
     """Tell whether two bodies, at least one of them free, may be closer than `reach` (m)."""
     if body.inverse_mass == 0.0 and other.inverse_mass == 0.0:
@@ -36,7 +36,7 @@ def are_near(body: Record, other: Record, reach: float) -> bool:
     return dx * dx + dy * dy <= limit * limit and separation(body, other) <= reach
 
 
-@kernel
+@rare_kernel
 def add_pair(world: World, count: int, a: int, b: int) -> int:
     """Append a pair with its candidate corners, if it has any and there is room; return the count needed."""
     bodies = world.bodies
@@ -66,13 +66,13 @@ def add_pair(world: World, count: int, a: int, b: int) -> int:
     return count + 1 if corners > 0 else count
 
 
-@kernel
+@rare_kernel
 def comes_before(one: Record, two: Record) -> bool:
     """Tell whether a pair comes before another in the order of the list."""
     return one.a < two.a or (one.a == two.a and one.b < two.b)
 
 
-@kernel
+@rare_kernel
 def carry_history(world: World, count: int) -> None:
     """Bring the contact history of pairs that are in both lists over to the new one; both are sorted."""
     q = 0
@@ -87,7 +87,7 @@ def carry_history(world: World, count: int) -> None:
                 world.spare_slots[p, k] = world.slots[q, k]
 
 
-@kernel
+@rare_kernel
 def collect_pairs(world: World) -> int:
     """Write all pairs within reach into the spare list, sorted; return how many there are, fitting or not."""
     bodies = world.bodies
@@ -103,7 +103,7 @@ def collect_pairs(world: World) -> int:
     return count
 
 
-@kernel
+@rare_kernel
 def rebuild_pairs(world: World) -> bool:
     """Make the pair list anew; return False, with the old list untouched, where it does not fit."""
     count = collect_pairs(world)

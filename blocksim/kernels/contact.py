@@ -11,12 +11,12 @@ from blocksim.kernels.arrays import NO_FACE, NORMAL, SHEAR, SLOTS, Record, Recor
 from blocksim.kernels.broad_phase import clear_slot
 from blocksim.kernels.damping import add_dashpots
 from blocksim.kernels.friction import coulomb_limit
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.kinematics import DELASSUS, normal_masses, resolve_point, shear_masses, weigh_first_step
 from blocksim.kernels.laws import elastic_force, tangent_stiffness
 
 
-@kernel
+@rare_kernel
 def release_slot(slot: Record, ledger: Record, shear_stiffness: float) -> None:
     """End the contact of one slot: book what its springs still hold and clear its history."""
     ledger.broken += 0.5 * shear_stiffness * slot.spring * slot.spring
@@ -25,7 +25,7 @@ def release_slot(slot: Record, ledger: Record, shear_stiffness: float) -> None:
     clear_slot(slot)
 
 
-@kernel
+@rare_kernel
 def release_ended(slots: Records, points: Records, count: int, ledger: Record, shear_stiffness: float) -> None:
     """Release the slots of a pair whose corner is no longer in contact or touches another face than before."""
     for k in range(SLOTS):
@@ -98,9 +98,9 @@ def clip_to_cone(point: Record, slot: Record, values: Record) -> float:
     return dissipated
 
 
-@kernel
+@rare_kernel
 def start_contacts(world: World, p: int, count: int, shear_stiffness: float) -> None:
-    """The set of contacts has changed: release what ended, weigh first steps, make the operators anew."""
+    """Take up a changed set of contacts: release what ended, weigh first steps, make the operators anew."""
     slots = world.slots[p]
     release_ended(slots, world.points, count, world.ledger[0], shear_stiffness)
     for i in range(count):
@@ -204,7 +204,7 @@ def pair_forces(world: World, p: int, count: int, step: float) -> None:
     force_pass(world, p, count, a, b, values)
 
 
-@kernel
+@rare_kernel
 def release_pair(world: World, p: int) -> None:
     """End all contacts of a pair."""
     pair = world.pairs[p]

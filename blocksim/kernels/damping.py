@@ -15,7 +15,7 @@ stable as an implicit dashpot.
 import math
 
 from blocksim.kernels.arrays import Floats, Record, Records
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.kinematics import DELASSUS
 from blocksim.kernels.matrices import RANK_TOLERANCE, inverse_root_2, inverse_root_n, solve_in_place
 
@@ -55,7 +55,7 @@ def add_dashpots(
         operator.left = OPERATOR_LIFE
 
 
-@kernel
+@rare_kernel
 def is_lasting(points: Records, count: int) -> bool:
     """Tell whether no point is in its first step of contact, whose weight holds for this step only."""
     for i in range(count):
@@ -80,7 +80,7 @@ def apply_operator(points: Records, count: int, operator: Record) -> None:
     two.force += operator.e_mixed * rate_one + operator.e_two * rate_two
 
 
-@kernel
+@rare_kernel
 def fill_single(point: Record, ratio: float, step: float, delassus: Floats, operator: Record, i: int) -> None:
     """Only point i has a dashpot: c = 2 z sqrt(k/A), E = c/(1 + dt/2 A c)."""
     half = 0.5 * step
@@ -95,7 +95,7 @@ def fill_single(point: Record, ratio: float, step: float, delassus: Floats, oper
     operator.h_two = half * delassus[1, 1]
 
 
-@kernel
+@rare_kernel
 def fill_two_alike(point: Record, ratio: float, step: float, delassus: Floats, operator: Record) -> None:
     """Two points of the same stiffness and weight: E = (I + dt/2 C A)^-1 C with C = g A^(-1/2), g = 2 z k^(1/2).
 
@@ -131,7 +131,7 @@ def fill_two_alike(point: Record, ratio: float, step: float, delassus: Floats, o
     operator.e_mixed = -scale * (m_two * b + m_mixed * (a + s))
 
 
-@kernel
+@rare_kernel
 def fill_damping(points: Records, count: int, ratio: float, work: Floats) -> None:
     """Write the weighted damping matrix (N s/m) of two or more points."""
     matrix = work[MATRIX]
@@ -149,7 +149,7 @@ def fill_damping(points: Records, count: int, ratio: float, work: Floats) -> Non
             damping[i, j] *= 2.0 * ratio * math.sqrt(scale)
 
 
-@kernel
+@rare_kernel
 def solve_coupled(points: Records, count: int, step: float, work: Floats) -> None:
     """Solve (I + dt/2 C A) d = C (free rate) and add d to the forces."""
     delassus = work[DELASSUS]

@@ -2,13 +2,13 @@
 
 from blocksim.kernels.arrays import NO_FACE, SLOTS, Floats, World
 from blocksim.kernels.integrate import kinetic_energy
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.laws import stored_energy
 
 LEDGER_ROW = ("kinetic", "potential", "stored_normal", "stored_shear", "dashpot", "friction", "broken")
 
 
-@kernel
+@rare_kernel
 def potential_energy(world: World) -> float:
     """Return the energy (J) of all masses in the field of gravity, zero at the origin."""
     total = 0.0
@@ -19,7 +19,7 @@ def potential_energy(world: World) -> float:
     return total
 
 
-@kernel
+@rare_kernel
 def contact_summary(world: World) -> tuple[float, float, int, float]:
     """Return energy stored in normal and in shear springs (J), number of contacts, largest overlap (m)."""
     normal = 0.0
@@ -41,7 +41,7 @@ def contact_summary(world: World) -> tuple[float, float, int, float]:
     return normal, shear, count, largest
 
 
-@kernel
+@rare_kernel
 def measure(world: World, row: Floats) -> None:
     """Write one row of the ledger: energies (J) as in `LEDGER_ROW`, number of contacts, largest overlap (m)."""
     ledger = world.ledger[0]

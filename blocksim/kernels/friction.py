@@ -11,7 +11,7 @@ FULLY_KINETIC = 40.0
 
 @kernel
 def friction_coefficient(static: float, kinetic: float, transition_speed: float, speed: float) -> float:
-    """Return mu(v) = mu_k + (mu_s - mu_k) exp(-|v|/v_s): the static value at rest, the kinetic one when sliding fast."""
+    """Return mu(v) = mu_k + (mu_s - mu_k) exp(-|v|/v_s): static at rest, kinetic when sliding fast."""
     if static == kinetic or abs(speed) > FULLY_KINETIC * transition_speed:
         return kinetic
     return kinetic + (static - kinetic) * math.exp(-abs(speed) / transition_speed)

@@ -54,7 +54,7 @@ def separation(body: Record, other: Record) -> float:
     gap_y = abs(py) - other.half_y - s_abs * body.half_x - c_abs * body.half_y
     gap_u = abs(c * px + s * py) - body.half_x - c_abs * other.half_x - s_abs * other.half_y
     gap_v = abs(c * py - s * px) - body.half_y - s_abs * other.half_x - c_abs * other.half_y
-    return max(max(gap_x, gap_y), max(gap_u, gap_v))
+    return max(gap_x, gap_y, gap_u, gap_v)
 
 
 @kernel

@@ -4,7 +4,7 @@ import math
 
 from blocksim.kernels.arrays import Record, Records, World
 from blocksim.kernels.geometry import turn
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.jit import kernel, rare_kernel
 
 PAIR_SHARE = 0.4  # of the skin, that a body may move before the pair list is made anew
 
@@ -40,7 +40,7 @@ def kick_and_drift(bodies: Records, controls: Record, step: float, ledger: Recor
     return is_due
 
 
-@kernel
+@rare_kernel
 def renew_rotations(bodies: Records) -> None:
     """Recompute cosines and sines from the angles, so that round-off does not add up."""
     for i in range(bodies.size):
@@ -70,7 +70,7 @@ def accelerate_and_kick(bodies: Records, controls: Record, step: float) -> None:
         body.torque = 0.0
 
 
-@kernel
+@rare_kernel
 def kinetic_energy(world: World) -> float:
     """Return the kinetic energy (J) of all bodies."""
     total = 0.0

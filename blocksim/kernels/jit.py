@@ -15,14 +15,17 @@ from typing import Any, TypeVar
 
 import numba
 import numpy as np
-from numba import config
+from numba import config as numba_config
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
-# IEEE arithmetic as written (no fastmath) and division by zero as in IEEE (no exception can leave a kernel). Everything
-# is inlined into the outermost kernel, and nothing allocates, so that reference counts of arrays (two atomic
-# operations an array and call) are switched off: together that made the step five times faster than the defaults.
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "forceinline": True, "_nrt": False}
+# IEEE arithmetic as written (no fastmath: the same input gives the same bits) and division by zero as in IEEE (no
+# exception can leave a kernel). Nothing allocates, so reference counts of arrays, two atomic operations an array and
+# call, are switched off; together with inlining of the hot path that made a step five times faster than the defaults.
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+
+config: Any = numba_config  # its settings are attributes made at run time
+njit: Any = numba.njit  # _nrt is an option that its types leave out
 
 KERNEL_FOLDER = Path(__file__).resolve().parent
 
@@ -70,16 +73,22 @@ def is_compiled() -> bool:
     return bool(config.DISABLE_JIT) or (folder is not None and any(folder.rglob("advance.advance-*.nbc")))
 
 
-def kernel(function: Function) -> Function:
-    """Compile `function` with numba in nopython mode, cached on disk by the hash of all kernel sources.
-
-    The same input gives the same bits.
-    """
+def _compiled(function: Function, **options: object) -> Function:
     folder = cache_folder()
     before = config.CACHE_DIR
     config.CACHE_DIR = str(folder or "")
     try:
-        compiled: Function = numba.njit(cache=folder is not None, **OPTIONS)(function)
+        compiled: Function = njit(cache=folder is not None, **OPTIONS, **options)(function)
     finally:
         config.CACHE_DIR = before
     return compiled
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function of the hot path: inlined where it is called, cached on disk by the hash of all sources."""
+    return _compiled(function, forceinline=True)
+
+
+def rare_kernel(function: Function) -> Function:
+    """Compile a function that most steps do not call; kept out of the hot path, which it would only lengthen."""
+    return _compiled(function)

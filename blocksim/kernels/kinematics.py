@@ -1,7 +1,7 @@
 """Rates, displacements and inverse masses at the contact points of one pair, along the normals or the tangents."""
 
 from blocksim.kernels.arrays import Floats, Record, Records
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.jit import kernel, rare_kernel
 
 DELASSUS = 0  # index into the work matrices
 
@@ -36,7 +36,7 @@ def resolve_point(point: Record, a: Record, b: Record, step: float) -> None:
     point.drawn = 1.0
 
 
-@kernel
+@rare_kernel
 def weigh_first_step(point: Record) -> None:
     """Set the dashpot weight and the drawn share of the shear spring of a point that was not in contact before.
 
@@ -51,7 +51,7 @@ def weigh_first_step(point: Record) -> None:
         point.drawn = share
 
 
-@kernel
+@rare_kernel
 def normal_masses(points: Records, count: int, a: Record, b: Record, out: Floats) -> None:
     """Write the inverse masses (1/kg) J M^-1 J^T that the points see of one another along their normals."""
     inverse_mass = a.inverse_mass + b.inverse_mass
@@ -65,7 +65,7 @@ def normal_masses(points: Records, count: int, a: Record, b: Record, out: Floats
             out[j, i] = out[i, j]
 
 
-@kernel
+@rare_kernel
 def shear_masses(points: Records, count: int, a: Record, b: Record, out: Floats) -> None:
     """Write the inverse masses (1/kg) that the points see along their tangents, which enclose the normals' angles."""
     inverse_mass = a.inverse_mass + b.inverse_mass

@@ -3,21 +3,22 @@
 import math
 
 from blocksim.kernels.arrays import Floats
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.jit import rare_kernel
 
 # eigenvalues below this share of the largest count as zero: tangents of points on one face are parallel, so that
 # their matrix has rank one up to the difference of two overlaps
 RANK_TOLERANCE = 1e-4
 SWEEPS = 12
+ROUND_OFF = 1e-15
 
 
-@kernel
+@rare_kernel
 def inverse_root(eigenvalue: float, largest: float) -> float:
     """Return eigenvalue^(-1/2), or zero outside the range of the matrix (pseudo-inverse)."""
     return 1.0 / math.sqrt(eigenvalue) if eigenvalue > RANK_TOLERANCE * largest else 0.0
 
 
-@kernel
+@rare_kernel
 def inverse_root_2(matrix: Floats, out: Floats) -> None:
     """Write the inverse square root of a symmetric positive 2 x 2 matrix into `out`, over its range only."""
     a = matrix[0, 0]
@@ -37,7 +38,7 @@ def inverse_root_2(matrix: Floats, out: Floats) -> None:
     out[1, 0] = slope * b
 
 
-@kernel
+@rare_kernel
 def rotate_pair(matrix: Floats, vectors: Floats, n: int, p: int, q: int) -> None:
     """Zero matrix[p, q] by one Jacobi rotation and turn the eigenvectors with it."""
     theta = 0.5 * (matrix[q, q] - matrix[p, p]) / matrix[p, q]
@@ -60,7 +61,16 @@ def rotate_pair(matrix: Floats, vectors: Floats, n: int, p: int, q: int) -> None
         vectors[k, q] = s * vp + c * vq
 
 
-@kernel
+@rare_kernel
+def sweep_pairs(matrix: Floats, vectors: Floats, n: int) -> None:
+    """Rotate every pair of axes once, where it is not diagonal to round-off."""
+    for p in range(n - 1):
+        for q in range(p + 1, n):
+            if abs(matrix[p, q]) > ROUND_OFF * math.sqrt(abs(matrix[p, p] * matrix[q, q])):
+                rotate_pair(matrix, vectors, n, p, q)
+
+
+@rare_kernel
 def inverse_root_n(matrix: Floats, vectors: Floats, out: Floats, n: int) -> None:
     """Write the pseudo-inverse square root of a symmetric positive n x n matrix into `out`; destroys `matrix`.
 
@@ -70,10 +80,7 @@ def inverse_root_n(matrix: Floats, vectors: Floats, out: Floats, n: int) -> None
         for j in range(n):
             vectors[i, j] = 1.0 if i == j else 0.0
     for _ in range(SWEEPS):
-        for p in range(n - 1):
-            for q in range(p + 1, n):
-                if abs(matrix[p, q]) > 1e-15 * math.sqrt(abs(matrix[p, p] * matrix[q, q])) and matrix[p, q] != 0.0:
-                    rotate_pair(matrix, vectors, n, p, q)
+        sweep_pairs(matrix, vectors, n)
     largest = 0.0
     for i in range(n):
         largest = max(largest, matrix[i, i])
@@ -85,7 +92,7 @@ def inverse_root_n(matrix: Floats, vectors: Floats, out: Floats, n: int) -> None
             out[i, j] = total
 
 
-@kernel
+@rare_kernel
 def solve_in_place(matrix: Floats, right: Floats, n: int) -> None:
     """Solve matrix x = right; x replaces `right`, `matrix` is destroyed.
 

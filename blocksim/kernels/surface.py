@@ -2,7 +2,7 @@
 
 from blocksim.kernels.arrays import NO_FACE, SLOTS, Integers, Record, Records
 from blocksim.kernels.geometry import relative_pose, to_world
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.jit import kernel, rare_kernel
 
 # A corner can touch a face only where the face normal, reversed, lies between the outward normals of the two sides
 # that meet in the corner (the vertex-face pairs of the Minkowski difference of two convex bodies). The tolerance
@@ -29,10 +29,10 @@ def face_below_corner(
         face = 0 if side > 0.0 else 2
         depth = touched.half_x - abs(px)
     side = 1.0 if py >= 0.0 else -1.0
-    if -sx * side * s >= -CONE_TOLERANCE and -sy * side * c >= -CONE_TOLERANCE:
-        if face == NO_FACE or touched.half_y - abs(py) < depth:
-            face = 1 if side > 0.0 else 3
-            depth = touched.half_y - abs(py)
+    is_open = -sx * side * s >= -CONE_TOLERANCE and -sy * side * c >= -CONE_TOLERANCE
+    if is_open and (face == NO_FACE or touched.half_y - abs(py) < depth):
+        face = 1 if side > 0.0 else 3
+        depth = touched.half_y - abs(py)
     return face, depth
 
 
@@ -99,7 +99,7 @@ def ground_points(owner: Record, corners: int, candidates: Integers, points: Rec
     return count
 
 
-@kernel
+@rare_kernel
 def lies_near(owner: Record, touched: Record, corner: int, reach: float) -> bool:
     """Tell whether a corner of `owner` lies inside `touched` grown by `reach` (m) on every side."""
     x0, y0, c, s = relative_pose(owner, touched)
@@ -109,7 +109,7 @@ def lies_near(owner: Record, touched: Record, corner: int, reach: float) -> bool
     return abs(px) <= touched.half_x + reach and abs(py) <= touched.half_y + reach
 
 
-@kernel
+@rare_kernel
 def outward_along(body: Record, corner: int, tx: float, ty: float) -> float:
     """Return the component along (tx, ty) of the way (m) from the centre of a body to one of its corners."""
     sx, sy = corner_signs(corner)
@@ -117,7 +117,7 @@ def outward_along(body: Record, corner: int, tx: float, ty: float) -> float:
     return tx * (x - body.x) + ty * (y - body.y)
 
 
-@kernel
+@rare_kernel
 def same_end(of_a: Record, of_b: Record, a: Record, b: Record) -> bool:
     """Tell whether a corner of a and a corner of b (both points) mark the same end of one face contact."""
     if of_a.nx * of_b.nx + of_a.ny * of_b.ny < PARALLEL:
@@ -127,7 +127,7 @@ def same_end(of_a: Record, of_b: Record, a: Record, b: Record) -> bool:
     return end_a * end_b > 0.0
 
 
-@kernel
+@rare_kernel
 def drop_point(points: Records, gone: int, count: int) -> int:
     """Remove one point, keep the order of the others, return the new count."""
     for i in range(gone, count - 1):
@@ -143,7 +143,7 @@ def drop_point(points: Records, gone: int, count: int) -> int:
     return count - 1
 
 
-@kernel
+@rare_kernel
 def drop_twins(a: Record, b: Record, slots: Records, points: Records, count: int) -> int:
     """Keep one of two coinciding corners, so that a face contact always has two points and the stiffness of two.
 

@@ -69,7 +69,7 @@ def build_world(scenario: Scenario) -> World:
 
 def empty_lists(capacity: int) -> dict[str, Any]:
     """Return the pair lists of a world, without pairs, with room for `capacity` of them."""
-    lists = {
+    lists: dict[str, Any] = {
         "pairs": zeros(capacity, PAIR),
         "slots": zeros((capacity, SLOTS), SLOT),
         "candidates": np.zeros((capacity, SLOTS), dtype=np.int64),
@@ -95,10 +95,10 @@ def with_more_room(world: World) -> World:
 
 def admissible_step(bodies: Records, table: Records, safety: float) -> float:
     """Return the largest safe step (s) of these bodies with these contact parameters."""
-    columns = ("half_x", "half_y", "inverse_mass", "inverse_inertia", "contact_class")
-    kinds = [
-        (ContactBody(2.0 * hx, 2.0 * hy, im, ii), int(c)) for hx, hy, im, ii, c in np.unique(bodies[:-1][list(columns)])
-    ]
+    kinds = dict.fromkeys(
+        (ContactBody(2.0 * r.half_x, 2.0 * r.half_y, r.inverse_mass, r.inverse_inertia), int(r.contact_class))
+        for r in bodies[:-1]
+    )
 
     def stiffness(i: int, j: int) -> ContactStiffness:
         row = table[i, j]

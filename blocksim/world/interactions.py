@@ -1,4 +1,4 @@
-"""Contact parameters of every pair of contact classes: stiffness from elasticity, damping from restitution, friction."""
+"""Contact parameters of every pair of contact classes: stiffness from elasticity, damping from restitution."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ def contact_classes(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> tuple
 
 
 def normal_stiffness(scenario: Scenario, a: ContactClass, b: ContactClass) -> float:
-    """Return the stiffness (N/m) of one contact point: scale E* L, with 1/E* = sum (1 - nu^2)/E, L the shorter depth."""
+    """Return the stiffness (N/m) of one contact point: scale E* L, 1/E* = sum (1 - nu^2)/E, L the shorter depth."""
     contact = scenario.contact
     if contact.normal_stiffness is not None:
         return contact.stiffness_scale * contact.normal_stiffness

@@ -1,0 +1,114 @@
+"""Rotations and distances of rectangles against independent geometry."""
+
+from __future__ import annotations
+
+from math import cos, hypot, pi, radians, sin
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blocksim.kernels.geometry import SMALL_TURN, ground_gap, relative_pose, separation, to_world, turn
+
+if TYPE_CHECKING:
+    from blocksim.kernels.arrays import Record
+    from tests.kernels.conftest import MakeBody
+
+SIGNS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+places = st.floats(-0.06, 0.06)
+sides = st.floats(1e-3, 0.05)
+angles = st.floats(-7.0, 7.0)
+
+
+def corners(body: Record) -> np.ndarray:
+    """Return the corners (4, 2) of a body from its angle."""
+    c, s = cos(body.angle), sin(body.angle)
+    local = SIGNS * (body.half_x, body.half_y)
+    return local @ np.array([[c, s], [-s, c]]) + (body.x, body.y)
+
+
+def points_of(body: Record, count: int = 15) -> np.ndarray:
+    """Return a grid of points that fills a body."""
+    u, v = np.meshgrid(np.linspace(-1.0, 1.0, count), np.linspace(-1.0, 1.0, count))
+    c, s = cos(body.angle), sin(body.angle)
+    local = np.stack([u.ravel() * body.half_x, v.ravel() * body.half_y], axis=1)
+    return local @ np.array([[c, s], [-s, c]]) + (body.x, body.y)
+
+
+def distances(points: np.ndarray, body: Record) -> np.ndarray:
+    """Return the distance of points to a rectangle, zero inside."""
+    c, s = cos(body.angle), sin(body.angle)
+    local = np.abs((points - (body.x, body.y)) @ np.array([[c, -s], [s, c]]))
+    outside = np.maximum(local - (body.half_x, body.half_y), 0.0)
+    return np.hypot(outside[:, 0], outside[:, 1])
+
+
+def gap_along_axes(one: Record, two: Record) -> float:
+    """Return the largest gap between the projections of the corners on the four face normals."""
+    gaps = []
+    for angle in (one.angle, one.angle + pi / 2, two.angle, two.angle + pi / 2):
+        axis = np.array([cos(angle), sin(angle)])
+        a, b = corners(one) @ axis, corners(two) @ axis
+        gaps.append(max(b.min() - a.max(), a.min() - b.max()))
+    return float(max(gaps))
+
+
+@given(start=angles, by=st.floats(-1e3, 1e3))
+def test_turn_agrees_with_the_library_for_any_angle(start: float, by: float) -> None:
+    assert turn(cos(start), sin(start), by) == pytest.approx((cos(start + by), sin(start + by)), abs=2e-13)
+
+
+@pytest.mark.parametrize("by", [0.0, 1e-9, 1e-3, SMALL_TURN * (1 - 1e-9), SMALL_TURN, SMALL_TURN * (1 + 1e-9), -0.049])
+def test_turn_agrees_with_the_library_on_both_sides_of_the_series(by: float) -> None:
+    assert turn(1.0, 0.0, by) == pytest.approx((cos(by), sin(by)), abs=1e-14)
+
+
+def test_many_small_turns_keep_the_length_and_the_angle() -> None:
+    c, s = 1.0, 0.0
+    for _ in range(20_000):
+        c, s = turn(c, s, 1.2345e-3)
+    assert hypot(c, s) == pytest.approx(1.0, abs=1e-15)
+    assert [c, s] == pytest.approx([cos(20_000 * 1.2345e-3), sin(20_000 * 1.2345e-3)], abs=1e-11)
+
+
+@given(x=places, y=places, one=angles, two=angles, w=sides, h=sides)
+def test_separation_is_the_largest_gap_and_never_exceeds_the_distance(
+    make_body: MakeBody, x: float, y: float, one: float, two: float, w: float, h: float
+) -> None:
+    a = make_body(x, y, one)
+    b = make_body(0.0, 0.01, two, width=w, height=h)
+    gap = separation(a, b)
+    assert gap == pytest.approx(gap_along_axes(a, b), abs=1e-15)
+    assert gap == pytest.approx(separation(b, a), abs=1e-15)
+    nearest = min(distances(points_of(a), b).min(), distances(points_of(b), a).min())
+    assert gap <= nearest + 1e-15
+    assert (gap <= 0.0) or (nearest > 0.0)
+
+
+def test_separation_of_overlapping_blocks_is_the_depth(make_body: MakeBody) -> None:
+    assert separation(make_body(0.0, 0.0), make_body(0.001, 0.024)) == pytest.approx(-0.001)
+    assert separation(make_body(0.0, 0.0), make_body(0.04, 0.0)) == pytest.approx(0.008)
+
+
+@given(y=places, angle=angles, w=sides, h=sides)
+def test_ground_gap_is_the_height_of_the_lowest_corner(
+    make_body: MakeBody, y: float, angle: float, w: float, h: float
+) -> None:
+    body = make_body(0.3, y, angle, width=w, height=h)
+    assert ground_gap(body) == pytest.approx(corners(body)[:, 1].min(), abs=1e-15)
+
+
+@given(x=places, y=places, one=angles, two=angles)
+def test_relative_pose_leads_back_to_the_world(
+    make_body: MakeBody, x: float, y: float, one: float, two: float
+) -> None:
+    a, b = make_body(x, y, one), make_body(0.02, -0.01, two)
+    px, py, c, s = relative_pose(a, b)
+    assert to_world(b, px, py) == pytest.approx((a.x, a.y), abs=1e-15)
+    assert (c, s) == pytest.approx((cos(one - two), sin(one - two)), abs=1e-14)
+
+
+def test_to_world_turns_counter_clockwise(make_body: MakeBody) -> None:
+    assert to_world(make_body(1.0, 2.0, radians(90.0)), 0.1, 0.0) == pytest.approx((1.0, 2.1))

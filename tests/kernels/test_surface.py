@@ -1,0 +1,175 @@
+"""Which corners touch which faces, and how deep."""
+
+from __future__ import annotations
+
+from math import radians
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from blocksim.kernels.arrays import NO_FACE, POINT, SLOT, SLOTS, zeros
+from blocksim.kernels.geometry import ground_gap, separation, to_world
+from blocksim.kernels.surface import (
+    CONE_TOLERANCE,
+    block_points,
+    corner_signs,
+    face_below_corner,
+    face_normal,
+    ground_points,
+    lies_near,
+)
+
+if TYPE_CHECKING:
+    from blocksim.kernels.arrays import Record, Records
+    from tests.kernels.conftest import MakeBody
+
+ALL = np.arange(SLOTS)
+W, H = 0.032, 0.025
+
+
+def corner_of(body: Record, corner: int) -> np.ndarray:
+    sx, sy = corner_signs(corner)
+    return np.array(to_world(body, sx * body.half_x, sy * body.half_y))
+
+
+def in_frame(body: Record, point: np.ndarray) -> np.ndarray:
+    dx, dy = point - (body.x, body.y)
+    return np.array([body.cos * dx + body.sin * dy, body.cos * dy - body.sin * dx])
+
+
+def no_history() -> Records:
+    slots = zeros(SLOTS, SLOT)
+    slots.face = NO_FACE
+    return slots
+
+
+def points_between(a: Record, b: Record, slots: Records | None = None) -> list[Any]:
+    points = zeros(SLOTS, POINT)
+    count = block_points(a, b, SLOTS, ALL, no_history() if slots is None else slots, points)
+    return list(points[:count])
+
+
+def test_corners_count_counter_clockwise_from_the_lower_left() -> None:
+    assert [corner_signs(k) for k in range(4)] == [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+
+
+def test_faces_count_from_plus_x_counter_clockwise(make_body: MakeBody) -> None:
+    body = make_body(angle=0.3)
+    for face in range(4):
+        assert face_normal(face, body) == pytest.approx(
+            (np.cos(0.3 + face * np.pi / 2), np.sin(0.3 + face * np.pi / 2)), abs=1e-15
+        )
+
+
+@given(
+    x=st.floats(-0.035, 0.035), y=st.floats(-0.03, 0.03), one=st.floats(-4.0, 4.0), two=st.floats(-4.0, 4.0)
+)
+def test_every_contact_point_is_a_corner_inside_the_other_block(
+    make_body: MakeBody, x: float, y: float, one: float, two: float
+) -> None:
+    a, b = make_body(x, y, one), make_body(0.0, 0.0, two, width=0.02)
+    found = points_between(a, b)
+    for point in found:
+        owner, touched = (a, b) if point.slot < 4 else (b, a)
+        corner = corner_of(owner, point.slot % 4)
+        assert [point.x, point.y] == pytest.approx(corner, abs=1e-15)
+        local = in_frame(touched, corner)
+        outward = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)][point.face])
+        half = abs(outward @ (touched.half_x, touched.half_y))
+        assert point.depth == pytest.approx(half - outward @ local, abs=1e-15)
+        assert point.depth > 0.0
+        sign = 1.0 if point.slot < 4 else -1.0  # from b to a
+        assert [point.nx, point.ny] == pytest.approx(sign * np.array(face_normal(point.face, touched)))
+    assert len({point.slot for point in found}) == len(found)
+    assert not found or separation(a, b) < 0.0
+
+
+@given(x=st.floats(-0.03, 0.03), one=st.floats(-0.7, 0.7), depth=st.floats(1e-9, 1e-4))
+def test_shallow_overlap_of_two_blocks_is_always_found(
+    make_body: MakeBody, x: float, one: float, depth: float
+) -> None:
+    a, b = make_body(x, 0.0, one), make_body(0.0, 0.0)
+    a.y = 0.03
+    a.y -= separation(a, b) + depth  # from above: its gap along y is the largest one
+    assume(separation(a, b) < 0.0)
+    assert points_between(a, b)
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-9, -1e-9, 0.01])
+@pytest.mark.parametrize("depth", [1e-9, 1e-6])
+def test_stacked_blocks_touch_at_the_top_and_not_at_the_sides(make_body: MakeBody, shift: float, depth: float) -> None:
+    found = points_between(make_body(shift, H - depth), make_body())
+    assert len(found) == 2
+    for point in found:
+        assert [point.nx, point.ny] == pytest.approx([0.0, 1.0], abs=1e-15)
+        assert point.depth == pytest.approx(depth, rel=1e-6)
+    assert abs(found[0].x - found[1].x) == pytest.approx(W - abs(shift))
+
+
+def test_corner_touches_only_faces_within_its_normal_cone(make_body: MakeBody) -> None:
+    touched = make_body()
+    tiny = 1e-9
+    # a lower left corner near the upper right one, nearer to the side than to the top
+    face, depth = face_below_corner(W / 2 - tiny, H / 2 - 2 * tiny, touched, 1.0, -1.0, 1.0, 0.0)
+    assert (face, depth) == (1, pytest.approx(2 * tiny, rel=1e-6))
+    # its mirror image at the upper left
+    face, depth = face_below_corner(-W / 2 + tiny, H / 2 - 2 * tiny, touched, -1.0, -1.0, 1.0, 0.0)
+    assert (face, depth) == (1, pytest.approx(2 * tiny, rel=1e-6))
+    # a lower left corner at the upper right one may touch either: the nearest counts
+    assert face_below_corner(W / 2 - tiny, H / 2 - 2 * tiny, touched, -1.0, -1.0, 1.0, 0.0)[0] == 0
+    assert face_below_corner(W / 2 - 2 * tiny, H / 2 - tiny, touched, -1.0, -1.0, 1.0, 0.0)[0] == 1
+
+
+def test_upper_corner_never_touches_the_top_of_another_block(make_body: MakeBody) -> None:
+    assert CONE_TOLERANCE < 1.0
+    assert face_below_corner(0.0, H / 2 - 1e-6, make_body(), -1.0, 1.0, 1.0, 0.0)[0] != 1
+
+
+def test_aligned_blocks_keep_the_corner_that_was_in_contact(make_body: MakeBody) -> None:
+    a, b = make_body(0.0, H - 1e-6), make_body()
+    assert [point.slot for point in points_between(a, b)] == [0, 1]
+    slots = no_history()
+    slots[4 + 2].face = slots[4 + 3].face = 3  # the upper corners of b were in the lower face of a
+    assert sorted(point.slot for point in points_between(a, b, slots)) == [6, 7]
+
+
+def test_aligned_blocks_keep_the_deeper_corner_without_history(make_body: MakeBody) -> None:
+    a, b = make_body(0.0, H - 1e-6, 1e-6), make_body()
+    found = points_between(a, b)
+    assert len(found) == 2
+    every = {point.slot: point.depth for point in found}
+    assert max(every.values()) == pytest.approx(1e-6 + 0.016e-6, rel=1e-3)
+
+
+@given(y=st.floats(-0.01, 0.03), angle=st.floats(-7.0, 7.0))
+def test_corners_below_the_ground_touch_it(make_body: MakeBody, y: float, angle: float) -> None:
+    body, points = make_body(0.4, y, angle), zeros(SLOTS, POINT)
+    count = ground_points(body, 4, ALL, points)
+    heights = [corner_of(body, k)[1] for k in range(4)]
+    assert [point.slot for point in points[:count]] == [k for k in range(4) if heights[k] < 0.0]
+    for point in points[:count]:
+        assert point.depth == pytest.approx(-heights[point.slot])
+        assert (point.nx, point.ny) == (0.0, 1.0)
+    assert (count > 0) == (ground_gap(body) < 0.0) or abs(ground_gap(body)) < 1e-15
+
+
+@given(x=st.floats(-0.06, 0.06), y=st.floats(-0.06, 0.06), one=st.floats(-4.0, 4.0), two=st.floats(-4.0, 4.0))
+def test_corner_is_near_when_it_lies_in_the_grown_rectangle(
+    make_body: MakeBody, x: float, y: float, one: float, two: float
+) -> None:
+    a, b = make_body(x, y, one), make_body(0.0, 0.0, two)
+    for corner in range(4):
+        local = np.abs(in_frame(b, corner_of(a, corner)))
+        beyond = float(max(local[0] - b.half_x, local[1] - b.half_y))
+        assume(abs(beyond - 0.01) > 1e-12)
+        assert lies_near(a, b, corner, 0.01) == (beyond <= 0.01)
+
+
+def test_corner_a_quarter_turn_apart_touches_the_side_it_came_through(make_body: MakeBody) -> None:
+    a = make_body(W / 2 + H / 2 - 1e-6, 0.0, radians(90.0))
+    found = points_between(a, make_body())
+    assert {(round(point.nx), round(point.ny)) for point in found} == {(1, 0)}
+    assert [point.depth for point in found] == pytest.approx([1e-6, 1e-6], rel=1e-6)
