@@ -56,10 +56,6 @@ smoke: $(RUN_STAMP) ## Short run, 2 x 2 sweep and compare, for your CI: does thi
 	if [ $$code -gt 1 ]; then echo "smoke: compare failed with exit code $$code" >&2; exit $$code; fi; \
 	echo "smoke: ok in $$SECONDS s (nothing has landed after 0.05 s, so \"outside\" is right here)"
 
-.PHONY: bench
-bench: $(RUN_STAMP) ## Measure the speed
-	$(BLOCKSIM) bench
-
 .PHONY: lint
 lint: $(DEV_STAMP) ## Check style, types and the direction of imports
 	$(VENV_PYTHON) -m ruff check
@@ -71,6 +67,10 @@ lint: $(DEV_STAMP) ## Check style, types and the direction of imports
 format: $(DEV_STAMP) ## Bring the code into shape
 	$(VENV_PYTHON) -m ruff format
 	$(VENV_PYTHON) -m ruff check --fix
+
+.PHONY: readme
+readme: $(DEV_STAMP) ## Write the table of scenario keys in the README anew, from the models
+	$(VENV_PYTHON) -m blocksim.scenario.reference README.md
 
 .PHONY: setup
 setup: $(DEV_STAMP) ## Create or update .venv, with the tools for developers

@@ -70,9 +70,7 @@ def _sweep(data: Data) -> Iterator[Finding]:
     if not isinstance(sweep, Mapping):
         return
     if len(sweep) > MAX_VARIED:
-        yield Finding(
-            ("sweep",), f"{len(sweep)} keys are too many; at most {MAX_VARIED} can be varied", at="key"
-        )
+        yield Finding(("sweep",), f"{len(sweep)} keys are too many; at most {MAX_VARIED} can be varied", at="key")
         return
     bare = {key: entry for key, entry in data.items() if key not in ("sweep", "experiment")}
     before = _single_mistakes(bare)
@@ -119,9 +117,7 @@ def _tried(
 def _single_mistakes(data: Data) -> list[Finding]:
     """List the mistakes of values by themselves."""
     _, findings = _validated(data, Path())
-    return [
-        finding for finding in (*findings, *islice(_references(data), MAX_FINDINGS)) if not finding.relation
-    ]
+    return [finding for finding in (*findings, *islice(_references(data), MAX_FINDINGS)) if not finding.relation]
 
 
 def _provenance(data: Data) -> Iterator[Finding]:

@@ -105,9 +105,7 @@ def is_known(path: Sequence[str | int], data: object) -> bool:
     if len(path) in (1, 2) and path[0] in ("materials", "blocks", "structures", "bodies"):
         return follow(data, path) is not MISSING
     return field_at(path, data) is not None or (
-        isinstance(path[-1], int)
-        and follow(data, path) is not MISSING
-        and field_at(path[:-1], data) is not None
+        isinstance(path[-1], int) and follow(data, path) is not MISSING and field_at(path[:-1], data) is not None
     )
 
 
@@ -134,9 +132,7 @@ def _inside(annotation: object, part: str | int, node: object) -> object:
 
 
 def _table(annotation: object, node: object) -> type[Table] | None:
-    tables = [
-        option for option in _options(annotation) if isinstance(option, type) and issubclass(option, Table)
-    ]
+    tables = [option for option in _options(annotation) if isinstance(option, type) and issubclass(option, Table)]
     if tables and all(issubclass(table, Structure) for table in tables):
         kind = node.get("kind") if isinstance(node, Mapping) else None
         return KINDS.get(kind) if isinstance(kind, str) else None

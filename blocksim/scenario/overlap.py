@@ -48,8 +48,7 @@ def penetration(one: Rectangle, other: Rectangle) -> float:
     """Return the shortest way (m) that parts two rectangles; zero or negative where they are apart."""
     x, y = other.x - one.x, other.y - one.y
     return min(
-        one.reach(axis) + other.reach(axis) - abs(x * axis[0] + y * axis[1])
-        for axis in (*one.axes, *other.axes)
+        one.reach(axis) + other.reach(axis) - abs(x * axis[0] + y * axis[1]) for axis in (*one.axes, *other.axes)
     )
 
 

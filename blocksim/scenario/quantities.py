@@ -159,9 +159,7 @@ class Quantity:
             self.read, core_schema.float_schema(strict=True, allow_inf_nan=False)
         )
 
-    def __get_pydantic_json_schema__(
-        self, _core_schema: CoreSchema, _handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, _core_schema: CoreSchema, _handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Describe what may stand in the file."""
         return self.json_schema()
 
@@ -249,9 +247,7 @@ class FrictionCoefficient:
             self.read, core_schema.float_schema(strict=True, allow_inf_nan=False)
         )
 
-    def __get_pydantic_json_schema__(
-        self, _core_schema: CoreSchema, _handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, _core_schema: CoreSchema, _handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Describe what may stand in the file."""
         return self.json_schema()
 
@@ -263,7 +259,7 @@ class FrictionCoefficient:
 PositiveNumber = Annotated[float, Quantity(NUMBER, above=0.0)]
 NonNegativeNumber = Annotated[float, Quantity(NUMBER, at_least=0.0)]
 Share = Annotated[float, Quantity(NUMBER, at_least=0.0, at_most=1.0)]
-PositiveShare = Annotated[float, Quantity(NUMBER, above=0.0, at_most=1.0)]
+Safety = Annotated[float, Quantity(NUMBER, above=0.0, at_most=0.1)]
 PoissonRatio = Annotated[float, Quantity(NUMBER, above=-1.0, below=0.5)]
 Friction = Annotated[float, FrictionCoefficient()]
 Length = Annotated[float, Quantity(LENGTH)]

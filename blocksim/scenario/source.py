@@ -74,9 +74,7 @@ class Source:
         if message.startswith(_TWICE):
             head = re.match(r"\s*(\[*)([^=\]]*[^=\]\s])?", line)
             start, end = (head.start(2), head.end(2)) if head is not None and head[2] else (0, len(line))
-            return self.shown(
-                "this key or table is already there, further up", "", Span(number, start, end - start)
-            )
+            return self.shown("this key or table is already there, further up", "", Span(number, start, end - start))
         message = _CLEARER.get(message) or f"not valid TOML: {message[:1].lower()}{message[1:]}"
         return self.shown(message, "", Span(number, column, 1))
 

@@ -172,9 +172,7 @@ def unit_by_pint(text: str) -> Unit:
         unknown: Any = error.unit_names
         raise UnitError(unknown if isinstance(unknown, str) else next(iter(unknown))) from None
     powers = unit.dimensionality
-    length, mass, time, angle = (
-        int(powers.get(f"[{name}]", 0)) for name in ("length", "mass", "time", "angle")
-    )
+    length, mass, time, angle = (int(powers.get(f"[{name}]", 0)) for name in ("length", "mass", "time", "angle"))
     return Unit(Fraction(factor), (length, mass, time, angle))
 
 

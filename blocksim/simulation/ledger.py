@@ -1,9 +1,11 @@
 """The energy ledger of a run: where the energy went, and how much of it is unaccounted for."""
 
-from dataclasses import asdict, dataclass
+import math
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, computed_field
 
 from blocksim.kernels.arrays import World
 from blocksim.kernels.energy import LEDGER_ROW, measure
@@ -12,35 +14,34 @@ SMALLEST_HEIGHT = 1e-3  # m; the energy in play is at least that of lifting ever
 STANDARD_GRAVITY = 9.81
 ROW_LENGTH = len(LEDGER_ROW) + 2
 
+Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]  # JSON has no NaN
 
-@dataclass(frozen=True)
-class EnergyLedger:
+
+class EnergyLedger(BaseModel, frozen=True):
     """All in J. The residual is what total + losses has drifted since the start."""
 
-    kinetic: float
-    potential: float
-    stored_normal: float
-    stored_shear: float
-    dashpot: float
-    friction: float
-    broken: float
-    start: float
-    in_play: float
+    kinetic: Number
+    potential: Number
+    stored_normal: Number
+    stored_shear: Number
+    dashpot: Number
+    friction: Number
+    broken: Number
+    start: Number
+    in_play: Number
 
+    @computed_field  # type: ignore[prop-decorator]  # mypy knows no decorated properties
     @property
     def residual(self) -> float:
         """Energy now plus all losses, minus the energy at the start (J)."""
         now = self.kinetic + self.potential + self.stored_normal + self.stored_shear
         return now + self.dashpot + self.friction + self.broken - self.start
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def relative_residual(self) -> float:
         """Size of the residual as a share of the energy in play."""
-        return abs(self.residual) / self.in_play
-
-    def to_dict(self) -> dict[str, float]:
-        """Return all entries, the residual and its share."""
-        return {**asdict(self), "residual": self.residual, "relative_residual": self.relative_residual}
+        return abs(self.residual) / self.in_play if self.in_play else abs(self.residual)
 
 
 def energy_row(world: World) -> NDArray[np.float64]:

@@ -12,6 +12,8 @@ from blocksim.simulation.outcome import Outcome
 from blocksim.simulation.recorder import Recorder
 from blocksim.world.build import with_more_room
 
+BODY_STEPS_A_CALL = 1_000_000  # a tenth of a second or so; after that Ctrl-C is heard and progress is shown
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -21,6 +23,9 @@ class Progress:
     end: float  # s
     steps: int
     relative_residual: float
+
+
+Watcher = Callable[[Progress], None]
 
 
 @dataclass(frozen=True)
@@ -48,31 +53,34 @@ def advance_with_room(world: World, last_step: int) -> tuple[World, int]:
 
 
 def run_loop(
-    world: World, recorder: Recorder, end: float, *, on_frame: Callable[[Progress], None] = lambda _: None
+    world: World,
+    recorder: Recorder,
+    end: float,
+    *,
+    on_progress: Watcher = lambda _: None,
+    is_stopped: Callable[[], bool] = lambda: False,
 ) -> LoopResult:
-    """Advance the world to `end` (s) or until it rests or fails; the recorder samples on the way.
-
-    `on_frame` is called after every frame. Ctrl-C ends the run between two frames with the outcome INTERRUPTED.
-    """
+    """Advance the world to `end` (s) or until it rests, fails or `is_stopped`; the recorder samples on the way."""
     step = float(world.controls[0].step)
     last = last_step_of(end, step)
-    outcome = ends.END_OF_TIME
+    most = max(1, BODY_STEPS_A_CALL // world.bodies.size)
     seconds = -time.perf_counter()
     world, status = advance_with_room(world, 0)
     seconds += time.perf_counter()
     start = start_energy(world)
     recorder.sample(world)
-    try:
-        while world.clock[0].steps < last and status == REACHED:
-            seconds -= time.perf_counter()
-            world, status = advance_with_room(world, min(recorder.next_step(int(world.clock[0].steps)), last))
-            seconds += time.perf_counter()
+    done, wanted = 0, 0
+    while status == REACHED and done < last and not is_stopped():
+        wanted = min(recorder.next_step(done), last) if done == wanted else wanted
+        seconds -= time.perf_counter()
+        world, status = advance_with_room(world, min(wanted, done + most))
+        seconds += time.perf_counter()
+        done = int(world.clock[0].steps)
+        if done == wanted:
             recorder.sample(world)
-            steps = int(world.clock[0].steps)
-            on_frame(Progress(steps * step, end, steps, energy_ledger(world, start).relative_residual))
-        outcome = ends.BY_CODE[status]
-    except KeyboardInterrupt:
-        outcome = ends.INTERRUPTED
+        on_progress(Progress(done * step, end, done, energy_ledger(world, start).relative_residual))
+    recorder.sample(world)  # wherever it ended
+    outcome = ends.INTERRUPTED if status == REACHED and done < last else ends.BY_CODE[status]
     ledger = energy_ledger(world, start)
     if outcome.is_finished and ledger.relative_residual > ends.RESIDUAL_LIMIT:
         outcome = ends.RESIDUAL

@@ -1,27 +1,26 @@
-"""What it takes to know, years later, what a number came from."""
+"""What a run came from: hashes of scenario, code and state, versions and machine."""
 
 import hashlib
 import os
 import platform
+import shlex
 import sys
 from importlib import metadata
+from pathlib import Path
 
+from blocksim import __version__
 from blocksim.kernels.arrays import World
 from blocksim.kernels.jit import source_hash
 from blocksim.scenario import Scenario, scenario_hash
 
 PACKAGES = ("numpy", "numba", "pydantic", "h5py", "pandas")
 HASH_DIGITS = 12
-
-
-def code_version() -> str:
-    """Return the version of the installed package."""
-    return metadata.version("blocksim")
+CPU_INFO = Path("/proc/cpuinfo")
 
 
 def run_hash(scenario: Scenario) -> str:
     """Return the name of a run: a hash of everything that decides its bits, scenario and code."""
-    text = f"{scenario_hash(scenario)} {code_version()} {source_hash()}"
+    text = f"{scenario_hash(scenario)} {__version__} {source_hash()}"
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
 
 
@@ -37,21 +36,21 @@ def environment() -> dict[str, str]:
     """Return versions and machine."""
     versions = {name: metadata.version(name) for name in PACKAGES}
     return {
-        "blocksim": code_version(),
+        "blocksim": __version__,
         "kernel_source": source_hash(),
         "python": platform.python_version(),
         **versions,
         "platform": platform.platform(),
         "processor": _processor(),
         "cores": str(os.cpu_count()),
-        "command": " ".join(sys.argv),
+        "command": shlex.join(sys.argv),
     }
 
 
 def _processor() -> str:
     try:
-        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:  # noqa: PTH123 - a device, not a path of ours
-            names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
+        lines = CPU_INFO.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
-        names = []
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.processor() or platform.machine()

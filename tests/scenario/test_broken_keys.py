@@ -1,6 +1,6 @@
 """Misspelt, missing and misplaced keys. Every message in full."""
 
-# ruff: noqa: E501 - messages and scenario lines stand as they are
+
 
 from collections.abc import Callable
 

@@ -1,6 +1,6 @@
 """Files that are no TOML, and lines that are hard to show. Every message in full."""
 
-# ruff: noqa: E501 - messages and scenario lines stand as they are
+
 
 from collections.abc import Callable
 

@@ -151,11 +151,11 @@ bad.toml:21: time.step: "0 s" is too small; a time above 0 such as "2 s" is need
       |        ^^^^^
 """,
     ),
-    "safety above 1": (
+    "safety above 0.1": (
         None,
         "\n[time]\nsafety = 2\n",
         """
-bad.toml:21: time.safety: 2 is too large; a plain number above 0 and at most 1 is needed
+bad.toml:21: time.safety: 2 is too large; a plain number above 0 and at most 0.1 is needed
    21 | safety = 2
       |          ^
 """,

@@ -35,9 +35,7 @@ def test_what_is_no_key(text: str) -> None:
         parse_key(text)
 
 
-@given(
-    st.lists(st.text(st.characters(max_codepoint=0xFFFF, exclude_categories=["Cs"])), min_size=1, max_size=4)
-)
+@given(st.lists(st.text(st.characters(max_codepoint=0xFFFF, exclude_categories=["Cs"])), min_size=1, max_size=4))
 def test_a_key_that_was_written_is_read_again(parts: list[str]) -> None:
     assert parse_key(format_key(parts)) == tuple(parts)
 

@@ -43,9 +43,7 @@ def values(data: object, path: KeyPath = ()) -> Iterator[tuple[KeyPath, object]]
     """Yield every path of parsed TOML and what stands there."""
     if path:
         yield path, data
-    for key, entry in (
-        data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
-    ):
+    for key, entry in data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ():
         yield from values(entry, (*path, key))
 
 

@@ -13,9 +13,7 @@ from blocksim.scenario.placement import PlacedBody
 
 
 def body(x: float, y: float, angle: float = 0.0, size_x: float = 0.04, size_y: float = 0.02) -> PlacedBody:
-    return PlacedBody(
-        "b", "brick", "steel", size_x, size_y, 1.0, 1.0, x, y, angle, 0.0, 0.0, 0.0, fixed=False
-    )
+    return PlacedBody("b", "brick", "steel", size_x, size_y, 1.0, 1.0, x, y, angle, 0.0, 0.0, 0.0, fixed=False)
 
 
 def corners(b: PlacedBody) -> list[tuple[float, float]]:
@@ -48,9 +46,7 @@ turn = st.floats(-math.pi, math.pi)
 
 
 @given(place, place, turn, turn)
-def test_rectangles_penetrate_where_they_have_an_area_in_common(
-    x: float, y: float, a: float, b: float
-) -> None:
+def test_rectangles_penetrate_where_they_have_an_area_in_common(x: float, y: float, a: float, b: float) -> None:
     one, other = body(0.0, 0.0, a), body(x, y, b)
     depth = penetration(Rectangle.of(one), Rectangle.of(other))
     assert (common_area(one, other) > 0) == (depth > 0) or abs(depth) < 1e-6
@@ -94,9 +90,7 @@ def test_the_sweep_finds_the_pairs_that_comparing_all_finds(poses: list[tuple[fl
     bodies = [body(*pose) for pose in poses]
     rectangles = [Rectangle.of(b) for b in bodies]
     expected = {
-        (i, j)
-        for i, j in combinations(range(len(bodies)), 2)
-        if penetration(rectangles[i], rectangles[j]) > 1e-9
+        (i, j) for i, j in combinations(range(len(bodies)), 2) if penetration(rectangles[i], rectangles[j]) > 1e-9
     }
     assert {(i, j) for i, j, _ in overlapping_pairs(bodies)} == expected
 
@@ -111,6 +105,4 @@ def test_a_thousand_touching_bodies_are_checked_quickly(layout: str) -> None:
 
 
 def test_the_lowest_corner_of_a_turned_rectangle() -> None:
-    assert Rectangle.of(body(0.0, 0.0, math.pi / 4)).bottom == pytest.approx(
-        -0.03 * math.sqrt(0.5), abs=1e-15
-    )
+    assert Rectangle.of(body(0.0, 0.0, math.pi / 4)).bottom == pytest.approx(-0.03 * math.sqrt(0.5), abs=1e-15)

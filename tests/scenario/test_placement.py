@@ -27,9 +27,7 @@ def test_the_three_blocks_stand_as_in_the_experiment() -> None:
     assert [body.name for body in bodies] == ["1", "2", "3"]
     assert [body.x for body in bodies] == pytest.approx([0.016, 0.038, 0.060], abs=1e-15)
     assert [body.y for body in bodies] == pytest.approx([0.025, 0.075, 0.125], abs=1e-15)
-    assert {(body.size_x, body.size_y, body.depth, body.angle) for body in bodies} == {
-        (0.032, 0.05, 0.025, 0.0)
-    }
+    assert {(body.size_x, body.size_y, body.depth, body.angle) for body in bodies} == {(0.032, 0.05, 0.025, 0.0)}
     assert bodies[0].density == pytest.approx(2721.7, abs=0.05)
     assert bodies[0].mass == pytest.approx(0.10887, abs=5e-6)
     assert bodies[0].inertia == pytest.approx(0.10887 * (0.032**2 + 0.05**2) / 12, rel=1e-4)

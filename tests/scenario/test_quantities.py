@@ -89,7 +89,7 @@ def test_a_frequency_is_no_spin() -> None:
         (q.PositiveLength, "1 nm", 0),
         (q.NonNegativeTime, 0, "-1 ns"),
         (q.Share, 1, 1.0000001),
-        (q.PositiveShare, 1, 0),
+        (q.Safety, 0.1, 0.2),
         (q.PoissonRatio, -0.999, -1),
         (q.TiltAngle, "89.9 deg", "-90 deg"),
         (q.Friction, "89 deg", "-1 deg"),

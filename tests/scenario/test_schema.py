@@ -21,9 +21,7 @@ def test_it_is_a_schema() -> None:
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
 
 
-def test_shipped_scenarios_are_valid_as_written_and_resolved(
-    validator: Draft202012Validator, shipped: Path
-) -> None:
+def test_shipped_scenarios_are_valid_as_written_and_resolved(validator: Draft202012Validator, shipped: Path) -> None:
     validator.validate(tomllib.loads(shipped.read_text()))
     validator.validate(tomllib.loads(scenario_to_toml(load_scenario(shipped))))
 
@@ -43,9 +41,7 @@ def test_shipped_scenarios_are_valid_as_written_and_resolved(
         '[provenance]\n"time.end" = "assumed"',
     ],
 )
-def test_every_form_of_a_value_is_valid(
-    validator: Draft202012Validator, valid_text: str, addition: str
-) -> None:
+def test_every_form_of_a_value_is_valid(validator: Draft202012Validator, valid_text: str, addition: str) -> None:
     validator.validate(tomllib.loads(f"{valid_text}\n{addition}\n"))
 
 

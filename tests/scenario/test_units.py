@@ -40,9 +40,7 @@ def test_other_units_are_read_by_pint(text: str, factor: Fraction, dimension: un
     assert parse_unit(text) == units.Unit(factor, dimension)
 
 
-@pytest.mark.parametrize(
-    "text", ["m**9**9", "m^999", "m;m", "m+m", "(m)", "m//s", "/s", "m" * 50, "2 m", "f(m)"]
-)
+@pytest.mark.parametrize("text", ["m**9**9", "m^999", "m;m", "m+m", "(m)", "m//s", "/s", "m" * 50, "2 m", "f(m)"])
 def test_expressions_never_reach_pint(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(units, "unit_by_pint", lambda _: pytest.fail("pint was asked"))
     with pytest.raises(UnitError):
@@ -56,8 +54,6 @@ def test_an_unknown_unit_is_named() -> None:
 
 
 def test_a_scenario_in_common_units_is_loaded_without_pint() -> None:
-    code = (
-        "import sys, blocksim.scenario as s; s.load_scenario(sys.argv[1]); assert 'pint' not in sys.modules"
-    )
+    code = "import sys, blocksim.scenario as s; s.load_scenario(sys.argv[1]); assert 'pint' not in sys.modules"
     path = Path(__file__).parents[2] / "scenarios" / "three_blocks.toml"
     subprocess.run([sys.executable, "-c", code, path], check=True)

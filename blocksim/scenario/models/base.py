@@ -57,9 +57,7 @@ def _identifier(value: object) -> object:
         raise invalid(message)
     allowed = value.isascii() and all(c.isalnum() or c in "._-" for c in value)
     if not allowed or not 1 <= len(value) <= MAX_NAME or value[0] in ".-":
-        message = (
-            f"{shown(value)} is not a name; 1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
-        )
+        message = f"{shown(value)} is not a name; 1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
         raise invalid(message)
     return value
 

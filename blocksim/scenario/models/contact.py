@@ -49,9 +49,7 @@ class PairFriction(Table):
         return self
 
     @classmethod
-    def __get_pydantic_json_schema__(
-        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Accept a bare number or angle."""
         return or_bare(handler(schema), q.FrictionCoefficient().json_schema())
 
@@ -71,9 +69,7 @@ class Restitution(Table):
     """Coefficients of restitution; a bare number in the file sets both."""
 
     block_block: q.Share = Field(default=0.2, description="restitution between two blocks (assumed)")
-    block_ground: q.Share = Field(
-        default=0.2, description="restitution between a block and the ground (assumed)"
-    )
+    block_ground: q.Share = Field(default=0.2, description="restitution between a block and the ground (assumed)")
 
     @model_validator(mode="before")
     @classmethod
@@ -86,9 +82,7 @@ class Restitution(Table):
         raise q.invalid(message)
 
     @classmethod
-    def __get_pydantic_json_schema__(
-        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Accept a bare number."""
         bare: dict[str, Any] = {"type": "number", "minimum": 0, "maximum": 1}
         return or_bare(handler(schema), bare)
@@ -104,9 +98,7 @@ class Contact(Table):
         default="linear", description="how the force grows with the overlap"
     )
     restitution: Restitution = Field(default=Restitution(), description="rebound speed over impact speed")
-    stiffness_scale: q.PositiveNumber = Field(
-        default=1.0, description="factor on the stiffness of every contact"
-    )
+    stiffness_scale: q.PositiveNumber = Field(default=1.0, description="factor on the stiffness of every contact")
     normal_stiffness: q.Stiffness | None = Field(
         default=None, description="stiffness of one contact point (default: from the materials)"
     )

@@ -18,9 +18,7 @@ SIDES: tuple[Side, ...] = ("width", "height", "length")
 class Material(Table):
     """An elastic material; exactly one of density and unit weight is given."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"oneOf": [{"required": ["density"]}, {"required": ["unit_weight"]}]}
-    )
+    model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": ["density"]}, {"required": ["unit_weight"]}]})
 
     given_density: q.Density | None = Field(
         default=None, alias="density", description="mass per volume; give this or unit_weight"
@@ -59,9 +57,7 @@ class Block(Table):
     width: q.PositiveLength = Field(description="the block's width")
     height: q.PositiveLength = Field(description="the block's height")
     length: q.PositiveLength = Field(description="the block's length")
-    upright: Annotated[Side, OneOf(SIDES)] = Field(
-        default="height", description="the side that stands upright"
-    )
+    upright: Annotated[Side, OneOf(SIDES)] = Field(default="height", description="the side that stands upright")
     along: Annotated[Side, OneOf(SIDES)] = Field(
         default_factory=lambda known: "length" if known.get("upright") == "width" else "width",
         description="the side that lies along x (default: width, or length where width stands upright)",
@@ -103,9 +99,7 @@ class BodySpec(Table):
     x: q.Length = Field(description="centre along the ground")
     y: q.Length = Field(description="centre above the ground")
     angle: q.Angle = Field(default=0.0, description="turned counter-clockwise by this angle")
-    velocity: tuple[q.Speed, q.Speed] = Field(
-        default=(0.0, 0.0), description="velocity of the centre along x and y"
-    )
+    velocity: tuple[q.Speed, q.Speed] = Field(default=(0.0, 0.0), description="velocity of the centre along x and y")
     spin: q.Spin = Field(default=0.0, description="angular velocity, counter-clockwise positive")
     fixed: bool = Field(default=False, description="true for a body that never moves")
     name: Identifier | None = Field(default=None, description="name in tables (default: its number, from 1)")
@@ -121,9 +115,5 @@ class BodySpec(Table):
 class Ground(Table):
     """The half-plane below y = 0; a tilt turns gravity, x stays along the ground."""
 
-    tilt: q.TiltAngle = Field(
-        default=0.0, description="slope of the ground, positive where its +x end is raised"
-    )
-    material: str | None = Field(
-        default=None, description="the name of its material (default: the blocks' own)"
-    )
+    tilt: q.TiltAngle = Field(default=0.0, description="slope of the ground, positive where its +x end is raised")
+    material: str | None = Field(default=None, description="the name of its material (default: the blocks' own)")

@@ -31,8 +31,8 @@ class Time(Table):
     )
     end: q.PositiveTime = Field(default=2.0, description="simulated time")
     step: Step = Field(default="auto", description='time step, or "auto" for the largest safe one')
-    safety: q.PositiveShare = Field(
-        default=0.05, description="share of the stability limit that the automatic step is"
+    safety: q.Safety = Field(
+        default=0.05, description="share of the stability limit that the automatic step is, at most 0.1"
     )
     force_step: bool = Field(default=False, description="true to accept a step above the safe one")
     stop_at_rest: bool = Field(default=True, description="true to end the run once everything rests")
@@ -44,4 +44,3 @@ class Output(Table):
     """What is recorded; it never changes the motion."""
 
     every: q.PositiveTime = Field(default=0.001, description="time between two recorded frames")
-    contacts: bool = Field(default=False, description="true to record every contact force too")

@@ -54,9 +54,7 @@ def _expanded(value: object) -> object:
     if isinstance(value, Mapping) and set(value) == {"from", "to", "count"}:
         return _spread(value)
     if not isinstance(value, list | tuple):
-        message = (
-            f"{q.shown(value)} is no variation; write a list or {{ from, to, count }}, and the key in quotes"
-        )
+        message = f"{q.shown(value)} is no variation; write a list or {{ from, to, count }}, and the key in quotes"
         raise q.invalid(message)
     if not value:
         message = "the list of values is empty"
@@ -109,10 +107,8 @@ Values = Annotated[tuple[Any, ...], BeforeValidator(_expanded)]
 class Sweep(Table):
     """Which scenario keys to vary; in the file every dotted key stands in quotes beside `mode`."""
 
-    mode: Annotated[
-        Literal["grid", "list"], OneOf(("grid", "list"), planned=("table", "lhs", "sobol", "normal"))
-    ] = Field(
-        default="grid", description="grid: every combination; list: all first values, all second values …"
+    mode: Annotated[Literal["grid", "list"], OneOf(("grid", "list"), planned=("table", "lhs", "sobol", "normal"))] = (
+        Field(default="grid", description="grid: every combination; list: all first values, all second values …")
     )
     vary: dict[str, Values] = Field(description="dotted key of the scenario and its values")
 
@@ -137,9 +133,7 @@ class Sweep(Table):
         return self
 
     @classmethod
-    def __get_pydantic_json_schema__(
-        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Describe the table of the file, where the varied keys stand beside `mode`."""
         table = handler.resolve_ref_schema(handler(schema))
         return {

@@ -19,9 +19,7 @@ from blocksim.scenario import Block, Material
     ],
 )
 def test_sides_along_upright_and_deep(turned: dict[str, str], sizes: tuple[float, float, float]) -> None:
-    block = Block.model_validate(
-        {"width": "32 mm", "height": "25 mm", "length": "50 mm", "material": "a", **turned}
-    )
+    block = Block.model_validate({"width": "32 mm", "height": "25 mm", "length": "50 mm", "material": "a", **turned})
     assert (block.size_x, block.size_y, block.depth) == sizes
 
 

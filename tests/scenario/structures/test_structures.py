@@ -36,7 +36,5 @@ def test_more_overlap_than_block_is_refused() -> None:
 @pytest.mark.parametrize("offset", [0.0, 0.0105, -0.004])
 def test_a_stack_leans_by_its_offset(offset: float) -> None:
     poses = Stack(kind="stack", block="brick", count=5, left=-0.1, offset=offset).place(BRICK)
-    assert [pose.x - 0.016 for pose in poses] == pytest.approx(
-        [-0.1 + i * offset for i in range(5)], abs=1e-15
-    )
+    assert [pose.x - 0.016 for pose in poses] == pytest.approx([-0.1 + i * offset for i in range(5)], abs=1e-15)
     assert [pose.y for pose in poses] == pytest.approx([0.025 * (i + 0.5) for i in range(5)], abs=1e-15)

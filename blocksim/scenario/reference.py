@@ -1,0 +1,102 @@
+"""The table of all scenario keys and their defaults, for the README; written from the models, so that it cannot lie."""
+
+import re
+import sys
+import typing
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from blocksim.scenario.models.contact import Contact, Friction, PairFriction, Restitution
+from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.stepping import Output, Time
+from blocksim.scenario.models.study import Experiment, Sweep
+from blocksim.scenario.quantities import Quantity
+from blocksim.scenario.structures import KINDS
+
+BEGIN = "<!-- keys: written by `make readme` -->"
+END = "<!-- end of keys -->"
+HEAD = "| key | unit | default | meaning |\n| --- | --- | --- | --- |"
+SUBTABLES = (dict, tuple, BaseModel)
+
+
+def key_table() -> str:
+    """Return all keys as a Markdown table: key, SI unit, default, meaning."""
+    sections: list[tuple[str, type[BaseModel]]] = [
+        ("", Scenario),
+        ("materials.NAME", Material),
+        ("blocks.NAME", Block),
+        *((f'structures, kind = "{kind}"', model) for kind, model in KINDS.items()),
+        ("bodies", BodySpec),
+        ("ground", Ground),
+        ("friction", Friction),
+        ("friction.PAIR", PairFriction),
+        ("contact", Contact),
+        ("contact.restitution", Restitution),
+        ("time", Time),
+        ("output", Output),
+        ("experiment", Experiment),
+        ("sweep", Sweep),
+    ]
+    rows = [row for prefix, model in sections for row in _rows(prefix, model)]
+    return "\n".join([HEAD, *rows])
+
+
+def with_key_table(text: str) -> str:
+    """Return a README with the table between the two marks replaced by the present one."""
+    marked = re.compile(f"{re.escape(BEGIN)}.*{re.escape(END)}", re.DOTALL)
+    return marked.sub(lambda _: f"{BEGIN}\n{key_table()}\n{END}", text)
+
+
+def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
+    place = prefix.partition(",")[0]
+    note = prefix.partition(", ")[2]
+    for name, info in model.model_fields.items():
+        if name == "kind" or (_is_table(info) and model not in {Friction, Sweep}):
+            continue
+        key = f"{place}.{info.alias or name}" if place else (info.alias or name)
+        if model is Sweep and name == "vary":
+            key = 'sweep."KEY"'
+        where = f" ({note})" if note else ""
+        default = f"`{info.default.static}`" if model is Friction else _default(info)
+        yield f"| `{key}`{where} | {_unit(info)} | {default} | {info.description} |"
+
+
+def _is_table(info: FieldInfo) -> bool:
+    kind = typing.get_origin(info.annotation) or info.annotation
+    is_model = isinstance(kind, type) and issubclass(kind, SUBTABLES) and "Speed" not in str(info.annotation)
+    optional = any(isinstance(part, type) and issubclass(part, BaseModel) for part in typing.get_args(info.annotation))
+    return (is_model and "float" not in str(info.annotation)) or optional or "Any" in str(info.annotation)
+
+
+def _unit(info: FieldInfo) -> str:
+    found = next((part for part in _parts(info.annotation, info.metadata) if isinstance(part, Quantity)), None)
+    return found.kind.unit if found is not None else ""
+
+
+def _parts(annotation: Any, metadata: list[Any]) -> Iterator[Any]:
+    yield from metadata
+    for part in typing.get_args(annotation):
+        yield part
+        yield from _parts(part, [])
+
+
+def _default(info: FieldInfo) -> str:
+    if info.is_required():
+        return "**required**"
+    value = info.default
+    if value is None or value is PydanticUndefined or info.default_factory is not None:  # explained by the meaning
+        return "–"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"`{value}`" if value != "" else "empty"
+
+
+if __name__ == "__main__":
+    readme = Path(sys.argv[1])
+    readme.write_text(with_key_table(readme.read_text(encoding="utf-8")), encoding="utf-8")

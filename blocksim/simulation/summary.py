@@ -1,0 +1,52 @@
+"""run.json: how a run ended, what it cost, and what it takes to know, years later, where its numbers came from."""
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ValidationError
+
+from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.simulation.ledger import EnergyLedger
+
+
+class Summary(BaseModel, frozen=True):
+    """The entries of run.json; seconds are of wall time, unless they say that they are simulated."""
+
+    name: str
+    status: Literal["finished", "failed", "interrupted"]
+    reason: str
+    exit_code: int
+    run: str
+    scenario_hash: str
+    final_state_sha256: str
+    steps: int
+    time_step_s: float
+    simulated_time_s: float
+    compile_seconds: float
+    solver_seconds: float
+    total_seconds: float
+    energy_J: EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
+    warnings: tuple[str, ...]
+    environment: dict[str, str]
+    sha256: dict[str, str] = {}
+
+    def to_json(self) -> str:
+        """Return the text of run.json; numbers that are not finite become null."""
+        return self.model_dump_json(indent=2) + "\n"
+
+
+def read_summary(path: Path) -> Summary:
+    """Return what a run.json holds. Raises InputMissingError or InvalidInputError."""
+    try:
+        return Summary.model_validate_json(path.read_bytes())
+    except FileNotFoundError:
+        message = f"{path}: no such file"
+        raise InputMissingError(message) from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        message = f"{path}: not the summary of a run: {place + ': ' if place else ''}{first['msg']}"
+        raise InvalidInputError(message) from None
+    except OSError as error:
+        message = f"{path}: cannot be read: {error.strerror}"
+        raise InputMissingError(message) from None

@@ -1,0 +1,31 @@
+"""The README must not promise keys, commands or files that are not there."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from blocksim.scenario import Document
+from blocksim.scenario.reference import with_key_table
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_table_of_keys_is_the_one_of_the_models() -> None:
+    assert with_key_table(README) == README, "run: make readme"
+
+
+def test_the_scenario_in_the_readme_is_valid() -> None:
+    text = re.search(r"```toml\n(.*?)```", README, re.DOTALL)
+    assert text is not None
+    assert Document.parse(text.group(1), "README.md").build().name == "my_tower"
+
+
+@pytest.mark.parametrize("place", sorted(set(re.findall(r"`((?:blocksim|tests|scenarios|results)/[\w/.]+)`", README))))
+def test_every_place_that_the_readme_names_exists(place: str) -> None:
+    assert (ROOT / place).exists()
+
+
+def test_the_picture_of_the_readme_is_there() -> None:
+    assert (ROOT / "results" / "three_blocks.png").stat().st_size > 0
