@@ -4,8 +4,9 @@ import math
 
 from blocksim.kernels.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL, REACHED, Records, World
 from blocksim.kernels.broad_phase import rebuild_pairs
-from blocksim.kernels.contact import pair_forces, release_pair
+from blocksim.kernels.contact import pair_forces
 from blocksim.kernels.energy import contact_summary
+from blocksim.kernels.history import change_contacts
 from blocksim.kernels.integrate import accelerate_and_kick, kick_and_drift, kinetic_energy, renew_rotations
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.surface import block_points, ground_points
@@ -33,7 +34,7 @@ def contact_forces(world: World, step: float) -> None:
         if count > 0:
             pair_forces(world, p, count, step)
         elif world.pairs[p].active > 0:
-            release_pair(world, p)
+            change_contacts(world, p, 0, step)
     accelerate_and_kick(world.bodies, world.controls[0], step)
 
 

@@ -44,7 +44,8 @@ BODY = record_type(
     "inverse_mass inverse_inertia "  # 1/kg, 1/(kg m2): zero for fixed bodies and the ground
     "mass inertia "  # kg, kg m2 about the centre, out of the plane: kept for fixed bodies too
     "list_x list_y list_angle",  # m, m, rad: where the body was when the pair list was made
-    "contact_class",  # index into the interaction table; class 0 is the ground
+    "contact_class "  # index into the interaction table; class 0 is the ground
+    "pairs_now pairs_before",  # pairs in contact, of the evaluation under way and of the one before
 )
 PAIR = record_type("", "a b corners active")  # bodies, sorted; number of candidate corners; of slots in contact
 SLOT = record_type(
@@ -60,6 +61,7 @@ INTERACTION = record_type(
 )
 POINT = record_type(
     "x y nx ny depth "  # m: contact point; normal; m: overlap
+    "beside "  # m: the greater overlap, with the other face that the corner may touch; infinite where there is none
     "normal_arm_a normal_arm_b shear_arm_a shear_arm_b "  # m: lever arms of normal and tangent about both bodies
     "closing slipping "  # m: relative displacement of the last drift, against the normal and along the tangent
     "closing_rate slip_rate "  # m/s: the same as rates at the end of the drift, predicted
@@ -96,7 +98,7 @@ class World(NamedTuple):
     spare_slots: Records  # (p, 8) SLOT
     spare_candidates: Integers  # (p, 8)
     interactions: Records  # (c, c) INTERACTION
-    points: Records  # (8,) POINT, work space of one pair
+    points: Records  # (9,) POINT, work space of one pair; the last one for contacts that end
     matrices: Floats  # (4, 8, 8) work space of one pair
     controls: Records  # (1,) CONTROLS
     clock: Records  # (1,) CLOCK

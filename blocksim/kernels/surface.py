@@ -1,5 +1,7 @@
 """Narrow phase of the `surface` model: corners of one body against the exact rectangle of another, or the ground."""
 
+import math
+
 from blocksim.kernels.arrays import NO_FACE, SLOTS, Integers, Record, Records
 from blocksim.kernels.geometry import relative_pose, to_world
 from blocksim.kernels.jit import kernel, rare_kernel
@@ -11,29 +13,34 @@ from blocksim.kernels.jit import kernel, rare_kernel
 CONE_TOLERANCE = 0.2
 
 PARALLEL = 0.9
+CLOSE = 8.0  # overlaps; two corners nearer than that meet in one place
 
 
 @kernel
 def face_below_corner(
     px: float, py: float, touched: Record, sx: float, sy: float, c: float, s: float
-) -> tuple[int, float]:
-    """Return the face (or NO_FACE) that a corner touches and its overlap (m).
+) -> tuple[int, float, float]:
+    """Return the face (or NO_FACE) that a corner touches, its overlap (m), and the overlap with the other face (m).
 
     (px, py) is the corner in the frame of the touched rectangle, (sx, sy) = +-1 says which corner of its owner it
-    is, (c, s) the rotation of the owner against the touched rectangle. Of the admissible faces the nearest counts.
+    is, (c, s) the rotation of the owner against the touched rectangle. Of the admissible faces the nearest counts; the
+    third value is infinite where only one is admissible.
     """
-    face = NO_FACE
-    depth = 0.0
-    side = 1.0 if px >= 0.0 else -1.0
-    if -sx * side * c >= -CONE_TOLERANCE and sy * side * s >= -CONE_TOLERANCE:
-        face = 0 if side > 0.0 else 2
-        depth = touched.half_x - abs(px)
-    side = 1.0 if py >= 0.0 else -1.0
-    is_open = -sx * side * s >= -CONE_TOLERANCE and -sy * side * c >= -CONE_TOLERANCE
-    if is_open and (face == NO_FACE or touched.half_y - abs(py) < depth):
-        face = 1 if side > 0.0 else 3
-        depth = touched.half_y - abs(py)
-    return face, depth
+    side_x = 1.0 if px >= 0.0 else -1.0
+    side_y = 1.0 if py >= 0.0 else -1.0
+    depth_x = touched.half_x - abs(px)
+    depth_y = touched.half_y - abs(py)
+    face_x = 0 if side_x > 0.0 else 2
+    face_y = 1 if side_y > 0.0 else 3
+    open_x = -sx * side_x * c >= -CONE_TOLERANCE and sy * side_x * s >= -CONE_TOLERANCE
+    open_y = -sx * side_y * s >= -CONE_TOLERANCE and -sy * side_y * c >= -CONE_TOLERANCE
+    if open_x and open_y:
+        return (face_x, depth_x, depth_y) if depth_x <= depth_y else (face_y, depth_y, depth_x)
+    if open_x:
+        return face_x, depth_x, math.inf
+    if open_y:
+        return face_y, depth_y, math.inf
+    return NO_FACE, 0.0, math.inf
 
 
 @kernel
@@ -67,7 +74,7 @@ def add_corner(
     py = y0 + sx * s * owner.half_x + sy * c * owner.half_y
     if abs(px) > touched.half_x or abs(py) > touched.half_y:
         return count
-    face, depth = face_below_corner(px, py, touched, sx, sy, c, s)
+    face, depth, beside = face_below_corner(px, py, touched, sx, sy, c, s)
     if depth <= 0.0:
         return count
     point = points[count]
@@ -76,6 +83,7 @@ def add_corner(
     point.x, point.y = to_world(touched, px, py)
     point.nx, point.ny = face_normal(face, touched)
     point.depth = depth
+    point.beside = beside
     return count + 1
 
 
@@ -95,6 +103,7 @@ def ground_points(owner: Record, corners: int, candidates: Integers, points: Rec
             point.nx = 0.0
             point.ny = 1.0
             point.depth = -y
+            point.beside = math.inf
             count += 1
     return count
 
@@ -128,6 +137,38 @@ def same_end(of_a: Record, of_b: Record, a: Record, b: Record) -> bool:
 
 
 @rare_kernel
+def is_oblique(a: Record, b: Record) -> bool:
+    """Tell whether no face of a is nearly parallel to a face of b, so that they touch in one point at most."""
+    c = abs(a.cos * b.cos + a.sin * b.sin)
+    s = abs(a.sin * b.cos - a.cos * b.sin)
+    return min(c, s) > CONE_TOLERANCE
+
+
+@rare_kernel
+def coincide(one: Record, two: Record) -> bool:
+    """Tell whether two corners meet: they are about as near to one another as they are deep."""
+    dx = one.x - two.x
+    dy = one.y - two.y
+    reach = CLOSE * max(one.depth, two.depth)
+    return dx * dx + dy * dy < reach * reach
+
+
+@rare_kernel
+def keeps_first(one: Record, two: Record, slots: Records, oblique: bool) -> bool:
+    """Choose between two coinciding corners.
+
+    Oblique: the shallower one, which is the nearest edge of the Minkowski difference, so that the overlap changes
+    continuously when the corners pass one another. Parallel: the one already in contact, otherwise the deeper one,
+    otherwise that of a.
+    """
+    if oblique:
+        return one.depth <= two.depth
+    was_one = slots[one.slot].face != NO_FACE
+    was_two = slots[two.slot].face != NO_FACE
+    return was_one if was_one != was_two else one.depth >= two.depth
+
+
+@rare_kernel
 def drop_point(points: Records, gone: int, count: int) -> int:
     """Remove one point, keep the order of the others, return the new count."""
     for i in range(gone, count - 1):
@@ -140,23 +181,25 @@ def drop_point(points: Records, gone: int, count: int) -> int:
         target.nx = source.nx
         target.ny = source.ny
         target.depth = source.depth
+        target.beside = source.beside
     return count - 1
 
 
 @rare_kernel
 def drop_twins(a: Record, b: Record, slots: Records, points: Records, count: int) -> int:
-    """Keep one of two coinciding corners, so that a face contact always has two points and the stiffness of two.
+    """Keep one of two coinciding corners: they are one contact, and a face contact has the stiffness of two points.
 
-    Where two blocks are exactly aligned, a corner of each lies in the other. The one already in contact stays,
-    otherwise the deeper one, otherwise that of `a`. `slots` are the slots of this pair.
+    Where two blocks are exactly aligned, or meet corner on corner, a corner of each lies in the other. `slots` are the
+    slots of this pair.
     """
+    oblique = is_oblique(a, b)
     i = 0
     while i < count and points[i].slot < SLOTS // 2:
         for j in range(i + 1, count):
-            if points[j].slot >= SLOTS // 2 and same_end(points[i], points[j], a, b):
-                old_i = slots[points[i].slot].face != NO_FACE
-                old_j = slots[points[j].slot].face != NO_FACE
-                keep_i = old_i if old_i != old_j else points[i].depth >= points[j].depth
+            if points[j].slot >= SLOTS // 2 and (
+                coincide(points[i], points[j]) if oblique else same_end(points[i], points[j], a, b)
+            ):
+                keep_i = keeps_first(points[i], points[j], slots, oblique)
                 count = drop_point(points, j if keep_i else i, count)
                 i -= 0 if keep_i else 1
                 break

@@ -59,7 +59,7 @@ def build_world(scenario: Scenario) -> World:
         bodies=bodies,
         **empty_lists(capacity),
         interactions=table,
-        points=zeros(SLOTS, POINT),
+        points=zeros(SLOTS + 1, POINT),
         matrices=np.zeros((4, SLOTS, SLOTS)),
         controls=_controls(scenario, bodies, choose_step(scenario, bodies, table)),
         clock=_clock(),

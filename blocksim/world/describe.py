@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from blocksim.kernels.arrays import World
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.world.build import build_world
-from blocksim.world.interactions import contact_classes
+from blocksim.world.interactions import ContactClass, contact_classes
 
 # measured on one core: a step costs about this for every body with its contacts (three to a hundred blocks)
 SECONDS_PER_BODY_AND_STEP = 75e-9
@@ -60,6 +60,7 @@ def describe(scenario: Scenario) -> Description:
 
 def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> tuple[PairDescription, ...]:
     classes = contact_classes(scenario, placed)
+    names = _class_names(classes)
     found = []
     for i in range(1, len(classes)):
         for j in range(i + 1):
@@ -67,8 +68,7 @@ def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> 
             restitution = scenario.contact.restitution
             found.append(
                 PairDescription(
-                    pair=f"{classes[i].material} {1e3 * classes[i].depth:g} mm deep, on "
-                    + ("ground" if j == 0 else f"{classes[j].material} {1e3 * classes[j].depth:g} mm deep"),
+                    pair=f"{names[i]} - {names[j]}",
                     static_friction=float(row.static_friction),
                     kinetic_friction=float(row.kinetic_friction),
                     restitution=restitution.block_ground if j == 0 else restitution.block_block,
@@ -79,3 +79,13 @@ def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> 
                 )
             )
     return tuple(found)
+
+
+def _class_names(classes: tuple[ContactClass, ...]) -> list[str]:
+    """Return names for people: the material, and the depth where blocks of one material differ in it."""
+    materials = [one.material for one in classes[1:]]
+    names = [
+        f"{one.material} {1e3 * one.depth:g} mm" if materials.count(one.material) > 1 else str(one.material)
+        for one in classes[1:]
+    ]
+    return ["ground", *names]
