@@ -5,7 +5,7 @@ import math
 from blocksim.kernels.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL, REACHED, Records, World
 from blocksim.kernels.broad_phase import rebuild_pairs
 from blocksim.kernels.contact import pair_forces
-from blocksim.kernels.energy import contact_summary
+from blocksim.kernels.energy import has_excessive_overlap
 from blocksim.kernels.history import change_contacts
 from blocksim.kernels.integrate import accelerate_and_kick, kick_and_drift, kinetic_energy, renew_rotations
 from blocksim.kernels.jit import kernel, rare_kernel
@@ -62,7 +62,7 @@ def check(world: World) -> int:
     fastest = fastest_point(world.bodies)
     if math.isinf(fastest):
         return NOT_FINITE
-    if contact_summary(world)[3] > controls.max_overlap:
+    if has_excessive_overlap(world):
         return OVERLAP_LIMIT
     clock.checks_at_rest = clock.checks_at_rest + 1 if fastest < controls.rest_speed else 0
     return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED

@@ -28,9 +28,13 @@ NO_FACE = -1
 REACHED, AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL = range(5)
 
 
-def record_type(floats: str, integers: str = "") -> np.dtype[np.void]:
-    """Return a dtype of 8-byte fields from space-separated names."""
-    fields = [(name, np.float64) for name in floats.split()] + [(name, np.int64) for name in integers.split()]
+def record_type(floats: str, integers: str = "", indices: str = "") -> np.dtype[np.void]:
+    """Return a dtype of 8-byte fields from space-separated names.
+
+    Indices are unsigned: compiled code then need not look for negative ones, which count from the end.
+    """
+    kinds: list[tuple[str, type]] = [(floats, np.float64), (integers, np.int64), (indices, np.uint64)]
+    fields = [(name, kind) for names, kind in kinds for name in names.split()]
     return np.dtype(fields, align=True)
 
 
@@ -69,7 +73,8 @@ POINT = record_type(
     "stiffness rate before force "  # N/m, m/s, N, N: of the pass under way; force of the step before; force now
     "spring_force normal_force limit "  # N: normal spring; normal total; Coulomb limit of the tangential force
     "free_rate",  # m/s: rate without this step's change of the pair's own forces
-    "slot face",
+    "face",
+    "slot",
 )
 OPERATOR = record_type(
     "e_one e_mixed e_two "  # N s/m: dashpot force of points one and two per free rate of each
@@ -79,7 +84,8 @@ OPERATOR = record_type(
 NORMAL, SHEAR = 0, 1
 CONTROLS = record_type(
     "step gravity_x gravity_y "  # s, m/s2
-    "skin max_overlap rest_speed",  # m: reach of the pair list beyond contact; m; m/s
+    "skin rest_speed "  # m: reach of the pair list beyond contact; m/s
+    "max_overlap",  # m, zero: a share of the smaller side of each pair
     "law check_every rest_checks",  # law code; steps between checks; checks in a row that must find rest (0: never)
 )
 CLOCK = record_type("", "steps checks_at_rest pair_count rebuilds pairs_due is_started")  # the last two: flags

@@ -1,10 +1,13 @@
 """Energy ledger: what the scene holds now. Losses are booked where the forces are applied (contact.py)."""
 
-from blocksim.kernels.arrays import NO_FACE, SLOTS, Floats, World
+import math
+
+from blocksim.kernels.arrays import NO_FACE, SLOTS, Floats, Record, World
 from blocksim.kernels.integrate import kinetic_energy
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.laws import stored_energy
 
+OVERLAP_SHARE = 0.05  # of the smallest side of a pair
 LEDGER_ROW = ("kinetic", "potential", "stored_normal", "stored_shear", "dashpot", "friction", "broken")
 
 
@@ -55,3 +58,25 @@ def measure(world: World, row: Floats) -> None:
     row[6] = ledger.broken
     row[7] = count
     row[8] = largest
+
+
+@rare_kernel
+def smallest_side(body: Record) -> float:
+    """Return the smaller side (m) of a body; infinite for the ground, which has none."""
+    half = min(body.half_x, body.half_y)
+    return 2.0 * half if half > 0.0 else math.inf
+
+
+@rare_kernel
+def has_excessive_overlap(world: World) -> bool:
+    """Tell whether any contact is deeper than the limit given, or else than a share of the pair's smallest side."""
+    given = world.controls[0].max_overlap
+    for p in range(world.clock[0].pair_count):
+        pair = world.pairs[p]
+        if pair.active > 0:
+            side = min(smallest_side(world.bodies[pair.a]), smallest_side(world.bodies[pair.b]))
+            limit = given if given > 0.0 else OVERLAP_SHARE * side
+            for k in range(SLOTS):
+                if world.slots[p, k].face != NO_FACE and world.slots[p, k].depth > limit:
+                    return True
+    return False

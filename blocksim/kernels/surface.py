@@ -13,7 +13,20 @@ from blocksim.kernels.jit import kernel, rare_kernel
 CONE_TOLERANCE = 0.2
 
 PARALLEL = 0.9
+BESIDE_SHARE = 0.1  # of the half diagonal; a face farther than that below a corner is not beside it
 CLOSE = 8.0  # overlaps; two corners nearer than that meet in one place
+
+
+@kernel
+def opens(face: int, sx: float, sy: float, c: float, s: float) -> bool:
+    """Tell whether a corner (sx, sy = +-1) of a body turned by (c, s) against another can touch that one's face."""
+    if face == 0:
+        return -sx * c >= -CONE_TOLERANCE and sy * s >= -CONE_TOLERANCE
+    if face == 1:
+        return -sx * s >= -CONE_TOLERANCE and -sy * c >= -CONE_TOLERANCE
+    if face == 2:
+        return sx * c >= -CONE_TOLERANCE and -sy * s >= -CONE_TOLERANCE
+    return sx * s >= -CONE_TOLERANCE and sy * c >= -CONE_TOLERANCE
 
 
 @kernel
@@ -24,22 +37,21 @@ def face_below_corner(
 
     (px, py) is the corner in the frame of the touched rectangle, (sx, sy) = +-1 says which corner of its owner it
     is, (c, s) the rotation of the owner against the touched rectangle. Of the admissible faces the nearest counts; the
-    third value is infinite where only one is admissible.
+    third value is infinite where the other one is not admissible or far away.
     """
-    side_x = 1.0 if px >= 0.0 else -1.0
-    side_y = 1.0 if py >= 0.0 else -1.0
     depth_x = touched.half_x - abs(px)
     depth_y = touched.half_y - abs(py)
-    face_x = 0 if side_x > 0.0 else 2
-    face_y = 1 if side_y > 0.0 else 3
-    open_x = -sx * side_x * c >= -CONE_TOLERANCE and sy * side_x * s >= -CONE_TOLERANCE
-    open_y = -sx * side_y * s >= -CONE_TOLERANCE and -sy * side_y * c >= -CONE_TOLERANCE
-    if open_x and open_y:
-        return (face_x, depth_x, depth_y) if depth_x <= depth_y else (face_y, depth_y, depth_x)
-    if open_x:
-        return face_x, depth_x, math.inf
-    if open_y:
-        return face_y, depth_y, math.inf
+    face_x = 0 if px >= 0.0 else 2
+    face_y = 1 if py >= 0.0 else 3
+    if depth_x <= depth_y:
+        near, near_depth, far, far_depth = face_x, depth_x, face_y, depth_y
+    else:
+        near, near_depth, far, far_depth = face_y, depth_y, face_x, depth_x
+    if opens(near, sx, sy, c, s):
+        is_beside = far_depth < BESIDE_SHARE * touched.radius and opens(far, sx, sy, c, s)
+        return near, near_depth, far_depth if is_beside else math.inf
+    if opens(far, sx, sy, c, s):
+        return far, far_depth, math.inf
     return NO_FACE, 0.0, math.inf
 
 

@@ -29,7 +29,6 @@ from blocksim.world.stable_step import ContactBody, ContactStiffness, stable_ste
 
 CHECK_INTERVAL = 1e-4  # s of simulated time between looks at rest, overlap and finiteness
 SKIN_SHARE = 0.05  # of the smallest side
-OVERLAP_SHARE = 0.05  # of the smallest side
 PAIRS_PER_BODY = 8
 
 
@@ -161,7 +160,7 @@ def _controls(scenario: Scenario, bodies: Records, step: float) -> Records:
     record.gravity_x = -scenario.gravity * math.sin(scenario.ground.tilt)
     record.gravity_y = -scenario.gravity * math.cos(scenario.ground.tilt)
     record.skin = SKIN_SHARE * smallest
-    record.max_overlap = OVERLAP_SHARE * smallest if given_limit is None else given_limit
+    record.max_overlap = 0.0 if given_limit is None else given_limit
     record.rest_speed = scenario.time.rest_speed
     record.law = LAW_CODES[scenario.contact.law]
     record.check_every = max(1, round(CHECK_INTERVAL / step))

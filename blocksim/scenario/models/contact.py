@@ -109,7 +109,7 @@ class Contact(Table):
         default=None, description="damping ratio in shear (default: the normal one)"
     )
     max_overlap: q.PositiveLength | None = Field(
-        default=None, description="overlap that stops the run (default: 5 % of the smallest side)"
+        default=None, description="overlap that stops the run (default: 5 % of the smallest side of each pair)"
     )
     particle_spacing: q.PositiveLength = Field(
         default=0.001, description="spacing of the boundary particles (particles, kernel)"
