@@ -51,7 +51,7 @@ def add_dashpots(
         solve_coupled(points, count, step, work)
         return
     apply_operator(points, count, operator)
-    if is_lasting(points, count):
+    if step > 0.0 and is_lasting(points, count):
         operator.left = OPERATOR_LIFE
 
 
