@@ -20,7 +20,7 @@ from blocksim.world.build import build_world
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from blocksim.kernels.arrays import Records, World
+    from blocksim.kernels.arrays import World
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 WIDTH, HEIGHT, DEPTH = 0.032, 0.025, 0.05
@@ -63,9 +63,14 @@ class Simulation:
         self.start_energy = self.energy()
 
     @property
-    def bodies(self) -> Records:
-        """All bodies without the ground."""
+    def bodies(self) -> Any:
+        """All bodies without the ground: a record array, as in blocksim.kernels.arrays."""
         return self.world.bodies[:-1]
+
+    @property
+    def slots(self) -> Any:
+        """Contact slots of the pairs in the list: a record array, 8 a pair."""
+        return self.world.slots[: self.world.clock[0].pair_count]
 
     @property
     def step(self) -> float:
@@ -160,7 +165,11 @@ def scenario_of(bodies: Sequence[Mapping[str, object]], **tables: Any) -> Scenar
             "blocks": {f"block{i}": block_type(body) for i, body in enumerate(bodies)},
             "bodies": [
                 {"x": 0.0, "block": f"block{i}"}
-                | {key: _with_unit(key, value) for key, value in body.items() if key not in {"width", "height", "length"}}
+                | {
+                    key: _with_unit(key, value)
+                    for key, value in body.items()
+                    if key not in {"width", "height", "length"}
+                }
                 for i, body in enumerate(bodies)
             ],
             **tables,
@@ -169,7 +178,7 @@ def scenario_of(bodies: Sequence[Mapping[str, object]], **tables: Any) -> Scenar
 
 
 def _with_unit(key: str, value: object) -> object:
-    return f"{value!r} rad" if key == "angle" and value else value
+    return f"{float(str(value))!r} rad" if key == "angle" and value else value
 
 
 @pytest.fixture(scope="session")
@@ -217,12 +226,12 @@ def start_shipped() -> Callable[..., Simulation]:
 
 @pytest.fixture(scope="session")
 def paper_block() -> PaperBlock:
-    """The paper's block."""
+    """Return the paper's block."""
     return PaperBlock()
 
 
 @pytest.fixture(scope="session", params=sorted(SCENARIOS.glob("*.toml")), ids=lambda path: path.stem)
 def shipped(request: pytest.FixtureRequest) -> Path:
-    """Every scenario file that ships."""
+    """Return every scenario file that ships, one a test."""
     path: Path = request.param
     return path

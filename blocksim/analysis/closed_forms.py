@@ -34,9 +34,7 @@ def rebound_speed(height: float, restitution: float, impacts: int, gravity: floa
     return sqrt(2.0 * gravity * height) * restitution**impacts
 
 
-def rebound_height(
-    time: float, height: float, restitution: float, impacts: int, gravity: float = GRAVITY
-) -> float:
+def rebound_height(time: float, height: float, restitution: float, impacts: int, gravity: float = GRAVITY) -> float:
     """Return the height (m) at `time` (s) after impact number `impacts`: v t - g t^2/2, v the rebound speed.
 
     This is what Eq. 10, second form, is meant to give; see `remaining_rise` for what it does give.
@@ -44,9 +42,7 @@ def rebound_height(
     return rebound_speed(height, restitution, impacts, gravity) * time - fall_distance(time, gravity)
 
 
-def remaining_rise(
-    time: float, height: float, restitution: float, impacts: int, gravity: float = GRAVITY
-) -> float:
+def remaining_rise(time: float, height: float, restitution: float, impacts: int, gravity: float = GRAVITY) -> float:
     """Return (v - g t)^2/(2 g) (m), Eq. 10, second form, as printed.
 
     With the speed v - g t at that moment this is how far the body will STILL rise, not how high it is: it is
@@ -185,9 +181,7 @@ def sticking_impact(
     )
     wanted = np.array([0.0, -restitution * corner[1]])
     along, up = (float(part) for part in np.linalg.solve(inverse_mass, wanted - corner))
-    return Motion(
-        before.vx + along / mass, before.vy + up / mass, before.spin + (x * up - y * along) / inertia
-    )
+    return Motion(before.vx + along / mass, before.vy + up / mass, before.spin + (x * up - y * along) / inertia)
 
 
 # Rocking of a block on its base (G. W. Housner 1963, Bull. Seismol. Soc. Am. 53, 403-417)

@@ -138,9 +138,7 @@ def _check_name(cell: Cell, table: Table) -> None:
     if not cell.text:
         table.problems.append(cell.problem("the block has no name"))
     elif len(cell.text) > LONGEST_NAME:
-        table.problems.append(
-            cell.problem(f"the name has {len(cell.text)} characters, at most {LONGEST_NAME}")
-        )
+        table.problems.append(cell.problem(f"the name has {len(cell.text)} characters, at most {LONGEST_NAME}"))
 
 
 def _replicate(cell: Cell, table: Table) -> int:
@@ -148,9 +146,7 @@ def _replicate(cell: Cell, table: Table) -> int:
     is_number = cell.text.isascii() and cell.text.isdigit() and len(cell.text) <= len(str(LARGEST_REPLICATE))
     if is_number and 1 <= int(cell.text) <= LARGEST_REPLICATE:
         return int(cell.text)
-    table.problems.append(
-        cell.problem(f"'{cell.text}' is not the number of a repeat, count them 1, 2, 3, ...")
-    )
+    table.problems.append(cell.problem(f"'{cell.text}' is not the number of a repeat, count them 1, 2, 3, ..."))
     return 0
 
 
@@ -173,7 +169,5 @@ def _value(cell: Cell, factor: float, table: Table) -> float:
         table.problems.append(cell.problem(str(error)))
         return 0.0
     if abs(value) > LARGEST_VALUE:
-        table.problems.append(
-            cell.problem(f"'{cell.text}' is too large, at most {LARGEST_VALUE:g} mm or degrees")
-        )
+        table.problems.append(cell.problem(f"'{cell.text}' is too large, at most {LARGEST_VALUE:g} mm or degrees"))
     return value

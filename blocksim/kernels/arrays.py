@@ -22,6 +22,7 @@ Records = np.recarray[Any, np.dtype[np.record]]
 Record = Any  # one element of Records: a pointer in compiled code, numpy.record without the compiler
 
 SLOTS = 8
+CACHE_LINE = 64  # bytes
 NO_FACE = -1
 
 # status codes that `advance` returns
@@ -49,7 +50,7 @@ BODY = record_type(
     "mass inertia "  # kg, kg m2 about the centre, out of the plane: kept for fixed bodies too
     "list_x list_y list_angle",  # m, m, rad: where the body was when the pair list was made
     "contact_class "  # index into the interaction table; class 0 is the ground
-    "pairs_now pairs_before",  # pairs in contact, of the evaluation under way and of the one before
+    "pairs_now pairs_before pairs_changed",  # pairs in contact in this evaluation and in the one before; flag
 )
 PAIR = record_type("", "a b corners active")  # bodies, sorted; number of candidate corners; of slots in contact
 SLOT = record_type(
@@ -112,5 +113,8 @@ class World(NamedTuple):
 
 
 def zeros(shape: int | tuple[int, ...], dtype: np.dtype[np.void]) -> Records:
-    """Return an array of zeroed records."""
-    return np.zeros(shape, dtype=dtype).view(np.recarray)
+    """Return an array of zeroed records that starts on a cache line: unaligned ones cost up to 15 % at random."""
+    count = int(np.prod(shape)) * dtype.itemsize
+    memory = np.zeros(count + CACHE_LINE, dtype=np.uint8)
+    begin = -memory.ctypes.data % CACHE_LINE
+    return memory[begin : begin + count].view(dtype).reshape(shape).view(np.recarray)

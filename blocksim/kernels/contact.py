@@ -11,7 +11,7 @@ from blocksim.kernels.arrays import NORMAL, SHEAR, Record, World
 from blocksim.kernels.damping import add_dashpots
 from blocksim.kernels.friction import coulomb_limit
 from blocksim.kernels.history import change_contacts
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.kinematics import DELASSUS, normal_masses, resolve_point, shear_masses
 from blocksim.kernels.laws import elastic_force, tangent_stiffness
 
@@ -77,7 +77,7 @@ def clip_to_cone(point: Record, slot: Record, values: Record) -> float:
     return dissipated
 
 
-@kernel
+@rare_kernel
 def spare_lost_faces(world: World, p: int, count: int) -> None:
     """Take the dashpot from corners about to pass beyond the end of the face they touch.
 
@@ -98,7 +98,8 @@ def shared_step(a: Record, b: Record, step: float) -> float:
     """Return the step (s) for the dashpots' own-force correction, longer where other pairs act on the same body.
 
     The correction knows this pair's change of force only. With p pairs that act alike on one body the others' part is
-    missing; counting the own part p/2 times keeps the recurrence stable for any p and changes nothing up to p = 2.
+    missing; counting the own part p/2 times keeps the recurrence stable (world/stable_step.py says how far) and changes
+    nothing up to p = 2.
     """
     most = 2
     if a.inverse_mass > 0.0:
@@ -109,22 +110,33 @@ def shared_step(a: Record, b: Record, step: float) -> float:
 
 
 @kernel
+def has_new_neighbours(a: Record, b: Record) -> bool:
+    """Tell whether the number of pairs on a free body has changed, so that operators made with the old one are void."""
+    return (a.pairs_changed == 1 and a.inverse_mass > 0.0) or (b.pairs_changed == 1 and b.inverse_mass > 0.0)
+
+
+@kernel
 def normal_pass(world: World, p: int, count: int, a: Record, b: Record, values: Record, step: float) -> None:
     """Kinematics, then springs and dashpots along the normals."""
     points = world.points
     law = world.controls[0].law
     continuing = 0
+    loses_face = False
     for i in range(count):
         point = points[i]
         slot = world.slots[p, point.slot]
         resolve_point(point, a, b, step)
         push_spring(point, slot, law, values.normal_stiffness)
         continuing += 1 if slot.face == point.face else 0
+        loses_face = loses_face or point.beside < IMPACT_STEPS * abs(point.closing)
     if continuing != count or count != world.pairs[p].active:
         change_contacts(world, p, count, step)
-    spare_lost_faces(world, p, count)
+    if loses_face:
+        spare_lost_faces(world, p, count)
     if values.normal_damping > 0.0:
         operator = world.operators[p, NORMAL]
+        if has_new_neighbours(a, b):
+            operator.left = 0
         if operator.left == 0:
             normal_masses(points, count, a, b, world.matrices[DELASSUS])
         pattern = (1 << count) - 1
@@ -148,7 +160,7 @@ def shear_pass(world: World, p: int, count: int, a: Record, b: Record, values: R
     ledger.dashpot += dashpot_work
     ledger.friction += friction_work
     operator = world.operators[p, SHEAR]
-    if operator.pattern != sticking or sticking == 0:
+    if operator.pattern != sticking or sticking == 0 or has_new_neighbours(a, b):
         operator.left = 0
     if sticking > 0 and values.shear_damping > 0.0:
         if operator.left == 0:

@@ -65,6 +65,7 @@ def accelerate_and_kick(bodies: Records, controls: Record, step: float) -> None:
             body.vx += half * body.ax
             body.vy += half * body.ay
             body.spin += half * body.spin_rate
+        body.pairs_changed = body.pairs_now != body.pairs_before
         body.pairs_before = body.pairs_now
         body.pairs_now = 0
         body.fx = 0.0

@@ -12,9 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MILLIMETRES = 1e3  # per metre
-UNIT_CORNERS = np.array(
-    [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
-)  # counter-clockwise from lower left
+UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # counter-clockwise from lower left
 GROUND_THICKNESS = 5.0  # points
 EDGE_INSET = 0.86  # where the mark of the upper side runs, as a part of half the height
 
@@ -80,12 +78,8 @@ def draw_scene(axes: "Axes", frames: FramesLike, frame: int, extent: Extent, poi
     ground = GROUND_THICKNESS / points_per_mm
     axes.fill_between([extent.left, extent.right], -ground, 0.0, color=style.GROUND_COLOUR, linewidth=0)
     axes.axhline(0.0, color=style.INK, linewidth=style.LINE_WIDTH)
-    axes.add_collection(
-        PolyCollection(list(outlines), facecolors=fills, edgecolors=style.INK, linewidths=thin)
-    )
-    axes.add_collection(
-        LineCollection(list(_upper_sides(frames, frame)), colors=style.INK, linewidths=2.0 * thin)
-    )
+    axes.add_collection(PolyCollection(list(outlines), facecolors=fills, edgecolors=style.INK, linewidths=thin))
+    axes.add_collection(LineCollection(list(_upper_sides(frames, frame)), colors=style.INK, linewidths=2.0 * thin))
     fonts = _label_fonts(frames, points_per_mm)
     for index, font in enumerate(fonts):
         x, y = outlines[index].mean(axis=0)
@@ -100,9 +94,7 @@ def draw_centres(axes: "Axes", frames: FramesLike, frame: int, points_per_mm: fl
         axes.plot([x, x], [-GROUND_THICKNESS / points_per_mm, 0.0], color=style.INK, linewidth=1.2)
 
 
-def draw_measured(
-    axes: "Axes", measured: list[MeasuredRange], points_per_mm: float, row_height: float
-) -> None:
+def draw_measured(axes: "Axes", measured: list[MeasuredRange], points_per_mm: float, row_height: float) -> None:
     """Draw measured mean and range of each block in rows of `row_height` (points) below the ground."""
     for item in measured:
         y = -(GROUND_THICKNESS + (item.row + 0.6) * row_height) / points_per_mm

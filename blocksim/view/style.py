@@ -77,9 +77,7 @@ def styled_figure(width: float, height: float) -> Iterator["Figure"]:
     from matplotlib.figure import Figure  # noqa: PLC0415
 
     # A user's own matplotlibrc must not change the file, but the backend is none of our business.
-    settings: dict[Any, Any] = {
-        key: value for key, value in rcParamsDefault.items() if not key.startswith("backend")
-    }
+    settings: dict[Any, Any] = {key: value for key, value in rcParamsDefault.items() if not key.startswith("backend")}
     with rc_context(settings | SETTINGS):
         figure = Figure(figsize=(width, height))
         FigureCanvasAgg(figure)

@@ -25,6 +25,15 @@ def with_value(name: str, value: float) -> Callable[[World], None]:
     return change
 
 
+def test_overlap_beyond_a_share_of_the_smallest_side_stops_the_run(start: Start) -> None:
+    small = {**FALLING, "height": 0.01, "y": 0.02}
+    for body, limit in ((FALLING, 0.05 * 0.025), (small, 0.05 * 0.01)):
+        thrown = {**body, "velocity": [0.0, -1.0]}
+        scene = start([thrown], contact={"normal_stiffness": 1e4}).to_time(1.0)
+        assert scene.status == OVERLAP_LIMIT
+        assert limit < scene.measured()[8] < limit + 2.0 * scene.step
+
+
 @pytest.mark.parametrize("name", ["x", "y", "angle", "vx", "vy", "spin"])
 @pytest.mark.parametrize("value", [nan, inf])
 def test_state_that_is_not_finite_stops_the_run(start: Start, name: str, value: float) -> None:

@@ -24,7 +24,7 @@ SEEDS = st.integers(0, 10_000)
 def inverse_masses(n: int, seed: int, *, parallel: bool = False) -> np.ndarray:
     """Return what n points of a pair see (1/kg): of rank three at most, of rank one for tangents on one face."""
     random = np.random.default_rng(seed)
-    jacobian = random.uniform(-1.0, 1.0, (n, 3)) + (2.0, 0.0, 0.0)
+    jacobian = random.uniform(-1.0, 1.0, (n, 3)) + np.array([2.0, 0.0, 0.0])
     if parallel:
         jacobian[1:] = jacobian[0]
     return np.asarray(10.0 * jacobian @ jacobian.T)

@@ -64,9 +64,7 @@ def test_faces_count_from_plus_x_counter_clockwise(make_body: MakeBody) -> None:
         )
 
 
-@given(
-    x=st.floats(-0.035, 0.035), y=st.floats(-0.03, 0.03), one=st.floats(-4.0, 4.0), two=st.floats(-4.0, 4.0)
-)
+@given(x=st.floats(-0.035, 0.035), y=st.floats(-0.03, 0.03), one=st.floats(-4.0, 4.0), two=st.floats(-4.0, 4.0))
 def test_every_contact_point_is_a_corner_inside_the_other_block(
     make_body: MakeBody, x: float, y: float, one: float, two: float
 ) -> None:
@@ -88,9 +86,7 @@ def test_every_contact_point_is_a_corner_inside_the_other_block(
 
 
 @given(x=st.floats(-0.03, 0.03), one=st.floats(-0.7, 0.7), depth=st.floats(1e-9, 1e-4))
-def test_shallow_overlap_of_two_blocks_is_always_found(
-    make_body: MakeBody, x: float, one: float, depth: float
-) -> None:
+def test_shallow_overlap_of_two_blocks_is_always_found(make_body: MakeBody, x: float, one: float, depth: float) -> None:
     a, b = make_body(x, 0.0, one), make_body(0.0, 0.0)
     a.y = 0.03
     a.y -= separation(a, b) + depth  # from above: its gap along y is the largest one
@@ -113,11 +109,13 @@ def test_corner_touches_only_faces_within_its_normal_cone(make_body: MakeBody) -
     touched = make_body()
     tiny = 1e-9
     # a lower left corner near the upper right one, nearer to the side than to the top
-    face, depth = face_below_corner(W / 2 - tiny, H / 2 - 2 * tiny, touched, 1.0, -1.0, 1.0, 0.0)
-    assert (face, depth) == (1, pytest.approx(2 * tiny, rel=1e-6))
+    face, depth, *_ = face_below_corner(W / 2 - tiny, H / 2 - 2 * tiny, touched, 1.0, -1.0, 1.0, 0.0)
+    assert face == 1
+    assert depth == pytest.approx(2 * tiny, rel=1e-6)
     # its mirror image at the upper left
-    face, depth = face_below_corner(-W / 2 + tiny, H / 2 - 2 * tiny, touched, -1.0, -1.0, 1.0, 0.0)
-    assert (face, depth) == (1, pytest.approx(2 * tiny, rel=1e-6))
+    face, depth, *_ = face_below_corner(-W / 2 + tiny, H / 2 - 2 * tiny, touched, -1.0, -1.0, 1.0, 0.0)
+    assert face == 1
+    assert depth == pytest.approx(2 * tiny, rel=1e-6)
     # a lower left corner at the upper right one may touch either: the nearest counts
     assert face_below_corner(W / 2 - tiny, H / 2 - 2 * tiny, touched, -1.0, -1.0, 1.0, 0.0)[0] == 0
     assert face_below_corner(W / 2 - 2 * tiny, H / 2 - tiny, touched, -1.0, -1.0, 1.0, 0.0)[0] == 1
@@ -173,3 +171,18 @@ def test_corner_a_quarter_turn_apart_touches_the_side_it_came_through(make_body:
     found = points_between(a, make_body())
     assert {(round(point.nx), round(point.ny)) for point in found} == {(1, 0)}
     assert [point.depth for point in found] == pytest.approx([1e-6, 1e-6], rel=1e-6)
+
+
+def test_corner_passing_a_corner_is_one_contact_of_continuous_depth(make_body: MakeBody) -> None:
+    b = make_body()
+    depths = []
+    for shift in np.linspace(-3e-6, 1.2e-6, 85):  # a stands on its lower corner, which leaves b over its edge
+        a = make_body(0.0, 0.0, radians(45.0))
+        lowest = min((corner_of(a, k) for k in range(4)), key=lambda corner: float(corner[1]))
+        a.x, a.y = W / 2 + shift - lowest[0], H / 2 - 1e-6 - lowest[1]
+        found = points_between(a, b)
+        assert len(found) <= 1
+        depths.append(float(found[0].depth) if found else 0.0)
+    assert depths[0] == pytest.approx(1e-6, rel=1e-6)
+    assert depths[-1] == 0.0
+    assert np.abs(np.diff(depths)).max() < 0.06e-6

@@ -60,9 +60,7 @@ def test_without_restitution_blocks_come_to_rest_where_other_engines_put_them(
 
 def staircase(order: Sequence[int] = (0, 1, 2), side: float = 1.0, shift: float = 0.0) -> list[dict[str, object]]:
     """Return the bodies, block `order[i]` at place i of the list; to the other side for `side` = -1."""
-    return [
-        {"x": shift + side * (0.016 + 0.022 * level), "y": 0.025 + 0.05 * level, **SIZES} for level in order
-    ]
+    return [{"x": shift + side * (0.016 + 0.022 * level), "y": 0.025 + 0.05 * level, **SIZES} for level in order]
 
 
 def states(collapse: Simulation) -> tuple[np.ndarray, np.ndarray]:
@@ -73,7 +71,7 @@ def states(collapse: Simulation) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def usual(start: Start) -> tuple[np.ndarray, np.ndarray]:
-    """The collapse as everybody sees it."""
+    """Return the collapse as everybody sees it."""
     return states(start(staircase()))
 
 

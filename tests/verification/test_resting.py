@@ -11,7 +11,7 @@ import pytest
 from blocksim.analysis import closed_forms as forms
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from tests.conftest import PaperBlock, Simulation, Start
 
@@ -26,7 +26,7 @@ def test_block_sinks_into_the_ground_by_weight_over_face_stiffness(
     expected = forms.static_overlap(paper_block.mass, 2.0 * paper_block.point_stiffness)
     assert paper_block.height / 2 - rest.bodies[0].y == pytest.approx(expected, rel=1e-3)
     assert rest.contacts == 2
-    assert rest.world.slots[0, :2].depth == pytest.approx([expected, expected], rel=1e-3)
+    assert rest.slots[0, :2].depth == pytest.approx([expected, expected], rel=1e-3)
 
 
 def test_particle_spacing_changes_no_bit_of_a_rest(start: Start, paper_block: PaperBlock) -> None:
@@ -85,12 +85,11 @@ def test_three_blocks_of_equal_offset_fall_beyond_a_third_of_the_width(
     assert has_fallen(start(places, contact={"stiffness_scale": SOFT}), paper_block, 1.5) is falls
 
 
-def overhanging(block: PaperBlock, share: float, count: int) -> Sequence[dict[str, object]]:
+def overhanging(block: PaperBlock, share: float, count: int) -> Sequence[Mapping[str, object]]:
     """Return a fixed table and `count` blocks on it, each a share of the largest offset beyond the one below."""
     offsets = [share * offset for offset in reversed(forms.harmonic_offsets(count, block.width))]
-    blocks = [
-        {"x": x, "y": (level + 0.5) * block.height}
-        for level, x in enumerate(accumulate(offsets), start=1)
+    blocks: list[Mapping[str, object]] = [
+        {"x": x, "y": (level + 0.5) * block.height} for level, x in enumerate(accumulate(offsets), start=1)
     ]
     return [{"y": 0.5 * block.height, "fixed": True}, *blocks]
 

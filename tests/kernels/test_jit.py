@@ -1,0 +1,186 @@
+"""The cache of compiled kernels: never stale, reused, and not needed; compiled and interpreted kernels agree."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from blocksim.kernels import jit
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from tests.conftest import Simulation
+
+PACKAGE = Path(jit.__file__).parents[1]
+SCENARIO = Path(__file__).parents[2] / "scenarios" / "three_blocks.toml"
+
+# a kernel of contact.py, which knows the law in laws/linear.py by two imports only
+PUSH = """
+from blocksim.kernels import jit
+from blocksim.kernels.arrays import POINT, SLOT, zeros
+from blocksim.kernels.contact import push_spring
+
+point = zeros(1, POINT)[0]
+point.depth = 2e-6
+push_spring(point, zeros(1, SLOT)[0], 0, 1e9)
+hits, misses = (sum(counts.values()) for counts in (push_spring.stats.cache_hits, push_spring.stats.cache_misses))
+print(point.force, hits, misses, jit.cache_folder())
+"""
+
+COLLAPSE = """
+import sys
+import numpy as np
+from blocksim.kernels.advance import advance
+from blocksim.scenario import load_scenario
+from blocksim.world.build import build_world
+
+scenario = load_scenario(sys.argv[1], {"contact.stiffness_scale": 1e-4})
+world = build_world(scenario)
+world.bodies.y[1] += 0.5e-6
+world.bodies.spin[2] = -3.0
+advance(world, 400)
+np.savez(sys.argv[2], **world._asdict())
+"""
+
+
+def python(program: str, *arguments: str | Path, folder: Path, **environment: str) -> list[str]:
+    """Run a program in a process of its own that imports the package from `folder`; return the words it prints."""
+    process = subprocess.run(
+        [sys.executable, "-c", program, *map(str, arguments)],
+        env={**os.environ, "PYTHONPATH": str(folder), **environment},
+        cwd=folder,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return process.stdout.split()
+
+
+@pytest.fixture
+def copied_kernels(tmp_path: Path) -> Path:
+    """Return a folder with a copy of the kernels that a test may edit."""
+    folder = tmp_path / "copy"
+    (folder / "blocksim").mkdir(parents=True)
+    (folder / "blocksim" / "__init__.py").touch()
+    shutil.copytree(PACKAGE / "kernels", folder / "blocksim" / "kernels", ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+def test_edited_law_changes_the_results_of_kernels_in_other_files(copied_kernels: Path, tmp_path: Path) -> None:
+    cache = str(tmp_path / "cache")
+    force, *_ = python(PUSH, folder=copied_kernels, BLOCKSIM_CACHE_DIR=cache)
+    law = copied_kernels / "blocksim" / "kernels" / "laws" / "linear.py"
+    law.write_text(law.read_text().replace("return stiffness * depth", "return 3.0 * stiffness * depth"))
+    edited, *_ = python(PUSH, folder=copied_kernels, BLOCKSIM_CACHE_DIR=cache)
+    assert float(force) == pytest.approx(2e3)
+    assert float(edited) == pytest.approx(6e3)
+
+
+def test_second_process_takes_compiled_kernels_from_the_cache(copied_kernels: Path, tmp_path: Path) -> None:
+    cache = str(tmp_path / "cache")
+    runs = [python(PUSH, folder=copied_kernels, BLOCKSIM_CACHE_DIR=cache) for _ in range(2)]
+    assert runs[0][1:3] == ["0", "1"]
+    assert runs[1][1:3] == ["1", "0"]
+    assert runs[0][3].startswith(cache)
+    assert runs[0][0] == runs[1][0]
+
+
+@pytest.fixture
+def fresh_folder_choice() -> Iterator[None]:
+    """Forget the chosen cache folder before and after a test."""
+    jit.cache_folder.cache_clear()
+    yield
+    jit.cache_folder.cache_clear()
+
+
+@pytest.fixture
+def file_in_the_way(tmp_path: Path) -> Path:
+    """Return a path below which nothing can be written, not even by root."""
+    file = tmp_path / "file"
+    file.touch()
+    return file / "cache"
+
+
+@pytest.mark.usefixtures("fresh_folder_choice")
+def test_cache_folder_falls_back_to_the_temporary_one(
+    file_in_the_way: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(file_in_the_way))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    folder = jit.cache_folder()
+    assert folder is not None
+    assert folder.is_relative_to(tmp_path / "temporary")
+    assert folder.name == jit.source_hash()
+
+
+@pytest.mark.usefixtures("fresh_folder_choice")
+def test_without_any_writable_folder_kernels_are_compiled_and_not_kept(
+    file_in_the_way: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(file_in_the_way))
+    monkeypatch.setattr(tempfile, "tempdir", str(file_in_the_way))
+    assert jit.cache_folder() is None
+    assert not jit.is_compiled()
+
+    def double(number: float) -> float:
+        return 2.0 * number
+
+    assert jit.kernel(double)(3.0) == 6.0
+
+
+@pytest.mark.usefixtures("fresh_folder_choice")
+def test_user_is_told_whether_kernels_have_to_be_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(tmp_path))
+    assert not jit.is_compiled()
+    below = tmp_path / jit.source_hash() / "kernels"
+    below.mkdir(parents=True)
+    (below / "advance.advance-1.py311.1.nbc").touch()
+    assert jit.is_compiled()
+
+
+def test_compiled_advance_is_found_once_it_has_run(start_shipped: Callable[..., Simulation]) -> None:
+    start_shipped("slide")
+    assert jit.is_compiled()
+
+
+def test_cache_root_follows_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("BLOCKSIM_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
+    assert jit.cache_root() == Path("/somewhere/blocksim")
+    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", "/elsewhere")
+    assert jit.cache_root() == Path("/elsewhere")
+
+
+def test_hash_sees_every_source_below_the_folder(copied_kernels: Path) -> None:
+    folder = copied_kernels / "blocksim" / "kernels"
+    assert jit.source_hash(folder) == jit.source_hash()
+    seen = {jit.source_hash(folder)}
+    for path in (folder / "contact.py", folder / "laws" / "linear.py"):
+        path.write_text(path.read_text() + "# edited\n")
+        seen.add(jit.source_hash(folder))
+    (folder / "laws" / "linear.py").rename(folder / "laws" / "straight.py")
+    seen.add(jit.source_hash(folder))
+    assert len(seen) == 4
+
+
+def test_interpreted_kernels_give_what_compiled_ones_give(tmp_path: Path) -> None:
+    for name, disabled in (("compiled", "0"), ("interpreted", "1")):
+        python(COLLAPSE, SCENARIO, tmp_path / f"{name}.npz", folder=PACKAGE.parent, NUMBA_DISABLE_JIT=disabled)
+    compiled, interpreted = (np.load(tmp_path / f"{name}.npz") for name in ("compiled", "interpreted"))
+    assert compiled["clock"]["steps"] == interpreted["clock"]["steps"] == 400
+    assert compiled["slots"]["face"].max() >= 0
+    assert compiled["ledger"]["dashpot"] > 0.0
+    for array in ("bodies", "slots", "ledger", "clock", "pairs"):
+        for field in compiled[array].dtype.names:
+            one, two = compiled[array][field], interpreted[array][field]
+            size = max(1.0, float(np.abs(one).max()))
+            assert np.abs(one - two).max() <= 1e-12 * size, f"{array}.{field}"

@@ -1,0 +1,166 @@
+"""From a scenario to arrays."""
+
+from __future__ import annotations
+
+from math import cos, hypot, radians, sin, sqrt
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from blocksim.errors import ExitCode
+from blocksim.kernels.arrays import NO_FACE
+from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.world.build import (
+    StepTooLargeError,
+    admissible_step,
+    build_world,
+    empty_lists,
+    with_more_room,
+)
+from blocksim.world.restitution import damping_ratio
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+W, H, D = 0.032, 0.025, 0.05
+BODY = {"block": "brick", "x": 0.1, "y": 0.2}
+
+
+def scenario(
+    body: Mapping[str, object] | None = None, more: tuple[Mapping[str, object], ...] = (), **tables: Any
+) -> Scenario:
+    return scenario_from_mapping(
+        {
+            "schema": 1,
+            "name": "build",
+            "materials": {"aluminium": {"unit_weight": 26.7e3, "young_modulus": 69e9, "poisson_ratio": 0.3}},
+            "blocks": {"brick": {"width": W, "height": H, "length": D, "material": "aluminium"}},
+            "bodies": [{**BODY, **(body or {})}, *more],
+            **tables,
+        }
+    )
+
+
+def test_mass_and_inertia_are_those_of_the_solid() -> None:
+    body = build_world(scenario()).bodies[0]
+    assert body.mass == pytest.approx(0.10887, abs=5e-6)
+    assert body.inertia == pytest.approx(1.496e-5, abs=5e-9)
+    assert body.mass == pytest.approx(26.7e3 / 9.81 * W * H * D, rel=1e-12)
+    assert body.inertia == pytest.approx(body.mass * (W**2 + H**2) / 12.0, rel=1e-12)
+    assert body.inverse_mass * body.mass == pytest.approx(1.0)
+    assert body.inverse_inertia * body.inertia == pytest.approx(1.0)
+    assert [body.half_x, body.half_y, body.radius] == [W / 2, H / 2, pytest.approx(hypot(W, H) / 2)]
+
+
+def test_poses_and_velocities_are_those_of_the_scenario() -> None:
+    body = build_world(scenario({"angle": "30 deg", "velocity": [1.0, -2.0], "spin": 3.0})).bodies[0]
+    assert [body.x, body.y, body.angle] == [0.1, 0.2, pytest.approx(radians(30.0))]
+    assert [body.cos, body.sin] == pytest.approx([cos(radians(30.0)), sin(radians(30.0))])
+    assert [body.vx, body.vy, body.spin] == [1.0, -2.0, 3.0]
+
+
+def test_fixed_bodies_have_mass_but_no_inverse_mass() -> None:
+    world = build_world(scenario({"fixed": True}, more=({**BODY, "x": 0.5},)))
+    fixed, free, ground = world.bodies
+    assert fixed.mass == free.mass
+    assert (fixed.inverse_mass, fixed.inverse_inertia) == (0.0, 0.0)
+    assert (ground.inverse_mass, ground.inverse_inertia, ground.contact_class) == (0.0, 0.0, 0)
+    assert free.inverse_mass > 0.0
+    assert [ground.x, ground.y, ground.cos, ground.sin] == [0.0, 0.0, 1.0, 0.0]
+
+
+@pytest.mark.parametrize("tilt", [0.0, 5.0, -20.0])
+def test_tilted_ground_turns_gravity_so_that_positive_tilt_raises_the_far_end(tilt: float) -> None:
+    controls = build_world(scenario(ground={"tilt": f"{tilt} deg"}, gravity=2.0)).controls[0]
+    assert controls.gravity_x == pytest.approx(-2.0 * sin(radians(tilt)), abs=1e-15)
+    assert controls.gravity_y == pytest.approx(-2.0 * cos(radians(tilt)))
+
+
+def test_world_starts_without_contacts_time_or_losses() -> None:
+    world = build_world(scenario({"velocity": [3.0, 0.0], "spin": 2.0}))
+    assert (world.slots.face == NO_FACE).all()
+    assert world.clock[0].steps == 0
+    assert world.clock[0].pair_count == 0
+    ledger, body = world.ledger[0], world.bodies[0]
+    assert (ledger.dashpot, ledger.friction, ledger.broken, ledger.travel_work) == (0.0, 0.0, 0.0, 0.0)
+    assert ledger.largest_kinetic == pytest.approx(0.5 * (body.mass * 9.0 + body.inertia * 4.0))
+
+
+def test_overlap_limit_is_the_given_one_and_zero_stands_for_none() -> None:
+    assert build_world(scenario()).controls[0].max_overlap == 0.0
+    assert build_world(scenario(contact={"max_overlap": 1e-4})).controls[0].max_overlap == 1e-4
+
+
+def test_rest_is_looked_for_only_where_it_may_stop_the_run() -> None:
+    assert build_world(scenario(time={"stop_at_rest": False})).controls[0].rest_checks == 0
+    controls = build_world(scenario(time={"rest_hold": 0.02})).controls[0]
+    held = controls.rest_checks * controls.check_every * controls.step
+    assert 0.02 <= held < 0.0203
+    assert build_world(scenario(time={"rest_hold": 0.0})).controls[0].rest_checks == 1
+
+
+def test_automatic_step_is_the_admissible_one_and_follows_safety_and_stiffness() -> None:
+    world = build_world(scenario())
+    step = float(world.controls[0].step)
+    assert step == admissible_step(world.bodies, world.interactions, 0.05)
+    assert build_world(scenario(time={"safety": 0.025})).controls[0].step == pytest.approx(step / 2)
+    assert build_world(scenario(contact={"stiffness_scale": 0.01})).controls[0].step == pytest.approx(10 * step)
+    strong = damping_ratio(0.0)
+    assert build_world(scenario(contact={"restitution": 0.0})).controls[0].step == pytest.approx(step / (strong / 2))
+
+
+def test_automatic_step_resolves_the_oscillation_on_two_corners() -> None:
+    world = build_world(scenario())
+    frequency = sqrt(2.0 * world.interactions[1, 0].normal_stiffness / world.bodies[0].mass)
+    assert 0.02 < frequency * world.controls[0].step < 0.1
+
+
+def test_smallest_body_decides_about_the_step() -> None:
+    small = {"brick": {"width": W, "height": H, "length": D, "material": "aluminium"}}
+    small["pebble"] = {**small["brick"], "width": 0.002, "height": 0.002}
+    both = scenario(more=({"block": "pebble", "x": 0.5, "y": 0.2},), blocks=small)
+    assert build_world(both).controls[0].step < 0.2 * build_world(scenario()).controls[0].step
+
+
+def test_step_above_the_admissible_one_is_refused_with_both_numbers() -> None:
+    limit = float(build_world(scenario()).controls[0].step)
+    with pytest.raises(StepTooLargeError) as refusal:
+        build_world(scenario(time={"step": 1e-5}))
+    assert str(refusal.value) == (
+        f"1e-05 s is above the largest safe step {limit:.4g} s; "
+        'use step = "auto", or force_step = true to take it all the same'
+    )
+    assert refusal.value.exit_code == ExitCode.INVALID_INPUT
+    assert refusal.value.limit == limit
+
+
+def test_step_by_hand_is_taken_when_it_is_safe_or_forced() -> None:
+    limit = float(build_world(scenario()).controls[0].step)
+    assert build_world(scenario(time={"step": limit})).controls[0].step == limit
+    assert build_world(scenario(time={"step": 1e-8})).controls[0].step == 1e-8
+    assert build_world(scenario(time={"step": 1e-5, "force_step": True})).controls[0].step == 1e-5
+
+
+def test_step_is_never_longer_than_the_run() -> None:
+    assert build_world(scenario(time={"end": 1e-9})).controls[0].step == 1e-9
+
+
+def test_more_room_keeps_what_there_is() -> None:
+    world = build_world(scenario())
+    world.pairs.a[:] = np.arange(world.pairs.size)
+    world.slots.spring[:] = 7.0
+    wider = with_more_room(world)
+    used = world.pairs.size
+    assert wider.pairs.size == wider.spare_pairs.size == 2 * used
+    assert (wider.pairs[:used] == world.pairs).all()
+    assert (wider.slots[:used] == world.slots).all()
+    assert (wider.slots.face[used:] == NO_FACE).all()
+    assert wider.bodies is world.bodies
+
+
+def test_empty_lists_hold_no_contact() -> None:
+    lists = empty_lists(5)
+    assert len(lists["pairs"]) == 5
+    assert (lists["slots"].face == NO_FACE).all()
+    assert (lists["spare_slots"].face == NO_FACE).all()

@@ -1,0 +1,150 @@
+"""Contact parameters of material pairs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from blocksim.kernels.arrays import INTERACTION, zeros
+from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
+from blocksim.world.interactions import (
+    ContactClass,
+    contact_classes,
+    fill_interaction,
+    interaction_table,
+    normal_stiffness,
+    shear_stiffness_ratio,
+)
+from blocksim.world.restitution import damping_ratio
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+ALUMINIUM = {"unit_weight": 26.7e3, "young_modulus": 69e9, "poisson_ratio": 0.3}
+OAK = {"density": 700.0, "young_modulus": 11e9, "poisson_ratio": 0.4}
+SIZES = {"width": 0.032, "height": 0.025, "length": 0.05}
+
+
+def scenario(ground: Mapping[str, object] | None = None, **tables: Any) -> Scenario:
+    """Return blocks of aluminium (two upright differently, so of different depth) and of oak."""
+    return scenario_from_mapping(
+        {
+            "schema": 1,
+            "name": "pairs",
+            "materials": {"aluminium": ALUMINIUM, "oak": OAK},
+            "blocks": {
+                "paper": {**SIZES, "material": "aluminium", "upright": "length"},
+                "flat": {**SIZES, "material": "aluminium"},
+                "wooden": {**SIZES, "material": "oak"},
+            },
+            "bodies": [
+                {"block": name, "x": 0.1 * i, "y": 0.1} for i, name in enumerate(("paper", "flat", "wooden", "flat"))
+            ],
+            "ground": ground or {},
+            **tables,
+        }
+    )
+
+
+def classes(of: Scenario) -> tuple[ContactClass, ...]:
+    return contact_classes(of, place_bodies(of))
+
+
+def modulus(one: Mapping[str, float], two: Mapping[str, float]) -> float:
+    return 1.0 / sum((1.0 - m["poisson_ratio"] ** 2) / m["young_modulus"] for m in (one, two))
+
+
+def test_bodies_of_one_material_and_depth_share_a_class_after_the_ground() -> None:
+    ground, *others = classes(scenario())
+    assert ground == ContactClass(None, float("inf"))
+    assert others == [ContactClass("aluminium", 0.025), ContactClass("aluminium", 0.05), ContactClass("oak", 0.05)]
+
+
+def test_papers_block_has_the_stiffness_of_its_material() -> None:
+    of = scenario()
+    ground, paper, *_ = classes(of)
+    expected = 69e9 / (2.0 * (1.0 - 0.3**2)) * 0.025
+    assert normal_stiffness(of, paper, paper) == pytest.approx(expected, rel=1e-12)
+    assert normal_stiffness(of, paper, paper) == pytest.approx(9.48e8, rel=1e-3)
+    assert normal_stiffness(of, paper, ground) == normal_stiffness(of, paper, paper)
+
+
+def test_equal_materials_have_mindlins_stiffness_ratio() -> None:
+    of = scenario()
+    ground, paper, _, wooden = classes(of)
+    assert shear_stiffness_ratio(of, paper, ground) == pytest.approx(2.0 * 0.7 / 1.7, rel=1e-12)
+    assert shear_stiffness_ratio(of, paper, paper) == pytest.approx(0.8235, abs=5e-5)
+    assert shear_stiffness_ratio(of, wooden, wooden) == pytest.approx(2.0 * 0.6 / 1.6, rel=1e-12)
+
+
+def test_different_materials_add_their_compliances_and_the_shorter_depth_counts() -> None:
+    of = scenario()
+    _, paper, flat, wooden = classes(of)
+    assert normal_stiffness(of, flat, wooden) == pytest.approx(modulus(ALUMINIUM, OAK) * 0.05, rel=1e-12)
+    assert normal_stiffness(of, paper, wooden) == pytest.approx(modulus(ALUMINIUM, OAK) * 0.025, rel=1e-12)
+    shear = sum(
+        2.0 * (2.0 - m["poisson_ratio"]) * (1.0 + m["poisson_ratio"]) / m["young_modulus"] for m in (ALUMINIUM, OAK)
+    )
+    assert shear_stiffness_ratio(of, flat, wooden) == pytest.approx(4.0 / shear / modulus(ALUMINIUM, OAK), rel=1e-12)
+
+
+def test_named_ground_material_counts_for_every_block() -> None:
+    of = scenario(ground={"material": "oak"})
+    ground, paper, _, wooden = classes(of)
+    assert normal_stiffness(of, paper, ground) == pytest.approx(modulus(ALUMINIUM, OAK) * 0.025, rel=1e-12)
+    assert normal_stiffness(of, wooden, ground) == pytest.approx(modulus(OAK, OAK) * 0.05, rel=1e-12)
+
+
+def test_given_stiffness_replaces_that_of_the_materials_and_is_scaled() -> None:
+    of = scenario(contact={"normal_stiffness": 1e6, "shear_stiffness_ratio": 0.5, "stiffness_scale": 3.0})
+    table = interaction_table(of, classes(of))
+    assert set(table.normal_stiffness[1:].ravel().tolist()) == {3e6}
+    assert set(table.shear_stiffness[1:].ravel().tolist()) == {1.5e6}
+
+
+def test_stiffness_scale_multiplies_every_stiffness() -> None:
+    usual, scaled = (
+        interaction_table(of, classes(of)) for of in (scenario(), scenario(contact={"stiffness_scale": 0.01}))
+    )
+    for name in ("normal_stiffness", "shear_stiffness"):
+        assert scaled[name] == pytest.approx(0.01 * usual[name], rel=1e-12)
+    assert (scaled.normal_damping == usual.normal_damping).all()
+
+
+def test_table_is_symmetric_and_empty_for_the_ground_alone() -> None:
+    of = scenario()
+    table = interaction_table(of, classes(of))
+    assert (table == table.T).all()
+    assert not table[0, 0].normal_stiffness
+
+
+def test_ground_and_blocks_have_their_own_friction_and_restitution() -> None:
+    of = scenario(
+        friction={
+            "block_block": {"static": 0.31, "kinetic": 0.19, "transition_speed": 0.004},
+            "block_ground": 0.38,
+        },
+        contact={"restitution": {"block_block": 0.3, "block_ground": 0.6}},
+    )
+    table = interaction_table(of, classes(of))
+    blocks, ground = table[1, 2], table[1, 0]
+    assert (blocks.static_friction, blocks.kinetic_friction, blocks.transition_speed) == (0.31, 0.19, 0.004)
+    assert (ground.static_friction, ground.kinetic_friction) == (0.38, 0.38)
+    assert blocks.normal_damping == blocks.shear_damping == damping_ratio(0.3)
+    assert ground.normal_damping == ground.shear_damping == damping_ratio(0.6)
+
+
+def test_given_shear_damping_replaces_the_normal_one_in_shear_only() -> None:
+    of = scenario(contact={"shear_damping_ratio": 0.05, "restitution": 0.2})
+    record = zeros(1, INTERACTION)[0]
+    ground, paper, *_ = classes(of)
+    fill_interaction(record, of, paper, ground, ground=True)
+    assert (record.normal_damping, record.shear_damping) == (damping_ratio(0.2), 0.05)
+
+
+def test_ground_cannot_touch_itself() -> None:
+    of = scenario()
+    ground = classes(of)[0]
+    with pytest.raises(ValueError, match="does not touch itself"):
+        normal_stiffness(of, ground, ground)
