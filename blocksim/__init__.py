@@ -20,7 +20,7 @@ _HOMES = {
     "load": ("blocksim.scenario", "load_scenario"),
     "run": ("blocksim.study.single", "run"),
     "compare": ("blocksim.study.single", "compare"),
-    "sweep": ("blocksim.study.sweep", "sweep"),
+    "sweep": ("blocksim.study.many", "sweep"),
 }
 
 

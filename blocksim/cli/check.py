@@ -3,9 +3,10 @@
 from dataclasses import asdict
 
 from blocksim.cli import options
-from blocksim.cli.output import note, number, print_json, print_table
+from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.scenario import read_scenario
-from blocksim.scenario import PlacedBody, Scenario, scenario_to_toml
+from blocksim.scenario import PlacedBody, scenario_to_toml
+from blocksim.study.single import check_experiment
 from blocksim.world.describe import Description, PairDescription, describe
 
 MOST_BODIES = 12
@@ -19,38 +20,46 @@ def check_command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Validate a scenario without running it; show masses, contact parameters, time step, cost and size.
+    """Validate a scenario and show what it comes to.
+
+    Prints every value that will be used, then masses, contact parameters, time step, and what the run will cost.
+    Nothing is run; with --quiet only mistakes are printed.
 
     Example: blocksim check scenarios/three_blocks.toml
     """
     with read_scenario(scenario, settings or []) as ready:
         description = describe(ready)
+    check_experiment(ready)
     if as_json:
-        print_json({"scenario": ready.name, **asdict(description)})
+        print_json({"scenario": ready.model_dump(mode="json"), **_data(description)})
     elif not quiet:
-        _show(ready, description)
+        answer(scenario_to_toml(ready))
+        answer("\n\n".join("\n".join(lines) for lines in _tables(description)))
+        note(f"{ready.name}: valid")
 
 
-def _show(scenario: Scenario, description: Description) -> None:
-    note(f"{scenario.name}: valid, all values resolved:")
-    print(scenario_to_toml(scenario))  # noqa: T201 - this is the answer
+def _data(description: Description) -> dict[str, object]:
+    bodies = [{**asdict(body), "mass": body.mass, "inertia": body.inertia} for body in description.bodies]
+    return {**asdict(description), "bodies": bodies}
+
+
+def _tables(description: Description) -> list[list[str]]:
     bodies = description.bodies
-    columns = ("block", "x mm", "y mm", "along x", "upright", "depth mm", "mass kg", "inertia kg m²")
-    print_table("Blocks", columns, [_body_cells(body) for body in bodies[:MOST_BODIES]])
+    body_columns = ("block", "x mm", "y mm", "along x", "upright", "depth mm", "mass kg", "inertia kg m²")
+    body_rows = table_lines(body_columns, [_body_cells(body) for body in bodies[:MOST_BODIES]])
     if len(bodies) > MOST_BODIES:
-        note(f"... and {len(bodies) - MOST_BODIES} more blocks")
-    print_table(
-        "Contacts (K of one contact point in N/m; a face contact has two)",
-        ("pair", "μ static", "μ kinetic", "e", "damping", "K normal", "K shear"),
-        [_pair_cells(pair) for pair in description.pairs],
-    )
-    rows = [
-        ("time step", f"{description.step:.3e} s"),
-        ("steps", f"{description.steps} at most"),
-        ("solving", f"about {description.seconds:.1f} s on one core at most"),
-        ("results", f"{description.frames} frames, about {description.bytes / MEGA:.1f} MB at most"),
+        body_rows.append(f"... and {len(bodies) - MOST_BODIES} more blocks")
+    pair_columns = ("pair", "μ static", "μ kinetic", "e", "damping", "K normal", "K shear")
+    pair_rows = table_lines(pair_columns, [_pair_cells(pair) for pair in description.pairs])
+    return [body_rows, [*pair_rows, "K in N/m, of one contact point; a face contact has two"], _cost(description)]
+
+
+def _cost(description: Description) -> list[str]:
+    return [
+        f"time step  {description.step:.3e} s, at most {description.steps} steps",
+        f"solving    at most about {description.seconds:.1f} s on one core",
+        f"results    at most {description.frames} frames, about {description.bytes / MEGA:.1f} MB",
     ]
-    print_table("Cost", ("", ""), rows)
 
 
 def _body_cells(body: PlacedBody) -> tuple[str, ...]:

@@ -15,6 +15,9 @@ Settings = Annotated[
 OutFolder = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results (default: results/NAME/HASH).")
 ]
+SweepFolder = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results (default: results/NAME/sweep-HASH).")
+]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Run again and replace what is there.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the answer as JSON, for programs.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but the answer.")]

@@ -2,29 +2,28 @@
 
 import json
 import math
+import shutil
+import sys
 from collections.abc import Iterable, Sequence
 
-from rich import box
-from rich.console import Console
-from rich.table import Table
-
 NARROW = 80
-
-
-def answer_console() -> Console:
-    """Return the console for answers; 80 columns where there is no terminal."""
-    console = Console(highlight=False, soft_wrap=False)
-    return console if console.is_terminal else Console(highlight=False, width=NARROW)
+GAP = "  "
+SHORTEST = 8
 
 
 def note(text: str) -> None:
     """Print a line about what is going on, to standard error."""
-    Console(stderr=True, highlight=False, soft_wrap=True).print(text, markup=False)
+    print(text, file=sys.stderr, flush=True)  # noqa: T201 - this is the place for it
+
+
+def answer(text: str) -> None:
+    """Print text that was asked for, to standard output."""
+    print(text)  # noqa: T201 - this is the place for it
 
 
 def print_json(data: object) -> None:
     """Print JSON to standard output; numbers that are not finite become null."""
-    print(json.dumps(_finite(data), indent=2, default=str))  # noqa: T201 - this is the answer
+    answer(json.dumps(_finite(data), indent=2, default=str))
 
 
 def _finite(data: object) -> object:
@@ -37,16 +36,35 @@ def _finite(data: object) -> object:
     return data
 
 
-def print_table(title: str | None, columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> None:
-    """Print a table to standard output; the first `left` columns are text, the others numbers."""
-    table = Table(
-        title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), title_style="bold"
-    )
-    for number, column in enumerate(columns):
-        table.add_column(column, justify="left" if number < left else "right", no_wrap=number >= left)
-    for row in rows:
-        table.add_row(*row)
-    answer_console().print(table)
+def width_of_screen() -> int:
+    """Return the columns of the terminal (or of COLUMNS), 80 where there is none."""
+    return shutil.get_terminal_size((NARROW, 24)).columns
+
+
+def table_lines(columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> list[str]:
+    """Return a table: heads, a rule, rows; the first `left` columns are text, the others numbers to the right.
+
+    Where it is wider than the screen, texts are cut, never numbers or heads.
+    """
+    cells = [list(row) for row in rows]
+    widths = [max(map(len, column)) for column in zip(columns, *cells, strict=True)]
+    excess = sum(widths) + len(GAP) * (len(widths) - 1) - width_of_screen()
+    for i in sorted(range(left), key=lambda i: -widths[i]):
+        least = max(len(columns[i]), SHORTEST)
+        cut = min(max(excess, 0), max(widths[i] - least, 0))
+        widths[i] -= cut
+        excess -= cut
+
+    def line(row: Sequence[str]) -> str:
+        texts = (_fitted(text, width).ljust(width) for text, width in zip(row[:left], widths, strict=False))
+        numbers = (text.rjust(width) for text, width in zip(row[left:], widths[left:], strict=True))
+        return GAP.join((*texts, *numbers)).rstrip()
+
+    return [line(columns), GAP.join("─" * width for width in widths), *map(line, cells)]
+
+
+def _fitted(text: str, width: int) -> str:
+    return text if len(text) <= width else text[: width - 1] + "…"
 
 
 def number(value: float, digits: int = 2) -> str:

@@ -9,11 +9,11 @@ from blocksim.analysis.experiment import load_table
 from blocksim.cli import options
 from blocksim.cli.output import note
 from blocksim.errors import InvalidInputError
-from blocksim.simulation import read_result
+from blocksim.scenario import load_scenario
+from blocksim.simulation import folder as files
+from blocksim.simulation.stores.hdf5 import read_frames
 from blocksim.study.single import find_run
 from blocksim.view.strip import draw_strip
-
-FORMATS = (".png", ".svg", ".pdf")
 
 
 def plot_command(
@@ -27,21 +27,22 @@ def plot_command(
     experiment: options.ExperimentPath = None,
     quiet: options.Quiet = False,
 ) -> None:
-    """Draw a strip of frames of a run, with the measured ranges under the final state.
+    """Draw a run as a strip of pictures.
+
+    Below its final state stand the measured ranges. A run that was stopped or killed is drawn as far as it came.
 
     Example: blocksim plot scenarios/three_blocks.toml --out strip.png
     """
-    folder = find_run(run)
-    result = read_result(folder)
-    table = experiment or result.experiment
-    picture = out or Path(f"{result.name}.png")
-    if picture.suffix.lower() not in FORMATS:
-        message = f"{picture}: pictures end in {', '.join(FORMATS)}"
-        raise InvalidInputError(message)
+    moments = _times(times)
+    folder = find_run(run, needed=(files.SCENARIO, files.FRAMES))
+    scenario = load_scenario(folder / files.SCENARIO)
+    frames = read_frames(folder / files.FRAMES, scenario)
+    table = experiment or (scenario.experiment.table if scenario.experiment is not None else None)
     measured = None if table is None else load_table(table)
-    draw_strip(result.frames, picture, times=_times(times), title=result.name, measured=measured)
+    picture = out or Path(f"{scenario.name}.png")
+    draw_strip(frames, picture, times=moments, title=scenario.name, measured=measured)
     if not quiet:
-        note(f"Picture: {picture}")
+        note(f"picture: {picture}")
 
 
 def _times(text: str | None) -> list[float] | None:

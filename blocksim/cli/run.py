@@ -3,13 +3,13 @@
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.comparison import comparison_rows
-from blocksim.cli.output import note, number, print_json, print_table
+from blocksim.cli.compare import comparison_table, verdict_lines
+from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.progress import tell_compilation, watching
 from blocksim.cli.scenario import read_scenario
 from blocksim.simulation import Result
 from blocksim.simulation.folder import default_folder, holds_run
-from blocksim.study.single import compare, run
+from blocksim.study.single import FINISHED, check_experiment, compare, run
 
 
 def run_command(
@@ -20,58 +20,64 @@ def run_command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Simulate a scenario; keep the result and show where the blocks end.
+    """Simulate a scenario and show where the blocks end.
 
-    Where the scenario names an experiment, the measured ranges stand beside. Example:
+    Where the scenario names an experiment, the measured ranges stand beside. A run that is there already is shown
+    again.
 
-    blocksim run scenarios/three_blocks.toml --set contact.stiffness_scale=0.01
+    Example: blocksim run scenarios/three_blocks.toml --set time.end=0.1
     """
+    silent = quiet or as_json
     with read_scenario(scenario, settings or []) as ready:
         folder = out or default_folder(ready)
-        silent = quiet or as_json
         known = not overwrite and holds_run(folder, ready)
         if not known:
+            check_experiment(ready)
             tell_compilation(quiet=silent)
-        with watching(quiet=silent or known) as on_frame:
-            result = run(ready, out=folder, overwrite=overwrite, on_frame=on_frame)
+        with watching(quiet=silent or known) as on_progress:
+            result = run(ready, out=folder, overwrite=overwrite, on_progress=on_progress)
     if known and not silent:
         note(f"already there, --overwrite repeats it: {folder}")
-    show_result(result, as_json=as_json, quiet=quiet)
-    raise typer.Exit(int(result.summary["exit_code"]))
+    show_result(result, as_json=as_json, quiet=silent)
+    raise typer.Exit(result.summary.exit_code)
 
 
 def show_result(result: Result, *, as_json: bool, quiet: bool) -> None:
     """Print the final table, beside the measured ranges where the scenario names an experiment."""
+    if not quiet:
+        _tell_end(result)
     if as_json:
         final = result.final.to_dict(orient="records")
-        print_json({"folder": str(result.folder), "final": final, "summary": result.summary})
-        return
-    if not quiet:
-        for line in _headline(result):
-            note(line)
-    if result.experiment is not None and result.status == "finished":
-        columns, rows = comparison_rows(compare(result))
-        print_table(None, columns, rows, left=2)
+        print_json({"folder": str(result.folder), "final": final, "summary": result.summary.model_dump()})
     else:
-        print_table(None, ("block", "x mm", "y mm", "rotation deg"), _final_rows(result))
-    if not quiet:
-        note(f"Results: {result.folder}")
+        answer("\n".join(_answer_lines(result)))
+    if result.status != FINISHED:
+        note(f"{result.name}: {result.status}: {result.reason}; what there is by then is kept in {result.folder}")
+    elif not quiet:
+        note(f"results: {result.folder}")
 
 
-def _final_rows(result: Result) -> list[tuple[str, ...]]:
-    return [
-        (str(row.block), number(row.x_mm), number(row.y_mm), number(row.rotation_deg))
-        for row in result.final.itertuples()
+def _answer_lines(result: Result) -> list[str]:
+    if result.experiment is not None and result.status == FINISHED:
+        comparison = compare(result)
+        return [*comparison_table(comparison), *verdict_lines(comparison)]
+    final = result.final
+    rows = [
+        (block, number(x), number(y), number(rotation))
+        for block, x, y, rotation in zip(
+            final["block"], final["x_mm"], final["y_mm"], final["rotation_deg"], strict=True
+        )
     ]
+    return table_lines(("block", "x mm", "y mm", "rotation °"), rows)
 
 
-def _headline(result: Result) -> list[str]:
+def _tell_end(result: Result) -> None:
     summary = result.summary
-    energy = summary["energy_J"]
-    lines = [
-        f"{result.name}: {result.status} ({result.reason}) at {summary['simulated_time_s']:.3f} s, "
-        f"{summary['steps']} steps of {summary['time_step_s']:.2e} s",
-        f"{summary['solver_seconds']:.2f} s of solving; energy accounted for to "
-        f"{energy['relative_residual']:.0e} of the energy in play",
-    ]
-    return [*lines, *(f"warning: {text}" for text in summary["warnings"])]
+    note(f"{result.name}: {result.status} ({result.reason}) at {summary.simulated_time_s:.3f} s of simulated time")
+    note(
+        f"{summary.steps} steps of {summary.time_step_s:.2e} s in {summary.solver_seconds:.2f} s; "
+        f"energy off by {summary.energy_J.relative_residual:.0e} of what was in play"
+    )
+    for text in summary.warnings:
+        note(f"warning: {text}")
+    note("")

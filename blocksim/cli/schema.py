@@ -5,7 +5,9 @@ from blocksim.scenario import json_schema
 
 
 def schema_command() -> None:
-    """Print the JSON Schema of scenario files, for editors that complete and check TOML.
+    """Print the JSON Schema of scenario files, for editors.
+
+    An editor with a TOML language server completes and checks keys with it.
 
     Example: blocksim schema > scenario.schema.json
     """

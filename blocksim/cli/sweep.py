@@ -1,18 +1,30 @@
 """blocksim sweep: many runs of one scenario."""
 
-from pathlib import Path
+import math
+from enum import StrEnum
 from typing import Annotated
 
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.output import note, print_json, print_table
+from blocksim.cli.output import GAP, answer, note, print_json, table_lines, width_of_screen
 from blocksim.cli.progress import tell_compilation
-from blocksim.cli.vary import parse_vary
+from blocksim.cli.vary import with_vary
+from blocksim.errors import ExitCode
 from blocksim.scenario import Document
-from blocksim.study.sweep import Row, SweepResult, sweep, sweep_exit_code
+from blocksim.study.many import TABLE, SweepResult, sweep
+from blocksim.study.pool import Row
+from blocksim.study.single import FINISHED
 
 MOST_ROWS = 40
+NOT_SHOWN = {"case", "reason", "seconds"}
+
+
+class Mode(StrEnum):
+    """How values go together."""
+
+    GRID = "grid"
+    LIST = "list"
 
 
 def sweep_command(
@@ -21,58 +33,90 @@ def sweep_command(
         list[str] | None,
         typer.Option("--vary", metavar="KEY=VALUES", help="KEY=a,b,c or KEY=from:to:count. Repeatable."),
     ] = None,
-    mode: Annotated[
-        str | None, typer.Option(metavar="grid|list", help="All combinations, or the k-th value of every key.")
-    ] = None,
+    mode: Annotated[Mode | None, typer.Option(help="All combinations, or the k-th value of every key.")] = None,
     settings: options.Settings = None,
     jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes (default: one a core).")] = None,
-    out: options.OutFolder = None,
+    out: options.SweepFolder = None,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Run a scenario many times with some keys varied; one row a case in sweep.csv.
+    """Run a scenario many times with some keys varied.
 
-    Called again, it runs only the cases that are missing. Example:
+    Every case gives a row in sweep.csv. Called again, the same sweep runs only the cases that are missing.
 
-    blocksim sweep scenarios/three_blocks.toml --vary friction.block_block.kinetic=0.17:0.21:5
+    Example: blocksim sweep scenarios/tower.toml --vary structures.0.offset=0:0.004:5
     """
-    document = Document.read(scenario).with_settings(settings or [])
-    document.build()
     silent = quiet or as_json
-    ranges = parse_vary(vary or [])
+    document = with_vary(
+        Document.read(scenario).with_settings(settings or []), vary or [], None if mode is None else mode.value
+    )
+    short = short_keys(document)
     tell_compilation(quiet=silent)
 
     def on_row(done: int, total: int, row: Row) -> None:
         if not silent:
-            note(f"{done}/{total} {row['status']}: {_values(row)}")
+            values = ", ".join(f"{name} = {shown(row[key])}" for key, name in short.items())
+            note(f"{done}/{total} {row['status']}: {values}")
 
-    result = sweep(document, ranges, mode=mode, out=out, jobs=jobs, overwrite=overwrite, on_row=on_row)
-    _show(result, as_json=as_json, quiet=quiet)
-    raise typer.Exit(int(sweep_exit_code(result)))
-
-
-def _values(row: Row) -> str:
-    keys = [key for key in row if "." in key and not key.endswith(("_mm", "_deg"))]
-    return ", ".join(f"{key} = {row[key]}" for key in keys)
-
-
-def _show(result: SweepResult, *, as_json: bool, quiet: bool) -> None:
-    table = result.table
+    result = sweep(document, out=out, jobs=jobs, overwrite=overwrite, on_row=on_row)
     if as_json:
-        print_json({"folder": str(result.folder), "rows": table.to_dict(orient="records")})
-        return
-    columns = [name for name in table.columns if name not in {"case", "reason", "seconds"} and "rotation" not in name]
-    shown = table[columns].head(MOST_ROWS)
-    rows = [[f"{v:.4g}" if isinstance(v, float) else str(v) for v in row] for row in shown.itertuples(index=False)]
-    print_table(None, [name.removeprefix("friction.") for name in columns], rows, left=0)
+        print_json({"folder": str(result.folder), "rows": result.table.to_dict(orient="records")})
+    else:
+        _show(result, short, quiet=quiet)
+    raise typer.Exit(ExitCode.SWEEP_HAS_FAILURES if result.failed else ExitCode.SUCCESS)
+
+
+def short_keys(document: Document) -> dict[str, str]:
+    """Return the varied keys with the shortest ends that tell them apart."""
+    plan = document.build().sweep
+    keys = [] if plan is None else list(plan.vary)
+    return {
+        key: next(end for end in _ends(key) if sum(f".{other}".endswith(f".{end}") for other in keys) == 1)
+        for key in keys
+    }
+
+
+def _ends(key: str) -> list[str]:
+    parts = key.split(".")
+    return [".".join(parts[start:]) for start in reversed(range(len(parts)))]
+
+
+def shown(value: object) -> str:
+    """Return a cell of the table for people."""
+    match value:
+        case bool():
+            return "yes" if value else "no"
+        case float():
+            return f"{value:.6g}" if math.isfinite(value) else "–"
+        case _:
+            return str(value)
+
+
+def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
+    table = result.table
+    names = [name for name in table.columns if name not in NOT_SHOWN and not name.endswith("rotation_deg")]
+    rows = [[shown(value) for value in row] for row in table[names].head(MOST_ROWS).itertuples(index=False)]
+    fitting = _fitting([short.get(name, name) for name in names], rows)
+    heads = [short.get(name, name) for name in names[:fitting]]
+    answer("\n".join(table_lines(heads, [row[:fitting] for row in rows], left=0)))
     if quiet:
         return
-    if len(table) > MOST_ROWS:
-        note(f"... and {len(table) - MOST_ROWS} more rows in the file")
+    if fitting < len(names) or len(table) > len(rows):
+        note(f"... and {len(table) - len(rows)} more rows, {len(names) - fitting} more columns in {TABLE}")
     if result.share_inside is not None:
-        note(f"{result.share_inside:.0%} of the cases are inside all measured ranges")
+        note(f"{result.share_inside:.0%} of {len(table)} cases are inside all measured ranges")
     if result.failed:
-        failed = table[table["status"] != "finished"]
-        note(f"{result.failed} of {len(table)} cases did not finish; the first: {failed['reason'].iloc[0]}")
-    note(f"Table: {Path(result.folder) / 'sweep.csv'}")
+        first = table[table["status"] != FINISHED]["reason"].iloc[0]
+        note(f"{result.failed} of {len(table)} cases did not finish; the first: {first}")
+    note(f"table: {result.folder / TABLE}")
+
+
+def _fitting(heads: list[str], rows: list[list[str]]) -> int:
+    """Return how many columns fit on the screen, at least one."""
+    width, room = 0, width_of_screen()
+    for index, column in enumerate(zip(heads, *rows, strict=True)):
+        width += max(map(len, column)) + (len(GAP) if index else 0)
+        if width > room:
+            return max(index, 1)
+    return len(heads)

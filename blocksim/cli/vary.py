@@ -1,45 +1,45 @@
 """Reading --vary KEY=VALUES."""
 
-import tomllib
 from collections.abc import Sequence
 
-from pydantic import ValidationError
-
-from blocksim.errors import InvalidInputError
-from blocksim.scenario.models.study import Sweep
+from blocksim.errors import Problem, ScenarioError
+from blocksim.scenario import Document
+from blocksim.scenario.overrides import UnfitOverrideError, parse_value
+from blocksim.study.plan import Values, with_sweep
 
 RANGE_PARTS = 3
 
 
-def parse_vary(texts: Sequence[str]) -> dict[str, tuple[object, ...]]:
-    """Return the values of every key from texts such as `key=a,b,c` and `key=from:to:count`.
+def with_vary(document: Document, texts: Sequence[str], mode: str | None) -> Document:
+    """Return the document with a [sweep] table from texts such as `key=a,b,c` and `key=from:to:count`.
 
-    Raises InvalidInputError, naming the text.
+    Raises ScenarioError where a text is neither; wrong keys and values show when the document is built.
     """
-    return dict(_parse_one(text) for text in texts)
+    problems = [Problem(f"--vary {text}", "write KEY=a,b,c or KEY=from:to:count") for text in texts if not _parts(text)]
+    if problems:
+        raise ScenarioError(problems)
+    split = {key: (text, values) for text in texts for key, values in _parts(text)}
+    vary = {key: _values(values) for key, (_, values) in split.items()}
+    return with_sweep(document, vary, mode, {key: text for key, (text, _) in split.items()})
 
 
-def _parse_one(text: str) -> tuple[str, tuple[object, ...]]:
-    key, equals, values = text.partition("=")
-    key = key.strip()
-    if not equals or not key or not values.strip():
-        message = f"--vary {text}: write KEY=a,b,c or KEY=from:to:count"
-        raise InvalidInputError(message)
-    parts = values.split(":")
-    if len(parts) != RANGE_PARTS:
-        return key, tuple(_value(part) for part in values.split(","))
-    spread = {"from": _value(parts[0]), "to": _value(parts[1]), "count": _value(parts[2])}
-    try:
-        return key, Sweep.model_validate({"vary": {key: spread}}).vary[key]
-    except ValidationError as error:
-        message = f"--vary {text}: {error.errors()[0]['msg']}"
-        raise InvalidInputError(message) from None
+def _parts(text: str) -> list[tuple[str, str]]:
+    """Return key and values, or nothing."""
+    key, equals, values = (part.strip() for part in text.partition("="))
+    return [(key, values)] if equals and key and values else []
+
+
+def _values(text: str) -> Values:
+    parts = [_value(part) for part in text.split(":")]
+    if len(parts) == RANGE_PARTS:
+        return dict(zip(("from", "to", "count"), parts, strict=True))
+    return [_value(part) for part in text.split(",")]
 
 
 def _value(text: str) -> object:
-    """Return a TOML value, or the bare text (such as 5 mm/s) where it is none."""
+    """Return a TOML value or bare text; what is neither is refused where it is tried, as text."""
     text = text.strip()
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        return parse_value(text) if text else text
+    except UnfitOverrideError:
         return text

@@ -124,7 +124,7 @@ COMMON: dict[str, tuple[Fraction, Dimension]] = {
 }
 """Expressions that need no pint, and the suggestions for a misspelt unit."""
 
-_FACTOR = r"[A-Za-zµμ°_]+[0-9]?(?:\^-?[0-9]{1,2})?"
+_FACTOR = r"[A-Za-zµμ°_]+[0-9]?(?:\^-?[1-9][0-9]?)?"
 _EXPRESSION = re.compile(rf"{_FACTOR}(?:[ ]?[*/·][ ]?{_FACTOR}|[ ]{_FACTOR})*")
 _OPERATOR = re.compile(r" ?([*/·]) ?")
 _SUPERSCRIPTS = str.maketrans({"²": "^2", "³": "^3"})

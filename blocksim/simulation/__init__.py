@@ -1,8 +1,9 @@
 """The time loop and what it leaves behind: frames, final table, summary, and the folder that keeps them."""
 
 from blocksim.simulation.frames import Frames
-from blocksim.simulation.loop import Progress
+from blocksim.simulation.loop import Progress, Watcher
 from blocksim.simulation.result import Result, read_result
 from blocksim.simulation.simulate import simulate, simulate_into
+from blocksim.simulation.summary import Summary
 
-__all__ = ["Frames", "Progress", "Result", "read_result", "simulate", "simulate_into"]
+__all__ = ["Frames", "Progress", "Result", "Summary", "Watcher", "read_result", "simulate", "simulate_into"]

@@ -1,6 +1,7 @@
 """How a run can end, in words and exit codes."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from blocksim.errors import ExitCode
 from blocksim.kernels import arrays
@@ -11,9 +12,9 @@ RESIDUAL_PROMISE = 1e-3  # of the energy in play; beyond this a warning is due
 
 @dataclass(frozen=True)
 class Outcome:
-    """`status` is finished, failed or interrupted; `reason` says why the run ended."""
+    """What a run came to; `reason` says why it ended."""
 
-    status: str
+    status: Literal["finished", "failed", "interrupted"]
     reason: str
     exit_code: ExitCode
 

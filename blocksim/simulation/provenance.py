@@ -1,5 +1,6 @@
 """What a run came from: hashes of scenario, code and state, versions and machine."""
 
+import functools
 import hashlib
 import os
 import platform
@@ -8,19 +9,32 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
-from blocksim import __version__
 from blocksim.kernels.arrays import World
 from blocksim.kernels.jit import source_hash
 from blocksim.scenario import Scenario, scenario_hash
 
+ROOMS = ("kernels", "scenario", "simulation", "world")  # their code decides the bits of a run
 PACKAGES = ("numpy", "numba", "pydantic", "h5py", "pandas")
 HASH_DIGITS = 12
 CPU_INFO = Path("/proc/cpuinfo")
 
 
+def code_version() -> str:
+    """Return the version of the installed package."""
+    return metadata.version("blocksim")
+
+
+@functools.cache
+def code_hash() -> str:
+    """Return a hash of all code that decides the bits of a run, and of the versions it is compiled with."""
+    package = Path(__file__).resolve().parents[1]
+    text = " ".join([code_version(), *(source_hash(package / room) for room in ROOMS)])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
 def run_hash(scenario: Scenario) -> str:
     """Return the name of a run: a hash of everything that decides its bits, scenario and code."""
-    text = f"{scenario_hash(scenario)} {__version__} {source_hash()}"
+    text = f"{scenario_hash(scenario)} {code_hash()}"
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
 
 
@@ -36,8 +50,8 @@ def environment() -> dict[str, str]:
     """Return versions and machine."""
     versions = {name: metadata.version(name) for name in PACKAGES}
     return {
-        "blocksim": __version__,
-        "kernel_source": source_hash(),
+        "blocksim": code_version(),
+        "code": code_hash()[:HASH_DIGITS],
         "python": platform.python_version(),
         **versions,
         "platform": platform.platform(),

@@ -26,7 +26,7 @@ class Recorder:
     """Rows of steps, motions (6, b) and measured values, one a frame, growing as the run goes on."""
 
     def __init__(self, placed: Sequence[PlacedBody], every: float, step: float, sink: FrameSink | None = None) -> None:
-        """Record every `every` seconds of a run with time step `step` (s), at the nearest step; `sink` gets all frames."""
+        """Record every `every` seconds, at the nearest step of length `step` (s); `sink` gets all frames too."""
         self.placed = tuple(placed)
         self.time_step = step
         self.sink = sink
@@ -71,10 +71,16 @@ def frames_from_rows(
 ) -> Frames:
     """Return frames from step numbers (n,), motion (n, 6, b) and measured values (n, 9)."""
     columns = measured.T
+    x, y, angle, vx, vy, spin = motion.swapaxes(0, 1)
     return Frames(
-        steps,
-        steps * time_step,
-        *motion.swapaxes(0, 1),
+        step=steps,
+        time=np.multiply(steps, time_step, dtype=np.float64),
+        x=x,
+        y=y,
+        angle=angle,
+        vx=vx,
+        vy=vy,
+        spin=spin,
         energy=dict(zip(LEDGER_ROW, columns, strict=False)),
         contact_count=columns[-2],
         largest_overlap=columns[-1],

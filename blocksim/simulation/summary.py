@@ -22,6 +22,7 @@ class Summary(BaseModel, frozen=True):
     steps: int
     time_step_s: float
     simulated_time_s: float
+    ended_at: str
     compile_seconds: float
     solver_seconds: float
     total_seconds: float

@@ -1,8 +1,12 @@
 """The final table: where every block ended, in mm and degrees, for people and spreadsheets."""
 
+import math
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 
+from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.simulation.frames import Frames
 
 COLUMNS = (
@@ -44,3 +48,25 @@ def final_table(frames: Frames, frame: int = -1) -> pd.DataFrame:
         np.degrees(frames.spin[frame]),
     )
     return pd.DataFrame(dict(zip(COLUMNS, (list(frames.names), *values), strict=True)))
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """Return a final table from its file. Raises InputMissingError or InvalidInputError."""
+    try:
+        texts = pd.read_csv(path, dtype=str, keep_default_na=False)
+        final = texts.assign(**{name: [_number(text) for text in texts[name]] for name in texts.columns[1:]})
+    except FileNotFoundError:
+        message = f"{path}: no such file"
+        raise InputMissingError(message) from None
+    except (OSError, ValueError) as error:
+        message = f"{path}: not a final table: {str(error).strip()}"
+        raise InvalidInputError(message) from error
+    if tuple(final.columns) != COLUMNS:
+        message = f"{path}: not a final table: the columns have to be {','.join(COLUMNS)}"
+        raise InvalidInputError(message)
+    return final
+
+
+def _number(text: str) -> float:
+    """Return the number of a cell to the last bit; an empty cell is one that is not finite."""
+    return float(text) if text else math.nan

@@ -1,19 +1,23 @@
 """One run, and its comparison with an experiment."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
 
 from blocksim.analysis.compare import Comparison, compare_final
-from blocksim.analysis.experiment import load_table
-from blocksim.errors import InputMissingError
-from blocksim.scenario import Scenario, load_scenario
+from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.scenario import Scenario, load_scenario, place_bodies
+from blocksim.simulation import Progress, Result, Watcher, read_result, simulate, simulate_into
 from blocksim.simulation import folder as files
-from blocksim.simulation.result import Result, read_final, read_result, read_summary
-from blocksim.simulation.simulate import Watcher, simulate, simulate_into
+from blocksim.simulation.summary import read_summary
+from blocksim.simulation.table import COLUMNS, read_table
+
+FINISHED = "finished"
 
 
-def _ignore(_: object) -> None:
+def _ignore(_: Progress) -> None:
     pass
 
 
@@ -22,61 +26,92 @@ def run(
     *,
     out: Path | str | None = None,
     overwrite: bool = False,
-    on_frame: Watcher = _ignore,
+    on_progress: Watcher = _ignore,
 ) -> Result:
     """Simulate a scenario and return the result; with `out` it is kept in that folder as well.
 
     A folder that holds the finished run of exactly this scenario and code is read instead, unless `overwrite` is
-    given. Raises ScenarioError, OutputExistsError, OutputError.
+    given. Ctrl-C returns what there is by then, with the status `interrupted`. Raises ScenarioError, InvalidInputError
+    for an experiment table that does not go with the blocks, OutputExistsError, OutputError.
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
+    check_experiment(scenario)
     if out is None:
-        return simulate(scenario, on_frame=on_frame)
+        return simulate(scenario, on_progress=on_progress)
     folder = Path(out)
     if not overwrite and files.holds_run(folder, scenario):
         return read_result(folder)
-    return simulate_into(scenario, folder, overwrite=overwrite, on_frame=on_frame)
+    return simulate_into(scenario, folder, overwrite=overwrite, on_progress=on_progress)
+
+
+def check_experiment(scenario: Scenario) -> None:
+    """Read the table that a scenario names and look whether it goes with the blocks: better now than after the run."""
+    if scenario.experiment is not None:
+        names = [body.name for body in place_bodies(scenario)]
+        unknown = dict.fromkeys(COLUMNS[1:], 0.0)
+        compare_final(pd.DataFrame({"block": names, **unknown}), load_table(scenario.experiment.table))
 
 
 def compare(run: Result | pd.DataFrame | Path | str, experiment: Path | str | None = None) -> Comparison:
     """Compare a result, a final table or what `find_run` understands with an experiment table.
 
-    Without `experiment` the table that the run's scenario names is taken. Raises InputMissingError without any table.
+    Without `experiment` the table that the run's scenario names is taken. Raises InputMissingError without any table,
+    InvalidInputError for a run that did not finish.
     """
+    if isinstance(run, pd.DataFrame):
+        return compare_final(run, _table(experiment, None))
     if isinstance(run, Result):
-        final, named = run.final, run.experiment
-    elif isinstance(run, pd.DataFrame):
-        final, named = run, None
-    else:
-        folder = find_run(run)
-        final = read_final(folder)
-        named = load_scenario(folder / files.SCENARIO).experiment
-        named = None if named is None else named.table
-    table = named if experiment is None else Path(experiment)
+        _refuse_unfinished(run.name, run.status, run.reason)
+        return compare_final(run.final, _table(experiment, run.experiment))
+    folder = find_run(run)
+    summary = read_summary(folder / files.SUMMARY)
+    _refuse_unfinished(str(folder), summary.status, summary.reason)
+    named = load_scenario(folder / files.SCENARIO).experiment
+    return compare_final(read_table(folder / files.FINAL), _table(experiment, named.table if named else None))
+
+
+def _table(given: Path | str | None, named: Path | None) -> ExperimentTable:
+    table = given or named
     if table is None:
         message = "the scenario names no experiment; give a table with --experiment"
         raise InputMissingError(message)
-    return compare_final(final, load_table(table))
+    return load_table(table)
 
 
-def find_run(place: Path | str) -> Path:
+def _refuse_unfinished(name: str, status: str, reason: str) -> None:
+    if status != FINISHED:
+        message = f"{name}: this run has {status} ({reason}); only a finished run can be compared"
+        raise InvalidInputError(message)
+
+
+def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Path:
     """Return the run folder meant by a run folder, by `results/<name>` (newest finished run) or by a scenario file.
 
-    Raises InputMissingError with the command that helps.
+    A folder counts as a run when it has all `needed` files. Raises InputMissingError with the command that helps.
     """
     place = Path(place)
+    if not place.exists():
+        message = f"{place}: no such run folder or scenario file"
+        raise InputMissingError(message)
     if place.is_dir():
-        if (place / files.SUMMARY).is_file():
-            read_summary(place)
-            return place
-        newest = files.newest_finished(place)
-        if newest is None:
-            message = f"{place}: no finished run in this folder; blocksim run SCENARIO makes one"
-            raise InputMissingError(message)
-        return newest
+        return _run_in(place, needed)
     folder = files.default_folder(load_scenario(place))
     if not files.is_finished(folder):
         message = f"{place}: no finished run of exactly this scenario in {folder}; first: blocksim run {place}"
         raise InputMissingError(message)
     return folder
+
+
+def _run_in(place: Path, needed: Sequence[str]) -> Path:
+    missing = [name for name in needed if not (place / name).is_file()]
+    if not missing:
+        return place
+    if (place / files.SCENARIO).is_file():
+        message = f"{place}: this run is not complete (there is no {missing[0]}); blocksim run --overwrite repeats it"
+        raise InputMissingError(message)
+    newest = files.newest_finished(place)
+    if newest is None:
+        message = f"{place}: no finished run in this folder; blocksim run SCENARIO makes one"
+        raise InputMissingError(message)
+    return newest

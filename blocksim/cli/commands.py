@@ -1,0 +1,53 @@
+"""The table of all commands, and a group that imports a command only when it is called.
+
+So `blocksim --help` need not wait for numba, pandas and HDF5, and `blocksim check` not for matplotlib.
+"""
+
+from importlib import import_module
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from blocksim.cli.failures import told
+
+COMMANDS = {  # name: module in this folder, function in it, first line of its help
+    "run": ("run", "run_command", "Simulate a scenario and show where the blocks end."),
+    "compare": ("compare", "compare_command", "Compare runs with measured repeats."),
+    "check": ("check", "check_command", "Validate a scenario and show what it comes to."),
+    "sweep": ("sweep", "sweep_command", "Run a scenario many times with some keys varied."),
+    "plot": ("plot", "plot_command", "Draw a run as a strip of pictures."),
+    "schema": ("schema", "schema_command", "Print the JSON Schema of scenario files, for editors."),
+}
+
+
+class CommandGroup(TyperGroup):
+    """The group of all commands; it also turns errors into messages and exit codes."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
+        """Import the command that was asked for."""
+        name, command, rest = super().resolve_command(ctx, args)
+        return name, loaded(name) if name in COMMANDS else command, rest
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command."""
+        with told():
+            return super().invoke(ctx)
+
+
+def loaded(name: str) -> Any:
+    """Return the command of a name, ready to be called."""
+    module, function, summary = COMMANDS[name]
+    alone = typer.Typer(add_completion=False, rich_markup_mode=None)
+    alone.command(name, short_help=summary)(getattr(import_module(f"blocksim.cli.{module}"), function))
+    return typer.main.get_command(alone)
+
+
+def _listed() -> None:
+    """Stand for a command in the list of all commands."""
+
+
+def add_commands(app: typer.Typer) -> None:
+    """List all commands in an application whose group is a CommandGroup."""
+    for name, (_, _, summary) in COMMANDS.items():
+        app.command(name, help=summary)(_listed)

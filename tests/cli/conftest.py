@@ -1,0 +1,87 @@
+"""The command line, called in this process; and as a process of its own, where that matters."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import pytest
+from typer.testing import CliRunner
+
+from blocksim.cli.app import app
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SOFT = ("--set", "contact.stiffness_scale=0.001")
+START = "from blocksim.cli.app import main; main()"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command left: exit code, answer, and what it told beside."""
+
+    code: int
+    out: str
+    err: str
+
+
+class Command(Protocol):
+    """Call blocksim with arguments."""
+
+    def __call__(self, *arguments: object) -> Answer:
+        """Give its answer."""
+
+
+@pytest.fixture
+def blocksim(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
+    """Call commands in an empty folder that has `scenarios`, on a screen of 80 columns."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    (tmp_path / "scenarios").symlink_to(SCENARIOS)
+
+    def call(*arguments: object) -> Answer:
+        result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        return Answer(result.exit_code, result.stdout, result.stderr)
+
+    return call
+
+
+Process = Callable[..., "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def process(tmp_path: Path) -> Process:
+    """Start blocksim as a process."""
+    environment = {**os.environ, "COLUMNS": "80"}
+    scenarios = tmp_path / "scenarios"
+    if not scenarios.exists():
+        scenarios.symlink_to(SCENARIOS)
+
+    def start(*arguments: object, before: str = "", **options: object) -> "subprocess.Popen[str]":
+        command = [sys.executable, "-c", f"{before}\n{START}", *map(str, arguments)]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
+        return subprocess.Popen(command, cwd=tmp_path, env=environment, text=True, **pipes)  # type: ignore[call-overload,no-any-return]
+
+    return start
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Give the folder of a finished run of the nominal scenario; not to be changed."""
+    folder = tmp_path_factory.mktemp("finished") / "run"
+    result = CliRunner().invoke(
+        app, ["run", str(SCENARIOS / "three_blocks_nominal.toml"), *SOFT, "--out", str(folder), "--quiet"]
+    )
+    assert result.exit_code == 0, result.output
+    return folder
+
+
+@pytest.fixture
+def copied(finished: Path, tmp_path: Path) -> Path:
+    """Give a copy of the finished run, to be damaged."""
+    return Path(shutil.copytree(finished, tmp_path / "copied"))

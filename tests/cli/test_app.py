@@ -1,0 +1,70 @@
+"""The command itself: help, version, mistyped commands, and that it starts quickly."""
+
+import inspect
+import subprocess
+import sys
+from importlib import import_module
+
+import pytest
+
+from blocksim import __version__
+from blocksim.cli.commands import COMMANDS
+from tests.cli.conftest import Command
+
+HEAVY = ("numba", "pandas", "h5py", "matplotlib", "pint", "numpy")
+
+
+def test_help_lists_all_commands_in_80_columns(blocksim: Command) -> None:
+    answer = blocksim("--help")
+    assert answer.code == 0
+    for name, (_, _, summary) in COMMANDS.items():
+        assert f"  {name} " in answer.out
+        assert summary in answer.out
+    assert max(map(len, answer.out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_of_a_command_has_its_summary_and_an_example_on_one_line(blocksim: Command, name: str) -> None:
+    answer = blocksim(name, "--help")
+    module, function, summary = COMMANDS[name]
+    text = inspect.getdoc(getattr(import_module(f"blocksim.cli.{module}"), function))
+    assert answer.code == 0
+    assert text is not None
+    assert text.splitlines()[0] == summary
+    assert text.splitlines()[-1] in answer.out
+    assert text.splitlines()[-1].startswith(f"Example: blocksim {name}")
+    assert max(map(len, answer.out.splitlines())) <= 80
+
+
+def test_version(blocksim: Command) -> None:
+    assert blocksim("--version").out == f"blocksim {__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["rnu"], "Did you mean 'run'?"),
+        (["run"], "Missing argument 'SCENARIO'"),
+        (["run", "a.toml", "--outt", "x"], "--outt"),
+        (["compare"], "Missing argument 'RUN'"),
+        (["compare", "a", "--threshold", "2"], "--threshold"),
+        (["sweep", "a.toml", "--mode", "gird"], "--mode"),
+        (["sweep", "a.toml", "--jobs", "0"], "--jobs"),
+        (["schema", "x"], "unexpected extra argument"),
+    ],
+)
+def test_wrong_usage_is_told_with_exit_code_2(blocksim: Command, arguments: list[str], told: str) -> None:
+    answer = blocksim(*arguments)
+    assert answer.code == 2
+    assert told in answer.err
+    assert answer.out == ""
+
+
+def test_help_does_not_wait_for_heavy_packages() -> None:
+    code = (
+        "import sys; from typer.testing import CliRunner; from blocksim.cli.app import app;"
+        "assert CliRunner().invoke(app, ['--help']).exit_code == 0;"
+        f"print([name for name in {HEAVY!r} if name in sys.modules])"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"

@@ -1,0 +1,55 @@
+"""Whatever happens: one message, the right exit code, no traceback."""
+
+import errno
+from pathlib import Path
+
+import pytest
+import typer
+
+from blocksim.cli.failures import tell_internal_error, told
+from blocksim.errors import ExitCode, OutputError, UnavailableError
+
+
+def exit_code_of(error: BaseException) -> int:
+    def fail() -> None:
+        with told():
+            raise error
+
+    with pytest.raises(typer.Exit) as caught:
+        fail()
+    return caught.value.exit_code
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (UnavailableError("install blocksim[dask]"), ExitCode.UNAVAILABLE),
+        (OutputError("x: cannot be written"), ExitCode.INPUT_OUTPUT),
+        (KeyboardInterrupt(), ExitCode.STOPPED_EARLY),
+        (OSError(errno.ENOSPC, "No space left on device"), ExitCode.INPUT_OUTPUT),
+    ],
+)
+def test_error_becomes_a_line_and_its_exit_code(
+    capsys: pytest.CaptureFixture[str], error: BaseException, code: int
+) -> None:
+    assert exit_code_of(error) == code
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_internal_error_is_one_line_and_a_file(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    tell_internal_error(ValueError("two\nlines"))
+    line = capsys.readouterr().err
+    assert line.startswith("internal error: ValueError: two lines; please report it with the file ")
+    assert line.count("\n") == 1
+    assert "ValueError: two" in next(tmp_path.iterdir()).read_text()
+
+
+def test_internal_error_on_a_full_disk_is_still_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "nowhere"))
+    tell_internal_error(ValueError("x"))
+    assert "internal error: ValueError: x" in capsys.readouterr().err

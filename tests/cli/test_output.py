@@ -1,0 +1,45 @@
+"""Tables fit the screen; numbers and JSON are fit for their readers."""
+
+import json
+import math
+
+import pytest
+
+from blocksim.cli.output import note, number, print_json, table_lines
+
+
+def test_columns_line_up() -> None:
+    assert table_lines(("block", "x mm"), [("1", "16.00"), ("long", "-1.5")]) == [
+        "block   x mm",
+        "─────  ─────",
+        "1      16.00",
+        "long    -1.5",
+    ]
+
+
+def test_wide_table_cuts_texts_and_never_numbers_or_heads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    lines = table_lines(("block", "x"), [("a" * 60, "1234567.89"), ("b", "1")])
+    assert max(map(len, lines)) == 40
+    assert lines[2] == "a" * 27 + "…" + "  1234567.89"
+
+
+def test_table_without_rows_has_its_heads() -> None:
+    assert table_lines(("a", "b"), []) == ["a  b", "─  ─"]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(1.005, "1.00"), (-0.001, "0.00"), (-0.01, "-0.01"), (math.nan, "–"), (math.inf, "–")]
+)
+def test_numbers_have_no_minus_zero_and_no_nan(value: float, text: str) -> None:
+    assert number(value) == text
+
+
+def test_json_has_null_for_what_is_not_finite(capsys: pytest.CaptureFixture[str]) -> None:
+    print_json({"a": [math.nan, (math.inf, 1.0)], "b": True})
+    assert json.loads(capsys.readouterr().out) == {"a": [None, [None, 1.0]], "b": True}
+
+
+def test_notes_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+    note("0.1:x:3 [bold] é")
+    assert capsys.readouterr().err == "0.1:x:3 [bold] é\n"

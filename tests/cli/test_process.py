@@ -1,0 +1,154 @@
+"""What only a real process shows: signals, kills, full disks, closed pipes, terminals."""
+
+import json
+import os
+import pty
+import select
+import signal
+import time
+from pathlib import Path
+from subprocess import Popen
+
+import pytest
+
+from blocksim.scenario import load_scenario
+from blocksim.simulation.stores.hdf5 import read_frames
+from tests.cli.conftest import SOFT, Process
+
+SLOW = ("run", "scenarios/three_blocks_nominal.toml", *SOFT, "--set", "time.end=1e4", "--set", "time.stop_at_rest=false")
+LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))"
+PATIENCE = 60.0  # s
+
+
+def wait_for(path: Path, running: "Popen[str]") -> None:
+    began = time.monotonic()
+    while not path.exists():
+        assert running.poll() is None, running.communicate()
+        assert time.monotonic() - began < PATIENCE
+        time.sleep(0.005)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_stopped_run_is_75_and_keeps_its_frames(process: Process, tmp_path: Path, number: signal.Signals) -> None:
+    running = process(*SLOW, "--out", "out", "--quiet")
+    wait_for(tmp_path / "out" / "run.h5", running)
+    time.sleep(0.3)
+    running.send_signal(number)
+    out, err = running.communicate(timeout=PATIENCE)
+    assert running.returncode == 75
+    assert "Traceback" not in out + err
+    assert "interrupted: stopped by the user; what there is by then is kept in out" in err
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "interrupted"
+    assert not (tmp_path / "out" / "done.json").exists()
+    frames = read_frames(tmp_path / "out" / "run.h5", load_scenario(tmp_path / "out" / "scenario.toml"))
+    assert len(frames) > 10
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.003, 0.05, 0.26, 0.51])
+def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path, delay: float) -> None:
+    running = process(*SLOW, "--set", "output.every=1e-5", "--out", "out", "--quiet")
+    wait_for(tmp_path / "out" / "run.h5", running)
+    time.sleep(delay)
+    running.kill()
+    running.communicate()
+    path = tmp_path / "out" / "run.h5"
+    scenario = load_scenario(tmp_path / "out" / "scenario.toml")
+    if delay < 0.05:
+        wait_for_nothing_torn(path)
+        return
+    frames = read_frames(path, scenario)
+    assert frames.time[0] == 0.0
+    assert frames.x[0].tolist() == pytest.approx([0.016, 0.038, 0.060], abs=1e-6)
+    assert len(frames) > 1 or delay < 0.26
+
+
+def wait_for_nothing_torn(path: Path) -> None:
+    """Look that a file killed in its first milliseconds opens, with or without a frame in it."""
+    import h5py  # noqa: PLC0415
+
+    with h5py.File(path, "r", libver="latest", swmr=True) as file:
+        assert int(file["n_committed"][()]) in {0, 1}
+
+
+@pytest.mark.parametrize(("limit", "file"), [(1000, "scenario.toml"), (100_000, "run.h5"), (600_000, "run.h5")])
+def test_full_disk_is_74_with_one_line(process: Process, tmp_path: Path, limit: int, file: str) -> None:
+    running = process(*SLOW, "--set", "output.every=1e-5", "--out", "out", "-q", before=LIMIT.format(limit))
+    out, err = running.communicate(timeout=PATIENCE)
+    assert (running.returncode, out) == (74, "")
+    assert err == f"out/{file}: cannot be written: File too large\n"
+    assert not [path.name for path in (tmp_path / "out").iterdir() if path.name.startswith(".")]
+
+
+def test_full_disk_keeps_the_frames_before(process: Process, tmp_path: Path) -> None:
+    process(*SLOW, "--set", "output.every=1e-5", "--out", "out", "-q", before=LIMIT.format(600_000)).communicate()
+    frames = read_frames(tmp_path / "out" / "run.h5", load_scenario(tmp_path / "out" / "scenario.toml"))
+    assert len(frames) > 0
+
+
+def test_answer_that_cannot_be_written_is_74(process: Process) -> None:
+    with Path("/dev/full").open("w") as full:
+        running = process("schema", stdout=full)
+        _, err = running.communicate(timeout=PATIENCE)
+    assert running.returncode == 74
+    assert err == "the answer: cannot be written: No space left on device\n"
+
+
+def test_reader_that_has_gone_is_no_traceback(process: Process) -> None:
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    running = process("schema", stdout=write_end)
+    os.close(write_end)
+    _, err = running.communicate(timeout=PATIENCE)
+    assert (running.returncode, err) == (74, "")
+
+
+def test_internal_error_is_70_with_one_line(process: Process) -> None:
+    breaking = "import blocksim.scenario; blocksim.scenario.json_schema = lambda: 1 / 0"
+    running = process("schema", before=breaking)
+    _, err = running.communicate(timeout=PATIENCE)
+    assert running.returncode == 70
+    assert err.startswith("internal error: ZeroDivisionError: division by zero; please report it with the file ")
+    Path(err.split()[-1]).unlink()
+
+
+def test_terminal_without_the_signs_gets_an_answer(process: Process) -> None:
+    before = "import sys; sys.stdout.reconfigure(encoding='ascii'); sys.stderr.reconfigure(encoding='ascii')"
+    arguments = ("run", "scenarios/three_blocks_nominal.toml", *SOFT, "--out", "out")
+    out, _ = (running := process(*arguments, before=before)).communicate(timeout=PATIENCE)
+    assert running.returncode == 0
+    assert "16.00 ? 0.00" in out
+
+
+def test_stopped_sweep_is_75_and_ends_its_workers(process: Process, tmp_path: Path) -> None:
+    vary = ("--vary", "time.end=0.001,1e4,2e4", "--set", "time.stop_at_rest=false", "--jobs", 2)
+    arguments = ("sweep", "scenarios/three_blocks_nominal.toml", *SOFT, *vary, "--out", "out")
+    running = process(*arguments, start_new_session=True)
+    assert running.stderr is not None
+    line = running.stderr.readline()
+    while line and "1/3 finished" not in line:
+        line = running.stderr.readline()
+    os.killpg(running.pid, signal.SIGINT)
+    _, err = running.communicate(timeout=PATIENCE)
+    assert running.returncode == 75
+    assert err == "stopped with 1 of 3 cases done; the same command does the others\n"
+    assert (tmp_path / "out" / "sweep.csv").read_text().count("\n") == 2
+    with pytest.raises(ProcessLookupError):  # nobody is left in the session
+        os.killpg(running.pid, 0)
+
+
+def test_terminal_shows_progress_on_one_line_and_clears_it(process: Process) -> None:
+    leader, follower = pty.openpty()
+    running = process(*SLOW[:-4], "--set", "time.end=20", "--set", "time.stop_at_rest=false", "--out", "out", stderr=follower)
+    os.close(follower)
+    shown = b""
+    while select.select([leader], [], [], PATIENCE)[0]:
+        try:
+            shown += os.read(leader, 4096)
+        except OSError:
+            break
+    running.communicate(timeout=PATIENCE)
+    os.close(leader)
+    text = shown.decode()
+    assert running.returncode == 0
+    assert "s simulated" in text
+    assert "steps/s" in text

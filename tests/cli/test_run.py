@@ -1,0 +1,117 @@
+"""blocksim run: answers, notes and exit codes."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import SCENARIOS, SOFT, Command
+
+RUN = ("run", "scenarios/three_blocks_nominal.toml", *SOFT)
+
+
+def test_answer_is_the_comparison_and_notes_say_where(blocksim: Command) -> None:
+    answer = blocksim(*RUN)
+    assert answer.code == 0
+    lines = answer.out.splitlines()
+    assert lines[0].split() == ["block", "quantity", "simulated", "mean", "±", "s", "[min,", "max]", "error", "verdict"]
+    assert lines[-1].startswith("outside: x of block 2 by ")
+    assert max(map(len, lines)) <= 80
+    assert "finished (at rest)" in answer.err
+    assert "results: results/three_blocks_nominal/" in answer.err
+
+
+def test_without_experiment_the_answer_is_where_the_blocks_end(blocksim: Command) -> None:
+    answer = blocksim("run", "scenarios/slide.toml", "--quiet")
+    assert answer.out.splitlines()[0].split() == ["block", "x", "mm", "y", "mm", "rotation", "°"]
+    assert answer.out.splitlines()[2].split()[:2] == ["block", "33.53"]
+    assert answer.err == ""
+
+
+def test_finished_run_is_shown_again(blocksim: Command) -> None:
+    first, second = blocksim(*RUN), blocksim(*RUN)
+    assert second.code == 0
+    assert second.out == first.out
+    assert second.err.startswith("already there, --overwrite repeats it: results/three_blocks_nominal/")
+    assert "already there" not in blocksim(*RUN, "--overwrite").err
+
+
+def test_quiet_prints_nothing_but_the_answer(blocksim: Command) -> None:
+    loud = blocksim(*RUN)
+    for _ in range(2):
+        answer = blocksim(*RUN, "--quiet")
+        assert (answer.out, answer.err) == (loud.out, "")
+
+
+def test_json_is_all_there_is(blocksim: Command) -> None:
+    for _ in range(2):
+        answer = blocksim(*RUN, "--json")
+        data = json.loads(answer.out)
+        assert answer.err == ""
+        assert data["summary"]["status"] == "finished"
+        assert [row["block"] for row in data["final"]] == ["1", "2", "3"]
+        assert Path(data["folder"], "done.json").is_file()
+
+
+def test_failed_run_is_told_kept_and_76(blocksim: Command) -> None:
+    for flag in ("--quiet", "--json"):
+        answer = blocksim(*RUN, "--set", "contact.max_overlap=1e-9", "--out", "out", "--overwrite", flag)
+        assert answer.code == 76
+        assert answer.err == (
+            "three_blocks_nominal: failed: an overlap exceeds contact.max_overlap; "
+            "what there is by then is kept in out\n"
+        )
+    assert json.loads(Path("out/run.json").read_text())["status"] == "failed"
+    assert not Path("out/done.json").exists()
+    assert blocksim(*RUN, "--set", "contact.max_overlap=1e-9", "--out", "out").code == 73
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["run", "nix.toml"], 66, "nix.toml: no such file"),
+        (["run", "scenarios"], 66, "this is a folder"),
+        (["run", "broken.toml"], 65, "broken.toml:1: "),
+        ([*RUN, "--set", "friction.block_blok=1"], 65, "did you mean 'block_block'?"),
+        ([*RUN, "--set", "time.step=1e-3"], 65, "--set time.step=1e-3: 0.001 s is above the largest safe step"),
+        ([*RUN, "--set", "experiment.table=nix.csv"], 65, "no such file"),
+        ([*RUN, "--set", "experiment.table=../tests/bad.csv"], 65, "no such file"),
+        ([*RUN, "--out", "broken.toml"], 73, "broken.toml: cannot be created"),
+        ([*RUN, "--out", "broken.toml/x"], 73, "broken.toml/x: cannot be created: Not a directory"),
+        ([*RUN, "--out", "foreign"], 73, "holds files that are not a blocksim run (thesis.tex)"),
+        ([*RUN, "--out", "foreign", "--overwrite"], 73, "holds files that are not a blocksim run (thesis.tex)"),
+    ],
+)
+def test_mistakes_are_told_and_leave_nothing_behind(
+    blocksim: Command, tmp_path: Path, arguments: list[str], code: int, told: str
+) -> None:
+    (tmp_path / "broken.toml").write_text("schema = 2\n")
+    (tmp_path / "foreign").mkdir()
+    (tmp_path / "foreign" / "thesis.tex").write_text("years of work")
+    before = sorted(tmp_path.rglob("*"))
+    answer = blocksim(*arguments)
+    assert answer.code == code
+    assert told in answer.err
+    assert answer.out == ""
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_experiment_of_other_blocks_is_told_before_the_run(blocksim: Command, tmp_path: Path) -> None:
+    shutil.copytree(SCENARIOS, tmp_path / "mine")
+    table = tmp_path / "mine" / "experiments" / "three_blocks.csv"
+    table.write_text(table.read_text().replace("\n3,", "\n4,"))
+    answer = blocksim("run", "mine/three_blocks_nominal.toml", "--out", "out")
+    assert answer.code == 65
+    assert "measures block '4'" in answer.err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["run.json", "final.csv", "run.h5", "scenario.toml"])
+def test_damaged_finished_run_is_told_and_can_be_repeated(blocksim: Command, copied: Path, name: str) -> None:
+    (copied / name).write_text("rubbish")
+    answer = blocksim(*RUN, "--out", copied)
+    assert answer.code == 65
+    assert name in answer.err
+    if name != "scenario.toml":
+        assert blocksim(*RUN, "--out", copied, "--overwrite").code == 0

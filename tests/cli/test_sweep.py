@@ -1,0 +1,126 @@
+"""blocksim sweep: table, notes and exit codes."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from blocksim.cli.sweep import short_keys
+from blocksim.scenario import Document
+from blocksim.study.plan import with_sweep
+from tests.cli.conftest import SCENARIOS, SOFT, Command
+
+SHORT = ("sweep", "scenarios/three_blocks_nominal.toml", *SOFT, "--set", "time.end=0.01", "--jobs", 1, "--out", "out")
+KINETIC = "friction.block_block.kinetic"
+
+
+def rows() -> list[dict[str, str]]:
+    with Path("out/sweep.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_grid_from_the_command_line(blocksim: Command) -> None:
+    answer = blocksim(*SHORT, "--vary", f"{KINETIC}=0.2:0.3:2", "--vary", "friction.block_ground.kinetic=0.2,0.3")
+    assert answer.code == 0
+    assert [(row[KINETIC], row["friction.block_ground.kinetic"]) for row in rows()] == [
+        ("0.2", "0.2"),
+        ("0.2", "0.3"),
+        ("0.3", "0.2"),
+        ("0.3", "0.3"),
+    ]
+    lines = answer.out.splitlines()
+    assert lines[0].startswith("block_block.kinetic  block_ground.kinetic    status  inside")
+    assert max(map(len, lines)) <= 80
+    assert "4/4 finished: block_block.kinetic = 0.3, block_ground.kinetic = 0.3" in answer.err
+    assert answer.err.splitlines()[-1] == "table: out/sweep.csv"
+
+
+def test_list_mode(blocksim: Command) -> None:
+    vary = ("--vary", f"{KINETIC}=0.2,0.3", "--vary", "time.end=0.01,0.02", "--mode", "list")
+    assert blocksim(*SHORT, *vary).code == 0
+    assert [(row[KINETIC], row["time.end"]) for row in rows()] == [("0.2", "0.01"), ("0.3", "0.02")]
+
+
+def test_scenario_with_its_own_sweep_needs_no_flags(blocksim: Command, tmp_path: Path) -> None:
+    text = (SCENARIOS / "slide.toml").read_text()
+    (tmp_path / "mine.toml").write_text(text + '\n[sweep]\n"friction.block_ground" = { from = 0.3, to = 0.4, count = 3 }\n')
+    answer = blocksim("sweep", "mine.toml", "--out", "out", "--jobs", 1)
+    assert answer.code == 0
+    assert [row["friction.block_ground"] for row in rows()] == ["0.3", "0.35", "0.4"]
+    assert answer.out.splitlines()[0].split()[0] == "block_ground"
+
+
+def test_json_and_quiet_tell_nothing_else(blocksim: Command) -> None:
+    vary = ("--vary", f"{KINETIC}=0.2,0.9")
+    told = blocksim(*SHORT, *vary, "--json")
+    data = json.loads(told.out)
+    assert (told.code, told.err) == (77, "")
+    assert [row["status"] for row in data["rows"]] == ["finished", "invalid"]
+    assert data["rows"][1]["3.x_mm"] is None
+    assert data["rows"][0]["inside"] is False
+    quiet = blocksim(*SHORT, *vary, "--quiet")
+    assert (quiet.code, quiet.err, len(quiet.out.splitlines())) == (77, "", 4)
+
+
+def test_failed_case_is_77_and_its_reason_is_told(blocksim: Command) -> None:
+    answer = blocksim(*SHORT, "--vary", "contact.max_overlap=1e-3,1e-9")
+    assert answer.code == 77
+    assert "1 of 2 cases did not finish; the first: an overlap exceeds contact.max_overlap" in answer.err
+
+
+@pytest.mark.parametrize(
+    ("vary", "told"),
+    [
+        ("friction.block_blok=1,2", "--vary friction.block_blok=1,2: unknown key, did you mean 'block_block'?"),
+        (KINETIC, f"--vary {KINETIC}: write KEY=a,b,c or KEY=from:to:count"),
+        ("=1,2", "write KEY=a,b,c"),
+        (f"{KINETIC}=", "write KEY=a,b,c"),
+        (f"{KINETIC}=0.1:x:3", f"--vary {KINETIC}=0.1:x:3: "),
+        (f"{KINETIC}=0.1:0.2:0", "count 0 is not a whole number"),
+        (f"{KINETIC}=0.1:0.2:2.5", "count 2.5 is not a whole number"),
+        (f"{KINETIC}=,", "not a plain number"),
+        (f"{KINETIC}=[0.1", "not a plain number"),
+        (f"{KINETIC}=0.8,0.9", "none of the 2 cases can be simulated"),
+        ("friction.block_block.transition_speed=5 mm/s,1 m", "is a length"),
+        ("schema=1,2", "schema cannot be varied"),
+    ],
+)
+def test_wrong_variation_is_65_and_leaves_nothing_behind(
+    blocksim: Command, tmp_path: Path, vary: str, told: str
+) -> None:
+    before = sorted(tmp_path.rglob("*"))
+    answer = blocksim(*SHORT, "--vary", vary)
+    assert (answer.code, answer.out) == (65, "")
+    assert told in answer.err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_nothing_to_vary_is_told(blocksim: Command) -> None:
+    answer = blocksim(*SHORT)
+    assert answer.code == 65
+    assert "nothing to vary: give --vary KEY=VALUES" in answer.err
+
+
+def test_many_rows_and_columns_are_cut_and_counted(blocksim: Command) -> None:
+    answer = blocksim(
+        "sweep", "scenarios/tower.toml", *SOFT, "--set", "time.end=1e-5", "--jobs", 1, "--out", "out",
+        "--vary", "time.rest_speed=" + ",".join(f"{k}e-4" for k in range(1, 43)),
+    )  # fmt: skip
+    lines = answer.out.splitlines()
+    assert len(lines) == 2 + 40
+    assert max(map(len, lines)) <= 80
+    assert "... and 2 more rows, 4 more columns in sweep.csv" in answer.err
+
+
+def test_short_keys_are_the_shortest_ends_that_differ() -> None:
+    document = with_sweep(
+        Document.read(SCENARIOS / "three_blocks_nominal.toml"),
+        {KINETIC: [0.1], "friction.block_ground.kinetic": [0.1], "contact.stiffness_scale": [1.0], "time.end": [1.0]},
+    )
+    assert list(short_keys(document).values()) == [
+        "block_block.kinetic",
+        "block_ground.kinetic",
+        "stiffness_scale",
+        "end",
+    ]

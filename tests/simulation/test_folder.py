@@ -1,0 +1,94 @@
+"""Nothing that a run has not written is ever removed."""
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from blocksim.errors import OutputExistsError
+from blocksim.simulation import Result
+from blocksim.simulation.folder import default_folder, holds_run, newest_finished, prepare_folder
+from tests.simulation.conftest import SCENARIOS, Shipped
+
+
+@pytest.fixture
+def copy(kept: Result, tmp_path: Path) -> Path:
+    assert kept.folder is not None
+    return Path(shutil.copytree(kept.folder, tmp_path / "run"))
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def test_new_folder_is_made_with_its_parents(tmp_path: Path) -> None:
+    prepare_folder(tmp_path / "a" / "b", overwrite=False)
+    assert (tmp_path / "a" / "b").is_dir()
+
+
+def test_overwriting_empties_a_run(copy: Path) -> None:
+    prepare_folder(copy, overwrite=True)
+    assert names(copy) == set()
+
+
+def test_leftovers_of_a_kill_do_not_block_a_folder(copy: Path) -> None:
+    for name in ("done.json", "run.json", "final.csv"):
+        (copy / name).unlink()
+    (copy / ".final.csv.k2j3h4").write_text("half")
+    (copy / ".run.h5.new").write_text("half")
+    with pytest.raises(OutputExistsError, match="did not finish"):
+        prepare_folder(copy, overwrite=False)
+    prepare_folder(copy, overwrite=True)
+    assert names(copy) == set()
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_foreign_file_is_never_removed(copy: Path, overwrite: bool) -> None:
+    (copy / "thesis.tex").write_text("years of work")
+    before = names(copy)
+    with pytest.raises(OutputExistsError, match=r"not a blocksim run \(thesis\.tex\)"):
+        prepare_folder(copy, overwrite=overwrite)
+    assert names(copy) == before
+
+
+def test_scenario_written_by_a_person_is_never_removed(tmp_path: Path) -> None:
+    shutil.copyfile(SCENARIOS / "tower.toml", tmp_path / "scenario.toml")
+    with pytest.raises(OutputExistsError, match=r"scenario\.toml"):
+        prepare_folder(tmp_path, overwrite=True)
+    assert names(tmp_path) == {"scenario.toml"}
+
+
+def test_file_in_the_place_of_the_folder_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputExistsError, match="cannot be created"):
+        prepare_folder(tmp_path / "file", overwrite=True)
+
+
+def test_folder_holds_only_its_own_scenario(kept: Result, soft: Shipped) -> None:
+    assert kept.folder is not None
+    assert holds_run(kept.folder, soft())
+    assert not holds_run(kept.folder, soft(friction__block_block=0.3))
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", "\0"])
+def test_rubbish_in_done_is_no_finished_run(copy: Path, soft: Shipped, text: str) -> None:
+    (copy / "done.json").write_text(text)
+    assert not holds_run(copy, soft())
+
+
+def test_newest_finished_run_is_found(kept: Result, tmp_path: Path) -> None:
+    assert kept.folder is not None
+    assert newest_finished(tmp_path) is None
+    for number, name in enumerate(("b", "c", "a")):
+        done = Path(shutil.copytree(kept.folder, tmp_path / name)) / "done.json"
+        os.utime(done, (1e9 + number, 1e9 + number))
+    (tmp_path / "a" / "done.json").unlink()
+    assert newest_finished(tmp_path) == tmp_path / "c"
+
+
+def test_what_changes_the_result_changes_the_default_folder(soft: Shipped) -> None:
+    same = {default_folder(soft()), default_folder(soft(description="other words"))}
+    assert len(same) == 1
+    assert default_folder(soft(contact__restitution=0.21)) not in same
+    assert default_folder(soft()).parent == Path("results/three_blocks_nominal")

@@ -1,0 +1,44 @@
+"""The loop is heard between outputs too, and stops where it should."""
+
+import pytest
+
+from blocksim.scenario import place_bodies
+from blocksim.simulation import loop
+from blocksim.simulation.recorder import Recorder
+from blocksim.world.build import build_world
+from tests.simulation.conftest import Shipped
+
+
+def test_rare_output_does_not_make_the_loop_deaf(soft: Shipped, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loop, "BODY_STEPS_A_CALL", 400)
+    scenario = soft(time__end=0.02, time__stop_at_rest=False)
+    world = build_world(scenario)
+    recorder = Recorder(place_bodies(scenario), 1.0, float(world.controls[0].step))
+    seen: list[loop.Progress] = []
+    ended = loop.run_loop(world, recorder, 0.02, on_progress=seen.append, is_stopped=lambda: len(seen) == 3)
+    assert [where.steps for where in seen] == [100, 200, 300]
+    assert ended.outcome.status == "interrupted"
+    assert recorder.steps == [0, 300]
+
+
+def test_stop_before_the_first_step_leaves_one_frame(soft: Shipped) -> None:
+    scenario = soft()
+    world = build_world(scenario)
+    recorder = Recorder(place_bodies(scenario), 1e-3, float(world.controls[0].step))
+    ended = loop.run_loop(world, recorder, 1.0, is_stopped=lambda: True)
+    assert ended.outcome.status == "interrupted"
+    assert recorder.steps == [0]
+
+
+@pytest.mark.parametrize(("end", "step", "last"), [(1.0, 0.25, 4), (1.0, 0.3, 3), (1e-9, 1.0, 1)])
+def test_last_step_is_the_nearest_and_at_least_one(end: float, step: float, last: int) -> None:
+    assert loop.last_step_of(end, step) == last
+
+
+def test_loss_of_energy_fails_a_run(soft: Shipped, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loop.ends, "RESIDUAL_LIMIT", 1e-30)
+    scenario = soft(time__end=0.25)
+    world = build_world(scenario)
+    recorder = Recorder(place_bodies(scenario), 1e-2, float(world.controls[0].step))
+    ended = loop.run_loop(world, recorder, 0.25)
+    assert (ended.outcome.status, ended.outcome.exit_code) == ("failed", 76)

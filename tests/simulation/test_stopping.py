@@ -1,0 +1,50 @@
+"""Signals are taken over only where nobody else has, and given back."""
+
+import os
+import signal
+import threading
+
+import pytest
+
+from blocksim.simulation.stopping import interruptible, stop_requests
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signal_becomes_a_request_and_the_handler_comes_back(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+    with stop_requests() as is_stopped:
+        assert not is_stopped()
+        os.kill(os.getpid(), number)
+        assert is_stopped()
+    assert signal.getsignal(number) is before
+
+
+def test_handler_of_somebody_else_stays() -> None:
+    heard = []
+    before = signal.signal(signal.SIGINT, lambda *_: heard.append("mine"))
+    try:
+        with stop_requests() as is_stopped:
+            os.kill(os.getpid(), signal.SIGINT)
+            assert not is_stopped()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert heard == ["mine"]
+
+
+def test_runs_in_other_threads_leave_signals_alone() -> None:
+    answers: list[bool] = []
+
+    def ask() -> None:
+        with stop_requests() as is_stopped:
+            answers.append(is_stopped())
+
+    thread = threading.Thread(target=ask)
+    thread.start()
+    thread.join()
+    assert answers == [False]
+
+
+def test_being_terminated_is_like_ctrl_c_during_a_sweep() -> None:
+    with pytest.raises(KeyboardInterrupt), interruptible():
+        os.kill(os.getpid(), signal.SIGTERM)
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL

@@ -1,0 +1,37 @@
+"""A pool ends with whoever started it, and survives the death of a worker."""
+
+import os
+import signal
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import active_children
+from pathlib import Path
+
+import pytest
+
+from blocksim.scenario import Document
+from blocksim.study.pool import Row, _outcome, run_all
+
+
+def test_dead_worker_fails_its_case_and_says_what_to_do() -> None:
+    future: Future[Row] = Future()
+    future.set_exception(BrokenProcessPool())
+    row = _outcome(future)
+    assert row["status"] == "failed"
+    assert "runs this case again" in str(row["reason"])
+
+
+def test_ctrl_c_ends_the_workers_at_once(nominal: Document, tmp_path: Path) -> None:
+    quick = nominal.with_values({"time.end": 0.01}).build()
+    endless = nominal.with_values({"time.end": 1e5, "time.stop_at_rest": False}).build()
+    tasks = {tmp_path / "quick": quick, tmp_path / "a": endless, tmp_path / "b": endless}
+    rows = run_all(tasks, jobs=2)
+    assert next(rows)[0] == tmp_path / "quick"
+    before = signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGINT))
+    signal.setitimer(signal.ITIMER_REAL, 0.5)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            next(rows)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert active_children() == []

@@ -1,0 +1,88 @@
+"""The scenarios that ship, end to end: what their comments and the README say about them."""
+
+import numpy as np
+import pytest
+
+from blocksim.analysis import Verdict, closed_forms
+from blocksim.analysis.compare import Comparison
+from blocksim.scenario import load_scenario
+from blocksim.simulation import Frames, Result
+from blocksim.study.single import compare, run
+from tests.study.conftest import SCENARIOS
+
+HALF_HEIGHT = 0.0125  # m
+
+
+def run_shipped(name: str, **overrides: object) -> Result:
+    return run(load_scenario(SCENARIOS / f"{name}.toml", overrides))
+
+
+def verdicts(comparison: Comparison) -> dict[tuple[str, str], Verdict]:
+    return {(row.block, row.quantity): row.verdict for row in comparison.rows}
+
+
+def test_calibrated_scenario_is_inside_everywhere() -> None:
+    comparison = compare(run_shipped("three_blocks"))
+    assert len(comparison.rows) == 6
+    assert comparison.inside, comparison.to_frame()
+
+
+def test_nominal_scenario_gets_block_1_and_all_rotations() -> None:
+    found = verdicts(compare(run_shipped("three_blocks_nominal")))
+    assert found[("1", "x")] == Verdict.INSIDE
+    assert [found[(block, "rotation")] for block in "123"] == [Verdict.INSIDE] * 3
+
+
+def test_literal_reading_is_far_outside() -> None:
+    found = {(row.block, row.quantity): row.distance for row in compare(run_shipped("three_blocks_literal")).rows}
+    assert found[("2", "x")] > 10.0
+    assert found[("3", "x")] > 10.0
+
+
+@pytest.fixture(scope="module")
+def bounce() -> Frames:
+    return run_shipped("bounce").frames
+
+
+def test_bouncing_block_falls_as_equation_10_says(bounce: Frames) -> None:
+    falling = bounce.time < closed_forms.fall_time(0.1) - 1e-3
+    fallen = 0.1125 - bounce.y[falling, 0]
+    expected = [closed_forms.fall_distance(float(time)) for time in bounce.time[falling]]
+    np.testing.assert_allclose(fallen, expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("impact", [1, 2, 3])
+def test_bouncing_block_rises_as_equation_12_says(bounce: Frames, impact: int) -> None:
+    times = [closed_forms.fall_time(0.1)]
+    for earlier in range(1, impact + 1):
+        times.append(times[-1] + closed_forms.flight_time(0.1, 0.5, earlier))
+    flying = (bounce.time > times[impact - 1]) & (bounce.time < times[impact])
+    apex = float(np.max(bounce.y[flying, 0])) - HALF_HEIGHT
+    assert apex == pytest.approx(closed_forms.apex_height(0.1, 0.5, impact), rel=2e-3)
+    middle = 0.5 * (times[impact - 1] + times[impact])
+    assert bounce.time[flying][np.argmax(bounce.y[flying, 0])] == pytest.approx(middle, abs=5e-4)
+
+
+def test_sliding_block_stops_where_equation_13_says() -> None:
+    result = run_shipped("slide")
+    assert result.reason == "at rest"
+    row = result.final.iloc[0]
+    assert row["x_mm"] == pytest.approx(1e3 * closed_forms.sliding_stop_distance(0.5, 0.38), abs=0.1)
+    assert row["rotation_deg"] == pytest.approx(0.0, abs=0.01)
+    frames = result.frames
+    sliding = (frames.time > 0.01) & (frames.time < closed_forms.sliding_stop_time(0.5, 0.38) - 0.01)
+    expected = [closed_forms.sliding_speed(float(time), 0.5, 0.38) for time in frames.time[sliding]]
+    np.testing.assert_allclose(frames.vx[sliding, 0], expected, atol=2e-3)
+
+
+def test_tower_stands() -> None:
+    result = run_shipped("tower", **{"contact.stiffness_scale": 0.01})
+    assert result.status == "finished"
+    np.testing.assert_allclose(result.final["x_mm"], result.final["x_mm"].iloc[0], atol=0.01)
+    np.testing.assert_allclose(result.final["rotation_deg"], 0.0, atol=0.01)
+    np.testing.assert_allclose(result.final["y_mm"], 12.5 + 25.0 * np.arange(10), atol=0.05)
+
+
+def test_tower_with_large_offset_falls() -> None:
+    result = run_shipped("tower", **{"contact.stiffness_scale": 0.001, "structures.0.offset": "3.5 mm"})
+    assert result.final["rotation_deg"].abs().max() > 45.0
