@@ -22,7 +22,10 @@ def test_the_scenario_in_the_readme_is_valid() -> None:
     assert Document.parse(text.group(1), "README.md").build().name == "my_tower"
 
 
-@pytest.mark.parametrize("place", sorted(set(re.findall(r"`((?:blocksim|tests|scenarios|results)/[a-z_/.]+)`", README))))
+PLACES = sorted(set(re.findall(r"`((?:blocksim|tests|scenarios|results)/[a-z_/.]+)`", README)))
+
+
+@pytest.mark.parametrize("place", PLACES)
 def test_every_place_that_the_readme_names_exists(place: str) -> None:
     assert (ROOT / place).exists()
 

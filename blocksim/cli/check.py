@@ -49,9 +49,13 @@ def _tables(description: Description) -> list[list[str]]:
     body_rows = table_lines(body_columns, [_body_cells(body) for body in bodies[:MOST_BODIES]])
     if len(bodies) > MOST_BODIES:
         body_rows.append(f"... and {len(bodies) - MOST_BODIES} more blocks")
-    pair_columns = ("pair", "μ static", "μ kinetic", "e", "damping", "K normal", "K shear")
+    pair_columns = ("pair", "μs", "μk", "e", "damping", "K normal", "K shear")
     pair_rows = table_lines(pair_columns, [_pair_cells(pair) for pair in description.pairs])
-    return [body_rows, [*pair_rows, "K in N/m, of one contact point; a face contact has two"], _cost(description)]
+    return [
+        body_rows,
+        [*pair_rows, "μs static, μk kinetic friction; K in N/m, of one contact point (a face has two)"],
+        _cost(description),
+    ]
 
 
 def _cost(description: Description) -> list[str]:
@@ -74,6 +78,6 @@ def _pair_cells(pair: PairDescription) -> tuple[str, ...]:
         f"{pair.kinetic_friction:.3g}",
         f"{pair.restitution:.3g}",
         f"{pair.normal_damping_ratio:.3f}",
-        f"{pair.normal_stiffness:.3e}",
-        f"{pair.shear_stiffness:.3e}",
+        f"{pair.normal_stiffness:.2e}",
+        f"{pair.shear_stiffness:.2e}",
     )

@@ -45,7 +45,7 @@ def sweep_command(
 
     Every case gives a row in sweep.csv. Called again, the same sweep runs only the cases that are missing.
 
-    Example: blocksim sweep scenarios/tower.toml --vary structures.0.offset=0:0.004:5
+    Example: blocksim sweep scenarios/slide.toml --vary gravity=1.62,9.81
     """
     silent = quiet or as_json
     document = with_vary(

@@ -26,9 +26,7 @@ def bounce(height: float, restitution: float, impacts: int) -> tuple[list[float]
     time, state = 0.0, [height, 0.0]
     times, apexes = [], []
     for _ in range(impacts + 1):
-        flight = solve_ivp(
-            lambda _, y: [y[1], -G], (time, time + 1), state, events=landing, max_step=1e-3, **TIGHT
-        )
+        flight = solve_ivp(lambda _, y: [y[1], -G], (time, time + 1), state, events=landing, max_step=1e-3, **TIGHT)
         apexes.append(float(flight.y[0].max()))
         time = float(flight.t_events[0][0])
         times.append(time)
@@ -143,9 +141,7 @@ def test_harmonic_stack_is_on_the_verge_at_every_level(count: int) -> None:
 
 
 def test_lowest_corner_is_the_lowest_of_four() -> None:
-    assert forms.lowest_corner(0.032, 0.025, radians(30)) == pytest.approx(
-        (-7.6064e-3, -18.8253e-3), abs=1e-7
-    )
+    assert forms.lowest_corner(0.032, 0.025, radians(30)) == pytest.approx((-7.6064e-3, -18.8253e-3), abs=1e-7)
     x, y = forms.lowest_corner(0.032, 0.025, radians(-120))
     assert hypot(x, y) == pytest.approx(hypot(0.032, 0.025) / 2)
     assert y < 0.0
@@ -232,9 +228,7 @@ def test_an_elastic_frictionless_impact_keeps_the_energy() -> None:
     assert kinetic_energy(after) == pytest.approx(kinetic_energy(FALLING), rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("width", "height", "part"), [(0.010, 0.040, 0.5), (0.032, 0.050, 0.9), (0.01, 0.04, 0.01)]
-)
+@pytest.mark.parametrize(("width", "height", "part"), [(0.010, 0.040, 0.5), (0.032, 0.050, 0.9), (0.01, 0.04, 0.01)])
 def test_rocking_takes_as_long_as_integrated(width: float, height: float, part: float) -> None:
     alpha, radius = atan(width / height), hypot(width, height) / 2
 
@@ -285,9 +279,7 @@ def test_housner_ratio_keeps_angular_momentum_of_every_particle() -> None:
 
 def test_inertia_is_the_sum_over_the_particles() -> None:
     x, y = grid(0.032, 0.025)
-    assert forms.rectangle_inertia(MASS, 0.032, 0.025) == pytest.approx(
-        MASS * float(np.mean(x**2 + y**2)), rel=1e-4
-    )
+    assert forms.rectangle_inertia(MASS, 0.032, 0.025) == pytest.approx(MASS * float(np.mean(x**2 + y**2)), rel=1e-4)
     assert forms.rectangle_inertia(MASS, 0.032, 0.025) == pytest.approx(INERTIA, rel=1e-3)
 
 

@@ -55,9 +55,7 @@ def test_centres_average_to_what_table_3_prints(centres: ExperimentTable, block:
 def test_edges_average_to_what_table_2_prints(
     edges: ExperimentTable, block: str, quantity: str, printed: float
 ) -> None:
-    assert mean_of(edges, block, quantity) == pytest.approx(
-        printed, abs=0.005 + 1e-9
-    )  # 151.505 became 151.51
+    assert mean_of(edges, block, quantity) == pytest.approx(printed, abs=0.005 + 1e-9)  # 151.505 became 151.51
 
 
 @pytest.mark.parametrize("block", ["1", "2", "3"])
@@ -68,9 +66,7 @@ def test_every_centre_is_the_midpoint_of_its_edges_rounded_half_up(
     assert printed == midpoints(edges, block, ROUND_HALF_UP)
 
 
-def test_centres_are_not_the_midpoints_rounded_half_even(
-    centres: ExperimentTable, edges: ExperimentTable
-) -> None:
+def test_centres_are_not_the_midpoints_rounded_half_even(centres: ExperimentTable, edges: ExperimentTable) -> None:
     differing = [
         (block, replicate)
         for block in centres.blocks
@@ -117,9 +113,7 @@ def test_values_already_in_millimetres_keep_their_bits(tmp_path: Path) -> None:
 
 
 def test_spreadsheet_habits_are_understood(tmp_path: Path) -> None:
-    text = (
-        '\ufeff# a "note"\r\n\r\nvalue , block,quantity,unit,replicate\r\n 1.5e1, "left, ""L""" ,x,mm, 2\r\n'
-    )
+    text = '\ufeff# a "note"\r\n\r\nvalue , block,quantity,unit,replicate\r\n 1.5e1, "left, ""L""" ,x,mm, 2\r\n'
     table = load_table(write(tmp_path, text))
     assert table.blocks == ('left, "L"',)
     assert list(table.values('left, "L"', "x").items()) == [(2, 15.0)]
@@ -142,11 +136,7 @@ GOOD = "1,x,mm,1,16\n"
 BROKEN = {
     "unit of another kind": (
         HEADER + "1,x,kg,1,16\n",
-        (
-            "table.csv:2: unit: 'kg' is not the unit of a length, write mm, cm or m\n"
-            "    2 | 1,x,kg,1,16\n"
-            "      |     ^^"
-        ),
+        ("table.csv:2: unit: 'kg' is not the unit of a length, write mm, cm or m\n    2 | 1,x,kg,1,16\n      |     ^^"),
     ),
     "unit that does not exist": (
         HEADER + "1,x,millimetrs,1,16\n",

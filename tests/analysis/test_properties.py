@@ -44,11 +44,7 @@ def test_properties_cannot_be_changed_by_accident() -> None:
 BROKEN = {
     "mistyped": (
         "widht,mm,32\n",
-        (
-            "table.csv:2: property: unknown property 'widht', did you mean 'width'?\n"
-            "    2 | widht,mm,32\n"
-            "      | ^^^^^"
-        ),
+        ("table.csv:2: property: unknown property 'widht', did you mean 'width'?\n    2 | widht,mm,32\n      | ^^^^^"),
     ),
     "unit": (
         "unit_weight,kg/m^3,26.7\n",
@@ -60,11 +56,7 @@ BROKEN = {
     ),
     "no unit": (
         "width,,32\n",
-        (
-            "table.csv:2: unit: nothing is no unit of width, write for example m\n"
-            "    2 | width,,32\n"
-            "      |       ^"
-        ),
+        ("table.csv:2: unit: nothing is no unit of width, write for example m\n    2 | width,,32\n      |       ^"),
     ),
     "number": (
         "width,mm,32mm\n",
@@ -96,11 +88,7 @@ BROKEN = {
     ),
     "empty": (
         "",
-        (
-            "table.csv:1: the table has a header and no rows\n"
-            "    1 | property,unit,value\n"
-            "      | ^^^^^^^^^^^^^^^^^^^"
-        ),
+        ("table.csv:1: the table has a header and no rows\n    1 | property,unit,value\n      | ^^^^^^^^^^^^^^^^^^^"),
     ),
 }
 

@@ -16,7 +16,7 @@ def test_shipped_scenarios_are_valid(blocksim: Command, shipped: Path) -> None:
 def test_tables_show_masses_contacts_and_cost_in_80_columns(blocksim: Command) -> None:
     answer = blocksim("check", "scenarios/three_blocks_nominal.toml")
     assert "1      16.00   25.00    32.00    50.00     25.00  0.10887     3.1971e-05" in answer.out
-    assert "aluminium - ground         0.38       0.38  0.2" in answer.out
+    assert "aluminium - ground     0.38  0.38  0.2" in answer.out
     assert "time step  " in answer.out
     tables = answer.out[answer.out.index("block   x mm") :]
     assert max(map(len, tables.splitlines())) <= 80

@@ -44,7 +44,9 @@ def test_list_mode(blocksim: Command) -> None:
 
 def test_scenario_with_its_own_sweep_needs_no_flags(blocksim: Command, tmp_path: Path) -> None:
     text = (SCENARIOS / "slide.toml").read_text()
-    (tmp_path / "mine.toml").write_text(text + '\n[sweep]\n"friction.block_ground" = { from = 0.3, to = 0.4, count = 3 }\n')
+    (tmp_path / "mine.toml").write_text(
+        text + '\n[sweep]\n"friction.block_ground" = { from = 0.3, to = 0.4, count = 3 }\n'
+    )
     answer = blocksim("sweep", "mine.toml", "--out", "out", "--jobs", 1)
     assert answer.code == 0
     assert [row["friction.block_ground"] for row in rows()] == ["0.3", "0.35", "0.4"]
@@ -79,8 +81,8 @@ def test_failed_case_is_77_and_its_reason_is_told(blocksim: Command) -> None:
         (f"{KINETIC}=0.1:x:3", f"--vary {KINETIC}=0.1:x:3: "),
         (f"{KINETIC}=0.1:0.2:0", "count 0 is not a whole number"),
         (f"{KINETIC}=0.1:0.2:2.5", "count 2.5 is not a whole number"),
-        (f"{KINETIC}=,", "not a plain number"),
-        (f"{KINETIC}=[0.1", "not a plain number"),
+        (f"{KINETIC}=,", '"" is not'),
+        (f"{KINETIC}=[0.1", '"[0.1" is not'),
         (f"{KINETIC}=0.8,0.9", "none of the 2 cases can be simulated"),
         ("friction.block_block.transition_speed=5 mm/s,1 m", "is a length"),
         ("schema=1,2", "schema cannot be varied"),
@@ -110,7 +112,7 @@ def test_many_rows_and_columns_are_cut_and_counted(blocksim: Command) -> None:
     lines = answer.out.splitlines()
     assert len(lines) == 2 + 40
     assert max(map(len, lines)) <= 80
-    assert "... and 2 more rows, 4 more columns in sweep.csv" in answer.err
+    assert "... and 2 more rows, 3 more columns in sweep.csv" in answer.err
 
 
 def test_short_keys_are_the_shortest_ends_that_differ() -> None:

@@ -1,7 +1,5 @@
 """Misspelt, missing and misplaced keys. Every message in full."""
 
-
-
 from collections.abc import Callable
 
 import pytest

@@ -1,7 +1,5 @@
 """Files that are no TOML, and lines that are hard to show. Every message in full."""
 
-
-
 from collections.abc import Callable
 
 import pytest

@@ -5,6 +5,7 @@ import json
 import os
 import signal
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -168,4 +169,4 @@ def test_progress_comes_to_the_end(soft: Shipped) -> None:
     simulate(soft(time__end=0.02, time__stop_at_rest=False), on_progress=seen.append)
     assert seen[-1].time == pytest.approx(0.02, abs=1e-5)
     assert seen[-1].end == 0.02
-    assert all(a.steps < b.steps for a, b in zip(seen, seen[1:], strict=False))
+    assert all(a.steps < b.steps for a, b in pairwise(seen))

@@ -87,7 +87,7 @@ def test_sweep_without_a_possible_case_is_refused(nominal: Document) -> None:
     document = with_sweep(nominal, {KINETIC: [0.8, 0.9]})
     sweep = document.build().sweep
     assert sweep is not None
-    with pytest.raises(InvalidInputError, match="none of the 2 cases can be simulated; the first: .*0.8"):
+    with pytest.raises(InvalidInputError, match=r"none of the 2 cases can be simulated; the first: .*0\.8"):
         cases_of(document, sweep)
 
 

@@ -3,8 +3,8 @@
 import json
 import shutil
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import pandas as pd
 import pytest
 
 import blocksim
@@ -14,6 +14,9 @@ from blocksim.simulation import Result
 from blocksim.study import single
 from blocksim.study.single import compare, find_run, run
 from tests.study.conftest import SCENARIOS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @pytest.fixture(scope="module")

@@ -36,9 +36,7 @@ FRAMES = Frames(
 def test_a_block_turned_clockwise_lies_on_its_right_side() -> None:
     upright, lying = corners(FRAMES, 0)[0], corners(FRAMES, 1)[0]
     assert upright.tolist() == [pytest.approx(point) for point in ([84, 0], [116, 0], [116, 50], [84, 50])]
-    assert lying.tolist() == [
-        pytest.approx(point, abs=1e-9) for point in ([175, 32], [175, 0], [225, 0], [225, 32])
-    ]
+    assert lying.tolist() == [pytest.approx(point, abs=1e-9) for point in ([175, 32], [175, 0], [225, 0], [225, 32])]
 
 
 def test_the_scene_is_as_large_as_the_corners_with_one_margin() -> None:

@@ -176,9 +176,7 @@ def test_long_scenes_get_fewer_columns(extent: Extent, columns: int, panels: int
     assert arrangement(extent) == (columns, panels)
 
 
-@pytest.mark.parametrize(
-    "extent", [Extent(0, 160, -5, 150), Extent(0, 900, -2, 50), Extent(-200, 300, -5, 2000)]
-)
+@pytest.mark.parametrize("extent", [Extent(0, 160, -5, 150), Extent(0, 900, -2, 50), Extent(-200, 300, -5, 2000)])
 def test_panels_share_one_scale_and_do_not_overlap(extent: Extent) -> None:
     layout = plan(extent, *arrangement(extent), measured_rows=2)
     assert layout.panel_width * 72 / extent.width == pytest.approx(layout.points_per_mm)
