@@ -40,14 +40,14 @@ def tell_compilation(*, quiet: bool) -> None:
 @contextmanager
 def _live_line(console: Console) -> Iterator[Callable[[Where], None]]:
     columns = (
-        TextColumn("{task.completed:.3f} of at most {task.total:g} s simulated"),
+        TextColumn("{task.completed:.3f} of {task.total:g} s"),
         BarColumn(bar_width=None),
         TextColumn("{task.fields[speed]} steps/s, energy off by {task.fields[residual]}"),
         TimeRemainingColumn(),
     )
     began = time.monotonic()
     with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("", total=1.0, speed="", residual="")
+        task = progress.add_task("", total=1.0, visible=False, speed="", residual="")
         shown_at = 0.0
 
         def show(where: Where) -> None:
@@ -57,7 +57,9 @@ def _live_line(console: Console) -> Iterator[Callable[[Where], None]]:
                 shown_at = now
                 speed = f"{where.steps / max(now - began, 1e-9):.1e}"
                 residual = f"{where.relative_residual:.0e}"
-                progress.update(task, completed=where.time, total=where.end, speed=speed, residual=residual)
+                progress.update(
+                    task, completed=where.time, total=where.end, visible=True, speed=speed, residual=residual
+                )
 
         yield show
 

@@ -51,7 +51,8 @@ def blocksim(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
     return call
 
 
-Process = Callable[..., "subprocess.Popen[str]"]
+Running = subprocess.Popen[str]
+Process = Callable[..., Running]
 
 
 @pytest.fixture
@@ -62,7 +63,7 @@ def process(tmp_path: Path) -> Process:
     if not scenarios.exists():
         scenarios.symlink_to(SCENARIOS)
 
-    def start(*arguments: object, before: str = "", **options: object) -> "subprocess.Popen[str]":
+    def start(*arguments: object, before: str = "", **options: object) -> Running:
         command = [sys.executable, "-c", f"{before}\n{START}", *map(str, arguments)]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
         return subprocess.Popen(command, cwd=tmp_path, env=environment, text=True, **pipes)  # type: ignore[call-overload,no-any-return]

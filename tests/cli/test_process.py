@@ -7,13 +7,12 @@ import select
 import signal
 import time
 from pathlib import Path
-from subprocess import Popen
 
 import pytest
 
 from blocksim.scenario import load_scenario
 from blocksim.simulation.stores.hdf5 import read_frames
-from tests.cli.conftest import SOFT, Process
+from tests.cli.conftest import SOFT, Process, Running
 
 SLOW = (
     "run",
@@ -28,7 +27,7 @@ LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))"
 PATIENCE = 60.0  # s
 
 
-def wait_for(path: Path, running: "Popen[str]") -> None:
+def wait_for(path: Path, running: Running) -> None:
     began = time.monotonic()
     while not path.exists():
         assert running.poll() is None, running.communicate()
@@ -145,7 +144,7 @@ def test_stopped_sweep_is_75_and_ends_its_workers(process: Process, tmp_path: Pa
 def test_terminal_shows_progress_on_one_line_and_clears_it(process: Process) -> None:
     leader, follower = pty.openpty()
     running = process(
-        *SLOW[:-4], "--set", "time.end=20", "--set", "time.stop_at_rest=false", "--out", "out", stderr=follower
+        *SLOW[:-4], "--set", "time.end=4", "--set", "time.stop_at_rest=false", "--out", "out", stderr=follower
     )
     os.close(follower)
     shown = b""
@@ -158,5 +157,6 @@ def test_terminal_shows_progress_on_one_line_and_clears_it(process: Process) -> 
     os.close(leader)
     text = shown.decode()
     assert running.returncode == 0
-    assert "s simulated" in text
-    assert "steps/s" in text
+    assert "of 4 s " in text
+    assert "steps/s, energy off by " in text
+    assert "…" not in text

@@ -36,7 +36,7 @@ def test_last_step_is_the_nearest_and_at_least_one(end: float, step: float, last
 
 
 def test_loss_of_energy_fails_a_run(soft: Shipped, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop.ends, "RESIDUAL_LIMIT", 1e-30)
+    monkeypatch.setattr("blocksim.simulation.outcome.RESIDUAL_LIMIT", 1e-30)
     scenario = soft(time__end=0.25)
     world = build_world(scenario)
     recorder = Recorder(place_bodies(scenario), 1e-2, float(world.controls[0].step))
