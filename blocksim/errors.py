@@ -76,12 +76,6 @@ class InputMissingError(BlocksimError):
     exit_code = ExitCode.INPUT_MISSING
 
 
-class UnavailableError(BlocksimError):
-    """An optional package or a scheduler is not there; the message names the extra to install."""
-
-    exit_code = ExitCode.UNAVAILABLE
-
-
 class OutputExistsError(BlocksimError):
     """The output folder holds something that must not be overwritten, or cannot be created."""
 
@@ -98,9 +92,3 @@ class StoppedEarlyError(BlocksimError):
     """The run was stopped before its end and can be resumed."""
 
     exit_code = ExitCode.STOPPED_EARLY
-
-
-class NumericalFailureError(BlocksimError):
-    """Not finite, overlap above its limit, or energy residual above its limit."""
-
-    exit_code = ExitCode.NUMERICAL_FAILURE

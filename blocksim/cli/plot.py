@@ -11,7 +11,7 @@ from blocksim.cli.output import note
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.simulation import folder as files
-from blocksim.simulation.stores.hdf5 import read_frames
+from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.study.single import find_run
 from blocksim.view.strip import draw_strip
 

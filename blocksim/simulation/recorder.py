@@ -1,7 +1,7 @@
 """Samples the world at the output times. It names the next step it wants and never changes the motion."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,23 @@ MOTION = ("x", "y", "angle", "vx", "vy", "spin")
 MEASURED = (*LEDGER_ROW, "contact_count", "largest_overlap")
 
 
+class Frame(NamedTuple):
+    """One recorded state of b bodies, SI."""
+
+    step: int
+    motion: NDArray[np.float64]  # (6, b) as MOTION
+    measured: NDArray[np.float64]  # (9,) as MEASURED
+
+
 class FrameSink(Protocol):
     """Whatever keeps frames while the run goes on, such as a file."""
 
-    def append(self, step: int, motion: NDArray[np.float64], measured: NDArray[np.float64]) -> None:
-        """Keep one frame: step number, motion (6, b), measured values."""
+    def append(self, frame: Frame) -> None:
+        """Keep one frame."""
 
 
 class Recorder:
-    """Rows of steps, motions (6, b) and measured values, one a frame, growing as the run goes on."""
+    """Frames, growing as the run goes on."""
 
     def __init__(self, placed: Sequence[PlacedBody], every: float, step: float, sink: FrameSink | None = None) -> None:
         """Record every `every` seconds, at the nearest step of length `step` (s); `sink` gets all frames too."""
@@ -54,7 +62,7 @@ class Recorder:
         self.motion.append(motion)
         self.measured.append(row)
         if self.sink is not None:
-            self.sink.append(step, motion, row)
+            self.sink.append(Frame(step, motion, row))
 
     def frames(self) -> Frames:
         """Return all frames so far."""

@@ -8,7 +8,7 @@ import pandas as pd
 from blocksim.scenario import Scenario, load_scenario
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
-from blocksim.simulation.stores.hdf5 import read_frames
+from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import read_table
 

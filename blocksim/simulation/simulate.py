@@ -16,7 +16,7 @@ from blocksim.simulation.provenance import environment, run_hash, state_hash
 from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.result import Result
 from blocksim.simulation.stopping import stop_requests
-from blocksim.simulation.stores.hdf5 import FrameFile
+from blocksim.simulation.stores.hdf5_writer import FrameFile
 from blocksim.simulation.summary import Summary
 from blocksim.simulation.table import final_table
 from blocksim.world.build import build_world

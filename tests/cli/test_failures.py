@@ -7,7 +7,7 @@ import pytest
 import typer
 
 from blocksim.cli.failures import tell_internal_error, told
-from blocksim.errors import ExitCode, OutputError, UnavailableError
+from blocksim.errors import ExitCode, InputMissingError, OutputError
 
 
 def exit_code_of(error: BaseException) -> int:
@@ -23,7 +23,7 @@ def exit_code_of(error: BaseException) -> int:
 @pytest.mark.parametrize(
     ("error", "code"),
     [
-        (UnavailableError("install blocksim[dask]"), ExitCode.UNAVAILABLE),
+        (InputMissingError("x: no such file"), ExitCode.INPUT_MISSING),
         (OutputError("x: cannot be written"), ExitCode.INPUT_OUTPUT),
         (KeyboardInterrupt(), ExitCode.STOPPED_EARLY),
         (OSError(errno.ENOSPC, "No space left on device"), ExitCode.INPUT_OUTPUT),

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import load_scenario
-from blocksim.simulation.stores.hdf5 import read_frames
+from blocksim.simulation.stores.hdf5_reader import read_frames
 from tests.cli.conftest import SOFT, Process, Running
 
 SLOW = (

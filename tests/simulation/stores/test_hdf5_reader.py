@@ -11,8 +11,9 @@ import pytest
 from blocksim.errors import InputMissingError, InvalidInputError, OutputError
 from blocksim.scenario import place_bodies
 from blocksim.simulation import Result
-from blocksim.simulation.recorder import MEASURED, MOTION
-from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
+from blocksim.simulation.recorder import MEASURED, MOTION, Frame
+from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.stores.hdf5_writer import FrameFile
 from tests.simulation.conftest import Shipped
 
 UNITS = {"x": "m", "angle": "rad", "vy": "m s-1", "spin": "rad s-1", "time": "s", "mass": "kg", "inertia": "kg m2"}
@@ -29,7 +30,7 @@ def open_file(path: Path, soft: Shipped) -> FrameFile:
 
 def add_frames(sink: FrameFile, count: int) -> None:
     for step in range(count):
-        sink.append(step, np.full((len(MOTION), 3), float(step)), np.full(len(MEASURED), float(step)))
+        sink.append(Frame(step, np.full((len(MOTION), 3), float(step)), np.full(len(MEASURED), float(step))))
 
 
 def test_every_data_set_says_its_unit(kept: Result) -> None:

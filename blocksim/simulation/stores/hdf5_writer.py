@@ -1,0 +1,153 @@
+"""Writes run.h5 so that it stays readable after a kill, and whole after a full disk.
+
+A file that is killed in the middle of a plain write is often unreadable. Here all data sets exist, with fixed-length
+types, before the file switches to single-writer-multiple-reader mode, and only then does it get its name; every flush
+is followed by a new value of `n_committed`. HDF5 cannot recover from a write that fails, so space is reserved before.
+"""
+
+import contextlib
+import os
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.errors import OutputError
+from blocksim.scenario import PlacedBody
+from blocksim.simulation.recorder import MEASURED, MOTION, Frame
+from blocksim.simulation.stores import hdf5_layout as layout
+
+FLUSH_SECONDS = 0.25
+MOST_CHUNK_ROWS = 64
+CHUNK_VALUES = 1 << 17  # a megabyte
+RESERVE = 1 << 18  # bytes
+
+
+def _try_room(path: Path) -> None:
+    """Raise OSError, and leave nothing, where a small file cannot be written."""
+    try:
+        path.write_bytes(bytes(RESERVE))
+    finally:
+        path.unlink(missing_ok=True)
+
+
+class FrameFile:
+    """Writes frames as they come; use as a context manager."""
+
+    def __init__(self, path: Path, placed: Sequence[PlacedBody], time_step: float, scenario_toml: str) -> None:
+        """Create the file with all its data sets; raises OutputError when that fails."""
+        self.path = path
+        self.time_step = time_step
+        self.count = 0
+        self.chunk_rows = min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // len(placed)))
+        self.is_broken = False
+        self.waiting: list[Frame] = []
+        self.flushed_at = -np.inf
+        self.row_bytes = 8 * (2 + len(MOTION) * len(placed) + len(MEASURED))
+        unnamed = path.with_name(f".{path.name}.new")
+        with self._telling_trouble():
+            _try_room(unnamed)
+            self.file = h5py.File(unnamed, "w", libver="latest")
+            self._reserve(len(scenario_toml))
+            self._create(placed, scenario_toml)
+            self.file.swmr_mode = True
+            unnamed.replace(path)
+
+    def _create(self, placed: Sequence[PlacedBody], scenario_toml: str) -> None:
+        h5md = self.file.create_group("h5md")
+        h5md.attrs["version"] = np.array([1, 1])
+        h5md.create_group("creator").attrs["name"] = "blocksim"
+        self.file.create_dataset(layout.COMMITTED, (), dtype=np.int64).attrs["unit"] = "1"
+        self._growing(layout.STEP, np.int64, "1")
+        self._growing(layout.TIME, np.float64, "s")
+        for name, unit in layout.MOTION_UNITS.items():
+            self._growing(f"{layout.BLOCKS}/{name}", np.float64, unit, len(placed))
+        for name, unit in layout.MEASURED_UNITS.items():
+            self._growing(f"{layout.OBSERVABLES}/{name}", np.float64, unit)
+        for name, unit in layout.BODY_UNITS.items():
+            values = np.array([getattr(body, name) for body in placed])
+            self.file.create_dataset(f"{layout.BLOCKS}/{name}", data=values).attrs["unit"] = unit
+        text = self.file.create_dataset(layout.SCENARIO_TEXT, data=np.bytes_(scenario_toml.encode()))
+        text.attrs["unit"] = layout.TEXT_UNIT
+        self.file[layout.STEP].attrs["time_step"] = self.time_step  # s
+
+    def _growing(self, name: str, kind: type, unit: str, *row: int) -> None:
+        chunks = (self.chunk_rows, *row)
+        data_set = self.file.create_dataset(name, (0, *row), dtype=kind, maxshape=(None, *row), chunks=chunks)
+        data_set.attrs["unit"] = unit
+
+    def _reserve(self, size: int) -> None:
+        """Make sure of the space on the disk, and of what HDF5 adds: after a write that fails it cannot go on."""
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(self.file.id.get_vfd_handle(), self.file.id.get_filesize(), size + RESERVE)
+
+    def append(self, frame: Frame) -> None:
+        """Take one frame; writes what has come together a few times a second. Raises OutputError."""
+        self.waiting.append(frame)
+        if time.monotonic() - self.flushed_at > FLUSH_SECONDS:
+            self.commit()
+
+    def commit(self) -> None:
+        """Bring all frames so far to the disk and then say how many there are. Raises OutputError (disk full …)."""
+        with self._telling_trouble():
+            if self.waiting:
+                self._reserve((len(self.waiting) + 2 * self.chunk_rows) * self.row_bytes)
+                self._write_waiting()
+                self.file.flush()
+            self.file[layout.COMMITTED][()] = self.count
+            self.file.flush()
+        self.flushed_at = time.monotonic()
+
+    def _write_waiting(self) -> None:
+        steps, motions, rows = zip(*self.waiting, strict=True)
+        self._put(layout.STEP, np.array(steps))
+        self._put(layout.TIME, np.array(steps) * self.time_step)
+        for name, values in zip(MOTION, np.stack(motions, axis=1), strict=True):
+            self._put(f"{layout.BLOCKS}/{name}", values)
+        for name, values in zip(MEASURED, np.stack(rows, axis=1), strict=True):
+            self._put(f"{layout.OBSERVABLES}/{name}", values)
+        self.count += len(self.waiting)
+        self.waiting.clear()
+
+    def _put(self, name: str, values: NDArray[Any]) -> None:
+        data_set = self.file[name]
+        data_set.resize(self.count + len(values), axis=0)
+        data_set[self.count :] = values
+
+    @contextmanager
+    def _telling_trouble(self) -> Iterator[None]:
+        """Turn what HDF5 raises into one line; nothing more is written then."""
+        try:
+            yield
+        except (OSError, RuntimeError) as error:
+            self.is_broken = True
+            number = getattr(error, "errno", None)
+            reason = os.strerror(number) if number else str(error)
+            message = f"{self.path}: cannot be written: {reason}"
+            raise OutputError(message) from error
+
+    def close(self) -> None:
+        """Commit and close the file normally. Raises OutputError, unless trouble was told already."""
+        if self.is_broken:
+            with contextlib.suppress(OSError, RuntimeError):
+                self.file.close()
+            return
+        self.commit()
+        with self._telling_trouble():
+            self.file.close()
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the file, whatever happened."""
+        self.close()
