@@ -60,6 +60,7 @@ def _tables(description: Description) -> list[list[str]]:
 
 def _cost(description: Description) -> list[str]:
     return [
+        f"boundary   {description.particles} particles (the surface model needs only the corners among them)",
         f"time step  {description.step:.3e} s, at most {description.steps} steps",
         f"solving    at most about {description.seconds:.1f} s on one core",
         f"results    at most {description.frames} frames, about {description.bytes / MEGA:.1f} MB",

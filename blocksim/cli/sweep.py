@@ -102,8 +102,9 @@ def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
     answer("\n".join(table_lines(heads, [row[:fitting] for row in rows], left=0)))
     if quiet:
         return
-    if fitting < len(names) or len(table) > len(rows):
-        note(f"... and {len(table) - len(rows)} more rows, {len(names) - fitting} more columns in {TABLE}")
+    left_out = {"rows": len(table) - len(rows), "columns": len(names) - fitting}
+    if any(left_out.values()):
+        note(f"{TABLE} has " + " and ".join(f"{count} more {what}" for what, count in left_out.items() if count))
     if result.share_inside is not None:
         note(f"{result.share_inside:.0%} of {len(table)} cases are inside all measured ranges")
     if result.failed:

@@ -5,11 +5,12 @@ old physics would run silently. Here the cache folder is named by a hash of *all
 and numpy versions, so any edit of any kernel file starts an empty cache.
 """
 
+import contextlib
 import functools
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -47,23 +48,28 @@ def cache_root() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "blocksim"
 
 
-def _is_writable(folder: Path) -> bool:
+def _is_usable(folder: Path) -> bool:
+    """Tell whether files can be kept there, and only by this user: cached code is executed."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         with tempfile.TemporaryFile(dir=folder):
-            return True
+            return not hasattr(os, "getuid") or folder.stat().st_uid == os.getuid()
     except OSError:
         return False
 
 
+def _cache_roots() -> Iterator[Path]:
+    yield cache_root()
+    with contextlib.suppress(OSError):  # there may be no folder for temporary files either
+        yield Path(tempfile.gettempdir()) / f"blocksim-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
+
+
 @functools.cache
 def cache_folder() -> Path | None:
-    """Return the cache folder of this exact source, or None where nothing can be written."""
-    own_temporary = Path(tempfile.gettempdir()) / f"blocksim-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
-    for root in (cache_root(), own_temporary):
-        folder = root / source_hash()
-        if _is_writable(folder):
-            return folder
+    """Return the cache folder of this exact source, or None where nothing can be kept."""
+    for root in _cache_roots():
+        if _is_usable(root) and _is_usable(root / source_hash()):
+            return root / source_hash()
     return None
 
 

@@ -1,9 +1,11 @@
 """What a scenario comes to before it runs: masses, pair parameters, step, cost and size of the results."""
 
+from collections import Counter
 from dataclasses import dataclass
 
 from blocksim.kernels.arrays import World
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.world.boundary import boundary_particles
 from blocksim.world.build import build_world
 from blocksim.world.interactions import ContactClass, contact_classes
 
@@ -38,6 +40,7 @@ class Description:
     frames: int  # at most
     seconds: float  # estimated time of solving, at most
     bytes: int  # estimated size of run.h5, at most
+    particles: int  # on all boundaries, corners included
 
 
 def describe(scenario: Scenario) -> Description:
@@ -55,7 +58,14 @@ def describe(scenario: Scenario) -> Description:
         frames=frames,
         seconds=steps * len(placed) * SECONDS_PER_BODY_AND_STEP,
         bytes=frames * (FRAME_BYTES + BODY_FRAME_BYTES * len(placed)),
+        particles=_particles(scenario, placed),
     )
+
+
+def _particles(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> int:
+    spacing = scenario.contact.particle_spacing
+    sizes = Counter((body.size_x, body.size_y) for body in placed)
+    return sum(count * boundary_particles(*size, spacing).x.size for size, count in sizes.items())
 
 
 def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> tuple[PairDescription, ...]:

@@ -112,7 +112,7 @@ def test_many_rows_and_columns_are_cut_and_counted(blocksim: Command) -> None:
     lines = answer.out.splitlines()
     assert len(lines) == 2 + 40
     assert max(map(len, lines)) <= 80
-    assert "... and 2 more rows, 3 more columns in sweep.csv" in answer.err
+    assert "sweep.csv has 2 more rows and 3 more columns" in answer.err
 
 
 def test_short_keys_are_the_shortest_ends_that_differ() -> None:
