@@ -40,11 +40,7 @@ run: $(RUN_STAMP) ## Let the three blocks collapse and compare with the measurem
 
 .PHONY: test
 test: $(DEV_STAMP) ## Run the tests (sets up .venv first)
-	$(VENV_PYTHON) -m pytest -m "not long"
-
-.PHONY: test-long
-test-long: $(DEV_STAMP) ## Run the tests that take long
-	$(VENV_PYTHON) -m pytest -m long
+	$(VENV_PYTHON) -m pytest
 
 .PHONY: smoke
 smoke: $(RUN_STAMP) ## Short run, 2 x 2 sweep and compare, for your CI: does this installation work?

@@ -31,7 +31,7 @@ def check_command(
         description = describe(ready)
     check_experiment(ready)
     if as_json:
-        print_json({"scenario": ready.model_dump(mode="json"), **_data(description)})
+        print_json({"scenario": ready.model_dump(mode="json", by_alias=True), **_data(description)})
     elif not quiet:
         answer(scenario_to_toml(ready))
         answer("\n\n".join("\n".join(lines) for lines in _tables(description)))

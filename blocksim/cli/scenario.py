@@ -7,14 +7,14 @@ from pathlib import Path
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.findings import Finding
-from blocksim.world.build import StepTooLargeError
+from blocksim.world.build import StepError
 
 
 @contextmanager
 def read_scenario(path: Path, settings: Sequence[str]) -> Iterator[Scenario]:
-    """Give the validated scenario; a step that turns out to be too large is shown where it was written."""
+    """Give the validated scenario; a step that turns out not to fit is shown where it was written."""
     document = Document.read(path).with_settings(settings)
     try:
         yield document.build()
-    except StepTooLargeError as error:
+    except StepError as error:
         raise ScenarioError([document.problem(Finding(("time", "step"), str(error)))]) from None

@@ -1,6 +1,7 @@
 """blocksim sweep: many runs of one scenario."""
 
 import math
+from collections.abc import Iterable
 from enum import StrEnum
 from typing import Annotated
 
@@ -95,22 +96,33 @@ def shown(value: object) -> str:
 
 def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
     table = result.table
-    names = [name for name in table.columns if name not in NOT_SHOWN and not name.endswith("rotation_deg")]
+    told = [name for name in table.columns if name not in NOT_SHOWN and not name.endswith("rotation_deg")]
+    names = [name for name in told if name in short or name == "inside" or _varies(table[name])]
     rows = [[shown(value) for value in row] for row in table[names].head(MOST_ROWS).itertuples(index=False)]
     fitting = _fitting([short.get(name, name) for name in names], rows)
     heads = [short.get(name, name) for name in names[:fitting]]
     answer("\n".join(table_lines(heads, [row[:fitting] for row in rows], left=0)))
     if quiet:
         return
-    left_out = {"rows": len(table) - len(rows), "columns": len(names) - fitting}
+    left_out = {
+        "more rows": len(table) - len(rows),
+        "more columns": len(names) - fitting,
+        "columns that do not vary": len(told) - len(names),
+    }
     if any(left_out.values()):
-        note(f"{TABLE} has " + " and ".join(f"{count} more {what}" for what, count in left_out.items() if count))
+        note(f"{TABLE} has " + ", ".join(f"{count} {what}" for what, count in left_out.items() if count))
     if result.share_inside is not None:
         note(f"{result.share_inside:.0%} of {len(table)} cases are inside all measured ranges")
     if result.failed:
         first = table[table["status"] != FINISHED]["reason"].iloc[0]
         note(f"{result.failed} of {len(table)} cases did not finish; the first: {first}")
     note(f"table: {result.folder / TABLE}")
+
+
+def _varies(values: Iterable[object]) -> bool:
+    """Tell whether a column says anything: all finished, or a block that stays where it is, does not."""
+    told = [f"{value:.2f}" if isinstance(value, float) else str(value) for value in values]
+    return len(told) == 1 or len(set(told)) > 1
 
 
 def _fitting(heads: list[str], rows: list[list[str]]) -> int:

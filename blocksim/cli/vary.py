@@ -16,8 +16,12 @@ def with_vary(document: Document, texts: Sequence[str], mode: str | None) -> Doc
     Raises ScenarioError where a text is neither; wrong keys and values show when the document is built.
     """
     problems = [Problem(f"--vary {text}", "write KEY=a,b,c or KEY=from:to:count") for text in texts if not _parts(text)]
+    keys = [key for text in texts for key, _ in _parts(text)]
+    problems += [
+        Problem(f"--vary {key}", "given twice; list all its values once") for key in keys if keys.count(key) > 1
+    ]
     if problems:
-        raise ScenarioError(problems)
+        raise ScenarioError(list(dict.fromkeys(problems)))
     split = {key: (text, values) for text in texts for key, values in _parts(text)}
     vary = {key: _values(values) for key, (_, values) in split.items()}
     return with_sweep(document, vary, mode, {key: text for key, (text, _) in split.items()})

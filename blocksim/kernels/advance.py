@@ -2,7 +2,7 @@
 
 import math
 
-from blocksim.kernels.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL, REACHED, Records, World
+from blocksim.kernels.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL, REACHED, Record, Records, World
 from blocksim.kernels.broad_phase import rebuild_pairs
 from blocksim.kernels.contact import pair_forces
 from blocksim.kernels.energy import has_excessive_overlap
@@ -52,6 +52,17 @@ def fastest_point(bodies: Records) -> float:
 
 
 @rare_kernel
+def is_supported(bodies: Records, controls: Record) -> bool:
+    """Tell whether every free body touches something, where there is gravity: at the top of its flight none rests."""
+    if controls.gravity_x == 0.0 and controls.gravity_y == 0.0:
+        return True
+    for i in range(bodies.size - 1):
+        if bodies[i].inverse_mass > 0.0 and bodies[i].pairs_before == 0:
+            return False
+    return True
+
+
+@rare_kernel
 def check(world: World) -> int:
     """Look whether the run may go on: finite, overlap below its limit, not at rest for the hold time."""
     controls = world.controls[0]
@@ -64,7 +75,8 @@ def check(world: World) -> int:
         return NOT_FINITE
     if has_excessive_overlap(world):
         return OVERLAP_LIMIT
-    clock.checks_at_rest = clock.checks_at_rest + 1 if fastest < controls.rest_speed else 0
+    rests = fastest < controls.rest_speed and is_supported(world.bodies, controls)
+    clock.checks_at_rest = clock.checks_at_rest + 1 if rests else 0
     return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
 
 

@@ -57,7 +57,7 @@ def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
     place = prefix.partition(",")[0]
     note = prefix.partition(", ")[2]
     for name, info in model.model_fields.items():
-        if name == "kind" or (_is_table(info) and model not in {Friction, Sweep}):
+        if name == "kind" or (_is_table(info) and model not in {Friction, Sweep} and name != "provenance"):
             continue
         key = f"{place}.{info.alias or name}" if place else (info.alias or name)
         if model is Sweep and name == "vary":

@@ -3,7 +3,17 @@
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.loop import Progress, Watcher
 from blocksim.simulation.result import Result, read_result
-from blocksim.simulation.simulate import simulate, simulate_into
+from blocksim.simulation.simulate import renew_copies, simulate, simulate_into
 from blocksim.simulation.summary import Summary
 
-__all__ = ["Frames", "Progress", "Result", "Summary", "Watcher", "read_result", "simulate", "simulate_into"]
+__all__ = [
+    "Frames",
+    "Progress",
+    "Result",
+    "Summary",
+    "Watcher",
+    "read_result",
+    "renew_copies",
+    "simulate",
+    "simulate_into",
+]

@@ -17,7 +17,7 @@ from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.result import Result
 from blocksim.simulation.stopping import stop_requests
 from blocksim.simulation.stores.hdf5_writer import FrameFile
-from blocksim.simulation.summary import Summary
+from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import final_table
 from blocksim.world.build import build_world
 
@@ -58,6 +58,25 @@ def simulate_into(
             recorder = Recorder(placed, scenario.output.every, step, sink)
             ended = run_loop(world, recorder, scenario.time.end, on_progress=on_progress, is_stopped=is_stopped)
         return _keep_result(_result(scenario, recorder, ended, began), folder)
+
+
+def renew_copies(scenario: Scenario, folder: Path) -> None:
+    """Bring the resolved scenario and the experiment table in a finished run's folder up to date.
+
+    Neither decides the motion, so both may have changed since the run: another table, or another description.
+    """
+    measured = _experiment_bytes(scenario)
+    old = tuple(_bytes_of(folder / name) for name in (files.SCENARIO, files.EXPERIMENT))
+    if measured is None:
+        (folder / files.EXPERIMENT).unlink(missing_ok=True)
+    _keep_scenario(scenario, measured, folder)
+    if old != tuple(_bytes_of(folder / name) for name in (files.SCENARIO, files.EXPERIMENT)):
+        summary = _with_checksums(read_summary(folder / files.SUMMARY), folder)
+        write_text(folder / files.SUMMARY, summary.to_json())
+
+
+def _bytes_of(path: Path) -> bytes | None:
+    return path.read_bytes() if path.is_file() else None
 
 
 def _experiment_bytes(scenario: Scenario) -> bytes | None:
@@ -117,10 +136,14 @@ def _warnings(ended: LoopResult) -> tuple[str, ...]:
     return (f"energy is off by {residual:.1e} of the energy in play, more than {RESIDUAL_PROMISE:g}",)
 
 
+def _with_checksums(summary: Summary, folder: Path) -> Summary:
+    kept = [name for name in (files.SCENARIO, files.EXPERIMENT, files.FINAL, files.FRAMES) if (folder / name).is_file()]
+    return summary.model_copy(update={"sha256": {name: sha256_of(folder / name) for name in kept}})
+
+
 def _keep_result(result: Result, folder: Path) -> Result:
     write_text(folder / files.FINAL, result.final.to_csv(index=False, lineterminator="\n"))
-    kept = [name for name in (files.SCENARIO, files.EXPERIMENT, files.FINAL, files.FRAMES) if (folder / name).is_file()]
-    summary = result.summary.model_copy(update={"sha256": {name: sha256_of(folder / name) for name in kept}})
+    summary = _with_checksums(result.summary, folder)
     write_text(folder / files.SUMMARY, summary.to_json())
     if result.status == "finished":
         write_text(folder / files.DONE, json.dumps({"run": summary.run, "status": summary.status}) + "\n")

@@ -10,6 +10,7 @@ import shutil
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from multiprocessing import current_process
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +82,10 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     says. Cases that fail get a row with their status; the others go on. Raises ScenarioError for a bad scenario,
     InvalidInputError where nothing is varied, OutputExistsError where the folder is not free, StoppedEarlyError on
     Ctrl-C.
+
+    A script that calls it needs the guard `if __name__ == "__main__":`, as the processes import the script.
     """
+    _refuse_in_worker()
     document = with_sweep(scenario if isinstance(scenario, Document) else Document.read(scenario), vary, mode)
     base = document.build()
     if base.sweep is None:
@@ -94,6 +98,13 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     _prepare(folder, base, name, overwrite=overwrite)
     compile_kernels()
     return _run_cases(folder, cases, jobs or os.cpu_count() or 1, on_row)
+
+
+def _refuse_in_worker() -> None:
+    """Stop a worker process that runs the user's script again because the script has no main guard."""
+    if getattr(current_process(), "_inheriting", False):
+        message = 'sweep() starts processes that import this script: call it below if __name__ == "__main__":'
+        raise InvalidInputError(message)
 
 
 def sweep_hash(base: Scenario, plan: Sweep) -> str:

@@ -9,7 +9,7 @@ from blocksim.analysis.compare import Comparison, compare_final
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, place_bodies
-from blocksim.simulation import Progress, Result, Watcher, read_result, simulate, simulate_into
+from blocksim.simulation import Progress, Result, Watcher, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation import folder as files
 from blocksim.simulation.summary import read_summary
 from blocksim.simulation.table import COLUMNS, read_table
@@ -41,6 +41,7 @@ def run(
         return simulate(scenario, on_progress=on_progress)
     folder = Path(out)
     if not overwrite and files.holds_run(folder, scenario):
+        renew_copies(scenario, folder)
         return read_result(folder)
     return simulate_into(scenario, folder, overwrite=overwrite, on_progress=on_progress)
 
@@ -67,7 +68,8 @@ def compare(run: Result | pd.DataFrame | Path | str, experiment: Path | str | No
     folder = find_run(run)
     summary = read_summary(folder / files.SUMMARY)
     _refuse_unfinished(str(folder), summary.status, summary.reason)
-    named = load_scenario(folder / files.SCENARIO).experiment
+    # a scenario file may name another table by now than it did when it was run
+    named = load_scenario(run if Path(run).is_file() else folder / files.SCENARIO).experiment
     return compare_final(read_table(folder / files.FINAL), _table(experiment, named.table if named else None))
 
 
@@ -81,7 +83,8 @@ def _table(given: Path | str | None, named: Path | None) -> ExperimentTable:
 
 def _refuse_unfinished(name: str, status: str, reason: str) -> None:
     if status != FINISHED:
-        message = f"{name}: this run has {status} ({reason}); only a finished run can be compared"
+        verb = "was" if status == "interrupted" else "has"
+        message = f"{name}: this run {verb} {status} ({reason}); only a finished run can be compared"
         raise InvalidInputError(message)
 
 

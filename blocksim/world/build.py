@@ -30,9 +30,14 @@ from blocksim.world.stable_step import ContactBody, ContactStiffness, stable_ste
 CHECK_INTERVAL = 1e-4  # s of simulated time between looks at rest, overlap and finiteness
 SKIN_SHARE = 0.05  # of the smallest side
 PAIRS_PER_BODY = 8
+MOST_STEPS = 2**53  # beyond that a step number is no exact float
 
 
-class StepTooLargeError(InvalidInputError):
+class StepError(InvalidInputError):
+    """The time step of a scenario cannot be taken."""
+
+
+class StepTooLargeError(StepError):
     """A step given by hand exceeds the admissible one and is not forced; `limit` in s."""
 
     def __init__(self, step: float, limit: float) -> None:
@@ -109,15 +114,25 @@ def admissible_step(bodies: Records, table: Records, safety: float) -> float:
     return stable_step([*grounded, *paired], safety)
 
 
+class UncountableStepsError(StepError):
+    """Step and end do not go together: more steps than can be counted, or none of any length."""
+
+    def __init__(self, end: float, step: float) -> None:
+        """Say both."""
+        super().__init__(f"{end:.4g} s cannot be divided into steps of {step:.4g} s")
+
+
 def choose_step(scenario: Scenario, bodies: Records, table: Records) -> float:
     """Return the step (s) the run will take; raises StepTooLargeError."""
-    limit = min(admissible_step(bodies, table, scenario.time.safety), scenario.time.end)
+    with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused below
+        limit = min(admissible_step(bodies, table, scenario.time.safety), scenario.time.end)
     asked = scenario.time.step
-    if asked == "auto":
-        return limit
-    if asked > limit and not scenario.time.force_step:
-        raise StepTooLargeError(asked, limit)
-    return asked
+    step = limit if asked == "auto" else asked
+    if not 0.0 < step < math.inf or scenario.time.end / step > MOST_STEPS:
+        raise UncountableStepsError(scenario.time.end, step)
+    if step > limit and not scenario.time.force_step:
+        raise StepTooLargeError(step, limit)
+    return step
 
 
 def _bodies(placed: tuple[PlacedBody, ...], classes: tuple[ContactClass, ...]) -> Records:
@@ -163,7 +178,8 @@ def _controls(scenario: Scenario, bodies: Records, step: float) -> Records:
     record.max_overlap = 0.0 if given_limit is None else given_limit
     record.rest_speed = scenario.time.rest_speed
     record.law = LAW_CODES[scenario.contact.law]
-    record.check_every = max(1, round(CHECK_INTERVAL / step))
+    record.check_every = min(max(1, round(CHECK_INTERVAL / step)), MOST_STEPS)
     if scenario.time.stop_at_rest:
-        record.rest_checks = max(1, math.ceil(scenario.time.rest_hold / (record.check_every * step)))
+        checks = scenario.time.rest_hold / (record.check_every * step)
+        record.rest_checks = max(1, math.ceil(min(checks, MOST_STEPS)))
     return controls

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from blocksim.kernels.arrays import World
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
-from blocksim.world.boundary import boundary_particles
+from blocksim.world.boundary import particle_count
 from blocksim.world.build import build_world
 from blocksim.world.interactions import ContactClass, contact_classes
 
@@ -65,7 +65,7 @@ def describe(scenario: Scenario) -> Description:
 def _particles(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> int:
     spacing = scenario.contact.particle_spacing
     sizes = Counter((body.size_x, body.size_y) for body in placed)
-    return sum(count * boundary_particles(*size, spacing).x.size for size, count in sizes.items())
+    return sum(count * particle_count(*size, spacing) for size, count in sizes.items())
 
 
 def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> tuple[PairDescription, ...]:

@@ -107,11 +107,56 @@ def test_experiment_of_other_blocks_is_told_before_the_run(blocksim: Command, tm
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("name", ["run.json", "final.csv", "run.h5", "scenario.toml"])
+def test_damaged_copy_of_the_scenario_is_written_anew(blocksim: Command, copied: Path) -> None:
+    whole = (copied / "scenario.toml").read_text()
+    (copied / "scenario.toml").write_text("rubbish")
+    assert blocksim(*RUN, "--out", copied).code == 0
+    assert (copied / "scenario.toml").read_text() == whole
+
+
+@pytest.mark.parametrize("name", ["run.json", "final.csv", "run.h5"])
 def test_damaged_finished_run_is_told_and_can_be_repeated(blocksim: Command, copied: Path, name: str) -> None:
     (copied / name).write_text("rubbish")
     answer = blocksim(*RUN, "--out", copied)
     assert answer.code == 65
     assert name in answer.err
-    if name != "scenario.toml":
-        assert blocksim(*RUN, "--out", copied, "--overwrite").code == 0
+    assert blocksim(*RUN, "--out", copied, "--overwrite").code == 0
+
+
+def test_changed_experiment_table_is_judged_by_and_kept_without_running_again(
+    blocksim: Command, tmp_path: Path
+) -> None:
+    shutil.copytree(SCENARIOS, tmp_path / "mine")
+    table = tmp_path / "mine" / "experiments" / "three_blocks.csv"
+    mine = ("run", "mine/three_blocks_nominal.toml", *SOFT)
+    assert "67.0" in blocksim(*mine, "--out", "out").out
+    table.write_text(table.read_text().replace("2,x,mm,1,71.69", "2,x,mm,1,60.00"))
+    again = blocksim(*mine, "--out", "out")
+    assert "[60.00, 78.53]" in again.out
+    assert (tmp_path / "out" / "experiment.csv").read_bytes() == table.read_bytes()
+    assert "[60.00, 78.53]" in blocksim("compare", "out").out
+
+
+def test_experiment_taken_out_of_the_scenario_is_compared_no_more(blocksim: Command, tmp_path: Path) -> None:
+    shutil.copytree(SCENARIOS, tmp_path / "mine")
+    scenario = tmp_path / "mine" / "three_blocks_nominal.toml"
+    mine = ("run", "mine/three_blocks_nominal.toml", *SOFT, "--out", "out")
+    assert "verdict" in blocksim(*mine).out
+    scenario.write_text(scenario.read_text().partition("[experiment]")[0])
+    assert "verdict" not in blocksim(*mine).out
+    assert not (tmp_path / "out" / "experiment.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "setting",
+    ["time.end=1e308", "time.step=1e-30", "contact.stiffness_scale=1e300", "time.safety=1e-30"],
+)
+def test_steps_that_cannot_be_counted_are_told(blocksim: Command, setting: str) -> None:
+    answer = blocksim("check", "scenarios/three_blocks.toml", "--set", setting)
+    assert answer.code == 65
+    assert "cannot be divided into steps" in answer.err
+
+
+@pytest.mark.parametrize("setting", ["time.rest_hold=1e30", "time.end=1e-300", 'contact.particle_spacing="1 nm"'])
+def test_extreme_but_meaningful_values_are_valid(blocksim: Command, setting: str) -> None:
+    assert blocksim("check", "scenarios/three_blocks.toml", "--set", setting).code == 0

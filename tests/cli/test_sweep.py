@@ -30,7 +30,8 @@ def test_grid_from_the_command_line(blocksim: Command) -> None:
         ("0.3", "0.3"),
     ]
     lines = answer.out.splitlines()
-    assert lines[0].startswith("block_block.kinetic  block_ground.kinetic    status  inside")
+    assert lines[0].startswith("block_block.kinetic  block_ground.kinetic  inside   2.x_mm   3.x_mm")
+    assert "sweep.csv has 2 columns that do not vary" in answer.err
     assert max(map(len, lines)) <= 80
     assert "4/4 finished: block_block.kinetic = 0.3, block_ground.kinetic = 0.3" in answer.err
     assert answer.err.splitlines()[-1] == "table: out/sweep.csv"
@@ -112,7 +113,7 @@ def test_many_rows_and_columns_are_cut_and_counted(blocksim: Command) -> None:
     lines = answer.out.splitlines()
     assert len(lines) == 2 + 40
     assert max(map(len, lines)) <= 80
-    assert "sweep.csv has 2 more rows and 3 more columns" in answer.err
+    assert "sweep.csv has 2 more rows, 11 columns that do not vary" in answer.err
 
 
 def test_short_keys_are_the_shortest_ends_that_differ() -> None:
@@ -126,3 +127,9 @@ def test_short_keys_are_the_shortest_ends_that_differ() -> None:
         "stiffness_scale",
         "end",
     ]
+
+
+def test_key_given_twice_is_told(blocksim: Command) -> None:
+    answer = blocksim(*SHORT, "--vary", "gravity=1,2", "--vary", "gravity=3,4")
+    assert answer.code == 65
+    assert answer.err == "--vary gravity: given twice; list all its values once\n"

@@ -1,9 +1,11 @@
 """The loop is heard between outputs too, and stops where it should."""
 
+from pathlib import Path
+
 import pytest
 
-from blocksim.scenario import place_bodies
-from blocksim.simulation import loop
+from blocksim.scenario import load_scenario, place_bodies
+from blocksim.simulation import loop, simulate
 from blocksim.simulation.recorder import Recorder
 from blocksim.world.build import build_world
 from tests.simulation.conftest import Shipped
@@ -42,3 +44,9 @@ def test_loss_of_energy_fails_a_run(soft: Shipped, monkeypatch: pytest.MonkeyPat
     recorder = Recorder(place_bodies(scenario), 1e-2, float(world.controls[0].step))
     ended = loop.run_loop(world, recorder, 0.25)
     assert (ended.outcome.status, ended.outcome.exit_code) == ("failed", 76)
+
+
+def test_body_that_hangs_in_the_air_does_not_rest_however_slowly_it_falls() -> None:
+    shipped = Path(__file__).parents[2] / "scenarios" / "bounce.toml"
+    slow = {"gravity": 0.001, "time.stop_at_rest": True, "time.end": 0.08, "contact.stiffness_scale": 0.001}
+    assert simulate(load_scenario(shipped, slow)).reason == "end of simulated time"

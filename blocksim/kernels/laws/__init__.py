@@ -1,7 +1,7 @@
 """Contact laws and the one place that knows them all.
 
-A law is one file with `elastic_force(stiffness, depth)` and `tangent_stiffness(stiffness, depth)` and
-`stored_energy(stiffness, depth)`, one code here and one line in each dispatcher below. Dispatch on an integer code
+A law is one file with `elastic_force(stiffness, depth)`, `tangent_stiffness(stiffness, depth)` and
+`stored_energy(stiffness, depth)`, one code here and one branch in each dispatcher below. Dispatch on an integer code
 keeps numba's disk cache valid, which jitted functions passed as arguments do not.
 """
 
