@@ -22,6 +22,7 @@ Records = np.recarray[Any, np.dtype[np.record]]
 Record = Any  # one element of Records: a pointer in compiled code, numpy.record without the compiler
 
 SLOTS = 8
+HALF = SLOTS // 2  # slots of each body's corners
 CACHE_LINE = 64  # bytes
 NO_FACE = -1
 

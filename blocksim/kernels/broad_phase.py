@@ -1,6 +1,6 @@
 """Candidate pairs: rebuilt when a body has used up its part of the skin, contact history carried over."""
 
-from blocksim.kernels.arrays import NO_FACE, NORMAL, SHEAR, SLOTS, Record, World
+from blocksim.kernels.arrays import HALF, NO_FACE, NORMAL, SHEAR, SLOTS, Record, World
 from blocksim.kernels.geometry import ground_gap, separation
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.surface import corner_signs, lies_near
@@ -44,13 +44,13 @@ def add_pair(world: World, count: int, a: int, b: int) -> int:
     reach = world.controls[0].skin
     fits = count < world.spare_pairs.size
     corners = 0
-    for k in range(SLOTS if b != ground else SLOTS // 2):
+    for k in range(SLOTS if b != ground else HALF):
         if b == ground:
             near = corner_height(bodies[a], k) <= reach
-        elif k < SLOTS // 2:
+        elif k < HALF:
             near = lies_near(bodies[a], bodies[b], k, reach)
         else:
-            near = lies_near(bodies[b], bodies[a], k - SLOTS // 2, reach)
+            near = lies_near(bodies[b], bodies[a], k - HALF, reach)
         if near:
             if fits:
                 world.spare_candidates[count, corners] = k

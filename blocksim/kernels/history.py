@@ -5,14 +5,12 @@ what its springs hold is then lost and booked. Where two corners pass one anothe
 the contact itself goes on under another corner, and its history goes with it.
 """
 
-from blocksim.kernels.arrays import NO_FACE, NORMAL, SHEAR, SLOTS, Record, Records, World
+from blocksim.kernels.arrays import HALF, NO_FACE, NORMAL, SHEAR, SLOTS, Record, Records, World
 from blocksim.kernels.broad_phase import clear_slot
 from blocksim.kernels.geometry import to_world
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.kinematics import resolve_point, weigh_first_step
 from blocksim.kernels.surface import PARALLEL, corner_signs, face_normal
-
-HALF = SLOTS // 2
 
 
 @rare_kernel
@@ -70,16 +68,12 @@ def release_ended(world: World, p: int, count: int, step: float) -> None:
 
 
 @rare_kernel
-def take_over(point: Record, new: Record, old: Record) -> None:
-    """Give the history of a slot to the corner that takes its place."""
-    new.face = point.face
-    new.spring = old.spring
-    new.depth = old.depth
-    new.normal_force = old.normal_force
-    new.shear_force = old.shear_force
-    new.normal_loss = old.normal_loss
-    new.shear_loss = old.shear_loss
+def take_over(point: Record, slots: Records, k: int) -> None:
+    """Give the history of slot k of a pair to the corner that takes its place."""
+    old = slots[k]
     point.before = old.normal_force
+    slots[point.slot] = old
+    slots[point.slot].face = point.face
     clear_slot(old)
 
 
@@ -98,7 +92,7 @@ def hand_over(world: World, p: int, count: int) -> None:
             if is_late and old.face != NO_FACE and not goes_on(k, old.face, world.points, count):
                 nx, ny = slot_normal(k, old.face, a, b, pair.b == world.bodies.size - 1)
                 if nx * point.nx + ny * point.ny > PARALLEL:
-                    take_over(point, new, old)
+                    take_over(point, world.slots[p], k)
 
 
 @rare_kernel

@@ -52,28 +52,35 @@ def weigh_first_step(point: Record) -> None:
 
 
 @rare_kernel
+def mutual_mass(one: Record, two: Record, a: Record, b: Record, arms_a: float, arms_b: float) -> float:
+    """Return the inverse mass (1/kg) J M^-1 J^T that two points see of one another.
+
+    `arms_a` and `arms_b` are the products (m2) of both points' lever arms about either body. Tangents enclose the angle
+    of the normals, so that one formula serves both directions.
+    """
+    translation = (one.nx * two.nx + one.ny * two.ny) * (a.inverse_mass + b.inverse_mass)
+    return translation + arms_a * a.inverse_inertia + arms_b * b.inverse_inertia
+
+
+@rare_kernel
 def normal_masses(points: Records, count: int, a: Record, b: Record, out: Floats) -> None:
-    """Write the inverse masses (1/kg) J M^-1 J^T that the points see of one another along their normals."""
-    inverse_mass = a.inverse_mass + b.inverse_mass
+    """Write the inverse masses (1/kg) that the points see of one another along their normals."""
     for i in range(count):
         one = points[i]
         for j in range(i + 1):
             two = points[j]
-            translation = (one.nx * two.nx + one.ny * two.ny) * inverse_mass
-            rotation_a = one.normal_arm_a * two.normal_arm_a * a.inverse_inertia
-            out[i, j] = translation + rotation_a + one.normal_arm_b * two.normal_arm_b * b.inverse_inertia
-            out[j, i] = out[i, j]
+            arms_a = one.normal_arm_a * two.normal_arm_a
+            arms_b = one.normal_arm_b * two.normal_arm_b
+            out[i, j] = out[j, i] = mutual_mass(one, two, a, b, arms_a, arms_b)
 
 
 @rare_kernel
 def shear_masses(points: Records, count: int, a: Record, b: Record, out: Floats) -> None:
-    """Write the inverse masses (1/kg) that the points see along their tangents, which enclose the normals' angles."""
-    inverse_mass = a.inverse_mass + b.inverse_mass
+    """Write the inverse masses (1/kg) that the points see of one another along their tangents."""
     for i in range(count):
         one = points[i]
         for j in range(i + 1):
             two = points[j]
-            translation = (one.nx * two.nx + one.ny * two.ny) * inverse_mass
-            rotation_a = one.shear_arm_a * two.shear_arm_a * a.inverse_inertia
-            out[i, j] = translation + rotation_a + one.shear_arm_b * two.shear_arm_b * b.inverse_inertia
-            out[j, i] = out[i, j]
+            arms_a = one.shear_arm_a * two.shear_arm_a
+            arms_b = one.shear_arm_b * two.shear_arm_b
+            out[i, j] = out[j, i] = mutual_mass(one, two, a, b, arms_a, arms_b)

@@ -2,7 +2,7 @@
 
 import math
 
-from blocksim.kernels.arrays import NO_FACE, SLOTS, Integers, Record, Records
+from blocksim.kernels.arrays import HALF, NO_FACE, Integers, Record, Records
 from blocksim.kernels.geometry import relative_pose, to_world
 from blocksim.kernels.jit import kernel, rare_kernel
 
@@ -144,7 +144,7 @@ def same_end(of_a: Record, of_b: Record, a: Record, b: Record) -> bool:
     if of_a.nx * of_b.nx + of_a.ny * of_b.ny < PARALLEL:
         return False
     end_a = outward_along(a, of_a.slot, -of_a.ny, of_a.nx)
-    end_b = outward_along(b, of_b.slot - SLOTS // 2, -of_a.ny, of_a.nx)
+    end_b = outward_along(b, of_b.slot - HALF, -of_a.ny, of_a.nx)
     return end_a * end_b > 0.0
 
 
@@ -184,16 +184,7 @@ def keeps_first(one: Record, two: Record, slots: Records, oblique: bool) -> bool
 def drop_point(points: Records, gone: int, count: int) -> int:
     """Remove one point, keep the order of the others, return the new count."""
     for i in range(gone, count - 1):
-        target = points[i]
-        source = points[i + 1]
-        target.slot = source.slot
-        target.face = source.face
-        target.x = source.x
-        target.y = source.y
-        target.nx = source.nx
-        target.ny = source.ny
-        target.depth = source.depth
-        target.beside = source.beside
+        points[i] = points[i + 1]
     return count - 1
 
 
@@ -206,9 +197,9 @@ def drop_twins(a: Record, b: Record, slots: Records, points: Records, count: int
     """
     oblique = is_oblique(a, b)
     i = 0
-    while i < count and points[i].slot < SLOTS // 2:
+    while i < count and points[i].slot < HALF:
         for j in range(i + 1, count):
-            if points[j].slot >= SLOTS // 2 and (
+            if points[j].slot >= HALF and (
                 coincide(points[i], points[j]) if oblique else same_end(points[i], points[j], a, b)
             ):
                 keep_i = keeps_first(points[i], points[j], slots, oblique)
@@ -226,14 +217,14 @@ def block_points(a: Record, b: Record, corners: int, candidates: Integers, slots
     count = 0
     of_a = 0
     for m in range(corners):
-        if candidates[m] < SLOTS // 2:
+        if candidates[m] < HALF:
             count = add_corner(a, b, candidates[m], x0, y0, c, s, points, count)
             of_a = count
         else:
             before = count
             xb = -c * x0 - s * y0
             yb = s * x0 - c * y0
-            count = add_corner(b, a, candidates[m] - SLOTS // 2, xb, yb, c, -s, points, count)
+            count = add_corner(b, a, candidates[m] - HALF, xb, yb, c, -s, points, count)
             if count > before:
                 point = points[before]
                 point.slot = candidates[m]

@@ -41,7 +41,8 @@ def test_history_that_is_taken_over_leaves_nothing_behind() -> None:
     for value, name in enumerate(REMEMBERED, start=1):
         slots[0][name] = float(value)
     slots[0].face, slots[1].face, point.face = 1, NO_FACE, 3
-    take_over(point, slots[1], slots[0])
+    point.slot = 1
+    take_over(point, slots, 0)
     assert [slots[1][name] for name in REMEMBERED] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
     assert not any(slots[0][name] for name in REMEMBERED)
     assert (slots[0].face, slots[1].face) == (NO_FACE, 3)
