@@ -9,6 +9,7 @@ import os
 import shutil
 import time
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from multiprocessing import current_process
 from pathlib import Path
@@ -158,8 +159,9 @@ def _run_cases(folder: Path, cases: list[Case], jobs: int, on_row: OnRow) -> Swe
                 rows.add(number, {"status": "invalid", "reason": case.problem, "seconds": 0.0})
             else:
                 tasks[place] = case.scenario
-        with interruptible():
-            for place, row in run_all(tasks, jobs):
+        # closed here and now: left to the garbage collector, a Ctrl-C in this loop would wait for the workers
+        with interruptible(), closing(run_all(tasks, jobs)) as ended:
+            for place, row in ended:
                 for number in numbers[place]:
                     rows.add(number, row)
     except KeyboardInterrupt:

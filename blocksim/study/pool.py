@@ -3,7 +3,7 @@
 import signal
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
@@ -28,7 +28,7 @@ INTERRUPTED = "interrupted"
 Row = dict[str, object]
 
 
-def run_all(tasks: Mapping[Path, Scenario], jobs: int) -> Iterator[tuple[Path, Row]]:
+def run_all(tasks: Mapping[Path, Scenario], jobs: int) -> Generator[tuple[Path, Row], None, None]:
     """Run every scenario into its folder; yield folder and row as they end. Raises KeyboardInterrupt on Ctrl-C."""
     workers = min(jobs, len(tasks))
     if workers <= 1:

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from multiprocessing import active_children
 from pathlib import Path
 
 import numpy as np
@@ -210,3 +211,14 @@ def test_rubbish_for_a_sweep_table_is_refused(tmp_path: Path, text: str) -> None
 def test_missing_sweep_table_is_told(tmp_path: Path) -> None:
     with pytest.raises(InputMissingError, match="no such file"):
         read_sweep(tmp_path)
+
+
+def test_interrupt_between_two_rows_ends_the_workers_at_once(tmp_path: Path) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    shipped = Path(__file__).parents[2] / "scenarios" / "three_blocks_nominal.toml"
+    endless = Document.read(shipped).with_settings(["contact.stiffness_scale=0.001", "time.stop_at_rest=false"])
+    with pytest.raises(StoppedEarlyError, match="1 of 3 cases done"):
+        sweep(endless, {"time.end": [0.001, 1e4, 2e4]}, out=tmp_path / "out", jobs=2, on_row=interrupt)
+    assert active_children() == []
