@@ -9,18 +9,7 @@ from blocksim.kernels.energy import has_excessive_overlap
 from blocksim.kernels.history import change_contacts
 from blocksim.kernels.integrate import accelerate_and_kick, kick_and_drift, kinetic_energy, renew_rotations
 from blocksim.kernels.jit import kernel, rare_kernel
-from blocksim.kernels.surface import block_points, ground_points
-
-
-@kernel
-def contact_points(world: World, p: int) -> int:
-    """Find the contact points of pair p and return how many there are."""
-    pair = world.pairs[p]
-    a = world.bodies[pair.a]
-    if pair.b == world.bodies.size - 1:
-        return ground_points(a, pair.corners, world.candidates[p], world.points)
-    b = world.bodies[pair.b]
-    return block_points(a, b, pair.corners, world.candidates[p], world.slots[p], world.points)
+from blocksim.kernels.models import contact_points
 
 
 @kernel

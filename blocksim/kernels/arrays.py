@@ -5,10 +5,16 @@ is the half-plane y < 0, and a tilted ground is tilted gravity. Everything is an
 contact slot lies together in memory, and a compiled function that takes a record takes one pointer).
 
 `n` bodies plus one record for the ground, the last: it never moves and has no inverse mass. `p` candidate pairs
-(capacity) with 8 contact slots each: slots 0-3 are the corners of body `a` against body `b`, slots 4-7 the corners of
-`b` against `a`. Corners count counter-clockwise from the lower left one of the unrotated rectangle; faces are 0: +x,
-1: +y, 2: -x, 3: -y of the body that is touched. The contact normal always points from `b` to `a` and the tangent is the
-normal turned by +90 degrees, whichever of the two owns the corner.
+(capacity) with `s` contact slots each; what a slot stands for is the contact model's own affair:
+
+    surface    s = 8; slots 0-3 are the corners of body `a` against body `b`, slots 4-7 the corners of `b` against `a`.
+               Corners count counter-clockwise from the lower left one of the unrotated rectangle; faces are 0: +x,
+               1: +y, 2: -x, 3: -y of the body that is touched
+    kernel     particles of `a` against `b`, then particles of `b` against `a`; the face of a contact is always 0
+    particles  4 i + (j mod 4) for particle i of `a` against particle j of `b`; the face of a contact is j
+
+The contact normal always points from `b` to `a` and the tangent is the normal turned by +90 degrees, whichever of the
+two owns the corner or particle.
 """
 
 from typing import Any, NamedTuple
@@ -21,10 +27,11 @@ Integers = NDArray[np.int64]
 Records = np.recarray[Any, np.dtype[np.record]]
 Record = Any  # one element of Records: a pointer in compiled code, numpy.record without the compiler
 
-SLOTS = 8
+SLOTS = 8  # of a pair in the surface model
 HALF = SLOTS // 2  # slots of each body's corners
 CACHE_LINE = 64  # bytes
 NO_FACE = -1
+ALL = 15  # bits of all four faces or corners
 
 # status codes that `advance` returns
 REACHED, AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL = range(5)
@@ -51,17 +58,30 @@ BODY = record_type(
     "mass inertia "  # kg, kg m2 about the centre, out of the plane: kept for fixed bodies too
     "list_x list_y list_angle",  # m, m, rad: where the body was when the pair list was made
     "contact_class "  # index into the interaction table; class 0 is the ground
-    "pairs_now pairs_before pairs_changed",  # pairs in contact in this evaluation and in the one before; flag
+    "pairs_now pairs_before pairs_changed "  # pairs in contact in this evaluation and in the one before; flag
+    "faces corners "  # bits of those that can touch; pieces of ground have their upper face and its free ends
+    "first_particle particle_count "  # its part of the particles
+    "row_x row_y",  # intervals between particles on the faces along x and along y
 )
-PAIR = record_type("", "a b corners active")  # bodies, sorted; number of candidate corners; of slots in contact
+PARTICLE = record_type(
+    "x y "  # m: place in the body frame
+    "nx ny "  # -: outward normal in the body frame
+    "length "  # m: tributary length
+    "share_x share_y"  # -: tributary length over face length, for faces whose normal is along x and along y
+)
+PAIR = record_type("", "a b near active")  # bodies, sorted; number of candidate slots; of slots in contact
 SLOT = record_type(
     "spring depth "  # m: shear spring, overlap
     "normal_force shear_force "  # N: pushing apart, resisting slip
-    "normal_loss shear_loss",  # N: what of them is not spring force (dashpot, and what clipping took)
+    "normal_loss shear_loss "  # N: what of them is not spring force (dashpot, and what clipping took)
+    "shear_stiffness "  # N/m: of the shear spring
+    "share "  # -: stiffness of this contact over that of a corner contact
+    "x y nx ny",  # m, -: where the contact was and its normal; only the models with particles keep these
     "face",  # touched face, NO_FACE without contact
 )
 INTERACTION = record_type(
-    "normal_stiffness shear_stiffness "  # N/m of one contact point
+    "normal_stiffness "  # of one corner contact: N/m for the linear law, N/m^1.5 for Hertz-Mindlin
+    "shear_ratio "  # -: shear stiffness over the slope of the normal force
     "normal_damping shear_damping "  # damping ratios
     "static_friction kinetic_friction transition_speed"  # -, -, m/s
 )
@@ -71,6 +91,7 @@ POINT = record_type(
     "normal_arm_a normal_arm_b shear_arm_a shear_arm_b "  # m: lever arms of normal and tangent about both bodies
     "closing slipping "  # m: relative displacement of the last drift, against the normal and along the tangent
     "closing_rate slip_rate "  # m/s: the same as rates at the end of the drift, predicted
+    "share "  # -: stiffness over that of a corner contact
     "weight drawn "  # first steps of a contact: weight of the dashpot, share of the drift that draws the shear spring
     "stiffness rate before force "  # N/m, m/s, N, N: of the pass under way; force of the step before; force now
     "spring_force normal_force limit "  # N: normal spring; normal total; Coulomb limit of the tangential force
@@ -87,8 +108,10 @@ NORMAL, SHEAR = 0, 1
 CONTROLS = record_type(
     "step gravity_x gravity_y "  # s, m/s2
     "skin rest_speed "  # m: reach of the pair list beyond contact; m/s
-    "max_overlap",  # m, zero: a share of the smaller side of each pair
-    "law check_every rest_checks",  # law code; steps between checks; checks in a row that must find rest (0: never)
+    "max_overlap "  # m, zero: a share of the smaller side of each pair
+    "particle_size smoothing_length support",  # m: diameter; of the SPH kernel; radius beyond which it is zero
+    "model law sph_kernel "  # codes
+    "check_every rest_checks",  # steps between checks; checks in a row that must find rest (0: never)
 )
 CLOCK = record_type("", "steps checks_at_rest pair_count rebuilds pairs_due is_started")  # the last two: flags
 LEDGER = record_type("dashpot friction broken travel_work largest_kinetic")  # J
@@ -99,15 +122,16 @@ class World(NamedTuple):
 
     bodies: Records  # (n + 1,) BODY, the ground last
     pairs: Records  # (p,) PAIR
-    slots: Records  # (p, 8) SLOT
-    candidates: Integers  # (p, 8) slots whose corners lie within the skin of the other body, sorted, `corners` of them
+    slots: Records  # (p, s) SLOT
+    candidates: Integers  # (p, s) owners of slots within the skin of the other body, sorted, `near` of them
     operators: Records  # (p, 2) OPERATOR, dashpots along the normals and the tangents
     spare_pairs: Records  # (p,) PAIR, the list being built
-    spare_slots: Records  # (p, 8) SLOT
-    spare_candidates: Integers  # (p, 8)
+    spare_slots: Records  # (p, s) SLOT
+    spare_candidates: Integers  # (p, s)
     interactions: Records  # (c, c) INTERACTION
-    points: Records  # (9,) POINT, work space of one pair; the last one for contacts that end
-    matrices: Floats  # (4, 8, 8) work space of one pair
+    particles: Records  # (q,) PARTICLE, body after body; none for the surface model
+    points: Records  # (s + 1,) POINT, work space of one pair; the last one for contacts that end
+    matrices: Floats  # (8, 3, 3) work space of one pair
     controls: Records  # (1,) CONTROLS
     clock: Records  # (1,) CLOCK
     ledger: Records  # (1,) LEDGER

@@ -1,9 +1,9 @@
 """Candidate pairs: rebuilt when a body has used up its part of the skin, contact history carried over."""
 
-from blocksim.kernels.arrays import HALF, NO_FACE, NORMAL, SHEAR, SLOTS, Record, World
+from blocksim.kernels.arrays import NO_FACE, NORMAL, SHEAR, Record, World
 from blocksim.kernels.geometry import ground_gap, separation
 from blocksim.kernels.jit import rare_kernel
-from blocksim.kernels.surface import corner_signs, lies_near
+from blocksim.kernels.models import near_slots
 
 
 @rare_kernel
@@ -16,13 +16,7 @@ def clear_slot(slot: Record) -> None:
     slot.shear_force = 0.0
     slot.normal_loss = 0.0
     slot.shear_loss = 0.0
-
-
-@rare_kernel
-def corner_height(body: Record, corner: int) -> float:
-    """Return the height (m) of one corner over the ground."""
-    sx, sy = corner_signs(corner)
-    return body.y + body.sin * sx * body.half_x + body.cos * sy * body.half_y
+    slot.shear_stiffness = 0.0
 
 
 @rare_kernel
@@ -38,32 +32,19 @@ def are_near(body: Record, other: Record, reach: float) -> bool:
 
 @rare_kernel
 def add_pair(world: World, count: int, a: int, b: int) -> int:
-    """Append a pair with its candidate corners, if it has any and there is room; return the count needed."""
-    bodies = world.bodies
-    ground = bodies.size - 1
-    reach = world.controls[0].skin
+    """Append a pair with its candidate slots, if it has any and there is room; return the count needed."""
     fits = count < world.spare_pairs.size
-    corners = 0
-    for k in range(SLOTS if b != ground else HALF):
-        if b == ground:
-            near = corner_height(bodies[a], k) <= reach
-        elif k < HALF:
-            near = lies_near(bodies[a], bodies[b], k, reach)
-        else:
-            near = lies_near(bodies[b], bodies[a], k - HALF, reach)
-        if near:
-            if fits:
-                world.spare_candidates[count, corners] = k
-            corners += 1
-    if corners > 0 and fits:
+    row = count if fits else world.spare_pairs.size - 1
+    near = near_slots(world, a, b, world.controls[0].skin, world.spare_candidates[row])
+    if near > 0 and fits:
         pair = world.spare_pairs[count]
         pair.a = a
         pair.b = b
-        pair.corners = corners
+        pair.near = near
         pair.active = 0
-        for k in range(SLOTS):
+        for k in range(world.spare_slots.shape[1]):
             clear_slot(world.spare_slots[count, k])
-    return count + 1 if corners > 0 else count
+    return count + 1 if near > 0 else count
 
 
 @rare_kernel
@@ -83,7 +64,7 @@ def carry_history(world: World, count: int) -> None:
             q += 1
         if q < old_count and world.pairs[q].a == new.a and world.pairs[q].b == new.b:
             new.active = world.pairs[q].active
-            for k in range(SLOTS):
+            for k in range(world.slots.shape[1]):
                 world.spare_slots[p, k] = world.slots[q, k]
 
 
@@ -98,7 +79,7 @@ def collect_pairs(world: World) -> int:
         for j in range(i + 1, ground):
             if are_near(bodies[i], bodies[j], reach):
                 count = add_pair(world, count, i, j)
-        if bodies[i].inverse_mass > 0.0 and ground_gap(bodies[i]) <= reach:
+        if bodies[i].inverse_mass > 0.0 and ground_gap(bodies[i]) <= bodies[ground].y + reach:
             count = add_pair(world, count, i, ground)
     return count
 
@@ -114,7 +95,7 @@ def rebuild_pairs(world: World) -> bool:
         world.pairs[p] = world.spare_pairs[p]
         world.operators[p, NORMAL].left = 0
         world.operators[p, SHEAR].left = 0
-        for k in range(SLOTS):
+        for k in range(world.slots.shape[1]):
             world.candidates[p, k] = world.spare_candidates[p, k]
             world.slots[p, k] = world.spare_slots[p, k]
     for i in range(world.bodies.size):

@@ -8,12 +8,14 @@ kicks do.
 import math
 
 from blocksim.kernels.arrays import NORMAL, SHEAR, Record, World
+from blocksim.kernels.coupled import MOBILITY, add_coupled_dashpots, fill_mobility
 from blocksim.kernels.damping import add_dashpots
 from blocksim.kernels.friction import coulomb_limit
-from blocksim.kernels.history import change_contacts
+from blocksim.kernels.history import change_contacts, keep_places
 from blocksim.kernels.jit import kernel, rare_kernel
-from blocksim.kernels.kinematics import DELASSUS, normal_masses, resolve_point, shear_masses
-from blocksim.kernels.laws import elastic_force, tangent_stiffness
+from blocksim.kernels.kinematics import DELASSUS, inverse_masses, resolve_point
+from blocksim.kernels.laws import elastic_force, has_constant_stiffness, tangent_stiffness
+from blocksim.kernels.models import SURFACE
 
 IMPACT_STEPS = 10.0  # an impact lasts some thirty steps; a face lost in a third of that cannot stop a corner
 
@@ -23,8 +25,8 @@ def push_spring(point: Record, slot: Record, law: int, stiffness: float) -> None
     """Set the normal spring force of a point and what its dashpot needs."""
     point.before = slot.normal_force
     point.rate = point.closing_rate
-    point.stiffness = tangent_stiffness(law, stiffness, point.depth)
-    point.force = elastic_force(law, stiffness, point.depth)
+    point.stiffness = tangent_stiffness(law, stiffness * point.share, point.depth)
+    point.force = elastic_force(law, stiffness * point.share, point.depth)
     point.spring_force = point.force
 
 
@@ -38,6 +40,7 @@ def clip_tension(point: Record, slot: Record) -> float:
     slot.normal_force = force
     slot.normal_loss = loss
     slot.depth = point.depth
+    slot.share = point.share
     return dissipated
 
 
@@ -45,21 +48,30 @@ def clip_tension(point: Record, slot: Record) -> float:
 def draw_spring(point: Record, slot: Record, values: Record) -> float:
     """Stretch the shear spring by the last drift; the point slides where the spring alone exceeds the Coulomb limit.
 
-    A sliding point gets no dashpot: its stiffness is set to zero. Return the energy (J) lost to friction.
+    `point.stiffness` comes as the slope of the normal force and leaves as the shear stiffness k, or as zero where the
+    point slides: then it gets no dashpot. Where k grows with the overlap (Hertz-Mindlin) the force is kept and the
+    spring shortened; where k falls the spring is kept and the force falls with it (C. Thornton, J. Appl. Mech. 64
+    (1997) 160-164). Both lose energy and neither creates any: F^2/2 (1/k0 - 1/k1) and (k0 - k1) s (s + ds)/2.
+
+    Return the energy (J) lost to friction: the work over the last drift less what the spring has gained, exactly.
     """
-    stiffness = values.shear_stiffness
+    stiffness = values.shear_ratio * point.stiffness
     old = slot.spring
-    spring = old + point.slipping * point.drawn
+    old_stiffness = slot.shear_stiffness
+    kept = old * (old_stiffness / stiffness) if stiffness > old_stiffness else old
+    spring = kept + point.slipping * point.drawn
     point.limit = coulomb_limit(values, point.normal_force, point.slip_rate, stiffness * abs(spring))
     point.stiffness = stiffness
     if stiffness * abs(spring) > point.limit:
         spring = math.copysign(point.limit / stiffness, spring)
         point.stiffness = 0.0
     slot.spring = spring
+    slot.shear_stiffness = stiffness
     point.before = slot.shear_force
     point.rate = point.slip_rate
     point.force = stiffness * spring
-    return 0.5 * stiffness * (old + spring) * (point.slipping - (spring - old))
+    old_force = old_stiffness * old
+    return 0.5 * ((old_force + point.force) * point.slipping - point.force * spring + old_force * old)
 
 
 @kernel
@@ -69,7 +81,7 @@ def clip_to_cone(point: Record, slot: Record, values: Record) -> float:
     if abs(force) > point.limit:
         limit = coulomb_limit(values, point.normal_force, point.slip_rate, abs(force))
         force = min(max(force, -limit), limit)
-    loss = force - values.shear_stiffness * slot.spring
+    loss = force - slot.shear_stiffness * slot.spring
     dissipated = 0.5 * (slot.shear_loss + loss) * point.slipping
     point.force = force
     slot.shear_force = force
@@ -116,6 +128,35 @@ def has_new_neighbours(a: Record, b: Record) -> bool:
 
 
 @kernel
+def damp(world: World, p: int, count: int, direction: int, pattern: int, ratio: float, step: float) -> None:
+    """Add the dashpots of pair p to the forces of its points; `pattern` has a bit for every point that has one."""
+    operator = world.operators[p, direction]
+    if count > 2:
+        damp_many(world, p, count, direction, ratio, step)
+        return
+    if operator.left == 0:
+        fill_delassus(world, p, count, direction)
+    add_dashpots(world.points, count, pattern, ratio, step, operator, world.matrices)
+
+
+@rare_kernel
+def fill_delassus(world: World, p: int, count: int, direction: int) -> None:
+    """Bring the inverse masses of one or two points up to date."""
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    inverse_masses(world.points, count, direction, a, b, world.matrices[DELASSUS])
+
+
+@rare_kernel
+def damp_many(world: World, p: int, count: int, direction: int, ratio: float, step: float) -> None:
+    """Add the dashpots of more than two points."""
+    pair = world.pairs[p]
+    fill_mobility(world.bodies[pair.a], world.bodies[pair.b], world.matrices[MOBILITY])
+    add_coupled_dashpots(world.points, count, direction, ratio, step, world.matrices)
+
+
+@kernel
 def normal_pass(world: World, p: int, count: int, a: Record, b: Record, values: Record, step: float) -> None:
     """Kinematics, then springs and dashpots along the normals."""
     points = world.points
@@ -135,12 +176,9 @@ def normal_pass(world: World, p: int, count: int, a: Record, b: Record, values: 
         spare_lost_faces(world, p, count)
     if values.normal_damping > 0.0:
         operator = world.operators[p, NORMAL]
-        if has_new_neighbours(a, b):
+        if has_new_neighbours(a, b) or not has_constant_stiffness(law):
             operator.left = 0
-        if operator.left == 0:
-            normal_masses(points, count, a, b, world.matrices[DELASSUS])
-        pattern = (1 << count) - 1
-        add_dashpots(points, count, pattern, values.normal_damping, shared_step(a, b, step), operator, world.matrices)
+        damp(world, p, count, NORMAL, (1 << min(count, 2)) - 1, values.normal_damping, shared_step(a, b, step))
 
 
 @kernel
@@ -156,16 +194,15 @@ def shear_pass(world: World, p: int, count: int, a: Record, b: Record, values: R
         slot = world.slots[p, point.slot]
         dashpot_work += clip_tension(point, slot)
         friction_work += draw_spring(point, slot, values)
-        sticking += 1 << i if point.stiffness > 0.0 else 0
+        sticking |= 1 << min(i, 62) if point.stiffness > 0.0 else 0  # beyond two points only zero or not zero counts
     ledger.dashpot += dashpot_work
     ledger.friction += friction_work
     operator = world.operators[p, SHEAR]
-    if operator.pattern != sticking or sticking == 0 or has_new_neighbours(a, b):
+    changes = has_new_neighbours(a, b) or not has_constant_stiffness(world.controls[0].law)
+    if operator.pattern != sticking or sticking == 0 or changes:
         operator.left = 0
     if sticking > 0 and values.shear_damping > 0.0:
-        if operator.left == 0:
-            shear_masses(points, count, a, b, world.matrices[DELASSUS])
-        add_dashpots(points, count, sticking, values.shear_damping, shared_step(a, b, step), operator, world.matrices)
+        damp(world, p, count, SHEAR, sticking, values.shear_damping, shared_step(a, b, step))
 
 
 @kernel
@@ -210,3 +247,5 @@ def pair_forces(world: World, p: int, count: int, step: float) -> None:
     normal_pass(world, p, count, a, b, values, step)
     shear_pass(world, p, count, a, b, values, step)
     force_pass(world, p, count, a, b, values)
+    if world.controls[0].model != SURFACE:
+        keep_places(world, p, count)

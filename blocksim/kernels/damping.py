@@ -1,4 +1,4 @@
-"""Dashpots of one pair of bodies, as a matrix over its contact points.
+"""Dashpots of one pair of bodies, as a matrix over its contact points; here for one point and for two.
 
 One dashpot a point would damp a flat landing (two points) differently from a corner (one point). With A the inverse
 mass that the points see, k their stiffnesses and B = k^(1/2) A k^(1/2), the damping matrix
@@ -17,9 +17,9 @@ import math
 from blocksim.kernels.arrays import Floats, Record, Records
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.kinematics import DELASSUS
-from blocksim.kernels.matrices import RANK_TOLERANCE, inverse_root_2, inverse_root_n, solve_in_place
+from blocksim.kernels.matrices import RANK_TOLERANCE, inverse_root_2
 
-DAMPING, MATRIX, VECTORS = 1, 2, 3  # indices into the work matrices
+SCALED, ROOTED = 1, 2  # indices into the work matrices
 BOTH = 3  # pattern of two points with a dashpot
 OPERATOR_LIFE = 16  # steps
 
@@ -28,12 +28,12 @@ OPERATOR_LIFE = 16  # steps
 def add_dashpots(
     points: Records, count: int, pattern: int, ratio: float, step: float, operator: Record, work: Floats
 ) -> None:
-    """Add the dashpot forces (N) to `force` of every point, which holds the spring force.
+    """Add the dashpot forces (N) to `force` of one or two points, which holds the spring force.
 
     Uses `stiffness`, `rate`, `before`, `weight` of the points and, where the operator is due (`left` is zero), the
-    inverse masses in `work`; `pattern` has a bit set for every point with a dashpot. One point, and two alike or
-    with one sliding, go through the pair's operator, which is kept for some steps: arms change by less than a
-    thousandth in that time. The weight w of first steps enters as w^(1/2) C w^(1/2), so that the dashpots stay passive.
+    inverse masses in `work`; `pattern` has a bit set for every point with a dashpot. The operator is kept for some
+    steps: arms change by less than a thousandth in that time; where stiffnesses change too, the caller makes it due at
+    every step. The weight w of first steps enters as w^(1/2) C w^(1/2), so that the dashpots stay passive.
     """
     if operator.left > 0:
         operator.left -= 1
@@ -42,14 +42,12 @@ def add_dashpots(
     operator.pattern = pattern
     if count == 1:
         fill_single(points[0], ratio, step, work[DELASSUS], operator, 0)
-    elif count == 2 and pattern != BOTH:
+    elif pattern != BOTH:
         fill_single(points[pattern - 1], ratio, step, work[DELASSUS], operator, pattern - 1)
-    elif count == 2 and points[0].weight == points[1].weight and points[0].stiffness == points[1].stiffness:
+    elif points[0].weight == points[1].weight and points[0].stiffness == points[1].stiffness:
         fill_two_alike(points[0], ratio, step, work[DELASSUS], operator)
     else:
-        fill_damping(points, count, ratio, work)
-        solve_coupled(points, count, step, work)
-        return
+        fill_two(points, ratio, step, work, operator)
     apply_operator(points, count, operator)
     if step > 0.0 and is_lasting(points, count):
         operator.left = OPERATOR_LIFE
@@ -132,41 +130,31 @@ def fill_two_alike(point: Record, ratio: float, step: float, delassus: Floats, o
 
 
 @rare_kernel
-def fill_damping(points: Records, count: int, ratio: float, work: Floats) -> None:
-    """Write the weighted damping matrix (N s/m) of two or more points."""
-    matrix = work[MATRIX]
-    damping = work[DAMPING]
-    for i in range(count):
-        for j in range(count):
-            matrix[i, j] = work[DELASSUS, i, j] * math.sqrt(points[i].stiffness * points[j].stiffness)
-    if count == 2:
-        inverse_root_2(matrix, damping)
-    else:
-        inverse_root_n(matrix, work[VECTORS], damping, count)
-    for i in range(count):
-        for j in range(count):
-            scale = points[i].stiffness * points[i].weight * points[j].stiffness * points[j].weight
-            damping[i, j] *= 2.0 * ratio * math.sqrt(scale)
-
-
-@rare_kernel
-def solve_coupled(points: Records, count: int, step: float, work: Floats) -> None:
-    """Solve (I + dt/2 C A) d = C (free rate) and add d to the forces."""
+def fill_two(points: Records, ratio: float, step: float, work: Floats, operator: Record) -> None:
+    """Two points of different stiffness or weight: E = (I + dt/2 C A)^-1 C, symmetric as C and A are."""
+    one = points[0]
+    two = points[1]
+    half = 0.5 * step
     delassus = work[DELASSUS]
-    damping = work[DAMPING]
-    matrix = work[MATRIX]
-    right = work[VECTORS, 0]
-    for i in range(count):
-        points[i].free_rate = points[i].rate
-        for j in range(count):
-            points[i].free_rate += 0.5 * step * delassus[i, j] * (points[j].before - points[j].force)
-    for i in range(count):
-        right[i] = 0.0
-        for j in range(count):
-            right[i] += damping[i, j] * points[j].free_rate
-            matrix[i, j] = 1.0 if i == j else 0.0
-            for k in range(count):
-                matrix[i, j] += 0.5 * step * damping[i, k] * delassus[k, j]
-    solve_in_place(matrix, right, count)
-    for i in range(count):
-        points[i].force += right[i]
+    scaled = work[SCALED]
+    rooted = work[ROOTED]
+    scaled[0, 0] = delassus[0, 0] * one.stiffness
+    scaled[1, 1] = delassus[1, 1] * two.stiffness
+    scaled[0, 1] = delassus[0, 1] * math.sqrt(one.stiffness * two.stiffness)
+    inverse_root_2(scaled, rooted)
+    g_one = math.sqrt(one.stiffness * one.weight)
+    g_two = math.sqrt(two.stiffness * two.weight)
+    c_one = 2.0 * ratio * g_one * g_one * rooted[0, 0]
+    c_mixed = 2.0 * ratio * g_one * g_two * rooted[0, 1]
+    c_two = 2.0 * ratio * g_two * g_two * rooted[1, 1]
+    a = operator.h_one = half * delassus[0, 0]
+    b = operator.h_mixed = half * delassus[0, 1]
+    d = operator.h_two = half * delassus[1, 1]
+    m_11 = 1.0 + c_one * a + c_mixed * b
+    m_12 = c_one * b + c_mixed * d
+    m_21 = c_mixed * a + c_two * b
+    m_22 = 1.0 + c_mixed * b + c_two * d
+    determinant = m_11 * m_22 - m_12 * m_21
+    operator.e_one = (m_22 * c_one - m_12 * c_mixed) / determinant
+    operator.e_mixed = (m_22 * c_mixed - m_12 * c_two) / determinant
+    operator.e_two = (m_11 * c_two - m_21 * c_mixed) / determinant

@@ -2,7 +2,7 @@
 
 import math
 
-from blocksim.kernels.arrays import NO_FACE, SLOTS, Floats, Record, World
+from blocksim.kernels.arrays import NO_FACE, Floats, Record, World
 from blocksim.kernels.integrate import kinetic_energy
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.laws import stored_energy
@@ -34,11 +34,11 @@ def contact_summary(world: World) -> tuple[float, float, int, float]:
         pair = world.pairs[p]
         if pair.active > 0:
             values = world.interactions[world.bodies[pair.a].contact_class, world.bodies[pair.b].contact_class]
-            for k in range(SLOTS):
+            for k in range(world.slots.shape[1]):
                 slot = world.slots[p, k]
                 if slot.face != NO_FACE:
-                    normal += stored_energy(law, values.normal_stiffness, slot.depth)
-                    shear += 0.5 * values.shear_stiffness * slot.spring * slot.spring
+                    normal += stored_energy(law, values.normal_stiffness * slot.share, slot.depth)
+                    shear += 0.5 * slot.shear_stiffness * slot.spring * slot.spring
                     count += 1
                     largest = max(largest, slot.depth)
     return normal, shear, count, largest
@@ -76,7 +76,7 @@ def has_excessive_overlap(world: World) -> bool:
         if pair.active > 0:
             side = min(smallest_side(world.bodies[pair.a]), smallest_side(world.bodies[pair.b]))
             limit = given if given > 0.0 else OVERLAP_SHARE * side
-            for k in range(SLOTS):
+            for k in range(world.slots.shape[1]):
                 if world.slots[p, k].face != NO_FACE and world.slots[p, k].depth > limit:
                     return True
     return False

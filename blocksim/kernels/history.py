@@ -5,23 +5,12 @@ what its springs hold is then lost and booked. Where two corners pass one anothe
 the contact itself goes on under another corner, and its history goes with it.
 """
 
-from blocksim.kernels.arrays import HALF, NO_FACE, NORMAL, SHEAR, SLOTS, Record, Records, World
+from blocksim.kernels.arrays import NO_FACE, NORMAL, SHEAR, Record, Records, World
 from blocksim.kernels.broad_phase import clear_slot
-from blocksim.kernels.geometry import to_world
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.kinematics import resolve_point, weigh_first_step
-from blocksim.kernels.surface import PARALLEL, corner_signs, face_normal
-
-
-@rare_kernel
-def slot_normal(k: int, face: int, a: Record, b: Record, ground: bool) -> tuple[float, float]:
-    """Return the normal, from b to a, of a contact in slot k with a face of the other body."""
-    if ground:
-        return 0.0, 1.0
-    if k < HALF:
-        return face_normal(face, b)
-    nx, ny = face_normal(face, a)
-    return -nx, -ny
+from blocksim.kernels.models import SURFACE, place_ended
+from blocksim.kernels.models.surface import PARALLEL, slot_normal
 
 
 @rare_kernel
@@ -45,14 +34,10 @@ def release_slot(world: World, p: int, k: int, step: float) -> None:
     b = world.bodies[pair.b]
     slot = world.slots[p, k]
     ledger = world.ledger[0]
-    stiffness = world.interactions[a.contact_class, b.contact_class].shear_stiffness
-    owner = a if k < HALF else b
-    sx, sy = corner_signs(k % HALF)
-    point = world.points[SLOTS]
-    point.x, point.y = to_world(owner, sx * owner.half_x, sy * owner.half_y)
-    point.nx, point.ny = slot_normal(k, slot.face, a, b, pair.b == world.bodies.size - 1)
+    point = world.points[world.points.size - 1]
+    place_ended(world, p, k, point)
     resolve_point(point, a, b, step)
-    spring_force = stiffness * slot.spring
+    spring_force = slot.shear_stiffness * slot.spring
     ledger.dashpot += 0.5 * (slot.normal_loss * point.closing + slot.shear_loss * point.slipping)
     ledger.broken += 0.5 * spring_force * (slot.spring + point.slipping)
     clear_slot(slot)
@@ -61,7 +46,7 @@ def release_slot(world: World, p: int, k: int, step: float) -> None:
 @rare_kernel
 def release_ended(world: World, p: int, count: int, step: float) -> None:
     """Release the slots of a pair whose corner is no longer in contact, or touches another face than before."""
-    for k in range(SLOTS):
+    for k in range(world.slots.shape[1]):
         slot = world.slots[p, k]
         if slot.face != NO_FACE and not goes_on(k, slot.face, world.points, count):
             release_slot(world, p, k, step)
@@ -86,7 +71,7 @@ def hand_over(world: World, p: int, count: int) -> None:
     for i in range(count):
         point = world.points[i]
         new = world.slots[p, point.slot]
-        for k in range(SLOTS):
+        for k in range(world.slots.shape[1]):
             old = world.slots[p, k]
             is_late = new.face == NO_FACE and point.closing < point.depth
             if is_late and old.face != NO_FACE and not goes_on(k, old.face, world.points, count):
@@ -98,7 +83,8 @@ def hand_over(world: World, p: int, count: int) -> None:
 @rare_kernel
 def change_contacts(world: World, p: int, count: int, step: float) -> None:
     """Take up a changed set of contacts: pass on, release, weigh first steps, have the operators made anew."""
-    hand_over(world, p, count)
+    if world.controls[0].model == SURFACE:
+        hand_over(world, p, count)
     release_ended(world, p, count, step)
     for i in range(count):
         point = world.points[i]
@@ -110,3 +96,15 @@ def change_contacts(world: World, p: int, count: int, step: float) -> None:
     world.operators[p, NORMAL].left = 0
     world.operators[p, SHEAR].left = 0
     world.pairs[p].active = count
+
+
+@rare_kernel
+def keep_places(world: World, p: int, count: int) -> None:
+    """Note place and normal of every contact in its slot: that one has ended shows when its particle is gone."""
+    for i in range(count):
+        point = world.points[i]
+        slot = world.slots[p, point.slot]
+        slot.x = point.x
+        slot.y = point.y
+        slot.nx = point.nx
+        slot.ny = point.ny

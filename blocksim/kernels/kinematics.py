@@ -1,6 +1,6 @@
 """Rates, displacements and inverse masses at the contact points of one pair, along the normals or the tangents."""
 
-from blocksim.kernels.arrays import Floats, Record, Records
+from blocksim.kernels.arrays import NORMAL, Floats, Record, Records
 from blocksim.kernels.jit import kernel, rare_kernel
 
 DELASSUS = 0  # index into the work matrices
@@ -52,35 +52,24 @@ def weigh_first_step(point: Record) -> None:
 
 
 @rare_kernel
-def mutual_mass(one: Record, two: Record, a: Record, b: Record, arms_a: float, arms_b: float) -> float:
-    """Return the inverse mass (1/kg) J M^-1 J^T that two points see of one another.
+def mutual_mass(one: Record, two: Record, a: Record, b: Record, direction: int) -> float:
+    """Return the inverse mass (1/kg) J M^-1 J^T that two points see of one another, along normals or tangents.
 
-    `arms_a` and `arms_b` are the products (m2) of both points' lever arms about either body. Tangents enclose the angle
-    of the normals, so that one formula serves both directions.
+    Tangents enclose the angle of the normals, so that one formula for the translation serves both directions.
     """
+    if direction == NORMAL:
+        arms_a = one.normal_arm_a * two.normal_arm_a
+        arms_b = one.normal_arm_b * two.normal_arm_b
+    else:
+        arms_a = one.shear_arm_a * two.shear_arm_a
+        arms_b = one.shear_arm_b * two.shear_arm_b
     translation = (one.nx * two.nx + one.ny * two.ny) * (a.inverse_mass + b.inverse_mass)
     return translation + arms_a * a.inverse_inertia + arms_b * b.inverse_inertia
 
 
 @rare_kernel
-def normal_masses(points: Records, count: int, a: Record, b: Record, out: Floats) -> None:
-    """Write the inverse masses (1/kg) that the points see of one another along their normals."""
+def inverse_masses(points: Records, count: int, direction: int, a: Record, b: Record, out: Floats) -> None:
+    """Write the inverse masses (1/kg) that one or two points see of one another, along normals or tangents."""
     for i in range(count):
-        one = points[i]
         for j in range(i + 1):
-            two = points[j]
-            arms_a = one.normal_arm_a * two.normal_arm_a
-            arms_b = one.normal_arm_b * two.normal_arm_b
-            out[i, j] = out[j, i] = mutual_mass(one, two, a, b, arms_a, arms_b)
-
-
-@rare_kernel
-def shear_masses(points: Records, count: int, a: Record, b: Record, out: Floats) -> None:
-    """Write the inverse masses (1/kg) that the points see of one another along their tangents."""
-    for i in range(count):
-        one = points[i]
-        for j in range(i + 1):
-            two = points[j]
-            arms_a = one.shear_arm_a * two.shear_arm_a
-            arms_b = one.shear_arm_b * two.shear_arm_b
-            out[i, j] = out[j, i] = mutual_mass(one, two, a, b, arms_a, arms_b)
+            out[i, j] = out[j, i] = mutual_mass(points[i], points[j], a, b, direction)

@@ -1,4 +1,4 @@
-"""Small dense matrices of one pair's contact points: inverse square root and linear solve, without allocation."""
+"""Small dense matrices of one pair of bodies: roots, products and linear solve, without allocation."""
 
 import math
 
@@ -8,7 +8,8 @@ from blocksim.kernels.jit import rare_kernel
 # eigenvalues below this share of the largest count as zero: tangents of points on one face are parallel, so that
 # their matrix has rank one up to the difference of two overlaps
 RANK_TOLERANCE = 1e-4
-SWEEPS = 12
+SIZE = 3
+SWEEPS = 6  # quadratic convergence: five bring any 3 x 3 matrix to round-off
 ROUND_OFF = 1e-15
 
 
@@ -71,25 +72,54 @@ def sweep_pairs(matrix: Floats, vectors: Floats, n: int) -> None:
 
 
 @rare_kernel
-def inverse_root_n(matrix: Floats, vectors: Floats, out: Floats, n: int) -> None:
-    """Write the pseudo-inverse square root of a symmetric positive n x n matrix into `out`; destroys `matrix`.
+def inverse_three_halves(matrix: Floats, vectors: Floats, out: Floats) -> None:
+    """Write the power -3/2 of a symmetric positive 3 x 3 matrix into `out`, over its range only; destroys `matrix`.
 
-    Cyclic Jacobi rotations; n is 3 to 8 and rare (both corners of one block and one of the other, deep inside).
+    Cyclic Jacobi rotations.
     """
-    for i in range(n):
-        for j in range(n):
+    for i in range(SIZE):
+        for j in range(SIZE):
             vectors[i, j] = 1.0 if i == j else 0.0
     for _ in range(SWEEPS):
-        sweep_pairs(matrix, vectors, n)
-    largest = 0.0
-    for i in range(n):
-        largest = max(largest, matrix[i, i])
-    for i in range(n):
-        for j in range(n):
+        sweep_pairs(matrix, vectors, SIZE)
+    largest = max(matrix[0, 0], matrix[1, 1], matrix[2, 2])
+    for i in range(SIZE):
+        for j in range(SIZE):
             total = 0.0
-            for k in range(n):
-                total += vectors[i, k] * vectors[j, k] * inverse_root(max(matrix[k, k], 0.0), largest)
+            for k in range(SIZE):
+                root = inverse_root(max(matrix[k, k], 0.0), largest)
+                total += vectors[i, k] * vectors[j, k] * root * root * root
             out[i, j] = total
+
+
+@rare_kernel
+def cholesky(matrix: Floats, out: Floats) -> None:
+    """Write the lower triangle L of a symmetric positive 3 x 3 matrix L L^T into `out`, zeros above it."""
+    for i in range(SIZE):
+        for j in range(SIZE):
+            total = matrix[i, j]
+            for k in range(min(i, j)):
+                total -= out[i, k] * out[j, k]
+            if i == j:
+                out[i, i] = math.sqrt(max(total, 0.0))
+            else:
+                out[i, j] = total / out[j, j] if i > j else 0.0
+
+
+@rare_kernel
+def multiply(left: Floats, right: Floats, out: Floats) -> None:
+    """Write the product of two 3 x 3 matrices into `out`, another one."""
+    for i in range(SIZE):
+        for j in range(SIZE):
+            out[i, j] = left[i, 0] * right[0, j] + left[i, 1] * right[1, j] + left[i, 2] * right[2, j]
+
+
+@rare_kernel
+def multiply_transposed(left: Floats, right: Floats, out: Floats) -> None:
+    """Write left^T right, 3 x 3, into `out`, another matrix."""
+    for i in range(SIZE):
+        for j in range(SIZE):
+            out[i, j] = left[0, i] * right[0, j] + left[1, i] * right[1, j] + left[2, i] * right[2, j]
 
 
 @rare_kernel

@@ -26,7 +26,7 @@ def boundary_particles(size_x: float, size_y: float, spacing: float) -> Boundary
         raise ValueError(message)
     corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * (0.5 * size_x, 0.5 * size_y)
     sides = (size_x, size_y, size_x, size_y)
-    divisions = [_division(side, spacing) for side in sides]
+    divisions = [division(side, spacing) for side in sides]
     points, lengths = [], []
     for k, (side, count) in enumerate(zip(sides, divisions, strict=True)):
         share = np.arange(count)[:, np.newaxis] / count
@@ -40,9 +40,10 @@ def boundary_particles(size_x: float, size_y: float, spacing: float) -> Boundary
 
 def particle_count(size_x: float, size_y: float, spacing: float) -> int:
     """Return how many particles `boundary_particles` would place."""
-    return 2 * (_division(size_x, spacing) + _division(size_y, spacing))
+    return 2 * (division(size_x, spacing) + division(size_y, spacing))
 
 
-def _division(side: float, spacing: float) -> int:
+def division(side: float, spacing: float) -> int:
+    """Return the number of equal intervals, none longer than `spacing`, that a side (both m) is divided into."""
     # a quotient that round-off lifted just over an integer must not add a particle
     return max(1, math.ceil(side / spacing * (1.0 - 1e-12)))

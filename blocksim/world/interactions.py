@@ -1,5 +1,6 @@
 """Contact parameters of every pair of contact classes: stiffness from elasticity, damping from restitution."""
 
+import math
 from typing import NamedTuple
 
 from blocksim.kernels.arrays import INTERACTION, Record, Records, zeros
@@ -21,13 +22,23 @@ def contact_classes(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> tuple
 
 
 def normal_stiffness(scenario: Scenario, a: ContactClass, b: ContactClass) -> float:
-    """Return the stiffness (N/m) of one contact point: scale E* L, 1/E* = sum (1 - nu^2)/E, L the shorter depth."""
+    """Return the stiffness of one corner contact, with 1/E* = sum (1 - nu^2)/E.
+
+    Linear: scale E* L (N/m), L the shorter depth. Hertz-Mindlin: scale 4/3 E* R*^(1/2) (N/m^1.5), R* `contact_radius`.
+    """
     contact = scenario.contact
     if contact.normal_stiffness is not None:
         return contact.stiffness_scale * contact.normal_stiffness
-    one, two = (scenario.materials[name] for name in _materials(a, b))
-    compliance = sum((1.0 - m.poisson_ratio**2) / m.young_modulus for m in (one, two))
-    return contact.stiffness_scale * min(a.depth, b.depth) / compliance
+    modulus = effective_modulus(scenario, a, b)
+    if contact.law == "hertz-mindlin":
+        return contact.stiffness_scale * 4.0 / 3.0 * modulus * math.sqrt(contact.contact_radius)
+    return contact.stiffness_scale * modulus * min(a.depth, b.depth)
+
+
+def effective_modulus(scenario: Scenario, a: ContactClass, b: ContactClass) -> float:
+    """Return E* (Pa): 1/E* = sum (1 - nu^2)/E. K. L. Johnson, Contact Mechanics (1985), eq. 4.24."""
+    pair = [scenario.materials[name] for name in _materials(a, b)]
+    return 1.0 / sum((1.0 - m.poisson_ratio**2) / m.young_modulus for m in pair)
 
 
 def shear_stiffness_ratio(scenario: Scenario, a: ContactClass, b: ContactClass) -> float:
@@ -48,9 +59,9 @@ def fill_interaction(record: Record, scenario: Scenario, a: ContactClass, b: Con
     friction = scenario.friction.block_ground if ground else scenario.friction.block_block
     restitution = scenario.contact.restitution
     shear_damping = scenario.contact.shear_damping_ratio
-    ratio = damping_ratio(restitution.block_ground if ground else restitution.block_block)
+    ratio = damping_ratio(restitution.block_ground if ground else restitution.block_block, scenario.contact.law)
     record.normal_stiffness = normal_stiffness(scenario, a, b)
-    record.shear_stiffness = record.normal_stiffness * shear_stiffness_ratio(scenario, a, b)
+    record.shear_ratio = shear_stiffness_ratio(scenario, a, b)
     record.normal_damping = ratio
     record.shear_damping = ratio if shear_damping is None else shear_damping
     record.static_friction = friction.static

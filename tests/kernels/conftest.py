@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import pytest
 
-from blocksim.kernels.arrays import BODY, zeros
+from blocksim.kernels.arrays import ALL, BODY, zeros
 
 if TYPE_CHECKING:
     from blocksim.kernels.arrays import Record
@@ -45,6 +45,7 @@ def make_body() -> MakeBody:
         body = zeros(1, BODY)[0]
         body.x, body.y, body.angle = x, y, angle
         body.cos, body.sin = cos(angle), sin(angle)
+        body.faces = body.corners = ALL
         body.half_x, body.half_y, body.radius = width / 2, height / 2, hypot(width, height) / 2
         body.mass, body.inertia = mass, mass * (width**2 + height**2) / 12
         body.inverse_mass, body.inverse_inertia = 1.0 / body.mass, 1.0 / body.inertia

@@ -95,7 +95,7 @@ def test_list_misses_no_corner_within_reach_and_has_none_beyond(start: Start, se
         world = with_more_room(world)
     count = int(world.clock[0].pair_count)
     listed = {
-        (int(pair.a), int(pair.b)): near[: pair.corners].tolist()
+        (int(pair.a), int(pair.b)): near[: pair.near].tolist()
         for pair, near in zip(world.pairs[:count], world.candidates[:count], strict=True)
     }
     assert list(listed) == sorted(listed)
@@ -129,7 +129,7 @@ def run(world: World, last_step: int) -> tuple[World, int]:
 
 def test_full_list_stops_before_anything_has_moved(start: Start) -> None:
     world = unstarted(start)
-    world = world._replace(**empty_lists(1))
+    world = world._replace(**empty_lists(1, SLOTS))
     before = world.bodies.tobytes()
     assert advance(world, 1000) == PAIRS_FULL
     assert world.bodies.tobytes() == before
@@ -139,7 +139,7 @@ def test_full_list_stops_before_anything_has_moved(start: Start) -> None:
 
 def test_run_continued_with_more_room_has_the_same_bits(start: Start) -> None:
     roomy, never = run(unstarted(start), 10_000)
-    grown, often = run(unstarted(start)._replace(**empty_lists(1)), 10_000)
+    grown, often = run(unstarted(start)._replace(**empty_lists(1, SLOTS)), 10_000)
     assert never == 0
     assert often >= 3
     count = int(roomy.clock[0].pair_count)

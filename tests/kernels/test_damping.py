@@ -1,4 +1,4 @@
-"""Dashpots of one pair: the same damping ratio for every mode, passive, and one result on every path."""
+"""Dashpots of one or two points: the same damping ratio for every mode, passive, as defined."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import OPERATOR, POINT, SLOTS, zeros
-from blocksim.kernels.damping import BOTH, DAMPING, OPERATOR_LIFE, add_dashpots, fill_damping, solve_coupled
+from blocksim.kernels.arrays import OPERATOR, POINT, zeros
+from blocksim.kernels.damping import BOTH, OPERATOR_LIFE, add_dashpots
 from blocksim.kernels.kinematics import DELASSUS
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def inverse_masses(n: int, seed: int, *, parallel: bool = False) -> np.ndarray:
 
 def contact_points(n: int, seed: int, *, stiffness: tuple[float, ...] = (), weight: float = 1.0) -> Records:
     random = np.random.default_rng(seed)
-    points = zeros(SLOTS, POINT)
+    points = zeros(2, POINT)
     points.weight[:n] = weight
     points.stiffness[:n] = stiffness or K
     points.rate[:n] = random.normal(size=n)
@@ -42,15 +42,22 @@ def contact_points(n: int, seed: int, *, stiffness: tuple[float, ...] = (), weig
 
 
 def work_with(delassus: np.ndarray) -> np.ndarray:
-    work = np.zeros((4, SLOTS, SLOTS))
+    work = np.zeros((8, 3, 3))
     work[DELASSUS, : len(delassus), : len(delassus)] = delassus
     return work
 
 
 def damping_matrix(points: Records, delassus: np.ndarray, ratio: float) -> np.ndarray:
-    n, work = len(delassus), work_with(delassus)
-    fill_damping(points, n, ratio, work)
-    return work[DAMPING, :n, :n].copy()
+    """Return C, which is what a step of no length leaves of the dashpots: the force for each rate alone."""
+    n, columns = len(delassus), []
+    points.before[:] = points.force[:] = 0.0
+    for j in range(n):
+        points.rate[:n] = np.eye(n)[j]
+        operator = zeros(1, OPERATOR)[0]
+        add_dashpots(points, n, (1 << n) - 1, ratio, 0.0, operator, work_with(delassus))
+        columns.append(points.force[:n].copy())
+        points.force[:] = 0.0
+    return np.array(columns).T
 
 
 def by_definition(points: Records, delassus: np.ndarray, ratio: float) -> np.ndarray:
@@ -73,7 +80,7 @@ def added(points: Records, delassus: np.ndarray, ratio: float, pattern: int) -> 
 
 
 @pytest.mark.parametrize("ratio", [0.05, 0.3, 0.9])
-@pytest.mark.parametrize("stiffness", [(K, K), (K, 0.2 * K), (K, 0.5 * K, 2.0 * K)])
+@pytest.mark.parametrize("stiffness", [(K,), (K, K), (K, 0.2 * K)])
 @given(seed=SEEDS)
 def test_every_mode_of_a_pair_has_the_asked_damping_ratio(
     stiffness: tuple[float, ...], ratio: float, seed: int
@@ -87,11 +94,11 @@ def test_every_mode_of_a_pair_has_the_asked_damping_ratio(
 
 
 @pytest.mark.parametrize("parallel", [False, True])
-@given(seed=SEEDS, n=st.integers(2, 4))
-def test_dashpots_never_feed_energy(parallel: bool, seed: int, n: int) -> None:
-    points = contact_points(n, seed)
-    points.weight[:n] = np.random.default_rng(seed).uniform(0.5, 1.5, n)
-    damping = damping_matrix(points, inverse_masses(n, seed, parallel=parallel), 0.7)
+@given(seed=SEEDS)
+def test_dashpots_never_feed_energy(parallel: bool, seed: int) -> None:
+    points = contact_points(2, seed)
+    points.weight[:] = np.random.default_rng(seed).uniform(0.5, 1.5, 2)
+    damping = damping_matrix(points, inverse_masses(2, seed, parallel=parallel), 0.7)
     assert damping == pytest.approx(damping.T, rel=1e-9, abs=1e-9 * np.abs(damping).max())
     assert np.linalg.eigvalsh(damping).min() > -1e-9 * np.abs(damping).max()
 
@@ -107,20 +114,19 @@ def test_one_point_gets_the_dashpot_of_its_own_mass(ratio: float, weight: float,
 
 
 @pytest.mark.parametrize("parallel", [False, True])
-@pytest.mark.parametrize("weight", [0.6, 1.0])
+@pytest.mark.parametrize(
+    ("stiffness", "weights"), [((K, K), (1.0, 1.0)), ((K, K), (0.6, 1.3)), ((K, 0.1 * K), (1.0, 0.7))]
+)
 @given(seed=SEEDS, ratio=st.sampled_from([0.1, 1.0, 5.0]))
-def test_operator_of_two_points_agrees_with_the_general_path(
-    parallel: bool, weight: float, ratio: float, seed: int
+def test_two_points_follow_the_definition(
+    parallel: bool, stiffness: tuple[float, ...], weights: tuple[float, ...], ratio: float, seed: int
 ) -> None:
     delassus = inverse_masses(2, seed, parallel=parallel) + (0.0 if parallel else 2.0) * np.eye(2)
-    points, general = contact_points(2, seed, weight=weight), contact_points(2, seed, weight=weight)
+    points = contact_points(2, seed, stiffness=stiffness)
+    points.weight[:] = weights
     expected = by_definition(points, delassus, ratio)
     size = np.abs(expected).max()
     assert added(points, delassus, ratio, BOTH) == pytest.approx(expected, rel=1e-7, abs=1e-9 * size)
-    work, before = work_with(delassus), general.force.copy()
-    fill_damping(general, 2, ratio, work)
-    solve_coupled(general, 2, STEP, work)
-    assert (general.force - before)[:2] == pytest.approx(expected, rel=1e-7, abs=1e-9 * size)
 
 
 @pytest.mark.parametrize("sticking", [1, 2])
@@ -133,16 +139,6 @@ def test_sliding_point_beside_a_sticking_one_has_no_dashpot(sticking: int, seed:
     forces = added(points, delassus, 0.7, sticking)
     assert forces[2 - sticking] == 0.0
     assert forces == pytest.approx(expected, rel=1e-9)
-
-
-@given(seed=SEEDS, n=st.integers(3, 8))
-def test_any_number_of_points_follows_the_definition(seed: int, n: int) -> None:
-    delassus = inverse_masses(n, seed)
-    points = contact_points(n, seed)
-    points.weight[0] = 0.7
-    expected = by_definition(points, delassus, 0.7)
-    forces = added(points, delassus, 0.7, (1 << n) - 1)
-    assert forces == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
 
 
 def test_operator_is_kept_for_lasting_contacts_and_then_made_anew() -> None:

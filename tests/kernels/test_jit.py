@@ -30,7 +30,7 @@ from blocksim.kernels.arrays import POINT, SLOT, zeros
 from blocksim.kernels.contact import push_spring
 
 point = zeros(1, POINT)[0]
-point.depth = 2e-6
+point.depth, point.share = 2e-6, 1.0
 push_spring(point, zeros(1, SLOT)[0], 0, 1e9)
 hits, misses = (sum(counts.values()) for counts in (push_spring.stats.cache_hits, push_spring.stats.cache_misses))
 print(point.force, hits, misses, jit.cache_folder())

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import POINT, SLOTS, zeros
-from blocksim.kernels.kinematics import normal_masses, resolve_point, shear_masses, weigh_first_step
+from blocksim.kernels.arrays import NORMAL, POINT, SHEAR, SLOTS, zeros
+from blocksim.kernels.kinematics import inverse_masses, resolve_point, weigh_first_step
 
 if TYPE_CHECKING:
     from blocksim.kernels.arrays import Record, Records
@@ -60,13 +60,13 @@ def test_displacements_and_rates_are_those_of_rigid_bodies(make_body: MakeBody, 
     assert point.slip_rate == pytest.approx(tangent @ later, abs=1e-14)
 
 
-@given(seed=SEEDS, count=st.integers(1, 8))
+@given(seed=SEEDS, count=st.integers(1, 2))
 def test_inverse_masses_are_those_of_the_jacobian(make_body: MakeBody, seed: int, count: int) -> None:
     a, b, points = scene(make_body, seed, count)
     masses = [a.inverse_mass] * 2 + [a.inverse_inertia] + [b.inverse_mass] * 2 + [b.inverse_inertia]
-    for write, along in ((normal_masses, 0), (shear_masses, 1)):
-        out = np.zeros((SLOTS, SLOTS))
-        write(points, count, a, b, out)
+    for direction, along in ((NORMAL, 0), (SHEAR, 1)):
+        out = np.zeros((2, 2))
+        inverse_masses(points, count, direction, a, b, out)
         rows = np.array([jacobian(point, a, b, directions(point)[along]) for point in points[:count]])
         assert out[:count, :count] == pytest.approx((rows * masses) @ rows.T, rel=1e-10, abs=1e-10)
 

@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.linalg import sqrtm
 
 from blocksim.kernels.matrices import (
     RANK_TOLERANCE,
+    cholesky,
     inverse_root,
     inverse_root_2,
-    inverse_root_n,
+    inverse_three_halves,
+    multiply,
+    multiply_transposed,
     solve_in_place,
 )
 
@@ -26,34 +28,47 @@ def positive(n: int, rank: int, seed: int) -> np.ndarray:
     return np.asarray(0.5 * (matrix + matrix.T))
 
 
-def pseudo_inverse_root(matrix: np.ndarray) -> np.ndarray:
+def power(matrix: np.ndarray, exponent: float) -> np.ndarray:
+    """Return a power of a symmetric matrix over its range."""
     values, vectors = np.linalg.eigh(matrix)
     kept = values > RANK_TOLERANCE * values.max()
-    return np.asarray((vectors[:, kept] / np.sqrt(values[kept])) @ vectors[:, kept].T)
+    return np.asarray((vectors[:, kept] * values[kept] ** exponent) @ vectors[:, kept].T)
 
 
-def root_by_jacobi(matrix: np.ndarray) -> np.ndarray:
-    n = len(matrix)
-    out = np.zeros((8, 8))
-    work = np.zeros((8, 8))
-    work[:n, :n] = matrix
-    inverse_root_n(work, np.zeros((8, 8)), out, n)
-    assert not out[n:].any()
-    return out[:n, :n]
+def by_jacobi(matrix: np.ndarray) -> np.ndarray:
+    out = np.zeros((3, 3))
+    inverse_three_halves(matrix.copy(), np.zeros((3, 3)), out)
+    return out
 
 
-@pytest.mark.parametrize("n", range(1, 9))
-@given(seed=SEEDS)
-def test_inverse_root_of_any_size_agrees_with_eigenvalues(n: int, seed: int) -> None:
-    for rank in {n, max(1, n - 1), min(n, 3)}:
-        matrix = positive(n, rank, seed)
-        assert root_by_jacobi(matrix) == pytest.approx(pseudo_inverse_root(matrix), abs=1e-12)
+@given(seed=SEEDS, rank=st.integers(1, 3))
+def test_power_of_three_agrees_with_eigenvalues(seed: int, rank: int) -> None:
+    matrix = positive(3, rank, seed)
+    assert by_jacobi(matrix) == pytest.approx(power(matrix, -1.5), abs=1e-12)
 
 
 @given(seed=SEEDS)
-def test_inverse_root_is_the_inverse_of_the_matrix_root(seed: int) -> None:
-    matrix = positive(4, 4, seed)
-    assert root_by_jacobi(matrix) == pytest.approx(np.linalg.inv(sqrtm(matrix)), abs=1e-11)
+def test_power_of_three_squared_is_the_inverse_cube(seed: int) -> None:
+    matrix = positive(3, 3, seed)
+    assert by_jacobi(matrix) @ by_jacobi(matrix) @ matrix @ matrix @ matrix == pytest.approx(np.eye(3), abs=1e-8)
+
+
+@given(seed=SEEDS)
+def test_lower_triangle_times_its_transpose_is_the_matrix(seed: int) -> None:
+    matrix, lower = positive(3, 3, seed), np.zeros((3, 3))
+    cholesky(matrix, lower)
+    assert lower @ lower.T == pytest.approx(matrix, rel=1e-12)
+    assert not np.triu(lower, 1).any()
+
+
+@given(seed=SEEDS)
+def test_products_agree_with_numpy(seed: int) -> None:
+    left, right = np.random.default_rng(seed).normal(size=(2, 3, 3))
+    out = np.zeros((3, 3))
+    multiply(left, right, out)
+    assert out == pytest.approx(left @ right, abs=1e-14)
+    multiply_transposed(left, right, out)
+    assert out == pytest.approx(left.T @ right, abs=1e-14)
 
 
 @given(seed=SEEDS, rank=st.integers(1, 2))
@@ -61,7 +76,7 @@ def test_closed_form_of_two_agrees_with_eigenvalues(seed: int, rank: int) -> Non
     matrix = positive(2, rank, seed)
     out = np.zeros((2, 2))
     inverse_root_2(matrix, out)
-    assert out == pytest.approx(pseudo_inverse_root(matrix), abs=1e-12)
+    assert out == pytest.approx(power(matrix, -0.5), abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -70,14 +85,14 @@ def test_closed_form_of_two_agrees_with_eigenvalues(seed: int, rank: int) -> Non
 def test_special_matrices_of_two_agree_with_eigenvalues(matrix: np.ndarray) -> None:
     out = np.zeros((2, 2))
     inverse_root_2(matrix, out)
-    assert out == pytest.approx(pseudo_inverse_root(matrix), abs=1e-14)
+    assert out == pytest.approx(power(matrix, -0.5), abs=1e-14)
 
 
 def test_zero_matrix_has_the_root_zero_not_infinity() -> None:
     out = np.ones((2, 2))
     inverse_root_2(np.zeros((2, 2)), out)
     assert not out.any()
-    assert not root_by_jacobi(np.zeros((3, 3))).any()
+    assert not by_jacobi(np.zeros((3, 3))).any()
 
 
 def test_eigenvalues_below_the_rank_tolerance_count_as_zero() -> None:

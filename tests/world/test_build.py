@@ -19,6 +19,7 @@ from blocksim.world.build import (
     with_more_room,
 )
 from blocksim.world.restitution import damping_ratio
+from blocksim.world.stable_step import Load
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -103,7 +104,7 @@ def test_rest_is_looked_for_only_where_it_may_stop_the_run() -> None:
 def test_automatic_step_is_the_admissible_one_and_follows_safety_and_stiffness() -> None:
     world = build_world(scenario())
     step = float(world.controls[0].step)
-    assert step == admissible_step(world.bodies, world.interactions, 0.05)
+    assert step == admissible_step(world.bodies, world.interactions, 0.05, "linear", Load(0.0, 0.0))
     assert build_world(scenario(time={"safety": 0.025})).controls[0].step == pytest.approx(step / 2)
     assert build_world(scenario(contact={"stiffness_scale": 0.01})).controls[0].step == pytest.approx(10 * step)
     strong = damping_ratio(0.0)
@@ -160,7 +161,7 @@ def test_more_room_keeps_what_there_is() -> None:
 
 
 def test_empty_lists_hold_no_contact() -> None:
-    lists = empty_lists(5)
+    lists = empty_lists(5, 8)
     assert len(lists["pairs"]) == 5
     assert (lists["slots"].face == NO_FACE).all()
     assert (lists["spare_slots"].face == NO_FACE).all()

@@ -6,25 +6,37 @@ keeps numba's disk cache valid, which jitted functions passed as arguments do no
 """
 
 from blocksim.kernels.jit import kernel
-from blocksim.kernels.laws import linear
+from blocksim.kernels.laws import hertz_mindlin, linear
 
-LINEAR = 0
-LAW_CODES = {"linear": LINEAR}
+LINEAR, HERTZ_MINDLIN = range(2)
+LAW_CODES = {"linear": LINEAR, "hertz-mindlin": HERTZ_MINDLIN}
 
 
 @kernel
 def elastic_force(law: int, stiffness: float, depth: float) -> float:
     """Return the normal spring force (N) at an overlap (m)."""
+    if law == HERTZ_MINDLIN:
+        return hertz_mindlin.elastic_force(stiffness, depth)
     return linear.elastic_force(stiffness, depth)
 
 
 @kernel
 def tangent_stiffness(law: int, stiffness: float, depth: float) -> float:
     """Return the slope of the normal spring force (N/m) at an overlap (m)."""
+    if law == HERTZ_MINDLIN:
+        return hertz_mindlin.tangent_stiffness(stiffness, depth)
     return linear.tangent_stiffness(stiffness, depth)
 
 
 @kernel
 def stored_energy(law: int, stiffness: float, depth: float) -> float:
     """Return the energy (J) stored in the normal spring at an overlap (m)."""
+    if law == HERTZ_MINDLIN:
+        return hertz_mindlin.stored_energy(stiffness, depth)
     return linear.stored_energy(stiffness, depth)
+
+
+@kernel
+def has_constant_stiffness(law: int) -> bool:
+    """Tell whether the slope of the normal force is the same at every overlap."""
+    return law == LINEAR

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from blocksim.kernels.arrays import NO_FACE, POINT, SLOT, SLOTS, zeros
 from blocksim.kernels.geometry import ground_gap, separation, to_world
-from blocksim.kernels.surface import (
+from blocksim.kernels.models.surface import (
     CONE_TOLERANCE,
     block_points,
     corner_signs,
@@ -145,7 +145,7 @@ def test_aligned_blocks_keep_the_deeper_corner_without_history(make_body: MakeBo
 @given(y=st.floats(-0.01, 0.03), angle=st.floats(-7.0, 7.0))
 def test_corners_below_the_ground_touch_it(make_body: MakeBody, y: float, angle: float) -> None:
     body, points = make_body(0.4, y, angle), zeros(SLOTS, POINT)
-    count = ground_points(body, 4, ALL, points)
+    count = ground_points(body, 4, ALL, 0.0, points)
     heights = [corner_of(body, k)[1] for k in range(4)]
     assert [point.slot for point in points[:count]] == [k for k in range(4) if heights[k] < 0.0]
     for point in points[:count]:

@@ -2,7 +2,7 @@
 
 import math
 
-from blocksim.kernels.arrays import HALF, NO_FACE, Integers, Record, Records
+from blocksim.kernels.arrays import ALL, HALF, NO_FACE, SLOTS, Integers, Record, Records, World
 from blocksim.kernels.geometry import relative_pose, to_world
 from blocksim.kernels.jit import kernel, rare_kernel
 
@@ -15,6 +15,11 @@ CONE_TOLERANCE = 0.2
 PARALLEL = 0.9
 BESIDE_SHARE = 0.1  # of the half diagonal; a face farther than that below a corner is not beside it
 CLOSE = 8.0  # overlaps; two corners nearer than that meet in one place
+
+# A piece of ground is a slab of which only the upper face counts. Near a convex joint a corner may lie in the end of a
+# slab, where the next one bears it; at most this many times deeper below the face than behind the end it still touches.
+END_RATIO = 3.0
+UPPER_FACE = 1
 
 
 @kernel
@@ -73,6 +78,17 @@ def corner_signs(corner: int) -> tuple[float, float]:
     return 1.0 if corner == 1 or corner == 2 else -1.0, 1.0 if corner >= 2 else -1.0
 
 
+@rare_kernel
+def slab_overlap(px: float, py: float, slab: Record, sx: float, sy: float, c: float, s: float) -> float:
+    """Return the overlap (m) of a corner with the upper face of a slab; zero where it does not touch it.
+
+    The arguments are those of `face_below_corner`.
+    """
+    depth = slab.half_y - py
+    behind_end = slab.half_x - abs(px)
+    return depth if opens(UPPER_FACE, sx, sy, c, s) and depth <= END_RATIO * behind_end else 0.0
+
+
 @kernel
 def add_corner(
     owner: Record, touched: Record, corner: int, x0: float, y0: float, c: float, s: float, points: Records, count: int
@@ -86,7 +102,10 @@ def add_corner(
     py = y0 + sx * s * owner.half_x + sy * c * owner.half_y
     if abs(px) > touched.half_x or abs(py) > touched.half_y:
         return count
-    face, depth, beside = face_below_corner(px, py, touched, sx, sy, c, s)
+    if touched.faces == ALL:
+        face, depth, beside = face_below_corner(px, py, touched, sx, sy, c, s)
+    else:
+        face, depth, beside = UPPER_FACE, slab_overlap(px, py, touched, sx, sy, c, s), math.inf
     if depth <= 0.0:
         return count
     point = points[count]
@@ -100,13 +119,13 @@ def add_corner(
 
 
 @kernel
-def ground_points(owner: Record, corners: int, candidates: Integers, points: Records) -> int:
-    """Collect the candidate corners of `owner` below y = 0. Return how many there are."""
+def ground_points(owner: Record, near: int, candidates: Integers, level: float, points: Records) -> int:
+    """Collect the candidate corners of `owner` below the ground, y < level (m). Return how many there are."""
     count = 0
-    for m in range(corners):
+    for m in range(near):
         sx, sy = corner_signs(candidates[m])
         x, y = to_world(owner, sx * owner.half_x, sy * owner.half_y)
-        if y < 0.0:
+        if y < level:
             point = points[count]
             point.slot = candidates[m]
             point.face = 1
@@ -114,7 +133,7 @@ def ground_points(owner: Record, corners: int, candidates: Integers, points: Rec
             point.y = y
             point.nx = 0.0
             point.ny = 1.0
-            point.depth = -y
+            point.depth = level - y
             point.beside = math.inf
             count += 1
     return count
@@ -211,12 +230,12 @@ def drop_twins(a: Record, b: Record, slots: Records, points: Records, count: int
 
 
 @kernel
-def block_points(a: Record, b: Record, corners: int, candidates: Integers, slots: Records, points: Records) -> int:
+def block_points(a: Record, b: Record, near: int, candidates: Integers, slots: Records, points: Records) -> int:
     """Fill `points` with the contact points of two blocks and return how many there are (at most SLOTS)."""
     x0, y0, c, s = relative_pose(a, b)
     count = 0
     of_a = 0
-    for m in range(corners):
+    for m in range(near):
         if candidates[m] < HALF:
             count = add_corner(a, b, candidates[m], x0, y0, c, s, points, count)
             of_a = count
@@ -233,3 +252,67 @@ def block_points(a: Record, b: Record, corners: int, candidates: Integers, slots
     if of_a > 0 and count > of_a:
         count = drop_twins(a, b, slots, points, count)
     return count
+
+
+@kernel
+def find_points(world: World, p: int) -> int:
+    """Find the contact points of pair p and return how many there are."""
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    if pair.b == world.bodies.size - 1:
+        return ground_points(a, pair.near, world.candidates[p], b.y, world.points)
+    return block_points(a, b, pair.near, world.candidates[p], world.slots[p], world.points)
+
+
+@rare_kernel
+def corner_height(body: Record, corner: int) -> float:
+    """Return the height (m) of one corner over y = 0."""
+    sx, sy = corner_signs(corner)
+    return body.y + body.sin * sx * body.half_x + body.cos * sy * body.half_y
+
+
+@rare_kernel
+def is_near(world: World, a: int, b: int, k: int, reach: float) -> bool:
+    """Tell whether the corner of slot k of a pair may come into contact: it is within `reach` (m) of the other body."""
+    one = world.bodies[a]
+    two = world.bodies[b]
+    if b == world.bodies.size - 1:
+        return k < HALF and corner_height(one, k) <= two.y + reach
+    if k < HALF:
+        return (one.corners >> k) & 1 == 1 and lies_near(one, two, k, reach)
+    return (two.corners >> (k - HALF)) & 1 == 1 and lies_near(two, one, k - HALF, reach)
+
+
+@rare_kernel
+def near_slots(world: World, a: int, b: int, reach: float, out: Integers) -> int:
+    """Write the slots of a pair whose corners are near into `out` and return how many there are."""
+    count = 0
+    for k in range(SLOTS):
+        if is_near(world, a, b, k, reach):
+            out[count] = k
+            count += 1
+    return count
+
+
+@rare_kernel
+def slot_normal(k: int, face: int, a: Record, b: Record, ground: bool) -> tuple[float, float]:
+    """Return the normal, from b to a, of a contact in slot k with a face of the other body."""
+    if ground:
+        return 0.0, 1.0
+    if k < HALF:
+        return face_normal(face, b)
+    nx, ny = face_normal(face, a)
+    return -nx, -ny
+
+
+@rare_kernel
+def place_ended(world: World, p: int, k: int, point: Record) -> None:
+    """Set place and normal of a contact that ends, as they are now."""
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    owner = a if k < HALF else b
+    sx, sy = corner_signs(k % HALF)
+    point.x, point.y = to_world(owner, sx * owner.half_x, sy * owner.half_y)
+    point.nx, point.ny = slot_normal(k, world.slots[p, k].face, a, b, pair.b == world.bodies.size - 1)

@@ -1,0 +1,53 @@
+"""Contact models (narrow phase) and the one place that knows them all.
+
+A model is one file with
+
+    find_points(world, p)              fill world.points with the contact points of pair p, return how many there are
+    near_slots(world, a, b, reach, out)   write the slots of a pair that may come into contact, return how many
+    place_ended(world, p, k, point)    set place and normal of a contact that has just ended
+
+one code here and one branch in each dispatcher below. How many slots a pair needs is said in world/boundary.py. All
+models share laws, friction, dashpots, history and the energy ledger.
+"""
+
+from blocksim.kernels.arrays import Integers, Record, World
+from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.models import particles, smoothed, surface
+
+SURFACE, PARTICLES, KERNEL = range(3)
+MODEL_CODES = {"surface": SURFACE, "particles": PARTICLES, "kernel": KERNEL}
+
+
+@kernel
+def contact_points(world: World, p: int) -> int:
+    """Find the contact points of pair p and return how many there are."""
+    model = world.controls[0].model
+    if model == KERNEL:
+        return smoothed.find_points(world, p)
+    if model == PARTICLES:
+        return particles.find_points(world, p)
+    return surface.find_points(world, p)
+
+
+@rare_kernel
+def near_slots(world: World, a: int, b: int, reach: float, out: Integers) -> int:
+    """Write the candidate slots of the pair of bodies a and b into `out` and return how many there are."""
+    model = world.controls[0].model
+    if model == KERNEL:
+        return smoothed.near_slots(world, a, b, reach, out)
+    if model == PARTICLES:
+        return particles.near_slots(world, a, b, reach, out)
+    return surface.near_slots(world, a, b, reach, out)
+
+
+@rare_kernel
+def place_ended(world: World, p: int, k: int, point: Record) -> None:
+    """Set place and normal of the contact in slot k of pair p, which has just ended."""
+    if world.controls[0].model == SURFACE:
+        surface.place_ended(world, p, k, point)
+    else:
+        slot = world.slots[p, k]
+        point.x = slot.x
+        point.y = slot.y
+        point.nx = slot.nx
+        point.ny = slot.ny

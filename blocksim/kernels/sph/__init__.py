@@ -1,0 +1,1 @@
+"""Smoothed particle hydrodynamics in the plane: smoothing functions."""
