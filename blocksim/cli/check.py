@@ -1,15 +1,21 @@
 """blocksim check: validate a scenario and show what it comes to."""
 
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 
 from blocksim.cli import options
-from blocksim.cli.output import answer, note, number, print_json, table_lines
+from blocksim.cli.output import GAP, answer, note, number, print_json, table_lines, width_of_screen
 from blocksim.cli.scenario import read_scenario
-from blocksim.scenario import PlacedBody, scenario_to_toml
+from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
+from blocksim.scenario.pairs import DEFAULT, MATERIALS
 from blocksim.study.single import check_experiment
 from blocksim.world.describe import Description, PairDescription, describe
 
 MOST_BODIES = 12
+NO_KEY = (DEFAULT, MATERIALS)
+LEAST_ROOM = 24
+HARD_SPACE = "\N{NO-BREAK SPACE}"
 MILLI = 1e3
 MEGA = 1e6
 
@@ -34,7 +40,7 @@ def check_command(
         print_json({"scenario": ready.model_dump(mode="json", by_alias=True), **_data(description)})
     elif not quiet:
         answer(scenario_to_toml(ready))
-        answer("\n\n".join("\n".join(lines) for lines in _tables(description)))
+        answer("\n\n".join("\n".join(lines) for lines in _tables(ready, description)))
         note(f"{ready.name}: valid")
 
 
@@ -43,28 +49,77 @@ def _data(description: Description) -> dict[str, object]:
     return {**asdict(description), "bodies": bodies}
 
 
-def _tables(description: Description) -> list[list[str]]:
-    bodies = description.bodies
-    body_columns = ("block", "x mm", "y mm", "along x", "upright", "depth mm", "mass kg", "inertia kg m²")
-    body_rows = table_lines(body_columns, [_body_cells(body) for body in bodies[:MOST_BODIES]])
-    if len(bodies) > MOST_BODIES:
-        body_rows.append(f"... and {len(bodies) - MOST_BODIES} more blocks")
-    pair_columns = ("pair", "μs", "μk", "e", "damping", "K normal", "K shear")
-    pair_rows = table_lines(pair_columns, [_pair_cells(pair) for pair in description.pairs])
+def _tables(scenario: Scenario, description: Description) -> list[list[str]]:
     return [
-        body_rows,
-        [*pair_rows, "μs static, μk kinetic friction; K in N/m, of one contact point (a face has two)"],
-        _cost(description),
+        _bodies(description.bodies),
+        _pairs(scenario, description.pairs),
+        _rules(description.pairs),
+        _cost(scenario, description),
     ]
 
 
-def _cost(description: Description) -> list[str]:
+def _bodies(bodies: Sequence[PlacedBody]) -> list[str]:
+    columns = ("block", "x mm", "y mm", "along x", "upright", "depth mm", "mass kg", "inertia kg m²")
+    lines = table_lines(columns, [_body_cells(body) for body in bodies[:MOST_BODIES]])
+    if len(bodies) > MOST_BODIES:
+        lines.append(f"... and {len(bodies) - MOST_BODIES} more blocks")
+    return lines
+
+
+def _pairs(scenario: Scenario, pairs: Sequence[PairDescription]) -> list[str]:
+    cells = [_pair_cells(pair) for pair in pairs]
+    if all(pair.shear_damping_ratio == pair.normal_damping_ratio for pair in pairs):
+        for row in cells:
+            del row["ζ shear"]
+    points = "a face has two" if scenario.contact.model == "surface" else "the particles of a face share 2 K"
     return [
-        f"boundary   {description.particles} particles (the surface model needs only the corners among them)",
+        *table_lines(list(cells[0]), [list(row.values()) for row in cells]),
+        "μs static and μk kinetic friction, e restitution, ζ damping ratio, k/K in shear,",
+        f"K stiffness in {pairs[0].stiffness_unit} of one contact point ({points})",
+    ]
+
+
+def _rules(pairs: Sequence[PairDescription]) -> list[str]:
+    """Tell which keys of the scenario decided, and for which pairs; the rest follows defaults and materials."""
+    found: dict[str, dict[str, None]] = {}
+    for pair in pairs:
+        for key in pair.rules.values():
+            if key not in NO_KEY:
+                found.setdefault(key, {})[" - ".join(pair.materials)] = None
+    room = max(LEAST_ROOM, width_of_screen() - len(GAP) - max(map(len, found), default=0))
+    rows = [cells for key in sorted(found, key=_specific_first) for cells in _wrapped(key, found[key], room)]
+    lines = table_lines(("set by", "for"), rows, left=2) if found else []
+    return [*lines, "where no key is named: defaults; stiffness from E and ν of the materials"]
+
+
+def _specific_first(key: str) -> bool:
+    return not key.startswith("pairs.")
+
+
+def _wrapped(key: str, pairs: Iterable[str], room: int) -> Iterator[tuple[str, str]]:
+    """Yield the rows for one key: its pairs, as many in a line as there is room (columns) for."""
+    lines = textwrap.wrap(", ".join(pair.replace(" ", HARD_SPACE) for pair in pairs), room)
+    for i, line in enumerate(lines):
+        yield ("" if i else key), line.replace(HARD_SPACE, " ")
+
+
+def _cost(scenario: Scenario, description: Description) -> list[str]:
+    return [
+        f"boundary   {description.particles} particles ({_use_of_particles(scenario.contact)})",
         f"time step  {description.step:.3e} s, at most {description.steps} steps",
         f"solving    at most about {description.seconds:.1f} s on one core",
         f"results    at most {description.frames} frames, about {description.bytes / MEGA:.1f} MB",
     ]
+
+
+def _use_of_particles(contact: Contact) -> str:
+    match contact.model:
+        case "surface":
+            return "the surface model needs only the corners among them"
+        case "kernel":
+            return f"{contact.kernel}, smoothing length {number(MILLI * contact.resolved_smoothing_length)} mm"
+        case _:
+            return f"at most {number(MILLI * contact.particle_spacing)} mm apart"
 
 
 def _body_cells(body: PlacedBody) -> tuple[str, ...]:
@@ -72,13 +127,14 @@ def _body_cells(body: PlacedBody) -> tuple[str, ...]:
     return (body.name, *(number(MILLI * v) for v in lengths), f"{body.mass:.5g}", f"{body.inertia:.5g}")
 
 
-def _pair_cells(pair: PairDescription) -> tuple[str, ...]:
-    return (
-        pair.pair,
-        f"{pair.static_friction:.3g}",
-        f"{pair.kinetic_friction:.3g}",
-        f"{pair.restitution:.3g}",
-        f"{pair.normal_damping_ratio:.3f}",
-        f"{pair.normal_stiffness:.2e}",
-        f"{pair.shear_stiffness:.2e}",
-    )
+def _pair_cells(pair: PairDescription) -> dict[str, str]:
+    return {
+        "pair": pair.pair,
+        "μs": f"{pair.static_friction:.3g}",
+        "μk": f"{pair.kinetic_friction:.3g}",
+        "e": f"{pair.restitution:.3g}",
+        "ζ": f"{pair.normal_damping_ratio:.3f}",
+        "ζ shear": f"{pair.shear_damping_ratio:.3f}",
+        "K": f"{pair.normal_stiffness:.2e}",
+        "k/K": f"{pair.shear_stiffness_ratio:.3f}",
+    }

@@ -7,7 +7,7 @@ from pathlib import Path
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.findings import Finding
-from blocksim.world.build import StepError
+from blocksim.world.step import StepError
 
 
 @contextmanager

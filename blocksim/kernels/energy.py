@@ -2,7 +2,7 @@
 
 import math
 
-from blocksim.kernels.arrays import NO_FACE, Floats, Record, World
+from blocksim.kernels.arrays import ALL, NO_FACE, Floats, Record, World
 from blocksim.kernels.integrate import kinetic_energy
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.laws import stored_energy
@@ -62,9 +62,9 @@ def measure(world: World, row: Floats) -> None:
 
 @rare_kernel
 def smallest_side(body: Record) -> float:
-    """Return the smaller side (m) of a body; infinite for the ground, which has none."""
+    """Return the smaller side (m) of a body; infinite for the ground and its pieces, which have none."""
     half = min(body.half_x, body.half_y)
-    return 2.0 * half if half > 0.0 else math.inf
+    return 2.0 * half if half > 0.0 and body.faces == ALL else math.inf
 
 
 @rare_kernel

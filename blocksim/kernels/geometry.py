@@ -7,6 +7,10 @@ from blocksim.kernels.jit import kernel
 
 SMALL_TURN = 1e-2
 
+# A piece of ground is a slab of which only the upper face counts. Near a convex joint a point may lie in the end of a
+# slab, where the next one bears it; at most this many times deeper below the face than behind the end it still touches.
+END_RATIO = 3.0
+
 
 @kernel
 def turn(cos: float, sin: float, angle: float) -> tuple[float, float]:
@@ -65,3 +69,10 @@ def ground_gap(body: Record) -> float:
 def to_world(body: Record, px: float, py: float) -> tuple[float, float]:
     """Return the world position of a point given in the frame of a body."""
     return body.x + body.cos * px - body.sin * py, body.y + body.sin * px + body.cos * py
+
+
+@kernel
+def slab_depth(px: float, py: float, slab: Record) -> float:
+    """Return how deep (m) a point, given in the frame of a slab of ground, lies below its upper face; zero outside."""
+    depth = slab.half_y - py
+    return depth if 0.0 < depth <= END_RATIO * (slab.half_x - abs(px)) else 0.0

@@ -2,16 +2,20 @@
 
 from blocksim.scenario.document import Document
 from blocksim.scenario.load import load_scenario, scenario_from_mapping
-from blocksim.scenario.models.contact import Contact, Friction, PairFriction, Restitution
-from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material
+from blocksim.scenario.models.boundary import Ground, Wall
+from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
+from blocksim.scenario.models.geometry import Block, BodySpec, Material
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
+from blocksim.scenario.pairs import GROUND, ResolvedPair, resolve_pair
 from blocksim.scenario.placement import PlacedBody, place_bodies
 from blocksim.scenario.resolved import scenario_hash, scenario_to_toml
 from blocksim.scenario.schema import json_schema
+from blocksim.scenario.segments import PlacedSegment, place_segments, surface_height
 
 __all__ = [
+    "GROUND",
     "Block",
     "BodySpec",
     "Contact",
@@ -21,16 +25,23 @@ __all__ = [
     "Ground",
     "Material",
     "Output",
+    "Pair",
     "PairFriction",
     "PlacedBody",
+    "PlacedSegment",
+    "ResolvedPair",
     "Restitution",
     "Scenario",
     "Sweep",
     "Time",
+    "Wall",
     "json_schema",
     "load_scenario",
     "place_bodies",
+    "place_segments",
+    "resolve_pair",
     "scenario_from_mapping",
     "scenario_hash",
     "scenario_to_toml",
+    "surface_height",
 ]

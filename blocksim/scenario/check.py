@@ -1,23 +1,20 @@
 """Everything that must hold before a scenario may be used."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 
 from pydantic import ValidationError
 
-from blocksim.scenario import keys, overlap
-from blocksim.scenario.findings import MAX_FINDINGS, Finding, did_you_mean_or_list, findings_of
+from blocksim.scenario import keys
+from blocksim.scenario.findings import MAX_FINDINGS, Finding, findings_of
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.study import Sweep
 from blocksim.scenario.overrides import Data, UnfitOverrideError, with_value
-from blocksim.scenario.placement import PlacedBody, placed_with_origin
 from blocksim.scenario.quantities import shown
-from blocksim.scenario.structures import UnfitError
+from blocksim.scenario.references import wrong_names
+from blocksim.scenario.start import impossible_starts
 
-MAX_BODIES = 100_000
-MAX_OVERLAPS = 20
 MAX_TRIED = 100
 MAX_VARIED = 100
 UNVARIED = ("schema", "name", "description", "experiment", "sweep", "provenance")
@@ -29,10 +26,10 @@ def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Finding]]:
     Mistakes of placement, such as overlapping bodies, can only be told once everything else is right.
     """
     scenario, findings = _validated(data, folder)
-    findings += islice(_references(data), MAX_FINDINGS)
+    findings += islice(wrong_names(data), MAX_FINDINGS)
     findings += [*_sweep(data), *_provenance(data)]
     if scenario is not None and not findings:
-        findings += _placement(scenario)
+        findings += impossible_starts(scenario)
     return (None if findings else scenario), findings
 
 
@@ -41,27 +38,6 @@ def _validated(data: Data, folder: Path) -> tuple[Scenario | None, list[Finding]
         return Scenario.model_validate(data, context={"folder": folder}), []
     except ValidationError as error:
         return None, findings_of(error, data)
-
-
-def _references(data: Data) -> Iterator[Finding]:
-    """Find names of blocks and materials that do not exist, and scenarios without a body."""
-    if data.get("structures", ()) == () and data.get("bodies", ()) == ():
-        yield Finding((), "nothing to simulate: add a [[structures]] or a [[bodies]] table")
-    blocks = data.get("blocks")
-    for name in blocks if isinstance(blocks, Mapping) else ():
-        yield from _reference(data, ("blocks", name, "material"), "materials")
-    yield from _reference(data, ("ground", "material"), "materials")
-    for group in ("structures", "bodies"):
-        entries = data.get(group)
-        for index in range(len(entries) if isinstance(entries, tuple) else 0):
-            yield from _reference(data, (group, index, "block"), "blocks")
-
-
-def _reference(data: Data, path: keys.KeyPath, group: str) -> Iterator[Finding]:
-    name, known = keys.follow(data, path), data.get(group)
-    if isinstance(name, str) and isinstance(known, Mapping) and name not in known:
-        hint = did_you_mean_or_list(name, known)
-        yield Finding(path, f"unknown {group.removesuffix('s')} {shown(name)}, {hint}")
 
 
 def _sweep(data: Data) -> Iterator[Finding]:
@@ -117,7 +93,7 @@ def _tried(
 def _single_mistakes(data: Data) -> list[Finding]:
     """List the mistakes of values by themselves."""
     _, findings = _validated(data, Path())
-    return [finding for finding in (*findings, *islice(_references(data), MAX_FINDINGS)) if not finding.relation]
+    return [finding for finding in (*findings, *islice(wrong_names(data), MAX_FINDINGS)) if not finding.relation]
 
 
 def _provenance(data: Data) -> Iterator[Finding]:
@@ -130,60 +106,3 @@ def _provenance(data: Data) -> Iterator[Finding]:
             path = ()
         if isinstance(text, str) and not (path and keys.is_known(path, data)):
             yield Finding(("provenance", key), f"{shown(key)} is no key of this scenario", at="key")
-
-
-def _placement(scenario: Scenario) -> Iterator[Finding]:
-    """Place all bodies and find what cannot be at the start."""
-    count = sum(structure.size for structure in scenario.structures) + len(scenario.bodies)
-    if count > MAX_BODIES:
-        yield Finding(("structures",), f"{count} bodies are too many; at most {MAX_BODIES} are possible")
-        return
-    unfit = list(_unfit_structures(scenario))
-    if unfit:
-        yield from unfit
-        return
-    origins, bodies = zip(*placed_with_origin(scenario), strict=True)
-    yield from _impossible_masses(scenario)
-    yield from _equal_names(origins, bodies)
-    yield from _below_ground(origins, bodies)
-    yield from _overlaps(origins, bodies)
-
-
-def _unfit_structures(scenario: Scenario) -> Iterator[Finding]:
-    for number, structure in enumerate(scenario.structures):
-        try:
-            structure.place(scenario.blocks[structure.block])
-        except UnfitError as error:
-            yield Finding(("structures", number, error.key), str(error))
-
-
-def _impossible_masses(scenario: Scenario) -> Iterator[Finding]:
-    """Find blocks whose sizes are possible numbers while their mass or inertia is not."""
-    for name, block in scenario.blocks.items():
-        mass = scenario.materials[block.material].density * block.size_x * block.size_y * block.depth
-        inertia = mass * (block.size_x * block.size_x + block.size_y * block.size_y) / 12.0
-        if not (0.0 < inertia < math.inf and 0.0 < mass < math.inf):
-            message = f"a block of {mass:g} kg and {inertia:g} kg m^2 cannot be simulated"
-            yield Finding(("blocks", name), f"{message}; check its sides and density")
-
-
-def _equal_names(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
-    seen: set[str] = set()
-    for origin, body in zip(origins, bodies, strict=True):
-        if body.name in seen:
-            message = f"two bodies are named {shown(body.name)}; a body without a name has its number"
-            yield Finding((*origin, "name"), message)
-        seen.add(body.name)
-
-
-def _below_ground(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
-    for origin, body in zip(origins, bodies, strict=True):
-        bottom = overlap.Rectangle.of(body).bottom
-        if bottom < -overlap.TOLERANCE:
-            yield Finding(origin, f"body {body.name} reaches {-bottom * 1e3:.6g} mm below the ground (y = 0)")
-
-
-def _overlaps(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
-    for first, second, depth in islice(overlap.overlapping_pairs(bodies), MAX_OVERLAPS):
-        names = f"bodies {bodies[first].name} and {bodies[second].name}"
-        yield Finding(origins[second], f"{names} overlap by {depth * 1e3:.6g} mm; they may touch, no more")

@@ -62,7 +62,7 @@ def _finding(entry: ErrorDetails, data: object) -> Finding:
         case "blocksim":
             context = entry["ctx"]
             key = context["key"]
-            known = (*path, key) if key else path
+            known = (*path, *key)
             return Finding(_existing(known, data), context["message"], relation=bool(key))
         case _:
             return Finding(_existing(path, data), _wrong_type(entry, path))
@@ -134,7 +134,9 @@ def _wrong_type(entry: ErrorDetails, path: KeyPath) -> str:
             double = f"; write [{path[-1]}] with single brackets" if isinstance(value, list | tuple) else ""
             return f"{shown(value)} is not a table{double}"
         case "tuple_type":
-            double = f"; write [[{path[-1]}]] with double brackets" if isinstance(value, Mapping) else ""
+            double = (
+                f"; write [[{path[-1]}]] with double brackets" if isinstance(value, Mapping) and len(path) == 1 else ""
+            )
             return f"{shown(value)} is not a list{double}"
         case "too_long":
             return f"this list is too long; {TWO_VALUES}"

@@ -15,6 +15,9 @@ from blocksim.scenario.structures import KINDS, Structure
 KeyPath = tuple[str | int, ...]
 """A place in a scenario, such as ("structures", 0, "overlap")."""
 
+NAMED: dict[str | int, int] = {"materials": 2, "blocks": 2, "structures": 2, "bodies": 2, "walls": 2, "pairs": 3}
+"""Tables of named or numbered entries: how many parts of a path lead to one entry."""
+
 MISSING = object()
 """What `follow` returns where there is nothing."""
 
@@ -101,9 +104,12 @@ def field_at(path: Sequence[str | int], data: object) -> FieldInfo | None:
 
 
 def is_known(path: Sequence[str | int], data: object) -> bool:
-    """Tell whether the models have a place for this path (blocks and materials must be in `data`)."""
-    if len(path) in (1, 2) and path[0] in ("materials", "blocks", "structures", "bodies"):
-        return follow(data, path) is not MISSING
+    """Tell whether the models have a place for this path (what has a name or number must be in `data`)."""
+    named = NAMED.get(path[0], 0)
+    if named and follow(data, path[:named]) is MISSING:
+        return False
+    if len(path) <= named:
+        return True
     return field_at(path, data) is not None or (
         isinstance(path[-1], int) and follow(data, path) is not MISSING and field_at(path[:-1], data) is not None
     )

@@ -1,4 +1,4 @@
-"""Which placed rectangles overlap, and which reach below the ground, exactly (separating axes)."""
+"""Which placed rectangles overlap, and which reach into the ground or a wall, exactly (separating axes)."""
 
 import math
 from bisect import bisect_right
@@ -6,9 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from blocksim.scenario.placement import PlacedBody
-
-TOLERANCE = 1e-9
-"""m; touching blocks may overlap by this much round-off."""
+from blocksim.scenario.segments import TOLERANCE, PlacedSegment
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +25,13 @@ class Rectangle:
         """Take the outline of a placed body."""
         cosine, sine = math.cos(body.angle), math.sin(body.angle)
         return cls(body.x, body.y, body.size_x / 2, body.size_y / 2, cosine, sine)
+
+    @classmethod
+    def between(cls, x0: float, y0: float, x1: float, y1: float) -> "Rectangle":
+        """Take a straight piece as a rectangle without height."""
+        length = math.hypot(x1 - x0, y1 - y0)
+        middle_x, middle_y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+        return cls(middle_x, middle_y, 0.5 * length, 0.0, (x1 - x0) / length, (y1 - y0) / length)
 
     @property
     def axes(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -59,6 +64,18 @@ def overlapping_pairs(bodies: Sequence[PlacedBody]) -> Iterator[tuple[int, int, 
         depth = penetration(rectangles[i], rectangles[j])
         if depth > TOLERANCE:
             yield min(i, j), max(i, j), depth
+
+
+def crossings(bodies: Sequence[PlacedBody], segments: Sequence[PlacedSegment]) -> Iterator[tuple[int, int, float]]:
+    """Yield the body, the segment and the depth (m) where a body lies across a segment."""
+    outlines = [Rectangle.of(body) for body in bodies]
+    pieces = [Rectangle.between(piece.x0, piece.y0, piece.x1, piece.y1) for piece in segments]
+    for i, j in _near_pairs([*outlines, *pieces]):
+        body, piece = min(i, j), max(i, j) - len(bodies)
+        if body < len(bodies) and piece >= 0:
+            depth = penetration(outlines[body], pieces[piece])
+            if depth > TOLERANCE:
+                yield body, piece, depth
 
 
 def _near_pairs(rectangles: Sequence[Rectangle]) -> Iterator[tuple[int, int]]:

@@ -5,8 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from blocksim.scenario.findings import did_you_mean_or_list
-from blocksim.scenario.keys import MISSING, KeyPath, format_key, parse_key, read_key, skip_blank
+from blocksim.scenario.keys import MISSING, KeyPath, follow, format_key, parse_key, read_key, skip_blank
 from blocksim.scenario.models.contact import Friction
+from blocksim.scenario.pairs import GROUND
 from blocksim.scenario.quantities import shown
 
 Data = Mapping[str, object]
@@ -89,7 +90,8 @@ def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tup
     """Return data with one value set, and the path that was set; raises UnfitOverrideError.
 
     Tables on the way are made where they are missing. A bare friction c becomes { static = c }, whose kinetic
-    part follows the static one until it is set; a bare restitution becomes a table of both.
+    part follows the static one until it is set; the friction of a pair of materials starts as that of all pairs; a bare
+    restitution becomes a table of both.
     """
     try:
         parts = parse_key(key) if isinstance(key, str) else tuple(key)
@@ -97,9 +99,28 @@ def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tup
         message = f"{shown(key)} is not a dotted key"
         raise UnfitOverrideError(message) from None
     path: list[str | int] = []
-    result = _put(data, parts, frozen(value), path)
+    where = _in_given_order(data, parts)
+    result = _put(_with_own_friction(data, where), where, frozen(value), path)
     assert isinstance(result, Mapping)  # noqa: S101 - data is a mapping, so is its copy
     return result, tuple(path)
+
+
+def _in_given_order(data: Data, parts: Sequence[str | int]) -> Sequence[str | int]:
+    """Turn pairs.B.A round where the data have pairs.A.B: it is the same pair."""
+    if parts[0] != "pairs" or len(parts) < 3 or follow(data, parts[:3]) is not MISSING:  # noqa: PLR2004 - pairs.A.B
+        return parts
+    turned = (parts[0], parts[2], parts[1])
+    return parts if follow(data, turned) is MISSING else (*turned, *parts[3:])
+
+
+def _with_own_friction(data: Data, parts: Sequence[str | int]) -> Data:
+    """Give a pair of materials the general friction to start from, before something in its own is set."""
+    inside_friction = parts[0] == "pairs" and tuple(parts[3:4]) == ("friction",) and len(parts) > 4  # noqa: PLR2004
+    if not inside_friction or follow(data, parts[:4]) is not MISSING:
+        return data
+    side = "block_ground" if GROUND in parts[1:3] else "block_block"
+    general = follow(data, ("friction", side))
+    return with_value(data, parts[:4], getattr(_FRICTION, side).static if general is MISSING else general)[0]
 
 
 def _put(node: object, parts: Sequence[str | int], value: object, done: list[str | int]) -> object:
@@ -142,4 +163,6 @@ def _opened(path: KeyPath, child: object) -> object:
         if child is MISSING:
             return {"static": getattr(_FRICTION, str(path[-1])).static}
         return {"static": child} if bare else child
+    if path[:1] == ("pairs",) and path[3:] == ("friction",) and bare:
+        return {"static": child}
     return {} if child is MISSING else child

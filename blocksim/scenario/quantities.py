@@ -42,8 +42,8 @@ def shown(value: object) -> str:
     return text
 
 
-def invalid(message: str, key: str = "") -> PydanticCustomError:
-    """Build the error that carries a finished message through pydantic; `key` names the guilty key."""
+def invalid(message: str, *key: str | int) -> PydanticCustomError:
+    """Build the error that carries a finished message through pydantic; `key` is the path of the guilty key."""
     return PydanticCustomError("blocksim", "{message}", {"message": message, "key": key})
 
 

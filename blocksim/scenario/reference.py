@@ -11,8 +11,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from blocksim.scenario.models.contact import Contact, Friction, PairFriction, Restitution
-from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material
+from blocksim.scenario.models.boundary import Ground, Wall
+from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
+from blocksim.scenario.models.geometry import Block, BodySpec, Material
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
@@ -34,8 +35,10 @@ def key_table() -> str:
         *((f'structures, kind = "{kind}"', model) for kind, model in KINDS.items()),
         ("bodies", BodySpec),
         ("ground", Ground),
+        ("walls", Wall),
         ("friction", Friction),
         ("friction.PAIR", PairFriction),
+        ("pairs.A.B", Pair),
         ("contact", Contact),
         ("contact.restitution", Restitution),
         ("time", Time),
@@ -57,7 +60,7 @@ def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
     place = prefix.partition(",")[0]
     note = prefix.partition(", ")[2]
     for name, info in model.model_fields.items():
-        if name == "kind" or (_is_table(info) and model not in {Friction, Sweep} and name != "provenance"):
+        if name == "kind" or (_is_table(info) and model not in {Friction, Pair, Sweep} and name != "provenance"):
             continue
         key = f"{place}.{info.alias or name}" if place else (info.alias or name)
         if model is Sweep and name == "vary":

@@ -57,7 +57,7 @@ class Recorder:
             return
         row = np.zeros(len(MEASURED))
         measure(world, row)
-        motion = np.stack([world.bodies[name][:-1] for name in MOTION])
+        motion = np.stack([world.bodies[name][: len(self.placed)] for name in MOTION])
         self.steps.append(step)
         self.motion.append(motion)
         self.measured.append(row)

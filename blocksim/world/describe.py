@@ -1,32 +1,38 @@
 """What a scenario comes to before it runs: masses, pair parameters, step, cost and size of the results."""
 
 from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from blocksim.kernels.arrays import World
-from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.kernels.arrays import Record, World
+from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, place_bodies
 from blocksim.world.boundary import particle_count
 from blocksim.world.build import build_world
-from blocksim.world.interactions import ContactClass, contact_classes
+from blocksim.world.interactions import ContactClass, contact_classes, pair_of
 
 # measured on one core: a step costs about this for every body with its contacts (three to a hundred blocks)
 SECONDS_PER_BODY_AND_STEP = 75e-9
 FRAME_BYTES = 80
 BODY_FRAME_BYTES = 48
+STIFFNESS_UNITS = {"linear": "N/m", "hertz-mindlin": "N/m^1.5"}
 
 
 @dataclass(frozen=True)
 class PairDescription:
-    """Contact parameters of one kind of pair, SI."""
+    """Contact parameters of one kind of pair, SI, and the keys of the scenario that decided them."""
 
     pair: str
+    materials: tuple[str, str]  # without the depth that `pair` may name
     static_friction: float
     kinetic_friction: float
+    transition_speed: float  # m/s
     restitution: float
     normal_damping_ratio: float
     shear_damping_ratio: float
-    normal_stiffness: float  # N/m, of one contact point
-    shear_stiffness: float  # N/m
+    normal_stiffness: float  # of one contact point, in `stiffness_unit`
+    stiffness_unit: str  # N/m, with the law of Hertz N/m^1.5
+    shear_stiffness_ratio: float  # shear stiffness over (tangent) normal stiffness
+    rules: Mapping[str, str]  # quantity and what decided it, as in ResolvedPair
 
 
 @dataclass(frozen=True)
@@ -52,7 +58,7 @@ def describe(scenario: Scenario) -> Description:
     frames = min(steps, round(scenario.time.end / scenario.output.every)) + 1
     return Description(
         bodies=placed,
-        pairs=_pairs(scenario, world, placed),
+        pairs=tuple(_pairs(scenario, world, placed)),
         step=step,
         steps=steps,
         frames=frames,
@@ -68,34 +74,44 @@ def _particles(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> int:
     return sum(count * particle_count(*size, spacing) for size, count in sizes.items())
 
 
-def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> tuple[PairDescription, ...]:
+def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> Iterator[PairDescription]:
+    """Yield every pair of classes that can touch: blocks with the ground, with walls and with blocks."""
     classes = contact_classes(scenario, placed)
     names = _class_names(classes)
-    found = []
-    for i in range(1, len(classes)):
-        for j in range(i + 1):
-            row = world.interactions[i, j]
-            restitution = scenario.contact.restitution
-            found.append(
-                PairDescription(
-                    pair=f"{names[i]} - {names[j]}",
-                    static_friction=float(row.static_friction),
-                    kinetic_friction=float(row.kinetic_friction),
-                    restitution=restitution.block_ground if j == 0 else restitution.block_block,
-                    normal_damping_ratio=float(row.normal_damping),
-                    shear_damping_ratio=float(row.shear_damping),
-                    normal_stiffness=float(row.normal_stiffness),
-                    shear_stiffness=float(row.shear_stiffness),
-                )
-            )
-    return tuple(found)
+    for i, block in enumerate(classes):
+        for j, other in enumerate(classes):
+            if not block.is_ground and (other.is_ground or j <= i):
+                materials = (str(block.material), names[j] if other.is_ground else str(other.material))
+                pair, row = pair_of(scenario, block, other), world.interactions[i, j]
+                yield _pair((names[i], names[j]), materials, pair, row, scenario.contact.law)
+
+
+def _pair(
+    names: tuple[str, str], materials: tuple[str, str], pair: ResolvedPair, row: Record, law: str
+) -> PairDescription:
+    return PairDescription(
+        pair=" - ".join(names),
+        materials=materials,
+        static_friction=float(row.static_friction),
+        kinetic_friction=float(row.kinetic_friction),
+        transition_speed=float(row.transition_speed),
+        restitution=pair.restitution,
+        normal_damping_ratio=float(row.normal_damping),
+        shear_damping_ratio=float(row.shear_damping),
+        normal_stiffness=float(row.normal_stiffness),
+        stiffness_unit=STIFFNESS_UNITS[law],
+        shear_stiffness_ratio=float(row.shear_ratio),
+        rules=pair.rules,
+    )
 
 
 def _class_names(classes: tuple[ContactClass, ...]) -> list[str]:
     """Return names for people: the material, and the depth where blocks of one material differ in it."""
-    materials = [one.material for one in classes[1:]]
-    names = [
-        f"{one.material} {1e3 * one.depth:g} mm" if materials.count(one.material) > 1 else str(one.material)
-        for one in classes[1:]
-    ]
-    return ["ground", *names]
+    blocks = [one.material for one in classes if not one.is_ground]
+    return [GROUND, *(_class_name(one, blocks.count(one.material)) for one in classes[1:])]
+
+
+def _class_name(one: ContactClass, count: int) -> str:
+    if one.is_wall:
+        return f"wall of {one.material}"
+    return f"{one.material} {1e3 * one.depth:g} mm" if count > 1 else str(one.material)

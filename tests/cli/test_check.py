@@ -37,6 +37,92 @@ def test_blocks_of_two_depths_are_told_apart(blocksim: Command, tmp_path: Path) 
     assert "aluminium 200 mm - aluminium 50 mm" in answer.out
 
 
+TWO_MATERIALS = """
+[materials.oak]
+density = 700
+young_modulus = "11 GPa"
+poisson_ratio = 0.3
+
+[blocks.plank]
+width = "100 mm"
+height = "20 mm"
+length = "50 mm"
+material = "oak"
+
+[[bodies]]
+block = "plank"
+x = 1
+y = "10 mm"
+
+[pairs.oak.ground]
+friction = { static = "30 deg", kinetic = 0.4 }
+
+[pairs.aluminium.oak]
+restitution = 0.05
+"""
+
+
+@pytest.fixture
+def two_materials(tmp_path: Path) -> str:
+    text = (tmp_path / "scenarios" / "slide.toml").read_text()
+    (tmp_path / "two.toml").write_text(text + TWO_MATERIALS)
+    return "two.toml"
+
+
+def test_the_keys_that_decided_are_told_with_their_pairs(blocksim: Command, two_materials: str) -> None:
+    answer = blocksim("check", two_materials)
+    told = answer.out[answer.out.index("set by") : answer.out.index("where no key")]
+    assert told == TOLD.lstrip("\n")
+    tables = answer.out[answer.out.index("block  ") :]
+    assert max(map(len, tables.splitlines())) <= 80
+
+
+TOLD = """
+set by                            for
+────────────────────────────────  ────────────────────────────────
+pairs.oak.ground.friction         oak - ground
+pairs.aluminium.oak.restitution   oak - aluminium
+friction.block_ground             aluminium - ground
+contact.restitution.block_ground  aluminium - ground, oak - ground
+contact.restitution.block_block   aluminium - aluminium, oak - oak
+"""
+
+
+def test_json_has_the_rule_of_every_cell(blocksim: Command, two_materials: str) -> None:
+    pairs = {pair["pair"]: pair for pair in json.loads(blocksim("check", two_materials, "--json").out)["pairs"]}
+    assert set(pairs) == {
+        "aluminium - ground",
+        "aluminium - aluminium",
+        "oak - ground",
+        "oak - aluminium",
+        "oak - oak",
+    }
+    oak = pairs["oak - ground"]
+    assert (oak["static_friction"], oak["kinetic_friction"]) == (pytest.approx(3**-0.5), 0.4)
+    assert pairs["oak - aluminium"]["restitution"] == 0.05
+    assert oak["rules"] == {
+        "friction": "pairs.oak.ground.friction",
+        "restitution": "contact.restitution.block_ground",
+        "normal_stiffness": "materials",
+        "shear_stiffness_ratio": "materials",
+        "shear_damping_ratio": "default",
+    }
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("contact.law=hertz-mindlin", "K stiffness in N/m^1.5 of one contact point (a face has two)"),
+        ("contact.law=linear", "K stiffness in N/m of one contact point (a face has two)"),
+        ("contact.model=kernel", "492 particles (wendland-c2, smoothing length 1.30 mm)"),
+        ("contact.model=particles", "492 particles (at most 1.00 mm apart)"),
+        ("contact.model=particles", "of one contact point (the particles of a face share 2 K)"),
+    ],
+)
+def test_law_and_model_are_told(blocksim: Command, setting: str, told: str) -> None:
+    assert told in blocksim("check", "scenarios/three_blocks_nominal.toml", "--set", setting).out
+
+
 def test_json_has_masses_pairs_and_cost(blocksim: Command) -> None:
     answer = blocksim("check", "scenarios/three_blocks_nominal.toml", "--json")
     data = json.loads(answer.out)

@@ -101,7 +101,7 @@ bad.toml:22: time.safty: unknown key, did you mean 'safety'?
         "count = 3",
         'count = 3\noverlap = "10 mm"',
         """
-bad.toml:19: structures.0.overlap: unknown key, allowed are: block, kind, count, left, offset
+bad.toml:19: structures.0.overlap: unknown key, allowed are: block, kind, count, left, bottom, offset
    19 | overlap = "10 mm"
       | ^^^^^^^
 """,
@@ -110,7 +110,7 @@ bad.toml:19: structures.0.overlap: unknown key, allowed are: block, kind, count,
         None,
         '\n[ground]\ncolour = "green"\n',
         """
-bad.toml:21: ground.colour: unknown key, allowed are: tilt, material
+bad.toml:21: ground.colour: unknown key, allowed are: tilt, material, profile
    21 | colour = "green"
       | ^^^^^^
 """,

@@ -88,15 +88,6 @@ bad.toml:16: structures.0.kind: "stak" is no kind of structure, did you mean 'st
       |        ^^^^^^
 """,
     ),
-    "contact model not there yet": (
-        None,
-        '\n[contact]\nmodel = "particles"\n',
-        """
-bad.toml:21: contact.model: "particles" is not available yet; use "surface"
-   21 | model = "particles"
-      |         ^^^^^^^^^^^
-""",
-    ),
     "unknown contact law": (
         None,
         '\n[contact]\nlaw = "lineal"\n',

@@ -12,6 +12,7 @@ DATA = {
     "blocks": {"brick": {"width": 1}},
     "structures": ({"kind": "stack"}, {"kind": "none"}, 3),
     "friction": {"block_block": 0.3},
+    "pairs": {"steel": {"oak": {"friction": 0.3}}},
 }
 
 
@@ -82,6 +83,15 @@ def test_the_field_of_a_key_is_found_by_its_name_in_the_file() -> None:
         (("structures", 9), False),
         (("time", "end", "x"), False),
         (("friction", "block_blok"), False),
+        (("blocks", "stone", "length"), False),
+        (("pairs", "steel"), True),
+        (("pairs", "oak"), False),
+        (("pairs", "steel", "oak"), True),
+        (("pairs", "steel", "oak", "restitution"), True),
+        (("pairs", "steel", "oak", "friction", "kinetic"), True),
+        (("pairs", "steel", "ground", "restitution"), False),
+        (("walls", 0, "from"), False),
+        (("ground", "profile"), True),
     ],
 )
 def test_known_keys(path: tuple[str | int, ...], *, known: bool) -> None:

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.scenario.overlap import Rectangle, overlapping_pairs, penetration
+from blocksim.scenario.overlap import Rectangle, crossings, overlapping_pairs, penetration
 from blocksim.scenario.placement import PlacedBody
+from blocksim.scenario.segments import PlacedSegment
 
 
 def body(x: float, y: float, angle: float = 0.0, size_x: float = 0.04, size_y: float = 0.02) -> PlacedBody:
@@ -39,6 +40,27 @@ def common_area(one: PlacedBody, other: PlacedBody) -> float:
                 kept.append(p)
         polygon = kept
     return sum(polygon[i - 1][0] * p[1] - p[0] * polygon[i - 1][1] for i, p in enumerate(polygon)) / 2
+
+
+def segment(x0: float, y0: float, x1: float, y1: float) -> PlacedSegment:
+    flags = {"extends_start": False, "extends_end": False, "touches_start": True, "touches_end": True}
+    return PlacedSegment(x0, y0, x1, y1, material=None, **flags)
+
+
+def length_inside(piece: PlacedSegment, b: PlacedBody) -> float:
+    """Length of a piece inside a rectangle, by cutting it with every side of the rectangle."""
+    low, high = 0.0, 1.0
+    outline = corners(b)
+    for (ax, ay), (bx, by) in zip(outline, outline[1:] + outline[:1], strict=True):
+        start = (bx - ax) * (piece.y0 - ay) - (by - ay) * (piece.x0 - ax)
+        end = (bx - ax) * (piece.y1 - ay) - (by - ay) * (piece.x1 - ax)
+        if start < 0 and end < 0:
+            return 0.0
+        if start < 0:
+            low = max(low, start / (start - end))
+        elif end < 0:
+            high = min(high, start / (start - end))
+    return max(0.0, high - low) * piece.length
 
 
 place = st.floats(-0.04, 0.04)
@@ -101,6 +123,30 @@ def test_a_thousand_touching_bodies_are_checked_quickly(layout: str) -> None:
     bodies = [body(0.04 * (i % columns), 0.02 * (i // columns)) for i in range(1000)]
     start = time.perf_counter()
     assert list(overlapping_pairs(bodies)) == []
+    assert time.perf_counter() - start < 1.0
+
+
+@given(st.tuples(place, place, place, place).filter(lambda p: math.dist(p[:2], p[2:]) > 1e-4), turn)
+def test_a_piece_crosses_a_body_where_a_part_of_it_is_inside(
+    piece_ends: tuple[float, float, float, float], angle: float
+) -> None:
+    piece, block = segment(*piece_ends), body(0.0, 0.0, angle)
+    found = list(crossings([block], [piece]))
+    assert bool(found) == (length_inside(piece, block) > 0) or all(depth < 1e-6 for *_, depth in found)
+
+
+def test_crossings_name_body_piece_and_depth() -> None:
+    bodies = [body(0.0, 0.0), body(1.0, 0.0), body(1.03, 0.0)]
+    pieces = [segment(-1.0, -0.01, 3.0, -0.01), segment(-1.0, 0.009, 0.5, 0.009), segment(1.0, -1.0, 1.0, 1.0)]
+    found = {(b, p): depth for b, p, depth in crossings(bodies, pieces)}
+    assert found == {(0, 1): pytest.approx(0.001), (1, 2): pytest.approx(0.02)}
+
+
+def test_a_thousand_bodies_on_a_thousand_pieces_are_checked_quickly() -> None:
+    bodies = [body(0.04 * i, 0.01) for i in range(1000)]
+    pieces = [segment(0.04 * i, 0.0, 0.04 * (i + 1), 0.0) for i in range(1000)]
+    start = time.perf_counter()
+    assert list(crossings(bodies, pieces)) == []
     assert time.perf_counter() - start < 1.0
 
 

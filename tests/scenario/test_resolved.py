@@ -51,6 +51,12 @@ FRICTIONS = st.one_of(
         lambda v: {"static": v[0], "kinetic": v[0] * v[1], "transition_speed": v[2]}
     ),
 )
+HEIGHT = st.floats(-1.0, 20.0)
+PROFILES = st.lists(HEIGHT, min_size=2, max_size=4).map(lambda heights: [[100.0 * x, y] for x, y in enumerate(heights)])
+WALLS = st.tuples(HEIGHT, HEIGHT).map(lambda y: {"from": [1e4, y[0]], "to": [1e4 + 1, y[1]], "material": "m"})
+PAIRS = st.dictionaries(
+    st.sampled_from(["restitution", "shear_stiffness_ratio", "shear_damping_ratio"]), st.floats(0.1, 1)
+).flatmap(lambda table: FRICTIONS.map(lambda friction: {**table, "friction": friction}))
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=30)
 SCENARIOS = st.fixed_dictionaries(
     {
@@ -88,7 +94,11 @@ SCENARIOS = st.fixed_dictionaries(
     optional={
         "description": TEXT,
         "gravity": st.floats(0, 100),
-        "ground": st.fixed_dictionaries({"tilt": ANGLE}),
+        "ground": st.fixed_dictionaries({"tilt": ANGLE}, optional={"profile": PROFILES}),
+        "walls": st.lists(WALLS, max_size=2),
+        "pairs": st.fixed_dictionaries(
+            {}, optional={"m": st.fixed_dictionaries({}, optional={"m": PAIRS, "ground": PAIRS}).filter(bool)}
+        ),
         "friction": st.fixed_dictionaries({}, optional={"block_block": FRICTIONS, "block_ground": FRICTIONS}),
         "contact": st.fixed_dictionaries(
             {},
@@ -147,6 +157,7 @@ HASHED = {
     "structures.0.kind": "staircase",
     "structures.0.count": 2,
     "structures.0.left": 0.1,
+    "structures.0.bottom": 0.1,
     "structures.0.offset": 0.1,
     "bodies.0.block": "c",
     "bodies.0.x": 11,
@@ -158,12 +169,25 @@ HASHED = {
     "bodies.0.name": "x",
     "ground.tilt": "1 deg",
     "ground.material": "n",
+    "ground.profile": [[0, 0], [1, 0]],
+    "walls.0.from": [-12, 0],
+    "walls.0.to": [-9, 0],
+    "walls.0.material": "n",
     "friction.block_block.static": 0.32,
     "friction.block_block.kinetic": 0.1,
     "friction.block_block.transition_speed": 0.1,
     "friction.block_ground.static": 0.39,
     "friction.block_ground.kinetic": 0.1,
     "friction.block_ground.transition_speed": 0.1,
+    "pairs.m.n.friction.static": 0.32,
+    "pairs.m.n.friction.kinetic": 0.1,
+    "pairs.m.n.friction.transition_speed": 0.1,
+    "pairs.m.n.restitution": 0.1,
+    "pairs.m.n.normal_stiffness": 1.0,
+    "pairs.m.n.shear_stiffness_ratio": 0.82,
+    "pairs.m.n.shear_damping_ratio": 0.1,
+    "contact.model": "kernel",
+    "contact.law": "hertz-mindlin",
     "contact.restitution.block_block": 0.1,
     "contact.restitution.block_ground": 0.1,
     "contact.stiffness_scale": 0.1,
@@ -171,7 +195,10 @@ HASHED = {
     "contact.shear_stiffness_ratio": 0.82,
     "contact.shear_damping_ratio": 0.1,
     "contact.max_overlap": 0.1,
+    "contact.contact_radius": 0.1,
     "contact.particle_spacing": 0.1,
+    "contact.smoothing_length": 0.1,
+    "contact.kernel": "cubic-spline",
     "time.end": 1.0,
     "time.step": 1e-6,
     "time.safety": 0.1,
@@ -181,7 +208,7 @@ HASHED = {
     "time.rest_hold": 1.0,
     "output.every": 1.0,
 }
-SINGLE_CHOICE = {"schema", "contact.model", "contact.law", "time.scheme", "materials.m.unit_weight"}
+SINGLE_CHOICE = {"schema", "time.scheme", "materials.m.unit_weight"}
 
 
 @pytest.fixture
@@ -195,6 +222,8 @@ def data() -> dict[str, Any]:
         "blocks": {"b": block, "c": block},
         "structures": [{"kind": "stack", "block": "b", "count": 1}],
         "bodies": [{"block": "b", "x": 10, "y": 10}],
+        "walls": [{"from": [-10, 0], "to": [-10, 1]}],
+        "pairs": {"m": {"n": {"friction": 0.3}}},
     }
 
 
@@ -206,12 +235,19 @@ def leaves(table: BaseModel, path: str = "") -> Iterator[str]:
         if isinstance(value, BaseModel):
             yield from leaves(value, key + ".")
         elif isinstance(value, dict):
-            for inner, entry in value.items():
-                yield from leaves(entry, f"{key}.{inner}.")
+            yield from leaves_of_named(value, key)
         elif value and isinstance(value, tuple) and isinstance(value[0], BaseModel):
             yield from leaves(value[0], key + ".0.")
         else:
             yield key
+
+
+def leaves_of_named(entries: dict[str, Any], key: str) -> Iterator[str]:
+    for name, entry in entries.items():
+        if isinstance(entry, dict):
+            yield from leaves_of_named(entry, f"{key}.{name}")
+        else:
+            yield from leaves(entry, f"{key}.{name}.")
 
 
 @pytest.mark.parametrize("key", HASHED)

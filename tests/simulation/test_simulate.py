@@ -15,7 +15,7 @@ import pytest
 from blocksim.errors import InputMissingError, OutputExistsError
 from blocksim.scenario import load_scenario
 from blocksim.simulation import Progress, Result, read_result, simulate, simulate_into
-from blocksim.world.build import StepTooLargeError
+from blocksim.world.step import StepTooLargeError
 from tests.simulation.conftest import Shipped
 
 FILES = {"scenario.toml", "experiment.csv", "final.csv", "run.h5", "run.json", "done.json"}

@@ -11,15 +11,10 @@ import pytest
 from blocksim.errors import ExitCode
 from blocksim.kernels.arrays import NO_FACE
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.world.build import (
-    StepTooLargeError,
-    admissible_step,
-    build_world,
-    empty_lists,
-    with_more_room,
-)
+from blocksim.world.build import build_world, empty_lists, with_more_room
 from blocksim.world.restitution import damping_ratio
 from blocksim.world.stable_step import Load
+from blocksim.world.step import StepTooLargeError, admissible_step
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

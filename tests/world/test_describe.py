@@ -25,6 +25,53 @@ def test_ground_and_block_pairs_are_told_with_their_own_friction_and_restitution
     assert (block.static_friction, block.kinetic_friction, block.restitution) == (0.31, 0.192, 0.3)
 
 
+def test_stiffness_is_told_in_the_unit_of_the_law() -> None:
+    shipped = SCENARIOS / "three_blocks.toml"
+    linear, hertz = (describe(load_scenario(shipped, [f"contact.law={law}"])) for law in ("linear", "hertz-mindlin"))
+    assert {pair.stiffness_unit for pair in linear.pairs} == {"N/m"}
+    assert {pair.stiffness_unit for pair in hertz.pairs} == {"N/m^1.5"}
+    # E* L with 1/E* = 2 (1 - nu^2)/E, and 4/3 E* R*^(1/2) at R* = 1 mm
+    modulus = 69e9 / (2 * (1 - 0.3**2))
+    assert linear.pairs[0].normal_stiffness == pytest.approx(modulus * 0.025)
+    assert hertz.pairs[0].normal_stiffness == pytest.approx(4 / 3 * modulus * 0.001**0.5)
+    # Mindlin: 2 (1 - nu)/(2 - nu), for both laws
+    assert [pair.shear_stiffness_ratio for pair in (linear.pairs[0], hertz.pairs[0])] == pytest.approx([1.4 / 1.7] * 2)
+
+
+def test_every_pair_names_the_keys_that_decided() -> None:
+    ground, block = describe(load_scenario(SCENARIOS / "three_blocks_nominal.toml")).pairs
+    assert (ground.pair, ground.materials) == ("aluminium - ground", ("aluminium", "ground"))
+    assert (block.pair, block.materials) == ("aluminium - aluminium", ("aluminium", "aluminium"))
+    assert (ground.rules["friction"], block.rules["friction"]) == ("friction.block_ground", "friction.block_block")
+    assert (ground.rules["normal_stiffness"], ground.rules["shear_damping_ratio"]) == ("materials", "default")
+
+
+def test_walls_of_their_own_material_are_pairs_too(tmp_path: Path) -> None:
+    walls = """
+[materials.oak]
+density = 700
+young_modulus = "11 GPa"
+poisson_ratio = 0.3
+
+[[walls]]
+from = [1, 0]
+to = [1, 1]
+material = "oak"
+
+[[walls]]
+from = [2, 0]
+to = [2, 1]
+
+[pairs.aluminium.oak]
+friction = 0.6
+"""
+    (tmp_path / "walls.toml").write_text((SCENARIOS / "slide.toml").read_text() + walls)
+    pairs = {pair.pair: pair for pair in describe(load_scenario(tmp_path / "walls.toml")).pairs}
+    assert list(pairs) == ["aluminium - ground", "aluminium - aluminium", "aluminium - wall of oak"]
+    assert [pair.static_friction for pair in pairs.values()] == [0.38, 0.31, 0.6]
+    assert pairs["aluminium - wall of oak"].rules["friction"] == "pairs.aluminium.oak.friction"
+
+
 def test_every_boundary_particle_is_counted() -> None:
     # perimeter 2 (32 + 50) mm at 1 mm, three blocks; at 3 mm the sides divide into 11 and 17
     shipped = SCENARIOS / "three_blocks.toml"

@@ -139,7 +139,7 @@ def test_given_shear_damping_replaces_the_normal_one_in_shear_only() -> None:
     of = scenario(contact={"shear_damping_ratio": 0.05, "restitution": 0.2})
     record = zeros(1, INTERACTION)[0]
     ground, paper, *_ = classes(of)
-    fill_interaction(record, of, paper, ground, ground=True)
+    fill_interaction(record, of, paper, ground)
     assert (record.normal_damping, record.shear_damping) == (damping_ratio(0.2), 0.05)
 
 

@@ -139,8 +139,11 @@ def touch_slab(world: World, p: int, k: int, count: int) -> int:
     along = slab.cos * dx + slab.sin * dy
     above = slab.cos * dy - slab.sin * dx - slab.half_y
     half = 0.5 * world.controls[0].particle_size
-    is_over = abs(along) <= slab.half_x and above > -slab.half_y
-    if is_over and add_touch(world, count, k, 0, -slab.sin * above, slab.cos * above, half):
+    if (
+        abs(along) <= slab.half_x
+        and above > 0.0
+        and add_touch(world, count, k, 0, -slab.sin * above, slab.cos * above, half)
+    ):
         point = world.points[count]
         point.x = x + slab.sin * above
         point.y = y - slab.cos * above

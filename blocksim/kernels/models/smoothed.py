@@ -23,7 +23,7 @@ blocks touch both rows act, each with half of that.
 import math
 
 from blocksim.kernels.arrays import ALL, Integers, Record, World
-from blocksim.kernels.geometry import to_world
+from blocksim.kernels.geometry import slab_depth, to_world
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.models.boundary import (
     ROWS,
@@ -40,6 +40,7 @@ from blocksim.kernels.sph.functions import kernel_value
 
 FACE = 2.0  # stiffness of a face contact over that of a corner contact
 NO_SUM = 1e-30
+LEAST_FACING = 1e-9  # of two normals that oppose one another; at right angles they do not, whatever round-off says
 
 
 @rare_kernel
@@ -115,14 +116,14 @@ def resolve_particle(owner: Record, particle: Record, touched: Record, world: Wo
         depth = smoothed_overlap(point)
         mx, my = point.nx, point.ny
     else:
-        depth, mx, my = touched.half_y - py, 0.0, 1.0
+        depth, mx, my = slab_depth(px, py, touched), 0.0, 1.0
     point.x, point.y = to_world(owner, particle.x, particle.y)
     point.nx = touched.cos * mx - touched.sin * my
     point.ny = touched.sin * mx + touched.cos * my
     point.depth = depth
     facing = -(nx * mx + ny * my)
     point.share = FACE * facing * share_along(particle, particle.nx, particle.ny)
-    return depth > 0.0 and facing > 0.0
+    return depth > 0.0 and facing > LEAST_FACING
 
 
 @rare_kernel
@@ -137,7 +138,7 @@ def ground_points(world: World, p: int) -> int:
         particle = world.particles[owner.first_particle + k]
         x, y = to_world(owner, particle.x, particle.y)
         facing = -(owner.sin * particle.nx + owner.cos * particle.ny)
-        if y < level and facing > 0.0:
+        if y < level and facing > LEAST_FACING:
             point = world.points[count]
             point.slot = k
             point.x = x

@@ -3,7 +3,7 @@
 import math
 
 from blocksim.kernels.arrays import ALL, HALF, NO_FACE, SLOTS, Integers, Record, Records, World
-from blocksim.kernels.geometry import relative_pose, to_world
+from blocksim.kernels.geometry import relative_pose, slab_depth, to_world
 from blocksim.kernels.jit import kernel, rare_kernel
 
 # A corner can touch a face only where the face normal, reversed, lies between the outward normals of the two sides
@@ -15,11 +15,7 @@ CONE_TOLERANCE = 0.2
 PARALLEL = 0.9
 BESIDE_SHARE = 0.1  # of the half diagonal; a face farther than that below a corner is not beside it
 CLOSE = 8.0  # overlaps; two corners nearer than that meet in one place
-
-# A piece of ground is a slab of which only the upper face counts. Near a convex joint a corner may lie in the end of a
-# slab, where the next one bears it; at most this many times deeper below the face than behind the end it still touches.
-END_RATIO = 3.0
-UPPER_FACE = 1
+UPPER_FACE = 1  # of a piece of ground, the only one that counts
 
 
 @kernel
@@ -84,9 +80,7 @@ def slab_overlap(px: float, py: float, slab: Record, sx: float, sy: float, c: fl
 
     The arguments are those of `face_below_corner`.
     """
-    depth = slab.half_y - py
-    behind_end = slab.half_x - abs(px)
-    return depth if opens(UPPER_FACE, sx, sy, c, s) and depth <= END_RATIO * behind_end else 0.0
+    return slab_depth(px, py, slab) if opens(UPPER_FACE, sx, sy, c, s) else 0.0
 
 
 @kernel

@@ -2,14 +2,26 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic import ConfigDict, Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import OneOf, Table
+
+Model = Literal["surface", "particles", "kernel"]
+Law = Literal["linear", "hertz-mindlin"]
+Kernel = Literal["wendland-c2", "cubic-spline", "quintic-spline"]
+
+SUPPORT: dict[Kernel, float] = {"wendland-c2": 2.0, "cubic-spline": 2.0, "quintic-spline": 3.0}
+"""Radius at which a kernel function ends, in smoothing lengths."""
+SPACINGS_PER_LENGTH = 1.3
+"""Smoothing length by default, in particle spacings."""
+LEAST_SPACINGS = 0.8
+"""Least smoothing length, in particle spacings; below it a particle may have no neighbour on a flat side."""
+NO_FIXED_STIFFNESS = 'law "hertz-mindlin" takes it from the materials and contact_radius; use stiffness_scale'
 
 
 def or_bare(table: JsonSchemaValue, bare: JsonSchemaValue) -> JsonSchemaValue:
@@ -88,19 +100,40 @@ class Restitution(Table):
         return or_bare(handler(schema), bare)
 
 
+class Pair(Table):
+    """What is special about one pair of materials, or of a material and the ground; the rest follows the defaults."""
+
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1})
+
+    friction: PairFriction | None = Field(default=None, description="friction, as friction.block_block")
+    restitution: q.Share | None = Field(default=None, description="restitution")
+    normal_stiffness: q.Stiffness | None = Field(
+        default=None, description="stiffness of one contact point, linear law only"
+    )
+    shear_stiffness_ratio: q.PositiveNumber | None = Field(default=None, description="shear over normal stiffness")
+    shear_damping_ratio: q.NonNegativeNumber | None = Field(default=None, description="damping ratio in shear")
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Self:
+        if not self.model_fields_set:
+            message = "this pair is empty; give friction, restitution, a stiffness or a damping ratio"
+            raise q.invalid(message)
+        return self
+
+
 class Contact(Table):
     """Contact model, force law and their numbers."""
 
-    model: Annotated[Literal["surface"], OneOf(("surface",), planned=("particles", "kernel"))] = Field(
-        default="surface", description="how contacts are found"
+    model: Annotated[Model, OneOf(get_args(Model))] = Field(
+        default="surface", description="how contacts are found: surface, particles or kernel"
     )
-    law: Annotated[Literal["linear"], OneOf(("linear",), planned=("hertz-mindlin",))] = Field(
-        default="linear", description="how the force grows with the overlap"
+    law: Annotated[Law, OneOf(get_args(Law))] = Field(
+        default="linear", description="how the force grows with the overlap: linear or hertz-mindlin"
     )
     restitution: Restitution = Field(default=Restitution(), description="rebound speed over impact speed")
     stiffness_scale: q.PositiveNumber = Field(default=1.0, description="factor on the stiffness of every contact")
     normal_stiffness: q.Stiffness | None = Field(
-        default=None, description="stiffness of one contact point (default: from the materials)"
+        default=None, description="stiffness of one contact point, linear law only (default: from the materials)"
     )
     shear_stiffness_ratio: q.PositiveNumber | None = Field(
         default=None, description="shear over normal stiffness (default: Mindlin, from Poisson's ratio)"
@@ -111,6 +144,43 @@ class Contact(Table):
     max_overlap: q.PositiveLength | None = Field(
         default=None, description="overlap that stops the run (default: 5 % of the smallest side of each pair)"
     )
+    contact_radius: q.PositiveLength = Field(
+        default=0.001, description="radius of curvature R* of every contact (assumed; hertz-mindlin only)"
+    )
     particle_spacing: q.PositiveLength = Field(
         default=0.001, description="spacing of the boundary particles (particles, kernel)"
     )
+    smoothing_length: q.PositiveLength | None = Field(
+        default=None, description="smoothing length of the kernel (kernel only; default: 1.3 particle_spacing)"
+    )
+    kernel: Annotated[Kernel, OneOf(get_args(Kernel))] = Field(
+        default="wendland-c2",
+        description="kernel function (kernel only): wendland-c2, cubic-spline or quintic-spline",
+    )
+
+    @property
+    def resolved_smoothing_length(self) -> float:
+        """Smoothing length in m, as given or by default."""
+        return SPACINGS_PER_LENGTH * self.particle_spacing if self.smoothing_length is None else self.smoothing_length
+
+    @property
+    def support_radius(self) -> float:
+        """Distance in m at which the kernel function ends."""
+        return SUPPORT[self.kernel] * self.resolved_smoothing_length
+
+    @model_validator(mode="after")
+    def _stiffness_of_the_law(self) -> Self:
+        if self.law == "hertz-mindlin" and self.normal_stiffness is not None:
+            raise q.invalid(NO_FIXED_STIFFNESS, "normal_stiffness")
+        return self
+
+    @model_validator(mode="after")
+    def _neighbours_within_reach(self) -> Self:
+        least = LEAST_SPACINGS * self.particle_spacing
+        if self.model == "kernel" and self.smoothing_length is not None and self.smoothing_length < least:
+            message = (
+                f"{self.smoothing_length * 1e3:g} mm reaches too few particles; at least {LEAST_SPACINGS:g} "
+                f"particle_spacing ({least * 1e3:g} mm) is needed"
+            )
+            raise q.invalid(message, "smoothing_length")
+        return self

@@ -1,4 +1,4 @@
-"""What there is: materials, blocks, single bodies and the ground."""
+"""What moves: materials, blocks and single bodies."""
 
 import math
 from typing import Annotated, Literal, Self
@@ -110,10 +110,3 @@ class BodySpec(Table):
             message = "a fixed body cannot have a velocity or a spin"
             raise q.invalid(message, "fixed")
         return self
-
-
-class Ground(Table):
-    """The half-plane below y = 0; a tilt turns gravity, x stays along the ground."""
-
-    tilt: q.TiltAngle = Field(default=0.0, description="slope of the ground, positive where its +x end is raised")
-    material: str | None = Field(default=None, description="the name of its material (default: the blocks' own)")

@@ -6,8 +6,9 @@ from pydantic import Field
 
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table
-from blocksim.scenario.models.contact import Contact, Friction
-from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material
+from blocksim.scenario.models.boundary import Ground, Wall
+from blocksim.scenario.models.contact import Contact, Friction, Pair
+from blocksim.scenario.models.geometry import Block, BodySpec, Material
 from blocksim.scenario.models.stepping import Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure
@@ -32,8 +33,12 @@ class Scenario(Table):
     blocks: dict[str, Block] = Field(description="blocks by name, as in [blocks.brick]")
     structures: tuple[AnyStructure, ...] = Field(default=(), description="generators of bodies")
     bodies: tuple[BodySpec, ...] = Field(default=(), description="single bodies")
-    ground: Ground = Field(default=Ground(), description="the ground below y = 0")
-    friction: Friction = Field(default=Friction(), description="friction of the material pairs")
+    ground: Ground = Field(default=Ground(), description="the ground")
+    walls: tuple[Wall, ...] = Field(default=(), description="straight pieces of boundary beside the ground")
+    friction: Friction = Field(default=Friction(), description="friction between blocks and with the ground")
+    pairs: dict[str, dict[str, Pair]] = Field(
+        default={}, description="pairs of materials that differ, as in [pairs.aluminium.ground]"
+    )
     contact: Contact = Field(default=Contact(), description="contact model and its numbers")
     time: Time = Field(default=Time(), description="time stepping")
     output: Output = Field(default=Output(), description="what is recorded")

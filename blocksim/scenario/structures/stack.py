@@ -11,11 +11,12 @@ from blocksim.scenario.structures.base import Count, Pose, Structure
 
 
 class Stack(Structure):
-    """Block i (from 0) has its left edge at left + i offset and its bottom at i size_y."""
+    """Block i (from 0) has its left edge at left + i offset and its lower edge at bottom + i size_y."""
 
     kind: Literal["stack"] = Field(description="kind of structure")
     count: Count = Field(description="number of blocks")
     left: q.Length = Field(default=0.0, description="left edge of the lowest block")
+    bottom: q.Length = Field(default=0.0, description="height of the lowest block's lower edge")
     offset: q.Length = Field(default=0.0, description="shift of each block against the one below")
 
     @property
@@ -26,4 +27,4 @@ class Stack(Structure):
     def place(self, block: Block) -> Sequence[Pose]:
         """Return the poses from the ground up."""
         first = self.left + block.size_x / 2
-        return [Pose(first + i * self.offset, (i + 0.5) * block.size_y) for i in range(self.count)]
+        return [Pose(first + i * self.offset, self.bottom + (i + 0.5) * block.size_y) for i in range(self.count)]

@@ -11,12 +11,13 @@ from blocksim.scenario.structures.base import Count, Pose, Structure, UnfitError
 
 
 class Staircase(Structure):
-    """Block i (from 0) has its left edge at left + i (size_x - overlap) and its bottom at i size_y."""
+    """Block i (from 0) has its left edge at left + i (size_x - overlap) and its lower edge at bottom + i size_y."""
 
     kind: Literal["staircase"] = Field(description="kind of structure")
     count: Count = Field(description="number of blocks")
     overlap: q.PositiveLength = Field(description="length over which a block lies on the one below")
     left: q.Length = Field(default=0.0, description="left edge of the lowest block")
+    bottom: q.Length = Field(default=0.0, description="height of the lowest block's lower edge")
 
     @property
     def size(self) -> int:
@@ -32,4 +33,4 @@ class Staircase(Structure):
             )
         step = block.size_x - self.overlap
         first = self.left + block.size_x / 2
-        return [Pose(first + i * step, (i + 0.5) * block.size_y) for i in range(self.count)]
+        return [Pose(first + i * step, self.bottom + (i + 0.5) * block.size_y) for i in range(self.count)]

@@ -27,6 +27,15 @@ def test_a_staircase_of_full_overlap_is_a_straight_stack() -> None:
     assert stairs == Stack(kind="stack", block="brick", count=3).place(BRICK)
 
 
+@pytest.mark.parametrize("bottom", [0.1, -0.025])
+def test_a_structure_stands_at_its_bottom(bottom: float) -> None:
+    on_ground = Stack(kind="stack", block="brick", count=2, offset=0.001).place(BRICK)
+    raised = Stack(kind="stack", block="brick", count=2, offset=0.001, bottom=bottom).place(BRICK)
+    stairs = Staircase(kind="staircase", block="brick", count=2, overlap=0.031, bottom=bottom).place(BRICK)
+    assert [pose.y for pose in raised] == [pytest.approx(pose.y + bottom) for pose in on_ground]
+    assert [(pose.x, pose.y) for pose in stairs] == [pytest.approx((pose.x, pose.y)) for pose in raised]
+
+
 def test_more_overlap_than_block_is_refused() -> None:
     with pytest.raises(UnfitError, match="33 mm is more than the block's 32 mm along x") as caught:
         Staircase(kind="staircase", block="brick", count=3, overlap=0.033).place(BRICK)

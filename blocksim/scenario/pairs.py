@@ -1,0 +1,96 @@
+"""Which friction, restitution and stiffness two materials have on each other, and which key says so.
+
+For every quantity by itself, the first of these keys that is given decides:
+
+  between two blocks         pairs.A.B, in either order; then friction.block_block, contact.restitution.block_block
+  on the ground              pairs.A.ground; then pairs.A.M, where the ground names its material M; then block_ground
+  on a wall of material W    pairs.A.W; then pairs.A.ground; then block_ground
+
+and contact.normal_stiffness, contact.shear_stiffness_ratio and contact.shear_damping_ratio where no pair has its own.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from blocksim.scenario.keys import format_key
+from blocksim.scenario.models.base import Table
+from blocksim.scenario.models.contact import Contact, Pair, PairFriction
+from blocksim.scenario.models.scenario import Scenario
+
+GROUND = "ground"
+"""Stands for the ground where pairs name materials; no material can have this name."""
+DEFAULT = "default"
+MATERIALS = "materials"
+
+
+@dataclass(frozen=True)
+class ResolvedPair:
+    """What holds between two materials, SI; None where it follows from the materials, or damping from the normal one.
+
+    `normal_stiffness` is as given, not yet times contact.stiffness_scale. `rules` tells for every field the key that
+    decided, "default" where none is given, "materials" where Young's moduli and Poisson's ratios decide.
+    """
+
+    friction: PairFriction
+    restitution: float
+    normal_stiffness: float | None
+    shear_stiffness_ratio: float | None
+    shear_damping_ratio: float | None
+    rules: Mapping[str, str]
+
+
+def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> ResolvedPair:
+    """Return what holds between the materials `one` and `other`, of two blocks unless `ground`.
+
+    With `ground`, `one` is a block's material and `other` is "ground" or the material that a wall names; a wall
+    without a material is as the ground.
+    """
+    overrides = list(_overrides(scenario, _partners(scenario, one, other, ground=ground)))
+    values: dict[str, Any] = {}
+    rules: dict[str, str] = {}
+    for quantity, general in _general(scenario, "block_ground" if ground else "block_block").items():
+        special = ((getattr(pair, quantity), f"{key}.{quantity}") for key, pair in overrides)
+        values[quantity], rules[quantity] = next((found for found in special if found[0] is not None), general)
+    return ResolvedPair(**values, rules=rules)
+
+
+def _partners(scenario: Scenario, one: str, other: str, *, ground: bool) -> list[tuple[str, str]]:
+    """Return the pairs of names whose tables count, the first most."""
+    if not ground:
+        return [(one, other)]
+    if other != GROUND:
+        return [(one, other), (one, GROUND)]
+    named = scenario.ground.material
+    return [(one, GROUND)] if named is None else [(one, GROUND), (one, named)]
+
+
+def _overrides(scenario: Scenario, partners: Sequence[tuple[str, str]]) -> Iterator[tuple[str, Pair]]:
+    """Yield the tables of these pairs with their keys as they stand in the file, in either order."""
+    for one, other in partners:
+        for left, right in dict.fromkeys([(one, other), (other, one)]):
+            pair = scenario.pairs.get(left, {}).get(right)
+            if pair is not None:
+                yield format_key(("pairs", left, right)), pair
+
+
+def _general(scenario: Scenario, side: str) -> dict[str, tuple[object, str]]:
+    """Return what holds for every pair of this side without a table of its own, and the key that says so."""
+    contact, friction = scenario.contact, scenario.friction
+    restitution = contact.restitution
+    return {
+        "friction": (getattr(friction, side), _if_given(friction, side, "friction")),
+        "restitution": (getattr(restitution, side), _if_given(restitution, side, "contact.restitution")),
+        "normal_stiffness": _if_any(contact, "normal_stiffness", MATERIALS),
+        "shear_stiffness_ratio": _if_any(contact, "shear_stiffness_ratio", MATERIALS),
+        "shear_damping_ratio": _if_any(contact, "shear_damping_ratio", DEFAULT),
+    }
+
+
+def _if_given(table: Table, key: str, place: str) -> str:
+    return f"{place}.{key}" if key in table.model_fields_set else DEFAULT
+
+
+def _if_any(contact: Contact, key: str, otherwise: str) -> tuple[object, str]:
+    value = getattr(contact, key)
+    return value, otherwise if value is None else f"contact.{key}"

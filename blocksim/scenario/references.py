@@ -1,0 +1,80 @@
+"""Names in a scenario that must be names of something: blocks, materials, pairs of materials."""
+
+from collections.abc import Iterator, Mapping
+
+from blocksim.scenario import keys
+from blocksim.scenario.findings import Finding, did_you_mean_or_list
+from blocksim.scenario.models.contact import Pair
+from blocksim.scenario.overrides import Data
+from blocksim.scenario.pairs import GROUND
+from blocksim.scenario.quantities import shown
+
+BLOCKS_BY_NAME = ("structures", "bodies")
+
+
+def wrong_names(data: Data) -> Iterator[Finding]:
+    """Find names of blocks and materials that do not exist, and scenarios without a body."""
+    if all(data.get(group, ()) == () for group in BLOCKS_BY_NAME):
+        yield Finding((), "nothing to simulate: add a [[structures]] or a [[bodies]] table")
+    blocks = data.get("blocks")
+    for name in blocks if isinstance(blocks, Mapping) else ():
+        yield from _unknown(data, ("blocks", name, "material"), "materials")
+    yield from _unknown(data, ("ground", "material"), "materials")
+    yield from _in_list(data, "walls", "material", "materials")
+    for group in BLOCKS_BY_NAME:
+        yield from _in_list(data, group, "block", "blocks")
+    yield from _wrong_pairs(data)
+
+
+def _in_list(data: Data, group: str, key: str, named: str) -> Iterator[Finding]:
+    entries = data.get(group)
+    for index in range(len(entries) if isinstance(entries, tuple) else 0):
+        yield from _unknown(data, (group, index, key), named)
+
+
+def _unknown(data: Data, path: keys.KeyPath, group: str) -> Iterator[Finding]:
+    name, known = keys.follow(data, path), data.get(group)
+    if isinstance(name, str) and isinstance(known, Mapping) and name not in known:
+        hint = did_you_mean_or_list(name, known)
+        yield Finding(path, f"unknown {group.removesuffix('s')} {shown(name)}, {hint}")
+
+
+def _wrong_pairs(data: Data) -> Iterator[Finding]:
+    materials, pairs = data.get("materials"), data.get("pairs")
+    known = [*materials, GROUND] if isinstance(materials, Mapping) else []
+    if GROUND in known[:-1]:
+        message = f"{shown(GROUND)} means the ground in [pairs]; give this material another name"
+        yield Finding(("materials", GROUND), message, at="key")
+    found: set[frozenset[str]] = set()
+    for one, partners in pairs.items() if isinstance(pairs, Mapping) else ():
+        yield from _unknown_material(("pairs", one), one, known)
+        if partners == {}:
+            yield Finding(("pairs", one), _one_material(one), at="key")
+        for other in partners if isinstance(partners, Mapping) else ():
+            yield from _wrong_partner(one, other, known)
+            yield from _wrong_pair(one, other, found)
+            found.add(frozenset((one, other)))
+
+
+def _unknown_material(path: keys.KeyPath, name: str, known: list[str]) -> Iterator[Finding]:
+    if known and name not in known:
+        yield Finding(path, f"unknown material {shown(name)}, {did_you_mean_or_list(name, known)}", at="key")
+
+
+def _wrong_partner(one: str, other: str, known: list[str]) -> Iterator[Finding]:
+    if other in Pair.model_fields and other not in known:
+        yield Finding(("pairs", one, other), _one_material(one), at="key")
+    else:
+        yield from _unknown_material(("pairs", one, other), other, known)
+
+
+def _one_material(one: str) -> str:
+    return f"name the other material too, as in [{keys.format_key(('pairs', one, GROUND))}]"
+
+
+def _wrong_pair(one: str, other: str, found: set[frozenset[str]]) -> Iterator[Finding]:
+    if one == other == GROUND:
+        yield Finding(("pairs", one, other), "the ground does not touch itself", at="key")
+    elif frozenset((one, other)) in found:
+        twin = keys.format_key(("pairs", other, one))
+        yield Finding(("pairs", one, other), f"the same pair is given as {twin}; keep one of the two", at="key")

@@ -1,0 +1,159 @@
+"""What cannot be at the start although every value is fine by itself: sizes that do not go together, overlaps."""
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import islice, pairwise
+
+from blocksim.scenario import keys, overlap
+from blocksim.scenario.findings import Finding
+from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.placement import PlacedBody, placed_with_origin
+from blocksim.scenario.quantities import shown
+from blocksim.scenario.segments import TOLERANCE, profile_segments, surface_height, wall_segments
+from blocksim.scenario.structures import UnfitError
+
+MAX_BODIES = 100_000
+MAX_SEGMENTS = 1000
+MAX_OVERLAPS = 20
+SHORTEST_SHARE = 0.01
+"""Least length of a piece of boundary, in smallest sides of the blocks."""
+
+
+def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
+    """Place everything and find what cannot be at the start; the scenario is valid otherwise."""
+    too_many = list(_too_many(scenario))
+    if too_many:
+        yield from too_many
+        return
+    yield from _fixed_stiffnesses(scenario)
+    yield from _impossible_masses(scenario)
+    unfit = list(_unfit_structures(scenario))
+    if unfit:
+        yield from unfit
+        return
+    origins, bodies = zip(*placed_with_origin(scenario), strict=True)
+    smallest = min(min(body.size_x, body.size_y) for body in bodies)
+    yield from _coarse_particles(scenario, smallest)
+    yield from _short_segments(scenario, SHORTEST_SHARE * smallest)
+    yield from _equal_names(origins, bodies)
+    yield from _below_ground(scenario, origins, bodies)
+    yield from _in_walls(scenario, origins, bodies)
+    yield from _overlaps(origins, bodies)
+
+
+def _too_many(scenario: Scenario) -> Iterator[Finding]:
+    counts = {
+        ("structures",): (sum(structure.size for structure in scenario.structures) + len(scenario.bodies), "bodies"),
+        ("walls",): (len(scenario.walls), "walls"),
+        ("ground", "profile"): (len(scenario.ground.profile or ()), "points"),
+    }
+    for path, (count, what) in counts.items():
+        most = MAX_BODIES if what == "bodies" else MAX_SEGMENTS
+        if count > most:
+            yield Finding(path, f"{count} {what} are too many; at most {most} are possible")
+
+
+def _fixed_stiffnesses(scenario: Scenario) -> Iterator[Finding]:
+    if scenario.contact.law == "linear":
+        return
+    for one, partners in scenario.pairs.items():
+        for other, pair in partners.items():
+            if pair.normal_stiffness is not None:
+                yield Finding(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
+
+
+def _unfit_structures(scenario: Scenario) -> Iterator[Finding]:
+    for number, structure in enumerate(scenario.structures):
+        try:
+            structure.place(scenario.blocks[structure.block])
+        except UnfitError as error:
+            yield Finding(("structures", number, error.key), str(error))
+
+
+def _impossible_masses(scenario: Scenario) -> Iterator[Finding]:
+    """Find blocks whose sizes are possible numbers while their mass or inertia is not."""
+    for name, block in scenario.blocks.items():
+        mass = scenario.materials[block.material].density * block.size_x * block.size_y * block.depth
+        inertia = mass * (block.size_x * block.size_x + block.size_y * block.size_y) / 12.0
+        if not (0.0 < inertia < math.inf and 0.0 < mass < math.inf):
+            message = f"a block of {mass:g} kg and {inertia:g} kg m^2 cannot be simulated"
+            yield Finding(("blocks", name), f"{message}; check its sides and density")
+
+
+def _coarse_particles(scenario: Scenario, smallest: float) -> Iterator[Finding]:
+    """Find particles too far apart for the smallest side (m), and kernels that reach through it."""
+    contact = scenario.contact
+    side = f"the smallest side of a block, {_mm(smallest)}"
+    if contact.model != "surface" and contact.particle_spacing > 0.5 * smallest:
+        message = f"{_mm(contact.particle_spacing)} is more than half of {side}"
+        yield Finding(("contact", "particle_spacing"), message, relation=True)
+    elif contact.model == "kernel" and contact.support_radius >= smallest:
+        key = "particle_spacing" if contact.smoothing_length is None else "smoothing_length"
+        length = _mm(contact.resolved_smoothing_length)
+        message = f"a {contact.kernel} of smoothing length {length} reaches {_mm(contact.support_radius)} far"
+        yield Finding(("contact", key), f"{message}, through {side}", relation=True)
+
+
+def _short_segments(scenario: Scenario, least: float) -> Iterator[Finding]:
+    """Find pieces of boundary shorter than `least` (m): a corner could pass by them."""
+    points = scenario.ground.profile or ()
+    pieces: list[tuple[keys.KeyPath, float]] = [
+        (("ground", "profile", number), math.dist(*ends)) for number, ends in enumerate(pairwise(points), start=1)
+    ]
+    pieces += [(("walls", number), math.dist(wall.start, wall.end)) for number, wall in enumerate(scenario.walls)]
+    for path, length in pieces:
+        if length < least:
+            why = f"at least {_mm(least)} is needed, {100 * SHORTEST_SHARE:g} % of the smallest side of a block"
+            yield Finding(path, f"this piece is only {_mm(length)} long; {why}", relation=True)
+
+
+def _equal_names(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+    seen: set[str] = set()
+    for origin, body in zip(origins, bodies, strict=True):
+        if body.name in seen:
+            message = f"two bodies are named {shown(body.name)}; a body without a name has its number"
+            yield Finding((*origin, "name"), message)
+        seen.add(body.name)
+
+
+def _below_ground(
+    scenario: Scenario, origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]
+) -> Iterator[Finding]:
+    if scenario.ground.profile is not None:
+        yield from _below_profile(scenario, origins, bodies)
+        return
+    for origin, body in zip(origins, bodies, strict=True):
+        bottom = overlap.Rectangle.of(body).bottom
+        if bottom < -TOLERANCE:
+            yield Finding(origin, f"body {body.name} reaches {_mm(-bottom)} below the ground (y = 0)")
+
+
+def _below_profile(
+    scenario: Scenario, origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]
+) -> Iterator[Finding]:
+    """Find bodies across a piece of the profile, each with its greatest depth, and those wholly below."""
+    depths: dict[int, float] = {}
+    for index, _, depth in overlap.crossings(bodies, profile_segments(scenario)):
+        depths[index] = max(depths.get(index, 0.0), depth)
+    for index, (origin, body) in enumerate(zip(origins, bodies, strict=True)):
+        if index in depths:
+            yield Finding(origin, f"body {body.name} reaches {_mm(depths[index])} into the ground's profile")
+        elif body.y < surface_height(scenario, body.x):
+            yield Finding(origin, f"body {body.name} lies below the ground's profile")
+
+
+def _in_walls(scenario: Scenario, origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+    for body, wall, depth in islice(overlap.crossings(bodies, wall_segments(scenario)), MAX_OVERLAPS):
+        name = bodies[body].name
+        yield Finding(origins[body], f"body {name} and walls.{wall} overlap by {_mm(depth)}; they may touch, no more")
+
+
+def _overlaps(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+    for first, second, depth in islice(overlap.overlapping_pairs(bodies), MAX_OVERLAPS):
+        names = f"bodies {bodies[first].name} and {bodies[second].name}"
+        yield Finding(origins[second], f"{names} overlap by {_mm(depth)}; they may touch, no more")
+
+
+def _mm(length: float) -> str:
+    return f"{length * 1e3:.6g} mm"

@@ -1,0 +1,95 @@
+"""Contact models, laws and their numbers that do not go together. Every message in full."""
+
+# ruff: noqa: E501 - messages and scenario lines stand as they are
+
+from collections.abc import Callable
+
+import pytest
+
+CASES = {
+    "misspelt contact model": (
+        '\n[contact]\nmodel = "kernels"\n',
+        """
+bad.toml:21: contact.model: "kernels" is not known here, did you mean "kernel"?
+   21 | model = "kernels"
+      |         ^^^^^^^^^
+""",
+    ),
+    "unknown kernel function": (
+        '\n[contact]\nkernel = "gauss"\n',
+        """
+bad.toml:21: contact.kernel: "gauss" is not known here, use "wendland-c2" or "cubic-spline" or "quintic-spline"
+   21 | kernel = "gauss"
+      |          ^^^^^^^
+""",
+    ),
+    "fixed stiffness with Hertz": (
+        '\n[contact]\nlaw = "hertz-mindlin"\nnormal_stiffness = "1 MN/m"\n',
+        """
+bad.toml:22: contact.normal_stiffness: law "hertz-mindlin" takes it from the materials and contact_radius; use stiffness_scale
+   22 | normal_stiffness = "1 MN/m"
+      |                    ^^^^^^^^
+""",
+    ),
+    "fixed stiffness of a pair with Hertz": (
+        '\n[contact]\nlaw = "hertz-mindlin"\n\n[pairs.steel.ground]\nnormal_stiffness = "1 MN/m"\n',
+        """
+bad.toml:24: pairs.steel.ground.normal_stiffness: law "hertz-mindlin" takes it from the materials and contact_radius; use stiffness_scale
+   24 | normal_stiffness = "1 MN/m"
+      |                    ^^^^^^^^
+""",
+    ),
+    "contact radius of zero": (
+        "\n[contact]\ncontact_radius = 0\n",
+        """
+bad.toml:21: contact.contact_radius: 0 is too small; a length above 0 such as "32 mm" is needed
+   21 | contact_radius = 0
+      |                  ^
+""",
+    ),
+    "smoothing length with no neighbours": (
+        '\n[contact]\nmodel = "kernel"\nsmoothing_length = "0.79 mm"\n',
+        """
+bad.toml:22: contact.smoothing_length: 0.79 mm reaches too few particles; at least 0.8 particle_spacing (0.8 mm) is needed
+   22 | smoothing_length = "0.79 mm"
+      |                    ^^^^^^^^^
+""",
+    ),
+    "smoothing length through a block": (
+        '\n[contact]\nmodel = "kernel"\nsmoothing_length = "10 mm"\n',
+        """
+bad.toml:22: contact.smoothing_length: a wendland-c2 of smoothing length 10 mm reaches 20 mm far, through the smallest side of a block, 20 mm
+   22 | smoothing_length = "10 mm"
+      |                    ^^^^^^^
+""",
+    ),
+    "spacing whose kernel reaches through a block": (
+        '\n[contact]\nmodel = "kernel"\nparticle_spacing = "7.7 mm"\n',
+        """
+bad.toml:22: contact.particle_spacing: a wendland-c2 of smoothing length 10.01 mm reaches 20.02 mm far, through the smallest side of a block, 20 mm
+   22 | particle_spacing = "7.7 mm"
+      |                    ^^^^^^^^
+""",
+    ),
+    "kernel of a longer reach": (
+        '\n[contact]\nmodel = "kernel"\nkernel = "quintic-spline"\nparticle_spacing = "6 mm"\n',
+        """
+bad.toml:23: contact.particle_spacing: a quintic-spline of smoothing length 7.8 mm reaches 23.4 mm far, through the smallest side of a block, 20 mm
+   23 | particle_spacing = "6 mm"
+      |                    ^^^^^^
+""",
+    ),
+    "particles too far apart": (
+        '\n[contact]\nmodel = "particles"\nparticle_spacing = "10.1 mm"\n',
+        """
+bad.toml:22: contact.particle_spacing: 10.1 mm is more than half of the smallest side of a block, 20 mm
+   22 | particle_spacing = "10.1 mm"
+      |                    ^^^^^^^^^
+""",
+    ),
+}
+
+
+@pytest.mark.parametrize(("new", "message"), CASES.values(), ids=CASES)
+def test_contact(refusal_of_edit: Callable[[str | None, str], tuple[int, str]], new: str, message: str) -> None:
+    assert refusal_of_edit(None, new) == (65, message.strip("\n"))

@@ -1,0 +1,112 @@
+"""What may stand where at the start: bodies may touch the ground, walls and each other, no more."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pytest
+
+from blocksim.errors import ScenarioError
+from blocksim.scenario import place_bodies, scenario_from_mapping
+
+MATERIAL = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
+BRICK = {"width": 0.2, "height": 0.1, "length": 0.1, "material": "oak"}
+SLOPE = math.atan(0.5)
+
+
+def scenario_data(bodies: Sequence[Mapping[str, object]], **tables: object) -> dict[str, Any]:
+    return {
+        "schema": 1,
+        "name": "a",
+        "materials": {"oak": MATERIAL},
+        "blocks": {"brick": BRICK},
+        "bodies": [{"block": "brick", **body} for body in bodies],
+        **tables,
+    }
+
+
+def mistakes(data: dict[str, Any]) -> list[str]:
+    try:
+        scenario_from_mapping(data)
+    except ScenarioError as error:
+        return [problem.message for problem in error.problems]
+    return []
+
+
+def on_slope(gap: float, **keys: object) -> dict[str, Any]:
+    """Place a brick on the slope y = x/2, its face `gap` m above it."""
+    height = 0.05 + gap
+    x, y = -height * math.sin(SLOPE), height * math.cos(SLOPE)
+    return {"x": 1 + x, "y": 0.5 + y, "angle": f"{SLOPE!r} rad", **keys}
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+@pytest.mark.parametrize(
+    ("body", "tables"),
+    [
+        ({"x": 0, "y": 0.05}, {}),
+        ({"x": -0.1, "y": 0.05}, {"ground": {"profile": [[0, 0], [0, 1]]}}),  # beside a riser
+        ({"x": 0.1, "y": 1.05}, {"ground": {"profile": [[0, 0], [0, 1]]}}),  # on its upper level
+        ({"x": 0, "y": 1.05}, {"ground": {"profile": [[-1, 0], [0, 1], [1, 0]]}}),  # on a tip
+        (on_slope(0.0), {"ground": {"profile": [[0, 0], [2, 1]]}}),
+        ({"x": 0.1, "y": 0.05}, {"walls": [{"from": [0, 0], "to": [0, 1]}]}),
+        ({"x": 0, "y": 1.05}, {"walls": [{"from": [-1, 1], "to": [1, 1]}]}),  # on a shelf
+        ({"x": 0, "y": 1.05}, {"walls": [{"from": [0, 0], "to": [0, 1]}]}),  # on the tip of a wall
+        ({"x": 0, "y": 0.95}, {"walls": [{"from": [-1, 1], "to": [1, 1]}]}),  # below a shelf
+        ({"x": 0, "y": 0.05}, {"beside": [{"x": 0.2, "y": 0.05, "fixed": True}]}),
+    ],
+)
+def test_a_body_may_touch(body: dict[str, Any], tables: dict[str, Any], fixed: bool) -> None:
+    others = {key: table for key, table in tables.items() if key != "beside"}
+    assert mistakes(scenario_data([{**body, "fixed": fixed}, *tables.get("beside", [])], **others)) == []
+
+
+@pytest.mark.parametrize(("gap", "message"), [(-0.9e-9, []), (-1e-6, ["body 1 reaches 0.001 mm into"])])
+def test_a_nanometre_on_a_slope_is_forgiven(gap: float, message: list[str]) -> None:
+    data = scenario_data([on_slope(gap)], ground={"profile": [[0, 0], [2, 1]]})
+    assert [found[: len("body 1 reaches 0.001 mm into")] for found in mistakes(data)] == message
+
+
+def test_the_level_ground_beyond_the_ends_of_a_profile_counts() -> None:
+    profile = {"profile": [[0, 1], [1, 2]]}
+    assert mistakes(scenario_data([{"x": -5, "y": 1.05}, {"x": 50, "y": 2.05}], ground=profile)) == []
+    assert mistakes(scenario_data([{"x": -5, "y": 1.04}, {"x": 50, "y": 1.05}], ground=profile)) == [
+        "body 1 reaches 10 mm into the ground's profile",
+        "body 2 lies below the ground's profile",
+    ]
+
+
+def test_a_structure_stands_on_a_profile_at_its_bottom() -> None:
+    stack = {"kind": "stack", "block": "brick", "count": 2, "bottom": 1.0}
+    data = scenario_data([], structures=[stack], ground={"profile": [[0, 1], [1, 1]]})
+    del data["bodies"]
+    assert [body.y for body in place_bodies(scenario_from_mapping(data))] == pytest.approx([1.05, 1.15])
+
+
+def test_spacings_count_for_the_blocks_in_use_and_the_models_that_use_them() -> None:
+    tiny = {"width": 0.001, "height": 0.001, "length": 0.001, "material": "oak"}
+    blocks = {"brick": BRICK, "tiny": tiny}
+    coarse = {"particle_spacing": 0.03, "smoothing_length": 0.049, "model": "kernel"}
+    assert mistakes(scenario_data([{"x": 0, "y": 1}], blocks=blocks, contact=coarse)) == []
+    used: list[dict[str, object]] = [{"x": 0, "y": 1}, {"x": 1, "y": 1, "block": "tiny"}]
+    assert mistakes(scenario_data(used, blocks=blocks, contact={**coarse, "model": "surface"})) == []
+    assert mistakes(scenario_data(used, blocks=blocks, contact=coarse)) == [
+        "30 mm is more than half of the smallest side of a block, 1 mm"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        (
+            {"ground": {"profile": [[float(i), 0.0] for i in range(1001)]}},
+            "1001 points are too many; at most 1000 are possible",
+        ),
+        (
+            {"walls": [{"from": [float(i), 9], "to": [i + 0.5, 9]} for i in range(1001)]},
+            "1001 walls are too many; at most 1000 are possible",
+        ),
+    ],
+)
+def test_too_many_pieces_of_boundary(tables: dict[str, Any], message: str) -> None:
+    assert mistakes(scenario_data([{"x": 0, "y": 1}], **tables)) == [message]
