@@ -10,6 +10,13 @@ from blocksim.kernels.history import change_contacts
 from blocksim.kernels.integrate import accelerate_and_kick, kick_and_drift, kinetic_energy, renew_rotations
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.models import contact_points
+from blocksim.kernels.support import book_support, is_support_at_rest, move_support
+
+
+@kernel
+def has_motion(controls: Record) -> bool:
+    """Tell whether the support moves at all."""
+    return controls.motion_x != 0.0 or controls.motion_y != 0.0
 
 
 @kernel
@@ -24,6 +31,8 @@ def contact_forces(world: World, step: float) -> None:
             pair_forces(world, p, count, step)
         elif world.pairs[p].active > 0:
             change_contacts(world, p, 0, step)
+    if has_motion(world.controls[0]):
+        book_support(world, step)
     accelerate_and_kick(world.bodies, world.controls[0], step)
 
 
@@ -64,7 +73,7 @@ def check(world: World) -> int:
         return NOT_FINITE
     if has_excessive_overlap(world):
         return OVERLAP_LIMIT
-    rests = fastest < controls.rest_speed and is_supported(world.bodies, controls)
+    rests = fastest < controls.rest_speed and is_supported(world.bodies, controls) and is_support_at_rest(world)
     clock.checks_at_rest = clock.checks_at_rest + 1 if rests else 0
     return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
 
@@ -86,6 +95,8 @@ def advance(world: World, last_step: int) -> int:
             return PAIRS_FULL
         step = controls.step if clock.is_started else 0.0
         clock.pairs_due = kick_and_drift(world.bodies, controls, step, world.ledger[0])
+        if has_motion(controls):
+            clock.pairs_due = move_support(world, step) or clock.pairs_due == 1
         contact_forces(world, step)
         clock.steps += clock.is_started
         clock.is_started = 1

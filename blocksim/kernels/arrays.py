@@ -55,11 +55,14 @@ BODY = record_type(
     "fx fy torque "  # N, N, N m: contact totals of the evaluation under way
     "half_x half_y radius "  # m: half sides along the body's own axes, half diagonal
     "inverse_mass inverse_inertia "  # 1/kg, 1/(kg m2): zero for fixed bodies and the ground
-    "mass inertia "  # kg, kg m2 about the centre, out of the plane: kept for fixed bodies too
-    "list_x list_y list_angle",  # m, m, rad: where the body was when the pair list was made
+    "mass inertia "  # kg, kg m2 about the centre, out of the plane: zero for fixed bodies too
+    "list_x list_y list_angle "  # m, m, rad: where the body was when the pair list was made
+    "base_x base_y "  # m: where a body that moves with the support was at the start
+    "before_fx before_fy",  # N: contact totals on it in the evaluation before
     "contact_class "  # index into the interaction table; class 0 is the ground
     "pairs_now pairs_before pairs_changed "  # pairs in contact in this evaluation and in the one before; flag
     "faces corners "  # bits of those that can touch; pieces of ground have their upper face and its free ends
+    "is_moved "  # flag: moves with the support
     "first_particle particle_count "  # its part of the particles
     "row_x row_y",  # intervals between particles on the faces along x and along y
 )
@@ -108,13 +111,15 @@ NORMAL, SHEAR = 0, 1
 CONTROLS = record_type(
     "step gravity_x gravity_y "  # s, m/s2
     "skin rest_speed "  # m: reach of the pair list beyond contact; m/s
+    "motion_x motion_y "  # -: direction of the support's motion, both zero without one
     "max_overlap "  # m, zero: a share of the smaller side of each pair
     "particle_size smoothing_length support",  # m: diameter; of the SPH kernel; radius beyond which it is zero
     "model law sph_kernel "  # codes
     "check_every rest_checks",  # steps between checks; checks in a row that must find rest (0: never)
 )
-CLOCK = record_type("", "steps checks_at_rest pair_count rebuilds pairs_due is_started")  # the last two: flags
-LEDGER = record_type("dashpot friction broken travel_work largest_kinetic")  # J
+CLOCK = record_type("", "steps checks_at_rest pair_count rebuilds motion_piece pairs_due is_started")  # last two: flags
+LEDGER = record_type("dashpot friction broken to_support travel_work largest_kinetic")  # J
+MOTION_PIECE = record_type("start c0 c1 c2 c3")  # s, m, m/s ...: c0 + c1 t + c2 t^2 + c3 t^3 with t from the start
 
 
 class World(NamedTuple):
@@ -132,6 +137,7 @@ class World(NamedTuple):
     particles: Records  # (q,) PARTICLE, body after body; none for the surface model
     points: Records  # (s + 1,) POINT, work space of one pair; the last one for contacts that end
     matrices: Floats  # (8, 3, 3) work space of one pair
+    motion: Records  # (m,) MOTION_PIECE, displacement of the support over time; ends with a constant piece
     controls: Records  # (1,) CONTROLS
     clock: Records  # (1,) CLOCK
     ledger: Records  # (1,) LEDGER

@@ -8,7 +8,7 @@ from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.laws import stored_energy
 
 OVERLAP_SHARE = 0.05  # of the smallest side of a pair
-LEDGER_ROW = ("kinetic", "potential", "stored_normal", "stored_shear", "dashpot", "friction", "broken")
+LEDGER_ROW = ("kinetic", "potential", "stored_normal", "stored_shear", "dashpot", "friction", "broken", "to_support")
 
 
 @rare_kernel
@@ -56,8 +56,9 @@ def measure(world: World, row: Floats) -> None:
     row[4] = ledger.dashpot
     row[5] = ledger.friction
     row[6] = ledger.broken
-    row[7] = count
-    row[8] = largest
+    row[7] = ledger.to_support
+    row[8] = count
+    row[9] = largest
 
 
 @rare_kernel

@@ -10,7 +10,8 @@ from blocksim.kernels.broad_phase import clear_slot
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.kinematics import resolve_point, weigh_first_step
 from blocksim.kernels.models import SURFACE, place_ended
-from blocksim.kernels.models.surface import PARALLEL, slot_normal
+from blocksim.kernels.models.surface import slot_normal
+from blocksim.kernels.models.twins import PARALLEL
 
 
 @rare_kernel

@@ -18,7 +18,10 @@ Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is Non
 
 
 class EnergyLedger(BaseModel, frozen=True):
-    """All in J. The residual is what total + losses has drifted since the start."""
+    """All in J. The residual is what total + losses has drifted since the start.
+
+    `to_support` is the work done on a support that moves; negative where the support drives the scene.
+    """
 
     kinetic: Number
     potential: Number
@@ -27,6 +30,7 @@ class EnergyLedger(BaseModel, frozen=True):
     dashpot: Number
     friction: Number
     broken: Number
+    to_support: Number = 0.0
     start: Number
     in_play: Number
 
@@ -35,7 +39,7 @@ class EnergyLedger(BaseModel, frozen=True):
     def residual(self) -> float:
         """Energy now plus all losses, minus the energy at the start (J)."""
         now = self.kinetic + self.potential + self.stored_normal + self.stored_shear
-        return now + self.dashpot + self.friction + self.broken - self.start
+        return now + self.dashpot + self.friction + self.broken + self.to_support - self.start
 
     @computed_field  # type: ignore[prop-decorator]
     @property
@@ -59,11 +63,13 @@ def start_energy(world: World) -> float:
 def energy_ledger(world: World, start: float) -> EnergyLedger:
     """Return the ledger of the present state; `start` is the energy (J) at the start.
 
-    Energy in play: largest kinetic energy + sum of the weights' travel |m g v| dt, at least m_total g 1 mm.
+    Energy in play: largest kinetic energy + sum of the weights' travel |m g v| dt + |work of the support|, at least
+    m_total g 1 mm.
     """
     ledger = world.ledger[0]
     row = energy_row(world)
     weight = float(np.sum(world.bodies.mass)) * STANDARD_GRAVITY
-    in_play = max(float(ledger.largest_kinetic + ledger.travel_work), weight * SMALLEST_HEIGHT)
+    driven = float(ledger.largest_kinetic + ledger.travel_work) + abs(float(ledger.to_support))
+    in_play = max(driven, weight * SMALLEST_HEIGHT)
     entries = {name: float(value) for name, value in zip(LEDGER_ROW, row, strict=False)}
     return EnergyLedger(**entries, start=start, in_play=in_play)

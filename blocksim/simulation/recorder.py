@@ -20,7 +20,7 @@ class Frame(NamedTuple):
 
     step: int
     motion: NDArray[np.float64]  # (6, b) as MOTION
-    measured: NDArray[np.float64]  # (9,) as MEASURED
+    measured: NDArray[np.float64]  # (10,) as MEASURED
 
 
 class FrameSink(Protocol):
@@ -77,7 +77,7 @@ def frames_from_rows(
     motion: NDArray[np.float64],
     measured: NDArray[np.float64],
 ) -> Frames:
-    """Return frames from step numbers (n,), motion (n, 6, b) and measured values (n, 9)."""
+    """Return frames from step numbers (n,), motion (n, 6, b) and measured values (n, 10)."""
     columns = measured.T
     x, y, angle, vx, vy, spin = motion.swapaxes(0, 1)
     return Frames(

@@ -30,6 +30,8 @@ def body_records(scenario: Scenario, placed: tuple[PlacedBody, ...], classes: tu
         record.contact_class = classes.index(wall) if segment.material else 0
     if scenario.ground.profile is not None:
         bodies[-1].y = -math.inf
+    bodies.is_moved = bodies.inverse_mass == 0.0
+    bodies.base_x, bodies.base_y = bodies.x, bodies.y
     return bodies
 
 
@@ -39,9 +41,9 @@ def _fill_block(record: Record, body: PlacedBody) -> None:
     record.vx, record.vy, record.spin = body.vx, body.vy, body.spin
     record.half_x, record.half_y = 0.5 * body.size_x, 0.5 * body.size_y
     record.radius = 0.5 * math.hypot(body.size_x, body.size_y)
-    record.mass, record.inertia = body.mass, body.inertia
-    record.inverse_mass = 0.0 if body.fixed else 1.0 / body.mass
-    record.inverse_inertia = 0.0 if body.fixed else 1.0 / body.inertia
+    if not body.fixed:
+        record.mass, record.inertia = body.mass, body.inertia
+        record.inverse_mass, record.inverse_inertia = 1.0 / body.mass, 1.0 / body.inertia
 
 
 def _fill_slab(record: Record, segment: PlacedSegment, thickness: float) -> None:

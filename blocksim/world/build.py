@@ -24,6 +24,7 @@ from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.world.bodies import body_records
 from blocksim.world.interactions import contact_classes, interaction_table
+from blocksim.world.motion import motion_direction, motion_records
 from blocksim.world.particles import place_particles, slots_of_a_pair
 from blocksim.world.step import MOST_STEPS, choose_step
 
@@ -51,6 +52,7 @@ def build_world(scenario: Scenario) -> World:
         particles=particles,
         points=_points(slots),
         matrices=np.zeros((8, 3, 3)),
+        motion=motion_records(scenario),
         controls=_controls(scenario, bodies, len(placed), choose_step(scenario, bodies, table)),
         clock=_clock(),
         ledger=_ledger(bodies),
@@ -110,6 +112,7 @@ def _controls(scenario: Scenario, bodies: Records, blocks: int, step: float) -> 
     record.step = step
     record.gravity_x = -scenario.gravity * math.sin(scenario.ground.tilt)
     record.gravity_y = -scenario.gravity * math.cos(scenario.ground.tilt)
+    record.motion_x, record.motion_y = motion_direction(scenario)
     record.skin = SKIN_SHARE * smallest
     record.max_overlap = 0.0 if given_limit is None else given_limit
     record.rest_speed = scenario.time.rest_speed

@@ -4,8 +4,11 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from blocksim.kernels.arrays import Record, World
 from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, place_bodies
+from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
 from blocksim.world.boundary import particle_count
 from blocksim.world.build import build_world
 from blocksim.world.interactions import ContactClass, contact_classes, pair_of
@@ -36,11 +39,21 @@ class PairDescription:
 
 
 @dataclass(frozen=True)
+class MotionDescription:
+    """How far and how fast the supports move, SI."""
+
+    displacement: float  # m, greatest
+    speed: float  # m/s, greatest
+    final_speed: float  # m/s
+
+
+@dataclass(frozen=True)
 class Description:
     """The resolved scene, SI."""
 
     bodies: tuple[PlacedBody, ...]
     pairs: tuple[PairDescription, ...]
+    motion: MotionDescription | None
     step: float  # s
     steps: int  # at most
     frames: int  # at most
@@ -59,6 +72,7 @@ def describe(scenario: Scenario) -> Description:
     return Description(
         bodies=placed,
         pairs=tuple(_pairs(scenario, world, placed)),
+        motion=_motion(scenario),
         step=step,
         steps=steps,
         frames=frames,
@@ -66,6 +80,15 @@ def describe(scenario: Scenario) -> Description:
         bytes=frames * (FRAME_BYTES + BODY_FRAME_BYTES * len(placed)),
         particles=_particles(scenario, placed),
     )
+
+
+def _motion(scenario: Scenario) -> MotionDescription | None:
+    if scenario.motion is None:
+        return None
+    pieces = motion_pieces(scenario)
+    times = np.interp(np.arange(0, len(pieces.times) - 0.75, 0.25), np.arange(len(pieces.times)), pieces.times)
+    displacement, velocity = np.abs(displacement_and_velocity(pieces, times[times <= scenario.time.end]))
+    return MotionDescription(float(displacement.max()), float(velocity.max()), float(velocity[-1]))
 
 
 def _particles(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> int:

@@ -56,11 +56,11 @@ def test_poses_and_velocities_are_those_of_the_scenario() -> None:
     assert [body.vx, body.vy, body.spin] == [1.0, -2.0, 3.0]
 
 
-def test_fixed_bodies_have_mass_but_no_inverse_mass() -> None:
+def test_fixed_bodies_have_no_mass_and_move_with_the_support_as_the_ground_does() -> None:
     world = build_world(scenario({"fixed": True}, more=({**BODY, "x": 0.5},)))
     fixed, free, ground = world.bodies
-    assert fixed.mass == free.mass
-    assert (fixed.inverse_mass, fixed.inverse_inertia) == (0.0, 0.0)
+    assert (fixed.mass, fixed.inertia, fixed.inverse_mass, fixed.inverse_inertia) == (0.0, 0.0, 0.0, 0.0)
+    assert (fixed.is_moved, ground.is_moved, free.is_moved) == (1, 1, 0)
     assert (ground.inverse_mass, ground.inverse_inertia, ground.contact_class) == (0.0, 0.0, 0)
     assert free.inverse_mass > 0.0
     assert [ground.x, ground.y, ground.cos, ground.sin] == [0.0, 0.0, 1.0, 0.0]

@@ -5,16 +5,9 @@ import math
 from blocksim.kernels.arrays import ALL, HALF, NO_FACE, SLOTS, Integers, Record, Records, World
 from blocksim.kernels.geometry import relative_pose, slab_depth, to_world
 from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.models.twins import CONE_TOLERANCE, corner_signs, drop_twins
 
-# A corner can touch a face only where the face normal, reversed, lies between the outward normals of the two sides
-# that meet in the corner (the vertex-face pairs of the Minkowski difference of two convex bodies). The tolerance
-# (sine of an angle) lets both ends of a nearly parallel face contact count. Without this rule the corner of an
-# aligned stack, which lies nearer to the side of the block below than to its top, would touch the wrong face.
-CONE_TOLERANCE = 0.2
-
-PARALLEL = 0.9
 BESIDE_SHARE = 0.1  # of the half diagonal; a face farther than that below a corner is not beside it
-CLOSE = 8.0  # overlaps; two corners nearer than that meet in one place
 UPPER_FACE = 1  # of a piece of ground, the only one that counts
 
 
@@ -66,12 +59,6 @@ def face_normal(face: int, body: Record) -> tuple[float, float]:
     if face == 2:
         return -body.cos, -body.sin
     return body.sin, -body.cos
-
-
-@kernel
-def corner_signs(corner: int) -> tuple[float, float]:
-    """Return +-1 for the side of a body that a corner lies on, along its own x and y."""
-    return 1.0 if corner == 1 or corner == 2 else -1.0, 1.0 if corner >= 2 else -1.0
 
 
 @rare_kernel
@@ -141,86 +128,6 @@ def lies_near(owner: Record, touched: Record, corner: int, reach: float) -> bool
     px = x0 + sx * c * owner.half_x - sy * s * owner.half_y
     py = y0 + sx * s * owner.half_x + sy * c * owner.half_y
     return abs(px) <= touched.half_x + reach and abs(py) <= touched.half_y + reach
-
-
-@rare_kernel
-def outward_along(body: Record, corner: int, tx: float, ty: float) -> float:
-    """Return the component along (tx, ty) of the way (m) from the centre of a body to one of its corners."""
-    sx, sy = corner_signs(corner)
-    x, y = to_world(body, sx * body.half_x, sy * body.half_y)
-    return tx * (x - body.x) + ty * (y - body.y)
-
-
-@rare_kernel
-def same_end(of_a: Record, of_b: Record, a: Record, b: Record) -> bool:
-    """Tell whether a corner of a and a corner of b (both points) mark the same end of one face contact."""
-    if of_a.nx * of_b.nx + of_a.ny * of_b.ny < PARALLEL:
-        return False
-    end_a = outward_along(a, of_a.slot, -of_a.ny, of_a.nx)
-    end_b = outward_along(b, of_b.slot - HALF, -of_a.ny, of_a.nx)
-    return end_a * end_b > 0.0
-
-
-@rare_kernel
-def is_oblique(a: Record, b: Record) -> bool:
-    """Tell whether no face of a is nearly parallel to a face of b, so that they touch in one point at most."""
-    c = abs(a.cos * b.cos + a.sin * b.sin)
-    s = abs(a.sin * b.cos - a.cos * b.sin)
-    return min(c, s) > CONE_TOLERANCE
-
-
-@rare_kernel
-def coincide(one: Record, two: Record) -> bool:
-    """Tell whether two corners meet: they are about as near to one another as they are deep."""
-    dx = one.x - two.x
-    dy = one.y - two.y
-    reach = CLOSE * max(one.depth, two.depth)
-    return dx * dx + dy * dy < reach * reach
-
-
-@rare_kernel
-def keeps_first(one: Record, two: Record, slots: Records, oblique: bool) -> bool:
-    """Choose between two coinciding corners.
-
-    Oblique: the shallower one, which is the nearest edge of the Minkowski difference, so that the overlap changes
-    continuously when the corners pass one another. Parallel: the one already in contact, otherwise the deeper one,
-    otherwise that of a.
-    """
-    if oblique:
-        return one.depth <= two.depth
-    was_one = slots[one.slot].face != NO_FACE
-    was_two = slots[two.slot].face != NO_FACE
-    return was_one if was_one != was_two else one.depth >= two.depth
-
-
-@rare_kernel
-def drop_point(points: Records, gone: int, count: int) -> int:
-    """Remove one point, keep the order of the others, return the new count."""
-    for i in range(gone, count - 1):
-        points[i] = points[i + 1]
-    return count - 1
-
-
-@rare_kernel
-def drop_twins(a: Record, b: Record, slots: Records, points: Records, count: int) -> int:
-    """Keep one of two coinciding corners: they are one contact, and a face contact has the stiffness of two points.
-
-    Where two blocks are exactly aligned, or meet corner on corner, a corner of each lies in the other. `slots` are the
-    slots of this pair.
-    """
-    oblique = is_oblique(a, b)
-    i = 0
-    while i < count and points[i].slot < HALF:
-        for j in range(i + 1, count):
-            if points[j].slot >= HALF and (
-                coincide(points[i], points[j]) if oblique else same_end(points[i], points[j], a, b)
-            ):
-                keep_i = keeps_first(points[i], points[j], slots, oblique)
-                count = drop_point(points, j if keep_i else i, count)
-                i -= 0 if keep_i else 1
-                break
-        i += 1
-    return count
 
 
 @kernel

@@ -8,22 +8,32 @@ SUPPORT = 3.0  # smoothing lengths
 SCALE = 7.0 / (478.0 * math.pi)  # makes the integral over the plane one
 
 
-@kernel
-def power_4(s: float) -> float:
-    """Return s^4, or zero for negative s."""
-    return s * s * s * s if s > 0.0 else 0.0
+# For q < 1 the powers of (3 - q), (2 - q) and (1 - q) are multiplied out: they cancel in the centre, and what round-off
+# left of the slope there would be divided by r.
 
 
 @kernel
 def value(r: float, h: float) -> float:
     """Return W (1/m^2) at a distance r >= 0 (m) for the smoothing length h (m)."""
     q = r / h
-    a, b, c = 3.0 - q, 2.0 - q, 1.0 - q
-    return SCALE * (a * power_4(a) - 6.0 * b * power_4(b) + 15.0 * c * power_4(c)) / (h * h)
+    if q >= 3.0:
+        return 0.0
+    if q < 1.0:
+        q2 = q * q
+        return SCALE * (66.0 - q2 * (60.0 - q2 * (30.0 - 10.0 * q))) / (h * h)
+    outer = 3.0 - q
+    inner = max(2.0 - q, 0.0)
+    return SCALE * (outer**5 - 6.0 * inner**5) / (h * h)
 
 
 @kernel
 def slope(r: float, h: float) -> float:
     """Return dW/dr (1/m^3), never positive."""
     q = r / h
-    return -SCALE * 5.0 * (power_4(3.0 - q) - 6.0 * power_4(2.0 - q) + 15.0 * power_4(1.0 - q)) / (h * h * h)
+    if q >= 3.0:
+        return 0.0
+    if q < 1.0:
+        return -SCALE * q * (120.0 - q * q * (120.0 - 50.0 * q)) / (h * h * h)
+    outer = 3.0 - q
+    inner = max(2.0 - q, 0.0)
+    return -SCALE * 5.0 * (outer**4 - 6.0 * inner**4) / (h * h * h)

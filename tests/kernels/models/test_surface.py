@@ -13,14 +13,13 @@ from hypothesis import strategies as st
 from blocksim.kernels.arrays import NO_FACE, POINT, SLOT, SLOTS, zeros
 from blocksim.kernels.geometry import ground_gap, separation, to_world
 from blocksim.kernels.models.surface import (
-    CONE_TOLERANCE,
     block_points,
-    corner_signs,
     face_below_corner,
     face_normal,
     ground_points,
     lies_near,
 )
+from blocksim.kernels.models.twins import CONE_TOLERANCE, corner_signs
 
 if TYPE_CHECKING:
     from blocksim.kernels.arrays import Record, Records

@@ -1,0 +1,78 @@
+"""Prescribed motion of the support: the ground, its pieces, walls and all fixed bodies together."""
+
+from blocksim.kernels.arrays import Record, Records, World
+from blocksim.kernels.integrate import PAIR_SHARE
+from blocksim.kernels.jit import rare_kernel
+
+
+@rare_kernel
+def piece_at(motion: Records, piece: int, time: float) -> int:
+    """Return the piece that holds at a time (s), looked for from `piece` on."""
+    while piece + 1 < motion.size and motion[piece + 1].start <= time:
+        piece += 1
+    return piece
+
+
+@rare_kernel
+def displacement(piece: Record, time: float) -> float:
+    """Return the displacement (m) at a time (s)."""
+    t = time - piece.start
+    return piece.c0 + t * (piece.c1 + t * (piece.c2 + t * piece.c3))
+
+
+@rare_kernel
+def acceleration(piece: Record, time: float) -> float:
+    """Return the acceleration (m/s2) at a time (s)."""
+    return 2.0 * piece.c2 + 6.0 * piece.c3 * (time - piece.start)
+
+
+@rare_kernel
+def move_support(world: World, step: float) -> bool:
+    """Bring everything that moves with the support to the end of the drift under way; tell whether pairs are due.
+
+    Positions are exact at every step, never summed up. The velocity is that of the drift, displacement over time, as
+    the contacts want it: all relative displacements of the drift are exact.
+    """
+    controls = world.controls[0]
+    clock = world.clock[0]
+    before = clock.steps * controls.step
+    now = before + step
+    last = displacement(world.motion[piece_at(world.motion, clock.motion_piece, before)], before)
+    clock.motion_piece = piece_at(world.motion, clock.motion_piece, before)
+    piece = world.motion[piece_at(world.motion, clock.motion_piece, now)]
+    moved = displacement(piece, now)
+    rate = (moved - last) / step if step > 0.0 else piece.c1
+    change = acceleration(piece, now)
+    is_due = False
+    for i in range(world.bodies.size):
+        body = world.bodies[i]
+        if body.is_moved:
+            body.x = body.base_x + controls.motion_x * moved
+            body.y = body.base_y + controls.motion_y * moved
+            body.vx = controls.motion_x * rate
+            body.vy = controls.motion_y * rate
+            body.ax = controls.motion_x * change
+            body.ay = controls.motion_y * change
+            travelled = abs(body.x - body.list_x) + abs(body.y - body.list_y)
+            is_due = is_due or travelled > PAIR_SHARE * controls.skin
+    return is_due
+
+
+@rare_kernel
+def book_support(world: World, step: float) -> None:
+    """Book the work that contacts have done on the support over the last drift, by the trapezoid rule as all work."""
+    total = 0.0
+    for i in range(world.bodies.size):
+        body = world.bodies[i]
+        if body.is_moved:
+            total += (body.before_fx + body.fx) * body.vx + (body.before_fy + body.fy) * body.vy
+            body.before_fx = body.fx
+            body.before_fy = body.fy
+    world.ledger[0].to_support += 0.5 * step * total
+
+
+@rare_kernel
+def is_support_at_rest(world: World) -> bool:
+    """Tell whether the motion of the support is over, or there is none."""
+    last = world.motion[world.motion.size - 1]
+    return world.clock[0].steps * world.controls[0].step >= last.start

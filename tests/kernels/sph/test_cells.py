@@ -1,0 +1,114 @@
+"""The cell search against a search over all pairs, wherever the particles lie."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blocksim.kernels.sph.cells import find_neighbours, lay_grid, make_cells
+
+if TYPE_CHECKING:
+    from blocksim.kernels.arrays import Floats
+
+RADIUS = 0.1
+# on the edges of cells, between them, and so far away that cells of the size of the radius would be too many
+PLACES = st.one_of(
+    st.integers(-6, 6).map(lambda k: k * RADIUS), st.floats(-0.5, 0.5), st.floats(-1e9, 1e9), st.just(-0.0)
+)
+CLOUDS = st.lists(st.tuples(PLACES, PLACES), min_size=1, max_size=40).map(np.array)
+
+
+def by_cells(positions: Floats, points: Floats, radius: float) -> list[list[int]]:
+    offsets, indices = find_neighbours(positions, points, radius)
+    return [sorted(indices[offsets[i] : offsets[i + 1]].tolist()) for i in range(len(points))]
+
+
+def by_brute_force(positions: Floats, points: Floats, radius: float) -> list[list[int]]:
+    dx, dy = (positions[None, :, k] - points[:, None, k] for k in (0, 1))
+    return [np.flatnonzero(row).tolist() for row in dx * dx + dy * dy < radius * radius]
+
+
+@given(positions=CLOUDS, points=CLOUDS, radius=st.sampled_from([0.05, RADIUS, 0.3, 1e6]))
+def test_lists_equal_those_of_a_search_over_all_pairs(positions: Floats, points: Floats, radius: float) -> None:
+    assert by_cells(positions, points, radius) == by_brute_force(positions, points, radius)
+    assert by_cells(positions, positions, radius) == by_brute_force(positions, positions, radius)
+
+
+@pytest.mark.parametrize("shift", [0.0, -7.3, 1e6])
+@pytest.mark.parametrize("radius", [0.02, 0.1, 5.0])
+def test_random_cloud(shift: float, radius: float) -> None:
+    positions = np.random.default_rng(1).uniform(-1.0, 1.0, (300, 2)) + shift
+    found = by_cells(positions, positions, radius)
+    assert found == by_brute_force(positions, positions, radius)
+    assert all(i in near for i, near in enumerate(found))
+
+
+def test_neighbours_exactly_at_the_radius_are_none() -> None:
+    positions = np.array([[0.0, 0.0], [0.25, 0.0], [0.0, -0.25], [np.nextafter(0.25, 0.0), 0.0]])
+    assert by_cells(positions, np.zeros((1, 2)), 0.25) == [[0, 3]]
+
+
+def test_particles_in_one_place_are_neighbours_of_each_other() -> None:
+    positions = np.full((50, 2), -3.0)
+    assert by_cells(positions, positions, 1e-3) == [list(range(50))] * 50
+
+
+def test_points_far_outside_have_no_neighbours() -> None:
+    positions = np.random.default_rng(2).uniform(0.0, 1.0, (20, 2))
+    far = np.array([[5.0, 0.5], [-5.0, 0.5], [0.5, 1e30], [-1e90, -1e90]])
+    assert by_cells(positions, far, 0.2) == [[], [], [], []]
+    assert by_cells(positions, np.empty((0, 2)), 0.2) == []
+
+
+@given(positions=CLOUDS, radius=st.sampled_from([1e-9, RADIUS, 1e12]))
+def test_cells_are_few_and_hold_every_particle_once(positions: Floats, radius: float) -> None:
+    cells = make_cells(positions, radius)
+    count = cells.grid.columns * cells.grid.rows
+    assert count <= 3 * len(positions) + 1
+    assert cells.grid.size >= radius
+    assert sorted(cells.order.tolist()) == list(range(len(positions)))
+    assert (cells.starts[0], cells.starts[count]) == (0, len(positions))
+    for begin, end in zip(cells.starts[:count], cells.starts[1:], strict=False):
+        assert (np.diff(cells.order[begin:end]) > 0).all()
+
+
+def test_cells_of_an_even_cloud_have_the_size_of_the_radius() -> None:
+    positions = np.random.default_rng(3).uniform(0.0, 1.0, (1000, 2))
+    grid = lay_grid(positions, 0.1)
+    assert grid.size == 0.1
+    assert (grid.columns, grid.rows) == (10, 10)
+
+
+def test_particles_on_a_line_across_the_sky() -> None:
+    positions = np.array([[-1e12, 0.0], [0.0, 0.0], [0.05, 0.0], [1e12, 0.0]])
+    assert by_cells(positions, positions, RADIUS) == [[0], [1, 2], [1, 2], [3]]
+
+
+def test_same_lists_in_the_same_order_every_time() -> None:
+    positions = np.random.default_rng(4).uniform(-1.0, 1.0, (200, 2))
+    first, again = (find_neighbours(positions, positions, 0.2) for _ in range(2))
+    assert first.indices.tobytes() == again.indices.tobytes()
+    assert first.offsets.tobytes() == again.offsets.tobytes()
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_places_that_are_no_numbers_are_refused(bad: float) -> None:
+    good, wrong = np.zeros((2, 2)), np.array([[0.0, 0.0], [bad, 0.0]])
+    for positions, points in ((wrong, good), (good, wrong)):
+        with pytest.raises(ValueError, match="finite"):
+            find_neighbours(positions, points, 1.0)
+
+
+@pytest.mark.parametrize("radius", [0.0, -1.0, np.nan, np.inf])
+def test_radius_that_is_not_positive_is_refused(radius: float) -> None:
+    with pytest.raises(ValueError, match="radius above zero"):
+        find_neighbours(np.zeros((2, 2)), np.zeros((2, 2)), radius)
+
+
+def test_search_without_particles_is_refused() -> None:
+    with pytest.raises(ValueError, match="at least one particle"):
+        find_neighbours(np.empty((0, 2)), np.zeros((2, 2)), 1.0)
