@@ -69,6 +69,7 @@ BODY = record_type(
 PARTICLE = record_type(
     "x y "  # m: place in the body frame
     "nx ny "  # -: outward normal in the body frame
+    "mx my "  # -: that of the other face at a corner, elsewhere the same
     "length "  # m: tributary length
     "share_x share_y"  # -: tributary length over face length, for faces whose normal is along x and along y
 )

@@ -24,7 +24,7 @@ from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.world.bodies import body_records
 from blocksim.world.interactions import contact_classes, interaction_table
-from blocksim.world.motion import motion_direction, motion_records
+from blocksim.world.motion import motion_records, support_direction
 from blocksim.world.particles import place_particles, slots_of_a_pair
 from blocksim.world.step import MOST_STEPS, choose_step
 
@@ -112,7 +112,7 @@ def _controls(scenario: Scenario, bodies: Records, blocks: int, step: float) -> 
     record.step = step
     record.gravity_x = -scenario.gravity * math.sin(scenario.ground.tilt)
     record.gravity_y = -scenario.gravity * math.cos(scenario.ground.tilt)
-    record.motion_x, record.motion_y = motion_direction(scenario)
+    record.motion_x, record.motion_y = support_direction(scenario)
     record.skin = SKIN_SHARE * smallest
     record.max_overlap = 0.0 if given_limit is None else given_limit
     record.rest_speed = scenario.time.rest_speed

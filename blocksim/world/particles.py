@@ -46,7 +46,9 @@ def kernel_rows(body: Record, inset: float) -> Records:
     for start, normal, count in _rows(body):
         row = zeros(count + 1, PARTICLE)
         _line(row, body, inset, start, np.arange(count + 1) / count)
-        row.nx, row.ny = normal
+        row.nx, row.ny = row.mx, row.my = normal
+        row[0].mx, row[0].my = NORMALS[start - 1]
+        row[-1].mx, row[-1].my = NORMALS[(start + 1) % 4]
         row["share_x"] = 1.0 / count
         row["share_x"][[0, -1]] = 0.5 / count
         row["share_y"] = row["share_x"]
@@ -66,7 +68,7 @@ def disc_rows(body: Record, inset: float) -> Records:
     for k, (start, normal, count) in enumerate(_rows(body)):
         row = zeros(count, PARTICLE)
         _line(row, body, inset, start, np.arange(count) / count)
-        row.nx, row.ny = normal
+        row.nx, row.ny = row.mx, row.my = normal
         row["share_x"] = row["share_y"] = 1.0 / count
         row["length"] = sides[k] / count
         along_x, along_y = (k, k - 1) if k % 2 == 0 else (k - 1, k)
@@ -82,7 +84,7 @@ def free_ends(body: Record, model: str) -> Records:
     row = zeros(len(ends), PARTICLE)
     for particle, k in zip(row, ends, strict=True):
         particle.x, particle.y = CORNERS[k][0] * body.half_x, body.half_y
-        particle.ny = 1.0
+        particle.ny = particle.my = 1.0
         particle.share_x = particle.share_y = 0.5
     return row
 

@@ -10,11 +10,13 @@ one body sees the particles j of the other with the weights
     n = sum w_ij n_j / |sum w_ij n_j|,      d = n . sum w_ij (x_i - x_j) / sum w_ij,     overlap = -d.
 
 On a straight face all n_j agree and n . (x_i - x_j) is the distance from the face whichever j it is: the bumps of the
-`particles` model are gone, exactly. Near corners the normal turns smoothly. After the idea of S. Mohseni-Mofidi et al.
-(2022): kernel-weighted normal and projected distance for rigid bodies of particles. What is different here: the factor
-with both normals, which keeps the side faces out of a contact of two aligned blocks, and that a particle counts only
-while it lies inside the other rectangle (the kernel sums alone would carry a block up to one support radius beyond the
-edge that it hangs over). The ground and its pieces are the limit of ever finer particles: exact planes.
+`particles` model are gone, exactly. Near corners, where two faces are about equally near, the normal turns smoothly.
+
+After the idea of S. Mohseni-Mofidi et al. (2022), kernel-weighted normal and projected distance for rigid bodies of
+particles. What is different here: the factor with both normals, and that a face much deeper below the particle than the
+nearest one does not count: both keep side faces out of the contact of two aligned blocks. And a particle counts only
+while it lies inside the other rectangle: the kernel sums alone would carry a block up to one support radius beyond the
+edge that it hangs over. The ground and its pieces are the limit of ever finer particles: exact planes.
 
 A contact has the stiffness of a face, two corner contacts, times tributary over face length times -n_i . n. Where two
 blocks touch both rows act, each with half of that.
@@ -24,7 +26,7 @@ import math
 
 from blocksim.kernels.arrays import ALL, Integers, Record, World
 from blocksim.kernels.geometry import slab_depth, to_world
-from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.models.boundary import (
     ROWS,
     first_within,
@@ -40,6 +42,7 @@ from blocksim.kernels.sph.functions import kernel_value
 
 FACE = 2.0  # stiffness of a face contact over that of a corner contact
 NO_SUM = 1e-30
+NEAR_RATIO = 4.0  # a face that is deeper than this many times the nearest one is not the one that is touched
 LEAST_FACING = 1e-9  # of two normals that oppose one another; at right angles they do not, whatever round-off says
 
 
@@ -68,11 +71,39 @@ def add_row(px: float, py: float, facing: float, body: Record, row: int, control
     sums.y += shift * dy - total * above * dx
 
 
+@kernel
+def depth_below_row(px: float, py: float, body: Record, row: int) -> float:
+    """Return how far (m) a point of the body frame lies inside the face of a row."""
+    dx, dy = row_direction(row)
+    half = body.half_y if row % 2 == 0 else body.half_x
+    return half - (dy * px - dx * py)
+
+
+@kernel
+def least_depth(px: float, py: float, nx: float, ny: float, mx: float, my: float, touched: Record) -> float:
+    """Return the depth (m) below the nearest face that a particle at (px, py) can touch.
+
+    For a corner these are the faces that oppose one of its two normals; otherwise all, and where the nearest of them
+    does not oppose the particle, it is the neighbour's to touch that one, and this particle touches none.
+    """
+    is_corner = nx != mx or ny != my
+    least = math.inf
+    for row in range(ROWS):
+        dx, dy = row_direction(row)
+        opposes = ny * dx - nx * dy > LEAST_FACING or my * dx - mx * dy > LEAST_FACING
+        if opposes or not is_corner:
+            least = min(least, depth_below_row(px, py, touched, row))
+    return least
+
+
 @rare_kernel
-def weighted_sums(px: float, py: float, nx: float, ny: float, body: Record, controls: Record, sums: Record) -> None:
+def weighted_sums(
+    px: float, py: float, nx: float, ny: float, deepest: float, body: Record, controls: Record, sums: Record
+) -> None:
     """Sum weights, weighted normals and weighted distance vectors of a particle over those of `body`, in its frame.
 
-    They are left in the fields `weight`, `nx`, `ny`, `x`, `y` of a contact point.
+    Rows that it lies more than `deepest` (m) below do not count. The sums are left in the fields `weight`, `nx`, `ny`,
+    `x`, `y` of a contact point.
     """
     sums.x = 0.0
     sums.y = 0.0
@@ -82,7 +113,7 @@ def weighted_sums(px: float, py: float, nx: float, ny: float, body: Record, cont
     for row in range(ROWS):
         dx, dy = row_direction(row)
         facing = ny * dx - nx * dy
-        if facing > 0.0:
+        if facing > LEAST_FACING and depth_below_row(px, py, body, row) <= deepest:
             add_row(px, py, facing, body, row, controls, sums)
 
 
@@ -112,7 +143,10 @@ def resolve_particle(owner: Record, particle: Record, touched: Record, world: Wo
     nx = c * particle.nx - s * particle.ny
     ny = s * particle.nx + c * particle.ny
     if touched.faces == ALL:
-        weighted_sums(px, py, nx, ny, touched, world.controls[0], point)
+        mx = c * particle.mx - s * particle.my
+        my = s * particle.mx + c * particle.my
+        deepest = NEAR_RATIO * least_depth(px, py, nx, ny, mx, my, touched)
+        weighted_sums(px, py, nx, ny, deepest, touched, world.controls[0], point)
         depth = smoothed_overlap(point)
         mx, my = point.nx, point.ny
     else:
