@@ -94,6 +94,29 @@ def toppling_slope(width: float, height: float) -> float:
     return atan2(width, height)
 
 
+def rolling_friction_limit(width: float, height: float, slope: float) -> float:
+    """Return the friction coefficient that a block needs to start toppling on a slope without sliding.
+
+    Turning from rest about its lower edge with w' (1/s^2) = 3 g (h sin a - b cos a)/(2 (b^2 + h^2)), its centre
+    accelerates by w' h/2 down the slope and by w' b/2 away from it, so that per unit mass f = g sin a - w' h/2 and
+    N = g cos a + w' b/2; the limit is f/N. It lies below tan a, where the chart from statics puts it (J. P. Ashby 1971;
+    corrected by C. Sagaseta, Rock Mech. Rock Eng. 19 (1986) 261-266). At the toppling slope it is tan a = b/h. Needs a
+    slope not below the toppling slope.
+    """
+    spin_rate = 1.5 * (height * sin(slope) - width * cos(slope)) / (width**2 + height**2)  # times g
+    return (sin(slope) - 0.5 * spin_rate * height) / (cos(slope) + 0.5 * spin_rate * width)
+
+
+def ladder_friction(slope: float, slenderness: float) -> float:
+    """Return the ground friction below which a ladder of thickness/length `slenderness` slips at a smooth wall.
+
+    It stands at `slope` (rad) to the ground on one corner and leans with another one of the same side. Moments about
+    the foot: N_wall L sin a = m g (L cos a - t sin a)/2, and the ground's friction balances the wall: mu =
+    N_wall/(m g) = (cot a - t/L)/2.
+    """
+    return 0.5 * (1.0 / tan(slope) - slenderness)
+
+
 # Resting
 
 

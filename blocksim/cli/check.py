@@ -10,7 +10,7 @@ from blocksim.cli.scenario import read_scenario
 from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
 from blocksim.study.single import check_experiment
-from blocksim.world.describe import Description, PairDescription, describe
+from blocksim.world.describe import Description, MotionDescription, PairDescription, describe
 
 MOST_BODIES = 12
 NO_KEY = (DEFAULT, MATERIALS)
@@ -105,11 +105,19 @@ def _wrapped(key: str, pairs: Iterable[str], room: int) -> Iterator[tuple[str, s
 
 def _cost(scenario: Scenario, description: Description) -> list[str]:
     return [
+        *_motion(description.motion),
         f"boundary   {description.particles} particles ({_use_of_particles(scenario.contact)})",
         f"time step  {description.step:.3e} s, at most {description.steps} steps",
         f"solving    at most about {description.seconds:.1f} s on one core",
         f"results    at most {description.frames} frames, about {description.bytes / MEGA:.1f} MB",
     ]
+
+
+def _motion(motion: MotionDescription | None) -> list[str]:
+    if motion is None:
+        return []
+    greatest = f"at most {number(MILLI * motion.displacement)} mm and {number(MILLI * motion.speed)} mm/s"
+    return [f"supports   move {greatest}, {number(MILLI * motion.final_speed)} mm/s at the end"]
 
 
 def _use_of_particles(contact: Contact) -> str:

@@ -1,4 +1,4 @@
-"""blocksim plot: a strip of frames."""
+"""blocksim plot: a strip of frames, or where the blocks of a sweep end."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,12 +12,16 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.simulation import folder as files
 from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.study.many import TABLE
+from blocksim.study.picture import draw_sweep
 from blocksim.study.single import find_run
 from blocksim.view.strip import draw_strip
 
 
 def plot_command(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder, results/NAME or scenario file.")],
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN", help="Run folder, results/NAME, scenario file, or sweep folder.")
+    ],
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Picture to write: .png, .svg or .pdf.")
     ] = None,
@@ -27,13 +31,25 @@ def plot_command(
     experiment: options.ExperimentPath = None,
     quiet: options.Quiet = False,
 ) -> None:
-    """Draw a run as a strip of pictures.
+    """Draw a run as a strip of pictures, or where the blocks of a sweep end.
 
-    Below its final state stand the measured ranges. A run that was stopped or killed is drawn as far as it came.
+    Below the final state of a run stand the measured ranges. A run that was stopped or killed is drawn as far as it
+    came. The picture of a sweep over one key shows final x against its values, with the measured range as a band; a
+    second key gets a column for each of its values.
 
     Example: blocksim plot scenarios/three_blocks.toml --out strip.png
     """
     moments = _times(times)
+    if (run / TABLE).is_file():
+        _refuse_times(run, times)
+        picture = draw_sweep(run, out, experiment)
+    else:
+        picture = _draw_run(run, out, moments, experiment)
+    if not quiet:
+        note(f"picture: {picture}")
+
+
+def _draw_run(run: Path, out: Path | None, moments: list[float] | None, experiment: Path | None) -> Path:
     folder = find_run(run, needed=(files.SCENARIO, files.FRAMES))
     scenario = load_scenario(folder / files.SCENARIO)
     frames = read_frames(folder / files.FRAMES, scenario)
@@ -41,8 +57,13 @@ def plot_command(
     measured = None if table is None else load_table(table)
     picture = out or Path(f"{scenario.name}.png")
     draw_strip(frames, picture, times=moments, title=scenario.name, measured=measured)
-    if not quiet:
-        note(f"picture: {picture}")
+    return picture
+
+
+def _refuse_times(run: Path, times: str | None) -> None:
+    if times is not None:
+        message = f"--times picks frames of a run, but {run} is a sweep"
+        raise InvalidInputError(message)
 
 
 def _times(text: str | None) -> list[float] | None:

@@ -138,7 +138,7 @@ class World(NamedTuple):
     particles: Records  # (q,) PARTICLE, body after body; none for the surface model
     points: Records  # (s + 1,) POINT, work space of one pair; the last one for contacts that end
     matrices: Floats  # (8, 3, 3) work space of one pair
-    motion: Records  # (m,) MOTION_PIECE, displacement of the support over time; ends with a constant piece
+    motion: Records  # (m,) MOTION_PIECE, displacement of the support over time
     controls: Records  # (1,) CONTROLS
     clock: Records  # (1,) CLOCK
     ledger: Records  # (1,) LEDGER

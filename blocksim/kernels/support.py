@@ -75,4 +75,5 @@ def book_support(world: World, step: float) -> None:
 def is_support_at_rest(world: World) -> bool:
     """Tell whether the motion of the support is over, or there is none."""
     last = world.motion[world.motion.size - 1]
-    return world.clock[0].steps * world.controls[0].step >= last.start
+    is_constant = last.c1 == 0.0 and last.c2 == 0.0 and last.c3 == 0.0
+    return is_constant and world.clock[0].steps * world.controls[0].step >= last.start

@@ -10,7 +10,7 @@ from blocksim.scenario.models.stepping import Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.pairs import GROUND, ResolvedPair, resolve_pair
 from blocksim.scenario.placement import PlacedBody, place_bodies
-from blocksim.scenario.resolved import scenario_hash, scenario_to_toml
+from blocksim.scenario.resolved import motion_table_content, scenario_hash, scenario_to_toml
 from blocksim.scenario.schema import json_schema
 from blocksim.scenario.segments import PlacedSegment, place_segments, surface_height
 
@@ -37,6 +37,7 @@ __all__ = [
     "Wall",
     "json_schema",
     "load_scenario",
+    "motion_table_content",
     "place_bodies",
     "place_segments",
     "resolve_pair",

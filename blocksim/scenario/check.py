@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
 
 from pydantic import ValidationError
 
@@ -20,6 +21,14 @@ MAX_VARIED = 100
 UNVARIED = ("schema", "name", "description", "experiment", "sweep", "provenance")
 
 
+class Trial(NamedTuple):
+    """What the values of a sweep are tried in: data without sweep and experiment, and the mistakes in them."""
+
+    data: Data
+    folder: Path
+    before: Sequence[Finding]
+
+
 def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Finding]]:
     """Validate data (tuples for lists): the scenario, or None and all mistakes.
 
@@ -27,7 +36,7 @@ def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Finding]]:
     """
     scenario, findings = _validated(data, folder)
     findings += islice(wrong_names(data), MAX_FINDINGS)
-    findings += [*_sweep(data), *_provenance(data)]
+    findings += [*_sweep(data, folder), *_provenance(data)]
     if scenario is not None and not findings:
         findings += impossible_starts(scenario)
     return (None if findings else scenario), findings
@@ -40,7 +49,7 @@ def _validated(data: Data, folder: Path) -> tuple[Scenario | None, list[Finding]
         return None, findings_of(error, data)
 
 
-def _sweep(data: Data) -> Iterator[Finding]:
+def _sweep(data: Data, folder: Path) -> Iterator[Finding]:
     """Try the values of a sweep one by one; whether values go together shows in each case of the sweep."""
     sweep = data.get("sweep")
     if not isinstance(sweep, Mapping):
@@ -49,13 +58,13 @@ def _sweep(data: Data) -> Iterator[Finding]:
         yield Finding(("sweep",), f"{len(sweep)} keys are too many; at most {MAX_VARIED} can be varied", at="key")
         return
     bare = {key: entry for key, entry in data.items() if key not in ("sweep", "experiment")}
-    before = _single_mistakes(bare)
+    before = _single_mistakes(bare, folder)
     for key, values in sweep.items():
         if key != "mode":
-            yield from islice(_varied(bare, before, str(key), values), 1)
+            yield from islice(_varied(Trial(bare, folder, before), str(key), values), 1)
 
 
-def _varied(data: Data, before: Sequence[Finding], key: str, values: object) -> Iterator[Finding]:
+def _varied(trial: Trial, key: str, values: object) -> Iterator[Finding]:
     """Yield what is wrong with a swept key, then with its values."""
     place: keys.KeyPath = ("sweep", key)
     try:
@@ -72,27 +81,25 @@ def _varied(data: Data, before: Sequence[Finding], key: str, values: object) -> 
     tried = expanded[:MAX_TRIED] if isinstance(values, tuple) else (expanded[0], expanded[-1])
     for index, value in enumerate(tried):
         value_place = (*place, index) if isinstance(values, tuple) else place
-        yield from _tried(data, before, path, value, value_place)
+        yield from _tried(trial, path, value, value_place)
 
 
-def _tried(
-    data: Data, before: Sequence[Finding], path: keys.KeyPath, value: object, place: keys.KeyPath
-) -> Iterator[Finding]:
+def _tried(trial: Trial, path: keys.KeyPath, value: object, place: keys.KeyPath) -> Iterator[Finding]:
     """Yield the mistakes that setting one value adds."""
     try:
-        changed, _ = with_value(data, path, value)
+        changed, _ = with_value(trial.data, path, value)
     except UnfitOverrideError as error:
         yield Finding(place[:2], str(error), at="key")
         return
-    for finding in _single_mistakes(changed):
-        if finding not in before:
+    for finding in _single_mistakes(changed, trial.folder):
+        if finding not in trial.before:
             unknown = finding.at == "key"
             yield Finding(place[:2] if unknown else place, finding.message, at=finding.at)
 
 
-def _single_mistakes(data: Data) -> list[Finding]:
+def _single_mistakes(data: Data, folder: Path) -> list[Finding]:
     """List the mistakes of values by themselves."""
-    _, findings = _validated(data, Path())
+    _, findings = _validated(data, folder)
     return [finding for finding in (*findings, *islice(wrong_names(data), MAX_FINDINGS)) if not finding.relation]
 
 

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from blocksim.scenario.keys import MISSING, KeyPath, field_at, follow, keys_of, table_at
+from blocksim.scenario.models.motion import MOTIONS
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.spelling import nearest
 from blocksim.scenario.structures import KINDS
@@ -21,6 +22,7 @@ MAX_FINDINGS = 200
 MAX_COMPARED = 1000
 """Words that a misspelt one is compared with, for the same reason."""
 MAX_LISTED = 10
+KINDS_IN: dict[str | int, Iterable[str]] = {"structures": KINDS, "motion": MOTIONS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +54,11 @@ def _finding(entry: ErrorDetails, data: object) -> Finding:
         case "missing":
             return _missing(path, data)
         case "union_tag_not_found":
-            return Finding((*path, "kind"), f"this key is missing: {_kinds()} is needed", at="key")
+            return Finding((*path, "kind"), f"this key is missing: {_kinds(path)} is needed", at="key")
         case "union_tag_invalid":
             kind = follow(data, (*path, "kind"))
-            hint = did_you_mean(str(kind), KINDS) or f"use {_kinds()}"
-            return Finding((*path, "kind"), f"{shown(kind)} is no kind of structure, {hint}")
+            hint = did_you_mean(str(kind), KINDS_IN[path[0]]) or f"use {_kinds(path)}"
+            return Finding((*path, "kind"), f"{shown(kind)} is no kind of {str(path[0]).removesuffix('s')}, {hint}")
         case "extra_forbidden":
             return _unknown_key(path, data)
         case "blocksim":
@@ -73,6 +75,8 @@ def _path(loc: Sequence[str | int]) -> KeyPath:
     path = tuple(loc)
     if path[:1] == ("structures",):
         return (*path[:2], *path[3:])
+    if path[:1] == ("motion",):
+        return (*path[:1], *path[2:])
     return (path[0], *path[2:]) if path[:2] == ("sweep", "vary") else path
 
 
@@ -123,8 +127,8 @@ def similar_word(word: str, known: Iterable[str]) -> str | None:
     return similar
 
 
-def _kinds() -> str:
-    return " or ".join(shown(kind) for kind in KINDS)
+def _kinds(path: KeyPath) -> str:
+    return " or ".join(shown(kind) for kind in KINDS_IN[path[0]])
 
 
 def _wrong_type(entry: ErrorDetails, path: KeyPath) -> str:

@@ -10,7 +10,6 @@ from pydantic.fields import FieldInfo
 
 from blocksim.scenario.models.base import Table
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.structures import KINDS, Structure
 
 KeyPath = tuple[str | int, ...]
 """A place in a scenario, such as ("structures", 0, "overlap")."""
@@ -90,7 +89,7 @@ def follow(data: object, path: Sequence[str | int]) -> object:
 
 
 def table_at(path: Sequence[str | int], data: object) -> type[Table] | None:
-    """Return the model of the table at a path; `data` tells the kinds of structures."""
+    """Return the model of the table at a path; `data` tells the kinds of structures and motion."""
     annotation: object = Scenario
     for depth, part in enumerate(path):
         annotation = _inside(annotation, part, follow(data, path[:depth]))
@@ -126,7 +125,7 @@ def _fields(table: type[Table]) -> dict[str | int, FieldInfo]:
 
 def _inside(annotation: object, part: str | int, node: object) -> object:
     """Return the annotation of the element `part` of something annotated so."""
-    for option in _options(annotation):
+    for option in options(annotation):
         arguments = get_args(option)
         if get_origin(option) is dict:
             return arguments[1]
@@ -138,20 +137,26 @@ def _inside(annotation: object, part: str | int, node: object) -> object:
 
 
 def _table(annotation: object, node: object) -> type[Table] | None:
-    tables = [option for option in _options(annotation) if isinstance(option, type) and issubclass(option, Table)]
-    if tables and all(issubclass(table, Structure) for table in tables):
+    tables = [option for option in options(annotation) if isinstance(option, type) and issubclass(option, Table)]
+    if len(tables) > 1:
         kind = node.get("kind") if isinstance(node, Mapping) else None
-        return KINDS.get(kind) if isinstance(kind, str) else None
+        return next((table for table in tables if kind in kinds_of(table)), None)
     return tables[0] if tables else None
 
 
-def _options(annotation: Any) -> Iterator[Any]:
+def kinds_of(table: type[Table]) -> tuple[str, ...]:
+    """Return the words that tell this table from its alternatives."""
+    field = table.model_fields.get("kind")
+    return () if field is None else get_args(field.annotation)
+
+
+def options(annotation: Any) -> Iterator[Any]:
     """Yield the alternatives of a type expression, without metadata."""
     origin = get_origin(annotation)
     if origin is Annotated:
-        yield from _options(get_args(annotation)[0])
+        yield from options(get_args(annotation)[0])
     elif origin in (Union, types.UnionType):
         for option in get_args(annotation):
-            yield from _options(option)
+            yield from options(option)
     else:
         yield annotation

@@ -72,6 +72,7 @@ LENGTH = Kind(units.LENGTH, "m", "32 mm")
 TIME = Kind(units.TIME, "s", "2 s")
 ANGLE = Kind(units.ANGLE, "rad", "20 deg")
 SPEED = Kind(units.SPEED, "m/s", "5 mm/s")
+FREQUENCY = Kind(units.FREQUENCY, "Hz", "2 Hz")
 SPIN = Kind(units.SPIN, "rad/s", "90 deg/s")
 ACCELERATION = Kind(units.ACCELERATION, "m/s^2", "9.81 m/s^2")
 PRESSURE = Kind(units.PRESSURE, "Pa", "69 GPa")
@@ -256,6 +257,7 @@ class FrictionCoefficient:
         return {"anyOf": [{"type": "number", "minimum": 0}, _text_schema("21 deg")]}
 
 
+Number = Annotated[float, Quantity(NUMBER)]
 PositiveNumber = Annotated[float, Quantity(NUMBER, above=0.0)]
 NonNegativeNumber = Annotated[float, Quantity(NUMBER, at_least=0.0)]
 Share = Annotated[float, Quantity(NUMBER, at_least=0.0, at_most=1.0)]
@@ -271,6 +273,7 @@ Angle = Annotated[float, Quantity(ANGLE)]
 TiltAngle = Annotated[float, Quantity(ANGLE, above=-math.pi / 2, below=math.pi / 2)]
 Speed = Annotated[float, Quantity(SPEED)]
 PositiveSpeed = Annotated[float, Quantity(SPEED, above=0.0)]
+PositiveFrequency = Annotated[float, Quantity(FREQUENCY, above=0.0)]
 Spin = Annotated[float, Quantity(SPIN)]
 NonNegativeAcceleration = Annotated[float, Quantity(ACCELERATION, at_least=0.0)]
 Pressure = Annotated[float, Quantity(PRESSURE, above=0.0)]

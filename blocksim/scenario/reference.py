@@ -11,9 +11,11 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from blocksim.scenario.keys import options
 from blocksim.scenario.models.boundary import Ground, Wall
 from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
 from blocksim.scenario.models.geometry import Block, BodySpec, Material
+from blocksim.scenario.models.motion import MOTIONS
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
@@ -36,6 +38,7 @@ def key_table() -> str:
         ("bodies", BodySpec),
         ("ground", Ground),
         ("walls", Wall),
+        *((f'motion, kind = "{kind}"', model) for kind, model in MOTIONS.items()),
         ("friction", Friction),
         ("friction.PAIR", PairFriction),
         ("pairs.A.B", Pair),
@@ -73,7 +76,8 @@ def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
 def _is_table(info: FieldInfo) -> bool:
     kind = typing.get_origin(info.annotation) or info.annotation
     is_model = isinstance(kind, type) and issubclass(kind, SUBTABLES) and "Speed" not in str(info.annotation)
-    optional = any(isinstance(part, type) and issubclass(part, BaseModel) for part in typing.get_args(info.annotation))
+    parts = list(options(info.annotation))
+    optional = len(parts) > 1 and any(isinstance(part, type) and issubclass(part, BaseModel) for part in parts)
     return (is_model and "float" not in str(info.annotation)) or optional or "Any" in str(info.annotation)
 
 

@@ -10,30 +10,41 @@ import tomli_w
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.study import Sweep
+from blocksim.scenario.motion_table import MotionTable
 from blocksim.scenario.quantities import ANGLE, Quantity
 
 HEADER = "# Resolved by blocksim: every value that was used, in SI units (m, kg, s, N, Pa), angles in rad.\n"
 UNHASHED = {"description", "experiment", "sweep", "provenance"}
 
 
-def scenario_to_toml(scenario: Scenario, experiment_table: str | None = None) -> str:
+def scenario_to_toml(scenario: Scenario, experiment_table: str | None = None, motion_table: str | None = None) -> str:
     """Write every key with its value; loading the text gives an equal scenario, floats to the last bit.
 
-    `experiment_table` replaces the path of the experiment's table, for a copy kept beside the resolved file.
+    `experiment_table` and `motion_table` replace the paths of tables, for copies kept beside the resolved file.
     """
     data = _plain(scenario)
     if experiment_table is not None and "experiment" in data:
         data["experiment"] = {"table": experiment_table}
+    if motion_table is not None and isinstance(scenario.motion, FromTable):
+        data["motion"]["table"] = motion_table
     return HEADER + tomli_w.dumps(data)
 
 
 def scenario_hash(scenario: Scenario) -> str:
     """Return the SHA-256 (hex) of all that decides the motion and the output, in any order of the file."""
     data = scenario.model_dump(mode="json", exclude=UNHASHED)
+    if isinstance(scenario.motion, FromTable):
+        data["motion"]["table"] = scenario.motion.table.digest
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def motion_table_content(scenario: Scenario) -> bytes | None:
+    """Return the table of motion as it was read, for a copy, or None where there is none."""
+    return scenario.motion.table.content if isinstance(scenario.motion, FromTable) else None
 
 
 def _plain(table: BaseModel) -> dict[str, Any]:
@@ -61,5 +72,7 @@ def _value(value: object) -> object:
             return [_value(entry) for entry in value]
         case Path():
             return value.as_posix()
+        case MotionTable():
+            return value.path.as_posix()
         case _:
             return value

@@ -7,6 +7,7 @@ from itertools import islice, pairwise
 from blocksim.scenario import keys, overlap
 from blocksim.scenario.findings import Finding
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
+from blocksim.scenario.models.motion import PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.placement import PlacedBody, placed_with_origin
 from blocksim.scenario.quantities import shown
@@ -16,6 +17,7 @@ from blocksim.scenario.structures import UnfitError
 MAX_BODIES = 100_000
 MAX_SEGMENTS = 1000
 MAX_OVERLAPS = 20
+MAX_PIECES = 1_000_000
 SHORTEST_SHARE = 0.01
 """Least length of a piece of boundary, in smallest sides of the blocks."""
 
@@ -26,6 +28,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
     if too_many:
         yield from too_many
         return
+    yield from _endless_motion(scenario)
     yield from _fixed_stiffnesses(scenario)
     yield from _impossible_masses(scenario)
     unfit = list(_unfit_structures(scenario))
@@ -52,6 +55,16 @@ def _too_many(scenario: Scenario) -> Iterator[Finding]:
         most = MAX_BODIES if what == "bodies" else MAX_SEGMENTS
         if count > most:
             yield Finding(path, f"{count} {what} are too many; at most {most} are possible")
+
+
+def _endless_motion(scenario: Scenario) -> Iterator[Finding]:
+    """Find vibrations of too many cycles."""
+    motion = scenario.motion
+    if isinstance(motion, Harmonic):
+        pieces = sum(count for *_, count in motion.sections(scenario.time.end))
+        if pieces > MAX_PIECES:
+            message = f"{pieces / PIECES_PER_CYCLE:.6g} cycles are too many; at most {MAX_PIECES // PIECES_PER_CYCLE}"
+            yield Finding(("motion", "frequency"), f"{message} are possible")
 
 
 def _fixed_stiffnesses(scenario: Scenario) -> Iterator[Finding]:

@@ -29,6 +29,7 @@ TIME: Dimension = (0, 0, 1, 0)
 ANGLE: Dimension = (0, 0, 0, 1)
 AREA: Dimension = (2, 0, 0, 0)
 SPEED: Dimension = (1, 0, -1, 0)
+FREQUENCY: Dimension = (0, 0, -1, 0)
 SPIN: Dimension = (0, 0, -1, 1)
 ACCELERATION: Dimension = (1, 0, -2, 0)
 FORCE: Dimension = (1, 1, -2, 0)
@@ -45,6 +46,7 @@ NAMES: dict[Dimension, str] = {
     ANGLE: "an angle",
     AREA: "an area",
     SPEED: "a speed",
+    FREQUENCY: "a frequency",
     SPIN: "a spin",
     ACCELERATION: "an acceleration",
     FORCE: "a force",
@@ -78,6 +80,7 @@ hour = 3600 * second = h
 degree = {Decimal(math.pi)} / 180 * radian = deg = °
 turn = {Decimal(math.pi)} * 2 * radian = turn
 rpm = turn / minute = rpm
+hertz = 1 / second = Hz
 newton = kilogram * meter / second ** 2 = N
 pascal = newton / meter ** 2 = Pa
 bar = 1e5 * pascal = bar
@@ -100,6 +103,7 @@ COMMON: dict[str, tuple[Fraction, Dimension]] = {
     "min": (Fraction(60), TIME),
     "rad": (Fraction(1), ANGLE),
     "deg": (DEGREE, ANGLE),
+    "Hz": (Fraction(1), FREQUENCY),
     "m/s": (Fraction(1), SPEED),
     "mm/s": (Fraction(1, 1000), SPEED),
     "rad/s": (Fraction(1), SPIN),

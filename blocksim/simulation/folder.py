@@ -12,11 +12,12 @@ from blocksim.simulation.provenance import run_hash
 RESULTS = Path("results")
 SCENARIO = "scenario.toml"  # resolved; written first
 EXPERIMENT = "experiment.csv"  # copy of the table that the scenario names
+MOTION = "motion.csv"  # copy of the table of the support's motion
 FINAL = "final.csv"
 FRAMES = "run.h5"
 SUMMARY = "run.json"
 DONE = "done.json"  # written last: a folder without it is not finished
-OURS = (SCENARIO, EXPERIMENT, FINAL, FRAMES, SUMMARY, DONE)
+OURS = (SCENARIO, EXPERIMENT, MOTION, FINAL, FRAMES, SUMMARY, DONE)
 
 
 def default_folder(scenario: Scenario) -> Path:

@@ -2,14 +2,15 @@
 
 import json
 import time
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
-from blocksim.errors import InputMissingError
-from blocksim.scenario import Scenario, place_bodies, scenario_hash, scenario_to_toml
+from blocksim.scenario import Scenario, place_bodies, scenario_hash
 from blocksim.simulation import folder as files
-from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
+from blocksim.simulation.atomic import sha256_of, write_text
 from blocksim.simulation.compilation import compile_kernels
+from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
 from blocksim.simulation.loop import LoopResult, Progress, Watcher, run_loop
 from blocksim.simulation.outcome import RESIDUAL_PROMISE
 from blocksim.simulation.provenance import environment, run_hash, state_hash
@@ -20,6 +21,8 @@ from blocksim.simulation.stores.hdf5_writer import FrameFile
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import final_table
 from blocksim.world.build import build_world
+
+COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION)
 
 
 def _ignore(_: Progress) -> None:
@@ -48,9 +51,9 @@ def simulate_into(
     compile_kernels()
     began = time.perf_counter()
     world = build_world(scenario)
-    measured = _experiment_bytes(scenario)
+    tables = read_tables(scenario)
     files.prepare_folder(folder, overwrite=overwrite)
-    toml = _keep_scenario(scenario, measured, folder)
+    toml = _keep_scenario(scenario, tables, folder)
     placed = place_bodies(scenario)
     step = float(world.controls[0].step)
     with stop_requests() as is_stopped:
@@ -65,12 +68,10 @@ def renew_copies(scenario: Scenario, folder: Path) -> None:
 
     Neither decides the motion, so both may have changed since the run: another table, or another description.
     """
-    measured = _experiment_bytes(scenario)
-    old = tuple(_bytes_of(folder / name) for name in (files.SCENARIO, files.EXPERIMENT))
-    if measured is None:
-        (folder / files.EXPERIMENT).unlink(missing_ok=True)
-    _keep_scenario(scenario, measured, folder)
-    if old != tuple(_bytes_of(folder / name) for name in (files.SCENARIO, files.EXPERIMENT)):
+    tables = read_tables(scenario)
+    old = tuple(_bytes_of(folder / name) for name in COPIES)
+    _keep_scenario(scenario, tables, folder)
+    if old != tuple(_bytes_of(folder / name) for name in COPIES):
         summary = _with_checksums(read_summary(folder / files.SUMMARY), folder)
         write_text(folder / files.SUMMARY, summary.to_json())
 
@@ -79,23 +80,11 @@ def _bytes_of(path: Path) -> bytes | None:
     return path.read_bytes() if path.is_file() else None
 
 
-def _experiment_bytes(scenario: Scenario) -> bytes | None:
-    """Read the experiment table before the folder is emptied: it may lie in there, where a run is repeated."""
-    if scenario.experiment is None:
-        return None
-    try:
-        return scenario.experiment.table.read_bytes()
-    except OSError as error:
-        message = f"{scenario.experiment.table}: cannot be read: {error.strerror}"
-        raise InputMissingError(message) from error
-
-
-def _keep_scenario(scenario: Scenario, measured: bytes | None, folder: Path) -> str:
-    """Write the resolved scenario, and beside it a copy of its experiment table; return the TOML."""
-    toml = scenario_to_toml(scenario, experiment_table=None if measured is None else files.EXPERIMENT)
+def _keep_scenario(scenario: Scenario, tables: Mapping[str, bytes], folder: Path) -> str:
+    """Write the resolved scenario, and beside it copies of the tables that it names; return the TOML."""
+    toml = resolved_beside(scenario, tables)
     write_text(folder / files.SCENARIO, toml)
-    if measured is not None:
-        write_bytes(folder / files.EXPERIMENT, measured)
+    keep_tables(tables, folder)
     return toml
 
 
@@ -137,7 +126,7 @@ def _warnings(ended: LoopResult) -> tuple[str, ...]:
 
 
 def _with_checksums(summary: Summary, folder: Path) -> Summary:
-    kept = [name for name in (files.SCENARIO, files.EXPERIMENT, files.FINAL, files.FRAMES) if (folder / name).is_file()]
+    kept = [name for name in (*COPIES, files.FINAL, files.FRAMES) if (folder / name).is_file()]
     return summary.model_copy(update={"sha256": {name: sha256_of(folder / name) for name in kept}})
 
 

@@ -20,11 +20,12 @@ import pandas as pd
 from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import load_table
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError
-from blocksim.scenario import Document, Scenario, scenario_hash, scenario_to_toml
+from blocksim.scenario import Document, Scenario, scenario_hash
 from blocksim.scenario.models.study import Sweep
 from blocksim.simulation import folder as files
-from blocksim.simulation.atomic import write_bytes, write_text
+from blocksim.simulation.atomic import write_text
 from blocksim.simulation.compilation import compile_kernels
+from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.simulation.stopping import interruptible
 from blocksim.simulation.table import read_table
@@ -117,17 +118,15 @@ def sweep_hash(base: Scenario, plan: Sweep) -> str:
 def _prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool) -> None:
     """Make the folder and write the plan into it. Raises OutputExistsError when something else is there."""
     head = f"# Sweep {name}. To run it again: blocksim sweep FILE\n"
-    measured = None if base.experiment is None else base.experiment.table.read_bytes()
+    tables = read_tables(base)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         _make_free(folder, head, overwrite=overwrite)
     except OSError as error:
         message = f"{folder}: cannot be created: {error.strerror}"
         raise OutputExistsError(message) from error
-    table = None if measured is None else files.EXPERIMENT
-    write_text(folder / PLAN, head + scenario_to_toml(base, experiment_table=table))
-    if measured is not None:
-        write_bytes(folder / files.EXPERIMENT, measured)
+    write_text(folder / PLAN, head + resolved_beside(base, tables))
+    keep_tables(tables, folder)
 
 
 def _make_free(folder: Path, head: str, *, overwrite: bool) -> None:

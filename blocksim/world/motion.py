@@ -1,7 +1,5 @@
 """Prescribed motion of the support as the kernels want it: a cubic polynomial of displacement for every stretch."""
 
-import numpy as np
-
 from blocksim.kernels.arrays import MOTION_PIECE, Records, zeros
 from blocksim.scenario import Scenario
 from blocksim.scenario.motion import motion_direction, motion_pieces
@@ -13,16 +11,11 @@ def support_direction(scenario: Scenario) -> tuple[float, float]:
 
 
 def motion_records(scenario: Scenario) -> Records:
-    """Return the pieces of the displacement over time; the last one is constant: where the support stays at the end.
-
-    Where the motion is cut off by the end of the simulated time, that piece is never reached.
-    """
-    times, coefficients = motion_pieces(scenario)
-    records = zeros(len(coefficients) + 1, MOTION_PIECE)
-    if scenario.motion is None:
-        return records
-    records["start"] = times
-    for k, name in enumerate(("c0", "c1", "c2", "c3")):
-        records[name][:-1] = coefficients[:, k]
-    records["c0"][-1] = coefficients[-1] @ (times[-1] - times[-2]) ** np.arange(4)
+    """Return the pieces of the displacement over time; where a motion ends before the run, the last one is constant."""
+    pieces = motion_pieces(scenario)
+    records = zeros(max(1, len(pieces.coefficients)), MOTION_PIECE)
+    if len(pieces.coefficients) > 0:
+        records["start"] = pieces.times[:-1]
+        for k, name in enumerate(("c0", "c1", "c2", "c3")):
+            records[name] = pieces.coefficients[:, k]
     return records

@@ -100,6 +100,33 @@ def test_slopes_of_sliding_and_toppling_of_the_paper_s_block() -> None:
         assert centre_over_edge == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize(("width", "height", "slope"), [(0.025, 0.032, radians(60)), (0.032, 0.025, radians(55))])
+def test_friction_needed_to_topple_is_that_of_newton_and_euler(width: float, height: float, slope: float) -> None:
+    # unknowns: acceleration along (down the slope) and away from it, spin rate, friction (up the slope), normal force;
+    # the lower edge lies at (width/2, -height/2) from the centre and does not move
+    x, y, inertia = width / 2, -height / 2, (width**2 + height**2) / 12
+    rows = [[1, 0, 0, 1, 0], [0, 1, 0, 0, -1], [0, 0, inertia, -y, -x], [1, 0, -y, 0, 0], [0, 1, x, 0, 0]]
+    weight = np.array([G * sin(slope), -G * cos(slope), 0.0, 0.0, 0.0])
+    *_, friction, normal = np.linalg.solve(np.array(rows), weight)
+    assert forms.rolling_friction_limit(width, height, slope) == pytest.approx(friction / normal)
+    assert width / height < friction / normal < np.tan(slope)
+
+
+def test_friction_needed_to_topple_starts_at_the_toppling_slope() -> None:
+    slope = forms.toppling_slope(0.025, 0.032)
+    assert forms.rolling_friction_limit(0.025, 0.032, slope) == pytest.approx(np.tan(slope))
+
+
+def test_ladder_is_in_balance_with_the_friction_it_needs() -> None:
+    slope, length, thickness = radians(60), 1.0, 0.01
+    # corners of the ladder's under side touch ground and wall; coordinates from the foot, the wall to the left
+    axis, across = np.array([-cos(slope), sin(slope)]), np.array([sin(slope), cos(slope)])
+    head, centre = length * axis, 0.5 * (length * axis + thickness * across)
+    wall = -centre[0] * G / head[1]  # moments about the foot, per mass
+    assert forms.ladder_friction(slope, thickness / length) == pytest.approx(wall / G)
+    assert forms.ladder_friction(slope, 0.0) == pytest.approx(0.2887, abs=5e-5)
+
+
 def test_resting_overlaps_balance_the_weight() -> None:
     linear = brentq(lambda overlap: 1.9e9 * overlap - MASS * G, 0.0, 1e-6, xtol=1e-18)
     assert forms.static_overlap(MASS, 1.9e9) == pytest.approx(linear, rel=1e-6)

@@ -123,6 +123,17 @@ def test_law_and_model_are_told(blocksim: Command, setting: str, told: str) -> N
     assert told in blocksim("check", "scenarios/three_blocks_nominal.toml", "--set", setting).out
 
 
+SHAKEN = '[motion]\nkind = "harmonic"\namplitude = "10 mm"\nfrequency = "2 Hz"\nduration = "1.5 s"\n'
+
+
+def test_the_motion_of_the_supports_is_told(blocksim: Command, tmp_path: Path) -> None:
+    text = (tmp_path / "scenarios" / "slide.toml").read_text()
+    (tmp_path / "shaken.toml").write_text(text.replace('end = "0.5 s"', 'end = "2 s"') + SHAKEN)
+    answer = blocksim("check", "shaken.toml")
+    assert "supports   move at most 10.00 mm and 125.66 mm/s, 0.00 mm/s at the end\n" in answer.out
+    assert json.loads(blocksim("check", "shaken.toml", "--json").out)["motion"]["displacement"] == pytest.approx(0.01)
+
+
 def test_json_has_masses_pairs_and_cost(blocksim: Command) -> None:
     answer = blocksim("check", "scenarios/three_blocks_nominal.toml", "--json")
     data = json.loads(answer.out)

@@ -49,3 +49,25 @@ def test_damaged_frames_are_told(blocksim: Command, copied: Path, content: bytes
     answer = blocksim("plot", copied)
     assert answer.code == (66 if content is None else 65)
     assert "run.h5" in answer.err
+
+
+SWEEP = ("sweep", "scenarios/three_blocks_nominal.toml", *SOFT, "--set", "time.end=0.01", "--jobs", 1, "--out", "swept")
+
+
+def test_sweep_over_one_key_is_drawn(blocksim: Command) -> None:
+    assert blocksim(*SWEEP, "--vary", "structures.0.overlap=9 mm:11 mm:3").code == 0
+    answer = blocksim("plot", "swept")
+    assert (answer.code, answer.out, answer.err) == (0, "", "picture: three_blocks_nominal.png\n")
+    assert blocksim("plot", "swept", "--out", "sweep.svg", "--quiet").err == ""
+    text = Path("sweep.svg").read_text(encoding="utf-8")
+    assert "<!-- structures.0.overlap (mm) -->" in text
+    assert "Band: smallest to largest of the measured repeats." in text
+
+
+def test_sweep_that_cannot_be_drawn_is_told(blocksim: Command) -> None:
+    vary = [part for key in ("gravity", "time.rest_speed", "time.rest_hold") for part in ("--vary", f"{key}=1,2")]
+    assert blocksim(*SWEEP, *vary).code == 0
+    answer = blocksim("plot", "swept")
+    assert answer.code == 65
+    assert "swept: 3 keys are varied; a picture can show one or two" in answer.err
+    assert "--times picks frames of a run" in blocksim("plot", "swept", "--times", "0,0.01").err

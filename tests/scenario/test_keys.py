@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from blocksim.scenario.keys import MISSING, field_at, follow, format_key, is_known, parse_key, table_at
 from blocksim.scenario.models.contact import PairFriction
+from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.structures.stack import Stack
 
 DATA = {
@@ -61,6 +62,9 @@ def test_the_model_of_a_table_depends_on_the_kind_of_structure() -> None:
     assert table_at(("structures", 2), DATA) is None
     assert table_at(("friction", "block_ground"), DATA) is PairFriction
     assert table_at(("time", "end"), DATA) is None
+    assert table_at(("motion",), {"motion": {"kind": "table"}}) is FromTable
+    assert table_at(("motion",), {"motion": {"kind": "none"}}) is None
+    assert table_at(("motion",), DATA) is None
 
 
 def test_the_field_of_a_key_is_found_by_its_name_in_the_file() -> None:

@@ -179,6 +179,13 @@ HASHED = {
     "friction.block_ground.static": 0.39,
     "friction.block_ground.kinetic": 0.1,
     "friction.block_ground.transition_speed": 0.1,
+    "motion.amplitude": 0.1,
+    "motion.frequency": 2,
+    "motion.phase": "1 deg",
+    "motion.direction": "1 deg",
+    "motion.start": 0.1,
+    "motion.duration": 8,
+    "motion.ramp": 0.5,
     "pairs.m.n.friction.static": 0.32,
     "pairs.m.n.friction.kinetic": 0.1,
     "pairs.m.n.friction.transition_speed": 0.1,
@@ -208,7 +215,7 @@ HASHED = {
     "time.rest_hold": 1.0,
     "output.every": 1.0,
 }
-SINGLE_CHOICE = {"schema", "time.scheme", "materials.m.unit_weight"}
+SINGLE_CHOICE = {"schema", "time.scheme", "materials.m.unit_weight", "motion.kind"}
 
 
 @pytest.fixture
@@ -224,6 +231,7 @@ def data() -> dict[str, Any]:
         "bodies": [{"block": "b", "x": 10, "y": 10}],
         "walls": [{"from": [-10, 0], "to": [-10, 1]}],
         "pairs": {"m": {"n": {"friction": 0.3}}},
+        "motion": {"kind": "harmonic", "amplitude": 1, "frequency": 1},
     }
 
 

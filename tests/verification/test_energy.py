@@ -1,4 +1,4 @@
-"""The energy ledger balances on every scenario that ships (V23) and gets better with a smaller step."""
+"""The energy ledger gets better with a smaller step, and books losses only (V15 and V23 are cases)."""
 
 from __future__ import annotations
 
@@ -6,26 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from blocksim.kernels.arrays import REACHED
-from blocksim.scenario import load_scenario
-
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from tests.conftest import Simulation, Start
-
-
-def test_ledger_balances_at_every_output(shipped: Path, start_shipped: Callable[..., Simulation]) -> None:
-    scenario = load_scenario(shipped)
-    run = start_shipped(shipped.stem)
-    outputs = round(scenario.time.end / scenario.output.every)
-    for k in range(1, outputs + 1):
-        run.to_time(k * scenario.output.every)
-        assert run.residual() <= 1e-3, f"at {run.time} s"
-        if run.status != REACHED:
-            break
-    assert run.time > 0.15
+    from tests.conftest import Start
 
 
 def residual_of_an_impact(start: Start, safety: float) -> float:

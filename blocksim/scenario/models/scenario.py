@@ -9,6 +9,7 @@ from blocksim.scenario.models.base import Identifier, OneOf, Table
 from blocksim.scenario.models.boundary import Ground, Wall
 from blocksim.scenario.models.contact import Contact, Friction, Pair
 from blocksim.scenario.models.geometry import Block, BodySpec, Material
+from blocksim.scenario.models.motion import AnyMotion
 from blocksim.scenario.models.stepping import Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure
@@ -35,6 +36,7 @@ class Scenario(Table):
     bodies: tuple[BodySpec, ...] = Field(default=(), description="single bodies")
     ground: Ground = Field(default=Ground(), description="the ground")
     walls: tuple[Wall, ...] = Field(default=(), description="straight pieces of boundary beside the ground")
+    motion: AnyMotion | None = Field(default=None, description="prescribed motion of ground, walls and fixed bodies")
     friction: Friction = Field(default=Friction(), description="friction between blocks and with the ground")
     pairs: dict[str, dict[str, Pair]] = Field(
         default={}, description="pairs of materials that differ, as in [pairs.aluminium.ground]"

@@ -1,0 +1,111 @@
+"""blocksim verify: the verification table, measured now."""
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from blocksim.cli import options
+from blocksim.cli.output import answer, note, print_json, table_lines
+from blocksim.cli.progress import tell_compilation
+from blocksim.errors import ExitCode
+from blocksim.verification.case import Row, Setting, Verdict
+from blocksim.verification.cases import CASES, chosen
+from blocksim.verification.verify import (
+    Outcome,
+    error_text,
+    expected_text,
+    number,
+    run_case,
+    tolerance_text,
+)
+
+COLUMNS = ("quantity", "expected", "measured", "error", "tolerance", "verdict")
+
+
+class Model(StrEnum):
+    """How contacts are found."""
+
+    SURFACE = "surface"
+    PARTICLES = "particles"
+    KERNEL = "kernel"
+
+
+class Law(StrEnum):
+    """How the force grows with the overlap."""
+
+    LINEAR = "linear"
+    HERTZ_MINDLIN = "hertz-mindlin"
+
+
+def verify_command(
+    cases: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="V1 to V24; all without any.")] = None,
+    model: Annotated[Model, typer.Option(help="Contact model.")] = Model.SURFACE,
+    law: Annotated[Law, typer.Option(help="Force law.")] = Law.LINEAR,
+    quick: Annotated[bool, typer.Option("--quick", help="Shorten V9, V14, V18 (--json says how).")] = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Run the verification cases and show the table.
+
+    Exit code 1 says that a number is outside its tolerance. All cases take some four minutes on one core.
+
+    Example: blocksim verify V3 V7 --law hertz-mindlin
+    """
+    silent = quiet or as_json
+    wanted = chosen(cases or [])
+    tell_compilation(quiet=silent)
+    setting = Setting(model.value, law.value, quick)
+    outcomes = []
+    for number_of, case in enumerate(wanted, start=1):
+        if not silent:
+            note(f"{number_of}/{len(wanted)} {case.id} {case.title} ...")
+        outcomes.append(run_case(case, setting))
+    if as_json:
+        print_json([row for outcome in outcomes for row in outcome.to_dicts()])
+    else:
+        answer("\n".join(_lines(outcomes)))
+        if not quiet:
+            _tell_end(outcomes)
+    inside = all(outcome.inside for outcome in outcomes)
+    raise typer.Exit(ExitCode.SUCCESS if inside else ExitCode.OUTSIDE)
+
+
+def _lines(outcomes: list[Outcome]) -> list[str]:
+    """Return one table with a line above the rows of every case."""
+    rows = [_cells(row) for outcome in outcomes for row in outcome.rows]
+    head, rule, *lines = table_lines(COLUMNS, rows)
+    found = [head, rule]
+    for outcome in outcomes:
+        found.append(_heading(outcome))
+        found += lines[: len(outcome.rows)]
+        lines = lines[len(outcome.rows) :]
+    return found
+
+
+def _heading(outcome: Outcome) -> str:
+    return f"{outcome.case.id} {outcome.case.title} ({outcome.case.source}): {outcome.seconds:.1f} s"
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    return (
+        f"  {row.quantity} {row.unit}".rstrip(),
+        expected_text(row),
+        number(row.measured),
+        error_text(row),
+        tolerance_text(row),
+        str(row.verdict),
+    )
+
+
+def _tell_end(outcomes: list[Outcome]) -> None:
+    missed = [outcome for outcome in outcomes if not outcome.inside]
+    for outcome in missed:
+        count = sum(row.verdict == Verdict.OUTSIDE for row in outcome.rows)
+        why = f": {outcome.remark}" if outcome.remark else ""
+        note(f"{outcome.case.id} {outcome.case.title}: {count} of {len(outcome.rows)} outside{why}")
+    shortened = [f"{case.id}: {case.quick}" for case in CASES if case.quick and outcomes[0].setting.quick]
+    for text in shortened:
+        note(f"shortened: {text}")
+    seconds = sum(outcome.seconds for outcome in outcomes)
+    note(f"{len(outcomes) - len(missed)} of {len(outcomes)} cases inside, {seconds:.0f} s")

@@ -1,0 +1,212 @@
+"""What a study of convergence finds: levels, changes between them, observed order, verdict, and what to recommend.
+
+The distance between two results is the largest over all blocks of |change of x| and of |change of rotation| times half
+the diagonal, which is how far the turn moves a corner; both in mm. The observed order is Richardson's: with r the
+factor of a refinement, a change of order p shrinks by r^p, so p = log(change before / change) / log(r), taken from the
+coordinate that changes most and given only where it goes on in the same direction by less.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+from math import hypot, inf, isfinite, log, nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.scenario import Scenario, place_bodies
+from blocksim.study.pool import Row
+from blocksim.study.refinement import Refinement
+from blocksim.study.single import FINISHED
+
+ROUND_OFF_MM = 1e-6  # a smaller change says nothing about the order
+SHRINKING = 0.75  # a change is at most this part of the one before it where changes shrink
+MILLI = 1e3
+NO_COORDINATES = np.zeros(0)
+Floats = NDArray[np.float64]
+
+
+class Verdict(StrEnum):
+    """What refining has shown."""
+
+    CONVERGED = "converged"  # two refinements in a row change less than the tolerance
+    NOT_YET = "not yet converged"  # the changes shrink, but were still too large at the last level
+    SCATTERED = "not converged"  # the changes do not shrink
+    FAILED = "failed"  # a level that was needed did not run to its end
+
+
+@dataclass(frozen=True)
+class Level:
+    """One run: the refined value, how the run ended, and how far its final state is from others."""
+
+    value: float
+    is_own: bool  # the scenario's own value
+    status: str
+    reason: str
+    seconds: float  # of solving
+    x_mm: tuple[float, ...]  # final centre of each block; empty where the run did not finish
+    rotation_deg: tuple[float, ...]
+    change_mm: float  # distance to the level before; NaN where there is none
+    order: float  # observed; NaN where there is none
+    to_finest_mm: float  # distance to the finest level that finished
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether the run came to its proper end."""
+        return self.status == FINISHED
+
+
+@dataclass(frozen=True)
+class Study:
+    """One setting refined, from its coarsest level to its finest."""
+
+    study: str
+    title: str
+    key: str
+    factor: float
+    tolerance_mm: float
+    levels: tuple[Level, ...]
+    verdict: Verdict
+
+    @property
+    def own(self) -> Level:
+        """The level of the scenario as it is."""
+        return next(level for level in self.levels if level.is_own)
+
+    @property
+    def recommended(self) -> Level | None:
+        """The coarsest level that stays within the tolerance of the finest, with all levels between them."""
+        if self.verdict is not Verdict.CONVERGED:
+            return None
+        chosen = None
+        for level in reversed(self.levels):
+            if not level.to_finest_mm <= self.tolerance_mm:
+                break
+            chosen = level
+        return chosen
+
+    @property
+    def last_change_mm(self) -> float:
+        """The larger of the last two changes; NaN where there are none."""
+        return max((level.change_mm for level in self.levels[-2:]), default=nan)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Recommended settings in one run; `to_finest_mm` is its distance to the farthest of all finest levels."""
+
+    settings: dict[str, float]
+    seconds: float
+    own_seconds: float
+    to_finest_mm: float
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """All studies of one scenario; `recommended` is None where there is nothing to change, or nothing to rely on."""
+
+    name: str
+    blocks: tuple[str, ...]
+    tolerance_mm: float
+    studies: tuple[Study, ...]
+    notes: tuple[str, ...]
+    recommended: Joint | None
+
+    @property
+    def failed(self) -> bool:
+        """Whether the scenario does not even run as it is."""
+        return not self.studies[0].own.is_finished
+
+    @property
+    def converged(self) -> bool:
+        """Whether every study has converged."""
+        return all(study.verdict is Verdict.CONVERGED for study in self.studies)
+
+
+class Coordinates:
+    """Final states as points in a space whose largest coordinate difference is the distance defined above (mm)."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Learn names and half diagonals of the blocks."""
+        placed = place_bodies(scenario)
+        self.blocks = tuple(body.name for body in placed)
+        self._reach = np.array([0.5 * MILLI * hypot(body.size_x, body.size_y) for body in placed])
+
+    def read(self, row: Row) -> tuple[Floats, Floats]:
+        """Return final x (mm) and rotation (degrees) of every block, of no block where the run did not finish."""
+        if row["status"] != FINISHED:
+            return NO_COORDINATES, NO_COORDINATES
+        x, rotation = (
+            np.array([row[f"{name}.{column}"] for name in self.blocks], dtype=float)
+            for column in ("x_mm", "rotation_deg")
+        )
+        return x, rotation
+
+    def point(self, row: Row) -> Floats:
+        """Return the coordinates (mm), empty where the run did not finish."""
+        x, rotation = self.read(row)
+        return np.concatenate([x, np.radians(rotation) * self._reach[: len(rotation)]])
+
+
+def distance(one: Floats, other: Floats) -> float:
+    """Return the largest difference of two points; NaN where one is missing."""
+    return float(np.max(np.abs(one - other))) if one.size and other.size else nan
+
+
+def observed_order(points: Sequence[Floats], factor: float) -> float:
+    """Return the order from three levels, from coarse to fine, each finer by `factor`; NaN where there is none."""
+    if not all(point.size for point in points):
+        return nan
+    coarse, middle, fine = points
+    most = int(np.argmax(np.abs(fine - middle)))
+    before, after = float(middle[most] - coarse[most]), float(fine[most] - middle[most])
+    if abs(after) < ROUND_OFF_MM or before * after <= 0.0 or abs(after) >= abs(before):
+        return nan
+    return log(before / after) / abs(log(factor))
+
+
+def judge(rows: dict[int, Row], refinement: Refinement, coordinates: Coordinates, tolerance_mm: float) -> Study:
+    """Return what the rows of a study's levels say; `rows` is by level and complete from its first to its last."""
+    order = sorted(rows)
+    points = [coordinates.point(rows[level]) for level in order]
+    finest = next((point for point in reversed(points) if point.size), NO_COORDINATES)
+    levels = []
+    for i, number in enumerate(order):
+        x, rotation = coordinates.read(rows[number])
+        levels.append(
+            Level(
+                value=refinement.value(number),
+                is_own=number == 0,
+                status=str(rows[number]["status"]),
+                reason=str(rows[number]["reason"]),
+                seconds=float(str(rows[number]["seconds"])),
+                x_mm=tuple(x.tolist()),
+                rotation_deg=tuple(rotation.tolist()),
+                change_mm=distance(points[i - 1], points[i]) if i else nan,
+                order=observed_order(points[i - 2 : i + 1], refinement.factor) if i > 1 else nan,
+                to_finest_mm=distance(points[i], finest),
+            )
+        )
+    verdict = verdict_of([level.change_mm for level in levels[1:]], tolerance_mm)
+    return Study(
+        refinement.study,
+        refinement.title,
+        refinement.key,
+        refinement.factor,
+        tolerance_mm,
+        tuple(levels),
+        verdict,
+    )
+
+
+def verdict_of(changes_mm: Sequence[float], tolerance_mm: float) -> Verdict:
+    """Judge the changes from level to level, from coarse to fine; NaN is a change to or from a failed level."""
+    last = changes_mm[-2:]
+    if len(last) < 2 or not all(map(isfinite, last)):  # noqa: PLR2004 - two refinements in a row
+        return Verdict.FAILED
+    if max(last) < tolerance_mm:
+        return Verdict.CONVERGED
+    before = next((change for change in reversed(changes_mm[:-2]) if isfinite(change)), inf)
+    shrinks = all(after <= SHRINKING * before for before, after in pairwise([before, *last]))
+    return Verdict.NOT_YET if shrinks else Verdict.SCATTERED

@@ -1,0 +1,116 @@
+"""What a verification case is, and what it measures: rows of expected and measured numbers with a tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from blocksim.verification.scene import Scene, Simulation
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from blocksim.kernels.arrays import World
+
+
+class Verdict(StrEnum):
+    """What is said of a row."""
+
+    INSIDE = "inside"
+    OUTSIDE = "outside"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measured number. All but a relative tolerance (a share) is in `unit`."""
+
+    quantity: str
+    unit: str
+    expected: float
+    measured: float
+    tolerance: float
+    relative: bool = False
+    at_least: bool = False  # `expected` is a lower bound
+
+    @property
+    def error(self) -> float:
+        """Measured less expected, as a share of the expected number where the tolerance is one; 0 beyond a bound."""
+        difference = self.measured - self.expected
+        if self.at_least:
+            return min(difference, 0.0)
+        return difference / abs(self.expected) if self.relative else difference
+
+    @property
+    def verdict(self) -> Verdict:
+        """Inside the tolerance or not; a number that is not finite is outside."""
+        return Verdict.INSIDE if abs(self.error) <= self.tolerance else Verdict.OUTSIDE
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a case is run with."""
+
+    model: str = "surface"
+    law: str = "linear"
+    quick: bool = False  # the case's shortened size, where it has one
+
+    @property
+    def hertzian(self) -> bool:
+        """Tell whether the stiffness of a contact changes with its overlap."""
+        return self.law == "hertz-mindlin"
+
+    def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> Scene:
+        """Return a scene with this model and law; `values` are more fields of Scene."""
+        contact = {"model": self.model, "law": self.law, **values.pop("contact", {})}
+        return Scene(bodies, contact=contact, **values)
+
+    def start(
+        self,
+        bodies: Sequence[Mapping[str, object]],
+        change: Callable[[World], None] | None = None,
+        **values: Any,
+    ) -> Simulation:
+        """Start such a scene."""
+        return self.scene(bodies, **values).start(change)
+
+
+Measure = Callable[[Setting], Iterable[Row]]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One line of the verification table."""
+
+    id: str
+    title: str
+    source: str  # equation or reference of the expected number
+    measure: Measure
+    quick: str = ""  # what the quick size leaves out; empty where there is but one size
+    remarks: Mapping[str, str] = field(default_factory=dict)  # model: why it may be outside
+
+
+def absolute(quantity: str, unit: str, expected: float, measured: float, tolerance: float) -> Row:
+    """Return a row whose tolerance is in the unit."""
+    return Row(quantity, unit, float(expected), float(measured), tolerance)
+
+
+def relative(quantity: str, unit: str, expected: float, measured: float, tolerance: float) -> Row:
+    """Return a row whose tolerance is a share of the expected number."""
+    return Row(quantity, unit, float(expected), float(measured), tolerance, relative=True)
+
+
+def at_least(quantity: str, unit: str, bound: float, measured: float) -> Row:
+    """Return a row that is inside where the measured number is not below the bound."""
+    return Row(quantity, unit, bound, float(measured), 0.0, at_least=True)
+
+
+def count(quantity: str, expected: int, measured: int) -> Row:
+    """Return a row of outcomes counted; all have to be as expected."""
+    return Row(quantity, "", float(expected), float(measured), 0.0)
+
+
+def farthest(expected: float, values: Iterable[float]) -> float:
+    """Return the value that is farthest from the expected one; one that is no number is."""
+    return max(values, key=lambda value: abs(value - expected) if value == value else float("inf"))  # noqa: PLR0124

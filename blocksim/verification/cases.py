@@ -1,0 +1,88 @@
+"""All verification cases: one entry each, in the order of the table."""
+
+from blocksim.errors import InvalidInputError
+from blocksim.verification import (
+    collapse,
+    convergence,
+    dominoes,
+    energy,
+    flight,
+    impacts,
+    resting,
+    restitution,
+    rocking,
+    sliding,
+    symmetry,
+    toppling,
+)
+from blocksim.verification.case import Case
+
+CASES = (
+    Case("V1", "free flight and free spin", "parabola, constant spin", flight.free_flight),
+    Case("V2", "static overlap on the ground", "weight = contact force", resting.static_overlap),
+    Case("V3", "flat drop from 0.1 m, e = 0.5", "Eq 12", flight.bounces),
+    Case(
+        "V4",
+        "restitution of flat and corner impacts",
+        "Eq 11",
+        restitution.restitution,
+        quick="one particle spacing instead of four",
+    ),
+    Case("V5", "corner impact without friction", "impulse and moment", impacts.frictionless_corner),
+    Case("V6", "corner impact that sticks", "impulse and moment", impacts.sticking_corner),
+    Case("V7", "sliding to a stop on level ground", "Eq 13", sliding.sliding_to_rest),
+    Case("V8", "sliding down a slope of 30°", "g (sin a − μ cos a)", sliding.slope),
+    Case(
+        "V9",
+        "sticking below the friction angle, sliding above",
+        "arctan μ",
+        sliding.friction_angle,
+        quick="creep over 1–2 s instead of 5–10 s",
+    ),
+    Case("V10", "sliding and toppling on a slope", "Ashby 1971, Sagaseta 1986", toppling.chart),
+    Case("V11", "free rocking", "quadrature of the energy", rocking.quarter_period),
+    Case("V12", "spin lost in a rocking impact", "Housner 1963", rocking.housner),
+    Case(
+        "V13",
+        "overhanging stacks at their limit",
+        "moments about edges",
+        resting.overhanging_stacks,
+        quick="linear law: a hundredth of the stiffness",
+    ),
+    Case(
+        "V14",
+        "stack of ten blocks",
+        "rest",
+        resting.tower,
+        quick="creep over 0.5–1 s instead of 5–10 s",
+    ),
+    Case("V15", "kinetic energy in 4950 impacts", "no gain", energy.impacts),
+    Case("V16", "two free blocks colliding off-centre", "conservation", impacts.two_blocks),
+    Case("V17", "ladder 1:100 at a smooth wall, 60°", "(cot a − t/L)/2", toppling.ladder),
+    Case(
+        "V18",
+        "24 dominoes",
+        "van Leeuwen 2010",
+        dominoes.dominoes,
+        quick="gaps 0.2 h and 0.3 h only, a hundredth of the stiffness",
+    ),
+    Case("V19", "mirrored, relabelled, moved collapse", "symmetry", symmetry.symmetries),
+    Case("V20", "convergence in step and spacing", "second order", convergence.convergence),
+    Case("V21", "ground as a fixed block", "same motion", symmetry.fixed_block),
+    Case("V22", "three blocks at rest, e = 0", "ten engines", collapse.at_rest),
+    Case("V23", "energy ledger of every scenario", "balance", energy.ledgers),
+    Case("V24", "three blocks before their first impact", "pymunk, Box2D", collapse.before_impact),
+)
+
+
+class UnknownCaseError(InvalidInputError):
+    """A case that is not in the table."""
+
+
+def chosen(ids: list[str]) -> tuple[Case, ...]:
+    """Return the cases of some ids (upper or lower case), in the order of the table; all without ids."""
+    wanted = {name.upper() for name in ids}
+    unknown = sorted(wanted - {case.id for case in CASES})
+    if unknown:
+        raise UnknownCaseError(f"{', '.join(unknown)}: no such case; there are {CASES[0].id} to {CASES[-1].id}")
+    return tuple(case for case in CASES if not wanted or case.id in wanted)

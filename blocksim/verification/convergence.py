@@ -1,0 +1,80 @@
+"""V20: how fast errors fall with the step, and what the particle spacing does to the run-out."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from blocksim.analysis import closed_forms as forms
+from blocksim.verification.case import Row, Setting, absolute, at_least
+from blocksim.verification.collapse import LONGEST, collapse
+from blocksim.verification.resting import CONTACT_RADIUS
+from blocksim.verification.scene import HEIGHT, PaperBlock
+from blocksim.verification.throws import Throw, Thrower
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from blocksim.kernels.arrays import World
+
+ORDER = 1.8
+REFINEMENTS = (1, 2, 4)
+COARSEST = 0.1  # frequency times step
+PERIODS, SAMPLES = 3, 24  # of the oscillation
+PHASES = 32  # of a step, at which an impact begins
+SAFETIES = (0.1, 0.05, 0.025)
+RESTITUTION = 0.5
+RUN_OUT_BOUND = 1.0  # mm
+SOFT = 0.01  # stiffness scale of the run-out
+
+
+def convergence(setting: Setting) -> Iterator[Row]:
+    """Order in dt of an oscillation and of the restitution; change of the run-out when the spacing is halved."""
+    coarse, middle, fine = (oscillation(setting, refinement) for refinement in REFINEMENTS)
+    yield at_least("oscillation, order in dt", "", ORDER, np.log2(rms(coarse - middle) / rms(middle - fine)))
+    errors = [rms(restitution_errors(setting, safety)) for safety in SAFETIES]
+    order = np.log2(errors[0] / errors[-1]) / np.log2(SAFETIES[0] / SAFETIES[-1])
+    yield at_least("restitution, order in dt", "", ORDER, order)
+    one, half = (collapse(setting, 0.2, spacing, SOFT).to_time(LONGEST).bodies.x for spacing in (1e-3, 5e-4))
+    yield absolute("run-out, spacing halved", "mm", 0.0, 1e3 * float(np.abs(one - half).max()), RUN_OUT_BOUND)
+
+
+def rms(values: NDArray[np.float64]) -> float:
+    """Return the root of the mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def resting_state(setting: Setting) -> tuple[float, float]:
+    """Return overlap (m) and frequency (1/s) of a block that rests on its face."""
+    block = PaperBlock()
+    if setting.hertzian:
+        overlap = forms.hertz_static_overlap(block.mass, block.modulus, CONTACT_RADIUS)
+        return overlap, sqrt(1.5 * forms.GRAVITY / overlap)  # the slope of d^1.5 is 1.5 times force over overlap
+    overlap = forms.static_overlap(block.mass, 2.0 * block.point_stiffness)
+    return overlap, sqrt(forms.GRAVITY / overlap)
+
+
+def oscillation(setting: Setting, refinement: int) -> NDArray[np.float64]:
+    """Return heights (m) at fixed times of an undamped block that starts half of its overlap too high: no lift-off."""
+    overlap, frequency = resting_state(setting)
+    step = COARSEST / frequency / refinement
+
+    def press(world: World) -> None:
+        world.bodies[0].y -= 0.5 * overlap
+
+    contact = {"contact_radius": CONTACT_RADIUS} if setting.hertzian else {}
+    time = {"step": step, "force_step": True}
+    scene = setting.start([{"y": HEIGHT / 2}], press, restitution=1.0, contact=contact, time=time)
+    every = refinement * round(2.0 * np.pi / COARSEST * PERIODS / SAMPLES)
+    return np.array([scene.to_step(every * k).bodies[0].y for k in range(1, SAMPLES + 1)])
+
+
+def restitution_errors(setting: Setting, safety: float) -> NDArray[np.float64]:
+    """Return the errors of the restitution of flat impacts that begin at different phases of a step."""
+    thrower = Thrower(setting, RESTITUTION, time={"safety": safety})
+    throws = [thrower.throw(Throw(phase=(k + 0.5) / PHASES)).vy for k in range(PHASES)]
+    return np.array(throws) - RESTITUTION

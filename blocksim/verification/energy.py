@@ -1,0 +1,69 @@
+"""V15 impacts never gain kinetic energy, V23 the energy ledger of every scenario that ships."""
+
+from __future__ import annotations
+
+from itertools import product
+from math import log2, nan, radians
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from blocksim.kernels.arrays import REACHED
+from blocksim.scenario import load_scenario
+from blocksim.verification.case import Row, Setting, absolute, at_least
+from blocksim.verification.scene import Simulation
+from blocksim.verification.throws import GOLDEN, Throw, Thrower, kinetic_energy
+from blocksim.world.build import build_world
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+ANGLES = tuple(range(90))  # degrees
+FRICTIONS = tuple(tenth / 10 for tenth in range(11))
+LOSSY = (0.0, 0.3, 0.6, 0.9)  # restitutions
+SAFETY = 0.05  # the default; the stiffest mode has frequency times step = 2 safety
+PHASES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a step, at which an impact begins
+ROUND_OFF = 1e-12
+LEDGER_TOLERANCE = 1e-3
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+
+
+def impacts(setting: Setting) -> Iterator[Row]:
+    """Throw a block at 90 angles with 11 frictions and 5 restitutions; the largest gain counts."""
+    throws = [
+        Throw(radians(angle), friction, (GOLDEN * number) % 1.0)
+        for number, (angle, friction) in enumerate(product(ANGLES, FRICTIONS))
+    ]
+    lossy = max(largest_gain(Thrower(setting, e), throws) for e in LOSSY)
+    yield absolute("gain, e ≤ 0.9", "", 0.0, max(lossy, 0.0), ROUND_OFF)
+    bound = (2.0 * SAFETY) ** 2 / 4.0
+    yield absolute("gain, e = 1", "", 0.0, max(largest_gain(Thrower(setting, 1.0), throws), 0.0), bound)
+    smooth = [Throw(radians(angle), phase=phase) for angle, phase in product(ANGLES[::9], PHASES)]
+    coarse, fine = (
+        largest_gain(Thrower(setting, 1.0, time={"safety": safety}), smooth) for safety in (2.0 * SAFETY, SAFETY / 2.0)
+    )
+    yield at_least("gain, e = 1, order in dt", "", 1.8, log2(coarse / fine) / 2.0 if fine > 0.0 else nan)
+
+
+def largest_gain(thrower: Thrower, throws: Iterable[Throw]) -> float:
+    """Return the largest gain of kinetic energy in an impact, as a share of that before; negative for a loss."""
+    before = 0.5 * float(thrower.fresh["bodies"]["mass"][0])  # 1 m/s
+    return max(kinetic_energy(thrower.throw(throw)) / before - 1.0 for throw in throws)
+
+
+def ledgers(setting: Setting) -> Iterator[Row]:
+    """Run every scenario that ships and look at the ledger at every output."""
+    for path in sorted(SCENARIOS.glob("*.toml")):
+        yield absolute(path.stem, "", 0.0, worst_residual(setting, path), LEDGER_TOLERANCE)
+
+
+def worst_residual(setting: Setting, path: Path) -> float:
+    """Return the largest residual of a run, as a share of the energy in play."""
+    scenario = load_scenario(path, {"contact.model": setting.model, "contact.law": setting.law})
+    run = Simulation(build_world(scenario))
+    outputs = round(scenario.time.end / scenario.output.every)
+    worst = 0.0
+    for k in range(1, outputs + 1):
+        worst = max(worst, run.to_time(k * scenario.output.every).residual())
+        if run.status != REACHED:
+            break
+    return worst

@@ -1,0 +1,67 @@
+"""V5 and V6: one corner on the ground; V16: two free blocks against each other."""
+
+from __future__ import annotations
+
+from math import radians
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from blocksim.analysis import closed_forms as forms
+from blocksim.verification.case import Row, Setting, absolute, relative
+from blocksim.verification.scene import HEIGHT, WIDTH, PaperBlock, Simulation
+from blocksim.verification.throws import Throw, Thrower
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+TILT = radians(30.0)
+FALLING = forms.Motion(0.0, -1.0, 0.0)
+STICKING = 2.0  # friction coefficient
+COLLISION_STEPS = 20_000
+
+
+def frictionless_corner(setting: Setting) -> Iterator[Row]:
+    """Turn a fall into spin: impulse through one corner, without friction."""
+    block, arm = PaperBlock(), forms.lowest_corner(WIDTH, HEIGHT, TILT)
+    for e in (0.0, 0.5):
+        body = Thrower(setting, e).throw(Throw(TILT))
+        expected = forms.frictionless_impact(block.mass, block.inertia, arm, FALLING, e)
+        yield absolute(f"v_y at e = {e:g}", "m/s", expected.vy, body.vy, 0.01)
+        yield absolute(f"spin at e = {e:g}", "rad/s", expected.spin, body.spin, 0.5)
+
+
+def sticking_corner(setting: Setting) -> Iterator[Row]:
+    """Let a corner stop by friction, so that the block turns about it."""
+    block, arm = PaperBlock(), forms.lowest_corner(WIDTH, HEIGHT, TILT)
+    body = Thrower(setting, 0.0).throw(Throw(TILT, friction=STICKING))
+    expected = forms.sticking_impact(block.mass, block.inertia, arm, FALLING, 0.0)
+    yield relative("spin", "rad/s", expected.spin, body.spin, 0.02)
+
+
+def collision(setting: Setting, restitution: float) -> Simulation:
+    """Start two free blocks that will meet off-centre, both turning."""
+    one = {"y": 0.1, "velocity": [1.0, 0.1], "spin": 5.0}
+    two = {"y": 0.112, "x": 0.0335, "velocity": [-0.6, 0.0], "angle": 0.05, "spin": -12.0, "width": 0.03}
+    return setting.start([one, two], restitution=restitution, gravity=0.0)
+
+
+def momenta(scene: Simulation) -> NDArray[np.float64]:
+    """Return momentum along x and y (kg m/s) and the angular momentum (kg m2/s) about the origin."""
+    b = scene.bodies
+    spin = b.inertia * b.spin + b.mass * (b.x * b.vy - b.y * b.vx)
+    return np.array([(b.mass * b.vx).sum(), (b.mass * b.vy).sum(), spin.sum()])
+
+
+def two_blocks(setting: Setting) -> Iterator[Row]:
+    """Collide two blocks; momentum and angular momentum are kept to round-off times steps."""
+    scenes = [collision(setting, e) for e in (0.0, 0.2, 1.0)]
+    before = [momenta(scene) for scene in scenes]
+    after = [momenta(scene.to_step(COLLISION_STEPS)) for scene in scenes]
+    worst = np.abs(np.array(after) - np.array(before)).max(axis=0)
+    mass = float(scenes[0].bodies.mass.sum())
+    round_off = COLLISION_STEPS * float(np.finfo(float).eps) * mass  # speeds of 1 m/s
+    yield absolute("momentum", "kg m/s", 0.0, max(worst[0], worst[1]), round_off)
+    yield absolute("angular momentum", "kg m²/s", 0.0, worst[2], 0.1 * round_off)  # arms of 0.1 m

@@ -1,0 +1,133 @@
+"""The verification table of the README: measured, kept in results/verify.json, written as Markdown.
+
+`python -m blocksim.verification.reference README.md` writes the table anew from the kept results; with `--measure` all
+cases are run first and the results replaced.
+"""
+
+import json
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from blocksim.verification.case import Case, Row, Setting, Verdict
+from blocksim.verification.cases import CASES
+from blocksim.verification.verify import expected_text, number, run_case, tolerance_text
+
+BEGIN = "<!-- verify: written by `make verify-table` -->"
+END = "<!-- end of verify -->"
+STORE = Path("results") / "verify.json"
+COLUMNS = {  # head of the column: how it is measured
+    "linear": Setting(),
+    "Hertz–Mindlin": Setting(law="hertz-mindlin"),
+    "`kernel`": Setting("kernel", quick=True),
+    "`particles`": Setting("particles", quick=True),
+}
+FIELDS = ("quantity", "unit", "expected", "measured", "tolerance", "relative", "at_least")
+SIGNS = {Verdict.INSIDE: "✓", Verdict.OUTSIDE: "✗"}
+Stored = dict[str, dict[str, list[dict[str, Any]]]]  # head of the column, case id, rows
+
+
+def measure() -> Stored:
+    """Run all cases in all settings of the table; minutes."""
+    return {head: dict(_measured(setting)) for head, setting in COLUMNS.items()}
+
+
+def _measured(setting: Setting) -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    for case in CASES:
+        outcome = run_case(case, setting)
+        print(f"{setting.model} {setting.law} {case.id}: {outcome.seconds:.1f} s", file=sys.stderr, flush=True)  # noqa: T201
+        yield case.id, [{name: getattr(row, name) for name in FIELDS} for row in outcome.rows]
+
+
+def stored_rows(stored: Stored, head: str, case: Case) -> list[Row]:
+    """Return the kept rows of one case in one setting."""
+    return [Row(**{**row, "measured": _number(row["measured"])}) for row in stored[head].get(case.id, [])]
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else value
+
+
+def table(stored: Stored) -> str:
+    """Return the table as Markdown, and below it why models miss."""
+    head = ["case", "quantity", "expected", "tolerance", *COLUMNS]
+    lines = [f"| {' | '.join(head)} |", f"|{' --- |' * len(head)}"]
+    lines += [line for case in CASES for line in _case_lines(stored, case)]
+    return "\n".join([*lines, *_remarks(stored)])
+
+
+def _case_lines(stored: Stored, case: Case) -> Iterator[str]:
+    columns = [{row.quantity: row for row in stored_rows(stored, head, case)} for head in COLUMNS]
+    name = f"{case.id} {case.title}"
+    for quantity, row in columns[0].items():
+        others = [column.get(quantity) for column in columns]
+        laws = [other for other in others[:2] if other is not None]
+        cells = [
+            name,
+            f"{quantity}, {row.unit}" if row.unit else quantity,
+            " / ".join(dict.fromkeys(expected_text(other) for other in laws)),
+            " / ".join(dict.fromkeys(tolerance_text(other) for other in laws)),
+            *(_cell(other) for other in others),
+        ]
+        yield f"| {' | '.join(cells)} |"
+        name = ""
+
+
+def _cell(row: Row | None) -> str:
+    return "–" if row is None else f"{number(row.measured, 3)} {SIGNS[row.verdict]}"
+
+
+def _remarks(stored: Stored) -> Iterator[str]:
+    found = [text for head, setting in COLUMNS.items() for text in _missed(stored, head, setting)]
+    if found:
+        yield from ["", "Where models other than `surface` miss a tolerance:", "", *found]
+
+
+def _missed(stored: Stored, head: str, setting: Setting) -> Iterator[str]:
+    for case in CASES:
+        outside = any(row.verdict == Verdict.OUTSIDE for row in stored_rows(stored, head, case))
+        if outside and setting.model in case.remarks:
+            yield f"* {head} {case.id}: {case.remarks[setting.model]}"
+
+
+def with_table(text: str, stored: Stored) -> str:
+    """Return a README with the table between the two marks replaced."""
+    marked = re.compile(f"{re.escape(BEGIN)}.*{re.escape(END)}", re.DOTALL)
+    return marked.sub(lambda _: f"{BEGIN}\n{table(stored)}\n{END}", text)
+
+
+def read_store(path: Path) -> Stored:
+    """Read the kept results."""
+    stored: Stored = json.loads(path.read_text(encoding="utf-8"))
+    return stored
+
+
+def write_store(path: Path, stored: Stored) -> None:
+    """Keep results; one row a line, numbers that are not finite as null."""
+    text = json.dumps(_finite(stored), indent=1, ensure_ascii=False, allow_nan=False)
+    folded = re.sub(r"\{\n\s+\"quantity\".*?\}", lambda row: " ".join(row.group().split()), text, flags=re.DOTALL)
+    path.write_text(folded + "\n", encoding="utf-8")
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, float):
+        return data if abs(data) < float("inf") else None
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    return [_finite(value) for value in data] if isinstance(data, list) else data
+
+
+def main(arguments: Iterable[str]) -> None:
+    """Write the table into the README named, after measuring where asked to."""
+    options = list(arguments)
+    readme = Path(next(option for option in options if not option.startswith("-")))
+    store = readme.parent / STORE
+    if "--measure" in options:
+        write_store(store, measure())
+    readme.write_text(with_table(readme.read_text(encoding="utf-8"), read_store(store)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,190 @@
+"""Scenes of a few blocks, started and stepped: what verification cases and tests share. SI units, angles in rad."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from blocksim.kernels.advance import advance
+from blocksim.kernels.energy import LEDGER_ROW, measure
+from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.world.build import build_world
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from blocksim.kernels.arrays import World
+
+WIDTH, HEIGHT, DEPTH = 0.032, 0.025, 0.05  # m, the paper's block in the literal reading
+YOUNG_MODULUS, POISSON_RATIO, UNIT_WEIGHT = 69e9, 0.3, 26.7e3  # Pa, -, N/m3
+SIZES = {"width": WIDTH, "height": HEIGHT, "length": DEPTH}
+LEAST_RISE = 1e-3  # m; the energy in play is at least the weight times this
+
+
+@dataclass(frozen=True)
+class PaperBlock:
+    """The paper's block, the height upright unless other sides are given, and what follows from its material."""
+
+    width: float = WIDTH  # m
+    height: float = HEIGHT  # m
+    depth: float = DEPTH  # m
+    density: float = UNIT_WEIGHT / 9.81  # kg/m3
+    modulus: float = YOUNG_MODULUS / (2.0 * (1.0 - POISSON_RATIO**2))  # Pa, E* of two equal materials
+
+    @property
+    def mass(self) -> float:
+        """Mass (kg)."""
+        return self.density * self.width * self.height * self.depth
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia (kg m2) about the centre."""
+        return self.mass * (self.width**2 + self.height**2) / 12.0
+
+    @property
+    def point_stiffness(self) -> float:
+        """Stiffness (N/m) of one linear contact point; a face contact has two."""
+        return self.modulus * self.depth
+
+
+class Simulation:
+    """A world under way."""
+
+    def __init__(self, world: World) -> None:
+        """Find the first contacts and remember the energy."""
+        self.world = world
+        self.status = advance(world, 0)
+        self.start_energy = self.energy()
+
+    @property
+    def bodies(self) -> Any:
+        """All bodies without the ground: a record array, as in blocksim.kernels.arrays."""
+        return self.world.bodies[:-1]
+
+    @property
+    def slots(self) -> Any:
+        """Contact slots of the pairs in the list: a record array, one row a pair."""
+        return self.world.slots[: self.world.clock[0].pair_count]
+
+    @property
+    def step(self) -> float:
+        """Length of a step (s)."""
+        return float(self.world.controls[0].step)
+
+    @property
+    def steps(self) -> int:
+        """Steps done."""
+        return int(self.world.clock[0].steps)
+
+    @property
+    def time(self) -> float:
+        """Time (s) since the start."""
+        return self.steps * self.step
+
+    def to_step(self, last_step: int) -> Simulation:
+        """Go on to a step number."""
+        self.status = advance(self.world, last_step)
+        return self
+
+    def to_time(self, time: float) -> Simulation:
+        """Go on to the step nearest to a time (s)."""
+        return self.to_step(round(time / self.step))
+
+    def measured(self) -> NDArray[np.float64]:
+        """Return kinetic, potential, stored normal, stored shear, dashpot, friction, broken (J), contacts, overlap."""
+        row = np.zeros(len(LEDGER_ROW) + 2)
+        measure(self.world, row)
+        return row
+
+    @property
+    def kinetic(self) -> float:
+        """Kinetic energy (J)."""
+        return float(self.measured()[0])
+
+    @property
+    def contacts(self) -> int:
+        """Number of contact points."""
+        return int(self.measured()[len(LEDGER_ROW)])
+
+    def energy(self) -> float:
+        """Return everything the scene holds and has lost (J): constant, if the ledger is complete."""
+        return float(self.measured()[: len(LEDGER_ROW)].sum())
+
+    def residual(self) -> float:
+        """Return what the ledger lacks, as a share of the energy in play."""
+        ledger = self.world.ledger[0]
+        gravity = float(np.hypot(self.world.controls[0].gravity_x, self.world.controls[0].gravity_y))
+        least = float(self.bodies.mass.sum()) * gravity * LEAST_RISE
+        in_play = max(float(ledger.largest_kinetic + ledger.travel_work), least)
+        return abs(self.energy() - self.start_energy) / in_play
+
+    def state(self) -> NDArray[np.float64]:
+        """Return x, y, angle, vx, vy, spin of all bodies, one row a body."""
+        names = ("x", "y", "angle", "vx", "vy", "spin")
+        return np.array([self.bodies[name] for name in names]).T.copy()
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Single bodies on the ground, each with sides of its own (default: the paper's block)."""
+
+    bodies: Sequence[Mapping[str, object]]  # keys of [[bodies]] without `block`, and width, height, length
+    restitution: float = 0.2
+    friction: float = 0.31  # between blocks
+    ground_friction: float = 0.38
+    gravity: float = 9.81  # m/s2
+    tilt: float = 0.0  # rad
+    contact: Mapping[str, object] = field(default_factory=dict)  # more keys of [contact]
+    time: Mapping[str, object] = field(default_factory=dict)  # more keys of [time]
+
+    def start(self, change: Callable[[World], None] | None = None) -> Simulation:
+        """Start it; `change` edits the world before the first contacts are found."""
+        world = build_world(self.scenario())
+        if change is not None:
+            change(world)
+        return Simulation(world)
+
+    def scenario(self) -> Scenario:
+        """Return the scenario."""
+        return scenario_of(
+            self.bodies,
+            gravity=self.gravity,
+            ground={"tilt": in_radians(self.tilt)},
+            friction={"block_block": self.friction, "block_ground": self.ground_friction},
+            contact={"restitution": self.restitution, **self.contact},
+            time={"stop_at_rest": False, **self.time},
+        )
+
+
+def scenario_of(bodies: Sequence[Mapping[str, object]], **tables: Any) -> Scenario:
+    """Build a scenario of single bodies of the paper's material; every body has a block type of its own."""
+    material = {"unit_weight": UNIT_WEIGHT, "young_modulus": YOUNG_MODULUS, "poisson_ratio": POISSON_RATIO}
+    return scenario_from_mapping(
+        {
+            "schema": 1,
+            "name": "scene",
+            "materials": {"aluminium": material},
+            "blocks": {f"block{i}": block_type(body) for i, body in enumerate(bodies)},
+            "bodies": [{"x": 0.0, "block": f"block{i}", **placement(body)} for i, body in enumerate(bodies)],
+            **tables,
+        }
+    )
+
+
+def block_type(body: Mapping[str, object]) -> dict[str, object]:
+    """Return the block table of one body."""
+    return {key: body.get(key, size) for key, size in SIZES.items()} | {"material": "aluminium"}
+
+
+def placement(body: Mapping[str, object]) -> dict[str, object]:
+    """Return the body table without what belongs to its block."""
+    return {key: in_radians(value) if key == "angle" else value for key, value in body.items() if key not in SIZES}
+
+
+def in_radians(angle: object) -> object:
+    """Return an angle (rad) as scenarios want it: with its unit, unless it is zero."""
+    return f"{float(str(angle))!r} rad" if angle else angle

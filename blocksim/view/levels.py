@@ -1,0 +1,178 @@
+"""How far coarser levels of a numerical setting end from the finest: a panel for each setting, finer to the right."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.view import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
+PANEL_WIDTH, PANEL_HEIGHT = 3.3, 2.7  # inches
+LEFT, RIGHT, HEAD, FOOT, GAP = 0.72, 1.05, 0.80, 0.50, 0.35  # inches
+LINE = 0.14  # inches, of one row of text above a panel
+LEGEND_ROW, LEGEND_ENTRY = 0.18, 1.55  # inches: height of a row of the legend, width of an entry
+DEPTH = 1e-3  # of the tolerance, or of the farthest level where that is less: what is closer is drawn there
+MARKERS = "osD^vP"
+MOST_BLOCKS = 4
+LARGEST: dict[str, Any] = {"color": style.INK, "linewidth": 2.5, "alpha": 0.25}
+MOST_NUMBERS = 6  # below one axis
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One setting: n levels from coarse to fine, and how far each of b blocks ends from the last one."""
+
+    title: str
+    key: str
+    verdict: str
+    values: Floats  # (n,)
+    blocks: tuple[str, ...]
+    off_mm: Floats  # (n, b) |x - x at the finest level|
+    largest_off_mm: Floats  # (n,) over all blocks, rotation included
+    tolerance_mm: float
+    own: float
+    recommended: float | None
+
+
+def draw_levels(
+    panels: Sequence[Panel], path: Path | str, title: str | None = None, measured: Mapping[str, float] | None = None
+) -> None:
+    """Draw the panels side by side and write them as PNG, SVG or PDF; the same input gives the same bytes.
+
+    `measured` gives the width of the measured range (mm) of some blocks. Raises InvalidInputError for an unknown
+    picture format and OutputError when the file cannot be written.
+    """
+    path = Path(path)
+    style.picture_suffix(path)
+    widths = dict(measured or {})
+    shown = chosen_blocks(panels)
+    repeats = [widths[panels[0].blocks[block]] for block in shown if widths.get(panels[0].blocks[block], 0.0) > 0.0]
+    least = min(repeats, default=None)
+    low, high = limits_of(panels, [] if least is None else [least])
+    width = LEFT + len(panels) * PANEL_WIDTH + (len(panels) - 1) * GAP + RIGHT
+    columns = int(width / LEGEND_ENTRY)
+    foot = FOOT + LEGEND_ROW * -(-(len(shown) + 1) // columns)
+    height = HEAD + PANEL_HEIGHT + foot
+    with style.styled_figure(width, height) as figure:
+        for index, panel in enumerate(panels):
+            left = LEFT + index * (PANEL_WIDTH + GAP)
+            axes = figure.add_axes((left / width, foot / height, PANEL_WIDTH / width, PANEL_HEIGHT / height))
+            axes.set_yscale("log")
+            axes.set_ylim(low, high)
+            _draw_panel(axes, panel, shown)
+            _draw_limits(axes, panel.tolerance_mm, least, named=index == len(panels) - 1)
+            axes.tick_params(axis="y", which="both", labelleft=index == 0)
+        figure.axes[0].set_ylabel("distance from the finest level (mm)")
+        if title:
+            top = 1.0 - 0.06 / height
+            figure.suptitle(title, x=0.12 / width, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE)
+        figure.legend(handles=_legend(panels[0].blocks, shown), loc="lower left", ncols=columns, frameon=False)
+        style.save_figure(figure, path)
+
+
+def limits_of(panels: Sequence[Panel], others: Sequence[float]) -> tuple[float, float]:
+    """Return the range of the common axis (mm) around the tolerance, other lengths and everything that is shown."""
+    tolerance = panels[0].tolerance_mm
+    off = np.concatenate([array.ravel() for panel in panels for array in (panel.largest_off_mm, panel.off_mm)])
+    off = off[np.isfinite(off) & (off > 0.0)]
+    farthest = min(float(off.max(initial=0.0)) or tolerance, tolerance)
+    least = max(0.5 * float(off.min(initial=tolerance)), DEPTH * farthest)
+    return least, 2.0 * max(float(off.max(initial=tolerance)), *others, tolerance)
+
+
+def chosen_blocks(panels: Sequence[Panel]) -> list[int]:
+    """Return the blocks to draw, in their order: those that move at all, the farthest of them if they are many."""
+    most = np.max([panel.off_mm.max(axis=0, initial=0.0) for panel in panels], axis=0)
+    least = DEPTH * min(float(most.max(initial=0.0)), panels[0].tolerance_mm)
+    moving = [int(block) for block in np.argsort(-most, kind="stable") if most[block] > least]
+    return sorted(moving[:MOST_BLOCKS])
+
+
+def _look(shown: Sequence[int], block: int) -> dict[str, Any]:
+    """Return colour and marker of a block, its own as in other pictures where no two would look alike."""
+    number = block if max(shown) < len(style.BLOCK_COLOURS) else shown.index(block)
+    return {
+        "color": style.block_colour(number),
+        "marker": MARKERS[number],
+        "markersize": 4.5,
+        "markeredgecolor": style.INK,
+        "markeredgewidth": 0.4,
+        "linewidth": 1.2,
+    }
+
+
+def _draw_panel(axes: "Axes", panel: Panel, shown: Sequence[int]) -> None:
+    low, _ = axes.get_ylim()
+    coarser = panel.values[:-1]  # the finest level is what the others are measured from
+    axes.set_xscale("log")
+    axes.plot(coarser, np.maximum(panel.largest_off_mm[:-1], low), **LARGEST)
+    for block in shown:
+        off = np.maximum(panel.off_mm[:-1, block], low)
+        axes.plot(coarser, off, **_look(shown, block), clip_on=False, zorder=3)
+    _mark_values(axes, panel)
+    _number_axes(axes, panel)
+    axes.spines[["right", "top"]].set_visible(False)
+    axes.set_xlabel(f"{panel.key}, finer to the right", labelpad=2.0)
+    axes.set_title(f"{panel.title}: {panel.verdict}", loc="left", pad=4.0 + 2.0 * LINE * style.POINTS_PER_INCH)
+
+
+def _number_axes(axes: "Axes", panel: Panel) -> None:
+    """Write numbers below the levels, below every second one where they are many, always below the scenario's own."""
+    from matplotlib.ticker import FuncFormatter, NullLocator  # noqa: PLC0415 - see style
+
+    first, last = float(panel.values[0]), float(panel.values[-1])
+    margin = (last / first) ** 0.04
+    axes.set_xlim(first / margin, last * margin)
+    apart = 1 if len(panel.values) <= MOST_NUMBERS else 2
+    start = int(np.argmin(np.abs(panel.values - panel.own))) % apart
+    axes.set_xticks(panel.values[start::apart], [f"{value:.3g}" for value in panel.values[start::apart]])
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def _draw_limits(axes: "Axes", tolerance: float, repeats: float | None, *, named: bool) -> None:
+    """Draw the tolerance and the least measured range (mm), named to the right of the last panel."""
+    lines = [(tolerance, f"tolerance\n{tolerance:g} mm", style.INK)]
+    if repeats is not None:
+        lines.append((repeats, f"repeats differ\nby {repeats:.2g} mm", style.MEASURED_COLOUR))
+    highest = max(y for y, _, _ in lines)
+    for y, text, colour in lines:
+        axes.axhline(y, color=colour, linewidth=style.LINE_WIDTH, linestyle=(0, (5, 3)))
+        if named:
+            va = "bottom" if y == highest else "top"
+            axes.annotate(text, (1.0, y), (4.0, 0.0), ("axes fraction", "data"), "offset points", color=colour, va=va)
+
+
+def _mark_values(axes: "Axes", panel: Panel) -> None:
+    """Mark the scenario's own value and the recommended one above the panel, in a row of text each."""
+    marks = [(panel.own, "own", 1)]
+    if panel.recommended is not None:
+        marks.append((panel.recommended, "recommended", 0))
+    for value, text, row in marks:
+        axes.axvline(value, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (1, 2)), zorder=1)
+        at_edge = {panel.values[0]: "left", panel.values[-1]: "right"}
+        axes.annotate(
+            text,
+            (value, 1.0),
+            (0.0, 2.0 + row * LINE * style.POINTS_PER_INCH),
+            ("data", "axes fraction"),
+            "offset points",
+            color=style.FAINT_INK,
+            ha=at_edge.get(value, "center"),
+        )
+
+
+def _legend(blocks: Sequence[str], shown: Sequence[int]) -> "list[Line2D]":
+    """Name the lines."""
+    from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
+
+    lines = [Line2D([], [], **_look(shown, block), label=f"x of block {blocks[block]}") for block in shown]
+    return [*lines, Line2D([], [], **LARGEST, label="largest, with turns")]

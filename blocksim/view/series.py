@@ -1,0 +1,234 @@
+"""Where blocks end over the values of one key: a row for each block, a column for each series."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.view import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH = 7.6  # inches
+LEFT, RIGHT, HEAD, FOOT = 0.62, 0.15, 0.62, 0.68  # inches
+COLUMN_GAP, ROW_GAP = 0.25, 0.36  # inches
+ROW_HEIGHT = 1.35  # inches
+MOST_ROWS, MOST_COLUMNS = 4, 4
+STAYS_MM = 0.01  # a block whose final x varies less than this is not drawn beside others
+LEAST_SPAN_MM = 1.0  # of an axis, so that round-off does not look like scatter
+DECADES = 30.0  # largest over smallest value from which an axis is logarithmic
+NARROW = 1e-2  # span over middle below which an axis shows distances from the middle
+WAVERING = 1.6  # way up and down over range, above which points are not joined
+PREFIXED = ("m", "s", "Pa")
+PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+Floats = NDArray[np.float64]
+
+
+class SeriesLike(Protocol):
+    """Final centres of b blocks in n runs, in the order of the key's values."""
+
+    @property
+    def label(self) -> str:
+        """What all runs of this series share."""
+        ...
+
+    @property
+    def values(self) -> Floats:
+        """Values of the key in SI, (n,)."""
+        ...
+
+    @property
+    def x_mm(self) -> Floats:
+        """Final centres (mm), (n, b)."""
+        ...
+
+
+@dataclass(frozen=True)
+class ValueAxis:
+    """How values of a key are shown: `(value - middle) * factor`."""
+
+    label: str
+    middle: float
+    factor: float
+    is_log: bool
+
+    def shown(self, values: Floats) -> Floats:
+        """Return the numbers on the axis."""
+        return (values - self.middle) * self.factor
+
+
+def draw_series(
+    series: Sequence[SeriesLike],
+    blocks: Sequence[str],
+    key: tuple[str, str],
+    path: Path | str,
+    title: str | None = None,
+    measured: Mapping[str, tuple[float, float]] | None = None,
+) -> None:
+    """Draw final x over a key, given with its SI unit, and write PNG, SVG or PDF; the same input gives the same bytes.
+
+    `measured` gives smallest and largest measured x (mm) of some blocks. Raises InvalidInputError for an unknown
+    picture format and OutputError when the file cannot be written.
+    """
+    path = Path(path)
+    style.picture_suffix(path)
+    drawn = list(series)[:MOST_COLUMNS]
+    rows = moving_blocks(drawn)
+    height = HEAD + len(rows) * ROW_HEIGHT + (len(rows) - 1) * ROW_GAP + FOOT
+    with style.styled_figure(WIDTH, height) as figure:
+        _draw_panels(figure, drawn, [(block, blocks[block]) for block in rows], key, measured or {})
+        for axes, one in zip(figure.axes, drawn, strict=False):
+            place = axes.get_position().x0, 1.0 - 0.29 / height
+            figure.text(*place, one.label, va="top", weight="bold")
+        if title:
+            figure.suptitle(title, x=0.1 / WIDTH, y=1.0 - 0.06 / height, ha="left", va="top", fontsize=style.TITLE_SIZE)
+        texts = _legend(len(rows), len(blocks), len(series) - len(drawn), is_measured=bool(measured))
+        figure.text(0.1 / WIDTH, 0.06 / height, texts, color=style.FAINT_INK, va="bottom")
+        style.save_figure(figure, path)
+
+
+def _draw_panels(
+    figure: "Figure",
+    series: Sequence[SeriesLike],
+    rows: Sequence[tuple[int, str]],
+    key: tuple[str, str],
+    measured: Mapping[str, tuple[float, float]],
+) -> None:
+    """Draw a row of panels for each block, given by number and name, and a column for each series."""
+    axis = value_axis(np.concatenate([one.values for one in series]), *key)
+    joined = all(is_smooth(one.x_mm[:, block]) for one in series for block, _ in rows)
+    height = float(figure.get_figheight())
+    panel = (WIDTH - LEFT - RIGHT - (len(series) - 1) * COLUMN_GAP) / len(series)
+    for row, (block, name) in enumerate(rows):
+        limits = _limits(series, block, measured.get(name))
+        bottom = FOOT + (len(rows) - 1 - row) * (ROW_HEIGHT + ROW_GAP)
+        for column, one in enumerate(series):
+            left = LEFT + column * (panel + COLUMN_GAP)
+            axes = figure.add_axes((left / WIDTH, bottom / height, panel / WIDTH, ROW_HEIGHT / height))
+            axes.set_ylim(*limits)
+            _draw_band(axes, measured.get(name))
+            _draw_points(axes, one, block, axis, joined=joined)
+            _finish(axes, axis, is_first=column == 0, is_last=row == len(rows) - 1)
+            axes.set_title(_caption(name, one.x_mm[:, block]), loc="left", pad=3.0)
+
+
+def moving_blocks(series: Sequence[SeriesLike]) -> list[int]:
+    """Return the blocks to draw, in their order: those whose final x varies most; all are candidates if none does."""
+    spread = np.max([np.ptp(one.x_mm, axis=0) for one in series], axis=0)
+    candidates = [int(block) for block in np.argsort(-spread, kind="stable")]
+    moving = [block for block in candidates if spread[block] >= STAYS_MM]
+    return sorted((moving or candidates)[:MOST_ROWS])
+
+
+def value_axis(values: Floats, key: str, unit: str) -> ValueAxis:
+    """Return how to show values of a key: over decades, as distances from their middle, or as they are."""
+    low, high = float(values.min()), float(values.max())
+    if low > 0.0 and high >= DECADES * low:
+        return ValueAxis(f"{key} ({unit})" if unit else key, 0.0, 1.0, is_log=True)
+    middle = float(np.median(np.unique(values)))
+    if 0.0 < high - low < NARROW * abs(middle):
+        factor, told = scale_of(max(high - middle, middle - low), unit)
+        other, around = scale_of(abs(middle), unit)
+        return ValueAxis(
+            f"{key} − {middle * other:.9g}{_spaced(around)}{_bracketed(told)}", middle, factor, is_log=False
+        )
+    factor, told = scale_of(max(abs(low), abs(high)), unit)
+    return ValueAxis(f"{key}{_bracketed(told)}", 0.0, factor, is_log=False)
+
+
+def scale_of(size: float, unit: str) -> tuple[float, str]:
+    """Return the factor and the unit with which values of this size are best read."""
+    if unit == "rad":
+        return 180.0 / np.pi, "°"
+    power = 3 * int(np.floor(np.log10(size) / 3.0)) if size > 0.0 else 0
+    if unit in PREFIXED:
+        power = min(max(power, min(PREFIXES)), max(PREFIXES))
+        return 10.0**-power, PREFIXES[power] + unit
+    if power in {-3, 0, 3}:
+        return 1.0, unit
+    return 10.0**-power, f"10^{power} {unit}".strip()
+
+
+def is_smooth(values: Floats) -> bool:
+    """Tell whether values go up and down so little that a line through them is no invention."""
+    spread = float(np.ptp(values))
+    return spread < STAYS_MM or float(np.abs(np.diff(values)).sum()) <= WAVERING * spread
+
+
+def _spaced(unit: str) -> str:
+    return f" {unit}" if unit else ""
+
+
+def _bracketed(unit: str) -> str:
+    return f" ({unit})" if unit else ""
+
+
+def _limits(series: Sequence[SeriesLike], block: int, band: tuple[float, float] | None) -> tuple[float, float]:
+    """Return the range of a row's axis (mm), the same for all series."""
+    ends = np.concatenate([one.x_mm[:, block] for one in series] + ([] if band is None else [np.array(band)]))
+    low, high = float(ends.min()), float(ends.max())
+    margin = 0.1 * (high - low) + 0.5 * max(LEAST_SPAN_MM - (high - low), 0.0)
+    return low - margin, high + margin
+
+
+def _draw_points(axes: "Axes", one: SeriesLike, block: int, axis: ValueAxis, *, joined: bool) -> None:
+    if axis.is_log:
+        axes.set_xscale("log")
+    axes.plot(
+        axis.shown(one.values),
+        one.x_mm[:, block],
+        color=style.block_colour(block),
+        linestyle="-" if joined else "",
+        linewidth=1.0,
+        marker="o",
+        markersize=4.0,
+        markeredgecolor=style.INK,
+        markeredgewidth=0.4,
+        zorder=3,
+    )
+
+
+def _draw_band(axes: "Axes", band: tuple[float, float] | None) -> None:
+    """Draw the measured range, a line where all repeats are equal."""
+    if band is not None:
+        axes.axhspan(*band, color=style.MEASURED_COLOUR, alpha=0.15, linewidth=0, zorder=0)
+        for end in set(band):
+            axes.axhline(end, color=style.MEASURED_COLOUR, linewidth=style.LINE_WIDTH, zorder=1)
+
+
+def _finish(axes: "Axes", axis: ValueAxis, *, is_first: bool, is_last: bool) -> None:
+    from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter  # noqa: PLC0415 - see style
+
+    axes.spines[["right", "top"]].set_visible(False)
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
+    for side in (axes.xaxis, axes.yaxis):
+        side.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}"))
+        side.set_minor_formatter(NullFormatter())
+    if not axis.is_log:
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]))
+    axes.tick_params(axis="x", labelbottom=is_last)
+    axes.tick_params(axis="y", labelleft=is_first)
+    if is_first:
+        axes.set_ylabel("final x (mm)")
+    if is_last:
+        axes.set_xlabel(axis.label, labelpad=2.0)
+
+
+def _caption(name: str, x: Floats) -> str:
+    return f"block {name}: {x.min():.2f} to {x.max():.2f} mm, {np.ptp(x):.2f} mm apart"
+
+
+def _legend(rows: int, blocks: int, more_series: int, *, is_measured: bool) -> str:
+    texts = ["One point: one run."]
+    if is_measured:
+        texts.append("Band: smallest to largest of the measured repeats.")
+    if rows < blocks:
+        texts.append(f"Not shown: {blocks - rows} of {blocks} blocks, whose final x varies least.")
+    if more_series:
+        texts.append(f"{more_series} more series.")
+    return " ".join(texts)

@@ -1,0 +1,203 @@
+"""Studies of convergence: what is refined, what is observed, and what is recommended."""
+
+from math import isnan, radians
+from pathlib import Path
+
+import pytest
+
+from blocksim.errors import InvalidInputError, StoppedEarlyError
+from blocksim.scenario import Document, Scenario
+from blocksim.study import pool
+from blocksim.study.converge import converge
+from blocksim.study.convergence import Coordinates, Study, Verdict, judge
+from blocksim.study.pool import Row
+from blocksim.study.refinement import Refinement, refinements_of, with_setting
+from tests.study.conftest import SCENARIOS
+
+HALVED = Refinement("step", "time step", "time.safety", 0.05, 0.5, 1)
+
+
+@pytest.fixture(scope="module")
+def slide() -> Scenario:
+    """Give the sliding block, a hundred times softer than aluminium."""
+    return Document.read(SCENARIOS / "slide.toml").with_values({"contact.stiffness_scale": 0.01}).build()
+
+
+@pytest.fixture(scope="module")
+def coordinates(slide: Scenario) -> Coordinates:
+    return Coordinates(slide)
+
+
+def finished(x_mm: float, rotation_deg: float = 0.0, seconds: float = 1.0) -> Row:
+    return {
+        "status": "finished",
+        "reason": "at rest",
+        "seconds": seconds,
+        "block.x_mm": x_mm,
+        "block.rotation_deg": rotation_deg,
+    }
+
+
+def judged(coordinates: Coordinates, places: list[float], tolerance_mm: float = 0.1) -> Study:
+    """Judge made-up final places, the first of the next coarser level, the second of the scenario's own."""
+    rows = {level: finished(x, seconds=2.0**level) for level, x in enumerate(places, start=-1)}
+    return judge(rows, HALVED, coordinates, tolerance_mm)
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.0])
+def test_order_of_an_exact_power_law_is_observed(coordinates: Coordinates, order: float) -> None:
+    study = judged(coordinates, [70.0 + 3.0 * (0.5**level) ** order for level in range(5)])
+    assert [isnan(level.order) for level in study.levels] == [True, True, False, False, False]
+    assert [level.order for level in study.levels[2:]] == pytest.approx([order] * 3)
+
+
+@pytest.mark.parametrize(
+    "places",
+    [
+        [70.0, 70.2, 70.1],  # turns back
+        [70.0, 70.1, 70.3],  # grows
+        [70.0, 70.0, 70.0],  # stays
+        [70.0, 70.0 + 3e-7, 70.0 + 4e-7],  # round-off
+    ],
+)
+def test_no_order_is_made_up(coordinates: Coordinates, places: list[float]) -> None:
+    assert isnan(judged(coordinates, places).levels[-1].order)
+
+
+@pytest.mark.parametrize(
+    ("places", "verdict"),
+    [
+        ([70.0, 70.05, 70.06, 70.09], Verdict.CONVERGED),
+        ([70.0, 75.0, 75.05, 75.0], Verdict.CONVERGED),
+        ([70.0, 74.0, 76.0, 77.0], Verdict.NOT_YET),
+        ([70.0, 74.0, 71.0, 73.9], Verdict.SCATTERED),
+        ([70.0, 70.01, 70.02, 70.2], Verdict.SCATTERED),
+    ],
+)
+def test_verdict_looks_at_two_refinements_in_a_row(
+    coordinates: Coordinates, places: list[float], verdict: Verdict
+) -> None:
+    assert judged(coordinates, places).verdict is verdict
+
+
+def test_only_what_has_converged_is_recommended(coordinates: Coordinates) -> None:
+    assert judged(coordinates, [70.0, 74.0, 71.0, 73.9]).recommended is None
+    assert judged(coordinates, [70.0, 74.0, 76.0, 77.0]).recommended is None
+
+
+def test_the_coarsest_level_with_nothing_worse_above_it_is_recommended(coordinates: Coordinates) -> None:
+    by_luck = judged(coordinates, [70.0, 70.5, 70.03, 70.0, 70.0])
+    assert by_luck.recommended is by_luck.levels[2]
+    own = judged(coordinates, [70.2, 70.05, 70.02, 70.0])
+    assert own.recommended is own.own
+    assert own.own.value == 0.05
+
+
+def test_a_turn_counts_as_far_as_it_moves_a_corner(coordinates: Coordinates) -> None:
+    study = judge({0: finished(10.0), 1: finished(10.0, 1.0)}, HALVED, coordinates, 0.1)
+    half_diagonal = 0.5 * (32.0**2 + 25.0**2) ** 0.5
+    assert study.levels[1].change_mm == pytest.approx(radians(1.0) * half_diagonal)
+
+
+def test_a_failed_level_is_neither_near_nor_far(coordinates: Coordinates) -> None:
+    failed: Row = {"status": "failed", "reason": "an overlap exceeds contact.max_overlap", "seconds": 0.1}
+    study = judge({0: finished(10.0), 1: finished(10.0), 2: failed}, HALVED, coordinates, 0.1)
+    assert study.verdict is Verdict.FAILED
+    assert isnan(study.levels[2].change_mm)
+    assert study.levels[0].to_finest_mm == 0.0
+    coarse = judge({-1: failed, 0: finished(10.0), 1: finished(10.0), 2: finished(10.0)}, HALVED, coordinates, 0.1)
+    assert coarse.verdict is Verdict.CONVERGED
+    assert coarse.recommended is coarse.own
+
+
+def test_own_value_is_refined_and_coarsened_as_far_as_is_safe(slide: Scenario) -> None:
+    step, stiffness = refinements_of(slide)
+    assert [step.value(n) for n in range(-step.coarser, 3)] == [0.1, 0.05, 0.025, 0.0125]
+    levels = [stiffness.value(n) for n in range(-stiffness.coarser, 3)]
+    assert levels == pytest.approx([1e-3, 3.16228e-3, 1e-2, 3.16228e-2, 1e-1])
+    finer = refinements_of(with_setting(slide, "time.safety", 0.02))[0]
+    assert [finer.value(n) for n in (-2, -1, 0)] == [0.08, 0.04, 0.02]
+    assert finer.coarser == 2
+
+
+def test_step_given_by_hand_is_refined_itself(slide: Scenario) -> None:
+    step = refinements_of(with_setting(slide, "time.step", 1e-7))[0]
+    assert (step.key, step.value(1), step.coarser) == ("time.step", 5e-8, 2)
+    assert refinements_of(with_setting(slide, "time.step", 5e-6))[0].coarser == 0
+
+
+def test_spacing_is_refined_where_there_are_particles(slide: Scenario) -> None:
+    contact = slide.contact.model_copy(update={"model": "particles"})
+    *_, spacing = refinements_of(slide.model_copy(update={"contact": contact}))
+    assert (spacing.key, spacing.value(0), spacing.value(1)) == ("contact.particle_spacing", 1e-3, 5e-4)
+    with pytest.raises(InvalidInputError, match=r'no effect on contact\.model = "surface"'):
+        refinements_of(slide, ["spacing"])
+    with pytest.raises(InvalidInputError, match="'speed' is no study of convergence; there are step, stiffness"):
+        refinements_of(slide, ["speed"])
+
+
+def test_slide_converges_with_the_order_of_its_static_deflections(slide: Scenario, tmp_path: Path) -> None:
+    # what a sliding block owes to its springs are lengths such as m g / K: first order in the stiffness
+    result = converge(slide, studies=["stiffness"], out=tmp_path)
+    (study,) = result.studies
+    assert study.verdict is Verdict.CONVERGED
+    assert [level.order for level in study.levels[2:]] == pytest.approx([1.0] * 3, abs=0.05)
+    assert result.recommended is not None
+    assert result.recommended.settings == {"contact.stiffness_scale": 0.001}
+    assert result.recommended.to_finest_mm < 1e-3
+    assert study.own.x_mm[0] == pytest.approx(33.532, abs=1e-3)
+
+
+def test_all_recommended_values_are_tried_together(slide: Scenario, tmp_path: Path) -> None:
+    labels: list[str] = []
+    result = converge(slide, out=tmp_path, on_run=lambda label, _: labels.append(label))
+    assert result.converged
+    assert result.recommended is not None
+    assert result.recommended.settings == {"time.safety": 0.1, "contact.stiffness_scale": 0.001}
+    assert labels[-1] == "recommended settings together"
+    assert len(labels) == len(list(tmp_path.iterdir())) == 4 + 5 - 1 + 1  # the scenario's own run is shared
+    assert any("particle spacing has no effect" in text for text in result.notes)
+
+
+def test_more_levels_run_only_what_is_missing(slide: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = converge(slide, studies=["step"], out=tmp_path)
+    monkeypatch.setattr(pool, "run", None)
+    assert converge(slide, studies=["step"], out=tmp_path, levels=9) == before
+
+
+def test_refining_goes_on_until_the_tolerance_is_met(slide: Scenario, tmp_path: Path) -> None:
+    few = converge(slide, studies=["stiffness"], out=tmp_path, tolerance_mm=1e-6, levels=2).studies[0]
+    more = converge(slide, studies=["stiffness"], out=tmp_path, tolerance_mm=1e-6, levels=6).studies[0]
+    assert few.verdict is Verdict.NOT_YET
+    assert more.verdict is Verdict.CONVERGED
+    assert len(few.levels) < len(more.levels) < 2 + 1 + 6
+    assert more.last_change_mm < 1e-6
+
+
+def test_scenario_that_fails_as_it_is_says_so(slide: Scenario, tmp_path: Path) -> None:
+    failing = slide.model_copy(update={"contact": slide.contact.model_copy(update={"max_overlap": 1e-9})})
+    result = converge(failing, studies=["step"], out=tmp_path)
+    assert result.failed
+    assert result.recommended is None
+    assert result.studies[0].verdict is Verdict.FAILED
+
+
+def test_run_cut_by_the_end_of_time_is_noted(slide: Scenario, tmp_path: Path) -> None:
+    short = slide.model_copy(update={"time": slide.time.model_copy(update={"end": 0.01})})
+    result = converge(short, studies=["step"], out=tmp_path)
+    assert any("depend on time.end" in text for text in result.notes)
+
+
+def test_interrupt_stops_the_study(slide: Scenario, tmp_path: Path) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(StoppedEarlyError, match="stopped after 1 runs; the same command does the others"):
+        converge(slide, out=tmp_path, on_run=interrupt)
+
+
+@pytest.mark.parametrize("wrong", [{"tolerance_mm": 0.0}, {"tolerance_mm": float("nan")}, {"levels": 1}])
+def test_useless_limits_are_refused(slide: Scenario, tmp_path: Path, wrong: dict[str, float]) -> None:
+    with pytest.raises(InvalidInputError, match="levels 2 or more"):
+        converge(slide, out=tmp_path, **wrong)  # type: ignore[arg-type]
+    assert list(tmp_path.iterdir()) == []

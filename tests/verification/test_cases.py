@@ -1,0 +1,113 @@
+"""Every case, under both laws; `blocksim verify` runs the same functions. And: what the README says is still so."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from blocksim.verification.case import Case, Row, Setting, Verdict, at_least
+from blocksim.verification.cases import CASES, chosen
+from blocksim.verification.reference import BEGIN, END, STORE, read_store, stored_rows, table, with_table
+from blocksim.verification.verify import Outcome, run_case
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+ROOT = Path(__file__).parents[2]
+LAWS = {"linear": "linear", "Hertz–Mindlin": "hertz-mindlin"}  # head of the column in the README: law
+SHARE = 0.2  # of its tolerance by which a measured number may differ from the kept one
+ORDER_SHARE = 0.1  # of its bound, for a number with a lower bound only
+
+
+@functools.cache
+def outcome(case_id: str, law: str, *, quick: bool) -> Outcome:
+    (case,) = chosen([case_id])
+    return run_case(case, Setting(law=law, quick=quick))
+
+
+def missed(outcome: Outcome) -> list[Row]:
+    return [row for row in outcome.rows if row.verdict != Verdict.INSIDE]
+
+
+@pytest.mark.parametrize("law", LAWS.values())
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.id)
+def test_case_is_inside_its_tolerances(case: Case, law: str) -> None:
+    found = outcome(case.id, law, quick=True)
+    assert found.rows
+    assert missed(found) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("law", LAWS.values())
+@pytest.mark.parametrize("case", [case for case in CASES if case.quick], ids=lambda case: case.id)
+def test_case_in_full_is_inside_its_tolerances(case: Case, law: str) -> None:
+    assert missed(outcome(case.id, law, quick=False)) == []
+
+
+def test_table_of_the_readme_is_that_of_the_kept_results() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert BEGIN in readme
+    assert END in readme
+    assert with_table(readme, read_store(ROOT / STORE)) == readme, "run: make verify-table"
+
+
+def test_kept_results_have_all_cases_in_every_column() -> None:
+    for column in read_store(ROOT / STORE).values():
+        assert list(column) == [case.id for case in CASES]
+        assert all(column.values())
+
+
+def same_kind(kept: Row, now: Row) -> bool:
+    """Tell whether two rows expect the same number to the same tolerance."""
+    told = (kept.quantity, kept.unit, kept.relative, kept.at_least)
+    numbers = pytest.approx([now.expected, now.tolerance], rel=1e-6)
+    return told == (now.quantity, now.unit, now.relative, now.at_least) and [kept.expected, kept.tolerance] == numbers
+
+
+def allowed(row: Row) -> float:
+    """Return by how much the kept number may differ from the one measured now."""
+    if row.at_least:
+        return ORDER_SHARE * row.expected
+    return SHARE * row.tolerance * (abs(row.expected) if row.relative else 1.0)
+
+
+@pytest.mark.parametrize("head", LAWS)
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.id)
+def test_kept_results_are_what_is_measured_now(case: Case, head: str) -> None:
+    """The quick size may leave rows out; numbers are compared where the sizes are the same."""
+    kept = {row.quantity: row for row in stored_rows(read_store(ROOT / STORE), head, case)}
+    rows = outcome(case.id, LAWS[head], quick=True).rows
+    assert case.quick or list(kept) == [row.quantity for row in rows], "run: make verify-table"
+    for row in rows:
+        assert same_kind(kept[row.quantity], row), "run: make verify-table"
+        if not case.quick:
+            assert kept[row.quantity].measured == pytest.approx(row.measured, rel=1e-9, abs=allowed(row))
+
+
+def rows_outside() -> Iterator[Row]:
+    yield Row("number", "m", 1.0, 1.02, 0.01)
+    yield Row("share", "m", 100.0, 98.0, 0.01, relative=True)
+    yield Row("not a number", "m", 1.0, float("nan"), 10.0)
+    yield at_least("order", "", 1.8, 1.79)
+
+
+@pytest.mark.parametrize("row", rows_outside(), ids=lambda row: row.quantity)
+def test_a_number_beyond_its_tolerance_is_outside(row: Row) -> None:
+    assert row.verdict == Verdict.OUTSIDE
+
+
+def test_a_number_within_its_tolerance_is_inside() -> None:
+    assert Row("number", "m", 1.0, 0.991, 0.01).verdict == Verdict.INSIDE
+    assert Row("share", "m", -100.0, -100.9, 0.01, relative=True).verdict == Verdict.INSIDE
+    assert at_least("order", "", 1.8, 2.5).verdict == Verdict.INSIDE
+
+
+def test_table_shows_a_miss_and_its_reason() -> None:
+    stored = read_store(ROOT / STORE)
+    changed = {head: dict(column) for head, column in stored.items()}
+    changed["linear"]["V2"] = [{**changed["linear"]["V2"][0], "measured": None}]
+    line = next(line for line in table(changed).splitlines() if line.startswith("| V2 "))
+    assert "– ✗" in line
