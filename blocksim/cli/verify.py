@@ -89,7 +89,7 @@ def _heading(outcome: Outcome) -> str:
 
 def _cells(row: Row) -> tuple[str, ...]:
     return (
-        f"  {row.quantity} {row.unit}".rstrip(),
+        f"  {row.quantity}, {row.unit}" if row.unit else f"  {row.quantity}",
         expected_text(row),
         number(row.measured),
         error_text(row),

@@ -71,7 +71,7 @@ PARTICLE = record_type(
     "nx ny "  # -: outward normal in the body frame
     "mx my "  # -: that of the other face at a corner, elsewhere the same
     "length "  # m: tributary length
-    "share_x share_y"  # -: tributary length over face length, for faces whose normal is along x and along y
+    "share"  # -: tributary length over face length, summed over both faces at a corner that is one particle
 )
 PAIR = record_type("", "a b near active")  # bodies, sorted; number of candidate slots; of slots in contact
 SLOT = record_type(

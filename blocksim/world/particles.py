@@ -49,10 +49,9 @@ def kernel_rows(body: Record, inset: float) -> Records:
         row.nx, row.ny = row.mx, row.my = normal
         row[0].mx, row[0].my = NORMALS[start - 1]
         row[-1].mx, row[-1].my = NORMALS[(start + 1) % 4]
-        row["share_x"] = 1.0 / count
-        row["share_x"][[0, -1]] = 0.5 / count
-        row["share_y"] = row["share_x"]
-        row["length"] = row["share_x"] * 2.0 * (body.half_x if normal[0] == 0.0 else body.half_y)
+        row["share"] = 1.0 / count
+        row["share"][[0, -1]] = 0.5 / count
+        row["length"] = row["share"] * 2.0 * (body.half_x if normal[0] == 0.0 else body.half_y)
         parts.append(row)
     return np.concatenate(parts).view(np.recarray)
 
@@ -69,10 +68,9 @@ def disc_rows(body: Record, inset: float) -> Records:
         row = zeros(count, PARTICLE)
         _line(row, body, inset, start, np.arange(count) / count)
         row.nx, row.ny = row.mx, row.my = normal
-        row["share_x"] = row["share_y"] = 1.0 / count
+        row["share"] = 1.0 / count
+        row["share"][0] = 0.5 / count + 0.5 / counts[k - 1]
         row["length"] = sides[k] / count
-        along_x, along_y = (k, k - 1) if k % 2 == 0 else (k - 1, k)
-        row["share_y"][0], row["share_x"][0] = 0.5 / counts[along_x], 0.5 / counts[along_y]
         row["length"][0] = 0.5 * (sides[k] / count + sides[k - 1] / counts[k - 1])
         parts.append(row)
     return np.concatenate(parts).view(np.recarray)
@@ -85,7 +83,7 @@ def free_ends(body: Record, model: str) -> Records:
     for particle, k in zip(row, ends, strict=True):
         particle.x, particle.y = CORNERS[k][0] * body.half_x, body.half_y
         particle.ny = particle.my = 1.0
-        particle.share_x = particle.share_y = 0.5
+        particle.share = 0.5
     return row
 
 

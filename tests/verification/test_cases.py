@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -12,9 +11,6 @@ from blocksim.verification.case import Case, Row, Setting, Verdict, at_least
 from blocksim.verification.cases import CASES, chosen
 from blocksim.verification.reference import BEGIN, END, STORE, read_store, stored_rows, table, with_table
 from blocksim.verification.verify import Outcome, run_case
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 ROOT = Path(__file__).parents[2]
 LAWS = {"linear": "linear", "Hertz–Mindlin": "hertz-mindlin"}  # head of the column in the README: law
@@ -87,14 +83,15 @@ def test_kept_results_are_what_is_measured_now(case: Case, head: str) -> None:
             assert kept[row.quantity].measured == pytest.approx(row.measured, rel=1e-9, abs=allowed(row))
 
 
-def rows_outside() -> Iterator[Row]:
-    yield Row("number", "m", 1.0, 1.02, 0.01)
-    yield Row("share", "m", 100.0, 98.0, 0.01, relative=True)
-    yield Row("not a number", "m", 1.0, float("nan"), 10.0)
-    yield at_least("order", "", 1.8, 1.79)
+ROWS_OUTSIDE = (
+    Row("number", "m", 1.0, 1.02, 0.01),
+    Row("share", "m", 100.0, 98.0, 0.01, relative=True),
+    Row("not a number", "m", 1.0, float("nan"), 10.0),
+    at_least("order", "", 1.8, 1.79),
+)
 
 
-@pytest.mark.parametrize("row", rows_outside(), ids=lambda row: row.quantity)
+@pytest.mark.parametrize("row", ROWS_OUTSIDE, ids=lambda row: row.quantity)
 def test_a_number_beyond_its_tolerance_is_outside(row: Row) -> None:
     assert row.verdict == Verdict.OUTSIDE
 

@@ -71,12 +71,3 @@ def is_particle_near(owner: Record, particle: Record, touched: Record, reach: fl
 def particle_height(body: Record, particle: Record) -> float:
     """Return the height (m) of a particle over y = 0."""
     return body.y + body.sin * particle.x + body.cos * particle.y
-
-
-@rare_kernel
-def share_along(particle: Record, nx: float, ny: float) -> float:
-    """Return tributary over face length of a particle for a normal (nx, ny) in its own body's frame.
-
-    Only corners differ in the two directions; the shares of a face sum to one.
-    """
-    return particle.share_x * nx * nx + particle.share_y * ny * ny

@@ -14,7 +14,7 @@ A contact has the stiffness of a face, two corner contacts, times the mean of th
 
 import math
 
-from blocksim.kernels.arrays import ALL, Integers, Record, World
+from blocksim.kernels.arrays import ALL, Integers, World
 from blocksim.kernels.geometry import to_world
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.models.boundary import (
@@ -26,17 +26,10 @@ from blocksim.kernels.models.boundary import (
     row_direction,
     row_intervals,
     seen_from_row,
-    share_along,
 )
 
 FACE = 2.0  # stiffness of a face contact over that of a corner contact
 PER_PARTICLE = 4  # slots of a particle; it touches neighbours in a row, which differ modulo four
-
-
-@rare_kernel
-def share_in_world(body: Record, particle: Record, nx: float, ny: float) -> float:
-    """Return tributary over face length of a particle for a normal in world axes."""
-    return share_along(particle, body.cos * nx + body.sin * ny, body.cos * ny - body.sin * nx)
 
 
 @rare_kernel
@@ -76,7 +69,7 @@ def touch_ground(world: World, p: int, k: int, count: int) -> int:
             point = world.points[count]
             point.x = x - 0.5 * offset
             point.y = y - 0.5 * height
-            point.share = FACE * share_in_world(a, particle, point.nx, point.ny)
+            point.share = FACE * particle.share
             count += 1
     return count
 
@@ -108,9 +101,7 @@ def touch_row(world: World, p: int, k: int, row: int, first: int, count: int) ->
             point = world.points[count]
             point.x = x - 0.5 * (b.cos * ox - b.sin * oy)
             point.y = y - 0.5 * (b.sin * ox + b.cos * oy)
-            one = share_in_world(a, particle, point.nx, point.ny)
-            other = share_in_world(b, world.particles[b.first_particle + first + j], point.nx, point.ny)
-            point.share = 0.5 * FACE * (one + other)
+            point.share = 0.5 * FACE * (particle.share + world.particles[b.first_particle + first + j].share)
             count += 1
     return count
 
@@ -147,7 +138,7 @@ def touch_slab(world: World, p: int, k: int, count: int) -> int:
         point = world.points[count]
         point.x = x + slab.sin * above
         point.y = y - slab.cos * above
-        point.share = FACE * share_in_world(a, particle, point.nx, point.ny)
+        point.share = FACE * particle.share
         count += 1
     return count
 

@@ -36,7 +36,6 @@ from blocksim.kernels.models.boundary import (
     row_direction,
     row_intervals,
     seen_from_row,
-    share_along,
 )
 from blocksim.kernels.sph.functions import kernel_value
 
@@ -156,7 +155,7 @@ def resolve_particle(owner: Record, particle: Record, touched: Record, world: Wo
     point.ny = touched.sin * mx + touched.cos * my
     point.depth = depth
     facing = -(nx * mx + ny * my)
-    point.share = FACE * facing * share_along(particle, particle.nx, particle.ny)
+    point.share = FACE * facing * particle.share
     return depth > 0.0 and facing > LEAST_FACING
 
 
@@ -180,7 +179,7 @@ def ground_points(world: World, p: int) -> int:
             point.nx = 0.0
             point.ny = 1.0
             point.depth = level - y
-            point.share = FACE * facing * share_along(particle, particle.nx, particle.ny)
+            point.share = FACE * facing * particle.share
             count += 1
     return count
 
