@@ -13,7 +13,7 @@ from blocksim.kernels.damping import add_dashpots
 from blocksim.kernels.friction import coulomb_limit
 from blocksim.kernels.history import change_contacts, keep_places
 from blocksim.kernels.jit import kernel, rare_kernel
-from blocksim.kernels.kinematics import DELASSUS, inverse_masses, resolve_point
+from blocksim.kernels.kinematics import DELASSUS, inverse_masses, resolve_point, weigh_onset
 from blocksim.kernels.laws import elastic_force, has_constant_stiffness, tangent_stiffness
 from blocksim.kernels.models import SURFACE
 
@@ -168,6 +168,8 @@ def normal_pass(world: World, p: int, count: int, a: Record, b: Record, values: 
         slot = world.slots[p, point.slot]
         resolve_point(point, a, b, step)
         push_spring(point, slot, law, values.normal_stiffness)
+        if not has_constant_stiffness(law):
+            weigh_onset(point, law)
         continuing += 1 if slot.face == point.face else 0
         loses_face = loses_face or point.beside < IMPACT_STEPS * abs(point.closing)
     if continuing != count or count != world.pairs[p].active:

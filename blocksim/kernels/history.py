@@ -93,7 +93,7 @@ def change_contacts(world: World, p: int, count: int, step: float) -> None:
         if slot.face == NO_FACE:
             slot.face = point.face
             point.before = 0.0
-            weigh_first_step(point)
+            weigh_first_step(point, world.controls[0].law)
     world.operators[p, NORMAL].left = 0
     world.operators[p, SHEAR].left = 0
     world.pairs[p].active = count

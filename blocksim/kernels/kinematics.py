@@ -2,8 +2,10 @@
 
 from blocksim.kernels.arrays import NORMAL, Floats, Record, Records
 from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.laws import dashpot_weight
 
 DELASSUS = 0  # index into the work matrices
+ONSET_STEPS = 16.0  # after which the mean over a step and the value in its middle differ by less than 1/30000
 
 
 @kernel
@@ -37,18 +39,29 @@ def resolve_point(point: Record, a: Record, b: Record, step: float) -> None:
 
 
 @rare_kernel
-def weigh_first_step(point: Record) -> None:
+def weigh_first_step(point: Record, law: int) -> None:
     """Set the dashpot weight and the drawn share of the shear spring of a point that was not in contact before.
 
-    The kick at time t covers [t - dt/2, t + dt/2]. A contact with overlap d = theta v dt began at t - theta dt, so the
-    share of the kick spent in contact is 1/2 + theta (more than one where the kick before missed its beginning), and
-    the last drift drew the shear spring for theta dt only. A contact that comes deeper than it closed was there before
-    under another corner: it keeps the full weight.
+    The kick at time t covers [t - dt/2, t + dt/2]. A contact with overlap d = s v dt began at t - s dt, so a dashpot of
+    constant coefficient acts for 1/2 + s steps (more than one where the kick before missed its beginning), and the last
+    drift drew the shear spring for s dt only. A contact that comes deeper than it closed was there before under another
+    corner: it keeps the full weight.
     """
     if point.closing >= point.depth:
         share = point.depth / point.closing
-        point.weight = 0.5 + share
+        point.weight = dashpot_weight(law, 0.0, share + 0.5, share)
         point.drawn = share
+
+
+@rare_kernel
+def weigh_onset(point: Record, law: int) -> None:
+    """Set the dashpot weight of a point whose contact began some steps ago, where the coefficient still rises fast.
+
+    Hertz: it goes with the fourth root of time, and one value for each step would leave an error of order dt^(5/4).
+    """
+    if 0.0 < point.depth < ONSET_STEPS * point.closing:
+        at = point.depth / point.closing
+        point.weight = dashpot_weight(law, max(at - 0.5, 0.0), at + 0.5, at)
 
 
 @rare_kernel

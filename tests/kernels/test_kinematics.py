@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from blocksim.kernels.arrays import NORMAL, POINT, SHEAR, SLOTS, zeros
 from blocksim.kernels.kinematics import inverse_masses, resolve_point, weigh_first_step
+from blocksim.kernels.laws import LINEAR
 
 if TYPE_CHECKING:
     from blocksim.kernels.arrays import Record, Records
@@ -76,7 +77,7 @@ def test_first_step_weighs_the_dashpot_by_the_time_in_contact(depth: float, weig
     point = zeros(1, POINT)[0]
     point.weight = point.drawn = 1.0
     point.closing, point.depth = 1e-6, depth
-    weigh_first_step(point)
+    weigh_first_step(point, LINEAR)
     assert point.weight == pytest.approx(weight)
     assert point.drawn == pytest.approx(depth / 1e-6)
 
@@ -85,5 +86,5 @@ def test_point_deeper_than_it_closed_keeps_its_full_weight() -> None:
     point = zeros(1, POINT)[0]
     point.weight = point.drawn = 1.0
     point.closing, point.depth = 1e-6, 1.1e-6
-    weigh_first_step(point)
+    weigh_first_step(point, LINEAR)
     assert (point.weight, point.drawn) == (1.0, 1.0)

@@ -1,8 +1,8 @@
 """Contact laws and the one place that knows them all.
 
-A law is one file with `elastic_force(stiffness, depth)`, `tangent_stiffness(stiffness, depth)` and
-`stored_energy(stiffness, depth)`, one code here and one branch in each dispatcher below. Dispatch on an integer code
-keeps numba's disk cache valid, which jitted functions passed as arguments do not.
+A law is one file with `elastic_force(stiffness, depth)`, `tangent_stiffness(stiffness, depth)`,
+`stored_energy(stiffness, depth)` and `dashpot_weight(begin, end, at)`, one code here and one branch in each dispatcher
+below. Dispatch on an integer code keeps numba's disk cache valid, which jitted functions passed as arguments do not.
 """
 
 from blocksim.kernels.jit import kernel
@@ -34,6 +34,14 @@ def stored_energy(law: int, stiffness: float, depth: float) -> float:
     if law == HERTZ_MINDLIN:
         return hertz_mindlin.stored_energy(stiffness, depth)
     return linear.stored_energy(stiffness, depth)
+
+
+@kernel
+def dashpot_weight(law: int, begin: float, end: float, at: float) -> float:
+    """Return the integral of a dashpot's coefficient from `begin` to `end` over its value `at` (all in steps)."""
+    if law == HERTZ_MINDLIN:
+        return hertz_mindlin.dashpot_weight(begin, end, at)
+    return linear.dashpot_weight(begin, end, at)
 
 
 @kernel

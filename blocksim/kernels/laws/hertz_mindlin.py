@@ -25,6 +25,22 @@ def tangent_stiffness(stiffness: float, depth: float) -> float:
 
 
 @kernel
+def dashpot_weight(begin: float, end: float, at: float) -> float:
+    """Return the mean of the dashpot coefficient over [begin, end] over its value `at` a moment, times the length.
+
+    Times in steps since the contact began. The coefficient goes with the root of the slope of the force, d^(1/4), and
+    while a contact closes d grows in proportion to time: (end^(5/4) - begin^(5/4))/(5/4 at^(1/4)).
+    """
+    return 0.8 * (fourth_root(end) * end - fourth_root(begin) * begin) / fourth_root(at)
+
+
+@kernel
+def fourth_root(x: float) -> float:
+    """Return x^(1/4) for x >= 0."""
+    return math.sqrt(math.sqrt(x))
+
+
+@kernel
 def stored_energy(stiffness: float, depth: float) -> float:
     """Return 2/5 K d^(5/2) (J)."""
     return 0.4 * stiffness * depth * depth * math.sqrt(depth)

@@ -16,6 +16,15 @@ def tangent_stiffness(stiffness: float, depth: float) -> float:
 
 
 @kernel
+def dashpot_weight(begin: float, end: float, at: float) -> float:
+    """Return the mean of the dashpot coefficient over [begin, end] over its value `at` a moment, times the length.
+
+    Times in steps since the contact began. The coefficient is constant.
+    """
+    return end - begin
+
+
+@kernel
 def stored_energy(stiffness: float, depth: float) -> float:
     """Return K d^2 / 2 (J)."""
     return 0.5 * stiffness * depth * depth
