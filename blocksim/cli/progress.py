@@ -28,13 +28,13 @@ def watching(*, quiet: bool) -> Iterator[Callable[[Where], None]]:
         yield _plain_lines()
 
 
-def tell_compilation(*, quiet: bool) -> None:
-    """Compile the kernels where that is still to be done, and say so: it is not part of the simulation."""
-    if quiet or is_compiled():
-        compile_kernels()
+def tell_compilation(model: str, *, quiet: bool) -> None:
+    """Compile the kernels for a contact model where that is still to be done, and say so: it is no part of a run."""
+    if quiet or is_compiled(model):
+        compile_kernels(model)
         return
     note("Compiling the solver, once after installation (about half a minute) ...")
-    note(f"Compiled in {compile_kernels():.0f} s.")
+    note(f"Compiled in {compile_kernels(model):.0f} s.")
 
 
 @contextmanager

@@ -33,7 +33,7 @@ def run_command(
         known = not overwrite and holds_run(folder, ready)
         if not known:
             check_experiment(ready)
-            tell_compilation(quiet=silent)
+            tell_compilation(ready.contact.model, quiet=silent)
         with watching(quiet=silent or known) as on_progress:
             result = run(ready, out=folder, overwrite=overwrite, on_progress=on_progress)
     if known and not silent:

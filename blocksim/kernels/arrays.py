@@ -135,7 +135,7 @@ class World(NamedTuple):
     spare_slots: Records  # (p, s) SLOT
     spare_candidates: Integers  # (p, s)
     interactions: Records  # (c, c) INTERACTION
-    particles: Records  # (q,) PARTICLE, body after body; none for the surface model
+    particles: Any  # (q,) PARTICLE, body after body; None, a type of its own, for the surface model
     points: Records  # (s + 1,) POINT, work space of one pair; the last one for contacts that end
     matrices: Floats  # (8, 3, 3) work space of one pair
     motion: Records  # (m,) MOTION_PIECE, displacement of the support over time

@@ -79,6 +79,20 @@ def is_compiled() -> bool:
     return bool(config.DISABLE_JIT) or (folder is not None and any(folder.rglob("advance.advance-*.nbc")))
 
 
+def is_marked(name: str) -> bool:
+    """Tell whether `mark` has been called with this name for this exact source."""
+    folder = cache_folder()
+    return bool(config.DISABLE_JIT) or (folder is not None and (folder / name).is_file())
+
+
+def mark(name: str) -> None:
+    """Note beside the compiled kernels that something is among them; where nothing can be kept, do nothing."""
+    folder = cache_folder()
+    if folder is not None and not config.DISABLE_JIT:
+        with contextlib.suppress(OSError):
+            (folder / name).touch()
+
+
 def _compiled(function: Function, **options: object) -> Function:
     folder = cache_folder()
     before = config.CACHE_DIR

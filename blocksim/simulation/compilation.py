@@ -3,13 +3,14 @@
 import functools
 import time
 
+from blocksim.kernels import jit
 from blocksim.kernels.advance import advance
-from blocksim.kernels.jit import is_compiled
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation.ledger import energy_row
 from blocksim.world.build import build_world
 
-__all__ = ["compile_kernels", "is_compiled"]
+SURFACE = "surface"  # all other models have boundary particles, and machine code of their own that serves them all
+PARTICLES_MARK = "with-particles"
 
 SMALLEST_SCENE = {
     "schema": 1,
@@ -20,11 +21,26 @@ SMALLEST_SCENE = {
 }
 
 
+def compile_kernels(model: str = SURFACE) -> float:
+    """Compile the kernels for a contact model, or load them from the cache on disk; return the seconds it took.
+
+    Works once a process.
+    """
+    return _compiled(has_particles=model != SURFACE)
+
+
+def is_compiled(model: str = SURFACE) -> bool:
+    """Tell whether the kernels for a contact model lie in the cache (or nothing has to be compiled)."""
+    return jit.is_compiled() and (model == SURFACE or jit.is_marked(PARTICLES_MARK))
+
+
 @functools.cache
-def compile_kernels() -> float:
-    """Compile all kernels, or load them from the cache on disk; return the seconds it took. Works once a process."""
+def _compiled(*, has_particles: bool) -> float:
     began = time.perf_counter()
-    world = build_world(scenario_from_mapping(SMALLEST_SCENE))
+    contact = {"model": "kernel", "particle_spacing": 0.1} if has_particles else {}
+    world = build_world(scenario_from_mapping({**SMALLEST_SCENE, "contact": contact}))
     advance(world, 0)
     energy_row(world)
+    if has_particles:
+        jit.mark(PARTICLES_MARK)
     return time.perf_counter() - began

@@ -31,7 +31,7 @@ def _ignore(_: Progress) -> None:
 
 def simulate(scenario: Scenario, *, on_progress: Watcher = _ignore) -> Result:
     """Run a scenario in memory, without writing anything. Ctrl-C ends it with the status `interrupted`."""
-    compile_kernels()
+    compile_kernels(scenario.contact.model)
     began = time.perf_counter()
     world = build_world(scenario)
     recorder = Recorder(place_bodies(scenario), scenario.output.every, float(world.controls[0].step))
@@ -48,7 +48,7 @@ def simulate_into(
     Raises OutputExistsError where the folder is not free and OutputError where writing fails. Ctrl-C ends it with the
     status `interrupted`, and what there is by then is kept.
     """
-    compile_kernels()
+    compile_kernels(scenario.contact.model)
     began = time.perf_counter()
     world = build_world(scenario)
     tables = read_tables(scenario)
@@ -109,7 +109,7 @@ def _summary(scenario: Scenario, ended: LoopResult, seconds: float) -> Summary:
         time_step_s=step,
         simulated_time_s=steps * step,
         ended_at=datetime.now(UTC).isoformat(timespec="seconds"),
-        compile_seconds=compile_kernels(),
+        compile_seconds=compile_kernels(scenario.contact.model),
         solver_seconds=ended.solver_seconds,
         total_seconds=seconds,
         energy_J=ended.ledger,

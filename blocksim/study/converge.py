@@ -56,7 +56,7 @@ def converge(  # noqa: PLR0913 - one argument for each option of the command
     check_experiment(scenario)
     build_world(scenario)
     refinements = refinements_of(scenario, studies)
-    compile_kernels()
+    compile_kernels(scenario.contact.model)
     folder = Path(out) if out is not None else files.RESULTS / scenario.name / FOLDER
     runs = _Runs(folder, jobs or os.cpu_count() or 1, on_run)
     found = _refine(scenario, refinements, runs, tolerance_mm, levels)

@@ -98,7 +98,8 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     name = sweep_hash(base, base.sweep)
     folder = Path(out) if out is not None else files.RESULTS / base.name / f"sweep-{name}"
     _prepare(folder, base, name, overwrite=overwrite)
-    compile_kernels()
+    for model in models_of(document):
+        compile_kernels(model)
     return _run_cases(folder, cases, jobs or os.cpu_count() or 1, on_row)
 
 
@@ -113,6 +114,13 @@ def sweep_hash(base: Scenario, plan: Sweep) -> str:
     """Return the name of a sweep: a hash of its scenario, of what it varies, and of the code."""
     text = json.dumps([scenario_hash(base), plan.mode, plan.vary, code_hash()])
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
+
+
+def models_of(document: Document) -> tuple[str, ...]:
+    """Return the contact models that the cases of a sweep use: there is machine code for each kind."""
+    base = document.build()
+    varied = base.sweep.vary.get("contact.model", ()) if base.sweep else ()
+    return tuple(dict.fromkeys((base.contact.model, *map(str, varied))))
 
 
 def _prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool) -> None:

@@ -11,14 +11,14 @@ CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 NORMALS = ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))
 
 
-def place_particles(bodies: Records, model: str, spacing: float) -> Records:
+def place_particles(bodies: Records, model: str, spacing: float) -> Records | None:
     """Give every body its boundary particles: fills its row and range fields and returns the particles of all.
 
     `spacing` (m) is the largest distance of neighbours; bodies of equal sides share their particles. The surface model
-    has none.
+    has none: None.
     """
     if model == "surface":
-        return zeros(0, PARTICLE)
+        return None
     rows = kernel_rows if model == "kernel" else disc_rows
     known: dict[tuple[float, ...], tuple[int, Records]] = {}
     total = 0

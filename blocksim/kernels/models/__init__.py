@@ -10,9 +10,10 @@ one code here and one branch in each dispatcher below. How many slots a pair nee
 models share laws, friction, dashpots, history and the energy ledger.
 """
 
-from blocksim.kernels.arrays import Integers, Record, World
+from blocksim.kernels.arrays import Integers, Record, Records, World
 from blocksim.kernels.jit import kernel, rare_kernel
-from blocksim.kernels.models import particles, smoothed, surface
+from blocksim.kernels.models import particles as discs
+from blocksim.kernels.models import smoothed, surface
 
 SURFACE, PARTICLES, KERNEL = range(3)
 MODEL_CODES = {"surface": SURFACE, "particles": PARTICLES, "kernel": KERNEL}
@@ -21,23 +22,33 @@ MODEL_CODES = {"surface": SURFACE, "particles": PARTICLES, "kernel": KERNEL}
 @kernel
 def contact_points(world: World, p: int) -> int:
     """Find the contact points of pair p and return how many there are."""
-    model = world.controls[0].model
-    if model == KERNEL:
+    return points_of(world, p, world.particles)
+
+
+@kernel
+def points_of(world: World, p: int, particles: Records | None) -> int:
+    """As contact_points. Where `particles` is None the compiler leaves the models with particles out altogether."""
+    if particles is None:
+        return surface.find_points(world, p)
+    if world.controls[0].model == KERNEL:
         return smoothed.find_points(world, p)
-    if model == PARTICLES:
-        return particles.find_points(world, p)
-    return surface.find_points(world, p)
+    return discs.find_points(world, p)
 
 
 @rare_kernel
 def near_slots(world: World, a: int, b: int, reach: float, out: Integers) -> int:
     """Write the candidate slots of the pair of bodies a and b into `out` and return how many there are."""
-    model = world.controls[0].model
-    if model == KERNEL:
+    return slots_near(world, a, b, reach, out, world.particles)
+
+
+@kernel
+def slots_near(world: World, a: int, b: int, reach: float, out: Integers, particles: Records | None) -> int:
+    """As near_slots; see points_of."""
+    if particles is None:
+        return surface.near_slots(world, a, b, reach, out)
+    if world.controls[0].model == KERNEL:
         return smoothed.near_slots(world, a, b, reach, out)
-    if model == PARTICLES:
-        return particles.near_slots(world, a, b, reach, out)
-    return surface.near_slots(world, a, b, reach, out)
+    return discs.near_slots(world, a, b, reach, out)
 
 
 @rare_kernel
