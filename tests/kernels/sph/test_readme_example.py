@@ -6,10 +6,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-TEXT = (
-    README if "<!-- sph example -->" in README else Path(__file__).with_name("section.md").read_text(encoding="utf-8")
-)
+TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 EXAMPLE = re.compile(
     r"<!-- sph example -->\n```python\n(.*?)```\n\n```\n(.*?)```\n<!-- end of sph example -->", re.DOTALL
 )
