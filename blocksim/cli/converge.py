@@ -57,11 +57,11 @@ def converge_command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Refine time step, stiffness and particle spacing until the run-out stops moving.
+    """Refine step, stiffness and spacing until the run-out stays.
 
-    One setting is refined at a time, the others stay as the scenario has them, until two refinements in a row move no
-    block by more than the tolerance. Exit code 0 says that the question is answered, whatever the answer. Called again,
-    only runs that are missing are done.
+    One of time step, contact stiffness and particle spacing is refined at a time, the others stay as the scenario has
+    them, until two refinements in a row move no block by more than the tolerance. Exit code 0 says that the question is
+    answered, whatever the answer. Called again, only runs that are missing are done.
 
     Example: blocksim converge scenarios/three_blocks_nominal.toml
     """
@@ -69,7 +69,7 @@ def converge_command(
     with read_scenario(scenario, settings or []) as ready:
         path = out or RESULTS / ready.name / "converge.png"
         picture_suffix(path)
-        tell_compilation(quiet=silent)
+        tell_compilation(ready.contact.model, quiet=silent)
         result = converge(
             ready,
             tolerance_mm=tolerance,

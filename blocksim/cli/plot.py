@@ -16,6 +16,7 @@ from blocksim.study.many import TABLE
 from blocksim.study.picture import draw_sweep
 from blocksim.study.single import find_run
 from blocksim.view.strip import draw_strip
+from blocksim.view.support import support_of
 
 
 def plot_command(
@@ -31,10 +32,10 @@ def plot_command(
     experiment: options.ExperimentPath = None,
     quiet: options.Quiet = False,
 ) -> None:
-    """Draw a run as a strip of pictures, or where the blocks of a sweep end.
+    """Draw a run as a strip of pictures.
 
     Below the final state of a run stand the measured ranges. A run that was stopped or killed is drawn as far as it
-    came. The picture of a sweep over one key shows final x against its values, with the measured range as a band; a
+    came. For a sweep over one key the picture shows final x against its values, with the measured range as a band; a
     second key gets a column for each of its values.
 
     Example: blocksim plot scenarios/three_blocks.toml --out strip.png
@@ -56,7 +57,7 @@ def _draw_run(run: Path, out: Path | None, moments: list[float] | None, experime
     table = experiment or (scenario.experiment.table if scenario.experiment is not None else None)
     measured = None if table is None else load_table(table)
     picture = out or Path(f"{scenario.name}.png")
-    draw_strip(frames, picture, times=moments, title=scenario.name, measured=measured)
+    draw_strip(frames, picture, times=moments, title=scenario.name, measured=measured, support=support_of(scenario))
     return picture
 
 

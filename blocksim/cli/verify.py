@@ -1,5 +1,6 @@
 """blocksim verify: the verification table, measured now."""
 
+from collections.abc import Iterator, Sequence
 from enum import StrEnum
 from typing import Annotated
 
@@ -9,8 +10,8 @@ from blocksim.cli import options
 from blocksim.cli.output import answer, note, print_json, table_lines
 from blocksim.cli.progress import tell_compilation
 from blocksim.errors import ExitCode
-from blocksim.verification.case import Row, Setting, Verdict
-from blocksim.verification.cases import CASES, chosen
+from blocksim.verification.case import Case, Row, Setting, Verdict
+from blocksim.verification.cases import chosen
 from blocksim.verification.verify import (
     Outcome,
     error_text,
@@ -42,7 +43,7 @@ def verify_command(
     cases: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="V1 to V24; all without any.")] = None,
     model: Annotated[Model, typer.Option(help="Contact model.")] = Model.SURFACE,
     law: Annotated[Law, typer.Option(help="Force law.")] = Law.LINEAR,
-    quick: Annotated[bool, typer.Option("--quick", help="Shorten V9, V14, V18 (--json says how).")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Shorten the longest cases; said at the end how.")] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -54,21 +55,32 @@ def verify_command(
     """
     silent = quiet or as_json
     wanted = chosen(cases or [])
-    tell_compilation(quiet=silent)
-    setting = Setting(model.value, law.value, quick)
-    outcomes = []
-    for number_of, case in enumerate(wanted, start=1):
-        if not silent:
-            note(f"{number_of}/{len(wanted)} {case.id} {case.title} ...")
-        outcomes.append(run_case(case, setting))
-    if as_json:
-        print_json([row for outcome in outcomes for row in outcome.to_dicts()])
-    else:
-        answer("\n".join(_lines(outcomes)))
-        if not quiet:
-            _tell_end(outcomes)
+    tell_compilation(model.value, quiet=silent)
+    outcomes: list[Outcome] = []
+    try:
+        outcomes.extend(_run(wanted, Setting(model.value, law.value, quick), quiet=silent))
+    finally:  # also when stopped: minutes of measuring are not to be lost, and the list has what came before
+        if outcomes:
+            _show(outcomes, as_json=as_json, quiet=quiet)
     inside = all(outcome.inside for outcome in outcomes)
     raise typer.Exit(ExitCode.SUCCESS if inside else ExitCode.OUTSIDE)
+
+
+def _run(cases: Sequence[Case], setting: Setting, *, quiet: bool) -> Iterator[Outcome]:
+    """Run cases one after the other and say which one is under way."""
+    for position, case in enumerate(cases, start=1):
+        if not quiet:
+            note(f"{position}/{len(cases)} {case.id} {case.title} ...")
+        yield run_case(case, setting)
+
+
+def _show(outcomes: list[Outcome], *, as_json: bool, quiet: bool) -> None:
+    if as_json:
+        print_json([row for outcome in outcomes for row in outcome.to_dicts()])
+        return
+    answer("\n".join(_lines(outcomes)))
+    if not quiet:
+        _tell_end(outcomes)
 
 
 def _lines(outcomes: list[Outcome]) -> list[str]:
@@ -104,8 +116,8 @@ def _tell_end(outcomes: list[Outcome]) -> None:
         count = sum(row.verdict == Verdict.OUTSIDE for row in outcome.rows)
         why = f": {outcome.remark}" if outcome.remark else ""
         note(f"{outcome.case.id} {outcome.case.title}: {count} of {len(outcome.rows)} outside{why}")
-    shortened = [f"{case.id}: {case.quick}" for case in CASES if case.quick and outcomes[0].setting.quick]
-    for text in shortened:
-        note(f"shortened: {text}")
+    for outcome in outcomes:
+        if outcome.setting.quick and outcome.case.quick:
+            note(f"{outcome.case.id} shortened: {outcome.case.quick}")
     seconds = sum(outcome.seconds for outcome in outcomes)
     note(f"{len(outcomes) - len(missed)} of {len(outcomes)} cases inside, {seconds:.0f} s")

@@ -1,5 +1,7 @@
 """All verification cases: one entry each, in the order of the table."""
 
+from dataclasses import replace
+
 from blocksim.errors import InvalidInputError
 from blocksim.verification import (
     collapse,
@@ -16,8 +18,9 @@ from blocksim.verification import (
     toppling,
 )
 from blocksim.verification.case import Case
+from blocksim.verification.remarks import REMARKS
 
-CASES = (
+_CASES = (
     Case("V1", "free flight and free spin", "parabola, constant spin", flight.free_flight),
     Case("V2", "static overlap on the ground", "weight = contact force", resting.static_overlap),
     Case("V3", "flat drop from 0.1 m, e = 0.5", "Eq 12", flight.bounces),
@@ -73,6 +76,7 @@ CASES = (
     Case("V23", "energy ledger of every scenario", "balance", energy.ledgers),
     Case("V24", "three blocks before their first impact", "pymunk, Box2D", collapse.before_impact),
 )
+CASES = tuple(replace(case, remarks=REMARKS.get(case.id, {})) for case in _CASES)
 
 
 class UnknownCaseError(InvalidInputError):

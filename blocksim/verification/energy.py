@@ -7,7 +7,7 @@ from math import log2, nan, radians
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.kernels.arrays import REACHED
+from blocksim.kernels.arrays import AT_REST, REACHED
 from blocksim.scenario import load_scenario
 from blocksim.verification.case import Row, Setting, absolute, at_least
 from blocksim.verification.scene import Simulation
@@ -57,8 +57,13 @@ def ledgers(setting: Setting) -> Iterator[Row]:
 
 
 def worst_residual(setting: Setting, path: Path) -> float:
-    """Return the largest residual of a run, as a share of the energy in play."""
-    scenario = load_scenario(path, {"contact.model": setting.model, "contact.law": setting.law})
+    """Return the largest residual of a run, as a share of the energy in play; NaN where the run fails.
+
+    A scenario keeps its own model and law unless the setting asks for others than the defaults.
+    """
+    asked = {"contact.model": setting.model, "contact.law": setting.law}
+    usual = {"contact.model": Setting().model, "contact.law": Setting().law}
+    scenario = load_scenario(path, {key: value for key, value in asked.items() if value != usual[key]})
     run = Simulation(build_world(scenario))
     outputs = round(scenario.time.end / scenario.output.every)
     worst = 0.0
@@ -66,4 +71,4 @@ def worst_residual(setting: Setting, path: Path) -> float:
         worst = max(worst, run.to_time(k * scenario.output.every).residual())
         if run.status != REACHED:
             break
-    return worst
+    return worst if run.status in {REACHED, AT_REST} else nan

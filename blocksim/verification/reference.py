@@ -1,13 +1,13 @@
 """The verification table of the README: measured, kept in results/verify.json, written as Markdown.
 
-`python -m blocksim.verification.reference README.md` writes the table anew from the kept results; with `--measure` all
-cases are run first and the results replaced.
+`python -m blocksim.verification.reference README.md` writes the table anew from the kept results. With `--measure` all
+cases are run first (a quarter of an hour) and the results replaced; column heads after it limit that to these columns.
 """
 
 import json
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +29,6 @@ SIGNS = {Verdict.INSIDE: "✓", Verdict.OUTSIDE: "✗"}
 Stored = dict[str, dict[str, list[dict[str, Any]]]]  # head of the column, case id, rows
 
 
-def measure() -> Stored:
-    """Run all cases in all settings of the table; minutes."""
-    return {head: dict(_measured(setting)) for head, setting in COLUMNS.items()}
-
-
 def _measured(setting: Setting) -> Iterator[tuple[str, list[dict[str, Any]]]]:
     for case in CASES:
         outcome = run_case(case, setting)
@@ -43,7 +38,7 @@ def _measured(setting: Setting) -> Iterator[tuple[str, list[dict[str, Any]]]]:
 
 def stored_rows(stored: Stored, head: str, case: Case) -> list[Row]:
     """Return the kept rows of one case in one setting."""
-    return [Row(**{**row, "measured": _number(row["measured"])}) for row in stored[head].get(case.id, [])]
+    return [Row(**{**row, "measured": _number(row["measured"])}) for row in stored.get(head, {}).get(case.id, [])]
 
 
 def _number(value: float | None) -> float:
@@ -119,14 +114,22 @@ def _finite(data: Any) -> Any:
     return [_finite(value) for value in data] if isinstance(data, list) else data
 
 
-def main(arguments: Iterable[str]) -> None:
-    """Write the table into the README named, after measuring where asked to."""
-    options = list(arguments)
-    readme = Path(next(option for option in options if not option.startswith("-")))
-    store = readme.parent / STORE
-    if "--measure" in options:
-        write_store(store, measure())
-    readme.write_text(with_table(readme.read_text(encoding="utf-8"), read_store(store)), encoding="utf-8")
+def main(arguments: Sequence[str]) -> None:
+    """Write the table into the README named first, after measuring where asked to."""
+    readme, *options = arguments
+    store = Path(readme).parent / STORE
+    if options[:1] == ["--measure"]:
+        measure(store, options[1:] or list(COLUMNS))
+    text = Path(readme).read_text(encoding="utf-8")
+    Path(readme).write_text(with_table(text, read_store(store)), encoding="utf-8")
+
+
+def measure(store: Path, heads: Sequence[str]) -> None:
+    """Run all cases in the settings of some columns and keep the results, column by column."""
+    for head in heads:
+        stored = read_store(store) if store.is_file() else {}
+        stored[head] = dict(_measured(COLUMNS[head]))
+        write_store(store, {name: stored[name] for name in COLUMNS if name in stored})
 
 
 if __name__ == "__main__":

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.kernels.advance import advance
-from blocksim.kernels.energy import LEDGER_ROW, measure
+from blocksim.kernels.arrays import REACHED
+from blocksim.kernels.energy import LEDGER_ROW
 from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.simulation.ledger import energy_ledger, energy_row
+from blocksim.simulation.loop import advance_with_room
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
@@ -22,7 +24,6 @@ if TYPE_CHECKING:
 WIDTH, HEIGHT, DEPTH = 0.032, 0.025, 0.05  # m, the paper's block in the literal reading
 YOUNG_MODULUS, POISSON_RATIO, UNIT_WEIGHT = 69e9, 0.3, 26.7e3  # Pa, -, N/m3
 SIZES = {"width": WIDTH, "height": HEIGHT, "length": DEPTH}
-LEAST_RISE = 1e-3  # m; the energy in play is at least the weight times this
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,8 @@ class Simulation:
     def __init__(self, world: World) -> None:
         """Find the first contacts and remember the energy."""
         self.world = world
-        self.status = advance(world, 0)
+        self.status = REACHED
+        self.to_step(0)
         self.start_energy = self.energy()
 
     @property
@@ -87,7 +89,7 @@ class Simulation:
 
     def to_step(self, last_step: int) -> Simulation:
         """Go on to a step number."""
-        self.status = advance(self.world, last_step)
+        self.world, self.status = advance_with_room(self.world, last_step)
         return self
 
     def to_time(self, time: float) -> Simulation:
@@ -95,10 +97,8 @@ class Simulation:
         return self.to_step(round(time / self.step))
 
     def measured(self) -> NDArray[np.float64]:
-        """Return kinetic, potential, stored normal, stored shear, dashpot, friction, broken (J), contacts, overlap."""
-        row = np.zeros(len(LEDGER_ROW) + 2)
-        measure(self.world, row)
-        return row
+        """Return the energies (J) of LEDGER_ROW, the number of contacts and the largest overlap (m)."""
+        return energy_row(self.world)
 
     @property
     def kinetic(self) -> float:
@@ -116,11 +116,7 @@ class Simulation:
 
     def residual(self) -> float:
         """Return what the ledger lacks, as a share of the energy in play."""
-        ledger = self.world.ledger[0]
-        gravity = float(np.hypot(self.world.controls[0].gravity_x, self.world.controls[0].gravity_y))
-        least = float(self.bodies.mass.sum()) * gravity * LEAST_RISE
-        in_play = max(float(ledger.largest_kinetic + ledger.travel_work), least)
-        return abs(self.energy() - self.start_energy) / in_play
+        return energy_ledger(self.world, self.start_energy).relative_residual
 
     def state(self) -> NDArray[np.float64]:
         """Return x, y, angle, vx, vy, spin of all bodies, one row a body."""

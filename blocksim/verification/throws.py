@@ -45,7 +45,8 @@ class Thrower:
         scene = setting.scene([body], restitution=restitution, gravity=0.0, **values)
         self.speed = speed
         self.world = build_world(scene.scenario())
-        self.fresh = {name: array.copy() for name, array in self.world._asdict().items()}
+        arrays = self.world._asdict().items()
+        self.fresh = {name: array.copy() for name, array in arrays if array is not None}
         self.row = np.zeros(len(LEDGER_ROW) + 2)
 
     @property
@@ -67,8 +68,8 @@ class Thrower:
         return body
 
     def _place(self, throw: Throw) -> None:
-        for name, array in self.world._asdict().items():
-            array[...] = self.fresh[name]
+        for name, fresh in self.fresh.items():
+            getattr(self.world, name)[...] = fresh
         body = self.world.bodies[0]
         lowest = forms.lowest_corner(WIDTH, HEIGHT, throw.angle)[1]
         body.y = self.speed * self.step * (STEPS_BEFORE + throw.phase) - lowest

@@ -5,12 +5,8 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from blocksim.verification.case import Case, Row, Setting, Verdict
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
 
 
 @dataclass(frozen=True)
@@ -72,12 +68,6 @@ def run_case(case: Case, setting: Setting) -> Outcome:
     began = time.perf_counter()
     rows = tuple(case.measure(setting))
     return Outcome(case, setting, rows, time.perf_counter() - began)
-
-
-def run_cases(cases: Iterable[Case], setting: Setting) -> Iterator[Outcome]:
-    """Run cases one after the other."""
-    for case in cases:
-        yield run_case(case, setting)
 
 
 def number(value: float, digits: int = 4) -> str:

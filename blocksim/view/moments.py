@@ -69,24 +69,28 @@ def drawable_frames(frames: FramesLike) -> Indices:
     return indices
 
 
-def path_travelled(frames: FramesLike, chosen: Indices) -> Floats:
+def path_travelled(frames: FramesLike, chosen: Indices, carried: Floats | None = None) -> Floats:
     """Return the path (m) up to each chosen frame, summed over the blocks; (len(chosen),), never falling.
 
-    A turn counts as the way of a corner: the angle times half the diagonal.
+    A turn counts as the way of a corner: the angle times half the diagonal. `carried` is how far the support has moved
+    along x and y (m) at the chosen frames, (len(chosen), 2): only the way relative to the support counts.
     """
     radius = 0.5 * np.hypot(frames.size_x, frames.size_y)
-    moved = np.hypot(np.diff(frames.x[chosen], axis=0), np.diff(frames.y[chosen], axis=0))
+    places = np.stack([frames.x[chosen], frames.y[chosen]], axis=-1)
+    if carried is not None:
+        places -= carried[:, None]
+    moved = np.hypot(*np.moveaxis(np.diff(places, axis=0), -1, 0))
     turned = radius * np.abs(np.diff(frames.angle[chosen], axis=0))
     return np.concatenate([[0.0], np.cumsum((moved + turned).sum(axis=1))])
 
 
-def moments_by_motion(frames: FramesLike, chosen: Indices, count: int) -> Indices:
+def moments_by_motion(frames: FramesLike, chosen: Indices, count: int, carried: Floats | None = None) -> Indices:
     """Return at most `count` of the chosen frames, even in the path travelled, first and last included.
 
     Even spacing in time would show the release and the rest several times and the impacts hardly. Where
-    nothing moves, the first and the last frame are left.
+    nothing moves, the first and the last frame are left. `carried` as for `path_travelled`.
     """
-    path = path_travelled(frames, chosen)
+    path = path_travelled(frames, chosen, carried)
     wanted = np.linspace(0.0, path[-1], count)[1:-1]
     between = np.searchsorted(path, wanted) if path[-1] > 0.0 else np.array([], dtype=np.intp)
     last = len(chosen) - 1

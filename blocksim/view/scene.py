@@ -1,40 +1,21 @@
-"""One moment of a run as a drawing: ground, numbered blocks, measured positions. Millimetres."""
+"""One moment of a run as a drawing: support, numbered blocks, measured positions. Millimetres."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.view import style
-from blocksim.view.moments import Floats, FramesLike, Indices
+from blocksim.view.ground import Canvas, draw_shift, draw_start, draw_support
+from blocksim.view.moments import Floats, FramesLike
+from blocksim.view.support import Support
+from blocksim.view.window import MILLIMETRES
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-MILLIMETRES = 1e3  # per metre
+Flags = NDArray[np.bool_]
 UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # counter-clockwise from lower left
-GROUND_THICKNESS = 5.0  # points
 EDGE_INSET = 0.86  # where the mark of the upper side runs, as a part of half the height
-
-
-@dataclass(frozen=True)
-class Extent:
-    """The part of the plane that is shown (mm)."""
-
-    left: float
-    right: float
-    bottom: float
-    top: float
-
-    @property
-    def width(self) -> float:
-        """Width (mm)."""
-        return self.right - self.left
-
-    @property
-    def height(self) -> float:
-        """Height (mm)."""
-        return self.top - self.bottom
+FIXED_HATCH = "////"
 
 
 @dataclass(frozen=True)
@@ -54,78 +35,96 @@ def corners(frames: FramesLike, frame: int) -> Floats:
     return MILLIMETRES * _placed(local, frames, frame)
 
 
-def extent_of(frames: FramesLike, chosen: Indices) -> Extent:
-    """Return what has to be shown so that no block is cut in any chosen frame, with a small margin."""
-    cosine, sine = np.abs(np.cos(frames.angle[chosen])), np.abs(np.sin(frames.angle[chosen]))
-    reach_x = 0.5 * (cosine * frames.size_x + sine * frames.size_y)
-    reach_y = 0.5 * (sine * frames.size_x + cosine * frames.size_y)
-    x, y = frames.x[chosen], frames.y[chosen]
-    left, right = MILLIMETRES * float((x - reach_x).min()), MILLIMETRES * float((x + reach_x).max())
-    bottom = MILLIMETRES * min(float((y - reach_y).min()), 0.0)
-    top = MILLIMETRES * float((y + reach_y).max())
-    margin = 0.04 * max(right - left, top - bottom)
-    return Extent(left - margin, right + margin, bottom - margin, top + margin)
-
-
-def draw_scene(axes: "Axes", frames: FramesLike, frame: int, extent: Extent, points_per_mm: float) -> None:
-    """Draw ground and blocks of one frame, with the blocks' names where there is room for all."""
-    from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415 - see style
-
+def draw_scene(canvas: Canvas, frames: FramesLike, frame: int, support: Support) -> None:
+    """Draw the support and the blocks of one frame, with the blocks' names where there is room for all."""
+    offset = MILLIMETRES * support.offset(frames.time[frame : frame + 1])[0]
     outlines = corners(frames, frame)
-    fills = [style.block_colour(index) for index in range(len(frames.names))]
-    smallest = MILLIMETRES * points_per_mm * float(min(frames.size_x.min(), frames.size_y.min()))
-    thin = min(style.LINE_WIDTH, 0.05 * smallest)
-    ground = GROUND_THICKNESS / points_per_mm
-    axes.fill_between([extent.left, extent.right], -ground, 0.0, color=style.GROUND_COLOUR, linewidth=0)
-    axes.axhline(0.0, color=style.INK, linewidth=style.LINE_WIDTH)
-    axes.add_collection(PolyCollection(list(outlines), facecolors=fills, edgecolors=style.INK, linewidths=thin))
-    axes.add_collection(LineCollection(list(_upper_sides(frames, frame)), colors=style.INK, linewidths=2.0 * thin))
-    fonts = _label_fonts(frames, points_per_mm)
-    for index, font in enumerate(fonts):
-        x, y = outlines[index].mean(axis=0)
-        colour = style.text_colour(fills[index])
-        name = frames.names[index]
-        axes.text(x, y, name, fontsize=font, color=colour, ha="center", va="center_baseline", clip_on=True)
+    fixed = np.array(support.fixed or (False,) * len(frames.names))
+    draw_support(canvas, support, offset)
+    draw_start(canvas, support, offset, outlines[fixed])
+    draw_shift(canvas, support, offset, MILLIMETRES * float(frames.x[0].mean()))
+    _draw_blocks(canvas, frames, frame, outlines, fixed)
+    _draw_names(canvas, frames, outlines.mean(axis=1), fixed)
 
 
-def draw_centres(axes: "Axes", frames: FramesLike, frame: int, points_per_mm: float) -> None:
+def draw_centres(canvas: Canvas, frames: FramesLike, frame: int) -> None:
     """Mark the centre of every block by a line through the ground below it."""
     for x in MILLIMETRES * frames.x[frame]:
-        axes.plot([x, x], [-GROUND_THICKNESS / points_per_mm, 0.0], color=style.INK, linewidth=1.2)
+        ends = [canvas.floor, canvas.extent.base]
+        canvas.axes.plot([x, x], ends, color=style.INK, linewidth=1.2, transform=canvas.scene)
 
 
-def draw_measured(axes: "Axes", measured: list[MeasuredRange], points_per_mm: float, row_height: float) -> None:
+def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: float) -> None:
     """Draw measured mean and range of each block in rows of `row_height` (points) below the ground."""
+    line: dict[str, Any] = {"color": style.MEASURED_COLOUR, "transform": canvas.scene}
     for item in measured:
-        y = -(GROUND_THICKNESS + (item.row + 0.6) * row_height) / points_per_mm
-        cap = 2.2 / points_per_mm
-        colour = style.MEASURED_COLOUR
-        axes.plot([item.minimum, item.maximum], [y, y], color=colour, linewidth=1.2)
+        y = canvas.floor - (item.row + 0.6) * row_height / canvas.points_per_mm
+        cap = 2.2 / canvas.points_per_mm
+        canvas.axes.plot([item.minimum, item.maximum], [y, y], linewidth=1.2, **line)
         for end in (item.minimum, item.maximum):
-            axes.plot([end, end], [y - cap, y + cap], color=colour, linewidth=1.2)
-        axes.plot(item.mean, y, marker="o", markersize=3.2, color=colour)
+            canvas.axes.plot([end, end], [y - cap, y + cap], linewidth=1.2, **line)
+        canvas.axes.plot(item.mean, y, marker="o", markersize=3.2, **line)
         font = style.fitting_font(item.block, (30.0, row_height), 6.0)
         if font:
-            axes.annotate(
+            canvas.axes.text(
+                item.maximum + 3.0 / canvas.points_per_mm,
+                y,
                 item.block,
-                (item.maximum, y),
-                xytext=(3.0, 0.0),
-                textcoords="offset points",
                 fontsize=font,
-                color=colour,
+                rotation=float(np.degrees(canvas.extent.tilt)),
+                rotation_mode="anchor",
                 va="center",
+                **line,
             )
 
 
-def _label_fonts(frames: FramesLike, points_per_mm: float) -> list[float]:
-    """Return the font size of each block's name; empty when one of them would be unreadable.
+def _draw_blocks(canvas: Canvas, frames: FramesLike, frame: int, outlines: Floats, fixed: Flags) -> None:
+    """Draw free blocks each in its colour, fixed ones hatched in that of the ground, and all upper sides."""
+    from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415 - see style
+
+    smallest = MILLIMETRES * canvas.points_per_mm * float(min(frames.size_x.min(), frames.size_y.min()))
+    thin = min(style.LINE_WIDTH, 0.05 * smallest)
+    line: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
+    fills = [style.block_colour(int(index)) for index in np.flatnonzero(~fixed)]
+    held = PolyCollection(list(outlines[fixed]), facecolors=style.GROUND_COLOUR, hatch=FIXED_HATCH, **line)
+    free = PolyCollection(list(outlines[~fixed]), facecolors=fills, **line)
+    sides = LineCollection(
+        list(_upper_sides(frames, frame)[~fixed]), colors=style.INK, linewidths=2.0 * thin, transform=canvas.scene
+    )
+    for artist in (held, free, sides):
+        canvas.axes.add_collection(artist)
+
+
+def _draw_names(canvas: Canvas, frames: FramesLike, places: Floats, fixed: Flags) -> None:
+    """Write the names of free and of fixed blocks, of either kind only where there is room for all."""
+    fonts = _label_fonts(frames, canvas.points_per_mm)
+    for kind in (fixed, ~fixed):
+        if not all(fonts[kind]):
+            continue
+        for index in np.flatnonzero(kind):
+            fill = style.GROUND_COLOUR if fixed[index] else style.block_colour(int(index))
+            canvas.axes.text(
+                float(places[index, 0]),
+                float(places[index, 1]),
+                frames.names[index],
+                fontsize=fonts[index],
+                color=style.text_colour(fill),
+                ha="center",
+                va="center_baseline",
+                clip_on=True,
+                transform=canvas.scene,
+                bbox={"facecolor": fill, "linewidth": 0.0, "pad": 0.8} if fixed[index] else None,
+            )
+
+
+def _label_fonts(frames: FramesLike, points_per_mm: float) -> Floats:
+    """Return the font size of each block's name, 0 where it would be unreadable.
 
     Names on some blocks only would look like a difference between the blocks.
     """
     sizes = MILLIMETRES * points_per_mm * np.minimum(frames.size_x, frames.size_y)
     rooms = [(0.85 * float(size), 0.7 * float(size)) for size in sizes]
-    fonts = [style.fitting_font(name, room) for name, room in zip(frames.names, rooms, strict=True)]
-    return fonts if all(fonts) else []
+    return np.array([style.fitting_font(name, room) for name, room in zip(frames.names, rooms, strict=True)])
 
 
 def _upper_sides(frames: FramesLike, frame: int) -> Floats:

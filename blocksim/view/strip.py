@@ -1,36 +1,37 @@
 """A run as a strip of pictures on one common scale, like Figure 4 of the paper."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Protocol
 
+import numpy as np
+
 from blocksim.view import style
+from blocksim.view.ground import GROUND_THICKNESS, RULER_HEIGHT, Canvas, draw_ruler
 from blocksim.view.moments import FramesLike, Indices, drawable_frames, moments_at, moments_by_motion
-from blocksim.view.scene import (
-    GROUND_THICKNESS,
-    Extent,
-    MeasuredRange,
-    draw_centres,
-    draw_measured,
-    draw_scene,
-    extent_of,
-)
+from blocksim.view.scene import MeasuredRange, draw_centres, draw_measured, draw_scene
+from blocksim.view.support import Support
+from blocksim.view.window import MILLIMETRES, Extent, extent_of
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WIDTH = 10.0  # inches, of the whole strip
 SIDE, GAP = 0.25, 0.25  # inches, at the left and right end and between columns
 HEAD, TITLE, FOOT = 0.22, 0.30, 0.52  # inches: time above a panel, title of the strip, axis and legend below
+LINE = 0.155  # inches, of each further line of text above a panel or below the strip
+LETTERS = 150  # in a line below the strip
 TICKS = 0.26  # inches, for the numbers under a row of panels
 TICK_ROOM = 0.4  # inches along the axis for one number
 TALLEST_PANEL = 4.0  # inches
 ROW_HEIGHT = 9.0  # points, of one row of measured ranges
 WIDEST_IN_FOURS, WIDEST_IN_PAIRS = 2.5, 6.0  # width over height, so that a panel stays about an inch tall
 NARROWEST = 0.35  # width over height
+LEAST_MOVED = 0.005  # mm; less is nothing in two decimals
+LEAST_ANGLE = 0.05  # degrees; motion closer to x is along x
 RANGE_GAP = 0.06  # part of the width that two measured ranges in one row keep apart
 
 
@@ -52,13 +53,21 @@ class Layout:
     panel_height: float
     points_per_mm: float
     height: float
+    extent: Extent
+    head: float = HEAD
+    foot: float = FOOT
+
+    @property
+    def ticks(self) -> float:
+        """Height of the numbers under a row of panels; tilted panels have theirs inside."""
+        return 0.0 if self.extent.tilt else TICKS
 
     def place(self, index: int) -> tuple[float, float, float, float]:
         """Return left, bottom, width, height of a panel as parts of the figure."""
         row, column = divmod(index, self.columns)
         used = self.columns * self.panel_width + (self.columns - 1) * GAP
         left = 0.5 * (WIDTH - used) + column * (self.panel_width + GAP)
-        bottom = FOOT + (self.rows - 1 - row) * (self.panel_height + HEAD + TICKS)
+        bottom = self.foot + (self.rows - 1 - row) * (self.panel_height + self.head + self.ticks)
         return left / WIDTH, bottom / self.height, self.panel_width / WIDTH, self.panel_height / self.height
 
 
@@ -68,30 +77,35 @@ def draw_strip(
     times: Sequence[float] | None = None,
     title: str | None = None,
     measured: MeasuredTable | None = None,
+    support: Support | None = None,
 ) -> None:
     """Draw the run as 6 to 8 panels from release to the final state and write them as PNG, SVG or PDF.
 
     `times` (s) picks the panels by hand. With `measured` the last panel shows mean and range of the measured
-    centres below the ground. The same input gives the same bytes. Raises InvalidInputError for an unknown
+    centres below the ground. `support` is what the blocks stand on, level ground at rest if it is not given. The same input gives the same bytes. Raises InvalidInputError for an unknown
     picture format, a time that was not recorded, or nothing to draw, and OutputError when the file cannot be
     written.
     """
     path = Path(path)
     style.picture_suffix(path)
+    support = support or Support()
     drawable = drawable_frames(frames)
-    extent = extent_of(frames, drawable)
+    extent = extent_of(frames, drawable, support)
     ranges = [] if measured is None else measured_ranges(measured, frames.names, extent.width)
     extent = widened(extent, ranges)
     columns, count = arrangement(extent)
     if times is None:
-        chosen = moments_by_motion(frames, drawable, count)
+        carried = support.offset(frames.time[drawable])
+        chosen = moments_by_motion(frames, drawable, count, carried)
     else:
         chosen = moments_at(frames, drawable, times)
         ranges = ranges if chosen[-1] == drawable[-1] else []  # they belong to the final state
-    layout = plan(extent, columns, len(chosen), 1 + max((item.row for item in ranges), default=-1))
+    notes = wrap(_legend(ranges, support), LETTERS)
+    captions = 1 if support.motion is None else 2
+    layout = plan(extent, columns, len(chosen), rows_of(ranges), captions, len(notes))
     with style.styled_figure(WIDTH, layout.height) as figure:
-        _draw_panels(figure, frames, chosen, extent, layout, ranges)
-        _draw_texts(figure, layout, title, ranges)
+        _draw_panels(figure, frames, chosen, layout, ranges, support)
+        _draw_texts(figure, layout, title, notes)
         style.save_figure(figure, path)
 
 
@@ -103,17 +117,33 @@ def arrangement(extent: Extent) -> tuple[int, int]:
     return (2, 8) if aspect <= WIDEST_IN_PAIRS else (1, 6)
 
 
-def plan(extent: Extent, columns: int, panels: int, measured_rows: int) -> Layout:
-    """Fit the panels into the width of the strip, all at one scale, with room for rows of measured ranges."""
+def plan(extent: Extent, columns: int, panels: int, measured_rows: int, captions: int = 1, notes: int = 1) -> Layout:
+    """Fit the panels into the width of the strip, all at one scale, with room for what stands below the ground.
+
+    `captions` and `notes` count the lines of text above each panel and below the strip.
+    """
     columns = min(columns, panels)
     rows = -(-panels // columns)
     panel_width = (WIDTH - 2.0 * SIDE - (columns - 1) * GAP) / columns
     scale = min(panel_width / extent.width, TALLEST_PANEL / extent.height)  # inches per mm
-    ground = (GROUND_THICKNESS + (measured_rows + 0.4) * ROW_HEIGHT) / style.POINTS_PER_INCH
-    below = max(-extent.bottom * scale, ground)
-    panel_height = extent.top * scale + below
-    height = TITLE + rows * (panel_height + HEAD) + (rows - 1) * TICKS + FOOT
-    return Layout(columns, rows, extent.width * scale, panel_height, scale * style.POINTS_PER_INCH, height)
+    below = max((extent.lowest - extent.bottom) * scale, _room_below(extent, measured_rows) / style.POINTS_PER_INCH)
+    panel_height = (extent.top - extent.lowest) * scale + below
+    ticks = 0.0 if extent.tilt else TICKS
+    head, foot = HEAD + (captions - 1) * LINE, FOOT - TICKS + ticks + (notes - 1) * LINE
+    height = TITLE + rows * (panel_height + head) + (rows - 1) * ticks + foot
+    points_per_mm = scale * style.POINTS_PER_INCH
+    return Layout(columns, rows, extent.width * scale, panel_height, points_per_mm, height, extent, head, foot)
+
+
+def _depth_of(rows: int) -> float:
+    """Return how far rows of measured ranges reach below the lowest ground (points)."""
+    return GROUND_THICKNESS + (rows + 0.4) * ROW_HEIGHT
+
+
+def _room_below(extent: Extent, rows: int) -> float:
+    """Return how far the picture goes on below the lowest ground (points)."""
+    depth = _depth_of(rows)
+    return (depth + RULER_HEIGHT) / float(np.cos(extent.tilt)) if extent.tilt else depth
 
 
 def measured_ranges(measured: MeasuredTable, names: Sequence[str], width: float) -> list[MeasuredRange]:
@@ -130,46 +160,55 @@ def measured_ranges(measured: MeasuredTable, names: Sequence[str], width: float)
     return ranges
 
 
+def rows_of(ranges: Sequence[MeasuredRange]) -> int:
+    """Return the number of rows that measured ranges take."""
+    return 1 + max((item.row for item in ranges), default=-1)
+
+
 def widened(extent: Extent, ranges: Sequence[MeasuredRange]) -> Extent:
     """Return an extent that also holds the measured ranges, and is wide enough for the time above a tower."""
     margin = RANGE_GAP * extent.width
     missing = max(NARROWEST * extent.height - extent.width, 0.0)
-    left = min([extent.left - 0.5 * missing, *(item.minimum - 0.5 * margin for item in ranges)])
-    right = max([extent.right + 0.5 * missing, *(item.maximum + margin for item in ranges)])
-    return Extent(left, right, extent.bottom, extent.top)
+    cosine, shift = float(np.cos(extent.tilt)), extent.base * float(np.sin(extent.tilt))
+    left = min([extent.left - 0.5 * missing, *(cosine * item.minimum - shift - 0.5 * margin for item in ranges)])
+    right = max([extent.right + 0.5 * missing, *(cosine * item.maximum - shift + margin for item in ranges)])
+    return replace(extent, left=left, right=right)
 
 
 def _draw_panels(
     figure: "Figure",
     frames: FramesLike,
     chosen: Indices,
-    extent: Extent,
     layout: Layout,
     ranges: list[MeasuredRange],
+    support: Support,
 ) -> None:
     last = len(chosen) - 1
     for index, frame in enumerate(int(frame) for frame in chosen):
-        axes = figure.add_axes(layout.place(index))
-        draw_scene(axes, frames, frame, extent, layout.points_per_mm)
+        canvas = Canvas(figure.add_axes(layout.place(index)), layout.extent, layout.points_per_mm)
+        draw_scene(canvas, frames, frame, support)
         if ranges and index == last:
-            draw_centres(axes, frames, frame, layout.points_per_mm)
-            draw_measured(axes, ranges, layout.points_per_mm, ROW_HEIGHT)
-        _finish_panel(axes, extent, layout, labelled=index + layout.columns > last)
-        axes.set_title(_caption(frames, frame), loc="left", pad=3.0)
+            draw_centres(canvas, frames, frame)
+            draw_measured(canvas, ranges, ROW_HEIGHT)
+        _finish_panel(canvas, layout, labelled=index + layout.columns > last)
+        if layout.extent.tilt:
+            draw_ruler(canvas, _depth_of(rows_of(ranges)))
+        canvas.axes.set_title(_caption(frames, frame, support), loc="left", pad=3.0)
 
 
-def _draw_texts(figure: "Figure", layout: Layout, title: str | None, ranges: list[MeasuredRange]) -> None:
+def _draw_texts(figure: "Figure", layout: Layout, title: str | None, notes: Sequence[str]) -> None:
     side = SIDE / WIDTH
     if title:
         top = 1.0 - 0.06 / layout.height
         figure.suptitle(title, x=side, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE)
-    figure.text(side, 0.05 / layout.height, _legend(ranges), color=style.FAINT_INK, va="bottom")
+    figure.text(side, 0.05 / layout.height, "\n".join(notes), color=style.FAINT_INK, va="bottom")
 
 
-def _finish_panel(axes: "Axes", extent: Extent, layout: Layout, *, labelled: bool) -> None:
-    """Fix the scale of a panel and leave only its x axis."""
+def _finish_panel(canvas: Canvas, layout: Layout, *, labelled: bool) -> None:
+    """Fix the scale of a panel and leave only its x axis, of which a tilted picture keeps no more than the name."""
     from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - see style
 
+    axes, extent = canvas.axes, canvas.extent
     axes.set_xlim(extent.left, extent.right)
     points_high = layout.panel_height * style.POINTS_PER_INCH
     axes.set_ylim(extent.top - points_high / layout.points_per_mm, extent.top)
@@ -178,20 +217,37 @@ def _finish_panel(axes: "Axes", extent: Extent, layout: Layout, *, labelled: boo
     ticks = max(2, int(layout.panel_width / TICK_ROOM))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=ticks, steps=[1, 2, 5, 10]))
     axes.tick_params(axis="x", length=2.5, pad=1.5)
+    if extent.tilt:
+        axes.spines["bottom"].set_visible(False)
+        axes.set_xticks([])
     if labelled:
-        axes.set_xlabel("x (mm)", labelpad=1.0)
+        axes.set_xlabel("x along the ground (mm)" if extent.tilt else "x (mm)", labelpad=1.0)
 
 
-def _caption(frames: FramesLike, frame: int) -> str:
-    """Return the time of a frame; the two ends of a run are named."""
+def _caption(frames: FramesLike, frame: int, support: Support) -> str:
+    """Return the time of a frame and how far the support has moved; the two ends of a run are named."""
     time = f"{float(frames.time[frame]):.3f} s"
     if frame == 0:
-        return f"{time}, release"
-    return f"{time}, final" if frame == len(frames.time) - 1 else time
+        time = f"{time}, release"
+    elif frame == len(frames.time) - 1:
+        time = f"{time}, final"
+    if support.motion is None:
+        return time
+    moved = MILLIMETRES * float(support.displacement(frames.time[frame : frame + 1])[0])
+    shown = f"{moved:+.2f}".replace("-", "−") if abs(moved) >= LEAST_MOVED else "0.00"
+    return f"{time}\nsupport {shown} mm"
 
 
-def _legend(ranges: Sequence[MeasuredRange]) -> str:
-    legend = "Thick line inside a block: its own upper side."
-    if not ranges:
-        return legend
-    return f"{legend} Last panel: simulated centres marked on the ground, measured mean and range below it."
+def _legend(ranges: Sequence[MeasuredRange], support: Support) -> str:
+    texts = ["Thick line inside a block: its own upper side."]
+    if any(support.fixed):
+        texts.append("Hatched: fixed.")
+    if support.motion is not None:
+        angle = float(np.degrees(np.arctan2(*support.direction[::-1])))
+        along = "along x" if abs(angle) < LEAST_ANGLE else f"along {angle:.3g}° from x"
+        texts.append(f"The support moves {along}; dashed: where it was at the start; arrow: way of the ground since.")
+    if support.tilt:
+        texts.append(f"Ground tilted by {float(np.degrees(support.tilt)):.3g}°; gravity points down.")
+    if ranges:
+        texts.append("Last panel: simulated centres marked on the ground, measured mean and range below it.")
+    return " ".join(texts)

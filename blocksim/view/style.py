@@ -38,6 +38,7 @@ SETTINGS: dict[Any, Any] = {
     "text.parse_math": False,
     "xtick.color": FAINT_INK,
     "xtick.labelcolor": INK,
+    "hatch.linewidth": 0.6,
     "svg.hashsalt": "blocksim",
     "savefig.dpi": DOTS_PER_INCH,
 }

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from blocksim.simulation.compilation import compile_kernels
 from tests.cli.conftest import SOFT, Command, Process
 
 SLIDE = ("converge", "scenarios/slide.toml", "--set", "contact.stiffness_scale=0.01", "--jobs", 1)
@@ -96,6 +97,7 @@ def test_mistakes_are_told_before_anything_runs(
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_ends_all_runs_with_75(process: Process, tmp_path: Path, jobs: int) -> None:
+    compile_kernels()  # into the cache on disk, so that the process starts at once
     endless = ("--set", "time.end=1e4", "--set", "time.stop_at_rest=false")
     running = process("converge", "scenarios/three_blocks_nominal.toml", *SOFT, *endless, "--jobs", jobs, "-q")
     began = time.monotonic()

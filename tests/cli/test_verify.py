@@ -52,9 +52,26 @@ def test_quiet_prints_the_table_only(blocksim: Command) -> None:
     assert answer.out.startswith("quantity")
 
 
-def test_quick_says_what_it_leaves_out(blocksim: Command) -> None:
-    answer = blocksim("verify", "V2", "--quick")
-    assert "V14: creep over" in answer.err
+def test_quick_says_what_it_leaves_out(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    def measure(setting: Setting) -> list[Row]:
+        return [absolute("quick", "", 1.0, float(setting.quick), 0.0)]
+
+    monkeypatch.setattr(cases, "CASES", (Case("V2", "made up", "nowhere", measure, quick="half of it"),))
+    answer = blocksim("verify", "--quick")
+    assert answer.code == 0
+    assert "V2 shortened: half of it" in answer.err
+
+
+def test_a_stop_keeps_what_was_measured(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(_: Setting) -> list[Row]:
+        raise KeyboardInterrupt
+
+    done = Case("V1", "done", "nowhere", lambda _: [absolute("half", "m", 1.0, 1.0, 0.1)])
+    monkeypatch.setattr(cases, "CASES", (done, Case("V2", "stopped", "nowhere", stop)))
+    answer = blocksim("verify")
+    assert answer.code == 75
+    assert "half, m" in answer.out
+    assert "stopped" in answer.err
 
 
 def test_an_unknown_case_is_told(blocksim: Command) -> None:
