@@ -28,6 +28,7 @@ VOID := $(if $(realpath $(VENV_PYTHON)),,void)
 
 SCENARIO := scenarios/three_blocks.toml
 SMOKE := results/make-smoke
+PICTURES := results/make-pictures
 
 .PHONY: help
 help: ## List the targets
@@ -41,6 +42,18 @@ run: $(RUN_STAMP) ## Let the three blocks collapse and compare with the measurem
 .PHONY: test
 test: $(DEV_STAMP) ## Run the tests (sets up .venv first)
 	$(VENV_PYTHON) -m pytest
+
+.PHONY: test-long
+test-long: $(DEV_STAMP) ## Run the full sizes of the verification cases, some minutes
+	$(VENV_PYTHON) -m pytest -m long
+
+.PHONY: test-nojit
+test-nojit: $(DEV_STAMP) ## Run the tests of the kernels as plain Python, without the compiler
+	NUMBA_DISABLE_JIT=1 $(VENV_PYTHON) -m pytest tests/kernels
+
+.PHONY: verify-table
+verify-table: $(DEV_STAMP) ## Measure all verification cases anew and write their table into the README
+	$(VENV_PYTHON) -m blocksim.verification.reference README.md --measure
 
 .PHONY: smoke
 smoke: $(RUN_STAMP) ## Short run, 2 x 2 sweep and compare, for your CI: does this installation work?
@@ -67,6 +80,15 @@ format: $(DEV_STAMP) ## Bring the code into shape
 .PHONY: readme
 readme: $(DEV_STAMP) ## Write the table of scenario keys in the README anew, from the models
 	$(VENV_PYTHON) -m blocksim.scenario.reference README.md
+
+.PHONY: pictures
+pictures: $(RUN_STAMP) ## Draw the pictures of the README anew
+	$(BLOCKSIM) run $(SCENARIO) --quiet
+	$(BLOCKSIM) plot $(SCENARIO) --out results/three_blocks.png
+	$(BLOCKSIM) sweep scenarios/stiffness_levels.toml --out $(PICTURES)/stiffness --overwrite --quiet
+	$(BLOCKSIM) plot $(PICTURES)/stiffness --out results/stiffness_levels.png
+	$(BLOCKSIM) sweep scenarios/start_jitter.toml --out $(PICTURES)/jitter --overwrite --quiet
+	$(BLOCKSIM) plot $(PICTURES)/jitter --out results/start_jitter.png
 
 .PHONY: setup
 setup: $(DEV_STAMP) ## Create or update .venv, with the tools for developers

@@ -73,7 +73,13 @@ _CASES = (
     Case("V20", "convergence in step and spacing", "second order", convergence.convergence),
     Case("V21", "ground as a fixed block", "same motion", symmetry.fixed_block),
     Case("V22", "three blocks at rest, e = 0", "ten engines", collapse.at_rest),
-    Case("V23", "energy ledger of every scenario", "balance", energy.ledgers),
+    Case(
+        "V23",
+        "energy ledger of every scenario",
+        "balance",
+        energy.ledgers,
+        quick="a hundredth of the stiffness",
+    ),
     Case("V24", "three blocks before their first impact", "pymunk, Box2D", collapse.before_impact),
 )
 CASES = tuple(replace(case, remarks=REMARKS.get(case.id, {})) for case in _CASES)

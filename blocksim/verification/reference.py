@@ -71,7 +71,7 @@ def _case_lines(stored: Stored, case: Case) -> Iterator[str]:
 
 
 def _cell(row: Row | None) -> str:
-    return "–" if row is None else f"{number(row.measured, 3)} {SIGNS[row.verdict]}"
+    return "–" if row is None else f"{number(row.measured)} {SIGNS[row.verdict]}"
 
 
 def _remarks(stored: Stored) -> Iterator[str]:

@@ -19,7 +19,7 @@ LONGEST = 0.2  # s
 SETTLED = 1e-3  # s after the impact
 
 
-def released(setting: Setting) -> Simulation:
+def released(setting: Setting, restitution: float) -> Simulation:
     """Let go of a slender block that stands on its right corner, turned by half the angle of balance."""
     tilt = forms.toppling_slope(SLENDER, TALL) / 2
     # the corner stays at x = SLENDER/2, y = 0; turned clockwise
@@ -30,12 +30,12 @@ def released(setting: Setting) -> Simulation:
         "width": SLENDER,
         "height": TALL,
     }
-    return setting.start([body], restitution=0.0, ground_friction=NO_SLIP)
+    return setting.start([body], restitution=restitution, ground_friction=NO_SLIP)
 
 
 def quarter_period(setting: Setting) -> Iterator[Row]:
     """Time the way from release to standing upright."""
-    time, _ = until_upright(released(setting))
+    time, _ = until_upright(released(setting, 0.2))
     expected = forms.rocking_quarter_time(SLENDER, TALL, forms.toppling_slope(SLENDER, TALL) / 2)
     yield relative("time to upright", "s", expected, time, 0.005)
 
@@ -57,7 +57,7 @@ def housner(setting: Setting) -> Iterator[Row]:
     The impact takes a while; until it is over the block has turned a little, and the spin at the upright position
     follows from the energy about the corner, w^2 + (3/2) g (cos(alpha) - cos(alpha - |angle|)) / R.
     """
-    scene = released(setting)
+    scene = released(setting, 0.0)
     before = upright_spin_before()
     time, _ = until_upright(scene)
     block = scene.to_time(time + SETTLED).bodies[0]

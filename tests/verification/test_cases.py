@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.verification.case import Case, Row, Setting, Verdict, at_least
 from blocksim.verification.cases import CASES, chosen
-from blocksim.verification.reference import BEGIN, END, STORE, read_store, stored_rows, table, with_table
+from blocksim.verification.reference import BEGIN, COLUMNS, END, STORE, read_store, stored_rows, table, with_table
 from blocksim.verification.verify import Outcome, run_case
 
 ROOT = Path(__file__).parents[2]
@@ -51,7 +51,9 @@ def test_table_of_the_readme_is_that_of_the_kept_results() -> None:
 
 
 def test_kept_results_have_all_cases_in_every_column() -> None:
-    for column in read_store(ROOT / STORE).values():
+    stored = read_store(ROOT / STORE)
+    assert list(stored) == list(COLUMNS), "run: make verify-table"
+    for column in stored.values():
         assert list(column) == [case.id for case in CASES]
         assert all(column.values())
 

@@ -20,7 +20,8 @@ END = 0.24  # s, after the first impacts
 
 def bits(scene: Simulation) -> dict[str, bytes]:
     """Return every bit of the state."""
-    return {name: array.tobytes() for name, array in scene.world._asdict().items() if name not in NOT_STATE}
+    arrays = scene.world._asdict().items()
+    return {name: array.tobytes() for name, array in arrays if name not in NOT_STATE and array is not None}
 
 
 def collapse(start_shipped: Callable[..., Simulation]) -> Simulation:

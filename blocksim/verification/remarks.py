@@ -1,0 +1,42 @@
+"""Why the contact models of particles miss tolerances: case, model, one line. Printed only where a case is outside."""
+
+BUMPS = "equal spacings of the two boundaries interlock, so bodies climb over bumps as high as (1 − √3/2) spacing"
+SETTLING = "particles settle in the gaps between those opposite, (1 − √3/2) spacing deeper than flat faces"
+ROUNDING = "corners are rounded by half a spacing, which moves the contact point inwards"
+SAMPLING = "where the opposite particles lie decides by how much an edge is felt; small differences grow"
+
+REMARKS = {
+    "V2": {"particles": SETTLING},
+    "V3": {"particles": SETTLING},
+    "V4": {"particles": ROUNDING},
+    "V5": {"particles": ROUNDING},
+    "V7": {"particles": BUMPS},
+    "V8": {"particles": BUMPS},
+    "V9": {"particles": BUMPS},
+    "V10": {"particles": BUMPS},
+    "V11": {"particles": ROUNDING},
+    "V12": {
+        "particles": ROUNDING,
+        "kernel": "several particles along the face share the impact, so it acts a little inside of the corner",
+    },
+    "V13": {"particles": ROUNDING},
+    "V17": {"particles": ROUNDING},
+    "V18": {"particles": ROUNDING},
+    "V19": {"particles": SAMPLING, "kernel": SAMPLING},
+    "V20": {
+        "particles": BUMPS,
+        "kernel": "distances and normals are means over a smoothing length, which is halved with the spacing",
+    },
+    "V21": {
+        "particles": BUMPS,
+        "kernel": "the plane is exact, the face of a fixed block is made of particles; bounces multiply the difference",
+    },
+    "V22": {
+        "particles": BUMPS,
+        "kernel": "edges are felt within a smoothing length of 1.3 mm, as if they were rounded",
+    },
+    "V24": {
+        "particles": BUMPS,
+        "kernel": "edges are felt within a smoothing length of 1.3 mm, as if they were rounded",
+    },
+}
