@@ -8,7 +8,7 @@ the contact itself goes on under another corner, and its history goes with it.
 from blocksim.kernels.arrays import NO_FACE, NORMAL, SHEAR, Record, Records, World
 from blocksim.kernels.broad_phase import clear_slot
 from blocksim.kernels.jit import rare_kernel
-from blocksim.kernels.kinematics import resolve_point, weigh_first_step
+from blocksim.kernels.kinematics import has_just_begun, resolve_point, weigh_first_step
 from blocksim.kernels.models import SURFACE, place_ended
 from blocksim.kernels.models.surface import slot_normal
 from blocksim.kernels.models.twins import PARALLEL
@@ -74,7 +74,7 @@ def hand_over(world: World, p: int, count: int) -> None:
         new = world.slots[p, point.slot]
         for k in range(world.slots.shape[1]):
             old = world.slots[p, k]
-            is_late = new.face == NO_FACE and point.closing < point.depth
+            is_late = new.face == NO_FACE and not has_just_begun(point)
             if is_late and old.face != NO_FACE and not goes_on(k, old.face, world.points, count):
                 nx, ny = slot_normal(k, old.face, a, b, pair.b == world.bodies.size - 1)
                 if nx * point.nx + ny * point.ny > PARALLEL:

@@ -5,6 +5,7 @@ from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.laws import dashpot_weight
 
 DELASSUS = 0  # index into the work matrices
+ROUND_OFF = 1e-6  # of an overlap after one drift: a small difference of places, where the closing is a small product
 ONSET_STEPS = 16.0  # after which the mean over a step and the value in its middle differ by less than 1/30000
 
 
@@ -39,6 +40,12 @@ def resolve_point(point: Record, a: Record, b: Record, step: float) -> None:
 
 
 @rare_kernel
+def has_just_begun(point: Record) -> bool:
+    """Tell whether a point came into contact within the last drift: it is no deeper than it closed, to round-off."""
+    return point.closing > 0.0 and point.depth <= point.closing * (1.0 + ROUND_OFF)
+
+
+@rare_kernel
 def weigh_first_step(point: Record, law: int) -> None:
     """Set the dashpot weight and the drawn share of the shear spring of a point that was not in contact before.
 
@@ -47,8 +54,8 @@ def weigh_first_step(point: Record, law: int) -> None:
     drift drew the shear spring for s dt only. A contact that comes deeper than it closed was there before under another
     corner: it keeps the full weight.
     """
-    if point.closing >= point.depth:
-        share = point.depth / point.closing
+    if has_just_begun(point):
+        share = min(point.depth / point.closing, 1.0)
         point.weight = dashpot_weight(law, 0.0, share + 0.5, share)
         point.drawn = share
 
