@@ -17,7 +17,7 @@ COMMANDS = {  # name: module in this folder, function in it, first line of its h
     "check": ("check", "check_command", "Validate a scenario and show what it comes to."),
     "sweep": ("sweep", "sweep_command", "Run a scenario many times with some keys varied."),
     "converge": ("converge", "converge_command", "Refine step, stiffness and spacing until the run-out stays."),
-    "verify": ("verify", "verify_command", "Run the verification cases and show how well they are met."),
+    "verify": ("verify", "verify_command", "Run the verification cases and show the table."),
     "plot": ("plot", "plot_command", "Draw a run as a strip of pictures."),
     "schema": ("schema", "schema_command", "Print the JSON Schema of scenario files, for editors."),
 }

@@ -33,7 +33,7 @@ def tell_compilation(model: str, *, quiet: bool) -> None:
     if quiet or is_compiled(model):
         compile_kernels(model)
         return
-    note("Compiling the solver, once after installation (about half a minute) ...")
+    note("Compiling the solver, once after installation (less than a minute) ...")
     note(f"Compiled in {compile_kernels(model):.0f} s.")
 
 
