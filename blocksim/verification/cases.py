@@ -57,7 +57,7 @@ _CASES = (
         "stack of ten blocks",
         "rest",
         resting.tower,
-        quick="creep over 0.5–1 s instead of 5–10 s",
+        quick="creep over 0.5–1 s instead of 5–10 s, a hundredth of the stiffness",
     ),
     Case("V15", "kinetic energy in 4950 impacts", "no gain", energy.impacts),
     Case("V16", "two free blocks colliding off-centre", "conservation", impacts.two_blocks),
