@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.scenario import PlacedSegment
+from blocksim.scenario.segments import TOLERANCE
 from blocksim.view import style
 from blocksim.view.moments import Floats
 from blocksim.view.support import Support
@@ -116,11 +117,11 @@ def draw_ruler(canvas: Canvas, depth: float) -> None:
     """Draw numbers of x (mm) along tilted ground, `depth` (points) below its lowest part."""
     from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - see style
 
-    low, high = canvas.extent.span
+    y = canvas.extent.base - depth / canvas.points_per_mm
+    low, high = canvas.extent.span(y)
     edge = RULER_EDGE / canvas.points_per_mm
     room = (high - low) * canvas.points_per_mm
     locator = MaxNLocator(nbins=max(2, int(room / TICK_SPACING)), steps=[1, 2, 5, 10])
-    y = canvas.extent.base - depth / canvas.points_per_mm
     tick = TICK_LENGTH / canvas.points_per_mm
     canvas.axes.plot([low, high], [y, y], color=style.FAINT_INK, linewidth=style.LINE_WIDTH, transform=canvas.scene)
     for x in locator.tick_values(low, high):
@@ -147,8 +148,8 @@ def wall_outlines(walls: tuple[PlacedSegment, ...], thickness: float) -> list[Fl
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     outlines = []
     for wall, face, way in zip(walls, faces, ways, strict=True):
-        before = [other for other, (_, end) in zip(ways, faces, strict=True) if np.allclose(end, face[0])]
-        after = [other for other, (start, _) in zip(ways, faces, strict=True) if np.allclose(start, face[1])]
+        before = [other for other, (_, end) in zip(ways, faces, strict=True) if _is_one(end, face[0])]
+        after = [other for other, (start, _) in zip(ways, faces, strict=True) if _is_one(start, face[1])]
         first = face[0] + thickness * _depth(way, before, -way * wall.extends_start)
         last = face[1] + thickness * _depth(way, after, way * wall.extends_end)
         outlines.append(np.stack([face[0], face[1], last, first]))
@@ -162,6 +163,10 @@ def _depth(way: Floats, others: list[Floats], beyond: Floats) -> Floats:
         other = _right(others[0])
         return np.asarray((right + other) / (1.0 + right @ other))
     return right + beyond
+
+
+def _is_one(point: Floats, other: Floats) -> bool:
+    return bool(np.hypot(*(point - other)) <= MILLIMETRES * TOLERANCE)
 
 
 def _right(way: Floats) -> Floats:

@@ -15,7 +15,9 @@ from blocksim.view.window import MILLIMETRES
 Flags = NDArray[np.bool_]
 UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # counter-clockwise from lower left
 EDGE_INSET = 0.86  # where the mark of the upper side runs, as a part of half the height
+NAME_ROOM = 0.85, 0.7  # width and height for a block's name, as parts of its smaller side
 FIXED_HATCH = "////"
+LEAST_HATCHED = 12.0  # points; on smaller blocks hatching is a few stray lines
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,14 @@ def corners(frames: FramesLike, frame: int) -> Floats:
     """Return the corners (mm) of every block in one frame, (b, 4, 2), counter-clockwise."""
     local = UNIT_CORNERS[None] * np.stack([frames.size_x, frames.size_y], axis=-1)[:, None, :]
     return MILLIMETRES * _placed(local, frames, frame)
+
+
+def readable_scale(frames: FramesLike) -> float:
+    """Return the least scale (points a mm) at which the name of every block fits into it."""
+    wide, tall = (letter * style.SMALLEST_FONT / room for letter, room in zip(style.LETTER, NAME_ROOM, strict=True))
+    sizes = MILLIMETRES * np.minimum(frames.size_x, frames.size_y)
+    lengths = np.array([len(name) for name in frames.names])
+    return float((np.maximum(wide * lengths, tall) / sizes).max())
 
 
 def draw_scene(canvas: Canvas, frames: FramesLike, frame: int, support: Support) -> None:
@@ -86,7 +96,8 @@ def _draw_blocks(canvas: Canvas, frames: FramesLike, frame: int, outlines: Float
     thin = min(style.LINE_WIDTH, 0.05 * smallest)
     line: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
     fills = [style.block_colour(int(index)) for index in np.flatnonzero(~fixed)]
-    held = PolyCollection(list(outlines[fixed]), facecolors=style.GROUND_COLOUR, hatch=FIXED_HATCH, **line)
+    hatch = FIXED_HATCH if smallest >= LEAST_HATCHED else None
+    held = PolyCollection(list(outlines[fixed]), facecolors=style.GROUND_COLOUR, hatch=hatch, **line)
     free = PolyCollection(list(outlines[~fixed]), facecolors=fills, **line)
     sides = LineCollection(
         list(_upper_sides(frames, frame)[~fixed]), colors=style.INK, linewidths=2.0 * thin, transform=canvas.scene
@@ -123,7 +134,7 @@ def _label_fonts(frames: FramesLike, points_per_mm: float) -> Floats:
     Names on some blocks only would look like a difference between the blocks.
     """
     sizes = MILLIMETRES * points_per_mm * np.minimum(frames.size_x, frames.size_y)
-    rooms = [(0.85 * float(size), 0.7 * float(size)) for size in sizes]
+    rooms = [(NAME_ROOM[0] * float(size), NAME_ROOM[1] * float(size)) for size in sizes]
     return np.array([style.fitting_font(name, room) for name, room in zip(frames.names, rooms, strict=True)])
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from blocksim.view import style
 from blocksim.view.ground import GROUND_THICKNESS, RULER_HEIGHT, Canvas, draw_ruler
 from blocksim.view.moments import FramesLike, Indices, drawable_frames, moments_at, moments_by_motion
-from blocksim.view.scene import MeasuredRange, draw_centres, draw_measured, draw_scene
+from blocksim.view.scene import MeasuredRange, draw_centres, draw_measured, draw_scene, readable_scale
 from blocksim.view.support import Support
 from blocksim.view.window import MILLIMETRES, Extent, extent_of
 
@@ -29,6 +29,7 @@ TICK_ROOM = 0.4  # inches along the axis for one number
 TALLEST_PANEL = 4.0  # inches
 ROW_HEIGHT = 9.0  # points, of one row of measured ranges
 WIDEST_IN_FOURS, WIDEST_IN_PAIRS = 2.5, 6.0  # width over height, so that a panel stays about an inch tall
+LOW_ENOUGH = 1.6  # width over height from which four rows of pairs fit on a page
 NARROWEST = 0.35  # width over height
 LEAST_MOVED = 0.005  # mm; less is nothing in two decimals
 LEAST_ANGLE = 0.05  # degrees; motion closer to x is along x
@@ -82,9 +83,9 @@ def draw_strip(
     """Draw the run as 6 to 8 panels from release to the final state and write them as PNG, SVG or PDF.
 
     `times` (s) picks the panels by hand. With `measured` the last panel shows mean and range of the measured
-    centres below the ground. `support` is what the blocks stand on, level ground at rest if it is not given. The same input gives the same bytes. Raises InvalidInputError for an unknown
-    picture format, a time that was not recorded, or nothing to draw, and OutputError when the file cannot be
-    written.
+    centres below the ground. `support` is what the blocks stand on: level ground at rest if it is not given. The same
+    input gives the same bytes. Raises InvalidInputError for an unknown picture format, a time that was not recorded,
+    or nothing to draw, and OutputError when the file cannot be written.
     """
     path = Path(path)
     style.picture_suffix(path)
@@ -93,7 +94,7 @@ def draw_strip(
     extent = extent_of(frames, drawable, support)
     ranges = [] if measured is None else measured_ranges(measured, frames.names, extent.width)
     extent = widened(extent, ranges)
-    columns, count = arrangement(extent)
+    columns, count = arrangement(extent, readable_scale(frames))
     if times is None:
         carried = support.offset(frames.time[drawable])
         chosen = moments_by_motion(frames, drawable, count, carried)
@@ -109,11 +110,15 @@ def draw_strip(
         style.save_figure(figure, path)
 
 
-def arrangement(extent: Extent) -> tuple[int, int]:
-    """Return the number of columns and the number of panels: flat and long scenes get few columns."""
+def arrangement(extent: Extent, readable: float = 0.0) -> tuple[int, int]:
+    """Return the number of columns and the number of panels: flat and long scenes get few columns.
+
+    So do scenes in between where names are `readable`, from that many points a mm on, in two columns but not in four.
+    """
     aspect = extent.width / extent.height
     if aspect <= WIDEST_IN_FOURS:
-        return 4, 8
+        fours, pairs = (style.POINTS_PER_INCH * _panel_width(columns) / extent.width for columns in (4, 2))
+        return (2, 8) if aspect >= LOW_ENOUGH and fours < readable <= pairs else (4, 8)
     return (2, 8) if aspect <= WIDEST_IN_PAIRS else (1, 6)
 
 
@@ -124,8 +129,7 @@ def plan(extent: Extent, columns: int, panels: int, measured_rows: int, captions
     """
     columns = min(columns, panels)
     rows = -(-panels // columns)
-    panel_width = (WIDTH - 2.0 * SIDE - (columns - 1) * GAP) / columns
-    scale = min(panel_width / extent.width, TALLEST_PANEL / extent.height)  # inches per mm
+    scale = min(_panel_width(columns) / extent.width, TALLEST_PANEL / extent.height)  # inches per mm
     below = max((extent.lowest - extent.bottom) * scale, _room_below(extent, measured_rows) / style.POINTS_PER_INCH)
     panel_height = (extent.top - extent.lowest) * scale + below
     ticks = 0.0 if extent.tilt else TICKS
@@ -133,6 +137,11 @@ def plan(extent: Extent, columns: int, panels: int, measured_rows: int, captions
     height = TITLE + rows * (panel_height + head) + (rows - 1) * ticks + foot
     points_per_mm = scale * style.POINTS_PER_INCH
     return Layout(columns, rows, extent.width * scale, panel_height, points_per_mm, height, extent, head, foot)
+
+
+def _panel_width(columns: int) -> float:
+    """Return the width that a panel may have (inches)."""
+    return (WIDTH - 2.0 * SIDE - (columns - 1) * GAP) / columns
 
 
 def _depth_of(rows: int) -> float:
@@ -205,7 +214,7 @@ def _draw_texts(figure: "Figure", layout: Layout, title: str | None, notes: Sequ
 
 
 def _finish_panel(canvas: Canvas, layout: Layout, *, labelled: bool) -> None:
-    """Fix the scale of a panel and leave only its x axis, of which a tilted picture keeps no more than the name."""
+    """Fix the scale of a panel and leave only its x axis; tilted ground has a ruler of its own."""
     from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - see style
 
     axes, extent = canvas.axes, canvas.extent
@@ -217,11 +226,10 @@ def _finish_panel(canvas: Canvas, layout: Layout, *, labelled: bool) -> None:
     ticks = max(2, int(layout.panel_width / TICK_ROOM))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=ticks, steps=[1, 2, 5, 10]))
     axes.tick_params(axis="x", length=2.5, pad=1.5)
-    if extent.tilt:
-        axes.spines["bottom"].set_visible(False)
-        axes.set_xticks([])
+    axes.xaxis.set_visible(not extent.tilt)
+    axes.spines["bottom"].set_visible(not extent.tilt)
     if labelled:
-        axes.set_xlabel("x along the ground (mm)" if extent.tilt else "x (mm)", labelpad=1.0)
+        axes.set_xlabel("x (mm)", labelpad=1.0)
 
 
 def _caption(frames: FramesLike, frame: int, support: Support) -> str:
@@ -241,13 +249,14 @@ def _caption(frames: FramesLike, frame: int, support: Support) -> str:
 def _legend(ranges: Sequence[MeasuredRange], support: Support) -> str:
     texts = ["Thick line inside a block: its own upper side."]
     if any(support.fixed):
-        texts.append("Hatched: fixed.")
+        texts.append("Grey: fixed.")
     if support.motion is not None:
-        angle = float(np.degrees(np.arctan2(*support.direction[::-1])))
-        along = "along x" if abs(angle) < LEAST_ANGLE else f"along {angle:.3g}° from x"
-        texts.append(f"The support moves {along}; dashed: where it was at the start; arrow: way of the ground since.")
+        turn = float(np.degrees(np.arctan2(*support.direction[::-1])))
+        along = "along x" if abs(turn) < LEAST_ANGLE else f"at {turn:.3g}° to x".replace("-", "−")
+        texts.append(f"The support moves {along}; dashes and arrow: from where it was at the start.")
     if support.tilt:
-        texts.append(f"Ground tilted by {float(np.degrees(support.tilt)):.3g}°; gravity points down.")
+        angle = f"{float(np.degrees(support.tilt)):.3g}°".replace("-", "−")
+        texts.append(f"The ground is tilted by {angle}, gravity points down; x along the ground in mm.")
     if ranges:
         texts.append("Last panel: simulated centres marked on the ground, measured mean and range below it.")
     return " ".join(texts)

@@ -23,6 +23,7 @@ DOTS_PER_INCH = 150
 FONT_SIZE = 8.0  # points
 TITLE_SIZE = 10.0
 SMALLEST_FONT = 4.0  # smaller text is left out
+LETTER = 0.64, 1.2  # width and height of a digit in units of the font size
 LINE_WIDTH = 0.8  # points
 
 # A fixed salt and no dates: the same picture is the same file.
@@ -99,6 +100,5 @@ def save_figure(figure: "Figure", path: Path) -> None:
 
 def fitting_font(text: str, room: tuple[float, float], largest: float = FONT_SIZE) -> float:
     """Return the font size (points) that fits `text` into `room` (width, height; points); 0 if unreadable."""
-    letter = 0.64  # width of a digit in units of the font size
-    size = min(largest, room[0] / (letter * max(len(text), 1)), room[1] / 1.2)
+    size = min(largest, room[0] / (LETTER[0] * max(len(text), 1)), room[1] / LETTER[1])
     return size if size >= SMALLEST_FONT else 0.0

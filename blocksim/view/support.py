@@ -31,11 +31,12 @@ class Support:
 
     def offset(self, times: Floats) -> Floats:
         """Return the displacement (m) along x and y at these times (s), (n, 2)."""
-        return self.displacement(times)[:, None] * np.array(self.direction)
+        return np.multiply.outer(self.displacement(times), self.direction)
 
     def height(self, x: Floats) -> Floats:
         """Return the height (m) of the ground at rest at these places (m)."""
-        return np.interp(x, *np.array(self.profile).T)
+        places, heights = np.array(self.profile).T
+        return np.asarray(np.interp(x, places, heights))
 
     def line(self, reach: float) -> Floats:
         """Return the points (m) of the ground at rest, with level ends of length `reach` (m); (k, 2)."""
@@ -48,7 +49,7 @@ class Support:
         line = self.line(1.0)
         before, after = np.diff(line, axis=0)[:-1], np.diff(line, axis=0)[1:]
         turns = before[:, 0] * after[:, 1] != before[:, 1] * after[:, 0]
-        return line[1:-1][turns]
+        return np.asarray(line[1:-1][turns])
 
 
 def support_of(scenario: Scenario) -> Support:

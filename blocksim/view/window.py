@@ -47,10 +47,9 @@ class Extent:
         """Where a line along the ground through `base` is lowest in the picture (mm)."""
         return self.base / float(np.cos(self.tilt)) + min(self.left * self._slope, self.right * self._slope)
 
-    @property
-    def span(self) -> tuple[float, float]:
-        """From which to which x (mm, scene) a line along the ground through `base` runs in the picture."""
-        cosine, shift = float(np.cos(self.tilt)), float(np.sin(self.tilt)) * self.base
+    def span(self, y: float) -> tuple[float, float]:
+        """Return from which to which x a line along the ground at height y can be seen (mm, scene)."""
+        cosine, shift = float(np.cos(self.tilt)), float(np.sin(self.tilt)) * y
         return (self.left + shift) / cosine, (self.right + shift) / cosine
 
     @property
@@ -92,7 +91,7 @@ def parts_within(line: Floats, low: Floats, high: Floats) -> Floats:
     enter = np.fmin(*shares).max(axis=1).clip(min=0.0)
     leave = np.fmax(*shares).min(axis=1).clip(max=1.0)
     ends = starts[:, None] + ways[:, None] * np.stack([enter, leave], axis=1)[:, :, None].clip(0.0, 1.0)
-    return ends[enter <= leave]
+    return np.asarray(ends[enter <= leave])
 
 
 def _reached(frames: FramesLike, chosen: Indices, support: Support) -> Floats:
@@ -114,7 +113,7 @@ def _extreme_offsets(frames: FramesLike, chosen: Indices, support: Support) -> F
     """Return the support's places (m) at its start and farthest to either side, (k, 2)."""
     displacement = support.displacement(frames.time[chosen])
     farthest = np.unique([0.0, displacement.min(), displacement.max()])
-    return farthest[:, None] * np.array(support.direction)
+    return np.asarray(np.multiply.outer(farthest, support.direction))
 
 
 def _near(support: Support, shifts: Floats, low: Floats, high: Floats) -> Floats:

@@ -24,6 +24,17 @@ def test_failed_run_can_be_drawn(blocksim: Command) -> None:
     assert blocksim("plot", "out").code == 0
 
 
+def test_the_folder_alone_tells_what_the_blocks_stand_on(blocksim: Command) -> None:
+    brief = ("--set", "time.end=0.1", "--set", "ground.tilt=3 deg", "--out", "out")
+    assert blocksim("run", "scenarios/shaking_table.toml", *SOFT, *brief).code == 0
+    Path("out").rename("elsewhere")
+    assert blocksim("plot", "elsewhere", "--out", "strip.svg", "--times", "0,0.05").code == 0
+    texts = Path("strip.svg").read_text(encoding="utf-8")
+    assert "The support moves along x" in texts
+    assert "gravity points down" in texts
+    assert "<!-- support 0.00 mm -->" in texts
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [

@@ -52,6 +52,13 @@ def test_going_back_and_forth_does_not_cancel() -> None:
     assert path_travelled(frames, drawable_frames(frames))[-1] == 2.0
 
 
+def test_riding_on_a_moving_support_is_no_way() -> None:
+    frames = moving([0.0, 1.0, 0.0, 0.5])
+    carried = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    assert list(path_travelled(frames, drawable_frames(frames), carried)) == [0.0, 0.0, 0.0, 0.5]
+    assert list(moments_by_motion(frames, drawable_frames(frames), 3, carried)) == [0, 3]
+
+
 @pytest.mark.parametrize(("places", "expected"), [([1.0], [0]), ([1.0] * 9, [0, 8]), ([0.0, 1.0, 2.0], [0, 1, 2])])
 def test_short_or_still_runs_show_no_frame_twice(places: list[float], expected: list[int]) -> None:
     frames = moving(places)

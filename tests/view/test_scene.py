@@ -4,9 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgba
+from matplotlib.path import Path as MatplotlibPath
 from numpy.typing import NDArray
 
-from blocksim.view.scene import corners, extent_of
+from blocksim.scenario.motion import MotionPieces
+from blocksim.view.ground import Canvas
+from blocksim.view.scene import corners, draw_scene, readable_scale
+from blocksim.view.style import GROUND_COLOUR, block_colour, styled_figure
+from blocksim.view.support import Support
+from blocksim.view.window import extent_of
 
 Floats = NDArray[np.float64]
 
@@ -39,21 +47,84 @@ def test_a_block_turned_clockwise_lies_on_its_right_side() -> None:
     assert lying.tolist() == [pytest.approx(point, abs=1e-9) for point in ([175, 32], [175, 0], [225, 0], [225, 32])]
 
 
-def test_the_scene_is_as_large_as_the_corners_with_one_margin() -> None:
-    extent = extent_of(FRAMES, np.array([0, 1]))
-    points = np.concatenate([corners(FRAMES, 0)[0], corners(FRAMES, 1)[0]])
-    margins = [
-        points[:, 0].min() - extent.left,
-        extent.right - points[:, 0].max(),
-        extent.top - points[:, 1].max(),
-    ]
-    assert margins == [pytest.approx(margins[0])] * 3
+def test_names_are_readable_from_the_scale_at_which_they_are_written() -> None:
+    scale = readable_scale(FRAMES)
+    assert name_at(1.01 * scale) == "1"
+    assert name_at(0.99 * scale) == ""
 
 
-def test_the_scene_holds_every_corner_of_every_frame_and_the_ground() -> None:
-    extent = extent_of(FRAMES, np.array([0, 1]))
-    assert extent.left < 84.0
-    assert extent.right > 225.0
-    assert extent.bottom < 0.0
-    assert extent.top > 50.0
-    assert extent.width < 1.2 * (225 - 84)
+def name_at(points_per_mm: float) -> str:
+    """Return what is written on the block of FRAMES at this scale."""
+    return "".join(text.get_text() for text in drawn(FRAMES, Support(), points_per_mm).axes.texts)
+
+
+def drawn(frames: Frames, support: Support, points_per_mm: float = 1.0) -> Canvas:
+    """Draw the last frame."""
+    frame = len(frames.time) - 1
+    extent = extent_of(frames, np.arange(frame + 1), support)
+    with styled_figure(1.0, 1.0) as figure:
+        canvas = Canvas(figure.add_axes((0.0, 0.0, 1.0, 1.0)), extent, points_per_mm)
+        draw_scene(canvas, frames, frame, support)
+    return canvas
+
+
+PAIR = Frames(
+    time=np.array([0.0]),
+    x=np.array([[0.1, 0.2]]),
+    y=np.array([[0.025, 0.025]]),
+    angle=np.zeros((1, 2)),
+    size_x=np.array([0.032, 0.032]),
+    size_y=np.array([0.050, 0.050]),
+    names=("pier", "2"),
+)
+
+
+def blocks_of(canvas: Canvas) -> list[PolyCollection]:
+    """Return what is drawn for fixed and for free blocks."""
+    return [artist for artist in canvas.axes.collections if isinstance(artist, PolyCollection)]
+
+
+def points(path: MatplotlibPath) -> Floats:
+    """Return the points (mm) of a path."""
+    return np.asarray(path.vertices, dtype=float)
+
+
+def test_fixed_blocks_are_hatched_in_the_ground_s_colour_and_free_ones_keep_theirs() -> None:
+    fixed, free = blocks_of(drawn(PAIR, Support(fixed=(True, False))))
+    assert [points(path)[0].tolist() for path in fixed.get_paths()] == [pytest.approx([84, 0])]
+    assert [points(path)[0].tolist() for path in free.get_paths()] == [pytest.approx([184, 0])]
+    assert fixed.get_hatch()
+    assert not free.get_hatch()
+    assert np.asarray(fixed.get_facecolor()).tolist() == [list(to_rgba(GROUND_COLOUR))]
+    assert np.asarray(free.get_facecolor()).tolist() == [list(to_rgba(block_colour(1)))]
+
+
+def test_only_free_blocks_show_their_upper_side() -> None:
+    lines = drawn(PAIR, Support(fixed=(True, False))).axes.collections[-1]
+    assert len(lines.get_paths()) == 1
+    assert points(lines.get_paths()[0])[:, 0].min() > 184.0
+
+
+def test_a_fixed_block_s_long_name_does_not_take_the_others_names_away() -> None:
+    scale = 0.3
+    free = drawn(PAIR, Support(), scale).axes.texts
+    held = drawn(PAIR, Support(fixed=(True, False)), scale).axes.texts
+    assert [text.get_text() for text in free] == []
+    assert [text.get_text() for text in held] == ["2"]
+
+
+def test_a_moving_fixed_block_is_dashed_where_it_was() -> None:
+    frames = Frames(
+        time=np.array([0.0, 1.0]),
+        x=np.array([[0.1], [0.11]]),
+        y=np.full((2, 1), 0.025),
+        angle=np.zeros((2, 1)),
+        size_x=np.array([0.032]),
+        size_y=np.array([0.050]),
+        names=("1",),
+    )
+    motion = MotionPieces(np.array([0.0, 1.0]), np.array([[0.0, 0.01, 0.0, 0.0]]), 0.01)
+    dashed = drawn(frames, Support(fixed=(True,), motion=motion)).axes.collections[1]
+    assert dashed.get_zorder() < 1.0  # under the blocks
+    assert [points(path)[0].tolist() for path in dashed.get_paths()] == [pytest.approx([84.0, 0.0])]
+    assert points(dashed.get_paths()[0]).max(axis=0).tolist() == pytest.approx([116.0, 50.0])

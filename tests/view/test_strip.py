@@ -4,19 +4,24 @@ import struct
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from blocksim.analysis import load_table
 from blocksim.errors import InvalidInputError, OutputError
-from blocksim.view import strip
-from blocksim.view.scene import Extent
+from blocksim.scenario.motion import MotionPieces
+from blocksim.view import strip, style
 from blocksim.view.strip import arrangement, draw_strip, measured_ranges, plan, widened
+from blocksim.view.support import Support
+from blocksim.view.window import Extent
 
 Floats = NDArray[np.float64]
 
@@ -187,6 +192,98 @@ def test_panels_share_one_scale_and_do_not_overlap(extent: Extent) -> None:
     for index, (left, bottom, width, height) in enumerate(boxes):
         for other_left, other_bottom, *_ in boxes[index + 1 :]:
             assert other_left >= left + width or other_bottom + height <= bottom
+
+
+def test_names_that_need_larger_panels_get_them_where_the_page_allows() -> None:
+    low, square = Extent(0, 800, 0, 400), Extent(0, 400, 0, 400)
+    assert arrangement(low, readable=0.3) == (2, 8)
+    assert arrangement(low, readable=0.1) == (4, 8)  # readable as it is
+    assert arrangement(low, readable=5.0) == (4, 8)  # not readable either way
+    assert arrangement(square, readable=0.5) == (4, 8)
+
+
+def test_tilted_panels_have_room_for_the_numbers_along_the_ground() -> None:
+    level, tilted = (plan(Extent(0, 400, 0, 300, tilt=tilt), 4, 8, measured_rows=1) for tilt in (0.0, 0.3))
+    below = [one.panel_height * 72 - (300 - one.extent.lowest) * one.points_per_mm for one in (level, tilted)]
+    assert below[1] - below[0] > 12.0
+
+
+MOVING = MotionPieces(np.array([0.0, 0.3, 1.0]), np.array([[0.0, 0.0, 0.1, 0.0], [0.009, 0.0, 0.0, 0.0]]), 0.0)
+SUPPORTS = {
+    "level": Support(),
+    "step": Support(profile=((0.05, 0.0), (0.05, -0.05)), fixed=(True, False, False)),
+    "moving": Support(motion=MOVING, direction=(np.cos(0.3), np.sin(0.3)), fixed=(True, False, False)),
+    "tilted": Support(tilt=0.3),
+    "steep": Support(tilt=-0.9, motion=MOVING),
+}
+
+
+@pytest.mark.parametrize("kind", SUPPORTS)
+@pytest.mark.parametrize("blocks", [1, 3])
+def test_no_text_overlaps_another_or_is_cut(kind: str, blocks: int, picture: list[Figure], tmp_path: Path) -> None:
+    support = replace(SUPPORTS[kind], fixed=SUPPORTS[kind].fixed[:blocks])
+    table = MadeUpTable({"1": (50.0, 55.0, 60.0), "2": (52.0, 90.0, 110.0)})
+    draw_strip(toppling(blocks), tmp_path / "strip.png", title="a title", measured=table, support=support)
+    boxes = [(text.get_text(), text.get_window_extent()) for text in texts_of(picture[0])]
+    assert len(boxes) > 10
+    for (one, box), (other, other_box) in combinations(boxes, 2):
+        is_apart = min(box.x1, other_box.x1) - max(box.x0, other_box.x0) <= 0.0
+        is_apart = is_apart or min(box.y1, other_box.y1) - max(box.y0, other_box.y0) <= 0.0
+        assert is_apart, (one, other)
+    whole = picture[0].bbox
+    for text, box in boxes:
+        assert min(box.x0, box.y0, whole.width - box.x1, whole.height - box.y1) >= 0.0, text
+
+
+def texts_of(figure: Figure) -> list[Text]:
+    """Return the texts that can be seen."""
+    texts = list(figure.texts)
+    for axes in figure.axes:
+        texts += [*axes.texts, axes._left_title]  # type: ignore[attr-defined]
+        if axes.xaxis.get_visible():
+            low, high = axes.get_xlim()
+            ticks = axes.xaxis.get_major_ticks()
+            texts += [axes.xaxis.label, *(tick.label1 for tick in ticks if low <= tick.get_loc() <= high)]
+    return [text for text in texts if text.get_text()]
+
+
+@pytest.fixture
+def picture(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """Give a list that will hold the drawn figures, which go no further."""
+    figures: list[Figure] = []
+
+    def keep(figure: Figure, _: Path) -> None:
+        figure.draw_without_rendering()
+        figures.append(figure)
+
+    monkeypatch.setattr(style, "save_figure", keep)
+    return figures
+
+
+def test_captions_tell_how_far_the_support_has_moved(tmp_path: Path) -> None:
+    path = tmp_path / "strip.svg"
+    draw_strip(toppling(3, steps=61), path, times=[0.0, 0.1, 0.3], support=Support(motion=MOVING))
+    texts = svg_texts(path)
+    for text in ("support 0.00 mm", "support +1.00 mm", "support +9.00 mm"):
+        assert f"<!-- {text} -->" in texts
+    assert "The support moves along x; dashes and arrow" in texts
+
+
+def test_riding_on_the_support_gets_no_panels_of_its_own(tmp_path: Path) -> None:
+    support, frames = Support(motion=MOVING), toppling(1)
+    frames.x, frames.angle = support.displacement(frames.time)[:, None], np.zeros_like(frames.angle)
+    frames.y = np.full_like(frames.y, 0.025)
+    draw_strip(frames, tmp_path / "strip.svg", support=support)
+    assert svg_texts(tmp_path / "strip.svg").count("<!-- support ") == 2
+
+
+def test_the_legend_names_what_is_drawn(tmp_path: Path) -> None:
+    path = tmp_path / "strip.svg"
+    draw_strip(toppling(3), path, support=Support(tilt=-0.2, fixed=(True, False, False)))
+    texts = svg_texts(path)
+    assert "Grey: fixed." in texts
+    assert "The ground is tilted by −11.5°, gravity points down" in texts
+    assert "support" not in texts
 
 
 def test_overlapping_measured_ranges_get_rows_of_their_own() -> None:

@@ -1,0 +1,158 @@
+"""Which part of the plane a strip shows."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from blocksim.scenario import PlacedSegment
+from blocksim.scenario.motion import MotionPieces
+from blocksim.view.scene import corners
+from blocksim.view.support import Support
+from blocksim.view.window import Extent, extent_of, parts_within, turned
+
+Floats = NDArray[np.float64]
+
+
+@dataclass
+class Frames:
+    """One block of 32 x 50 mm at the given places (m) and angles, a second apart."""
+
+    x: Floats
+    y: Floats
+    angle: Floats
+    time: Floats = field(init=False)
+    size_x: Floats = field(default_factory=lambda: np.array([0.032]))
+    size_y: Floats = field(default_factory=lambda: np.array([0.050]))
+    names: tuple[str, ...] = ("1",)
+
+    def __post_init__(self) -> None:
+        self.time = np.arange(len(self.x), dtype=float)
+
+
+def frames(*places: tuple[float, float, float]) -> Frames:
+    """Return frames of one block at these x, y (m) and angles (rad)."""
+    x, y, angle = np.array(places).T[:, :, None]
+    return Frames(x, y, angle)
+
+
+def window(shown: Frames, support: Support | None = None) -> Extent:
+    return extent_of(shown, np.arange(len(shown.time)), support)
+
+
+def wall(x0: float, y0: float, x1: float, y1: float) -> PlacedSegment:
+    return PlacedSegment(
+        x0,
+        y0,
+        x1,
+        y1,
+        material=None,
+        extends_start=False,
+        extends_end=False,
+        touches_start=True,
+        touches_end=True,
+    )
+
+
+FALLING = frames((0.1, 0.025, 0.0), (0.2, 0.016, -np.pi / 2))
+
+
+def test_the_scene_is_as_large_as_the_corners_with_one_margin() -> None:
+    extent = window(FALLING)
+    points = np.concatenate([corners(FALLING, 0)[0], corners(FALLING, 1)[0]])
+    margins = [
+        points[:, 0].min() - extent.left,
+        extent.right - points[:, 0].max(),
+        extent.top - points[:, 1].max(),
+    ]
+    assert margins == [pytest.approx(margins[0])] * 3
+
+
+def test_the_scene_holds_every_corner_of_every_frame_and_the_ground() -> None:
+    extent = window(FALLING)
+    assert extent.left < 84.0
+    assert extent.right > 225.0
+    assert extent.bottom < 0.0
+    assert extent.top > 50.0
+    assert extent.width < 1.2 * (225 - 84)
+    assert extent.base == 0.0
+
+
+def test_the_ground_below_a_block_is_shown_however_deep_but_no_other() -> None:
+    cliff = Support(profile=((0.12, 0.0), (0.12, -10.0)))
+    staying, falling = (
+        window(frames((0.1, 0.025, 0.0)), cliff),
+        window(frames((0.1, 0.025, 0.0), (0.2, 0.0, 0.0)), cliff),
+    )
+    assert -100.0 < staying.base < 0.0  # the cliff is seen, its foot is not
+    assert staying.right > 120.0
+    assert falling.base == pytest.approx(-10000.0)
+    assert falling.bottom < falling.base
+
+
+def test_corners_of_the_ground_are_shown_where_they_are_near() -> None:
+    block = frames((0.1, 0.025, 0.0))
+    near = window(block, Support(profile=((0.05, 0.01), (0.06, 0.0))))
+    far = window(block, Support(profile=((-5.0, 0.01), (-4.0, 0.0))))
+    plain = window(block)
+    assert near.left < 50.0 < plain.left
+    assert far == plain
+
+
+def test_level_ground_within_a_profile_needs_no_room_of_its_own() -> None:
+    block = frames((0.1, 0.025, 0.0))
+    assert window(block, Support(profile=((-300.0, 0.0), (0.1, 0.0), (300.0, 0.0)))) == window(block)
+
+
+def test_near_walls_are_shown_and_far_ones_are_not() -> None:
+    block = frames((0.1, 0.025, 0.0))
+    near = window(block, Support(walls=(wall(0.15, 0.0, 0.15, 100.0),)))
+    far = window(block, Support(walls=(wall(3.0, 0.0, 3.0, 100.0),)))
+    assert 150.0 < near.right < 200.0
+    assert 50.0 < near.top < 250.0  # no more of a high wall than shows that it goes on
+    assert far == window(block)
+
+
+def test_a_moving_support_is_shown_wherever_it_comes() -> None:
+    block = frames((0.1, 0.025, 0.0), (0.1, 0.025, 0.0))
+    motion = MotionPieces(np.array([0.0, 1.0]), np.array([[0.0, -0.03, 0.0, 0.0]]), -0.03)
+    pier = (wall(0.15, 0.0, 0.15, 0.05),)
+    still, sunk = (
+        window(block, Support(walls=pier)),
+        window(block, Support(walls=pier, direction=(0.0, 1.0), motion=motion)),
+    )
+    assert still.base == 0.0
+    assert sunk.base == pytest.approx(-30.0)
+    assert sunk.bottom < -30.0
+    moved = window(block, Support(walls=(wall(0.08, 0.0, 0.08, 0.05),), motion=motion))
+    assert moved.left < 50.0
+
+
+def test_tilted_ground_is_turned_so_that_gravity_points_down() -> None:
+    tilt = np.radians(30.0)
+    sliding = frames((0.0, 0.025, 0.0), (1.0, 0.025, 0.0))
+    extent = window(sliding, Support(tilt=tilt))
+    inside = np.concatenate([corners(sliding, frame)[0] for frame in (0, 1)])
+    pictured = turned(inside, tilt)
+    assert pictured[:, 0].min() > extent.left
+    assert pictured[:, 0].max() < extent.right
+    assert pictured[:, 1].max() < extent.top
+    assert extent.tilt == tilt
+    assert pictured[6, 1] - pictured[2, 1] == pytest.approx(1000.0 * np.sin(tilt))  # the same corner has risen
+    gravity = np.array([-np.sin(tilt), -np.cos(tilt)])  # as the world has it, along and across the ground
+    assert turned(gravity, tilt) == pytest.approx([0.0, -1.0])
+
+
+@pytest.mark.parametrize("tilt", [-0.4, 0.0, 0.7])
+def test_a_line_along_the_ground_is_lowest_at_the_edge_of_the_picture(tilt: float) -> None:
+    extent = Extent(-100.0, 300.0, 0.0, 200.0, base=-20.0, tilt=tilt)
+    ends = turned(np.array([[x, -20.0] for x in extent.span(-20.0)]), tilt)
+    assert ends[:, 0] == pytest.approx([-100.0, 300.0])
+    assert ends[:, 1].min() == pytest.approx(extent.lowest)
+
+
+def test_lines_are_cut_to_a_box() -> None:
+    line = np.array([[-1e5, 0.5], [0.5, 0.5], [0.5, 3.0], [5.0, 3.0]])
+    parts = parts_within(line, np.array([0.0, 0.0]), np.array([1.0, 1.0]))
+    assert parts == pytest.approx(np.array([[[0.0, 0.5], [0.5, 0.5]], [[0.5, 0.5], [0.5, 1.0]]]))
