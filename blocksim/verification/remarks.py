@@ -19,9 +19,15 @@ REMARKS = {
         "particles": ROUNDING,
         "kernel": "several particles along the face share the impact, so it acts a little inside of the corner",
     },
-    "V13": {"particles": ROUNDING},
+    "V13": {
+        "particles": ROUNDING,
+        "kernel": "few particles bear at an edge, which on the soft contacts of the quick size gives way too far",
+    },
     "V17": {"particles": ROUNDING},
-    "V18": {"particles": ROUNDING},
+    "V18": {
+        "particles": ROUNDING,
+        "kernel": "several particles along the face share the impact, so it acts a little inside of the corner",
+    },
     "V19": {"particles": SAMPLING, "kernel": SAMPLING},
     "V20": {
         "particles": BUMPS,
@@ -34,6 +40,10 @@ REMARKS = {
     "V22": {
         "particles": BUMPS,
         "kernel": "edges are felt within a smoothing length of 1.3 mm, as if they were rounded",
+    },
+    "V23": {
+        "particles": "the ends of pieces of ground have no disc, so contacts at edges end at full overlap",
+        "kernel": "the stiffness of a particle changes with its angle to the face, and no torque goes with that",
     },
     "V24": {
         "particles": BUMPS,
