@@ -21,7 +21,7 @@ REMARKS = {
     },
     "V13": {
         "particles": ROUNDING,
-        "kernel": "few particles bear at an edge, which on the soft contacts of the quick size gives way too far",
+        "kernel": "likely as few particles bear at an edge, which gives way too far on the soft contacts measured",
     },
     "V17": {"particles": ROUNDING},
     "V18": {
@@ -42,7 +42,7 @@ REMARKS = {
         "kernel": "edges are felt within a smoothing length of 1.3 mm, as if they were rounded",
     },
     "V23": {
-        "particles": "the ends of pieces of ground have no disc, so contacts at edges end at full overlap",
+        "particles": "likely as the ends of pieces of ground have no disc, so contacts at edges end at full overlap",
         "kernel": "the stiffness of a particle changes with its angle to the face, and no torque goes with that",
     },
     "V24": {

@@ -1,4 +1,8 @@
-"""Single records to call kernels with."""
+"""Single records to call kernels with, and what a run without the compiler (NUMBA_DISABLE_JIT=1) leaves out.
+
+Interpreted kernels take a thousand times longer. Tests then have fewer random examples, and one that steps a scene
+farther than an interpreter does in seconds is skipped: shorter ones see the same code.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +10,52 @@ from math import cos, hypot, sin
 from typing import TYPE_CHECKING, Protocol
 
 import pytest
+from hypothesis import settings
 
 from blocksim.kernels.arrays import ALL, BODY, zeros
+from blocksim.kernels.jit import config
+from blocksim.verification.scene import Simulation
 
 if TYPE_CHECKING:
     from blocksim.kernels.arrays import Record
+
+IS_INTERPRETED = bool(config.DISABLE_JIT)
+BODY_STEPS = 1000  # a test, times bodies: a second or two of an interpreter
+PARTICLES_COST = 15  # a step with boundary particles, in steps of the surface model
+
+if IS_INTERPRETED:
+    settings.register_profile("interpreted", settings.get_profile("ci"), max_examples=3)
+    settings.load_profile("interpreted")
+
+
+@pytest.fixture
+def compiler() -> None:
+    """Skip a test that is about compiled code."""
+    if IS_INTERPRETED:
+        pytest.skip("is about compiled kernels")
+
+
+@pytest.fixture(scope="session")
+def pace() -> int:
+    """Return by what a test divides the length of what it steps by itself: one with the compiler."""
+    return 10 if IS_INTERPRETED else 1
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the compiler, skip a test that asks for more steps than it is given."""
+    if not IS_INTERPRETED:
+        return
+    left, proceed = [BODY_STEPS], Simulation.to_step
+
+    def to_step(scene: Simulation, last_step: int) -> Simulation:
+        cost = 1 if scene.world.particles is None else PARTICLES_COST
+        left[0] -= (last_step - scene.steps) * scene.bodies.size * cost
+        if left[0] < 0:
+            pytest.skip("steps a scene too far for an interpreter")
+        return proceed(scene, last_step)
+
+    monkeypatch.setattr(Simulation, "to_step", to_step)
 
 
 class MakeBody(Protocol):

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from tests.conftest import Start
 
 FALLING = {"y": 0.03, "angle": 0.3}
+SOFT = {"stiffness_scale": 1e-4}  # a hundredth of the steps
 
 
 def with_value(name: str, value: float) -> Callable[[World], None]:
@@ -34,6 +35,7 @@ def test_overlap_beyond_a_share_of_the_smallest_side_stops_the_run(start: Start)
         assert limit < scene.measured()[-1] < limit + 2.0 * scene.step
 
 
+@pytest.mark.usefixtures("compiler")  # the cosine of infinity is an exception in Python, not a number in IEEE
 @pytest.mark.parametrize("name", ["x", "y", "angle", "vx", "vy", "spin"])
 @pytest.mark.parametrize("value", [nan, inf])
 def test_state_that_is_not_finite_stops_the_run(start: Start, name: str, value: float) -> None:
@@ -49,26 +51,26 @@ def test_overlap_beyond_the_limit_stops_the_run(start: Start) -> None:
 
 
 def test_rest_must_last_before_it_stops_the_run(start: Start) -> None:
-    rest = {"stop_at_rest": True, "rest_speed": 1e-4, "rest_hold": 0.02}
-    scene = start([{"y": 0.0125}], time=rest).to_time(1.0)
+    rest = {"stop_at_rest": True, "rest_speed": 2e-2, "rest_hold": 0.02}
+    scene = start([{"y": 0.0125}], time=rest, contact=SOFT).to_time(1.0)
     assert scene.status == AT_REST
     assert scene.time == pytest.approx(0.02, abs=1e-3)
 
 
 def test_block_at_the_top_of_its_flight_is_not_at_rest(start: Start) -> None:
     rest = {"stop_at_rest": True, "rest_speed": 1e-2, "rest_hold": 0.02}
-    scene = start([{"y": 1.0, "velocity": [0.0, 0.1]}], time=rest).to_time(0.1)
+    scene = start([{"y": 1.0, "velocity": [0.0, 0.1]}], time=rest, contact=SOFT).to_time(0.1)
     assert scene.status == REACHED
 
 
 def test_spinning_block_is_not_at_rest(start: Start) -> None:
     rest = {"stop_at_rest": True, "rest_speed": 1e-4, "rest_hold": 0.01}
-    scene = start([{"y": 1.0, "spin": 0.02}], gravity=0.0, time=rest).to_time(0.05)
+    scene = start([{"y": 1.0, "spin": 0.02}], gravity=0.0, time=rest, contact=SOFT).to_time(0.05)
     assert scene.status == REACHED
 
 
 def test_no_rest_is_looked_for_where_it_must_not_stop_the_run(start: Start) -> None:
-    assert start([{"y": 0.0125}], time={"stop_at_rest": False}).to_time(0.1).status == REACHED
+    assert start([{"y": 0.0125}], time={"stop_at_rest": False}, contact=SOFT).to_time(0.1).status == REACHED
 
 
 def test_start_moves_nothing_and_happens_once(start: Start) -> None:

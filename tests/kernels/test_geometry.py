@@ -10,7 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.geometry import SMALL_TURN, ground_gap, relative_pose, separation, to_world, turn
+from blocksim.kernels.arrays import BODY, zeros
+from blocksim.kernels.geometry import (
+    END_RATIO,
+    SMALL_TURN,
+    ground_gap,
+    relative_pose,
+    separation,
+    slab_depth,
+    to_world,
+    turn,
+)
 
 if TYPE_CHECKING:
     from blocksim.kernels.arrays import Record
@@ -110,3 +120,15 @@ def test_relative_pose_leads_back_to_the_world(make_body: MakeBody, x: float, y:
 
 def test_to_world_turns_counter_clockwise(make_body: MakeBody) -> None:
     assert to_world(make_body(1.0, 2.0, radians(90.0)), 0.1, 0.0) == pytest.approx((1.0, 2.1))
+
+
+@given(x=st.floats(-0.6, 0.6), depth=st.floats(-1e-3, 0.02))
+def test_depth_below_a_slab_is_the_distance_from_its_line_except_far_below_its_ends(x: float, depth: float) -> None:
+    slab = zeros(1, BODY)[0]
+    slab.half_x, slab.half_y = 0.5, 0.01
+    found = slab_depth(x, slab.half_y - depth, slab)
+    inside = 0.5 - abs(x)
+    if depth <= 0.0 or inside < 0.0 or depth > 1.001 * END_RATIO * inside:
+        assert found == 0.0
+    elif 1e-12 < depth < 0.999 * END_RATIO * inside:
+        assert found == pytest.approx(depth, abs=1e-16)

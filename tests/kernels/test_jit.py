@@ -43,13 +43,18 @@ from blocksim.kernels.advance import advance
 from blocksim.scenario import load_scenario
 from blocksim.world.build import build_world
 
-scenario = load_scenario(sys.argv[1], {"contact.stiffness_scale": 1e-4})
-world = build_world(scenario)
-world.bodies.y[1] += 0.5e-6
-world.bodies.spin[2] = -3.0
-advance(world, 400)
-np.savez(sys.argv[2], **world._asdict())
+for n, (model, law, steps) in enumerate(word.split(",") for word in sys.argv[3:]):
+    values = {"contact.stiffness_scale": 1e-4, "contact.particle_spacing": 0.004}
+    scenario = load_scenario(sys.argv[1], {**values, "contact.model": model, "contact.law": law})
+    world = build_world(scenario)
+    world.bodies.y[1] += 0.5e-6
+    world.bodies.spin[2] = -3.0
+    if model == "particles":  # corners are rounded: they begin above the ground
+        world.bodies.vy[:-1] = -1.0
+    advance(world, int(steps))
+    np.savez(sys.argv[2] + f"{n}.npz", **{key: part for key, part in world._asdict().items() if part is not None})
 """
+RUNS = ["surface,linear,400", "surface,hertz-mindlin,100", "kernel,linear,60", "particles,linear,60"]
 
 
 def python(program: str, *arguments: str | Path, folder: Path, **environment: str) -> list[str]:
@@ -75,6 +80,7 @@ def copied_kernels(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.usefixtures("compiler")
 def test_edited_law_changes_the_results_of_kernels_in_other_files(copied_kernels: Path, tmp_path: Path) -> None:
     cache = str(tmp_path / "cache")
     force, *_ = python(PUSH, folder=copied_kernels, BLOCKSIM_CACHE_DIR=cache)
@@ -85,6 +91,7 @@ def test_edited_law_changes_the_results_of_kernels_in_other_files(copied_kernels
     assert float(edited) == pytest.approx(6e3)
 
 
+@pytest.mark.usefixtures("compiler")
 def test_second_process_takes_compiled_kernels_from_the_cache(copied_kernels: Path, tmp_path: Path) -> None:
     cache = str(tmp_path / "cache")
     runs = [python(PUSH, folder=copied_kernels, BLOCKSIM_CACHE_DIR=cache) for _ in range(2)]
@@ -122,7 +129,7 @@ def test_cache_folder_falls_back_to_the_temporary_one(
     assert folder.name == jit.source_hash()
 
 
-@pytest.mark.usefixtures("fresh_folder_choice")
+@pytest.mark.usefixtures("fresh_folder_choice", "compiler")
 def test_without_any_writable_folder_kernels_are_compiled_and_not_kept(
     file_in_the_way: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -137,7 +144,7 @@ def test_without_any_writable_folder_kernels_are_compiled_and_not_kept(
     assert jit.kernel(double)(3.0) == 6.0
 
 
-@pytest.mark.usefixtures("fresh_folder_choice")
+@pytest.mark.usefixtures("fresh_folder_choice", "compiler")
 def test_user_is_told_whether_kernels_have_to_be_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(tmp_path))
     assert not jit.is_compiled()
@@ -174,13 +181,34 @@ def test_hash_sees_every_source_below_the_folder(copied_kernels: Path) -> None:
 
 def test_interpreted_kernels_give_what_compiled_ones_give(tmp_path: Path) -> None:
     for name, disabled in (("compiled", "0"), ("interpreted", "1")):
-        python(COLLAPSE, SCENARIO, tmp_path / f"{name}.npz", folder=PACKAGE.parent, NUMBA_DISABLE_JIT=disabled)
-    compiled, interpreted = (np.load(tmp_path / f"{name}.npz") for name in ("compiled", "interpreted"))
-    assert compiled["clock"]["steps"] == interpreted["clock"]["steps"] == 400
-    assert compiled["slots"]["face"].max() >= 0
-    assert compiled["ledger"]["dashpot"] > 0.0
-    for array in ("bodies", "slots", "ledger", "clock", "pairs"):
-        for field in compiled[array].dtype.names:
-            one, two = compiled[array][field], interpreted[array][field]
-            size = max(1.0, float(np.abs(one).max()))
-            assert np.abs(one - two).max() <= 1e-12 * size, f"{array}.{field}"
+        python(COLLAPSE, SCENARIO, tmp_path / name, *RUNS, folder=PACKAGE.parent, NUMBA_DISABLE_JIT=disabled)
+    for n, run in enumerate(RUNS):
+        compiled, interpreted = (np.load(tmp_path / f"{name}{n}.npz") for name in ("compiled", "interpreted"))
+        assert compiled["clock"]["steps"] == interpreted["clock"]["steps"] == int(run.split(",")[2])
+        assert compiled["slots"]["face"].max() >= 0
+        assert compiled["ledger"]["dashpot"] > 0.0
+        for array in ("bodies", "slots", "ledger", "clock", "pairs"):
+            for field in compiled[array].dtype.names:
+                one, two = compiled[array][field], interpreted[array][field]
+                size = max(1.0, float(np.abs(one).max()))
+                assert np.abs(one - two).max() <= 1e-12 * size, f"{run}: {array}.{field}"
+
+
+@pytest.mark.usefixtures("fresh_folder_choice", "compiler")
+def test_mark_is_found_for_this_source_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(tmp_path))
+    assert not jit.is_marked("seen")
+    jit.mark("seen")
+    assert jit.is_marked("seen")
+    assert not jit.is_marked("unseen")
+    monkeypatch.setattr(jit, "source_hash", lambda: "another")
+    jit.cache_folder.cache_clear()
+    assert not jit.is_marked("seen")
+
+
+@pytest.mark.usefixtures("fresh_folder_choice", "compiler")
+def test_mark_without_any_writable_folder_does_nothing(file_in_the_way: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(file_in_the_way))
+    monkeypatch.setattr(tempfile, "tempdir", str(file_in_the_way))
+    jit.mark("seen")
+    assert not jit.is_marked("seen")

@@ -148,3 +148,56 @@ def test_ground_cannot_touch_itself() -> None:
     ground = classes(of)[0]
     with pytest.raises(ValueError, match="does not touch itself"):
         normal_stiffness(of, ground, ground)
+
+
+def row(of: Scenario, one: str, two: str | None) -> Any:
+    """Return the parameters between a block type and another one, or the ground."""
+    order = ["ground", "paper", "flat", "wooden"]
+    return interaction_table(of, classes(of))[order.index(one), order.index(two or "ground")]
+
+
+def test_pair_of_its_own_counts_for_its_two_materials_only() -> None:
+    special = {"restitution": 0.7, "normal_stiffness": 5e6, "shear_stiffness_ratio": 0.4, "shear_damping_ratio": 0.01}
+    usual, of = scenario(), scenario(pairs={"aluminium": {"oak": {"friction": 0.9, **special}}})
+    for block in ("paper", "flat"):
+        mixed = row(of, block, "wooden")
+        assert (mixed.static_friction, mixed.kinetic_friction) == (0.9, 0.9)
+        assert (mixed.normal_stiffness, mixed.shear_ratio) == (5e6, 0.4)
+        assert (mixed.normal_damping, mixed.shear_damping) == (damping_ratio(0.7), 0.01)
+        assert row(of, block, "flat") == row(usual, block, "flat")
+    assert row(of, "wooden", None) == row(usual, "wooden", None)
+
+
+def test_ground_of_a_named_material_rubs_as_the_pair_of_the_materials_says() -> None:
+    pairs = {"aluminium": {"oak": {"friction": 0.9}, "ground": {"restitution": 0.5}}}
+    of = scenario(ground={"material": "oak"}, pairs=pairs)
+    assert row(of, "paper", None).static_friction == 0.9
+    assert row(of, "paper", None).normal_damping == damping_ratio(0.5)
+    assert row(of, "wooden", None).normal_damping == damping_ratio(0.2)
+
+
+def test_walls_are_ground_unless_they_have_a_material_of_their_own() -> None:
+    plain, oaken = {"from": [1.0, 0.5], "to": [1.0, 0.0]}, {"from": [2.0, 0.5], "to": [2.0, 0.0], "material": "oak"}
+    assert classes(scenario(walls=[plain])) == classes(scenario())
+    of = scenario(walls=[plain, oaken], friction={"block_block": 0.2, "block_ground": 0.5})
+    *usual, wall = classes(of)
+    assert tuple(usual) == classes(scenario())
+    assert wall == ContactClass("oak", float("inf"), is_wall=True)
+    table = interaction_table(of, classes(of))
+    assert table[1, -1].normal_stiffness == pytest.approx(modulus(ALUMINIUM, OAK) * 0.025, rel=1e-12)
+    assert table[1, -1].static_friction == 0.5
+    assert not table[0, -1].normal_stiffness
+
+
+def test_hertzian_stiffness_goes_with_the_modulus_and_the_root_of_the_radius() -> None:
+    law = {"law": "hertz-mindlin"}
+    usual, round_ = (
+        row(scenario(contact=law), "flat", "wooden"),
+        row(scenario(contact={**law, "contact_radius": 0.004}), "flat", "wooden"),
+    )
+    assert usual.normal_stiffness == pytest.approx(4.0 / 3.0 * modulus(ALUMINIUM, OAK) * 0.001**0.5, rel=1e-12)
+    assert round_.normal_stiffness == pytest.approx(2.0 * usual.normal_stiffness, rel=1e-12)
+    assert usual.shear_ratio == row(scenario(), "flat", "wooden").shear_ratio
+    assert row(scenario(contact=law), "paper", None).normal_stiffness == pytest.approx(
+        row(scenario(contact=law), "flat", None).normal_stiffness, rel=1e-12
+    )  # the depth of a block has no part in it

@@ -69,6 +69,61 @@ def test_both_branches_meet_at_critical_damping() -> None:
         assert restitution_of(ratio) == pytest.approx(at, rel=1e-4)
 
 
+def rebound_of_hertz(ratio: float) -> float:
+    """Return the rebound speed of x'' = -x^(3/2) - 2 z (3/2)^(1/2) x^(1/4) x' from x = 0, x' = 1, clipped as above.
+
+    In w = x^(5/4) the force is smooth at x = 0: dw/ds = 5/4 x', dx'/ds = -(w + 2 z (3/2)^(1/2) x'), ds = x^(1/4) dt.
+    """
+
+    def force(_: float, state: np.ndarray) -> float:
+        return float(state[0] + 2.0 * ratio * sqrt(1.5) * state[1])
+
+    force.terminal, force.direction = True, -1  # type: ignore[attr-defined]
+    motion = solve_ivp(
+        lambda s, state: [1.25 * state[1], -force(s, state)],
+        (0.0, 500.0),
+        [0.0, 1.0],
+        events=force,
+        method="DOP853",
+        rtol=1e-11,
+        atol=1e-13,
+    )
+    return -float(motion.y_events[0][0][1])
+
+
+def rebound_in_time(ratio: float) -> float:
+    """Return the same from the equation of motion in time, by small explicit steps."""
+    motion = solve_ivp(
+        lambda _, state: [state[1], -max(hertz_force(ratio, *state), 0.0)],
+        (0.0, 60.0),
+        [1e-12, 1.0],
+        max_step=4e-3,
+        method="RK45",
+        rtol=1e-9,
+        atol=1e-12,
+    )
+    return -float(motion.y[1, -1])
+
+
+def hertz_force(ratio: float, x: float, v: float) -> float:
+    return 0.0 if x <= 0.0 else float(x**1.5 + 2.0 * ratio * sqrt(1.5) * x**0.25 * v)
+
+
+@pytest.mark.parametrize("e", [SMALLEST_RESTITUTION, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.99])
+def test_hertzian_contact_rebounds_as_asked(e: float) -> None:
+    assert rebound_of_hertz(damping_ratio(e, "hertz-mindlin")) == pytest.approx(e, abs=1e-4)
+
+
+@pytest.mark.parametrize("e", [0.2, 0.6])
+def test_hertzian_contact_rebounds_as_asked_in_time_too(e: float) -> None:
+    assert rebound_in_time(damping_ratio(e, "hertz-mindlin")) == pytest.approx(e, abs=1e-4)
+
+
+def test_hertzian_limits_are_those_of_the_linear_law() -> None:
+    assert damping_ratio(1.0, "hertz-mindlin") == 0.0
+    assert damping_ratio(0.0, "hertz-mindlin") == damping_ratio(SMALLEST_RESTITUTION, "hertz-mindlin")
+
+
 @pytest.mark.parametrize("e", [-1e-9, 1.0000001, 2.0, float("nan")])
 def test_restitution_outside_zero_to_one_is_refused(e: float) -> None:
     with pytest.raises(ValueError, match="between 0 and 1"):
