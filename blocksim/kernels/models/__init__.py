@@ -4,10 +4,10 @@ A model is one file with
 
     find_points(world, p)              fill world.points with the contact points of pair p, return how many there are
     near_slots(world, a, b, reach, out)   write the slots of a pair that may come into contact, return how many
-    place_ended(world, p, k, point)    set place and normal of a contact that has just ended
 
-one code here and one branch in each dispatcher below. How many slots a pair needs is said in world/boundary.py. All
-models share laws, friction, dashpots, history and the energy ledger.
+one code here and one branch in each dispatcher below. How many slots a pair needs is said in world/particles.py. Where
+an ended contact was is derived again for corners and kept in the slot for particles (`place_ended`). All models share
+laws, friction, dashpots, history and the energy ledger.
 """
 
 from blocksim.kernels.arrays import Integers, Record, Records, World

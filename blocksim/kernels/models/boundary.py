@@ -5,11 +5,12 @@ Particles of a body lie in four rows, counter-clockwise: the lower face from its
 
 import math
 
-from blocksim.kernels.arrays import Record
+from blocksim.kernels.arrays import Integers, Record, World
 from blocksim.kernels.geometry import relative_pose
 from blocksim.kernels.jit import kernel, rare_kernel
 
 ROWS = 4
+FACE = 2.0  # stiffness of a face contact over that of a corner contact
 
 
 @kernel
@@ -71,3 +72,22 @@ def is_particle_near(owner: Record, particle: Record, touched: Record, reach: fl
 def particle_height(body: Record, particle: Record) -> float:
     """Return the height (m) of a particle over y = 0."""
     return body.y + body.sin * particle.x + body.cos * particle.y
+
+
+@rare_kernel
+def near_particles(world: World, a: int, b: int, reach: float, out: Integers) -> int:
+    """Write the particles of body a that are within reach (m) of body b into `out` and return how many there are."""
+    one = world.bodies[a]
+    two = world.bodies[b]
+    is_ground = b == world.bodies.size - 1
+    count = 0
+    for k in range(one.particle_count):
+        particle = world.particles[one.first_particle + k]
+        if is_ground:
+            near = particle_height(one, particle) <= two.y + reach
+        else:
+            near = is_particle_near(one, particle, two, reach)
+        if near:
+            out[count] = k
+            count += 1
+    return count

@@ -18,17 +18,16 @@ from blocksim.kernels.arrays import ALL, Integers, World
 from blocksim.kernels.geometry import to_world
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.models.boundary import (
+    FACE,
     ROWS,
     first_within,
-    is_particle_near,
     last_within,
-    particle_height,
+    near_particles,
     row_direction,
     row_intervals,
     seen_from_row,
 )
 
-FACE = 2.0  # stiffness of a face contact over that of a corner contact
 PER_PARTICLE = 4  # slots of a particle; it touches neighbours in a row, which differ modulo four
 
 
@@ -164,18 +163,4 @@ def find_points(world: World, p: int) -> int:
 @rare_kernel
 def near_slots(world: World, a: int, b: int, reach: float, out: Integers) -> int:
     """Write the particles of a that are within reach (m) of b into `out` and return how many there are."""
-    one = world.bodies[a]
-    two = world.bodies[b]
-    is_ground = b == world.bodies.size - 1
-    beyond = reach + world.controls[0].particle_size
-    count = 0
-    for k in range(one.particle_count):
-        particle = world.particles[one.first_particle + k]
-        if is_ground:
-            near = particle_height(one, particle) <= two.y + beyond
-        else:
-            near = is_particle_near(one, particle, two, beyond)
-        if near:
-            out[count] = k
-            count += 1
-    return count
+    return near_particles(world, a, b, reach + world.controls[0].particle_size, out)

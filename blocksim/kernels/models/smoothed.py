@@ -28,18 +28,17 @@ from blocksim.kernels.arrays import ALL, Integers, Record, World
 from blocksim.kernels.geometry import slab_depth, to_world
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.models.boundary import (
+    FACE,
     ROWS,
     first_within,
-    is_particle_near,
     last_within,
-    particle_height,
+    near_particles,
     row_direction,
     row_intervals,
     seen_from_row,
 )
 from blocksim.kernels.sph.functions import kernel_value
 
-FACE = 2.0  # stiffness of a face contact over that of a corner contact
 NO_SUM = 1e-30
 NEAR_RATIO = 4.0  # a face that is deeper than this many times the nearest one is not the one that is touched
 LEAST_FACING = 1e-9  # of two normals that oppose one another; at right angles they do not, whatever round-off says
@@ -225,22 +224,11 @@ def find_points(world: World, p: int) -> int:
 @rare_kernel
 def near_slots(world: World, a: int, b: int, reach: float, out: Integers) -> int:
     """Write the slots of a pair whose particles are within reach (m) into `out` and return how many there are."""
-    one = world.bodies[a]
-    two = world.bodies[b]
-    is_ground = b == world.bodies.size - 1
-    count = 0
-    for k in range(one.particle_count):
-        particle = world.particles[one.first_particle + k]
-        near = (
-            particle_height(one, particle) <= two.y + reach
-            if is_ground
-            else is_particle_near(one, particle, two, reach)
-        )
-        if near:
-            out[count] = k
-            count += 1
-    for k in range(two.particle_count):
-        if is_particle_near(two, world.particles[two.first_particle + k], one, reach):
-            out[count] = one.particle_count + k
-            count += 1
-    return count
+    of_b = world.bodies[a].particle_count
+    count = near_particles(world, a, b, reach, out)
+    if b == world.bodies.size - 1:
+        return count
+    more = near_particles(world, b, a, reach, out[count:])
+    for m in range(count, count + more):
+        out[m] += of_b
+    return count + more
