@@ -22,6 +22,7 @@ PIP_INSTALL := $(VENV_PYTHON) -m pip install -qq --disable-pip-version-check --c
 FOLDER := $(shell pwd | cksum | cut -d ' ' -f 1)
 RUN_STAMP := $(VENV)/.installed-run-$(FOLDER)
 DEV_STAMP := $(VENV)/.installed-dev-$(FOLDER)
+BENCH_STAMP := $(VENV)/.installed-bench-$(FOLDER)
 INSTALL_DECIDES := pyproject.toml $(CONSTRAINTS) blocksim/__init__.py
 # Without a Python (none yet, or it was upgraded away) the stamps are void.
 VOID := $(if $(realpath $(VENV_PYTHON)),,void)
@@ -54,6 +55,14 @@ test-nojit: $(DEV_STAMP) ## Run the tests of the kernels as plain Python, withou
 .PHONY: verify-table
 verify-table: $(DEV_STAMP) ## Measure all verification cases anew and write their table into the README
 	$(VENV_PYTHON) -m blocksim.verification.reference README.md --measure
+
+.PHONY: bench
+bench: $(RUN_STAMP) ## Measure speed and memory, some minutes; nothing else should run
+	$(BLOCKSIM) bench --out results/bench.json
+
+.PHONY: bench-peers
+bench-peers: $(BENCH_STAMP) ## The same scenes by pymunk and Box2D too, some minutes; draws the picture of the README
+	$(BLOCKSIM) bench --peers --out results/bench-peers.json
 
 .PHONY: smoke
 smoke: $(RUN_STAMP) ## Short run, 2 x 2 sweep and compare, for your CI: does this installation work?
@@ -99,7 +108,7 @@ lock: ## Rewrite the constraints with the newest versions that fit pyproject.tom
 	echo "Resolving in a fresh environment, with the oldest Python that is supported"; \
 	$(LOCK_PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11) and "lock: needs Python 3.11")'; \
 	$(LOCK_PYTHON) -m venv "$$folder/venv"; \
-	"$$folder/venv/bin/python" -m pip install -qq --disable-pip-version-check ".[dev]"; \
+	"$$folder/venv/bin/python" -m pip install -qq --disable-pip-version-check ".[bench,dev]"; \
 	{ echo "# Exact versions of everything that make installs, for Python 3.11 to 3.13. Written by: make lock"; \
 	  "$$folder/venv/bin/python" -m pip freeze --disable-pip-version-check --exclude blocksim \
 	      --exclude setuptools --exclude wheel; } >"$$folder/constraints.txt"; \
@@ -134,4 +143,9 @@ $(RUN_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
 $(DEV_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
 	@echo "Installing blocksim and its developers' tools into $(VENV), a minute or so (versions: $(CONSTRAINTS))"
 	@$(PIP_INSTALL) --editable ".[dev]"
+	@touch $(RUN_STAMP) $@
+
+$(BENCH_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
+	@echo "Installing the engines to compare with into $(VENV) (versions: $(CONSTRAINTS))"
+	@$(PIP_INSTALL) --editable ".[bench]"
 	@touch $(RUN_STAMP) $@

@@ -1,8 +1,9 @@
 """blocksim check: validate a scenario and show what it comes to."""
 
 import textwrap
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 from blocksim.cli import options
 from blocksim.cli.output import GAP, answer, note, number, print_json, table_lines, width_of_screen
@@ -11,13 +12,15 @@ from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
 from blocksim.study.single import check_experiment
 from blocksim.world.describe import Description, MotionDescription, PairDescription, describe
+from blocksim.world.memory import readable
 
 MOST_BODIES = 12
+SIDES = ("along x", "upright", "depth mm", "mass kg", "inertia kg m²")
 NO_KEY = (DEFAULT, MATERIALS)
 LEAST_ROOM = 24
 HARD_SPACE = "\N{NO-BREAK SPACE}"
 MILLI = 1e3
-MEGA = 1e6
+LONG_TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))  # s
 
 
 def check_command(
@@ -46,7 +49,7 @@ def check_command(
 
 def _data(description: Description) -> dict[str, object]:
     bodies = [{**asdict(body), "mass": body.mass, "inertia": body.inertia} for body in description.bodies]
-    return {**asdict(description), "bodies": bodies}
+    return {**asdict(replace(description, bodies=())), "bodies": bodies}
 
 
 def _tables(scenario: Scenario, description: Description) -> list[list[str]]:
@@ -59,11 +62,28 @@ def _tables(scenario: Scenario, description: Description) -> list[list[str]]:
 
 
 def _bodies(bodies: Sequence[PlacedBody]) -> list[str]:
-    columns = ("block", "x mm", "y mm", "along x", "upright", "depth mm", "mass kg", "inertia kg m²")
-    lines = table_lines(columns, [_body_cells(body) for body in bodies[:MOST_BODIES]])
-    if len(bodies) > MOST_BODIES:
-        lines.append(f"... and {len(bodies) - MOST_BODIES} more blocks")
-    return lines
+    """Tell of every block; of a crowd tell the kinds of blocks, how many there are of each and where they all are."""
+    if len(bodies) <= MOST_BODIES:
+        return table_lines(("block", "x mm", "y mm", *SIDES), [_body_cells(body) for body in bodies])
+    counts = Counter(body.block for body in bodies)
+    kinds = {body.block: body for body in bodies}
+    common = counts.most_common(MOST_BODIES)
+    rows = [(name, str(count), *_side_cells(kinds[name])) for name, count in common]
+    more = [f"... and {len(counts) - len(common)} more kinds"] if len(counts) > len(common) else []
+    spans = ("{} {} to {} mm".format(axis, *_span(getattr(body, axis) for body in bodies)) for axis in ("x", "y"))
+    fixed = sum(body.fixed for body in bodies)
+    still = f", {fixed} of them fixed" if fixed else ""
+    return [
+        *table_lines(("kind", "blocks", *SIDES), rows),
+        *more,
+        f"{len(bodies)} blocks{still}",
+        f"centres at {', '.join(spans)}",
+    ]
+
+
+def _span(values: Iterable[float]) -> tuple[str, str]:
+    lengths = tuple(values)
+    return number(MILLI * min(lengths)), number(MILLI * max(lengths))
 
 
 def _pairs(scenario: Scenario, pairs: Sequence[PairDescription]) -> list[str]:
@@ -108,8 +128,9 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
         *_motion(description.motion),
         f"boundary   {description.particles} particles ({_use_of_particles(scenario.contact)})",
         f"time step  {description.step:.3e} s, at most {description.steps} steps",
-        f"solving    at most about {description.seconds:.1f} s on one core",
-        f"results    at most {description.frames} frames, about {description.bytes / MEGA:.1f} MB",
+        f"solving    at most about {_duration(description.seconds)} on one core",
+        f"memory     at most about {readable(description.memory)}",
+        f"results    at most {description.frames} frames, about {readable(description.bytes)}",
     ]
 
 
@@ -120,10 +141,16 @@ def _motion(motion: MotionDescription | None) -> list[str]:
     return [f"supports   move {greatest}, {number(MILLI * motion.final_speed)} mm/s at the end"]
 
 
+def _duration(seconds: float) -> str:
+    """Return a time in the largest unit of which there are two."""
+    worth, unit = next((entry for entry in LONG_TIMES if seconds >= 2.0 * entry[0]), (1.0, "s"))
+    return f"{seconds / worth:.1f} {unit}"
+
+
 def _use_of_particles(contact: Contact) -> str:
     match contact.model:
         case "surface":
-            return "the surface model needs only the corners among them"
+            return "of which the surface model needs the corners"
         case "kernel":
             return f"{contact.kernel}, smoothing length {number(MILLI * contact.resolved_smoothing_length)} mm"
         case _:
@@ -131,8 +158,12 @@ def _use_of_particles(contact: Contact) -> str:
 
 
 def _body_cells(body: PlacedBody) -> tuple[str, ...]:
-    lengths = (body.x, body.y, body.size_x, body.size_y, body.depth)
-    return (body.name, *(number(MILLI * v) for v in lengths), f"{body.mass:.5g}", f"{body.inertia:.5g}")
+    return (body.name, number(MILLI * body.x), number(MILLI * body.y), *_side_cells(body))
+
+
+def _side_cells(body: PlacedBody) -> tuple[str, ...]:
+    lengths = (body.size_x, body.size_y, body.depth)
+    return (*(number(MILLI * v) for v in lengths), f"{body.mass:.5g}", f"{body.inertia:.5g}")
 
 
 def _pair_cells(pair: PairDescription) -> dict[str, str]:

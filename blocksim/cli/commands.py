@@ -18,6 +18,7 @@ COMMANDS = {  # name: module in this folder, function in it, first line of its h
     "sweep": ("sweep", "sweep_command", "Run a scenario many times with some keys varied."),
     "converge": ("converge", "converge_command", "Refine step, stiffness and spacing until the run-out stays."),
     "verify": ("verify", "verify_command", "Run the verification cases and show the table."),
+    "bench": ("bench", "bench_command", "Measure speed and memory, and show the table."),
     "plot": ("plot", "plot_command", "Draw a run as a strip of pictures."),
     "schema": ("schema", "schema_command", "Print the JSON Schema of scenario files, for editors."),
 }

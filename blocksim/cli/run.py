@@ -11,6 +11,9 @@ from blocksim.simulation import Result
 from blocksim.simulation.folder import default_folder, holds_run
 from blocksim.study.single import FINISHED, check_experiment, compare, run
 
+MOST_ROWS = 40  # of the final table on the screen; of a longer one the first are shown
+FIRST_ROWS = 10
+
 
 def run_command(
     scenario: options.ScenarioPath,
@@ -58,17 +61,20 @@ def show_result(result: Result, *, as_json: bool, quiet: bool) -> None:
 
 
 def _answer_lines(result: Result) -> list[str]:
+    """Return the lines of the final table; of a crowd the first ones, as all are in the run's folder."""
     if result.experiment is not None and result.status == FINISHED:
         comparison = compare(result)
         return [*comparison_table(comparison), *verdict_lines(comparison)]
-    final = result.final
+    count = len(result.final)
+    final = result.final.head(count if count <= MOST_ROWS else FIRST_ROWS)
     rows = [
         (block, number(x), number(y), number(rotation))
         for block, x, y, rotation in zip(
             final["block"], final["x_mm"], final["y_mm"], final["rotation_deg"], strict=True
         )
     ]
-    return table_lines(("block", "x mm", "y mm", "rotation °"), rows)
+    lines = table_lines(("block", "x mm", "y mm", "rotation °"), rows)
+    return lines if len(final) == count else [*lines, f"... and {count - len(final)} blocks more, see final.csv"]
 
 
 def _tell_end(result: Result) -> None:

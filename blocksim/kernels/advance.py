@@ -2,15 +2,31 @@
 
 import math
 
-from blocksim.kernels.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL, REACHED, Record, Records, World
-from blocksim.kernels.broad_phase import rebuild_pairs
+from blocksim.kernels.arrays import (
+    AT_REST,
+    GROUP,
+    NOT_FINITE,
+    OVERLAP_LIMIT,
+    PAIRS_FULL,
+    REACHED,
+    Record,
+    Records,
+    World,
+)
 from blocksim.kernels.contact import pair_forces
-from blocksim.kernels.energy import has_excessive_overlap
-from blocksim.kernels.history import change_contacts
-from blocksim.kernels.integrate import accelerate_and_kick, kick_and_drift, kinetic_energy, renew_rotations
-from blocksim.kernels.jit import kernel, rare_kernel
-from blocksim.kernels.models import contact_points
+from blocksim.kernels.energy import has_excessive_overlap, weights_power
+from blocksim.kernels.integrate import (
+    accelerate_and_kick,
+    go_on,
+    kick_and_drift,
+    kinetic_energy,
+    place_all_corners,
+    renew_rotations,
+)
+from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
+from blocksim.kernels.steady import steady_forces
 from blocksim.kernels.support import book_support, is_support_at_rest, move_support
+from blocksim.kernels.travel import look
 
 
 @kernel
@@ -20,20 +36,39 @@ def has_motion(controls: Record) -> bool:
 
 
 @kernel
+def group_forces(world: World, first: int, last: int, step: float, book: Record) -> None:
+    """Evaluate the contacts of the pairs from `first` to before `last`; what they lose goes into one book."""
+    dashpot = 0.0
+    friction = 0.0
+    for p in range(first, last):
+        is_steady, lost, rubbed = steady_forces(world, p, step, world.particles)
+        dashpot += lost
+        friction += rubbed
+        if not is_steady:
+            pair_forces(world, p, step, book)
+    book.dashpot += dashpot
+    book.friction += friction
+
+
+@kernel
 def contact_forces(world: World, step: float) -> None:
-    """Evaluate all contacts at the present positions and kick all bodies for the second half of the step.
+    """Evaluate all contacts at the present positions.
 
     `step` is the length (s) of the drift that led here, zero at the start.
     """
-    for p in range(world.clock[0].pair_count):
-        count = contact_points(world, p)
-        if count > 0:
-            pair_forces(world, p, count, step)
-        elif world.pairs[p].active > 0:
-            change_contacts(world, p, 0, step)
+    count = world.clock[0].pair_count
+    for first in range(0, count, GROUP):
+        group_forces(world, first, min(first + GROUP, count), step, world.ledger[first // GROUP])
     if has_motion(world.controls[0]):
         book_support(world, step)
-    accelerate_and_kick(world.bodies, world.controls[0], step)
+
+
+@kernel
+def begin_step(world: World, step: float) -> None:
+    """Bring everything to the end of the drift."""
+    kick_and_drift(world.bodies, step)
+    if has_motion(world.controls[0]):
+        move_support(world, step)
 
 
 @rare_kernel
@@ -67,6 +102,7 @@ def check(world: World) -> int:
     clock = world.clock[0]
     ledger = world.ledger[0]
     renew_rotations(world.bodies)
+    ledger.travel_work += controls.check_every * controls.step * weights_power(world)
     ledger.largest_kinetic = max(ledger.largest_kinetic, kinetic_energy(world))
     fastest = fastest_point(world.bodies)
     if math.isinf(fastest):
@@ -78,7 +114,7 @@ def check(world: World) -> int:
     return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
 
 
-@rare_kernel
+@entry_kernel
 def advance(world: World, last_step: int) -> int:
     """Step until `last_step` or until something ends the run; return one of the status codes of arrays.py.
 
@@ -90,16 +126,24 @@ def advance(world: World, last_step: int) -> int:
     controls = world.controls[0]
     clock = world.clock[0]
     next_check = (clock.steps // controls.check_every + 1) * controls.check_every
+    if clock.is_started == 0:
+        place_all_corners(world.bodies)
+    has_begun = False
     while clock.steps < last_step or clock.is_started == 0:
-        if clock.pairs_due and not rebuild_pairs(world):
-            return PAIRS_FULL
         step = controls.step if clock.is_started else 0.0
-        clock.pairs_due = kick_and_drift(world.bodies, controls, step, world.ledger[0])
-        if has_motion(controls):
-            clock.pairs_due = move_support(world, step) or clock.pairs_due == 1
+        if not has_begun:
+            if clock.steps >= clock.next_look and not look(world):
+                return PAIRS_FULL
+            begin_step(world, step)
         contact_forces(world, step)
         clock.steps += clock.is_started
+        has_begun = clock.is_started and clock.steps < min(last_step, next_check, clock.next_look)
         clock.is_started = 1
+        if has_begun and not has_motion(controls):
+            go_on(world.bodies, controls, step)
+            continue
+        has_begun = False
+        accelerate_and_kick(world.bodies, controls, step)
         if clock.steps == next_check:
             next_check += controls.check_every
             status = check(world)

@@ -29,6 +29,8 @@ Record = Any  # one element of Records: a pointer in compiled code, numpy.record
 
 SLOTS = 8  # of a pair in the surface model
 HALF = SLOTS // 2  # slots of each body's corners
+CONTACTS = 2  # of a pair in the surface model, see models/surface.py
+GROUP = 64  # pairs that share one book of the ledger
 CACHE_LINE = 64  # bytes
 NO_FACE = -1
 ALL = 15  # bits of all four faces or corners
@@ -37,12 +39,17 @@ ALL = 15  # bits of all four faces or corners
 REACHED, AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL = range(5)
 
 
-def record_type(floats: str, integers: str = "", indices: str = "") -> np.dtype[np.void]:
-    """Return a dtype of 8-byte fields from space-separated names.
+def record_type(floats: str, counters: str = "", indices: str = "", small: str = "") -> np.dtype[np.void]:
+    """Return a dtype from space-separated names: 8-byte floats, 8-byte integers, 4-byte indices, 2-byte counts.
 
-    Indices are unsigned: compiled code then need not look for negative ones, which count from the end.
+    Indices and small counts are unsigned: compiled code then need not look for negative ones, which count from the end.
     """
-    kinds: list[tuple[str, type]] = [(floats, np.float64), (integers, np.int64), (indices, np.uint64)]
+    kinds: list[tuple[str, type]] = [
+        (floats, np.float64),
+        (counters, np.int64),
+        (indices, np.uint32),
+        (small, np.uint16),
+    ]
     fields = [(name, kind) for names, kind in kinds for name in names.split()]
     return np.dtype(fields, align=True)
 
@@ -50,6 +57,7 @@ def record_type(floats: str, integers: str = "", indices: str = "") -> np.dtype[
 BODY = record_type(
     "x y angle "  # m, m, rad: centre and total turned angle of the body axes, never wrapped
     "cos sin "  # of angle, advanced beside it and renewed at fixed steps
+    "upper_x upper_y lower_x lower_y "  # m: from the centre to the upper and the lower right corner, world axes
     "vx vy spin "  # m/s, m/s, rad/s
     "ax ay spin_rate "  # m/s2, m/s2, rad/s2: of the last force evaluation
     "fx fy torque "  # N, N, N m: contact totals of the evaluation under way
@@ -59,11 +67,11 @@ BODY = record_type(
     "list_x list_y list_angle "  # m, m, rad: where the body was when the pair list was made
     "base_x base_y "  # m: where a body that moves with the support was at the start
     "before_fx before_fy",  # N: contact totals on it in the evaluation before
-    "contact_class "  # index into the interaction table; class 0 is the ground
-    "pairs_now pairs_before pairs_changed "  # pairs in contact in this evaluation and in the one before; flag
+    indices="contact_class "  # index into the interaction table; class 0 is the ground
+    "first_particle particle_count",  # its part of the particles
+    small="pairs_now pairs_before pairs_changed "  # pairs in contact in this evaluation and the one before; flag
     "faces corners "  # bits of those that can touch; pieces of ground have their upper face and its free ends
     "is_moved "  # flag: moves with the support
-    "first_particle particle_count "  # its part of the particles
     "row_x row_y",  # intervals between particles on the faces along x and along y
 )
 PARTICLE = record_type(
@@ -73,15 +81,24 @@ PARTICLE = record_type(
     "length "  # m: tributary length
     "share"  # -: tributary length over face length, summed over both faces at a corner that is one particle
 )
-PAIR = record_type("", "a b near active")  # bodies, sorted; number of candidate slots; of slots in contact
-SLOT = record_type(
+PAIR = record_type(
+    "",
+    indices="a b",  # bodies, sorted
+    small="near active "  # number of candidate slots; of contacts
+    "idle "  # candidates that are neither in contact nor a twin
+    "twins "  # bits of the slots whose corner is in touch, but marks the same end of a face contact as another one
+    "axis",  # along which the two were apart when last looked at; 0, 1: x, y of body b, 2, 3: of body a
+)
+CONTACT = record_type(
     "spring depth "  # m: shear spring, overlap
-    "normal_force shear_force "  # N: pushing apart, resisting slip
-    "normal_loss shear_loss "  # N: what of them is not spring force (dashpot, and what clipping took)
-    "shear_stiffness "  # N/m: of the shear spring
+    "normal_force shear_force",  # N: pushing apart, resisting slip
+    indices="slot face",  # which corner or particle it is, and the face that it touches
+)
+PARTICLE_CONTACT = record_type(
+    "spring depth normal_force shear_force "  # as above
     "share "  # -: stiffness of this contact over that of a corner contact
-    "x y nx ny",  # m, -: where the contact was and its normal; only the models with particles keep these
-    "face",  # touched face, NO_FACE without contact
+    "x y nx ny",  # m, -: where the contact was, and its normal
+    indices="slot face",
 )
 INTERACTION = record_type(
     "normal_stiffness "  # of one corner contact: N/m for the linear law, N/m^1.5 for Hertz-Mindlin
@@ -98,15 +115,14 @@ POINT = record_type(
     "share "  # -: stiffness over that of a corner contact
     "weight drawn "  # first steps of a contact: weight of the dashpot, share of the drift that draws the shear spring
     "stiffness rate before force "  # N/m, m/s, N, N: of the pass under way; force of the step before; force now
-    "spring_force normal_force limit "  # N: normal spring; normal total; Coulomb limit of the tangential force
-    "free_rate",  # m/s: rate without this step's change of the pair's own forces
-    "face",
-    "slot",
+    "spring_force normal_force limit "  # N: spring of the pass under way; normal total; Coulomb limit of the other
+    "lost",  # N: what the shear force of the step before was more than that of its spring
+    indices="slot face",
 )
 OPERATOR = record_type(
     "e_one e_mixed e_two "  # N s/m: dashpot force of points one and two per free rate of each
     "h_one h_mixed h_two",  # m/(s N): half a step times the inverse masses, change of rate per change of force
-    "left pattern",  # steps until it is made anew; bits of the points that have a dashpot
+    indices="left pattern",  # steps until it is made anew; bits of the points that have a dashpot
 )
 NORMAL, SHEAR = 0, 1
 CONTROLS = record_type(
@@ -114,11 +130,17 @@ CONTROLS = record_type(
     "skin rest_speed "  # m: reach of the pair list beyond contact; m/s
     "motion_x motion_y "  # -: direction of the support's motion, both zero without one
     "max_overlap "  # m, zero: a share of the smaller side of each pair
+    "cell_width cell_radius "  # m: of the grid of the broad phase; half diagonal of the largest body in it
     "particle_size smoothing_length support",  # m: diameter; of the SPH kernel; radius beyond which it is zero
     "model law sph_kernel "  # codes
     "check_every rest_checks",  # steps between checks; checks in a row that must find rest (0: never)
 )
-CLOCK = record_type("", "steps checks_at_rest pair_count rebuilds motion_piece pairs_due is_started")  # last two: flags
+CLOCK = record_type(
+    "",
+    "steps checks_at_rest pair_count rebuilds motion_piece "
+    "next_look "  # step at which the bodies' travel since the last pair list is looked at again
+    "is_started",  # flag
+)
 LEDGER = record_type("dashpot friction broken to_support travel_work largest_kinetic")  # J
 MOTION_PIECE = record_type("start c0 c1 c2 c3")  # s, m, m/s ...: c0 + c1 t + c2 t^2 + c3 t^3 with t from the start
 
@@ -128,20 +150,24 @@ class World(NamedTuple):
 
     bodies: Records  # (n + 1,) BODY, the ground last
     pairs: Records  # (p,) PAIR
-    slots: Records  # (p, s) SLOT
-    candidates: Integers  # (p, s) owners of slots within the skin of the other body, sorted, `near` of them
+    contacts: Records  # (p, c) CONTACT or PARTICLE_CONTACT; the first `active` of a pair, in the order of their slots
+    candidates: Any  # (p, s) uint8 or uint32: slots within the skin of the other body, sorted, `near` of them
     operators: Records  # (p, 2) OPERATOR, dashpots along the normals and the tangents
-    spare_pairs: Records  # (p,) PAIR, the list being built
-    spare_slots: Records  # (p, s) SLOT
-    spare_candidates: Integers  # (p, s)
-    interactions: Records  # (c, c) INTERACTION
+    interactions: Records  # (k, k) INTERACTION
     particles: Any  # (q,) PARTICLE, body after body; None, a type of its own, for the surface model
     points: Records  # (s + 1,) POINT, work space of one pair; the last one for contacts that end
+    spare_pairs: Records  # (p,) PAIR, the list being built
+    spare_candidates: Any  # (p, s) as candidates
+    heads: Any  # (power of two,) uint32: first body of each bucket of the grid, numbers from 1; 0 where there is none
+    links: Any  # (n,) uint32: the next body of the same bucket, numbers from 1
+    large: Any  # (l,) uint32: bodies too large for the grid, sorted
+    neighbours: Any  # (n + 1,) uint32, work space of the broad phase
+    before: Records  # (c,) CONTACT or PARTICLE_CONTACT, work space of one pair whose contacts change
     matrices: Floats  # (8, 3, 3) work space of one pair
     motion: Records  # (m,) MOTION_PIECE, displacement of the support over time
     controls: Records  # (1,) CONTROLS
     clock: Records  # (1,) CLOCK
-    ledger: Records  # (1,) LEDGER
+    ledger: Records  # (g,) LEDGER, one for each group of pairs; what is not of pairs is in the first one
 
 
 def zeros(shape: int | tuple[int, ...], dtype: np.dtype[np.void]) -> Records:

@@ -1,22 +1,19 @@
-"""Candidate pairs: rebuilt when a body has used up its part of the skin, contact history carried over."""
+"""Candidate pairs: rebuilt when a body has used up its part of the skin, contact history carried over.
 
-from blocksim.kernels.arrays import NO_FACE, NORMAL, SHEAR, Record, World
+A linked-cell grid finds them: every body but the few largest lies in the cell of its centre, cells are as wide as two
+of them can reach, and the largest are looked at one by one. Cells are hashed, so that it does not matter how far bodies
+fly. The list is sorted by both bodies; with that every sum over the pairs of a body has a fixed order.
+"""
+
+import math
+
+from blocksim.kernels.arrays import NORMAL, SHEAR, Integers, Record, World
 from blocksim.kernels.geometry import ground_gap, separation
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.models import near_slots
 
-
-@rare_kernel
-def clear_slot(slot: Record) -> None:
-    """Forget all contact history of a slot."""
-    slot.face = NO_FACE
-    slot.spring = 0.0
-    slot.depth = 0.0
-    slot.normal_force = 0.0
-    slot.shear_force = 0.0
-    slot.normal_loss = 0.0
-    slot.shear_loss = 0.0
-    slot.shear_stiffness = 0.0
+FARTHEST_CELL = 1e9  # bodies beyond it share cells
+PRIME_COLUMN, PRIME_ROW = 73856093, 19349663  # M. Teschner et al., Proc. VMV (2003) 47-54
 
 
 @rare_kernel
@@ -42,30 +39,89 @@ def add_pair(world: World, count: int, a: int, b: int) -> int:
         pair.b = b
         pair.near = near
         pair.active = 0
-        for k in range(world.spare_slots.shape[1]):
-            clear_slot(world.spare_slots[count, k])
+        pair.twins = 0
+        pair.axis = 0
     return count + 1 if near > 0 else count
 
 
 @rare_kernel
-def comes_before(one: Record, two: Record) -> bool:
-    """Tell whether a pair comes before another in the order of the list."""
-    return one.a < two.a or (one.a == two.a and one.b < two.b)
+def cell_of(place: float, width: float) -> int:
+    """Return the number of the cell along one axis."""
+    return int(math.floor(min(max(place / width, -FARTHEST_CELL), FARTHEST_CELL)))
 
 
 @rare_kernel
-def carry_history(world: World, count: int) -> None:
-    """Bring the contact history of pairs that are in both lists over to the new one; both are sorted."""
-    q = 0
-    old_count = world.clock[0].pair_count
-    for p in range(count):
-        new = world.spare_pairs[p]
-        while q < old_count and comes_before(world.pairs[q], new):
-            q += 1
-        if q < old_count and world.pairs[q].a == new.a and world.pairs[q].b == new.b:
-            new.active = world.pairs[q].active
-            for k in range(world.slots.shape[1]):
-                world.spare_slots[p, k] = world.slots[q, k]
+def bucket(column: int, row: int, size: int) -> int:
+    """Return the bucket of a cell in a table whose size is a power of two."""
+    return (column * PRIME_COLUMN ^ row * PRIME_ROW) & (size - 1)
+
+
+@rare_kernel
+def fill_grid(world: World) -> None:
+    """Link the bodies of every bucket, in the order of their numbers; the largest ones and the ground stay out."""
+    controls = world.controls[0]
+    world.heads[:] = 0
+    for i in range(world.bodies.size - 2, -1, -1):
+        body = world.bodies[i]
+        if body.radius <= controls.cell_radius:
+            k = bucket(cell_of(body.x, controls.cell_width), cell_of(body.y, controls.cell_width), world.heads.size)
+            world.links[i] = world.heads[k]
+            world.heads[k] = i + 1
+
+
+@rare_kernel
+def insert_sorted(row: Integers, count: int, j: int) -> int:
+    """Insert a number into the first `count` of a sorted row, unless it is there; return the new count."""
+    k = count
+    while k > 0 and row[k - 1] > j:
+        k -= 1
+    if k > 0 and row[k - 1] == j:
+        return count
+    for m in range(count, k, -1):
+        row[m] = row[m - 1]
+    row[k] = j
+    return count + 1
+
+
+@rare_kernel
+def neighbours_in_cell(world: World, i: int, column: int, row: int, count: int) -> int:
+    """Add the bodies after i in one cell that are within the skin of it to the work space; return their number."""
+    reach = world.controls[0].skin
+    j = world.heads[bucket(column, row, world.heads.size)]
+    while j > 0:
+        if j - 1 > i and are_near(world.bodies[i], world.bodies[j - 1], reach):
+            count = insert_sorted(world.neighbours, count, j - 1)
+        j = world.links[j - 1]
+    return count
+
+
+@rare_kernel
+def neighbours_of_large(world: World, i: int) -> int:
+    """Write the bodies after i that are within the skin of it into the work space, sorted; return their number."""
+    count = 0
+    for j in range(i + 1, world.bodies.size - 1):
+        if are_near(world.bodies[i], world.bodies[j], world.controls[0].skin):
+            world.neighbours[count] = j
+            count += 1
+    return count
+
+
+@rare_kernel
+def neighbours_of(world: World, i: int) -> int:
+    """Write the bodies after i that are within the skin of it into the work space, sorted; return their number."""
+    controls = world.controls[0]
+    body = world.bodies[i]
+    if body.radius > controls.cell_radius:
+        return neighbours_of_large(world, i)
+    count = 0
+    for column in range(-1, 2):
+        for row in range(-1, 2):
+            x = cell_of(body.x, controls.cell_width) + column
+            count = neighbours_in_cell(world, i, x, cell_of(body.y, controls.cell_width) + row, count)
+    for j in world.large:
+        if j > i and are_near(body, world.bodies[j], controls.skin):
+            count = insert_sorted(world.neighbours, count, j)
+    return count
 
 
 @rare_kernel
@@ -75,13 +131,68 @@ def collect_pairs(world: World) -> int:
     ground = bodies.size - 1
     reach = world.controls[0].skin
     count = 0
+    fill_grid(world)
     for i in range(ground):
-        for j in range(i + 1, ground):
-            if are_near(bodies[i], bodies[j], reach):
-                count = add_pair(world, count, i, j)
+        for k in range(neighbours_of(world, i)):
+            count = add_pair(world, count, i, world.neighbours[k])
         if bodies[i].inverse_mass > 0.0 and ground_gap(bodies[i]) <= bodies[ground].y + reach:
             count = add_pair(world, count, i, ground)
     return count
+
+
+@rare_kernel
+def comes_before(one: Record, two: Record) -> bool:
+    """Tell whether a pair comes before another in the order of the list."""
+    return one.a < two.a or (one.a == two.a and one.b < two.b)
+
+
+@rare_kernel
+def move_contacts(world: World, source: int, target: int, count: int) -> None:
+    """Copy the first `count` contacts and the dashpots of one pair's place in the list to another's."""
+    for k in range(count):
+        world.contacts[target, k] = world.contacts[source, k]
+    world.operators[target, NORMAL] = world.operators[source, NORMAL]
+    world.operators[target, SHEAR] = world.operators[source, SHEAR]
+
+
+@rare_kernel
+def carry_history(world: World, count: int) -> None:
+    """Bring the contacts of pairs that are in both lists to their new places.
+
+    Nothing of them changes, so that the motion does not depend on when lists are made. In place, as there is no memory
+    for two of them in a large scene. Both lists are sorted, so the places keep their order: first all contacts move to
+    the front, then from the last one on to where they belong.
+    """
+    q = 0
+    kept = 0
+    old_count = world.clock[0].pair_count
+    for p in range(count):
+        new = world.spare_pairs[p]
+        while q < old_count and comes_before(world.pairs[q], new):
+            q += 1
+        if q < old_count and world.pairs[q].a == new.a and world.pairs[q].b == new.b:
+            new.axis = world.pairs[q].axis
+            if world.pairs[q].active > 0:
+                new.active = world.pairs[q].active
+                new.twins = world.pairs[q].twins
+                move_contacts(world, q, kept, new.active)
+                kept += 1
+    for p in range(count - 1, -1, -1):
+        if world.spare_pairs[p].active > 0:
+            kept -= 1
+            move_contacts(world, kept, p, world.spare_pairs[p].active)
+
+
+@rare_kernel
+def idle_candidates(pair: Record) -> int:
+    """Return how many candidates of a pair are neither in contact nor the twin of one that is.
+
+    Discs can have two contacts each, so that there may be more of those than candidates.
+    """
+    twins = 0
+    for k in range(16):
+        twins += (pair.twins >> k) & 1
+    return max(0, int(pair.near) - int(pair.active) - twins)
 
 
 @rare_kernel
@@ -92,12 +203,14 @@ def rebuild_pairs(world: World) -> bool:
         return False
     carry_history(world, count)
     for p in range(count):
+        pair = world.pairs[p]
         world.pairs[p] = world.spare_pairs[p]
-        world.operators[p, NORMAL].left = 0
-        world.operators[p, SHEAR].left = 0
-        for k in range(world.slots.shape[1]):
+        pair.idle = idle_candidates(pair)
+        if pair.active == 0:
+            world.operators[p, NORMAL].left = 0
+            world.operators[p, SHEAR].left = 0
+        for k in range(pair.near):
             world.candidates[p, k] = world.spare_candidates[p, k]
-            world.slots[p, k] = world.spare_slots[p, k]
     for i in range(world.bodies.size):
         body = world.bodies[i]
         body.list_x = body.x

@@ -3,27 +3,29 @@
 The normal pass comes first, the tangential pass uses its forces for the Coulomb limit. Losses are booked where the
 forces are applied, by the trapezoid rule over the drift between two evaluations, which is exactly the work that the
 kicks do.
-"""
 
-import math
+Here any number of points, in whatever way they were found; steady.py has the same for pairs whose one or two contacts
+go on as they were, which is what nearly all pairs do at nearly all steps.
+"""
 
 from blocksim.kernels.arrays import NORMAL, SHEAR, Record, World
 from blocksim.kernels.coupled import MOBILITY, add_coupled_dashpots, fill_mobility
-from blocksim.kernels.damping import add_dashpots
-from blocksim.kernels.friction import coulomb_limit
+from blocksim.kernels.damping import BOTH, damp_one, damp_two, fill_alike, fill_different, fill_single, keep_masses
+from blocksim.kernels.friction import clip_to_cone, draw_spring
 from blocksim.kernels.history import change_contacts, keep_places
 from blocksim.kernels.jit import kernel, rare_kernel
-from blocksim.kernels.kinematics import DELASSUS, inverse_masses, resolve_point, weigh_onset
+from blocksim.kernels.kinematics import mutual_mass, resolve_point, weigh_onset
 from blocksim.kernels.laws import elastic_force, has_constant_stiffness, tangent_stiffness
-from blocksim.kernels.models import SURFACE
+from blocksim.kernels.memory import normal_loss, shear_loss, shear_stiffness_before
+from blocksim.kernels.models import contact_points
 
 IMPACT_STEPS = 10.0  # an impact lasts some thirty steps; a face lost in a third of that cannot stop a corner
 
 
 @kernel
-def push_spring(point: Record, slot: Record, law: int, stiffness: float) -> None:
+def push_spring(point: Record, contact: Record, law: int, stiffness: float) -> None:
     """Set the normal spring force of a point and what its dashpot needs."""
-    point.before = slot.normal_force
+    point.before = contact.normal_force
     point.rate = point.closing_rate
     point.stiffness = tangent_stiffness(law, stiffness * point.share, point.depth)
     point.force = elastic_force(law, stiffness * point.share, point.depth)
@@ -31,62 +33,13 @@ def push_spring(point: Record, slot: Record, law: int, stiffness: float) -> None
 
 
 @kernel
-def clip_tension(point: Record, slot: Record) -> float:
-    """Contacts do not pull. Return the energy (J) that dashpot and clipping have taken during the last drift."""
-    force = max(point.force, 0.0)
-    loss = force - point.spring_force
-    dissipated = 0.5 * (slot.normal_loss + loss) * point.closing
-    point.normal_force = force
-    slot.normal_force = force
-    slot.normal_loss = loss
-    slot.depth = point.depth
-    slot.share = point.share
-    return dissipated
+def clip_tension(point: Record, lost: float) -> float:
+    """Contacts do not pull. Return the energy (J) that dashpot and clipping have taken during the last drift.
 
-
-@kernel
-def draw_spring(point: Record, slot: Record, values: Record) -> float:
-    """Stretch the shear spring by the last drift; the point slides where the spring alone exceeds the Coulomb limit.
-
-    `point.stiffness` comes as the slope of the normal force and leaves as the shear stiffness k, or as zero where the
-    point slides: then it gets no dashpot. Where k grows with the overlap (Hertz-Mindlin) the force is kept and the
-    spring shortened; where k falls the spring is kept and the force falls with it (C. Thornton, J. Appl. Mech. 64
-    (1997) 160-164). Both lose energy and neither creates any: F^2/2 (1/k0 - 1/k1) and (k0 - k1) s (s + ds)/2.
-
-    Return the energy (J) lost to friction: the work over the last drift less what the spring has gained, exactly.
+    `lost` (N) is what the force of the step before was more than the spring's.
     """
-    stiffness = values.shear_ratio * point.stiffness
-    old = slot.spring
-    old_stiffness = slot.shear_stiffness
-    kept = old * (old_stiffness / stiffness) if stiffness > old_stiffness else old
-    spring = kept + point.slipping * point.drawn
-    point.limit = coulomb_limit(values, point.normal_force, point.slip_rate, stiffness * abs(spring))
-    point.stiffness = stiffness
-    if stiffness * abs(spring) > point.limit:
-        spring = math.copysign(point.limit / stiffness, spring)
-        point.stiffness = 0.0
-    slot.spring = spring
-    slot.shear_stiffness = stiffness
-    point.before = slot.shear_force
-    point.rate = point.slip_rate
-    point.force = stiffness * spring
-    old_force = old_stiffness * old
-    return 0.5 * ((old_force + point.force) * point.slipping - point.force * spring + old_force * old)
-
-
-@kernel
-def clip_to_cone(point: Record, slot: Record, values: Record) -> float:
-    """Clip spring and dashpot together to the Coulomb cone. Return the energy (J) lost to what is not spring force."""
-    force = point.force
-    if abs(force) > point.limit:
-        limit = coulomb_limit(values, point.normal_force, point.slip_rate, abs(force))
-        force = min(max(force, -limit), limit)
-    loss = force - slot.shear_stiffness * slot.spring
-    dissipated = 0.5 * (slot.shear_loss + loss) * point.slipping
-    point.force = force
-    slot.shear_force = force
-    slot.shear_loss = loss
-    return dissipated
+    point.normal_force = max(point.force, 0.0)
+    return 0.5 * (lost + (point.normal_force - point.spring_force)) * point.closing
 
 
 @rare_kernel
@@ -124,28 +77,53 @@ def shared_step(a: Record, b: Record, step: float) -> float:
 @kernel
 def has_new_neighbours(a: Record, b: Record) -> bool:
     """Tell whether the number of pairs on a free body has changed, so that operators made with the old one are void."""
-    return (a.pairs_changed == 1 and a.inverse_mass > 0.0) or (b.pairs_changed == 1 and b.inverse_mass > 0.0)
-
-
-@kernel
-def damp(world: World, p: int, count: int, direction: int, pattern: int, ratio: float, step: float) -> None:
-    """Add the dashpots of pair p to the forces of its points; `pattern` has a bit for every point that has one."""
-    operator = world.operators[p, direction]
-    if count > 2:
-        damp_many(world, p, count, direction, ratio, step)
-        return
-    if operator.left == 0:
-        fill_delassus(world, p, count, direction)
-    add_dashpots(world.points, count, pattern, ratio, step, operator, world.matrices)
+    return (a.pairs_changed | b.pairs_changed) != 0
 
 
 @rare_kernel
-def fill_delassus(world: World, p: int, count: int, direction: int) -> None:
-    """Bring the inverse masses of one or two points up to date."""
+def damp(world: World, p: int, count: int, direction: int, pattern: int, ratio: float, step: float) -> None:
+    """Add the dashpots of pair p to the forces of its points; `pattern` has a bit for every point that has one."""
+    if count > 2:
+        damp_many(world, p, count, direction, ratio, step)
+        return
+    operator = world.operators[p, direction]
+    if operator.left == 0:
+        fill_operator(world, p, count, direction, pattern, ratio, step)
+    else:
+        operator.left -= 1
+    one = world.points[0]
+    if count == 1:
+        one.force = damp_one(operator, one.force, one.before, one.rate)
+    else:
+        two = world.points[1]
+        one.force, two.force = damp_two(operator, one.force, two.force, one.before, two.before, one.rate, two.rate)
+
+
+@rare_kernel
+def fill_operator(world: World, p: int, count: int, direction: int, pattern: int, ratio: float, step: float) -> None:
+    """Make the operator of one or two points anew; a weight of a first step holds for this step only."""
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
-    inverse_masses(world.points, count, direction, a, b, world.matrices[DELASSUS])
+    operator = world.operators[p, direction]
+    one = world.points[0]
+    two = world.points[count - 1]
+    half = 0.5 * step
+    m_one = mutual_mass(one, one, a, b, direction)
+    m_mixed = mutual_mass(one, two, a, b, direction)
+    m_two = mutual_mass(two, two, a, b, direction)
+    keep_masses(operator, pattern, half, m_one, m_mixed, m_two)
+    if pattern == 1:
+        fill_single(operator, 0, ratio, half, m_one, one.stiffness, one.weight)
+    elif pattern != BOTH:
+        fill_single(operator, 1, ratio, half, m_two, two.stiffness, two.weight)
+    elif one.weight == two.weight and one.stiffness == two.stiffness:
+        g = one.weight * 2.0 * ratio * one.stiffness**0.5
+        fill_alike(operator, g, half, m_one, m_mixed, m_two)
+    else:
+        fill_different(operator, ratio, half, m_one, m_mixed, m_two, one, two)
+    if one.weight != 1.0 or two.weight != 1.0:
+        operator.left = 0
 
 
 @rare_kernel
@@ -156,98 +134,142 @@ def damp_many(world: World, p: int, count: int, direction: int, ratio: float, st
     add_coupled_dashpots(world.points, count, direction, ratio, step, world.matrices)
 
 
-@kernel
-def normal_pass(world: World, p: int, count: int, a: Record, b: Record, values: Record, step: float) -> None:
-    """Kinematics, then springs and dashpots along the normals."""
-    points = world.points
+@rare_kernel
+def resolve_points(world: World, p: int, count: int, step: float, book: Record) -> None:
+    """Kinematics of all points; history where the set of contacts has changed."""
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
     law = world.controls[0].law
     continuing = 0
     loses_face = False
     for i in range(count):
-        point = points[i]
-        slot = world.slots[p, point.slot]
+        point = world.points[i]
         resolve_point(point, a, b, step)
-        push_spring(point, slot, law, values.normal_stiffness)
         if not has_constant_stiffness(law):
             weigh_onset(point, law)
-        continuing += 1 if slot.face == point.face else 0
+        if i < pair.active:
+            contact = world.contacts[p, i]
+            continuing += 1 if contact.slot == point.slot and contact.face == point.face else 0
         loses_face = loses_face or point.beside < IMPACT_STEPS * abs(point.closing)
-    if continuing != count or count != world.pairs[p].active:
-        change_contacts(world, p, count, step)
+    if continuing != count or count != pair.active:
+        change_contacts(world, p, count, step, book)
     if loses_face:
         spare_lost_faces(world, p, count)
-    if values.normal_damping > 0.0:
-        operator = world.operators[p, NORMAL]
-        if has_new_neighbours(a, b) or not has_constant_stiffness(law):
-            operator.left = 0
-        damp(world, p, count, NORMAL, (1 << min(count, 2)) - 1, values.normal_damping, shared_step(a, b, step))
 
 
-@kernel
-def shear_pass(world: World, p: int, count: int, a: Record, b: Record, values: Record, step: float) -> None:
-    """Clip the normal forces; springs with history along the tangents and dashpots where a point sticks."""
-    points = world.points
-    ledger = world.ledger[0]
-    sticking = 0
-    dashpot_work = 0.0
-    friction_work = 0.0
+@rare_kernel
+def normal_pass(world: World, p: int, count: int, values: Record, step: float) -> None:
+    """Springs and dashpots along the normals."""
+    law = world.controls[0].law
     for i in range(count):
-        point = points[i]
-        slot = world.slots[p, point.slot]
-        dashpot_work += clip_tension(point, slot)
-        friction_work += draw_spring(point, slot, values)
-        sticking |= 1 << min(i, 62) if point.stiffness > 0.0 else 0  # beyond two points only zero or not zero counts
-    ledger.dashpot += dashpot_work
-    ledger.friction += friction_work
+        push_spring(world.points[i], world.contacts[p, i], law, values.normal_stiffness)
+    if values.normal_damping > 0.0:
+        damp(world, p, count, NORMAL, (1 << min(count, 2)) - 1, values.normal_damping, step)
+
+
+@rare_kernel
+def draw_springs(world: World, p: int, count: int, values: Record, book: Record) -> int:
+    """Clip the normal forces and stretch the shear springs; return the bits of the points that stick.
+
+    Beyond two points only zero or not zero counts.
+    """
+    law = world.controls[0].law
+    sticking = 0
+    for i in range(count):
+        point = world.points[i]
+        contact = world.contacts[p, i]
+        old_stiffness = shear_stiffness_before(contact, values, law, world.particles)
+        book.dashpot += clip_tension(point, normal_loss(contact, values, law, world.particles))
+        stiffness = values.shear_ratio * point.stiffness
+        slip = point.slipping
+        spring, point.limit, slides, friction_work = draw_spring(
+            values, stiffness, old_stiffness, contact.spring, slip, point.drawn, point.normal_force, point.slip_rate
+        )
+        book.friction += friction_work
+        point.lost = shear_loss(contact, old_stiffness)
+        sticking |= 0 if slides else 1 << min(i, 30)
+        point.stiffness = 0.0 if slides else stiffness
+        point.before = contact.shear_force
+        point.rate = point.slip_rate
+        point.force = point.spring_force = stiffness * spring
+        contact.spring = spring
+        contact.depth = point.depth
+        contact.normal_force = point.normal_force
+    return sticking
+
+
+@rare_kernel
+def shear_pass(world: World, p: int, count: int, values: Record, step: float, book: Record) -> None:
+    """Clip the normal forces; springs with history along the tangents and dashpots where a point sticks."""
+    sticking = draw_springs(world, p, count, values, book)
     operator = world.operators[p, SHEAR]
-    changes = has_new_neighbours(a, b) or not has_constant_stiffness(world.controls[0].law)
-    if operator.pattern != sticking or sticking == 0 or changes:
+    if operator.pattern != sticking or sticking == 0:
         operator.left = 0
     if sticking > 0 and values.shear_damping > 0.0:
-        damp(world, p, count, SHEAR, sticking, values.shear_damping, shared_step(a, b, step))
+        damp(world, p, count, SHEAR, sticking, values.shear_damping, step)
+    for i in range(count):
+        point = world.points[i]
+        contact = world.contacts[p, i]
+        force = clip_to_cone(values, point.force, point.limit, point.normal_force, point.slip_rate)
+        book.dashpot += 0.5 * (point.lost + (force - point.spring_force)) * point.slipping
+        contact.shear_force = point.force = force
 
 
-@kernel
-def force_pass(world: World, p: int, count: int, a: Record, b: Record, values: Record) -> None:
-    """Clip the shear forces and add all forces of the pair to the totals of both bodies.
+@rare_kernel
+def force_pass(world: World, p: int, count: int) -> None:
+    """Add all forces of the pair to the totals of both bodies.
 
     `force` is the resistance to slip of a ahead of b, along the tangent (-ny, nx).
     """
+    pair = world.pairs[p]
     fx = 0.0
     fy = 0.0
     torque_a = 0.0
     torque_b = 0.0
-    dashpot_work = 0.0
     for i in range(count):
         point = world.points[i]
-        dashpot_work += clip_to_cone(point, world.slots[p, point.slot], values)
         fx += point.nx * point.normal_force + point.ny * point.force
         fy += point.ny * point.normal_force - point.nx * point.force
         torque_a += point.normal_arm_a * point.normal_force - point.shear_arm_a * point.force
         torque_b += point.normal_arm_b * point.normal_force - point.shear_arm_b * point.force
-    world.ledger[0].dashpot += dashpot_work
-    a.fx += fx
-    a.fy += fy
-    a.torque += torque_a
-    b.fx -= fx
-    b.fy -= fy
-    b.torque -= torque_b
+    add_totals(world.bodies[pair.a], world.bodies[pair.b], fx, fy, torque_a, torque_b)
 
 
 @kernel
-def pair_forces(world: World, p: int, count: int, step: float) -> None:
-    """Add the forces of the `count` contact points found for pair p to the totals of its bodies.
+def add_totals(a: Record, b: Record, fx: float, fy: float, torque_a: float, torque_b: float) -> None:
+    """Add the force (N) of a pair on body a, and the torques (N m) on a and against b, to the totals of both."""
+    a.fx += fx
+    a.fy += fy
+    a.torque += torque_a
+    a.pairs_now += 1
+    b.fx -= fx
+    b.fy -= fy
+    b.torque -= torque_b
+    b.pairs_now += 1
+
+
+@rare_kernel
+def pair_forces(world: World, p: int, step: float, book: Record) -> None:
+    """Find the contact points of pair p and add their forces to the totals of its bodies.
 
     `step` is the length (s) of the drift that led here, zero for a first evaluation before any motion.
     """
     pair = world.pairs[p]
+    count = contact_points(world, p)
+    if count == 0:
+        if pair.active > 0:
+            change_contacts(world, p, 0, step, book)
+        return
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
     values = world.interactions[a.contact_class, b.contact_class]
-    a.pairs_now += 1
-    b.pairs_now += 1
-    normal_pass(world, p, count, a, b, values, step)
-    shear_pass(world, p, count, a, b, values, step)
-    force_pass(world, p, count, a, b, values)
-    if world.controls[0].model != SURFACE:
-        keep_places(world, p, count)
+    if has_new_neighbours(a, b) or not has_constant_stiffness(world.controls[0].law):
+        world.operators[p, NORMAL].left = 0
+        world.operators[p, SHEAR].left = 0
+    resolve_points(world, p, count, step, book)
+    shared = shared_step(a, b, step)
+    normal_pass(world, p, count, values, shared)
+    shear_pass(world, p, count, values, shared, book)
+    force_pass(world, p, count)
+    keep_places(world, p, count)

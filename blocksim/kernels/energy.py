@@ -2,10 +2,11 @@
 
 import math
 
-from blocksim.kernels.arrays import ALL, NO_FACE, Floats, Record, World
+from blocksim.kernels.arrays import ALL, Floats, Record, Records, World
 from blocksim.kernels.integrate import kinetic_energy
-from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.jit import entry_kernel, rare_kernel
 from blocksim.kernels.laws import stored_energy
+from blocksim.kernels.memory import share_before, shear_stiffness_before
 
 OVERLAP_SHARE = 0.05  # of the smallest side of a pair
 LEDGER_ROW = ("kinetic", "potential", "stored_normal", "stored_shear", "dashpot", "friction", "broken", "to_support")
@@ -23,6 +24,17 @@ def potential_energy(world: World) -> float:
 
 
 @rare_kernel
+def weights_power(world: World) -> float:
+    """Return the power (W) of all weights, each counted positive: summed over time, the travel of the weights."""
+    total = 0.0
+    controls = world.controls[0]
+    for i in range(world.bodies.size - 1):
+        body = world.bodies[i]
+        total += body.mass * abs(controls.gravity_x * body.vx + controls.gravity_y * body.vy)
+    return total
+
+
+@rare_kernel
 def contact_summary(world: World) -> tuple[float, float, int, float]:
     """Return energy stored in normal and in shear springs (J), number of contacts, largest overlap (m)."""
     normal = 0.0
@@ -34,17 +46,31 @@ def contact_summary(world: World) -> tuple[float, float, int, float]:
         pair = world.pairs[p]
         if pair.active > 0:
             values = world.interactions[world.bodies[pair.a].contact_class, world.bodies[pair.b].contact_class]
-            for k in range(world.slots.shape[1]):
-                slot = world.slots[p, k]
-                if slot.face != NO_FACE:
-                    normal += stored_energy(law, values.normal_stiffness * slot.share, slot.depth)
-                    shear += 0.5 * slot.shear_stiffness * slot.spring * slot.spring
-                    count += 1
-                    largest = max(largest, slot.depth)
+            for k in range(pair.active):
+                contact = world.contacts[p, k]
+                share = share_before(contact, world.particles)
+                stiffness = shear_stiffness_before(contact, values, law, world.particles)
+                normal += stored_energy(law, values.normal_stiffness * share, contact.depth)
+                shear += 0.5 * stiffness * contact.spring * contact.spring
+                count += 1
+                largest = max(largest, contact.depth)
     return normal, shear, count, largest
 
 
 @rare_kernel
+def booked(ledger: Records) -> tuple[float, float, float]:
+    """Return the losses (J) to dashpots, friction and broken contacts, summed over all groups of pairs in order."""
+    dashpot = 0.0
+    friction = 0.0
+    broken = 0.0
+    for book in ledger:
+        dashpot += book.dashpot
+        friction += book.friction
+        broken += book.broken
+    return dashpot, friction, broken
+
+
+@entry_kernel
 def measure(world: World, row: Floats) -> None:
     """Write one row of the ledger: energies (J) as in `LEDGER_ROW`, number of contacts, largest overlap (m)."""
     ledger = world.ledger[0]
@@ -53,9 +79,7 @@ def measure(world: World, row: Floats) -> None:
     row[1] = potential_energy(world)
     row[2] = normal
     row[3] = shear
-    row[4] = ledger.dashpot
-    row[5] = ledger.friction
-    row[6] = ledger.broken
+    row[4], row[5], row[6] = booked(world.ledger)
     row[7] = ledger.to_support
     row[8] = count
     row[9] = largest
@@ -77,7 +101,7 @@ def has_excessive_overlap(world: World) -> bool:
         if pair.active > 0:
             side = min(smallest_side(world.bodies[pair.a]), smallest_side(world.bodies[pair.b]))
             limit = given if given > 0.0 else OVERLAP_SHARE * side
-            for k in range(world.slots.shape[1]):
-                if world.slots[p, k].face != NO_FACE and world.slots[p, k].depth > limit:
+            for k in range(pair.active):
+                if world.contacts[p, k].depth > limit:
                     return True
     return False

@@ -28,3 +28,59 @@ def coulomb_limit(values: Record, normal_force: float, speed: float, needed: flo
         return kinetic
     static = values.static_friction
     return normal_force * friction_coefficient(static, values.kinetic_friction, values.transition_speed, speed)
+
+
+@kernel
+def draw_spring(
+    values: Record,
+    stiffness: float,
+    old_stiffness: float,
+    old: float,
+    slip: float,
+    drawn: float,
+    normal_force: float,
+    rate: float,
+) -> tuple[float, float, bool, float]:
+    """Stretch a shear spring from `old` (m) by the last drift; it slides where it alone exceeds the Coulomb limit.
+
+    `slip` (m) is the relative displacement of the drift, of which the share `drawn` counts, `rate` (m/s) the slip rate
+    at its end. Returns the spring (m), the Coulomb limit (N), whether it slides, and the energy (J) lost to friction:
+    the work over the drift less what the spring has gained, exactly.
+
+    Where the stiffness grows with the overlap (Hertz-Mindlin) the force is kept and the spring shortened; where it
+    falls the spring is kept and the force falls with it (C. Thornton, J. Appl. Mech. 64 (1997) 160-164). Both lose
+    energy and neither creates any: F^2/2 (1/k0 - 1/k1) and (k0 - k1) s (s + ds)/2.
+    """
+    kept = old * (old_stiffness / stiffness) if stiffness > old_stiffness else old
+    spring = kept + slip * drawn
+    needed = stiffness * abs(spring)
+    limit = coulomb_limit(values, normal_force, rate, needed)
+    slides = needed > limit
+    if slides:
+        spring = math.copysign(limit / stiffness, spring)
+    force = stiffness * spring
+    old_force = old_stiffness * old
+    return spring, limit, slides, 0.5 * ((old_force + force) * slip - force * spring + old_force * old)
+
+
+@kernel
+def draw_same_spring(
+    values: Record, stiffness: float, old: float, slip: float, normal_force: float, rate: float
+) -> tuple[float, float, bool, float]:
+    """As draw_spring, for a stiffness that does not change: a spring that sticks then loses nothing."""
+    spring = old + slip
+    needed = stiffness * abs(spring)
+    limit = coulomb_limit(values, normal_force, rate, needed)
+    if needed <= limit:
+        return spring, limit, False, 0.0
+    spring = math.copysign(limit / stiffness, spring)
+    return spring, limit, True, 0.5 * stiffness * ((old + spring) * slip - (spring - old) * (spring + old))
+
+
+@kernel
+def clip_to_cone(values: Record, force: float, limit: float, normal_force: float, rate: float) -> float:
+    """Return spring and dashpot force (N) together, within the Coulomb cone; `limit` (N) is what the spring had."""
+    if abs(force) <= limit:
+        return force
+    bound = coulomb_limit(values, normal_force, rate, abs(force))
+    return min(max(force, -bound), bound)

@@ -76,3 +76,25 @@ def slab_depth(px: float, py: float, slab: Record) -> float:
     """Return how deep (m) a point, given in the frame of a slab of ground, lies below its upper face; zero outside."""
     depth = slab.half_y - py
     return depth if 0.0 < depth <= END_RATIO * (slab.half_x - abs(px)) else 0.0
+
+
+@kernel
+def corner_offset(body: Record, corner: int) -> tuple[float, float]:
+    """Return the way (m) from the centre of a body to one of its corners, in world axes."""
+    is_upper = corner == 0 or corner == 2  # or its opposite
+    x = body.upper_x if is_upper else body.lower_x
+    y = body.upper_y if is_upper else body.lower_y
+    return (x, y) if corner == 1 or corner == 2 else (-x, -y)
+
+
+@kernel
+def place_corners(body: Record) -> None:
+    """Bring the ways to the corners of a body up to date with its rotation."""
+    ux = body.cos * body.half_x
+    uy = body.sin * body.half_x
+    vx = -body.sin * body.half_y
+    vy = body.cos * body.half_y
+    body.upper_x = ux + vx
+    body.upper_y = uy + vy
+    body.lower_x = ux - vx
+    body.lower_y = uy - vy

@@ -1,31 +1,83 @@
 """Contact history when contacts begin, end, or pass from one corner to another.
 
-A slot keeps what a contact remembers from step to step. A contact ends when its corner leaves, or touches another face;
-what its springs hold is then lost and booked. Where two corners pass one another (blocks that become exactly aligned),
-the contact itself goes on under another corner, and its history goes with it.
+A contact record keeps what a contact remembers from step to step. A contact ends when its corner leaves, or touches
+another face; what its springs hold is then lost and booked. Where two corners pass one another (blocks that become
+exactly aligned), the contact itself goes on under another corner, and its history goes with it.
 """
 
-from blocksim.kernels.arrays import NO_FACE, NORMAL, SHEAR, Record, Records, World
-from blocksim.kernels.broad_phase import clear_slot
-from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.arrays import NORMAL, SHEAR, Record, Records, World
+from blocksim.kernels.broad_phase import idle_candidates
+from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.kinematics import has_just_begun, resolve_point, weigh_first_step
+from blocksim.kernels.memory import normal_loss, shear_loss, shear_stiffness_before
 from blocksim.kernels.models import SURFACE, place_ended
 from blocksim.kernels.models.surface import slot_normal
 from blocksim.kernels.models.twins import PARALLEL
 
+TAKEN = 0xFFFFFFFF  # slot of an old contact that has found its successor; no corner or particle has this number
+
 
 @rare_kernel
-def goes_on(k: int, face: int, points: Records, count: int) -> bool:
-    """Tell whether the corner of slot k still touches the same face."""
-    for i in range(count):
-        if points[i].slot == k and points[i].face == face:
+def clear_contact(contact: Record) -> None:
+    """Forget all history of a contact."""
+    contact.spring = 0.0
+    contact.depth = 0.0
+    contact.normal_force = 0.0
+    contact.shear_force = 0.0
+
+
+@rare_kernel
+def carry_on(world: World, p: int, i: int, count: int) -> None:
+    """Give point i the history of the same corner on the same face, if there is one among `count`."""
+    point = world.points[i]
+    for j in range(count):
+        old = world.before[j]
+        if old.slot == point.slot and old.face == point.face:
+            world.contacts[p, i] = old
+            old.slot = TAKEN
+            return
+    contact = world.contacts[p, i]
+    clear_contact(contact)
+    contact.slot = point.slot
+    contact.face = point.face
+
+
+@rare_kernel
+def was_in_contact(slot: int, old: Records, count: int) -> bool:
+    """Tell whether a corner had a contact, on whichever face."""
+    for j in range(count):
+        if old[j].slot == slot:
             return True
     return False
 
 
 @rare_kernel
-def release_slot(world: World, p: int, k: int, step: float) -> None:
-    """End the contact of one slot: book its last half step and what its springs still hold; clear its history.
+def take_over(world: World, p: int, i: int, count: int) -> None:
+    """Let the corner of point i, new and deeper than it closed, take the place of one of `count` that has ended.
+
+    Their normals must agree: then the contact goes on under another corner.
+    """
+    pair = world.pairs[p]
+    point = world.points[i]
+    if has_just_begun(point) or was_in_contact(point.slot, world.before, count):
+        return
+    for j in range(count):
+        old = world.before[j]
+        if old.slot != TAKEN:
+            nx, ny = slot_normal(world, pair, old.slot, old.face)
+            if nx * point.nx + ny * point.ny > PARALLEL:
+                contact = world.contacts[p, i]
+                contact.spring = old.spring
+                contact.depth = old.depth
+                contact.normal_force = old.normal_force
+                contact.shear_force = old.shear_force
+                old.slot = TAKEN
+                return
+
+
+@rare_kernel
+def release(world: World, p: int, old: Record, step: float, book: Record) -> None:
+    """End a contact: book its last half step and what its springs still hold.
 
     The last kick was half of a trapezoid whose other half is empty: its work over the last drift is half the force
     times the relative displacement, along the normal and the tangent as they were.
@@ -33,79 +85,56 @@ def release_slot(world: World, p: int, k: int, step: float) -> None:
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
-    slot = world.slots[p, k]
-    ledger = world.ledger[0]
+    values = world.interactions[a.contact_class, b.contact_class]
+    law = world.controls[0].law
     point = world.points[world.points.size - 1]
-    place_ended(world, p, k, point)
+    place_ended(world, p, old, point)
     resolve_point(point, a, b, step)
-    spring_force = slot.shear_stiffness * slot.spring
-    ledger.dashpot += 0.5 * (slot.normal_loss * point.closing + slot.shear_loss * point.slipping)
-    ledger.broken += 0.5 * spring_force * (slot.spring + point.slipping)
-    clear_slot(slot)
+    stiffness = shear_stiffness_before(old, values, law, world.particles)
+    lost = normal_loss(old, values, law, world.particles) * point.closing
+    book.dashpot += 0.5 * (lost + shear_loss(old, stiffness) * point.slipping)
+    book.broken += 0.5 * stiffness * old.spring * (old.spring + point.slipping)
 
 
 @rare_kernel
-def release_ended(world: World, p: int, count: int, step: float) -> None:
-    """Release the slots of a pair whose corner is no longer in contact, or touches another face than before."""
-    for k in range(world.slots.shape[1]):
-        slot = world.slots[p, k]
-        if slot.face != NO_FACE and not goes_on(k, slot.face, world.points, count):
-            release_slot(world, p, k, step)
-
-
-@rare_kernel
-def take_over(point: Record, slots: Records, k: int) -> None:
-    """Give the history of slot k of a pair to the corner that takes its place."""
-    old = slots[k]
-    point.before = old.normal_force
-    slots[point.slot] = old
-    slots[point.slot].face = point.face
-    clear_slot(old)
-
-
-@rare_kernel
-def hand_over(world: World, p: int, count: int) -> None:
-    """Find corners that come deeper than they closed; where one of the same normal ended, they take its place."""
-    pair = world.pairs[p]
-    a = world.bodies[pair.a]
-    b = world.bodies[pair.b]
-    for i in range(count):
-        point = world.points[i]
-        new = world.slots[p, point.slot]
-        for k in range(world.slots.shape[1]):
-            old = world.slots[p, k]
-            is_late = new.face == NO_FACE and not has_just_begun(point)
-            if is_late and old.face != NO_FACE and not goes_on(k, old.face, world.points, count):
-                nx, ny = slot_normal(k, old.face, a, b, pair.b == world.bodies.size - 1)
-                if nx * point.nx + ny * point.ny > PARALLEL:
-                    take_over(point, world.slots[p], k)
-
-
-@rare_kernel
-def change_contacts(world: World, p: int, count: int, step: float) -> None:
+def change_contacts(world: World, p: int, count: int, step: float, book: Record) -> None:
     """Take up a changed set of contacts: pass on, release, weigh first steps, have the operators made anew."""
-    if world.controls[0].model == SURFACE:
-        hand_over(world, p, count)
-    release_ended(world, p, count, step)
+    pair = world.pairs[p]
+    before = pair.active
+    for j in range(before):
+        world.before[j] = world.contacts[p, j]
     for i in range(count):
-        point = world.points[i]
-        slot = world.slots[p, point.slot]
-        if slot.face == NO_FACE:
-            slot.face = point.face
-            point.before = 0.0
-            weigh_first_step(point, world.controls[0].law)
+        carry_on(world, p, i, before)
+    for i in range(count):
+        contact = world.contacts[p, i]
+        if contact.depth == 0.0 and world.controls[0].model == SURFACE:
+            take_over(world, p, i, before)
+        if contact.depth == 0.0:  # it is new
+            weigh_first_step(world.points[i], world.controls[0].law)
+    for j in range(before):
+        if world.before[j].slot != TAKEN:
+            release(world, p, world.before[j], step, book)
     world.operators[p, NORMAL].left = 0
     world.operators[p, SHEAR].left = 0
-    world.pairs[p].active = count
+    pair.active = count
+    pair.idle = idle_candidates(pair)
 
 
 @rare_kernel
 def keep_places(world: World, p: int, count: int) -> None:
-    """Note place and normal of every contact in its slot: that one has ended shows when its particle is gone."""
-    for i in range(count):
-        point = world.points[i]
-        slot = world.slots[p, point.slot]
-        slot.x = point.x
-        slot.y = point.y
-        slot.nx = point.nx
-        slot.ny = point.ny
+    """Note what only the models with particles keep: that a contact has ended shows when its particle is gone."""
+    keep_places_of(world, p, count, world.particles)
+
+
+@kernel
+def keep_places_of(world: World, p: int, count: int, particles: Records | None) -> None:
+    """As keep_places; corners (no particles) are found again."""
+    if particles is not None:
+        for i in range(count):
+            point = world.points[i]
+            contact = world.contacts[p, i]
+            contact.share = point.share
+            contact.x = point.x
+            contact.y = point.y
+            contact.nx = point.nx
+            contact.ny = point.ny

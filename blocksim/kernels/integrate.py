@@ -3,41 +3,40 @@
 import math
 
 from blocksim.kernels.arrays import Record, Records, World
-from blocksim.kernels.geometry import turn
+from blocksim.kernels.geometry import place_corners, turn
 from blocksim.kernels.jit import kernel, rare_kernel
-
-PAIR_SHARE = 0.4  # of the skin, that a body may move before the pair list is made anew
 
 
 @kernel
-def kick_and_drift(bodies: Records, controls: Record, step: float, ledger: Record) -> bool:
-    """Advance velocities by half a step, then positions and rotations by a full one; return whether pairs are due.
+def start_step(body: Record, step: float) -> None:
+    """Advance the velocities of a body by half a step, then its position and rotation by a full one.
 
-    Uses the accelerations of the last force evaluation. Books the weights' travel for the energy in play. The pair
-    list is due when a corner may have moved 0.4 skins since it was made: two bodies use up 0.8 skins, the rest covers
-    the drift that led here.
+    Uses the accelerations of the last force evaluation.
     """
     half = 0.5 * step
-    limit = PAIR_SHARE * controls.skin
-    travel_work = 0.0
-    is_due = False
+    body.vx += half * body.ax
+    body.vy += half * body.ay
+    body.spin += half * body.spin_rate
+    turned = step * body.spin
+    body.x += step * body.vx
+    body.y += step * body.vy
+    body.angle += turned
+    body.cos, body.sin = turn(body.cos, body.sin, turned)
+    place_corners(body)
+
+
+@kernel
+def kick_and_drift(bodies: Records, step: float) -> None:
+    """Start a step of all bodies."""
     for i in range(bodies.size - 1):
-        body = bodies[i]
-        body.vx += half * body.ax
-        body.vy += half * body.ay
-        body.spin += half * body.spin_rate
-        dx = step * body.vx
-        dy = step * body.vy
-        turned = step * body.spin
-        body.x += dx
-        body.y += dy
-        body.angle += turned
-        body.cos, body.sin = turn(body.cos, body.sin, turned)
-        travel_work += body.mass * abs(controls.gravity_x * dx + controls.gravity_y * dy)
-        moved = abs(body.x - body.list_x) + abs(body.y - body.list_y)
-        is_due = is_due or moved + body.radius * abs(body.angle - body.list_angle) > limit
-    ledger.travel_work += travel_work
-    return is_due
+        start_step(bodies[i], step)
+
+
+@rare_kernel
+def place_all_corners(bodies: Records) -> None:
+    """Bring the ways to the corners of all bodies up to date with their rotations; the ground has none."""
+    for i in range(bodies.size - 1):
+        place_corners(bodies[i])
 
 
 @rare_kernel
@@ -47,30 +46,45 @@ def renew_rotations(bodies: Records) -> None:
         body = bodies[i]
         body.cos = math.cos(body.angle)
         body.sin = math.sin(body.angle)
+    place_all_corners(bodies)
 
 
 @kernel
-def accelerate_and_kick(bodies: Records, controls: Record, step: float) -> None:
-    """Turn gravity and the contact totals into accelerations and advance velocities by half a step with them.
+def finish_step(body: Record, controls: Record, step: float) -> None:
+    """Turn gravity and contact totals of a body into accelerations, advance its velocities by half a step with them.
 
     Fixed bodies and the ground have no acceleration. Clears the totals.
     """
     half = 0.5 * step
-    for i in range(bodies.size):
-        body = bodies[i]
-        if body.inverse_mass > 0.0:
-            body.ax = controls.gravity_x + body.inverse_mass * body.fx
-            body.ay = controls.gravity_y + body.inverse_mass * body.fy
-            body.spin_rate = body.inverse_inertia * body.torque
-            body.vx += half * body.ax
-            body.vy += half * body.ay
-            body.spin += half * body.spin_rate
+    if body.inverse_mass > 0.0:
+        body.ax = controls.gravity_x + body.inverse_mass * body.fx
+        body.ay = controls.gravity_y + body.inverse_mass * body.fy
+        body.spin_rate = body.inverse_inertia * body.torque
+        body.vx += half * body.ax
+        body.vy += half * body.ay
+        body.spin += half * body.spin_rate
         body.pairs_changed = body.pairs_now != body.pairs_before
         body.pairs_before = body.pairs_now
-        body.pairs_now = 0
-        body.fx = 0.0
-        body.fy = 0.0
-        body.torque = 0.0
+    body.pairs_now = 0
+    body.fx = 0.0
+    body.fy = 0.0
+    body.torque = 0.0
+
+
+@kernel
+def accelerate_and_kick(bodies: Records, controls: Record, step: float) -> None:
+    """Finish the step of all bodies."""
+    for i in range(bodies.size):
+        finish_step(bodies[i], controls, step)
+
+
+@kernel
+def go_on(bodies: Records, controls: Record, step: float) -> None:
+    """Finish a step of all bodies and start the next one, where nothing has to be looked at between them."""
+    for i in range(bodies.size - 1):
+        finish_step(bodies[i], controls, step)
+        start_step(bodies[i], step)
+    finish_step(bodies[bodies.size - 1], controls, step)
 
 
 @rare_kernel

@@ -17,13 +17,19 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 from numba import config as numba_config
+from numba.core.registry import CPUDispatcher
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
 # IEEE arithmetic as written (no fastmath: the same input gives the same bits) and division by zero as in IEEE (no
 # exception can leave a kernel). Nothing allocates, so reference counts of arrays, two atomic operations an array and
 # call, are switched off; together with inlining of the hot path that made a step five times faster than the defaults.
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+
+# Most kernels are called by kernels only. Without the code that unpacks their arguments from Python objects all of them
+# compile in two thirds of the time. Tests, and whoever looks for an error, set this variable and can call every one.
+OPEN = "BLOCKSIM_OPEN_KERNELS"
+IS_OPEN = bool(os.environ.get(OPEN))
 
 config: Any = numba_config  # its settings are attributes made at run time
 njit: Any = numba.njit  # _nrt is an option that its types leave out
@@ -67,9 +73,10 @@ def _cache_roots() -> Iterator[Path]:
 @functools.cache
 def cache_folder() -> Path | None:
     """Return the cache folder of this exact source, or None where nothing can be kept."""
+    name = source_hash() + ("-open" if IS_OPEN else "")
     for root in _cache_roots():
-        if _is_usable(root) and _is_usable(root / source_hash()):
-            return root / source_hash()
+        if _is_usable(root) and _is_usable(root / name):
+            return root / name
     return None
 
 
@@ -104,11 +111,35 @@ def _compiled(function: Function, **options: object) -> Function:
     return compiled
 
 
+class _Inner(CPUDispatcher):
+    """A compiled function without the code that Python needs to call it."""
+
+    def __call__(self, *_: object, **__: object) -> None:
+        """Refuse: the process would die."""
+        message = f"{self.py_func.__name__} is compiled for other kernels only; {OPEN}=1 lets Python call it too"
+        raise TypeError(message)
+
+
+def _inner(function: Function, **options: object) -> Function:
+    """Compile a function that Python does not call, unless all are open."""
+    if IS_OPEN or config.DISABLE_JIT:
+        return _compiled(function, **options)
+    compiled: Any = _compiled(function, no_cpython_wrapper=True, **options)
+    compiled.__class__ = _Inner
+    inner: Function = compiled
+    return inner
+
+
 def kernel(function: Function) -> Function:
     """Compile a function of the hot path: inlined where it is called, cached on disk by the hash of all sources."""
-    return _compiled(function, forceinline=True)
+    return _inner(function, forceinline=True)
 
 
 def rare_kernel(function: Function) -> Function:
     """Compile a function that most steps do not call; kept out of the hot path, which it would only lengthen."""
-    return _compiled(function)
+    return _inner(function)
+
+
+def entry_kernel(function: Function) -> Function:
+    """Compile a function that Python calls; other threads can run meanwhile."""
+    return _compiled(function, nogil=True)

@@ -1,10 +1,9 @@
 """Rates, displacements and inverse masses at the contact points of one pair, along the normals or the tangents."""
 
-from blocksim.kernels.arrays import NORMAL, Floats, Record, Records
+from blocksim.kernels.arrays import NORMAL, Record
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.laws import dashpot_weight
 
-DELASSUS = 0  # index into the work matrices
 ROUND_OFF = 1e-6  # of an overlap after one drift: a small difference of places, where the closing is a small product
 ONSET_STEPS = 16.0  # after which the mean over a step and the value in its middle differ by less than 1/30000
 
@@ -85,11 +84,3 @@ def mutual_mass(one: Record, two: Record, a: Record, b: Record, direction: int) 
         arms_b = one.shear_arm_b * two.shear_arm_b
     translation = (one.nx * two.nx + one.ny * two.ny) * (a.inverse_mass + b.inverse_mass)
     return translation + arms_a * a.inverse_inertia + arms_b * b.inverse_inertia
-
-
-@rare_kernel
-def inverse_masses(points: Records, count: int, direction: int, a: Record, b: Record, out: Floats) -> None:
-    """Write the inverse masses (1/kg) that one or two points see of one another, along normals or tangents."""
-    for i in range(count):
-        for j in range(i + 1):
-            out[i, j] = out[j, i] = mutual_mass(points[i], points[j], a, b, direction)

@@ -20,11 +20,8 @@ def inverse_root(eigenvalue: float, largest: float) -> float:
 
 
 @rare_kernel
-def inverse_root_2(matrix: Floats, out: Floats) -> None:
-    """Write the inverse square root of a symmetric positive 2 x 2 matrix into `out`, over its range only."""
-    a = matrix[0, 0]
-    b = matrix[0, 1]
-    d = matrix[1, 1]
+def inverse_root_2(a: float, b: float, d: float) -> tuple[float, float, float]:
+    """Return the inverse square root of the symmetric positive matrix [[a, b], [b, d]], over its range only."""
     middle = 0.5 * (a + d)
     half = 0.5 * (a - d)
     radius = math.sqrt(half * half + b * b)
@@ -33,10 +30,7 @@ def inverse_root_2(matrix: Floats, out: Floats) -> None:
     # f(A) = mean I + slope (A - middle I) for any function f of a 2 x 2 matrix with eigenvalues middle +- radius
     mean = 0.5 * (high + low)
     slope = 0.5 * (high - low) / radius if radius > 0.0 else 0.0
-    out[0, 0] = mean + slope * half
-    out[1, 1] = mean - slope * half
-    out[0, 1] = slope * b
-    out[1, 0] = slope * b
+    return mean + slope * half, slope * b, mean - slope * half
 
 
 @rare_kernel

@@ -1,7 +1,6 @@
 """Prescribed motion of the support: the ground, its pieces, walls and all fixed bodies together."""
 
 from blocksim.kernels.arrays import Record, Records, World
-from blocksim.kernels.integrate import PAIR_SHARE
 from blocksim.kernels.jit import rare_kernel
 
 
@@ -27,8 +26,8 @@ def acceleration(piece: Record, time: float) -> float:
 
 
 @rare_kernel
-def move_support(world: World, step: float) -> bool:
-    """Bring everything that moves with the support to the end of the drift under way; tell whether pairs are due.
+def move_support(world: World, step: float) -> None:
+    """Bring everything that moves with the support to the end of the drift under way.
 
     Positions are exact at every step, never summed up. The velocity is that of the drift, displacement over time, as
     the contacts want it: all relative displacements of the drift are exact.
@@ -43,7 +42,6 @@ def move_support(world: World, step: float) -> bool:
     moved = displacement(piece, now)
     rate = (moved - last) / step if step > 0.0 else piece.c1
     change = acceleration(piece, now)
-    is_due = False
     for i in range(world.bodies.size):
         body = world.bodies[i]
         if body.is_moved:
@@ -53,9 +51,6 @@ def move_support(world: World, step: float) -> bool:
             body.vy = controls.motion_y * rate
             body.ax = controls.motion_x * change
             body.ay = controls.motion_y * change
-            travelled = abs(body.x - body.list_x) + abs(body.y - body.list_y)
-            is_due = is_due or travelled > PAIR_SHARE * controls.skin
-    return is_due
 
 
 @rare_kernel

@@ -128,7 +128,8 @@ def similar_word(word: str, known: Iterable[str]) -> str | None:
 
 
 def _kinds(path: KeyPath) -> str:
-    return " or ".join(shown(kind) for kind in KINDS_IN[path[0]])
+    *others, last = (shown(kind) for kind in KINDS_IN[path[0]])
+    return f"{', '.join(others)} or {last}"
 
 
 def _wrong_type(entry: ErrorDetails, path: KeyPath) -> str:

@@ -1,100 +1,174 @@
 """Which placed rectangles overlap, and which reach into the ground or a wall, exactly (separating axes)."""
 
 import math
-from bisect import bisect_right
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.scenario.placement import PlacedBody
 from blocksim.scenario.segments import TOLERANCE, PlacedSegment
 
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Pairs = tuple[Integers, Integers]
 
-@dataclass(frozen=True, slots=True)
-class Rectangle:
-    """Centre, half extents and directions of a rectangle."""
+MOST_AT_ONCE = 1_000_000
+"""Pairs that are looked at together; more only takes more memory."""
+ROOM = 1.01
 
-    x: float
-    y: float
-    half_x: float
-    half_y: float
-    cosine: float
-    sine: float
+
+class Rectangles(NamedTuple):
+    """Centres, half extents and directions of rectangles, each (n,)."""
+
+    x: Floats
+    y: Floats
+    half_x: Floats
+    half_y: Floats
+    cosine: Floats
+    sine: Floats
 
     @classmethod
-    def of(cls, body: PlacedBody) -> "Rectangle":
-        """Take the outline of a placed body."""
-        cosine, sine = math.cos(body.angle), math.sin(body.angle)
-        return cls(body.x, body.y, body.size_x / 2, body.size_y / 2, cosine, sine)
+    def of(cls, bodies: Sequence[PlacedBody]) -> Self:
+        """Take the outlines of placed bodies."""
+        rows = [(b.x, b.y, b.size_x / 2, b.size_y / 2, math.cos(b.angle), math.sin(b.angle)) for b in bodies]
+        return cls(*np.array(rows, dtype=np.float64).reshape(-1, len(cls._fields)).T)
 
     @classmethod
-    def between(cls, x0: float, y0: float, x1: float, y1: float) -> "Rectangle":
-        """Take a straight piece as a rectangle without height."""
-        length = math.hypot(x1 - x0, y1 - y0)
-        middle_x, middle_y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
-        return cls(middle_x, middle_y, 0.5 * length, 0.0, (x1 - x0) / length, (y1 - y0) / length)
+    def along(cls, segments: Sequence[PlacedSegment]) -> Self:
+        """Take straight pieces as rectangles without height."""
+        ends = np.array([(s.x0, s.y0, s.x1, s.y1, s.length) for s in segments], dtype=np.float64).reshape(-1, 5)
+        x0, y0, x1, y1, length = ends.T
+        return cls(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * length, 0.0 * length, (x1 - x0) / length, (y1 - y0) / length)
 
-    @property
-    def axes(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """The unit normals of its sides."""
-        return (self.cosine, self.sine), (-self.sine, self.cosine)
+    def some(self, indices: Integers) -> Self:
+        """Take some of them, in this order."""
+        return type(self)(*(values[indices] for values in self))
 
-    def reach(self, axis: tuple[float, float]) -> float:
-        """Half of its extent along a unit vector."""
-        along, across = (abs(axis[0] * own[0] + axis[1] * own[1]) for own in self.axes)
+    def reach(self, axis_x: Floats | float, axis_y: Floats | float) -> Floats:
+        """Half of the extents along unit vectors."""
+        along = np.abs(axis_x * self.cosine + axis_y * self.sine)
+        across = np.abs(axis_y * self.cosine - axis_x * self.sine)
         return self.half_x * along + self.half_y * across
 
     @property
-    def bottom(self) -> float:
-        """Height of its lowest corner."""
-        return self.y - self.reach((0.0, 1.0))
+    def bottom(self) -> Floats:
+        """Heights of the lowest corners."""
+        return self.y - self.reach(0.0, 1.0)
 
 
-def penetration(one: Rectangle, other: Rectangle) -> float:
-    """Return the shortest way (m) that parts two rectangles; zero or negative where they are apart."""
-    x, y = other.x - one.x, other.y - one.y
-    return min(
-        one.reach(axis) + other.reach(axis) - abs(x * axis[0] + y * axis[1]) for axis in (*one.axes, *other.axes)
-    )
+def penetration(ones: Rectangles, others: Rectangles) -> Floats:
+    """Return the shortest ways (m) that part each two rectangles; zero or negative where they are apart."""
+    x, y = others.x - ones.x, others.y - ones.y
+    axes = [axis for r in (ones, others) for axis in ((r.cosine, r.sine), (-r.sine, r.cosine))]
+    depths = [ones.reach(*axis) + others.reach(*axis) - np.abs(x * axis[0] + y * axis[1]) for axis in axes]
+    least: Floats = np.min(depths, axis=0)
+    return least
 
 
 def overlapping_pairs(bodies: Sequence[PlacedBody]) -> Iterator[tuple[int, int, float]]:
     """Yield the indices (smaller first) of every overlapping pair and its penetration in m."""
-    rectangles = [Rectangle.of(body) for body in bodies]
-    for i, j in _near_pairs(rectangles):
-        depth = penetration(rectangles[i], rectangles[j])
-        if depth > TOLERANCE:
-            yield min(i, j), max(i, j), depth
+    yield from _penetrating(Rectangles.of(bodies), len(bodies), within=True)
 
 
 def crossings(bodies: Sequence[PlacedBody], segments: Sequence[PlacedSegment]) -> Iterator[tuple[int, int, float]]:
     """Yield the body, the segment and the depth (m) where a body lies across a segment."""
-    outlines = [Rectangle.of(body) for body in bodies]
-    pieces = [Rectangle.between(piece.x0, piece.y0, piece.x1, piece.y1) for piece in segments]
-    for i, j in _near_pairs([*outlines, *pieces]):
-        body, piece = min(i, j), max(i, j) - len(bodies)
-        if body < len(bodies) and piece >= 0:
-            depth = penetration(outlines[body], pieces[piece])
-            if depth > TOLERANCE:
-                yield body, piece, depth
+    if not segments:
+        return
+    outlines, pieces = Rectangles.of(bodies), Rectangles.along(segments)
+    both = Rectangles(*(np.concatenate(values) for values in zip(outlines, pieces, strict=True)))
+    for body, piece, depth in _penetrating(both, len(bodies), within=False):
+        yield body, piece - len(bodies), depth
 
 
-def _near_pairs(rectangles: Sequence[Rectangle]) -> Iterator[tuple[int, int]]:
-    """Yield pairs whose axis-parallel boxes overlap, by a sweep along the axis that meets fewer pairs."""
-    x = [(r.x - r.reach((1.0, 0.0)), r.x + r.reach((1.0, 0.0))) for r in rectangles]
-    y = [(r.bottom, 2 * r.y - r.bottom) for r in rectangles]
-    along, across = (x, y) if _pair_count(x) <= _pair_count(y) else (y, x)
-    order = sorted(range(len(rectangles)), key=lambda index: along[index])
-    for position, i in enumerate(order):
-        for later in range(position + 1, len(order)):
-            j = order[later]
-            if along[j][0] > along[i][1]:
-                break
-            if across[i][0] < across[j][1] and across[j][0] < across[i][1]:
-                yield i, j
+def _penetrating(rectangles: Rectangles, bodies: int, *, within: bool) -> Iterator[tuple[int, int, float]]:
+    """Yield the pairs among the first `bodies` rectangles, or of one of them and one of the others, that penetrate."""
+    for one, other in near_pairs(rectangles):
+        first, second = np.minimum(one, other), np.maximum(one, other)
+        wanted = second < bodies if within else (first < bodies) & (second >= bodies)
+        first, second = first[wanted], second[wanted]
+        depth = penetration(rectangles.some(first), rectangles.some(second))
+        deep = depth > TOLERANCE
+        yield from zip(first[deep].tolist(), second[deep].tolist(), depth[deep].tolist(), strict=True)
 
 
-def _pair_count(spans: Sequence[tuple[float, float]]) -> int:
-    """Count the pairs of spans that a sweep along this axis meets."""
-    ordered = sorted(spans)
-    starts = [low for low, _ in ordered]
-    return sum(bisect_right(starts, high) - index - 1 for index, (_, high) in enumerate(ordered))
+class _Boxes(NamedTuple):
+    """Axis-parallel boxes, each (n,)."""
+
+    low_x: Floats
+    low_y: Floats
+    high_x: Floats
+    high_y: Floats
+
+
+def near_pairs(rectangles: Rectangles) -> Iterator[Pairs]:
+    """Yield the indices of all pairs whose axis-parallel boxes meet, each pair once, many at a time.
+
+    Sorted into cells as large as the largest box, a box reaches over four cells at most. Boxes of very different sizes
+    would share one cell, so every size (from one power of two to the next) has cells of its own, in which the boxes of
+    that size meet one another and all smaller ones.
+    """
+    reach_x, reach_y = rectangles.reach(1.0, 0.0), rectangles.reach(0.0, 1.0)
+    x, y = rectangles.x, rectangles.y
+    boxes = _Boxes(x - reach_x, y - reach_y, x + reach_x, y + reach_y)
+    level = np.frexp(np.maximum(reach_x, reach_y))[1]
+    for size in np.unique(level):
+        members = np.flatnonzero(level <= size)
+        is_small = level[members] < size
+        cell = (_cell(reach_x[members]), _cell(reach_y[members]))
+        for one, other in _in_cells(_Boxes(*(side[members] for side in boxes)), is_small, cell):
+            yield members[one], members[other]
+
+
+def _cell(reach: Floats) -> float:
+    """Return the side (m) of cells of which no box touches three: a little more than the largest box."""
+    return 2.0 * ROOM * float(reach.max()) or 1.0
+
+
+def _in_cells(boxes: _Boxes, is_small: NDArray[np.bool_], cell: tuple[float, float]) -> Iterator[Pairs]:
+    """Yield pairs of boxes that meet, at least one of each not small; no box is larger than a cell (m, m)."""
+    with np.errstate(over="ignore"):  # places beyond the last number share a cell
+        low = np.floor(boxes.low_x / cell[0]), np.floor(boxes.low_y / cell[1])
+        high = np.floor(boxes.high_x / cell[0]), np.floor(boxes.high_y / cell[1])
+    box, column, row = _entries(low, high)
+    order = np.lexsort((is_small[box], row, column))
+    box, column, row = box[order], column[order], row[order]
+    is_new = (column[1:] != column[:-1]) | (row[1:] != row[:-1])
+    begins = np.append(0, np.flatnonzero(is_new) + 1)
+    ends = np.repeat(np.append(begins[1:], box.size), np.diff(np.append(begins, box.size)))
+    partners = np.where(is_small[box], 0, ends - np.arange(box.size) - 1)
+    for one, other in _expanded(partners):
+        i, j = box[one], box[other]
+        # a pair may meet in several cells; it counts in that of the lower left corner of what it has in common
+        is_first = (np.maximum(low[0][i], low[0][j]) == column[one]) & (np.maximum(low[1][i], low[1][j]) == row[one])
+        along = (boxes.low_x[i] <= boxes.high_x[j]) & (boxes.low_x[j] <= boxes.high_x[i])
+        across = (boxes.low_y[i] <= boxes.high_y[j]) & (boxes.low_y[j] <= boxes.high_y[i])
+        near = is_first & along & across
+        yield i[near], j[near]
+
+
+def _entries(low: tuple[Floats, Floats], high: tuple[Floats, Floats]) -> tuple[Integers, Floats, Floats]:
+    """Return box, column and row of every cell that a box reaches into."""
+    everyone = np.arange(low[0].size)
+    found = []
+    for columns in (low[0], high[0]):
+        for rows in (low[1], high[1]):
+            is_new = ((columns is low[0]) | (high[0] != low[0])) & ((rows is low[1]) | (high[1] != low[1]))
+            found.append((everyone[is_new], columns[is_new], rows[is_new]))
+    box, column, row = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return box, column, row
+
+
+def _expanded(partners: Integers) -> Iterator[Pairs]:
+    """Yield positions one and other, other = one + 1 ... one + partners[one], in portions."""
+    total = np.cumsum(partners)
+    begin = 0
+    while begin < partners.size:
+        done = int(total[begin - 1]) if begin else 0
+        end = max(begin + 1, int(np.searchsorted(total, done + MOST_AT_ONCE, side="right")))
+        count = partners[begin:end]
+        one = np.repeat(np.arange(begin, end), count)
+        before = np.repeat(np.cumsum(count) - count, count)
+        yield one, one + 1 + np.arange(one.size) - before
+        begin = end

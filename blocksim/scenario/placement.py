@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 from blocksim.scenario.keys import KeyPath
 from blocksim.scenario.models.scenario import Scenario
@@ -50,40 +51,28 @@ def placed_with_origin(scenario: Scenario) -> Iterator[tuple[KeyPath, PlacedBody
     """Yield every placed body with the path of the structure or body that it comes from."""
     index = 0
     for number, structure in enumerate(scenario.structures):
-        for pose in structure.place(scenario.blocks[structure.block]):
+        place = _placer(scenario, structure.block)
+        for pose in structure.start(scenario.blocks[structure.block]):
             index += 1
-            yield ("structures", number), _placed(scenario, structure.block, str(index), pose)
+            yield ("structures", number), place(str(index), pose, fixed=False)
     for number, spec in enumerate(scenario.bodies):
         index += 1
-        pose = Pose(spec.x, spec.y, spec.angle)
-        motion = (*spec.velocity, spec.spin)
-        name = spec.name or str(index)
-        yield ("bodies", number), _placed(scenario, spec.block, name, pose, motion, fixed=spec.fixed)
+        pose = Pose(spec.x, spec.y, spec.angle, *spec.velocity, spec.spin)
+        yield ("bodies", number), _placer(scenario, spec.block)(spec.name or str(index), pose, fixed=spec.fixed)
 
 
-def _placed(
-    scenario: Scenario,
-    key: str,
-    name: str,
-    pose: Pose,
-    motion: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    *,
-    fixed: bool = False,
-) -> PlacedBody:
+class _Place(Protocol):
+    def __call__(self, name: str, pose: Pose, *, fixed: bool) -> PlacedBody: ...
+
+
+def _placer(scenario: Scenario, key: str) -> _Place:
+    """Return what places one kind of block; looking its sides up for every one of them would take most of the time."""
     block = scenario.blocks[key]
-    return PlacedBody(
-        name=name,
-        block=key,
-        material=block.material,
-        size_x=block.size_x,
-        size_y=block.size_y,
-        depth=block.depth,
-        density=scenario.materials[block.material].density,
-        x=pose.x,
-        y=pose.y,
-        angle=pose.angle,
-        vx=motion[0],
-        vy=motion[1],
-        spin=motion[2],
-        fixed=fixed,
-    )
+    material = block.material
+    size_x, size_y, depth = block.size_x, block.size_y, block.depth
+    density = scenario.materials[material].density
+
+    def place(name: str, pose: Pose, *, fixed: bool) -> PlacedBody:
+        return PlacedBody(name, key, material, size_x, size_y, depth, density, *pose, fixed=fixed)
+
+    return place

@@ -20,7 +20,7 @@ from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.quantities import Quantity
-from blocksim.scenario.structures import KINDS
+from blocksim.scenario.structures import KINDS, Structure
 
 BEGIN = "<!-- keys: written by `make readme` -->"
 END = "<!-- end of keys -->"
@@ -34,6 +34,7 @@ def key_table() -> str:
         ("", Scenario),
         ("materials.NAME", Material),
         ("blocks.NAME", Block),
+        ("structures, every kind", Structure),
         *((f'structures, kind = "{kind}"', model) for kind, model in KINDS.items()),
         ("bodies", BodySpec),
         ("ground", Ground),
@@ -62,8 +63,10 @@ def with_key_table(text: str) -> str:
 def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
     place = prefix.partition(",")[0]
     note = prefix.partition(", ")[2]
+    told = Structure.model_fields if issubclass(model, Structure) and model is not Structure else {}
     for name, info in model.model_fields.items():
-        if name == "kind" or (_is_table(info) and model not in {Friction, Pair, Sweep} and name != "provenance"):
+        has_rows_of_its_own = _is_table(info) and model not in {Friction, Pair, Sweep} and name != "provenance"
+        if name == "kind" or name in told or has_rows_of_its_own:
             continue
         key = f"{place}.{info.alias or name}" if place else (info.alias or name)
         if model is Sweep and name == "vary":
@@ -78,7 +81,8 @@ def _is_table(info: FieldInfo) -> bool:
     is_model = isinstance(kind, type) and issubclass(kind, SUBTABLES) and "Speed" not in str(info.annotation)
     parts = list(options(info.annotation))
     optional = len(parts) > 1 and any(isinstance(part, type) and issubclass(part, BaseModel) for part in parts)
-    return (is_model and "float" not in str(info.annotation)) or optional or "Any" in str(info.annotation)
+    has_numbers = re.search(r"\b(float|int)\b", str(info.annotation)) is not None
+    return (is_model and not has_numbers) or optional or "Any" in str(info.annotation)
 
 
 def _unit(info: FieldInfo) -> str:
@@ -101,7 +105,7 @@ def _default(info: FieldInfo) -> str:
         return "–"
     if isinstance(value, bool):
         return str(value).lower()
-    return f"`{value}`" if value != "" else "empty"
+    return f"`{value}`" if value not in ("", ()) else "empty"
 
 
 if __name__ == "__main__":

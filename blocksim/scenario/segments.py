@@ -5,11 +5,13 @@ A piece runs from (x0, y0) to (x1, y1) with the solid on its right hand, as the 
 """
 
 import math
-from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.scenario.models.boundary import Wall
 from blocksim.scenario.models.scenario import Scenario
@@ -22,6 +24,7 @@ TOLERANCE = 1e-9
 """m; what is this near touches, and ends this near to each other are one."""
 
 Point = tuple[float, float]
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,17 +62,20 @@ def place_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
 
 def surface_height(scenario: Scenario, x: float) -> float:
     """Return the height (m) of the ground at x, the upper one where it is vertical."""
+    return float(surface_heights(scenario, np.array([x]))[0])
+
+
+def surface_heights(scenario: Scenario, x: Floats) -> Floats:
+    """Return the heights (m) of the ground at many places x (n,)."""
     points = scenario.ground.profile
     if points is None:
-        return 0.0
-    xs = [point[0] for point in points]
-    first, after = bisect_left(xs, x), bisect_right(xs, x)
-    if first < after:
-        return max(point[1] for point in points[first:after])
-    if first in (0, len(points)):
-        return points[max(0, first - 1)][1]
-    (x0, y0), (x1, y1) = points[first - 1], points[first]
-    return y0 + (y1 - y0) * (x - x0) / (x1 - x0)
+        return np.zeros(x.shape)
+    xs, ys = np.array(points).T
+    heights = np.interp(x, xs, ys)
+    places, begins = np.unique(xs, return_index=True)
+    tops = np.maximum.reduceat(ys, begins)
+    nearest = np.minimum(np.searchsorted(places, x), places.size - 1)
+    return np.where(places[nearest] == x, tops[nearest], heights)
 
 
 def profile_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
@@ -118,15 +124,32 @@ class _End(NamedTuple):
 
 def wall_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
     """Return one piece for every wall."""
-    return tuple(_wall(scenario, wall) for wall in scenario.walls)
+    if not scenario.walls:
+        return ()
+    starts, ends = (np.array([getattr(wall, end) for wall in scenario.walls]) for end in ("start", "end"))
+    heights = [surface_heights(scenario, points[:, 0]) for points in (starts, ends)]
+    ground = [points[:, 1] <= height + TOLERANCE for points, height in zip((starts, ends), heights, strict=True)]
+    return tuple(
+        _wall(scenario.walls, number, starts, ends, (bool(ground[0][number]), bool(ground[1][number])))
+        for number in range(len(scenario.walls))
+    )
 
 
-def _wall(scenario: Scenario, wall: Wall) -> PlacedSegment:
-    others = [other for other in scenario.walls if other is not wall]
-    before = next((other for other in others if _is_near(other.end, wall.start)), None)
-    after = next((other for other in others if _is_near(wall.end, other.start)), None)
-    start = _free_end(scenario, wall.start, others) if before is None else _joint(before, wall, is_first=False)
-    end = _free_end(scenario, wall.end, others) if after is None else _joint(wall, after, is_first=True)
+def _wall(
+    walls: Sequence[Wall], number: int, starts: Floats, ends: Floats, on_ground: tuple[bool, bool]
+) -> PlacedSegment:
+    """Place one wall; `starts` and `ends` (n, 2) are those of all."""
+    wall = walls[number]
+    before, after = _neighbour(ends, wall.start, number), _neighbour(starts, wall.end, number)
+    others = np.arange(len(walls)) != number
+    if before is None:
+        start = _free_end(is_covered=on_ground[0] or _touches(wall.start, starts[others], ends[others]))
+    else:
+        start = _joint(walls[before], wall, is_first=False)
+    if after is None:
+        end = _free_end(is_covered=on_ground[1] or _touches(wall.end, starts[others], ends[others]))
+    else:
+        end = _joint(wall, walls[after], is_first=True)
     return PlacedSegment(
         *wall.start,
         *wall.end,
@@ -138,26 +161,25 @@ def _wall(scenario: Scenario, wall: Wall) -> PlacedSegment:
     )
 
 
+def _neighbour(points: Floats, end: Point, number: int) -> int | None:
+    """Return the first wall but this one of which the point (n, 2) is where an end is."""
+    near = np.flatnonzero(np.hypot(points[:, 0] - end[0], points[:, 1] - end[1]) <= TOLERANCE)
+    return next((int(other) for other in near if other != number), None)
+
+
 def _joint(before: Wall, after: Wall, *, is_first: bool) -> _End:
     turn = _turn(before.start, before.end, after.end)
     return _End(extends=turn > STRAIGHT, touches=is_first and turn < -STRAIGHT)
 
 
-def _free_end(scenario: Scenario, point: Point, others: Sequence[Wall]) -> _End:
-    """Tell whether the ground or another wall covers an end."""
-    is_covered = point[1] <= surface_height(scenario, point[0]) + TOLERANCE
-    is_covered = is_covered or any(_distance(point, other) <= TOLERANCE for other in others)
+def _free_end(*, is_covered: bool) -> _End:
+    """Judge an end without a neighbour, covered by the ground or the middle of another wall or not."""
     return _End(extends=is_covered, touches=not is_covered)
 
 
-def _is_near(one: Point, other: Point) -> bool:
-    return math.dist(one, other) <= TOLERANCE
-
-
-def _distance(point: Point, wall: Wall) -> float:
-    """Return the distance of a point from a wall."""
-    along_x, along_y = wall.end[0] - wall.start[0], wall.end[1] - wall.start[1]
-    from_x, from_y = point[0] - wall.start[0], point[1] - wall.start[1]
-    share = (from_x * along_x + from_y * along_y) / (along_x * along_x + along_y * along_y)
-    share = min(1.0, max(0.0, share))
-    return math.hypot(from_x - share * along_x, from_y - share * along_y)
+def _touches(point: Point, starts: Floats, ends: Floats) -> bool:
+    """Tell whether a point is on any of these walls."""
+    along, beyond = ends - starts, np.array(point) - starts
+    share = np.clip(np.sum(beyond * along, axis=1) / np.sum(along * along, axis=1), 0.0, 1.0)
+    distance = beyond - share[:, np.newaxis] * along
+    return bool(np.any(np.hypot(distance[:, 0], distance[:, 1]) <= TOLERANCE))

@@ -4,17 +4,18 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
 
+import numpy as np
+
 from blocksim.scenario import keys, overlap
-from blocksim.scenario.findings import Finding
+from blocksim.scenario.findings import MAX_FINDINGS, Finding
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.motion import PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.placement import PlacedBody, placed_with_origin
 from blocksim.scenario.quantities import shown
-from blocksim.scenario.segments import TOLERANCE, profile_segments, surface_height, wall_segments
-from blocksim.scenario.structures import UnfitError
+from blocksim.scenario.segments import TOLERANCE, profile_segments, surface_heights, wall_segments
+from blocksim.scenario.structures import MAX_BLOCKS, UnfitError
 
-MAX_BODIES = 100_000
 MAX_SEGMENTS = 1000
 MAX_OVERLAPS = 20
 MAX_PIECES = 1_000_000
@@ -36,6 +37,10 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
         yield from unfit
         return
     origins, bodies = zip(*placed_with_origin(scenario), strict=True)
+    endless = list(_endless_places(origins, bodies))
+    if endless:
+        yield from endless
+        return
     smallest = min(min(body.size_x, body.size_y) for body in bodies)
     yield from _coarse_particles(scenario, smallest)
     yield from _short_segments(scenario, SHORTEST_SHARE * smallest)
@@ -52,7 +57,7 @@ def _too_many(scenario: Scenario) -> Iterator[Finding]:
         ("ground", "profile"): (len(scenario.ground.profile or ()), "points"),
     }
     for path, (count, what) in counts.items():
-        most = MAX_BODIES if what == "bodies" else MAX_SEGMENTS
+        most = MAX_BLOCKS if what == "bodies" else MAX_SEGMENTS
         if count > most:
             yield Finding(path, f"{count} {what} are too many; at most {most} are possible")
 
@@ -79,9 +84,22 @@ def _fixed_stiffnesses(scenario: Scenario) -> Iterator[Finding]:
 def _unfit_structures(scenario: Scenario) -> Iterator[Finding]:
     for number, structure in enumerate(scenario.structures):
         try:
-            structure.place(scenario.blocks[structure.block])
+            structure.start(scenario.blocks[structure.block])
         except UnfitError as error:
             yield Finding(("structures", number, error.key), str(error))
+
+
+def _endless_places(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+    """Find structures whose keys are possible numbers while a place or velocity that follows from them is not."""
+    told = set()
+    for origin, body in zip(origins, bodies, strict=True):
+        if origin not in told and not all(map(math.isfinite, (body.x, body.y, body.vx, body.vy, body.spin))):
+            told.add(origin)
+            yield Finding(
+                origin,
+                f"body {body.name} would be at ({body.x:g}, {body.y:g}) m with a velocity of "
+                f"({body.vx:g}, {body.vy:g}) m/s and a spin of {body.spin:g} rad/s; check the keys of its structure",
+            )
 
 
 def _impossible_masses(scenario: Scenario) -> Iterator[Finding]:
@@ -136,10 +154,10 @@ def _below_ground(
     if scenario.ground.profile is not None:
         yield from _below_profile(scenario, origins, bodies)
         return
-    for origin, body in zip(origins, bodies, strict=True):
-        bottom = overlap.Rectangle.of(body).bottom
-        if bottom < -TOLERANCE:
-            yield Finding(origin, f"body {body.name} reaches {_mm(-bottom)} below the ground (y = 0)")
+    bottom = overlap.Rectangles.of(bodies).bottom
+    for index in np.flatnonzero(bottom < -TOLERANCE)[:MAX_FINDINGS]:
+        depth = _mm(-float(bottom[index]))
+        yield Finding(origins[index], f"body {bodies[index].name} reaches {depth} below the ground (y = 0)")
 
 
 def _below_profile(
@@ -149,10 +167,11 @@ def _below_profile(
     depths: dict[int, float] = {}
     for index, _, depth in overlap.crossings(bodies, profile_segments(scenario)):
         depths[index] = max(depths.get(index, 0.0), depth)
+    surface = surface_heights(scenario, np.array([body.x for body in bodies]))
     for index, (origin, body) in enumerate(zip(origins, bodies, strict=True)):
         if index in depths:
             yield Finding(origin, f"body {body.name} reaches {_mm(depths[index])} into the ground's profile")
-        elif body.y < surface_height(scenario, body.x):
+        elif body.y < surface[index]:
             yield Finding(origin, f"body {body.name} lies below the ground's profile")
 
 

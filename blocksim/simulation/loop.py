@@ -52,6 +52,14 @@ def advance_with_room(world: World, last_step: int) -> tuple[World, int]:
     return world, status
 
 
+def outcome_of(code: int, ledger: EnergyLedger) -> Outcome:
+    """Return what a run came to that was not interrupted: its status code, and whether its energy adds up."""
+    outcome = ends.BY_CODE[code]
+    if outcome.is_finished and ledger.relative_residual > ends.RESIDUAL_LIMIT:
+        return ends.RESIDUAL
+    return outcome
+
+
 def run_loop(
     world: World,
     recorder: Recorder,
@@ -80,8 +88,6 @@ def run_loop(
             recorder.sample(world)
         on_progress(Progress(done * step, end, done, energy_ledger(world, start).relative_residual))
     recorder.sample(world)  # wherever it ended
-    outcome = ends.INTERRUPTED if status == REACHED and done < last else ends.BY_CODE[status]
     ledger = energy_ledger(world, start)
-    if outcome.is_finished and ledger.relative_residual > ends.RESIDUAL_LIMIT:
-        outcome = ends.RESIDUAL
+    outcome = ends.INTERRUPTED if status == REACHED and done < last else outcome_of(status, ledger)
     return LoopResult(world, outcome, ledger, seconds)

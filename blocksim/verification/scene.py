@@ -68,9 +68,11 @@ class Simulation:
         return self.world.bodies[:-1]
 
     @property
-    def slots(self) -> Any:
-        """Contact slots of the pairs in the list: a record array, one row a pair."""
-        return self.world.slots[: self.world.clock[0].pair_count]
+    def touching(self) -> Any:
+        """Records of all contacts there are, pair after pair."""
+        count = int(self.world.clock[0].pair_count)
+        is_active = np.arange(self.world.contacts.shape[1]) < self.world.pairs.active[:count, np.newaxis]
+        return self.world.contacts[:count][is_active]
 
     @property
     def step(self) -> float:

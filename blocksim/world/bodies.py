@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from blocksim.kernels.arrays import ALL, BODY, Record, Records, zeros
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_segments
 from blocksim.world.interactions import ContactClass
@@ -19,9 +21,9 @@ def body_records(scenario: Scenario, placed: tuple[PlacedBody, ...], classes: tu
     bodies = zeros(len(placed) + len(segments) + 1, BODY)
     bodies.cos = 1.0  # the half-plane's, last
     bodies.faces = bodies.corners = ALL
-    for record, body in zip(bodies, placed, strict=False):
-        _fill_block(record, body)
-        record.contact_class = classes.index(ContactClass(body.material, body.depth), 1)
+    _fill_blocks(bodies[: len(placed)].view(np.recarray), placed)
+    codes = {one: code for code, one in enumerate(classes) if not one.is_ground}
+    bodies["contact_class"][: len(placed)] = [codes[ContactClass(body.material, body.depth)] for body in placed]
     smallest = min(min(body.size_x, body.size_y) for body in placed)
     thickness = max(SLAB_SHARE * smallest, 2.0 * (scenario.contact.max_overlap or 0.0))
     for record, segment in zip(bodies[len(placed) : -1], segments, strict=True):
@@ -35,15 +37,19 @@ def body_records(scenario: Scenario, placed: tuple[PlacedBody, ...], classes: tu
     return bodies
 
 
-def _fill_block(record: Record, body: PlacedBody) -> None:
-    record.x, record.y, record.angle = body.x, body.y, body.angle
-    record.cos, record.sin = math.cos(body.angle), math.sin(body.angle)
-    record.vx, record.vy, record.spin = body.vx, body.vy, body.spin
-    record.half_x, record.half_y = 0.5 * body.size_x, 0.5 * body.size_y
-    record.radius = 0.5 * math.hypot(body.size_x, body.size_y)
-    if not body.fixed:
-        record.mass, record.inertia = body.mass, body.inertia
-        record.inverse_mass, record.inverse_inertia = 1.0 / body.mass, 1.0 / body.inertia
+def _fill_blocks(records: Records, placed: tuple[PlacedBody, ...]) -> None:
+    for name in ("x", "y", "angle", "vx", "vy", "spin"):
+        records[name] = [getattr(body, name) for body in placed]
+    records["cos"] = [math.cos(body.angle) for body in placed]  # numpy's may differ in the last digit
+    records["sin"] = [math.sin(body.angle) for body in placed]
+    records["half_x"] = [0.5 * body.size_x for body in placed]
+    records["half_y"] = [0.5 * body.size_y for body in placed]
+    records["radius"] = [0.5 * math.hypot(body.size_x, body.size_y) for body in placed]
+    records["mass"] = [0.0 if body.fixed else body.mass for body in placed]
+    records["inertia"] = [0.0 if body.fixed else body.inertia for body in placed]
+    is_free = records["mass"] > 0.0
+    for name in ("mass", "inertia"):
+        records[f"inverse_{name}"][is_free] = 1.0 / records[name][is_free]
 
 
 def _fill_slab(record: Record, segment: PlacedSegment, thickness: float) -> None:

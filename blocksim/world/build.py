@@ -7,13 +7,15 @@ import numpy as np
 
 from blocksim.kernels.arrays import (
     CLOCK,
+    CONTACT,
+    CONTACTS,
     CONTROLS,
+    GROUP,
     LEDGER,
-    NO_FACE,
     OPERATOR,
     PAIR,
+    PARTICLE_CONTACT,
     POINT,
-    SLOT,
     Records,
     World,
     zeros,
@@ -24,84 +26,134 @@ from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.world.bodies import body_records
 from blocksim.world.interactions import contact_classes, interaction_table
+from blocksim.world.memory import SceneSize, refuse_if_too_large
 from blocksim.world.motion import motion_records, support_direction
 from blocksim.world.particles import place_particles, slots_of_a_pair
 from blocksim.world.step import MOST_STEPS, choose_step
 
 CHECK_INTERVAL = 1e-4  # s of simulated time between looks at rest, overlap and finiteness
+CHEAP_CHECKS = 50  # steps between looks, from which on they cost next to nothing; where steps are long, at most for
+LONGEST_CHECK = 1e-3  # s
 SKIN_SHARE = 0.05  # of the smallest side
-PAIRS_PER_BODY = 8
+LEAST_PAIRS = 16
+PAIRS_PER_BODY = 3
+GROWTH = 1.25  # of the room for pairs, each time that it does not suffice
+MOST_LARGE = 64  # bodies that are looked at one by one, outside the grid of the broad phase
+LARGE_RATIO = 4.0  # over the smallest body; nothing is large below that
 
 
 def build_world(scenario: Scenario) -> World:
     """Return the world at time zero: arrays as described in blocksim.kernels.arrays, pair lists still empty.
 
-    Raises StepTooLargeError when the scenario asks for an inadmissible step without forcing it.
+    Raises SceneTooLargeError when there is not enough memory for the run, and StepTooLargeError when the scenario asks
+    for an inadmissible step without forcing it.
     """
     placed = place_bodies(scenario)
     classes = contact_classes(scenario, placed)
     table = interaction_table(scenario, classes)
     bodies = body_records(scenario, placed, classes)
     particles = place_particles(bodies, scenario.contact.model, scenario.contact.particle_spacing)
+    bodies[-1].half_x = math.inf  # the half-plane has one face without ends
     slots = slots_of_a_pair(bodies, scenario.contact.model)
-    capacity = max(16, PAIRS_PER_BODY * len(placed))
-    return World(
+    _refuse_if_too_large(scenario, first_capacity(bodies), len(placed), slots)
+    contacts = zeros(contacts_of_a_pair(slots, scenario.contact.model), contact_type(scenario.contact.model))
+    world = World(
         bodies=bodies,
-        **empty_lists(capacity, slots),
+        **empty_lists(first_capacity(bodies), slots, contacts),
+        **_grid(bodies),
         interactions=table,
         particles=particles,
         points=_points(slots),
+        before=contacts,
         matrices=np.zeros((8, 3, 3)),
         motion=motion_records(scenario),
         controls=_controls(scenario, bodies, len(placed), choose_step(scenario, bodies, table)),
-        clock=_clock(),
-        ledger=_ledger(bodies),
+        clock=zeros(1, CLOCK),
     )
+    world.ledger[0].largest_kinetic = _kinetic_energy(bodies)
+    return world
 
 
-def empty_lists(capacity: int, slots: int) -> dict[str, Any]:
-    """Return the pair lists of a world, without pairs, with room for `capacity` of them with `slots` contacts each."""
-    lists: dict[str, Any] = {
+def _kinetic_energy(bodies: Records) -> float:
+    speed_squared = bodies.vx**2 + bodies.vy**2
+    return 0.5 * float(np.sum(bodies.mass * speed_squared + bodies.inertia * bodies.spin**2))
+
+
+def _refuse_if_too_large(scenario: Scenario, pairs: int, blocks: int, slots: int) -> None:
+    frames = round(min(scenario.time.end / scenario.output.every, MOST_STEPS)) + 1
+    refuse_if_too_large(SceneSize(blocks, pairs, slots, frames, scenario.contact.model != "surface"))
+
+
+def contact_type(model: str) -> np.dtype[np.void]:
+    """Return the type of the contact records of a model."""
+    return CONTACT if model == "surface" else PARTICLE_CONTACT
+
+
+def contacts_of_a_pair(slots: int, model: str) -> int:
+    """Return how many contacts a pair can have at the same time."""
+    return CONTACTS if model == "surface" else slots
+
+
+def first_capacity(bodies: Records) -> int:
+    """Return the room for pairs to start with: the contacts of convex bodies in a plane are at most three a body."""
+    return max(LEAST_PAIRS, PAIRS_PER_BODY * bodies.size)
+
+
+def empty_lists(capacity: int, slots: int, contacts: Records) -> dict[str, Any]:
+    """Return the pair lists of a world, without pairs, with room for `capacity` of them.
+
+    Every pair has `slots` of what can come into contact, and as many contacts at the same time, of the same type, as
+    `contacts` has.
+    """
+    kind = np.uint8 if contacts.dtype == CONTACT else np.uint32
+    return {
         "pairs": zeros(capacity, PAIR),
-        "slots": zeros((capacity, slots), SLOT),
-        "candidates": np.zeros((capacity, slots), dtype=np.int64),
+        "contacts": zeros((capacity, contacts.size), contacts.dtype),
+        "candidates": np.zeros((capacity, slots), dtype=kind),
         "operators": zeros((capacity, 2), OPERATOR),
         "spare_pairs": zeros(capacity, PAIR),
-        "spare_slots": zeros((capacity, slots), SLOT),
-        "spare_candidates": np.zeros((capacity, slots), dtype=np.int64),
+        "spare_candidates": np.zeros((capacity, slots), dtype=kind),
+        "ledger": zeros(capacity // GROUP + 1, LEDGER),
     }
-    lists["slots"]["face"] = lists["spare_slots"]["face"] = NO_FACE
-    return lists
 
 
 def with_more_room(world: World) -> World:
-    """Return the same world with twice the room for candidate pairs."""
+    """Return the same world with more room for candidate pairs. Raises SceneTooLargeError."""
     used = world.pairs.size
-    lists = empty_lists(2 * used, world.slots.shape[1])
-    lists["pairs"][:used] = world.pairs
-    lists["slots"][:used] = world.slots
-    lists["candidates"][:used] = world.candidates
-    lists["operators"][:used] = world.operators
+    capacity, slots = math.ceil(GROWTH * used), world.candidates.shape[1]
+    refuse_if_too_large(SceneSize(world.bodies.size, capacity, slots, has_particles=world.particles is not None))
+    lists = empty_lists(capacity, slots, world.before)
+    for name in ("pairs", "contacts", "candidates", "operators"):
+        lists[name][:used] = getattr(world, name)
+    lists["ledger"][: world.ledger.size] = world.ledger
     return world._replace(**lists)
+
+
+def _grid(bodies: Records) -> dict[str, Any]:
+    """Return the work space of the broad phase."""
+    blocks = bodies.size - 1
+    heads = 1 << max(4, (2 * blocks - 1).bit_length())
+    large = np.flatnonzero(bodies.radius[:-1] > cell_radius(bodies))
+    return {
+        "heads": np.zeros(heads, dtype=np.uint32),
+        "links": np.zeros(blocks, dtype=np.uint32),
+        "large": large.astype(np.uint32),
+        "neighbours": np.zeros(blocks, dtype=np.uint32),
+    }
+
+
+def cell_radius(bodies: Records) -> float:
+    """Return the half diagonal (m) of the largest body in the grid: of all but a few pieces of ground and planks."""
+    radii = np.sort(bodies.radius[:-1])
+    few = min(MOST_LARGE, radii.size // 8)
+    smaller = radii[radii <= LARGE_RATIO * radii[0]]
+    return float(max(radii[-1 - few], smaller[-1]))
 
 
 def _points(slots: int) -> Records:
     points = zeros(slots + 1, POINT)
     points.share = 1.0  # as it stays in the surface model
     return points
-
-
-def _clock() -> Records:
-    clock = zeros(1, CLOCK)
-    clock.pairs_due = 1  # there is no list yet
-    return clock
-
-
-def _ledger(bodies: Records) -> Records:
-    ledger = zeros(1, LEDGER)
-    speed_squared = bodies.vx**2 + bodies.vy**2
-    ledger.largest_kinetic = 0.5 * float(np.sum(bodies.mass * speed_squared + bodies.inertia * bodies.spin**2))
-    return ledger
 
 
 def _controls(scenario: Scenario, bodies: Records, blocks: int, step: float) -> Records:
@@ -114,6 +166,8 @@ def _controls(scenario: Scenario, bodies: Records, blocks: int, step: float) -> 
     record.gravity_y = -scenario.gravity * math.cos(scenario.ground.tilt)
     record.motion_x, record.motion_y = support_direction(scenario)
     record.skin = SKIN_SHARE * smallest
+    record.cell_radius = cell_radius(bodies)
+    record.cell_width = 2.0 * record.cell_radius + record.skin
     record.max_overlap = 0.0 if given_limit is None else given_limit
     record.rest_speed = scenario.time.rest_speed
     record.model = MODEL_CODES[scenario.contact.model]
@@ -122,7 +176,8 @@ def _controls(scenario: Scenario, bodies: Records, blocks: int, step: float) -> 
     record.particle_size = scenario.contact.particle_spacing
     record.smoothing_length = scenario.contact.resolved_smoothing_length
     record.support = support_radius(record.sph_kernel, record.smoothing_length)
-    record.check_every = min(max(1, round(CHECK_INTERVAL / step)), MOST_STEPS)
+    few = min(CHEAP_CHECKS, round(LONGEST_CHECK / step))
+    record.check_every = min(max(1, few, round(CHECK_INTERVAL / step)), MOST_STEPS)
     if scenario.time.stop_at_rest:
         checks = scenario.time.rest_hold / (record.check_every * step)
         record.rest_checks = max(1, math.ceil(min(checks, MOST_STEPS)))

@@ -12,11 +12,10 @@ from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
 from blocksim.world.boundary import particle_count
 from blocksim.world.build import build_world
 from blocksim.world.interactions import ContactClass, contact_classes, pair_of
+from blocksim.world.memory import SceneSize, file_bytes
 
 # measured on one core: a step costs about this for every body with its contacts (three to a hundred blocks)
 SECONDS_PER_BODY_AND_STEP = 75e-9
-FRAME_BYTES = 80
-BODY_FRAME_BYTES = 48
 STIFFNESS_UNITS = {"linear": "N/m", "hertz-mindlin": "N/m^1.5"}
 
 
@@ -59,6 +58,7 @@ class Description:
     frames: int  # at most
     seconds: float  # estimated time of solving, at most
     bytes: int  # estimated size of run.h5, at most
+    memory: int  # bytes that the run needs, at most
     particles: int  # on all boundaries, corners included
 
 
@@ -77,7 +77,10 @@ def describe(scenario: Scenario) -> Description:
         steps=steps,
         frames=frames,
         seconds=steps * len(placed) * SECONDS_PER_BODY_AND_STEP,
-        bytes=frames * (FRAME_BYTES + BODY_FRAME_BYTES * len(placed)),
+        bytes=file_bytes(len(placed), frames),
+        memory=SceneSize(
+            len(placed), world.pairs.size, world.candidates.shape[1], frames, world.particles is not None
+        ).bytes_needed,
         particles=_particles(scenario, placed),
     )
 

@@ -31,12 +31,9 @@ class StepTooLargeError(StepError):
 
 def admissible_step(bodies: Records, table: Records, safety: float, law: str, load: Load) -> float:
     """Return the largest safe step (s) of these bodies with these contact parameters."""
-    kinds = dict.fromkeys(
-        (ContactBody(2.0 * r.half_x, 2.0 * r.half_y, r.inverse_mass, r.inverse_inertia), int(r.contact_class))
-        for r in bodies[:-1]
-        if r.faces == ALL
-    )
-    grounds = sorted({0, *(int(r.contact_class) for r in bodies[:-1] if r.faces != ALL)})
+    is_block = bodies["faces"][:-1] == ALL
+    kinds = _kinds(bodies[:-1][is_block])
+    grounds = sorted({0, *np.unique(bodies["contact_class"][:-1][~is_block]).tolist()})
 
     def stiffness(i: int, j: int, inverse_mass: float) -> ContactStiffness:
         row = table[i, j]
@@ -50,6 +47,13 @@ def admissible_step(bodies: Records, table: Records, safety: float, law: str, lo
         for (a, ca), (b, cb) in combinations_with_replacement(kinds, 2)
     ]
     return stable_step([*grounded, *paired], safety)
+
+
+def _kinds(blocks: Records) -> list[tuple[ContactBody, int]]:
+    """Return every kind of block once: its sides and inverse masses, and its contact class."""
+    columns = (2.0 * blocks["half_x"], 2.0 * blocks["half_y"], blocks["inverse_mass"], blocks["inverse_inertia"])
+    rows = np.unique(np.column_stack([*columns, blocks["contact_class"]]), axis=0)
+    return [(ContactBody(*row[:-1]), int(row[-1])) for row in rows.tolist()]
 
 
 def expected_load(scenario: Scenario, bodies: Records) -> Load:

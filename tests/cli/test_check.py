@@ -1,6 +1,7 @@
 """blocksim check: what a scenario comes to."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -152,3 +153,46 @@ def test_step_that_is_too_large_is_told_where_it_stands(blocksim: Command, tmp_p
     assert answer.code == 65
     assert "time.step: 0.001 s is above the largest safe step" in answer.err
     assert '| step = "1 ms"' in answer.err
+
+
+def tables_of(out: str) -> list[str]:
+    """Return the lines below the resolved values."""
+    lines = out.splitlines()
+    return lines[max(i for i, line in enumerate(lines) if line.startswith("[")) + 1 :]
+
+
+def test_a_crowd_of_blocks_is_told_by_kinds_in_80_columns(blocksim: Command, tmp_path: Path) -> None:
+    text = (tmp_path / "scenarios" / "wall.toml").read_text()
+    plate = '\n[blocks.plate]\nwidth = 3\nheight = 0.02\nlength = 0.1\nmaterial = "aluminium"\n'
+    above = '[[bodies]]\nblock = "plate"\nx = "1 m"\ny = "2 m"\nfixed = true\n'
+    (tmp_path / "crowd.toml").write_text(text + plate + above)
+    lines = tables_of(blocksim("check", "crowd.toml").out)
+    assert "kind   blocks  along x  upright  depth mm  mass kg  inertia kg m²" in lines
+    assert "brick    1000    50.00    25.00     32.00  0.10887     2.8351e-05" in lines
+    assert any(line.startswith("plate       1  3000.00    20.00    100.00") for line in lines)
+    assert "1001 blocks, 1 of them fixed" in lines
+    assert "centres at x 25.00 to 2000.00 mm, y 12.50 to 2000.00 mm" in lines
+    assert len(lines) < 40
+    assert max(map(len, lines)) <= 80
+
+
+def test_the_rarest_of_many_kinds_are_only_counted(blocksim: Command, tmp_path: Path) -> None:
+    text = (tmp_path / "scenarios" / "slide.toml").read_text()
+    side = 'width = 0.1\nheight = 0.1\nlength = 0.1\nmaterial = "aluminium"\n'
+    kinds = "".join(f'\n[blocks.k{i}]\n{side}[[bodies]]\nblock = "k{i}"\nx = {i}\ny = 0.05\n' for i in range(1, 15))
+    (tmp_path / "kinds.toml").write_text(text + kinds)
+    lines = tables_of(blocksim("check", "kinds.toml").out)
+    assert "... and 3 more kinds" in lines
+
+
+def test_cost_is_told_in_units_that_people_read(blocksim: Command) -> None:
+    lines = blocksim("check", "scenarios/wall.toml", "--set", "time.end=10000", "--set", "output.every=1").out
+    assert re.search(r"^solving    at most about [0-9.]{3,5} (h|days) on one core$", lines, re.MULTILINE)
+    assert re.search(r"^memory     at most about [0-9.]{3,5} [MG]B$", lines, re.MULTILINE)
+    assert "results    at most 10001 frames, about 481 MB\n" in lines
+
+
+def test_json_of_a_crowd_has_every_block(blocksim: Command) -> None:
+    data = json.loads(blocksim("check", "scenarios/wall.toml", "--json").out)
+    assert [body["name"] for body in data["bodies"]] == [str(i + 1) for i in range(1000)]
+    assert data["memory"] > data["bytes"] > 0

@@ -6,18 +6,28 @@ farther than an interpreter does in seconds is skipped: shorter ones see the sam
 
 from __future__ import annotations
 
+import copy
+import json
+from functools import cache
 from math import cos, hypot, sin
 from typing import TYPE_CHECKING, Protocol
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
 from blocksim.kernels.arrays import ALL, BODY, zeros
+from blocksim.kernels.broad_phase import rebuild_pairs
+from blocksim.kernels.geometry import place_corners
+from blocksim.kernels.integrate import renew_rotations
 from blocksim.kernels.jit import config
-from blocksim.verification.scene import Simulation
+from blocksim.verification.scene import Simulation, scenario_of
+from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
-    from blocksim.kernels.arrays import Record
+    from collections.abc import Mapping
+
+    from blocksim.kernels.arrays import Record, Records, World
 
 IS_INTERPRETED = bool(config.DISABLE_JIT)
 BODY_STEPS = 1000  # a test, times bodies: a second or two of an interpreter
@@ -94,6 +104,49 @@ def make_body() -> MakeBody:
         body.half_x, body.half_y, body.radius = width / 2, height / 2, hypot(width, height) / 2
         body.mass, body.inertia = mass, mass * (width**2 + height**2) / 12
         body.inverse_mass, body.inverse_inertia = 1.0 / body.mass, 1.0 / body.inertia
+        place_corners(body)
         return body
+
+    return make
+
+
+def dashpots_by_definition(points: Records, masses: np.ndarray, ratio: float, step: float) -> np.ndarray:
+    """Return the dashpot forces from d = C (u + dt/2 A (f_before - f_spring - d)), solved by numpy.
+
+    `masses` (1/kg) are the inverse ones that the points see of one another.
+    """
+    root, weighted = np.sqrt(points.stiffness), np.sqrt(points.stiffness * points.weight)
+    values, vectors = np.linalg.eigh(root[:, None] * masses * root)
+    powers = [value**-0.5 if value > 1e-4 * values.max() else 0.0 for value in values]
+    c = 2.0 * ratio * weighted[:, None] * ((vectors * powers) @ vectors.T) * weighted
+    free = points.rate + 0.5 * step * masses @ (points.before - points.force)
+    return np.asarray(np.linalg.solve(np.eye(points.size) + 0.5 * step * c @ masses, c @ free))
+
+
+@cache
+def blocks_apart(count: int, tables: str) -> World:
+    """Return a world of blocks that do not touch, to be copied; `tables` of the scenario in JSON."""
+    apart: list[Mapping[str, object]] = [{"x": 0.1 * i, "y": 0.1} for i in range(count)]
+    return build_world(scenario_of(apart, **json.loads(tables)))
+
+
+class Pose(Protocol):
+    """Put blocks where a test wants them; the signature of the fixture `pose`."""
+
+    def __call__(self, *poses: tuple[float, float, float], **tables: object) -> World:
+        """x, y (m) and angle (rad) of every block; tables of the scenario. Nothing has moved, pairs are listed."""
+
+
+@pytest.fixture(scope="session")
+def pose() -> Pose:
+    """Make a world of the paper's blocks in any poses, overlapping ones too."""
+
+    def make(*poses: tuple[float, float, float], **tables: object) -> World:
+        world = copy.deepcopy(blocks_apart(len(poses), json.dumps(tables)))
+        for body, (x, y, angle) in zip(world.bodies, poses, strict=False):
+            body.x, body.y, body.angle = x, y, angle
+        renew_rotations(world.bodies)
+        assert rebuild_pairs(world)
+        return world
 
     return make

@@ -1,18 +1,25 @@
-"""What ends a run, and that a run starts only once."""
+"""What ends a run, that a run starts only once, and that it does not matter in how many calls it is made."""
 
 from __future__ import annotations
 
+import copy
 from math import inf, nan
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
-from blocksim.kernels.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, REACHED
+from blocksim.bench.scenes import pushed_wall
+from blocksim.kernels.advance import contact_forces, group_forces
+from blocksim.kernels.arrays import AT_REST, GROUP, LEDGER, MOTION_PIECE, NOT_FINITE, OVERLAP_LIMIT, REACHED, zeros
+from blocksim.kernels.energy import booked
+from blocksim.verification.scene import Simulation
+from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.kernels.arrays import World
+    from blocksim.kernels.arrays import Records, World
     from tests.conftest import Start
 
 FALLING = {"y": 0.03, "angle": 0.3}
@@ -81,3 +88,79 @@ def test_start_moves_nothing_and_happens_once(start: Start) -> None:
     before = scene.bodies.tobytes()
     assert scene.to_step(0).bodies.tobytes() == before
     assert scene.to_step(7).steps == 7
+
+
+HEAP = [
+    {"x": 0.036 * i + 0.005 * row, "y": 0.0125 + 0.025 * row, "velocity": [0.3 * row, 0.0]}
+    for row in range(3)
+    for i in range(3)
+]
+
+
+def shake(world: World) -> None:
+    """Move the support to and fro once."""
+    pieces = zeros(3, MOTION_PIECE)
+    pieces.start = 0.0, 0.02, 0.04
+    pieces.c0, pieces.c1 = (0.0, 4e-3, 0.0), (0.2, -0.2, 0.0)
+    world.motion[:] = pieces[0]
+    world.controls.motion_x = 1.0
+
+
+def bits(records: Records) -> dict[str, bytes]:
+    return {name: records[name].tobytes() for name in records.dtype.names or ()}
+
+
+@pytest.mark.parametrize("change", [None, shake])
+@pytest.mark.parametrize("contact", [SOFT, {**SOFT, "law": "hertz-mindlin", "max_overlap": 5e-3}])
+def test_one_call_for_all_steps_gives_the_bits_of_one_call_a_step(
+    start: Start, contact: dict[str, object], change: Callable[[World], None] | None, pace: int
+) -> None:
+    at_once, one_by_one = (start(HEAP, contact=contact, change=change) for _ in range(2))
+    last = 2000 // pace**2
+    at_once.to_step(last)
+    for step in range(1, last + 1):
+        one_by_one.to_step(step)
+    assert at_once.steps == one_by_one.steps == last
+    assert at_once.world.clock[0].rebuilds == one_by_one.world.clock[0].rebuilds
+    for name in ("bodies", "clock", "ledger", "pairs", "operators"):
+        assert bits(getattr(at_once.world, name)) == bits(getattr(one_by_one.world, name)), name
+    assert bits(at_once.touching) == bits(one_by_one.touching)
+    assert at_once.touching.size > 10
+
+
+@pytest.fixture
+def wall() -> Simulation:
+    """Return a wall that falls to pieces, with more pairs than one group."""
+    contact = {**SOFT, "max_overlap": 5e-3}
+    return Simulation(build_world(pushed_wall(8, 8, contact=contact))).to_time(0.05)
+
+
+@pytest.mark.usefixtures("compiler")
+def test_every_group_of_pairs_has_its_losses_in_its_own_book(wall: Simulation) -> None:
+    world, step = copy.deepcopy(wall.world), wall.step
+    count = int(world.clock[0].pair_count)
+    assert count > 2 * GROUP
+    apart = copy.deepcopy(world)
+    contact_forces(world, step)
+    books = zeros(count, LEDGER)
+    for p in range(count):
+        group_forces(apart, p, p + 1, step, books[p])
+    assert np.count_nonzero(books.friction) > GROUP
+    for name in ("dashpot", "friction", "broken"):
+        gained = world.ledger[name] - wall.world.ledger[name]
+        expected = np.add.reduceat(books[name], range(0, count, GROUP))
+        scale = 1e-12 * float(np.abs(wall.world.ledger[name]).max())
+        assert gained[: expected.size] == pytest.approx(expected, abs=scale), name
+        assert not gained[expected.size :].any()
+    assert bits(world.bodies) == bits(apart.bodies)
+
+
+@pytest.mark.usefixtures("compiler")
+def test_ledger_of_many_groups_is_complete(wall: Simulation) -> None:
+    books = wall.world.ledger
+    used = (int(wall.world.clock[0].pair_count) - 1) // GROUP + 1
+    assert np.count_nonzero(books.dashpot) >= used >= 3
+    assert not books.travel_work[1:].any()
+    assert not books.largest_kinetic[1:].any()
+    assert booked(books) == pytest.approx((books.dashpot.sum(), books.friction.sum(), books.broken.sum()), rel=1e-12)
+    assert wall.residual() < 1e-3

@@ -1,22 +1,25 @@
-"""Springs with history, clipping and what is booked, seen on one block."""
+"""Springs with history, clipping, dashpots of a pair and what is booked, seen on one block or one pair."""
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
-from typing import TYPE_CHECKING
+from math import cos, sin
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import INTERACTION, POINT, SLOT, zeros
-from blocksim.kernels.contact import clip_to_cone, draw_spring, shared_step
-from blocksim.kernels.laws import HERTZ_MINDLIN, LINEAR, elastic_force, tangent_stiffness
+from blocksim.kernels.arrays import LEDGER, NORMAL, SHEAR, zeros
+from blocksim.kernels.contact import damp, draw_springs, has_new_neighbours, shared_step, spare_lost_faces
+from blocksim.kernels.damping import BOTH, OPERATOR_LIFE
+from blocksim.kernels.kinematics import mutual_mass, resolve_point
+from tests.kernels.conftest import dashpots_by_definition
 
 if TYPE_CHECKING:
+    from blocksim.kernels.arrays import World
     from tests.conftest import PaperBlock, Start
-    from tests.kernels.conftest import MakeBody
+    from tests.kernels.conftest import MakeBody, Pose
 
 SLOPE = 0.2
 SOFT = {"stiffness_scale": 1e-4}  # a hundredth of the steps
@@ -42,29 +45,36 @@ def test_pairs_in_contact_are_counted_for_every_body(start: Start, paper_block: 
     brick = {"x": 0.5 * 0.033, "y": 1.5 * height}
     wall = start([{"y": 0.5 * height}, {"x": 0.033, "y": 0.5 * height}, brick], contact=SOFT).to_time(1e-2)
     assert wall.bodies.pairs_before.tolist() == [2, 2, 2]
-    assert wall.world.bodies[-1].pairs_before == 2
+
+
+@pytest.mark.parametrize(("of_a", "of_b", "new"), [(0, 0, False), (1, 0, True), (0, 1, True), (1, 1, True)])
+def test_pair_has_new_neighbours_where_the_number_of_pairs_on_a_body_has_changed(
+    make_body: MakeBody, of_a: int, of_b: int, new: bool
+) -> None:
+    a, b = make_body(), make_body()
+    a.pairs_changed, b.pairs_changed = of_a, of_b
+    assert has_new_neighbours(a, b) == new
 
 
 def test_sticking_block_pulls_its_shear_springs_against_the_slope(start: Start, paper_block: PaperBlock) -> None:
     rest = start([{"y": paper_block.height / 2}], tilt=-SLOPE, contact=SOFT).to_time(0.05)
-    slots = rest.slots[0, :2]
+    touching = rest.touching
+    assert touching.slot.tolist() == [0, 1]
     weight = paper_block.mass * 9.81
-    assert slots.normal_force.sum() == pytest.approx(weight * cos(SLOPE), rel=1e-3)
-    assert abs(slots.shear_force.sum()) == pytest.approx(weight * sin(SLOPE), rel=1e-3)
-    assert slots.normal_force[1] > slots.normal_force[0]  # it leans downhill, towards +x
+    assert touching.normal_force.sum() == pytest.approx(weight * cos(SLOPE), rel=1e-3)
+    assert abs(touching.shear_force.sum()) == pytest.approx(weight * sin(SLOPE), rel=1e-3)
+    assert touching.normal_force[1] > touching.normal_force[0]  # it leans downhill, towards +x
     lever = weight * sin(SLOPE) * paper_block.height / 2
-    assert np.diff(slots.normal_force)[0] * paper_block.width / 2 == pytest.approx(lever, rel=1e-3)
+    assert np.diff(touching.normal_force)[0] * paper_block.width / 2 == pytest.approx(lever, rel=1e-3)
 
 
 def test_sliding_block_has_its_springs_at_the_cone(start: Start, paper_block: PaperBlock) -> None:
     slide = start([{"y": paper_block.height / 2, "velocity": [-0.5, 0.0]}], contact=SOFT).to_time(0.02)
-    world = slide.world
-    slots, stiffness = (
-        slide.slots[0, :2],
-        float(world.interactions[1, 0].normal_stiffness * world.interactions[1, 0].shear_ratio),
-    )
-    assert abs(slots.shear_force) == pytest.approx(0.38 * slots.normal_force, rel=1e-12)
-    assert stiffness * slots.spring == pytest.approx(slots.shear_force, rel=1e-12)
+    world, touching = slide.world, slide.touching
+    stiffness = float(world.interactions[1, 0].normal_stiffness * world.interactions[1, 0].shear_ratio)
+    assert touching.size == 2
+    assert abs(touching.shear_force) == pytest.approx(0.38 * touching.normal_force, rel=1e-12)
+    assert stiffness * touching.spring == pytest.approx(touching.shear_force, rel=1e-12)
     assert world.ledger[0].friction == pytest.approx(
         0.38 * paper_block.mass * 9.81 * abs(float(slide.bodies[0].x)), rel=1e-2
     )
@@ -86,131 +96,103 @@ def test_kinetic_friction_slows_a_sliding_block_and_static_friction_holds_it(
 
 def test_contact_never_pulls_while_it_ends(start: Start, paper_block: PaperBlock) -> None:
     impact = start([{"y": paper_block.height / 2 + 1e-7, "velocity": [0.0, -1.0]}], restitution=0.1, gravity=0.0)
-    forces = [impact.to_step(step).slots[0].normal_force.copy() for step in range(1, 300)]
-    assert np.min(forces) == 0.0
-    assert np.max(forces) > 1e3
+    forces = [impact.to_step(step).touching.normal_force.copy() for step in range(1, 300)]
+    assert min(force.min(initial=0.0) for force in forces) == 0.0
+    assert any(force.size and force.max() == 0.0 for force in forces)  # in contact, and clipped
+    assert max(force.max(initial=0.0) for force in forces) > 1e3
     assert impact.contacts == 0
-    speed_change = np.sum(forces) * impact.step / paper_block.mass
+    speed_change = np.sum(np.concatenate(forces)) * impact.step / paper_block.mass
     assert speed_change == pytest.approx(float(impact.bodies[0].vy) + 1.0, rel=1e-9)
 
 
-DEEPEST = 1e-5  # m
-STIFFNESS = 1e6  # N/m, or N/m^1.5
+STEP, K = 2e-7, 1e8
 
 
-class Dragged:
-    """One point whose overlap and slip are prescribed, with its shear spring."""
-
-    def __init__(self, law: int, friction: float) -> None:
-        self.law, self.friction = law, friction
-        self.point, self.slot, self.values = zeros(1, POINT)[0], zeros(1, SLOT)[0], zeros(1, INTERACTION)[0]
-        self.values.shear_ratio = 0.8
-        self.values.static_friction = self.values.kinetic_friction = friction
-        self.values.transition_speed = 1e-3
-        self.work = self.lost = 0.0
-
-    @property
-    def stored(self) -> float:
-        """Energy (J) in the shear spring."""
-        return float(0.5 * self.slot.shear_stiffness * self.slot.spring**2)
-
-    def reach(self, depth: float) -> float:
-        """Return the longest spring (m) that sticks at an overlap (m)."""
-        stiffness = 0.8 * tangent_stiffness(self.law, STIFFNESS, depth)
-        return self.friction * elastic_force(self.law, STIFFNESS, depth) / stiffness
-
-    def drag(self, depth: float, slip: float, drawn: float = 1.0) -> float:
-        """Go to an overlap with a slip (m) of which `drawn` draws the spring; return what friction has taken (J)."""
-        point, slot = self.point, self.slot
-        point.normal_force = elastic_force(self.law, STIFFNESS, depth)
-        point.stiffness = tangent_stiffness(self.law, STIFFNESS, depth)
-        point.slipping, point.drawn = slip, drawn
-        before, energy = float(slot.shear_force), self.stored
-        lost = draw_spring(point, slot, self.values)
-        self.lost += lost
-        clip_to_cone(point, slot, self.values)
-        self.work += 0.5 * (before + slot.shear_force) * slip
-        assert lost == pytest.approx(0.5 * (before + slot.shear_force) * slip - (self.stored - energy), abs=1e-16)
-        return lost
+def two_points(pose: Pose, seed: int, direction: int) -> World:
+    """Return a pair of moving blocks with two random points, resolved along normals or tangents."""
+    world, random = pose((0.1, 0.2, 0.3), (0.12, 0.18, -0.5)), np.random.default_rng(seed)
+    pair = world.pairs[0]
+    a, b = world.bodies[:2]
+    assert (pair.a, pair.b) == (0, 1)
+    for body in (a, b):
+        for name in ("vx", "vy", "spin", "ax", "ay", "spin_rate"):
+            body[name] = random.normal()
+    for point in world.points[:2]:
+        angle = random.uniform(-np.pi, np.pi)
+        point.x, point.y = 0.11 + 0.01 * random.normal(), 0.19 + 0.01 * random.normal()
+        point.nx, point.ny = np.cos(angle), np.sin(angle)
+        resolve_point(point, a, b, STEP)
+        point.rate = point.closing_rate if direction == NORMAL else point.slip_rate
+        point.stiffness, point.before, point.force = K, *random.uniform(0.0, 100.0, 2)
+    return world
 
 
-laws = pytest.mark.parametrize("law", [LINEAR, HERTZ_MINDLIN])
-# overlaps as shares of the deepest one; slips as shares of the longest spring, or of twice that
-paths = st.lists(st.tuples(st.floats(1e-3, 1.0), st.floats(-1.0, 1.0)), min_size=1, max_size=15)
-
-
-@laws
-@given(path=paths, friction=st.floats(0.01, 2.0))
-def test_shear_spring_never_gives_back_more_than_was_put_in(
-    law: int, path: list[tuple[float, float]], friction: float
+@pytest.mark.parametrize("direction", [NORMAL, SHEAR])
+@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.7, 0.7), (0.6, 1.2), (0.0, 1.0)])
+@pytest.mark.parametrize(("count", "pattern"), [(1, 1), (2, BOTH), (2, 1), (2, 2)])
+@given(seed=st.integers(0, 10_000))
+def test_dashpots_of_a_pair_follow_the_definition(
+    pose: Pose, direction: int, weights: tuple[float, float], count: int, pattern: int, seed: int
 ) -> None:
-    contact = Dragged(law, friction)
-    scale = friction * elastic_force(law, STIFFNESS, DEEPEST) * DEEPEST
-    for share, slip in path:
-        depth = share * DEEPEST
-        lost = contact.drag(depth, 0.0), contact.drag(depth, 2.0 * slip * contact.reach(depth))
-        assert min(lost) >= -1e-15 * scale
-        assert contact.work >= contact.stored - 1e-14 * scale
-        limit = friction * elastic_force(law, STIFFNESS, depth)
-        assert abs(contact.slot.shear_force) <= limit * (1.0 + 1e-12)
+    world = two_points(pose, seed, direction)
+    a, b = world.bodies[:2]
+    points: Any = world.points[:count]
+    points.weight = weights[:count]
+    if count == 2 and pattern != BOTH:
+        points.stiffness[2 - pattern] = 0.0  # it slides
+    masses = np.array([[mutual_mass(one, two, a, b, direction) for two in points] for one in points])
+    expected = points.force + dashpots_by_definition(points, masses, 0.7, STEP)
+    damp(world, 0, count, direction, pattern, 0.7, STEP)
+    assert points.force == pytest.approx(expected, rel=1e-7, abs=1e-9 * np.abs(expected).max())
+    assert world.operators[0, direction].left == (OPERATOR_LIFE if weights[0] == weights[count - 1] == 1.0 else 0)
+    assert world.operators[0, 1 - direction].tobytes() == bytes(world.operators.itemsize)
 
 
-@laws
-@given(path=paths)
-def test_closed_path_of_overlap_and_slip_costs_energy(law: int, path: list[tuple[float, float]]) -> None:
-    """There and back again, in overlap and in slip, in steps so small that their size does not matter."""
-    contact = Dragged(law, 0.5)
-    legs = [(share * DEEPEST, slip * contact.reach(DEEPEST)) for share, slip in path]
-    legs += [(depth, -slip) for depth, slip in reversed(legs)]
-    depth = legs[0][0]
-    contact.drag(depth, 0.0)
-    for end, slip in legs:
-        for n in range(1, 21):
-            contact.drag(depth + (end - depth) * n / 20, slip / 20)
-        depth = end
-    assert contact.work >= contact.stored - 1e-20
+def test_operator_is_kept_for_lasting_contacts_and_then_made_anew(pose: Pose) -> None:
+    world = two_points(pose, 1, NORMAL)
+    operator = world.operators[0, NORMAL]
+    damp(world, 0, 2, NORMAL, BOTH, 0.7, STEP)
+    first = float(operator.e_one)
+    world.points.stiffness = 4.0 * K
+    for left in range(OPERATOR_LIFE - 1, -1, -1):
+        damp(world, 0, 2, NORMAL, BOTH, 0.7, STEP)
+        assert (operator.left, operator.e_one) == (left, first)
+    damp(world, 0, 2, NORMAL, BOTH, 0.7, STEP)
+    assert operator.left == OPERATOR_LIFE
+    assert operator.e_one > 1.1 * first
 
 
-@given(path=paths)
-def test_linear_spring_that_sticks_gives_everything_back(path: list[tuple[float, float]]) -> None:
-    contact = Dragged(LINEAR, 1e6)
-    for share, slip in path:
-        lost = contact.drag(share * DEEPEST, slip * DEEPEST)
-        assert abs(lost) < 1e-15 * STIFFNESS * (len(path) * DEEPEST) ** 2
-    assert contact.work == pytest.approx(contact.stored, abs=1e-12 * STIFFNESS * DEEPEST**2)
+def test_operator_of_a_step_without_length_is_not_kept(pose: Pose) -> None:
+    world = two_points(pose, 1, NORMAL)
+    damp(world, 0, 2, NORMAL, BOTH, 0.7, 0.0)
+    assert world.operators[0, NORMAL].left == 0
+    assert world.operators[0, NORMAL].e_one > 0.0
 
 
-@given(first=st.floats(0.05, 1.0), second=st.floats(0.05, 1.0), slip=st.floats(-1.0, 1.0))
-def test_growing_overlap_keeps_the_hertzian_shear_force_and_falling_overlap_lowers_it(
-    first: float, second: float, slip: float
+def test_point_that_slides_has_no_dashpot_and_the_other_one_keeps_its_own(pose: Pose) -> None:
+    world = two_points(pose, 1, SHEAR)
+    values, book = world.interactions[1, 1], zeros(1, LEDGER)[0]
+    one, two = world.points[:2]
+    one.force, two.force = 100.0, 0.0
+    one.slipping, two.slipping = 1e-9, 1e-9
+    stiffness = float(values.shear_ratio) * K
+    values.normal_stiffness = K
+    assert draw_springs(world, 0, 2, values, book) == 1
+    assert (one.stiffness, two.stiffness) == (pytest.approx(stiffness), 0.0)
+    assert (one.force, two.force) == (pytest.approx(stiffness * 1e-9), 0.0)
+    assert world.contacts[0].spring.tolist() == [1e-9, 0.0]
+    assert world.contacts[0].normal_force.tolist() == [100.0, 0.0]
+
+
+@pytest.mark.parametrize(("beside", "lost"), [(np.inf, False), (1.1e-6, False), (0.9e-6, True)])
+@pytest.mark.parametrize("closing", [1e-7, -1e-7])
+def test_corner_about_to_lose_its_face_has_no_dashpot_on_it(
+    pose: Pose, beside: float, lost: bool, closing: float
 ) -> None:
-    contact = Dragged(HERTZ_MINDLIN, 1e6)
-    contact.drag(first * DEEPEST, slip * DEEPEST)
-    force = float(contact.slot.shear_force)
-    contact.drag(second * DEEPEST, 0.0)
-    kept = min(1.0, sqrt(second / first))  # the stiffness goes with the root of the overlap
-    assert contact.slot.shear_force == pytest.approx(kept * force, rel=1e-12)
-
-
-@laws
-@given(slip=st.floats(-20.0, 20.0), drawn=st.floats(0.0, 1.0))
-def test_first_drift_draws_the_spring_for_its_part_in_contact(law: int, slip: float, drawn: float) -> None:
-    contact = Dragged(law, 1e6)
-    lost = contact.drag(DEEPEST, slip * DEEPEST, drawn)
-    assert contact.slot.spring == pytest.approx(drawn * slip * DEEPEST)
-    assert lost >= 0.0
-
-
-@laws
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_steady_slip_costs_the_friction_force_times_the_way(law: int, way: float) -> None:
-    contact = Dragged(law, 0.3)
-    step = 0.05 * contact.reach(DEEPEST) * way
-    for _ in range(40):
-        contact.drag(DEEPEST, step)
-    assert contact.point.stiffness == 0.0  # it slides: no dashpot
-    lost, force = contact.lost, 0.3 * elastic_force(law, STIFFNESS, DEEPEST)
-    for _ in range(100):
-        contact.drag(DEEPEST, step)
-    assert contact.lost - lost == pytest.approx(force * 100 * abs(step))
-    assert contact.slot.shear_force == pytest.approx(way * force)
+    world = two_points(pose, 1, NORMAL)
+    point = world.points[0]
+    world.operators["left"], point.closing, point.beside = 5, closing, beside
+    world.points.beside[1] = np.inf
+    spare_lost_faces(world, 0, 2)
+    assert world.points.weight[:2].tolist() == [0.0 if lost else 1.0, 1.0]
+    assert world.operators["left"][0].tolist() == ([0, 0] if lost else [5, 5])

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from blocksim.kernels.arrays import NORMAL, POINT, SHEAR, zeros
 from blocksim.kernels.coupled import MOBILITY, SIZE, add_coupled_dashpots, fill_mobility, fill_row
 from blocksim.kernels.kinematics import resolve_point
+from tests.kernels.conftest import dashpots_by_definition
 
 if TYPE_CHECKING:
     from blocksim.kernels.arrays import Record, Records
@@ -57,16 +58,6 @@ def delassus(points: Records, a: Record, b: Record, direction: int) -> np.ndarra
     return np.asarray((rows * masses) @ rows.T)
 
 
-def by_definition(points: Records, inverse: np.ndarray, ratio: float) -> np.ndarray:
-    """Return the dashpot forces from d = C (u + dt/2 A (f_before - f_spring - d)), solved by numpy."""
-    root, weighted = np.sqrt(points.stiffness), np.sqrt(points.stiffness * points.weight)
-    values, vectors = np.linalg.eigh(root[:, None] * inverse * root)
-    powers = [value**-0.5 if value > 1e-4 * values.max() else 0.0 for value in values]
-    c = 2.0 * ratio * weighted[:, None] * ((vectors * powers) @ vectors.T) * weighted
-    free = points.rate + 0.5 * STEP * inverse @ (points.before - points.force)
-    return np.asarray(np.linalg.solve(np.eye(points.size) + 0.5 * STEP * c @ inverse, c @ free))
-
-
 def added(points: Records, a: Record, b: Record, direction: int, ratio: float) -> np.ndarray:
     work, before = np.zeros((8, SIZE, SIZE)), points.force.copy()
     fill_mobility(a, b, work[MOBILITY])
@@ -96,7 +87,7 @@ def test_any_number_of_points_follows_the_definition(
     a, b, points = scene(make_body, seed, n, parallel=parallel)
     resolved = points.closing_rate if direction == NORMAL else points.slip_rate
     points.rate = resolved
-    expected = by_definition(points, delassus(points, a, b, direction), ratio)
+    expected = dashpots_by_definition(points, delassus(points, a, b, direction), ratio, STEP)
     forces = added(points, a, b, direction, ratio)
     assert forces == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
 

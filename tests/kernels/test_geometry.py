@@ -14,7 +14,9 @@ from blocksim.kernels.arrays import BODY, zeros
 from blocksim.kernels.geometry import (
     END_RATIO,
     SMALL_TURN,
+    corner_offset,
     ground_gap,
+    place_corners,
     relative_pose,
     separation,
     slab_depth,
@@ -116,6 +118,15 @@ def test_relative_pose_leads_back_to_the_world(make_body: MakeBody, x: float, y:
     px, py, c, s = relative_pose(a, b)
     assert to_world(b, px, py) == pytest.approx((a.x, a.y), abs=1e-15)
     assert (c, s) == pytest.approx((cos(one - two), sin(one - two)), abs=1e-14)
+
+
+@given(angle=angles, w=sides, h=sides)
+def test_ways_to_the_corners_lead_to_the_corners(make_body: MakeBody, angle: float, w: float, h: float) -> None:
+    body = make_body(0.1, -0.2, 0.0, width=w, height=h)
+    body.angle, body.cos, body.sin = angle, cos(angle), sin(angle)
+    place_corners(body)
+    ways = np.array([corner_offset(body, corner) for corner in range(4)])
+    assert ways == pytest.approx(corners(body) - (body.x, body.y), abs=1e-15)
 
 
 def test_to_world_turns_counter_clockwise(make_body: MakeBody) -> None:

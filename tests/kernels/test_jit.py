@@ -26,12 +26,12 @@ SCENARIO = Path(__file__).parents[2] / "scenarios" / "three_blocks.toml"
 # a kernel of contact.py, which knows the law in laws/linear.py by two imports only
 PUSH = """
 from blocksim.kernels import jit
-from blocksim.kernels.arrays import POINT, SLOT, zeros
+from blocksim.kernels.arrays import CONTACT, POINT, zeros
 from blocksim.kernels.contact import push_spring
 
 point = zeros(1, POINT)[0]
 point.depth, point.share = 2e-6, 1.0
-push_spring(point, zeros(1, SLOT)[0], 0, 1e9)
+push_spring(point, zeros(1, CONTACT)[0], 0, 1e9)
 hits, misses = (sum(counts.values()) for counts in (push_spring.stats.cache_hits, push_spring.stats.cache_misses))
 print(point.force, hits, misses, jit.cache_folder())
 """
@@ -126,7 +126,7 @@ def test_cache_folder_falls_back_to_the_temporary_one(
     folder = jit.cache_folder()
     assert folder is not None
     assert folder.is_relative_to(tmp_path / "temporary")
-    assert folder.name == jit.source_hash()
+    assert folder.name == f"{jit.source_hash()}-open"
 
 
 @pytest.mark.usefixtures("fresh_folder_choice", "compiler")
@@ -185,13 +185,13 @@ def test_interpreted_kernels_give_what_compiled_ones_give(tmp_path: Path) -> Non
     for n, run in enumerate(RUNS):
         compiled, interpreted = (np.load(tmp_path / f"{name}{n}.npz") for name in ("compiled", "interpreted"))
         assert compiled["clock"]["steps"] == interpreted["clock"]["steps"] == int(run.split(",")[2])
-        assert compiled["slots"]["face"].max() >= 0
+        assert compiled["pairs"]["active"].max() > 0
         assert compiled["ledger"]["dashpot"] > 0.0
-        for array in ("bodies", "slots", "ledger", "clock", "pairs"):
+        for array in ("bodies", "contacts", "operators", "ledger", "clock", "pairs"):
             for field in compiled[array].dtype.names:
                 one, two = compiled[array][field], interpreted[array][field]
-                size = max(1.0, float(np.abs(one).max()))
-                assert np.abs(one - two).max() <= 1e-12 * size, f"{run}: {array}.{field}"
+                size = max(1.0, float(np.abs(one[np.isfinite(one)]).max()))  # the half-plane has an infinite side
+                np.testing.assert_allclose(two, one, rtol=0.0, atol=1e-12 * size, err_msg=f"{run}: {array}.{field}")
 
 
 @pytest.mark.usefixtures("fresh_folder_choice", "compiler")

@@ -209,11 +209,6 @@ SCENES: list[tuple[list[dict[str, Any]], dict[str, Any]]] = [
 ]
 
 
-# below a profile the half-plane lies at minus infinity; interpreted kernels warn when they look how far it has moved
-moves_nowhere = pytest.mark.filterwarnings("ignore:invalid value encountered in scalar subtract:RuntimeWarning")
-
-
-@moves_nowhere
 @pytest.mark.parametrize(("bodies", "tables"), SCENES)
 def test_uniformly_moving_support_is_rest_seen_from_elsewhere(
     bodies: list[dict[str, object]], tables: dict[str, Any]
@@ -225,16 +220,16 @@ def test_uniformly_moving_support_is_rest_seen_from_elsewhere(
 
     resting = on_support(bodies, restitution=1.0, **tables)
     moving = on_support(bodies, pieces_of((0.0, 0.0, velocity)), change=push, restitution=1.0, **tables)
+    free_flight = resting.state()[:, 3:5] - (0.0, 0.04 * G)
     for time in (0.005, 0.02, 0.04):
         resting.to_time(time)
         moving.to_time(time)
         seen = moving.state() - velocity * np.array([moving.time, 0.0, 0.0, 1.0, 0.0, 0.0])
         assert seen == pytest.approx(resting.state(), abs=1e-9), time
-    assert resting.world.slots.normal_force.max() >= 0.0
+    assert np.abs(resting.state()[:, 3:5] - free_flight).max() > 0.1  # something has been hit
     assert moving.residual() < 1e-3
 
 
-@moves_nowhere
 @pytest.mark.parametrize(("bodies", "tables"), SCENES)
 def test_uniformly_accelerated_support_is_gravity_from_the_side(
     bodies: list[dict[str, object]], tables: dict[str, Any]

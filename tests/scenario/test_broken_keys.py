@@ -101,7 +101,8 @@ bad.toml:22: time.safty: unknown key, did you mean 'safety'?
         "count = 3",
         'count = 3\noverlap = "10 mm"',
         """
-bad.toml:19: structures.0.overlap: unknown key, allowed are: block, kind, count, left, bottom, offset
+bad.toml:19: structures.0.overlap: unknown key, allowed are: block, left, bottom, \
+velocity, shear_velocity, kind, count, offset
    19 | overlap = "10 mm"
       | ^^^^^^^
 """,
@@ -146,7 +147,8 @@ bad.toml:15: structures.0.count: this key is missing: number of blocks
         'kind = "stack"',
         "# no kind",
         """
-bad.toml:15: structures.0.kind: this key is missing: "staircase" or "stack" is needed
+bad.toml:15: structures.0.kind: this key is missing: \
+"staircase", "stack", "wall", "pyramid", "dominoes" or "grid" is needed
    15 | [[structures]]
       |   ^^^^^^^^^^
 """,

@@ -72,11 +72,12 @@ bad.toml:17: structures.0.block: unknown block "stone", there is: brick
     ),
     "unknown kind of structure": (
         'kind = "stack"',
-        'kind = "piramid"',
+        'kind = "cathedral"',
         """
-bad.toml:16: structures.0.kind: "piramid" is no kind of structure, use "staircase" or "stack"
-   16 | kind = "piramid"
-      |        ^^^^^^^^^
+bad.toml:16: structures.0.kind: "cathedral" is no kind of structure, use \
+"staircase", "stack", "wall", "pyramid", "dominoes" or "grid"
+   16 | kind = "cathedral"
+      |        ^^^^^^^^^^^
 """,
     ),
     "misspelt kind of structure": (
@@ -183,9 +184,9 @@ bad.toml:25: bodies.0.fixed: a fixed body cannot have a velocity or a spin
     ),
     "too many bodies": (
         "count = 3",
-        'count = 100_000\n[[structures]]\nkind = "stack"\nblock = "brick"\ncount = 1',
+        'count = 1\n[[structures]]\nkind = "wall"\nblock = "brick"\nrows = 1000\ncolumns = 1000',
         """
-bad.toml:15: structures: 100001 bodies are too many; at most 100000 are possible
+bad.toml:15: structures: 1000001 bodies are too many; at most 1000000 are possible
    15 | [[structures]]
       |   ^^^^^^^^^^
 """,

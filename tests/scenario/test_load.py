@@ -96,7 +96,7 @@ def test_overrides(file: Path, overrides: Mapping[str, object] | Sequence[str], 
 
 def test_an_element_of_a_list_is_set_by_its_number(file: Path) -> None:
     scenario = load_scenario(file, ["structures.0.count=7", "structures.0.offset=1 mm"])
-    assert [structure.count for structure in scenario.structures] == [7]
+    assert [structure.size for structure in scenario.structures] == [7]
 
 
 def test_a_quoted_key_is_set(file: Path) -> None:

@@ -14,6 +14,7 @@ from blocksim.scenario import (
     Document,
     Scenario,
     load_scenario,
+    place_bodies,
     scenario_from_mapping,
     scenario_hash,
     scenario_to_toml,
@@ -125,6 +126,39 @@ def test_any_scenario_is_written_and_loaded_bit_equal(data: dict[str, Any]) -> N
     assert scenario_hash(again(scenario)) == scenario_hash(scenario)
 
 
+ROWS = {"block": "brick", "rows": 3}
+MOVING = {"velocity": ["1 mm/s", 0], "shear_velocity": "-0.3 m/s", "left": "1 mm", "bottom": "1 m"}
+
+
+@pytest.mark.parametrize(
+    "structure",
+    [
+        {"kind": "wall", **ROWS, "columns": 4, "bond": "stack", "gap": "3 mm", "holes": [[1, 2], [3, 4]], **MOVING},
+        {"kind": "wall", **ROWS, "columns": 4, "gap": "3 mm", "missing": 0.3, "offset": "1.1 mm", "seed": 7},
+        {"kind": "pyramid", **ROWS, "gap": "3 mm", **MOVING},
+        {"kind": "dominoes", "block": "brick", "count": 5, "spacing": "7 mm", "push": "0.1 m/s", **MOVING},
+        {
+            "kind": "grid",
+            **ROWS,
+            "columns": 4,
+            "gap_x": "35 mm",
+            "gap_y": "1.1 m",
+            "offset": "0.7 mm",
+            "turn": "33 deg",
+            "seed": 4294967295,
+            **MOVING,
+        },
+        {"kind": "staircase", "block": "brick", "count": 3, "overlap": "7 mm", **MOVING},
+    ],
+    ids=lambda structure: structure["kind"],
+)
+def test_a_structure_is_written_and_loaded_bit_equal(valid_text: str, structure: dict[str, object]) -> None:
+    data = Document.parse(valid_text).data
+    scenario = scenario_from_mapping({**data, "structures": [structure]})
+    assert repr(again(scenario)) == repr(scenario)
+    assert place_bodies(again(scenario)) == place_bodies(scenario)
+
+
 def test_a_sweep_is_written_as_lists_of_values(valid_text: str) -> None:
     tilts = '"ground.tilt" = { from = "1 deg", to = "2 deg", count = 2 }'
     scenario = Document.parse(f'{valid_text}\n[sweep]\nmode = "list"\n{tilts}\n"time.end" = [1, 2]\n').build()
@@ -159,6 +193,8 @@ HASHED = {
     "structures.0.left": 0.1,
     "structures.0.bottom": 0.1,
     "structures.0.offset": 0.1,
+    "structures.0.velocity": [1, 0],
+    "structures.0.shear_velocity": 1,
     "bodies.0.block": "c",
     "bodies.0.x": 11,
     "bodies.0.y": 11,

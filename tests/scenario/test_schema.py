@@ -9,6 +9,8 @@ from jsonschema import Draft202012Validator
 
 from blocksim.scenario import json_schema, load_scenario, scenario_to_toml
 
+WALL = '[[structures]]\nkind = "wall"\nblock = "brick"\nrows = 2\ncolumns = 2\n'
+
 
 @pytest.fixture(scope="module")
 def validator() -> Draft202012Validator:
@@ -43,6 +45,11 @@ def test_shipped_scenarios_are_valid_as_written_and_resolved(validator: Draft202
         '[time]\nstep = "1e-6 s"',
         '[[bodies]]\nblock = "brick"\nx = 1\ny = "1 m"\nangle = 0\nvelocity = ["1 m/s", 0]',
         '[sweep]\nmode = "grid"\n"time.end" = [1, "2 s"]',
+        f'{WALL}bond = "stack"\nholes = [[1, 2], [2, 1]]\nvelocity = ["1 m/s", 0]\nshear_velocity = 1',
+        f'{WALL}gap = "1 mm"\noffset = 0.0005\nmissing = 0.1\nseed = 7',
+        '[[structures]]\nkind = "pyramid"\nblock = "brick"\nrows = 3\ngap = 0',
+        '[[structures]]\nkind = "dominoes"\nblock = "brick"\ncount = 3\nspacing = "9 mm"\npush = "-1 m/s"',
+        '[[structures]]\nkind = "grid"\nblock = "brick"\nrows = 3\ncolumns = 3\ngap_x = 1\ngap_y = 1\nturn = "9 deg"',
         '[sweep]\n"ground.tilt" = { from = "1 deg", to = "2 deg", count = 3 }',
         '[provenance]\n"time.end" = "assumed"',
     ],
@@ -78,6 +85,14 @@ def test_every_form_of_a_value_is_valid(validator: Draft202012Validator, valid_t
         '[[structures]]\nkind = "piramid"\nblock = "brick"\ncount = 1',
         '[[structures]]\nkind = "stack"\nblock = "brick"\ncount = 1\noverlap = 1',
         '[[structures]]\nkind = "stack"\nblock = "brick"\ncount = 0',
+        f'{WALL}bond = "english"',
+        f"{WALL}gap = -1",
+        f"{WALL}holes = [[0, 1]]",
+        f"{WALL}holes = [[1]]",
+        f"{WALL}holes = [1, 1]",
+        f"{WALL}missing = 2",
+        f"{WALL}seed = -1",
+        f"{WALL}velocity = 1",
         '[sweep]\n"time.end" = 3',
         "[materials.wood]\nyoung_modulus = 1\npoisson_ratio = 0",
         "[materials.wood]\ndensity = 1\nunit_weight = 1\nyoung_modulus = 1\npoisson_ratio = 0",

@@ -86,3 +86,25 @@ def test_tower_stands() -> None:
 def test_tower_with_large_offset_falls() -> None:
     result = run_shipped("tower", **{"contact.stiffness_scale": 0.001, "structures.0.offset": "3.5 mm"})
     assert result.final["rotation_deg"].abs().max() > 45.0
+
+
+def test_dominoes_fall_one_after_the_other_at_a_constant_speed() -> None:
+    result = run_shipped("dominoes")
+    assert result.reason == "at rest"
+    assert (result.final["rotation_deg"] < -60.0).all()
+    frames = result.frames
+    starts = np.array([frames.time[np.argmax(turned < -0.02)] for turned in frames.rotation.T])
+    assert (np.diff(starts) > 0.0).all()
+    for first, last in ((10, 17), (17, 23)):
+        assert (last - first) * 0.023 / (starts[last] - starts[first]) == pytest.approx(0.86, abs=0.03)
+
+
+def test_pushed_wall_leans_more_the_higher_a_course_is() -> None:
+    """The first moments; a whole run takes longer than a test may."""
+    result = run_shipped("wall", **{"time.end": 0.05})
+    assert result.status == "finished"
+    moved = result.frames.x[-1] - result.frames.x[0]
+    left = moved.reshape(25, 40)[:, :20].mean(axis=1)  # the other end breaks off
+    assert (np.diff(left) > 0.0).all()
+    assert abs(left[0]) < 1e-4
+    assert 0.02 < left[-1] < 0.05  # 1 m/s, less friction

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.scenario import place_segments
+from blocksim.scenario import place_bodies, place_segments
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.build import build_world
 
@@ -90,6 +90,27 @@ def test_upper_faces_of_slabs_are_the_line_of_the_profile(steps: list[tuple[floa
             assert slab.half_x - reach == pytest.approx(beyond, abs=1e-9)
         assert atan2(slab.sin, slab.cos) == pytest.approx(slab.angle, abs=1e-12)
         assert slab.radius == pytest.approx(hypot(slab.half_x, slab.half_y))
+
+
+def test_records_are_the_bodies_as_placed() -> None:
+    turned = {"y": 1.0, "angle": 0.3, "velocity": [0.4, -0.5], "spin": 3.0}
+    fixed = {"x": 1.0, "y": 1.0, "width": 0.1, "length": 0.2, "fixed": True}
+    scenario = scenario_of([turned, {"x": 2.0, "y": 2.0, "length": 0.2}, fixed, {"x": 3.0, "y": 1.0}])
+    placed, records = place_bodies(scenario), build_world(scenario).bodies
+    assert len(placed) == len(records) - 1 == 4
+    for body, record in zip(placed, records, strict=False):
+        assert (record.x, record.y, record.angle) == (body.x, body.y, body.angle)
+        assert (record.cos, record.sin) == (cos(body.angle), sin(body.angle))
+        assert (record.vx, record.vy, record.spin) == (body.vx, body.vy, body.spin)
+        assert (record.half_x, record.half_y) == (body.size_x / 2, body.size_y / 2)
+        assert record.radius == pytest.approx(hypot(body.size_x, body.size_y) / 2)
+        if body.fixed:
+            assert (record.mass, record.inertia, record.inverse_mass, record.inverse_inertia) == (0.0,) * 4
+        else:
+            assert (record.mass, record.inertia) == (body.mass, body.inertia)
+            assert (record.inverse_mass, record.inverse_inertia) == (1.0 / body.mass, 1.0 / body.inertia)
+    assert records.contact_class[:4].tolist() == [1, 2, 2, 1]  # by depth
+    assert records.is_moved[:4].tolist() == [0, 0, 1, 0]
 
 
 def test_slab_is_solid_on_the_right_hand_of_its_wall() -> None:
@@ -201,7 +222,7 @@ def test_block_landing_on_a_peak_is_held_by_its_point(model: str) -> None:
     assert scene.bodies[0].y == pytest.approx(HEIGHT / 2, abs=2e-4)
     assert abs(scene.bodies[0].vy) < 1e-3
     assert scene.contacts > 0
-    assert float(scene.slots.normal_force.sum()) == pytest.approx(float(scene.bodies[0].mass) * 9.81, rel=0.02)
+    assert float(scene.touching.normal_force.sum()) == pytest.approx(float(scene.bodies[0].mass) * 9.81, rel=0.02)
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, radians, sin, sqrt
+from math import ceil, cos, hypot, radians, sin, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from blocksim.errors import ExitCode
-from blocksim.kernels.arrays import NO_FACE
+from blocksim.kernels.arrays import BODY as BODY_RECORD
+from blocksim.kernels.arrays import CONTACT, GROUP, PARTICLE_CONTACT, zeros
+from blocksim.kernels.energy import booked
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.world.build import build_world, empty_lists, with_more_room
+from blocksim.world import memory
+from blocksim.world.build import (
+    GROWTH,
+    LARGE_RATIO,
+    MOST_LARGE,
+    build_world,
+    cell_radius,
+    empty_lists,
+    with_more_room,
+)
+from blocksim.world.memory import SceneTooLargeError
 from blocksim.world.restitution import damping_ratio
 from blocksim.world.stable_step import Load
 from blocksim.world.step import StepTooLargeError, admissible_step
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from blocksim.kernels.arrays import Records
 
 W, H, D = 0.032, 0.025, 0.05
 BODY = {"block": "brick", "x": 0.1, "y": 0.2}
@@ -75,11 +89,13 @@ def test_tilted_ground_turns_gravity_so_that_positive_tilt_raises_the_far_end(ti
 
 def test_world_starts_without_contacts_time_or_losses() -> None:
     world = build_world(scenario({"velocity": [3.0, 0.0], "spin": 2.0}))
-    assert (world.slots.face == NO_FACE).all()
+    assert not world.pairs.active.any()
+    assert world.clock[0].next_look == 0
     assert world.clock[0].steps == 0
     assert world.clock[0].pair_count == 0
     ledger, body = world.ledger[0], world.bodies[0]
-    assert (ledger.dashpot, ledger.friction, ledger.broken, ledger.travel_work) == (0.0, 0.0, 0.0, 0.0)
+    assert booked(world.ledger) == (0.0, 0.0, 0.0)
+    assert (ledger.to_support, ledger.travel_work) == (0.0, 0.0)
     assert ledger.largest_kinetic == pytest.approx(0.5 * (body.mass * 9.0 + body.inertia * 4.0))
 
 
@@ -142,21 +158,85 @@ def test_step_is_never_longer_than_the_run() -> None:
     assert build_world(scenario(time={"end": 1e-9})).controls[0].step == 1e-9
 
 
-def test_more_room_keeps_what_there_is() -> None:
-    world = build_world(scenario())
+@pytest.mark.parametrize("model", ["surface", "kernel"])
+def test_more_room_keeps_what_there_is(model: str) -> None:
+    world = build_world(scenario(contact={"model": model, "particle_spacing": 4e-3}))
     world.pairs.a[:] = np.arange(world.pairs.size)
-    world.slots.spring[:] = 7.0
+    world.contacts.spring[:] = 7.0
+    world.candidates[:] = 3
+    world.operators.left[:] = 5
+    world.ledger[0].friction = 11.0
     wider = with_more_room(world)
     used = world.pairs.size
-    assert wider.pairs.size == wider.spare_pairs.size == 2 * used
-    assert (wider.pairs[:used] == world.pairs).all()
-    assert (wider.slots[:used] == world.slots).all()
-    assert (wider.slots.face[used:] == NO_FACE).all()
+    assert wider.pairs.size == wider.spare_pairs.size == ceil(GROWTH * used)
+    for name in ("pairs", "contacts", "candidates", "operators"):
+        old, new = getattr(world, name), getattr(wider, name)
+        assert (new[:used] == old).all(), name
+        assert not new[used:].view(np.uint8).any(), name
+        assert (new.dtype, new.shape) == (old.dtype, (wider.pairs.size, *old.shape[1:])), name
+    assert wider.ledger[0].friction == 11.0
     assert wider.bodies is world.bodies
 
 
-def test_empty_lists_hold_no_contact() -> None:
-    lists = empty_lists(5, 8)
-    assert len(lists["pairs"]) == 5
-    assert (lists["slots"].face == NO_FACE).all()
-    assert (lists["spare_slots"].face == NO_FACE).all()
+def test_every_group_of_pairs_has_a_book_of_its_own() -> None:
+    world = build_world(scenario())
+    for _ in range(20):
+        last = (world.pairs.size - 1) // GROUP
+        assert world.ledger.size > last
+        world.ledger.friction[last] = world.pairs.size
+        world = with_more_room(world)
+        assert world.ledger[last].friction > 0.0
+    assert world.ledger.size > 5
+
+
+def test_more_room_than_there_is_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = build_world(scenario())
+    monkeypatch.setattr(memory, "available_bytes", lambda: 1000)
+    with pytest.raises(SceneTooLargeError):
+        with_more_room(world)
+
+
+@pytest.mark.parametrize("kind", [CONTACT, PARTICLE_CONTACT])
+def test_empty_lists_hold_no_contact(kind: np.dtype[np.void]) -> None:
+    lists = empty_lists(5, 8, zeros(3, kind))
+    assert {name: lists[name].shape for name in ("contacts", "candidates", "spare_candidates", "operators")} == {
+        "contacts": (5, 3),
+        "candidates": (5, 8),
+        "spare_candidates": (5, 8),
+        "operators": (5, 2),
+    }
+    assert lists["contacts"].dtype == kind
+    assert len(lists["pairs"]) == len(lists["spare_pairs"]) == 5
+    assert not lists["pairs"].active.any()
+
+
+def radii(*values: float) -> Records:
+    """Return bodies of these half diagonals, and a half-plane."""
+    bodies = zeros(len(values) + 1, BODY_RECORD)
+    bodies.radius[:-1] = values
+    return bodies
+
+
+def test_grid_holds_all_bodies_of_about_the_same_size() -> None:
+    assert cell_radius(radii(0.5)) == 0.5
+    assert cell_radius(radii(1.0, LARGE_RATIO, 2.0)) == LARGE_RATIO
+
+
+def test_few_bodies_that_are_much_larger_stay_out_of_the_grid() -> None:
+    assert cell_radius(radii(*[1.0] * 8, 50.0)) == 1.0
+    assert cell_radius(radii(*[1.0] * 7, 50.0, 60.0)) == 50.0  # more than one in eight are not few
+    assert cell_radius(radii(*[1.0] * 2000, *[50.0] * MOST_LARGE)) == 1.0
+    assert cell_radius(radii(*[1.0] * 2000, *[50.0] * (MOST_LARGE + 1))) == 50.0
+
+
+def test_what_is_large_is_listed_and_cells_are_as_wide_as_two_others_can_reach() -> None:
+    plank = {"plank": {"width": 3.2, "height": H, "length": D, "material": "aluminium"}}
+    brick = {"width": W, "height": H, "length": D, "material": "aluminium"}
+    bricks = tuple({**BODY, "x": 0.1 * i} for i in range(2, 10))
+    long = ({"block": "plank", "x": 0.0, "y": 1.0},)
+    world = build_world(scenario(more=bricks[:3] + long + bricks[3:], blocks={"brick": brick, **plank}))
+    assert world.large.tolist() == [4]
+    assert world.controls[0].cell_radius == pytest.approx(hypot(W, H) / 2)
+    assert world.controls[0].cell_width == pytest.approx(hypot(W, H) + world.controls[0].skin)
+    assert world.heads.size >= 2 * 10
+    assert world.heads.size & (world.heads.size - 1) == 0

@@ -95,7 +95,8 @@ def test_rows_follow_one_another_counter_clockwise(model: str) -> None:
 def test_surface_model_needs_no_particles() -> None:
     world = build_world(scenario([{"y": 0.5}], "surface", 1e-3))
     assert world.particles is None
-    assert world.slots.shape[1] == 8
+    assert world.candidates.shape[1] == 8
+    assert world.contacts.shape[1] == 2
 
 
 @pytest.mark.parametrize("model", WITH_PARTICLES)
@@ -103,8 +104,9 @@ def test_pair_of_the_two_largest_bodies_has_a_slot_for_every_contact(model: str)
     small, large = {"y": 0.5}, {"y": 0.5, "x": 0.2, "width": 0.064}
     world = build_world(scenario([small, large, {**large, "x": 0.4}], model, 1e-3))
     most = int(world.bodies[1].particle_count)
-    assert world.slots.shape[1] == slots_of_a_pair(world.bodies, model) == (2 if model == "kernel" else 4) * most
-    assert world.points.size == world.slots.shape[1] + 1
+    assert slots_of_a_pair(world.bodies, model) == (2 if model == "kernel" else 4) * most
+    assert world.candidates.shape[1] == world.contacts.shape[1] == slots_of_a_pair(world.bodies, model)
+    assert world.points.size == world.contacts.shape[1] + 1
 
 
 def test_slabs_of_ground_have_particles_at_their_free_ends_only() -> None:

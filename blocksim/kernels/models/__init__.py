@@ -19,7 +19,7 @@ SURFACE, PARTICLES, KERNEL = range(3)
 MODEL_CODES = {"surface": SURFACE, "particles": PARTICLES, "kernel": KERNEL}
 
 
-@kernel
+@rare_kernel
 def contact_points(world: World, p: int) -> int:
     """Find the contact points of pair p and return how many there are."""
     return points_of(world, p, world.particles)
@@ -52,13 +52,18 @@ def slots_near(world: World, a: int, b: int, reach: float, out: Integers, partic
 
 
 @rare_kernel
-def place_ended(world: World, p: int, k: int, point: Record) -> None:
-    """Set place and normal of the contact in slot k of pair p, which has just ended."""
-    if world.controls[0].model == SURFACE:
-        surface.place_ended(world, p, k, point)
+def place_ended(world: World, p: int, old: Record, point: Record) -> None:
+    """Set place, normal and share of a contact of pair p that has just ended."""
+    place_of(world, p, old, point, world.particles)
+
+
+@kernel
+def place_of(world: World, p: int, old: Record, point: Record, particles: Records | None) -> None:
+    """As place_ended; see points_of."""
+    if particles is None:
+        surface.place_ended(world, world.pairs[p], old, point)
     else:
-        slot = world.slots[p, k]
-        point.x = slot.x
-        point.y = slot.y
-        point.nx = slot.nx
-        point.ny = slot.ny
+        point.x = old.x
+        point.y = old.y
+        point.nx = old.nx
+        point.ny = old.ny

@@ -1,11 +1,17 @@
-"""Narrow phase of the `surface` model: corners of one body against the exact rectangle of another, or the ground."""
+"""Narrow phase of the `surface` model: corners of one body against the exact rectangle of another, or the ground.
+
+Two rectangles have at most two points of contact. While they overlap by less than half of any side, at most two corners
+of each lie in the other; if that is so for more than two in all, one end of a face of one body lies at the end of a
+face of the other, and of these twins one counts. (In 12 random heaps of three shapes, 20 blocks each and up to 700 000
+steps, there was never a third.) Should there be one after all, the shallowest does not count.
+"""
 
 import math
 
-from blocksim.kernels.arrays import ALL, HALF, NO_FACE, SLOTS, Integers, Record, Records, World
-from blocksim.kernels.geometry import relative_pose, slab_depth, to_world
+from blocksim.kernels.arrays import ALL, CONTACTS, HALF, NO_FACE, SLOTS, Integers, Record, Records, World
+from blocksim.kernels.geometry import corner_offset, relative_pose, slab_depth, to_world
 from blocksim.kernels.jit import kernel, rare_kernel
-from blocksim.kernels.models.twins import CONE_TOLERANCE, corner_signs, drop_twins
+from blocksim.kernels.models.twins import CONE_TOLERANCE, corner_signs, drop_point, drop_twins
 
 BESIDE_SHARE = 0.1  # of the half diagonal; a face farther than that below a corner is not beside it
 UPPER_FACE = 1  # of a piece of ground, the only one that counts
@@ -70,7 +76,7 @@ def slab_overlap(px: float, py: float, slab: Record, sx: float, sy: float, c: fl
     return slab_depth(px, py, slab) if opens(UPPER_FACE, sx, sy, c, s) else 0.0
 
 
-@kernel
+@rare_kernel
 def add_corner(
     owner: Record, touched: Record, corner: int, x0: float, y0: float, c: float, s: float, points: Records, count: int
 ) -> int:
@@ -99,7 +105,7 @@ def add_corner(
     return count + 1
 
 
-@kernel
+@rare_kernel
 def ground_points(owner: Record, near: int, candidates: Integers, level: float, points: Records) -> int:
     """Collect the candidate corners of `owner` below the ground, y < level (m). Return how many there are."""
     count = 0
@@ -130,13 +136,13 @@ def lies_near(owner: Record, touched: Record, corner: int, reach: float) -> bool
     return abs(px) <= touched.half_x + reach and abs(py) <= touched.half_y + reach
 
 
-@kernel
-def block_points(a: Record, b: Record, near: int, candidates: Integers, slots: Records, points: Records) -> int:
-    """Fill `points` with the contact points of two blocks and return how many there are (at most SLOTS)."""
+@rare_kernel
+def block_points(a: Record, b: Record, pair: Record, candidates: Integers, contacts: Records, points: Records) -> int:
+    """Fill `points` with the contact points of two blocks and return how many there are; marks twins in `pair`."""
     x0, y0, c, s = relative_pose(a, b)
     count = 0
     of_a = 0
-    for m in range(near):
+    for m in range(pair.near):
         if candidates[m] < HALF:
             count = add_corner(a, b, candidates[m], x0, y0, c, s, points, count)
             of_a = count
@@ -150,20 +156,35 @@ def block_points(a: Record, b: Record, near: int, candidates: Integers, slots: R
                 point.slot = candidates[m]
                 point.nx = -point.nx
                 point.ny = -point.ny
+    pair.twins = 0
     if of_a > 0 and count > of_a:
-        count = drop_twins(a, b, slots, points, count)
+        count = drop_twins(a, b, pair, contacts, points, count)
     return count
 
 
-@kernel
+@rare_kernel
+def keep_deepest(points: Records, count: int) -> int:
+    """Drop the points of least overlap beyond those that there is room for; return how many are left."""
+    while count > CONTACTS:
+        least = 0
+        for i in range(1, count):
+            if points[i].depth < points[least].depth:
+                least = i
+        count = drop_point(points, least, count)
+    return count
+
+
+@rare_kernel
 def find_points(world: World, p: int) -> int:
     """Find the contact points of pair p and return how many there are."""
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
     if pair.b == world.bodies.size - 1:
-        return ground_points(a, pair.near, world.candidates[p], b.y, world.points)
-    return block_points(a, b, pair.near, world.candidates[p], world.slots[p], world.points)
+        count = ground_points(a, pair.near, world.candidates[p], b.y, world.points)
+    else:
+        count = block_points(a, b, pair, world.candidates[p], world.contacts[p], world.points)
+    return keep_deepest(world.points, count)
 
 
 @rare_kernel
@@ -197,23 +218,21 @@ def near_slots(world: World, a: int, b: int, reach: float, out: Integers) -> int
 
 
 @rare_kernel
-def slot_normal(k: int, face: int, a: Record, b: Record, ground: bool) -> tuple[float, float]:
-    """Return the normal, from b to a, of a contact in slot k with a face of the other body."""
-    if ground:
+def slot_normal(world: World, pair: Record, slot: int, face: int) -> tuple[float, float]:
+    """Return the normal, from b to a, of the contact of a corner with a face of the other body."""
+    if pair.b == world.bodies.size - 1:
         return 0.0, 1.0
-    if k < HALF:
-        return face_normal(face, b)
-    nx, ny = face_normal(face, a)
+    if slot < HALF:
+        return face_normal(face, world.bodies[pair.b])
+    nx, ny = face_normal(face, world.bodies[pair.a])
     return -nx, -ny
 
 
 @rare_kernel
-def place_ended(world: World, p: int, k: int, point: Record) -> None:
+def place_ended(world: World, pair: Record, old: Record, point: Record) -> None:
     """Set place and normal of a contact that ends, as they are now."""
-    pair = world.pairs[p]
-    a = world.bodies[pair.a]
-    b = world.bodies[pair.b]
-    owner = a if k < HALF else b
-    sx, sy = corner_signs(k % HALF)
-    point.x, point.y = to_world(owner, sx * owner.half_x, sy * owner.half_y)
-    point.nx, point.ny = slot_normal(k, world.slots[p, k].face, a, b, pair.b == world.bodies.size - 1)
+    owner = world.bodies[pair.a] if old.slot < HALF else world.bodies[pair.b]
+    ox, oy = corner_offset(owner, old.slot % HALF)
+    point.x = owner.x + ox
+    point.y = owner.y + oy
+    point.nx, point.ny = slot_normal(world, pair, old.slot, old.face)

@@ -1,6 +1,6 @@
 """Corners of the `surface` model, and which of two corners that meet counts."""
 
-from blocksim.kernels.arrays import HALF, NO_FACE, Record, Records
+from blocksim.kernels.arrays import HALF, Record, Records
 from blocksim.kernels.geometry import to_world
 from blocksim.kernels.jit import kernel, rare_kernel
 
@@ -56,7 +56,16 @@ def coincide(one: Record, two: Record) -> bool:
 
 
 @rare_kernel
-def keeps_first(one: Record, two: Record, slots: Records, oblique: bool) -> bool:
+def was_touching(slot: int, contacts: Records, count: int) -> bool:
+    """Tell whether a corner is among the first `count` contacts."""
+    for j in range(count):
+        if contacts[j].slot == slot:
+            return True
+    return False
+
+
+@rare_kernel
+def keeps_first(one: Record, two: Record, pair: Record, contacts: Records, oblique: bool) -> bool:
     """Choose between two coinciding corners.
 
     Oblique: the shallower one, which is the nearest edge of the Minkowski difference, so that the overlap changes
@@ -65,8 +74,8 @@ def keeps_first(one: Record, two: Record, slots: Records, oblique: bool) -> bool
     """
     if oblique:
         return one.depth <= two.depth
-    was_one = slots[one.slot].face != NO_FACE
-    was_two = slots[two.slot].face != NO_FACE
+    was_one = was_touching(one.slot, contacts, pair.active)
+    was_two = was_touching(two.slot, contacts, pair.active)
     return was_one if was_one != was_two else one.depth >= two.depth
 
 
@@ -79,11 +88,11 @@ def drop_point(points: Records, gone: int, count: int) -> int:
 
 
 @rare_kernel
-def drop_twins(a: Record, b: Record, slots: Records, points: Records, count: int) -> int:
+def drop_twins(a: Record, b: Record, pair: Record, contacts: Records, points: Records, count: int) -> int:
     """Keep one of two coinciding corners: they are one contact, and a face contact has the stiffness of two points.
 
-    Where two blocks are exactly aligned, or meet corner on corner, a corner of each lies in the other. `slots` are the
-    slots of this pair.
+    Where two blocks are exactly aligned, or meet corner on corner, a corner of each lies in the other. `contacts` are
+    those of this pair so far; the corners that do not count are marked in its `twins`.
     """
     oblique = is_oblique(a, b)
     i = 0
@@ -92,8 +101,10 @@ def drop_twins(a: Record, b: Record, slots: Records, points: Records, count: int
             if points[j].slot >= HALF and (
                 coincide(points[i], points[j]) if oblique else same_end(points[i], points[j], a, b)
             ):
-                keep_i = keeps_first(points[i], points[j], slots, oblique)
-                count = drop_point(points, j if keep_i else i, count)
+                keep_i = keeps_first(points[i], points[j], pair, contacts, oblique)
+                gone = j if keep_i else i
+                pair.twins |= 1 << points[gone].slot
+                count = drop_point(points, gone, count)
                 i -= 0 if keep_i else 1
                 break
         i += 1

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from blocksim.kernels.arrays import Floats, Integers
-from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
 
 NOTHING: Integers = np.empty(0, np.int64)
 
@@ -47,7 +47,7 @@ def clipped_cell(distance: float, size: float, count: int) -> int:
     return int(min(max(distance / size, 0.0), count - 1.0))
 
 
-@rare_kernel
+@entry_kernel
 def sort_into_cells(positions: Floats, cells: CellList) -> None:
     """Fill `order` and `starts` (zero before) by counting; the order within a cell is that of the particles.
 
@@ -97,7 +97,7 @@ def add_neighbours(
     return count
 
 
-@rare_kernel
+@entry_kernel
 def list_neighbours(
     positions: Floats, cells: CellList, points: Floats, radius: float, offsets: Integers, indices: Integers
 ) -> None:

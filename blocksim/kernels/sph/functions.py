@@ -6,14 +6,14 @@ factor, positive and falling within their support, zero beyond it, and normalise
 The smoothing length h is the scale of q, not the support radius: that is 2 h or 3 h.
 """
 
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.jit import entry_kernel
 from blocksim.kernels.sph import cubic_spline, quintic_spline, wendland_c2
 
 WENDLAND_C2, CUBIC_SPLINE, QUINTIC_SPLINE = range(3)
 KERNEL_CODES = {"wendland-c2": WENDLAND_C2, "cubic-spline": CUBIC_SPLINE, "quintic-spline": QUINTIC_SPLINE}
 
 
-@kernel
+@entry_kernel
 def kernel_value(code: int, r: float, h: float) -> float:
     """Return W (1/m^2) at a distance r >= 0 (m) for the smoothing length h (m)."""
     if code == CUBIC_SPLINE:
@@ -23,7 +23,7 @@ def kernel_value(code: int, r: float, h: float) -> float:
     return wendland_c2.value(r, h)
 
 
-@kernel
+@entry_kernel
 def kernel_slope(code: int, r: float, h: float) -> float:
     """Return dW/dr (1/m^3) at a distance r >= 0 (m); never positive."""
     if code == CUBIC_SPLINE:
@@ -33,7 +33,7 @@ def kernel_slope(code: int, r: float, h: float) -> float:
     return wendland_c2.slope(r, h)
 
 
-@kernel
+@entry_kernel
 def support_radius(code: int, h: float) -> float:
     """Return the distance (m) from which on W is zero."""
     if code == CUBIC_SPLINE:

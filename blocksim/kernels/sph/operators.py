@@ -23,7 +23,7 @@ import math
 from typing import NamedTuple
 
 from blocksim.kernels.arrays import Floats, Integers
-from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
 from blocksim.kernels.sph.functions import kernel_slope, kernel_value
 
 PLAIN = 0
@@ -137,7 +137,7 @@ def interpolate_at(form: int, sources: Sources, values: Floats, x: float, y: flo
     return mean - slope_x * mean_x - slope_y * mean_y
 
 
-@rare_kernel
+@entry_kernel
 def interpolate_points(
     form: int, sources: Sources, values: Floats, points: Floats, offsets: Integers, indices: Integers, out: Floats
 ) -> None:
@@ -187,7 +187,7 @@ def gradient_at(form: int, sources: Sources, values: Floats, a: int, near: Integ
     return inverse_xx * sum_x + inverse_xy * sum_y, inverse_xy * sum_x + inverse_yy * sum_y
 
 
-@rare_kernel
+@entry_kernel
 def differentiate_particles(
     form: int, sources: Sources, values: Floats, offsets: Integers, indices: Integers, out: Floats
 ) -> None:

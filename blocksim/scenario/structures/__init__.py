@@ -4,11 +4,15 @@ from typing import Annotated, get_args
 
 from pydantic import Field
 
-from blocksim.scenario.structures.base import Pose, Structure, UnfitError
+from blocksim.scenario.structures.base import MAX_BLOCKS, Pose, Structure, UnfitError
+from blocksim.scenario.structures.dominoes import Dominoes
+from blocksim.scenario.structures.grid import Grid
+from blocksim.scenario.structures.pyramid import Pyramid
 from blocksim.scenario.structures.stack import Stack
 from blocksim.scenario.structures.staircase import Staircase
+from blocksim.scenario.structures.wall import BlockWall
 
-_Union = Staircase | Stack
+_Union = Staircase | Stack | BlockWall | Pyramid | Dominoes | Grid
 AnyStructure = Annotated[_Union, Field(discriminator="kind")]
 """Any structure of a scenario, told apart by its `kind`."""
 
@@ -17,4 +21,17 @@ KINDS: dict[str, type[Structure]] = {
 }
 """Kind as written in a scenario, and its class."""
 
-__all__ = ["KINDS", "AnyStructure", "Pose", "Stack", "Staircase", "Structure", "UnfitError"]
+__all__ = [
+    "KINDS",
+    "MAX_BLOCKS",
+    "AnyStructure",
+    "BlockWall",
+    "Dominoes",
+    "Grid",
+    "Pose",
+    "Pyramid",
+    "Stack",
+    "Staircase",
+    "Structure",
+    "UnfitError",
+]

@@ -2,16 +2,23 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple, Self
 
-from pydantic import BeforeValidator, Field
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, model_validator
 
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import Table
 from blocksim.scenario.models.geometry import Block
 
 MAX_COUNT = 100_000
+"""Of courses, or of blocks in a row."""
+MAX_BLOCKS = 1_000_000
+"""In a structure, and in a scenario."""
+MAX_SEED = 2**32 - 1
+
+Floats = NDArray[np.float64]
 
 
 def _count(value: object) -> object:
@@ -21,16 +28,26 @@ def _count(value: object) -> object:
     return value
 
 
+def _seed(value: object) -> object:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MAX_SEED:
+        message = f"{q.shown(value)} is not a whole number from 0 to {MAX_SEED}"
+        raise q.invalid(message)
+    return value
+
+
 Count = Annotated[int, BeforeValidator(_count), Field(json_schema_extra={"minimum": 1, "maximum": MAX_COUNT})]
+Seed = Annotated[int, BeforeValidator(_seed), Field(json_schema_extra={"minimum": 0, "maximum": MAX_SEED})]
 
 
-@dataclass(frozen=True, slots=True)
-class Pose:
-    """Centre (m) and angle (rad, counter-clockwise) of one placed block."""
+class Pose(NamedTuple):
+    """Centre (m), angle (rad, counter-clockwise), velocity (m/s) and spin (rad/s) of one placed block."""
 
     x: float
     y: float
     angle: float = 0.0
+    vx: float = 0.0
+    vy: float = 0.0
+    spin: float = 0.0
 
 
 class UnfitError(ValueError):
@@ -46,6 +63,13 @@ class Structure(Table, ABC):
     """A generator of bodies; every kind adds its `kind` literal and its own keys."""
 
     block: str = Field(description="the name of the block it is made of")
+    left: q.Length = Field(default=0.0, description="left edge of its first block, the lowest and leftmost")
+    bottom: q.Length = Field(default=0.0, description="height of that block's lower edge")
+    velocity: tuple[q.Speed, q.Speed] = Field(default=(0.0, 0.0), description="velocity of all blocks along x and y")
+    shear_velocity: q.Speed = Field(
+        default=0.0,
+        description="more velocity along x, in proportion to the height of the centre; this at full height",
+    )
 
     @property
     @abstractmethod
@@ -53,5 +77,53 @@ class Structure(Table, ABC):
         """Number of bodies, told without placing them."""
 
     @abstractmethod
+    def height(self, block: Block) -> float:
+        """Height (m) from the bottom to the upper edge of the highest block."""
+
+    @abstractmethod
     def place(self, block: Block) -> Sequence[Pose]:
-        """Return the pose of every block, lowest first; raises UnfitError where keys do not suit it."""
+        """Return the pose of every block, lowest first, before all are set in motion; raises UnfitError."""
+
+    @np.errstate(over="ignore", invalid="ignore")  # places that are no numbers are found later
+    def start(self, block: Block) -> Sequence[Pose]:
+        """Return the poses with the initial velocities: v_x = velocity_x + shear_velocity (y - bottom) / height.
+
+        Raises UnfitError where keys do not suit the block.
+        """
+        poses = self.place(block)
+        vx, vy = self.velocity
+        if (vx, vy, self.shear_velocity) == (0.0, 0.0, 0.0):
+            return poses
+        height, shear = self.height(block), self.shear_velocity
+        return [
+            pose._replace(vx=pose.vx + vx + shear * ((pose.y - self.bottom) / height), vy=pose.vy + vy)
+            for pose in poses
+        ]
+
+
+class Courses(Structure):
+    """A structure of several courses, one above the other."""
+
+    rows: Count = Field(description="number of courses, one above the other")
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> Self:
+        if self.size > MAX_BLOCKS:
+            message = f"{self.size} blocks are too many; a structure has at most {MAX_BLOCKS}"
+            raise q.invalid(message, "rows")
+        return self
+
+
+def poses_at(x: Floats, y: Floats, angle: Floats | None = None) -> list[Pose]:
+    """Return resting poses at centres (m), turned by angles (rad) where some are given."""
+    if angle is None:
+        return [Pose(*centre) for centre in zip(x.ravel().tolist(), y.ravel().tolist(), strict=True)]
+    return [Pose(*pose) for pose in zip(x.ravel().tolist(), y.ravel().tolist(), angle.ravel().tolist(), strict=True)]
+
+
+def draws(seed: int, *shape: int) -> Floats:
+    """Return uniform random numbers in [0, 1), the same for a seed on every machine and with every version of numpy.
+
+    Only the bit stream of PCG64 and its conversion to doubles are promised to stay; distributions are not.
+    """
+    return np.random.Generator(np.random.PCG64(seed)).random(shape)

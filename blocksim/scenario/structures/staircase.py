@@ -16,13 +16,15 @@ class Staircase(Structure):
     kind: Literal["staircase"] = Field(description="kind of structure")
     count: Count = Field(description="number of blocks")
     overlap: q.PositiveLength = Field(description="length over which a block lies on the one below")
-    left: q.Length = Field(default=0.0, description="left edge of the lowest block")
-    bottom: q.Length = Field(default=0.0, description="height of the lowest block's lower edge")
 
     @property
     def size(self) -> int:
         """Number of blocks."""
         return self.count
+
+    def height(self, block: Block) -> float:
+        """All blocks on top of each other."""
+        return self.count * block.size_y
 
     def place(self, block: Block) -> Sequence[Pose]:
         """Return the poses from the ground up."""

@@ -78,5 +78,4 @@ def test_static_overlap_carries_the_weight(start: Start, paper_block: PaperBlock
     rest = start([{"y": paper_block.height / 2}], restitution=0.0, contact=SOFT).to_time(0.05)
     stiffness = float(rest.world.interactions[1, 0].normal_stiffness)
     expected = (paper_block.mass * 9.81 / (2.0 * stiffness)) ** (2.0 / 3.0)
-    touching = rest.slots[0, :2]
-    assert touching.depth == pytest.approx(np.full(2, expected), rel=0.01)
+    assert rest.touching.depth == pytest.approx(np.full(2, expected), rel=0.01)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from math import cos, sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import NO_FACE
+from blocksim.kernels.arrays import LEDGER, zeros
 from blocksim.kernels.broad_phase import rebuild_pairs
 from blocksim.kernels.contact import pair_forces
 from blocksim.kernels.geometry import to_world
-from blocksim.kernels.models import contact_points
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.build import build_world
 
@@ -101,7 +100,8 @@ def test_no_two_contacts_share_a_slot(
     found = touch("particles", width=width, below=below, shift=shift * reach, depth=depth, angle=angle)
     slots = found.points.slot.tolist()
     assert len(set(slots)) == len(slots)
-    assert max(slots, default=0) < found.world.slots.shape[1]
+    assert max(slots, default=0) < found.world.candidates.shape[1]
+    assert found.world.contacts.shape == found.world.candidates.shape  # all of them at the same time
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.3])
@@ -111,8 +111,7 @@ def test_straight_pieces_of_ground_have_no_bumps(tilt: float) -> None:
     lying = {"y": HEIGHT / 2, "velocity": [0.3 * cos(tilt), 0.0]}
     profile = {"profile": [[-1.0, 0.0], [1.0, 0.0]]}
     scene = Simulation(build_world(scenario_of([lying], contact=contact, ground=profile)))
-    slots: Any = scene.to_time(2e-3).slots
-    touching = slots[slots.face != NO_FACE]
+    touching = scene.to_time(2e-3).touching
     assert len(touching) == COUNT
     assert np.abs(touching.nx).max() < 1e-12
 
@@ -127,12 +126,12 @@ def test_contact_keeps_its_history_while_its_disc_begins_and_ends_to_touch_other
     block.vx = drag / STEP
     assert rebuild_pairs(world)
     before: dict[tuple[int, int], float] = {}
-    met = parted = 0
+    met, parted, book = 0, 0, zeros(1, LEDGER)[0]
     for n in range(1200 // pace):
         block.x = n * drag
-        pair_forces(world, 0, contact_points(world, 0), STEP)
-        slots = world.slots[0]
-        now = {(k, int(slot.face)): float(slot.spring) for k, slot in enumerate(slots) if slot.face != NO_FACE}
+        pair_forces(world, 0, STEP, book)
+        contacts = world.contacts[0, : world.pairs[0].active]
+        now = {(int(contact.slot), int(contact.face)): float(contact.spring) for contact in contacts}
         for key, spring in now.items():
             assert abs(spring - before.get(key, 0.0)) <= 1.001 * drag, key
         met += n > 0 and len(now.keys() - before.keys()) > 0 and len(now.keys() & before.keys()) == COUNT

@@ -10,20 +10,23 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import NO_FACE, POINT, SLOT, SLOTS, zeros
+from blocksim.kernels.arrays import CONTACT, CONTACTS, LEDGER, PAIR, POINT, SLOTS, zeros
+from blocksim.kernels.contact import pair_forces
 from blocksim.kernels.geometry import ground_gap, separation, to_world
 from blocksim.kernels.models.surface import (
     block_points,
     face_below_corner,
     face_normal,
+    find_points,
     ground_points,
+    keep_deepest,
     lies_near,
 )
 from blocksim.kernels.models.twins import CONE_TOLERANCE, corner_signs
 
 if TYPE_CHECKING:
-    from blocksim.kernels.arrays import Record, Records
-    from tests.kernels.conftest import MakeBody
+    from blocksim.kernels.arrays import Record
+    from tests.kernels.conftest import MakeBody, Pose
 
 ALL = np.arange(SLOTS)
 W, H = 0.032, 0.025
@@ -39,16 +42,18 @@ def in_frame(body: Record, point: np.ndarray) -> np.ndarray:
     return np.array([body.cos * dx + body.sin * dy, body.cos * dy - body.sin * dx])
 
 
-def no_history() -> Records:
-    slots = zeros(SLOTS, SLOT)
-    slots.face = NO_FACE
-    return slots
+def points_and_twins(a: Record, b: Record, touching: tuple[int, ...] = ()) -> tuple[list[Any], list[int]]:
+    """Return the points between two blocks of which some corners are in contact already, and the slots of twins."""
+    points, contacts, pair = zeros(SLOTS, POINT), zeros(CONTACTS, CONTACT), zeros(1, PAIR)[0]
+    contacts.slot[: len(touching)] = touching
+    pair.near, pair.active = SLOTS, len(touching)
+    pair.twins = 0xFF  # of the step before
+    count = block_points(a, b, pair, ALL, contacts, points)
+    return list(points[:count]), [k for k in range(16) if (pair.twins >> k) & 1]
 
 
-def points_between(a: Record, b: Record, slots: Records | None = None) -> list[Any]:
-    points = zeros(SLOTS, POINT)
-    count = block_points(a, b, SLOTS, ALL, no_history() if slots is None else slots, points)
-    return list(points[:count])
+def points_between(a: Record, b: Record) -> list[Any]:
+    return points_and_twins(a, b)[0]
 
 
 def test_corners_count_counter_clockwise_from_the_lower_left() -> None:
@@ -127,10 +132,16 @@ def test_upper_corner_never_touches_the_top_of_another_block(make_body: MakeBody
 
 def test_aligned_blocks_keep_the_corner_that_was_in_contact(make_body: MakeBody) -> None:
     a, b = make_body(0.0, H - 1e-6), make_body()
-    assert [point.slot for point in points_between(a, b)] == [0, 1]
-    slots = no_history()
-    slots[4 + 2].face = slots[4 + 3].face = 3  # the upper corners of b were in the lower face of a
-    assert sorted(point.slot for point in points_between(a, b, slots)) == [6, 7]
+    for touching, twins in (((), [6, 7]), ((0, 1), [6, 7]), ((6, 7), [0, 1]), ((1, 7), [0, 6])):
+        points, found = points_and_twins(a, b, touching)
+        assert sorted(point.slot for point in points) == list(touching or (0, 1))
+        assert found == twins
+
+
+def test_corners_that_meet_no_other_have_no_twins(make_body: MakeBody) -> None:
+    points, twins = points_and_twins(make_body(0.003, H - 1e-6), make_body())
+    assert [point.slot for point in points] == [0, 6]
+    assert twins == []
 
 
 def test_aligned_blocks_keep_the_deeper_corner_without_history(make_body: MakeBody) -> None:
@@ -151,6 +162,48 @@ def test_corners_below_the_ground_touch_it(make_body: MakeBody, y: float, angle:
         assert point.depth == pytest.approx(-heights[point.slot])
         assert (point.nx, point.ny) == (0.0, 1.0)
     assert (count > 0) == (ground_gap(body) < 0.0) or abs(ground_gap(body)) < 1e-15
+
+
+@given(depths=st.lists(st.floats(0.0, 1e-3), max_size=SLOTS, unique=True))
+def test_points_of_least_overlap_go_where_there_is_no_room_for_them(depths: list[float]) -> None:
+    points: Any = zeros(SLOTS + 1, POINT)
+    points.depth[: len(depths)], points.slot = depths, range(SLOTS + 1)
+    count = keep_deepest(points, len(depths))
+    deepest = sorted(range(len(depths)), key=lambda k: depths[k])[-CONTACTS:]
+    assert points.slot[:count].tolist() == sorted(deepest)  # still in the order of their slots
+    assert points.depth[:count].tolist() == [depths[k] for k in sorted(deepest)]
+
+
+@pytest.mark.parametrize(
+    ("angle", "slots"), [(0.0, [0, 1]), (0.3, [0, 1]), (-1.2, [1, 2]), (3.0, [2, 3]), (2.0, [0, 3])]
+)
+def test_block_deep_under_ground_has_its_two_deepest_points_and_no_room_is_overrun(
+    pose: Pose, angle: float, slots: list[int]
+) -> None:
+    world = pose((0.0, -0.05, angle), (0.1, 0.0124, 0.0))
+    assert [(pair.a, pair.b, pair.near) for pair in world.pairs[:2]] == [(0, 2, 4), (1, 2, 2)]
+    world.contacts[1] = beside = np.full(CONTACTS, 7.0).astype(world.contacts.dtype).view(np.recarray)
+    assert find_points(world, 0) == CONTACTS
+    assert world.points.slot[:CONTACTS].tolist() == slots
+    pair_forces(world, 0, 1e-6, zeros(1, LEDGER)[0])
+    assert world.pairs[0].active == CONTACTS
+    assert world.contacts[0].slot.tolist() == slots
+    heights = [corner_of(world.bodies[0], k)[1] for k in slots]
+    assert world.contacts[0].depth == pytest.approx(-np.array(heights))
+    assert world.contacts[1].tobytes() == beside.tobytes()
+    assert not world.contacts["normal_force"][2:].any()
+
+
+@given(x=st.floats(-0.02, 0.02), y=st.floats(-0.02, 0.02), one=st.floats(-4.0, 4.0), two=st.floats(-4.0, 4.0))
+def test_two_blocks_in_one_place_have_two_points_at_most(
+    pose: Pose, x: float, y: float, one: float, two: float
+) -> None:
+    world = pose((x, 1.0 + y, one), (0.0, 1.0, two))
+    count = find_points(world, 0)
+    assert count <= CONTACTS
+    pair_forces(world, 0, 1e-6, zeros(1, LEDGER)[0])
+    assert world.pairs[0].active == count
+    assert not world.contacts["normal_force"][1:].any()
 
 
 @given(x=st.floats(-0.06, 0.06), y=st.floats(-0.06, 0.06), one=st.floats(-4.0, 4.0), two=st.floats(-4.0, 4.0))

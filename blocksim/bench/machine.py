@@ -1,0 +1,58 @@
+"""The machine that numbers come from, and whether it had anything else to do."""
+
+import os
+from dataclasses import asdict, dataclass
+
+from blocksim.simulation.provenance import environment
+
+BUSY = 0.5  # processes at work on average over the last minute, before anything was measured
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Processor, system, versions, and load at the start."""
+
+    processor: str
+    cores: int
+    platform: str
+    python: str
+    numba: str
+    numpy: str
+    blocksim: str
+    code: str
+    load: float | None  # None where the system does not tell
+
+    @property
+    def is_busy(self) -> bool:
+        """Tell whether other processes share the machine, so that times are too long and scatter."""
+        return self.load is not None and self.load > BUSY
+
+    def lines(self) -> list[str]:
+        """Return it for people."""
+        load = "unknown" if self.load is None else f"{self.load:.2f}"
+        found = [
+            f"{self.processor}, {self.cores} cores, load {load} at the start",
+            f"blocksim {self.blocksim}, Python {self.python}, numba {self.numba}, numpy {self.numpy}",
+            self.platform,
+        ]
+        if self.is_busy:
+            found.append("The machine is busy with something else: times are upper bounds and scatter.")
+        return found
+
+    def to_dict(self) -> dict[str, object]:
+        """Return it for programs."""
+        return {**asdict(self), "busy": self.is_busy}
+
+
+def this_machine() -> Machine:
+    """Return the machine we are on; the load is that of this moment."""
+    found = environment()
+    names = ("processor", "platform", "python", "numba", "numpy", "blocksim", "code")
+    return Machine(cores=os.cpu_count() or 1, load=_load(), **{name: found[name] for name in names})
+
+
+def _load() -> float | None:
+    try:
+        return round(os.getloadavg()[0], 2)
+    except (AttributeError, OSError):  # some systems have none
+        return None

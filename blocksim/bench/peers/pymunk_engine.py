@@ -1,0 +1,87 @@
+"""pymunk (Chipmunk2D): rigid contacts, impulses by Gauss-Seidel iterations, double precision."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from blocksim.bench.peers.packages import loaded
+from blocksim.bench.peers.scene import Final, Scene
+from blocksim.bench.scenes import FRICTION
+
+# Overlap that is left alone so that contacts last. The default of 0.1 is a tenth of a pixel; here it would be 0.1 m.
+SLOP = 1e-6  # m
+GROUND = ((-50.0, -1.0), (100.0, -1.0), (100.0, 0.0), (-50.0, 0.0))  # m
+MASS = 1.0  # kg; among equal blocks it has no influence
+
+
+@dataclass(frozen=True)
+class Pymunk:
+    """One step length and number of iterations."""
+
+    step: float  # s
+    iterations: int
+
+    @property
+    def setting(self) -> str:
+        """For people."""
+        return f"step {1e3 * self.step:g} ms"
+
+    def solve(self, scene: Scene) -> Final:
+        """Compute the scene. Not counted: making it."""
+        space, bodies = self._made(scene)
+        count = round(scene.end / self.step)
+        began = time.process_time()
+        for _ in range(count):
+            space.step(self.step)
+        seconds = time.process_time() - began
+        x, y = np.array([body.position for body in bodies]).T
+        return Final(x, y, seconds)
+
+    def _made(self, scene: Scene) -> tuple[Any, list[Any]]:
+        """Sleeping is off by default, and so is any damping of free motion.
+
+        `collision_bias` stays as it is: a tenth of the overlap beyond the slop goes in a sixtieth of a second, by
+        velocities that are forgotten after the step, so that it brings no energy in.
+        """
+        pymunk = loaded("pymunk")
+        space = empty_space()
+        space.iterations = self.iterations
+        # Both coefficients of a pair are products: blocks a and ground b with a*a and a*b as wanted.
+        friction = math.sqrt(FRICTION["block_block"])
+        bounce = math.sqrt(scene.restitution)
+        ground = pymunk.Poly(space.static_body, GROUND)
+        ground.friction = FRICTION["block_ground"] / friction
+        ground.elasticity = bounce
+        space.add(ground)
+        bodies = []
+        for block in scene.placed():
+            body = pymunk.Body(MASS, MASS * (block.size_x**2 + block.size_y**2) / 12.0)
+            body.position = (block.x, block.y)
+            body.velocity = (block.vx, block.vy)
+            shape = pymunk.Poly.create_box(body, (block.size_x, block.size_y))  # its corners are sharp: radius 0
+            shape.friction, shape.elasticity = friction, bounce
+            space.add(body, shape)
+            bodies.append(body)
+        return space, bodies
+
+
+def empty_space() -> Any:
+    """Return a space without anything in it."""
+    space = loaded("pymunk").Space()
+    space.gravity = (0.0, -9.81)
+    space.collision_slop = SLOP
+    return space
+
+
+def call_time(count: int = 20_000) -> float:
+    """Return the seconds that a call from Python costs where there is nothing to compute."""
+    space = empty_space()
+    began = time.process_time()
+    for _ in range(count):
+        space.step(1e-3)
+    return (time.process_time() - began) / count

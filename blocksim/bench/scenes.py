@@ -1,0 +1,49 @@
+"""The scenes that are measured, made here so that they need no file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from blocksim.scenario import Scenario, scenario_from_mapping
+
+Table = Mapping[str, object]
+
+MATERIAL = {"unit_weight": 26.7e3, "young_modulus": 69e9, "poisson_ratio": 0.3}  # N/m3, Pa, -
+SIDES = {"width": 0.032, "height": 0.025, "length": 0.05}  # m, the paper's block
+FRICTION = {"block_block": 0.31, "block_ground": 0.38}
+OVERLAP = 0.01  # m
+RESTITUTION = 0.2
+WALL_RESTITUTION = 0.1
+PUSH = 1.0  # m/s, of the upper edge of a wall
+
+
+def three_blocks(contact: Table | None = None, time: Table | None = None, friction: Table = FRICTION) -> Scenario:
+    """Return the three blocks of scenarios/three_blocks_nominal.toml; more keys of [contact] and [time]."""
+    stairs = {"kind": "staircase", "block": "brick", "count": 3, "overlap": OVERLAP}
+    more = {"contact": {"restitution": RESTITUTION, **(contact or {})}, "time": {"end": 2.0, **(time or {})}}
+    return _scenario("three_blocks", "length", stairs, {**more, "friction": friction})
+
+
+def pushed_wall(columns: int, rows: int, contact: Table | None = None, time: Table | None = None) -> Scenario:
+    """Return a wall in running bond, of the same blocks lying on their sides of 50 x 25 mm, 32 mm high.
+
+    At the start a block at height y moves along x with 1 m/s y / H, H the height of the wall.
+    """
+    wall = {"kind": "wall", "block": "brick", "columns": columns, "rows": rows, "shear_velocity": PUSH}
+    more = {"contact": {"restitution": WALL_RESTITUTION, **(contact or {})}}
+    more["time"] = {"end": 1.0, "stop_at_rest": False, **(time or {})}
+    return _scenario("pushed_wall", "width", wall, {**more, "friction": FRICTION})
+
+
+def _scenario(name: str, upright: str, structure: Table, more: Table) -> Scenario:
+    data: dict[str, Any] = {
+        "schema": 1,
+        "name": name,
+        "materials": {"aluminium": MATERIAL},
+        "blocks": {"brick": {**SIDES, "upright": upright, "material": "aluminium"}},
+        "structures": [structure],
+        "ground": {"material": "aluminium"},
+        **more,
+    }
+    return scenario_from_mapping(data)

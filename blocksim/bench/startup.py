@@ -1,0 +1,61 @@
+"""Starting the command: what a user waits for, in wall time."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from blocksim.bench.measurement import Findings, Number, Setting, repeated
+from blocksim.bench.scenes import three_blocks
+from blocksim.errors import BlocksimError
+from blocksim.scenario import scenario_to_toml
+
+QUICK = "no compilation into an empty cache"
+MAIN = "from blocksim.cli.app import main; main()"
+COMPILE = "from blocksim.simulation.compilation import compile_kernels; compile_kernels()"
+CACHE = "BLOCKSIM_CACHE_DIR"
+
+
+class StartError(BlocksimError):
+    """A process that was to be timed failed."""
+
+
+def measure(setting: Setting) -> Findings:
+    """Measure a bare start, a run with the solver compiled, and compiling it."""
+    with tempfile.TemporaryDirectory(prefix="blocksim-bench-") as name:
+        folder = Path(name)
+        numbers = [
+            repeated("blocksim --version", "s", lambda: _seconds(MAIN, "--version"), setting.repeats),
+            _run(folder, setting.repeats),
+        ]
+        if not setting.quick:
+            empty = {CACHE: str(folder / "cache")}
+            numbers.append(repeated("first compilation", "s", lambda: _seconds(COMPILE, **empty), 1))
+    return Findings(tuple(numbers), notes=("wall time of a new process; the first compilation happens once",))
+
+
+def _run(folder: Path, repeats: int) -> Number:
+    """Time `blocksim run` of the three blocks at full stiffness; a run before the first one warms all caches."""
+    scenario = folder / "three_blocks.toml"
+    scenario.write_text(scenario_to_toml(three_blocks()), encoding="utf-8")
+    arguments = ("run", str(scenario), "--out", str(folder / "run"), "--overwrite", "--quiet")
+    _seconds(MAIN, *arguments)
+    return repeated("blocksim run, three blocks", "s", lambda: _seconds(MAIN, *arguments), repeats)
+
+
+def _seconds(code: str, *arguments: str, **environment: str) -> float:
+    """Run Python code in a process of its own and return the seconds it took; raises StartError where it fails."""
+    began = time.perf_counter()
+    command = [sys.executable, "-c", code, *arguments]
+    done = subprocess.run(  # noqa: S603 - our own command
+        command, env=os.environ | environment, capture_output=True, text=True, check=False
+    )
+    seconds = time.perf_counter() - began
+    if done.returncode != 0:
+        told = done.stderr.strip().splitlines() or ["nothing was told"]
+        raise StartError(f"blocksim {' '.join(arguments)}: exit code {done.returncode}: {told[-1]}")
+    return seconds

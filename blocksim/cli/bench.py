@@ -1,0 +1,136 @@
+"""blocksim bench: speed and memory, measured now; other engines beside it on request."""
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from blocksim.bench.bench import Outcome, report, run_measurement
+from blocksim.bench.machine import Machine, this_machine
+from blocksim.bench.measurement import REPEATS, Measurement, Number, Setting
+from blocksim.bench.measurements import chosen
+from blocksim.bench.peers.packages import require_all
+from blocksim.cli import options
+from blocksim.cli.output import answer, note, print_json, table_lines
+from blocksim.cli.progress import tell_compilation
+from blocksim.errors import OutputError
+from blocksim.simulation.atomic import write_text
+from blocksim.verification.verify import number
+from blocksim.view.work_precision import draw_work_precision
+
+COLUMNS = ("quantity", "unit", "median", "smallest", "largest")
+PICTURE = Path("work_precision.png")
+DIGITS = 3
+LARGE = 100.0
+
+
+def bench_command(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="three-blocks, walls, start-up; with --peers three-blocks, wall."),
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Make everything small; said at the end how.")] = False,
+    repeats: Annotated[int, typer.Option(min=1, metavar="N", help="Samples of each number.")] = REPEATS,
+    peers: Annotated[bool, typer.Option("--peers", help="Compare with pymunk and Box2D, with a picture.")] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Write everything as JSON; the picture goes beside it.")
+    ] = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Measure speed and memory, and show the table.
+
+    Times of the solver are CPU seconds of its steps, medians over repeats with the smallest and largest sample. All
+    takes some minutes on one core; nothing else should run. --peers needs the extra blocksim[bench].
+
+    Example: blocksim bench walls --out bench.json
+    """
+    silent = quiet or as_json
+    wanted = chosen(names or [], peers=peers)
+    if peers:
+        require_all()
+    _refuse_folder(out)
+    machine = this_machine()
+    tell_compilation("surface", quiet=silent)
+    outcomes: list[Outcome] = []
+    try:
+        outcomes.extend(_run(wanted, Setting(quick, repeats), quiet=silent))
+    finally:  # also when stopped: minutes of measuring are not to be lost, and the list has what came before
+        if outcomes:
+            _show(machine, outcomes, out, as_json=as_json, quiet=silent)
+
+
+def _refuse_folder(out: Path | None) -> None:
+    """Notice before minutes of measuring that the report cannot be written."""
+    if out is not None and (out.is_dir() or not out.absolute().parent.is_dir()):
+        message = f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'there is no such folder'}"
+        raise OutputError(message)
+
+
+def _run(measurements: Sequence[Measurement], setting: Setting, *, quiet: bool) -> Iterator[Outcome]:
+    """Run measurements one after the other and say which one is under way."""
+    for position, measurement in enumerate(measurements, start=1):
+        if not quiet:
+            note(f"{position}/{len(measurements)} {measurement.name}: {measurement.title} ...")
+        yield run_measurement(measurement, setting)
+
+
+def _show(machine: Machine, outcomes: list[Outcome], out: Path | None, *, as_json: bool, quiet: bool) -> None:
+    data = report(machine, outcomes)
+    if out is not None:
+        write_text(out, json.dumps(data, indent=2) + "\n")
+    picture = _draw(outcomes, PICTURE if out is None else out.with_suffix(".png"))
+    if as_json:
+        print_json(data)
+    else:
+        answer("\n".join(_lines(outcomes)))
+    if not quiet:
+        _tell_end(machine, outcomes)
+        for path in (out, picture):
+            if path is not None:
+                note(f"written: {path}")
+
+
+def _draw(outcomes: list[Outcome], path: Path) -> Path | None:
+    panels = [outcome.findings.panel for outcome in outcomes if outcome.findings.panel is not None]
+    if not panels:
+        return None
+    draw_work_precision(panels, path, title="Accuracy for computing time, each engine against itself")
+    return path
+
+
+def _lines(outcomes: list[Outcome]) -> list[str]:
+    """Return one table with a line above the numbers of every measurement."""
+    rows = [_cells(one) for outcome in outcomes for one in outcome.findings.numbers]
+    head, rule, *lines = table_lines(COLUMNS, rows, left=2)
+    found = [head, rule]
+    for outcome in outcomes:
+        found.append(f"{outcome.measurement.name}: {outcome.measurement.title}")
+        count = len(outcome.findings.numbers)
+        found += lines[:count]
+        lines = lines[count:]
+    return found
+
+
+def _cells(one: Number) -> tuple[str, ...]:
+    spread = (one.smallest, one.largest) if one.is_repeated else (float("nan"),) * 2
+    return (f"  {one.quantity}", one.unit, *(_shown(value) for value in (one.median, *spread)))
+
+
+def _shown(value: float) -> str:
+    """Return a number with three digits, a large one with all before the point."""
+    return f"{value:.0f}" if LARGE <= abs(value) < math.inf else number(value, DIGITS)
+
+
+def _tell_end(machine: Machine, outcomes: list[Outcome]) -> None:
+    for outcome in outcomes:
+        for text in outcome.findings.notes:
+            note(f"{outcome.measurement.name}: {text}")
+        if outcome.setting.quick:
+            note(f"{outcome.measurement.name} shortened: {outcome.measurement.quick}")
+    for text in machine.lines():
+        note(text)
+    note(f"{sum(outcome.seconds for outcome in outcomes):.0f} s")

@@ -1,0 +1,57 @@
+"""Many copies of one scene with different numbers in them, one after the other in one compiled call."""
+
+from blocksim.kernels.advance import advance
+from blocksim.kernels.arrays import PAIRS_FULL, Floats, Integers, Records, World
+from blocksim.kernels.energy import measure
+from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
+
+
+@kernel
+def member_particles(particles: Records | None, m: int) -> Records | None:
+    """Return the particles of one member; None where there are none."""
+    if particles is None:
+        return None
+    return particles[m]
+
+
+@rare_kernel
+def member(worlds: World, m: int) -> World:
+    """Return the world of one member; every array of `worlds` has the members along its first axis."""
+    return World(
+        worlds.bodies[m],
+        worlds.pairs[m],
+        worlds.contacts[m],
+        worlds.candidates[m],
+        worlds.operators[m],
+        worlds.interactions[m],
+        member_particles(worlds.particles, m),
+        worlds.points[m],
+        worlds.spare_pairs[m],
+        worlds.spare_candidates[m],
+        worlds.heads[m],
+        worlds.links[m],
+        worlds.large[m],
+        worlds.neighbours[m],
+        worlds.before[m],
+        worlds.matrices[m],
+        worlds.motion[m],
+        worlds.controls[m],
+        worlds.clock[m],
+        worlds.ledger[m],
+    )
+
+
+@entry_kernel
+def advance_members(worlds: World, members: Integers, last_steps: Integers, starts: Floats, codes: Integers) -> None:
+    """Advance some members from their start to their last step, or to what ends them before.
+
+    `members` (k,) are the numbers of those to advance; by number, last_steps (n,) are steps, starts (n, 10) gets the
+    row of `measure` at the start, and codes (n,) the status codes. PAIRS_FULL leaves a member to the caller, who can
+    give it more room. A member is advanced by the code that advances a single world, so the bits are the same.
+    """
+    for m in members:
+        world = member(worlds, m)
+        codes[m] = advance(world, 0)
+        if codes[m] != PAIRS_FULL:
+            measure(world, starts[m])
+            codes[m] = advance(world, last_steps[m])

@@ -1,0 +1,165 @@
+"""Contacts that go on: where they are, how they move, and their dashpots made anew.
+
+Places are taken from the centre of body b, in world axes. The velocity of a point of body a against body b at a place r
+is then v + w x r with one v and one w for all points of the pair. Everything is passed by value and stays in registers.
+"""
+
+import math
+from typing import NamedTuple
+
+from blocksim.kernels.arrays import HALF, NORMAL, Record
+from blocksim.kernels.contact import IMPACT_STEPS, shared_step
+from blocksim.kernels.damping import BOTH, fill_alike, fill_single, keep_masses
+from blocksim.kernels.geometry import corner_offset
+from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.models.twins import CONE_TOLERANCE, corner_signs
+
+
+class Motion(NamedTuple):
+    """Motion of body a against body b at the centre of b: in the last drift, and as predicted at its end."""
+
+    vx: float  # m/s
+    vy: float
+    spin: float  # rad/s
+    end_vx: float
+    end_vy: float
+    end_spin: float
+
+
+class Spot(NamedTuple):
+    """One contact that goes on."""
+
+    x: float  # m, from the centre of b
+    y: float
+    nx: float  # normal, from b to a
+    ny: float
+    depth: float  # m
+    closing: float  # m, displacement of the last drift against the normal
+    slip: float  # m, along the tangent
+    closing_rate: float  # m/s, at the end of the drift
+    slip_rate: float
+
+
+@kernel
+def admits(owner: Record, corner: int, nx: float, ny: float) -> bool:
+    """Tell whether a corner of `owner` can touch a face of the outward normal (nx, ny); see models/twins.py."""
+    sx, sy = corner_signs(corner)
+    along_x = sx * (nx * owner.cos + ny * owner.sin)
+    along_y = sy * (ny * owner.cos - nx * owner.sin)
+    return along_x <= CONE_TOLERANCE and along_y <= CONE_TOLERANCE
+
+
+@kernel
+def face_frame(body: Record, face: int) -> tuple[float, float, float, float]:
+    """Return the outward normal of a face in world axes, its distance from the centre and half of its length (m)."""
+    sign = 1.0 if face < 2 else -1.0
+    if face % 2 == 0:
+        return sign * body.cos, sign * body.sin, body.half_x, body.half_y
+    return -sign * body.sin, sign * body.cos, body.half_y, body.half_x
+
+
+@kernel
+def relative_motion(a: Record, b: Record, dx: float, dy: float, time: float) -> Motion:
+    """Return the motion of a against b; the end of the drift is `time` (s) ahead, with the last accelerations."""
+    vx = a.vx - b.vx + a.spin * dy
+    vy = a.vy - b.vy - a.spin * dx
+    spin = a.spin - b.spin
+    ax = a.ax - b.ax + a.spin_rate * dy
+    ay = a.ay - b.ay - a.spin_rate * dx
+    return Motion(vx, vy, spin, vx + time * ax, vy + time * ay, spin + time * (a.spin_rate - b.spin_rate))
+
+
+@kernel
+def follow(
+    contact: Record, a: Record, b: Record, dx: float, dy: float, motion: Motion, step: float, turns: bool
+) -> tuple[bool, Spot]:
+    """Look whether a contact goes on, and where and how.
+
+    It does not where its corner has left or has passed the end of the face, where another face is nearer that it can
+    touch, or will be within a few steps. Whether the corner can still touch its face at all changes by turning only,
+    slowly, and is looked at where `turns` says so.
+    """
+    slot = contact.slot
+    is_own = slot < HALF
+    owner = a if is_own else b
+    touched = b if is_own else a
+    side = 1.0 if is_own else -1.0
+    corner = slot % HALF
+    ox, oy = corner_offset(owner, corner)
+    x = ox + side * dx
+    y = oy + side * dy
+    nx, ny, half, half_length = face_frame(touched, contact.face)
+    depth = half - (x * nx + y * ny)
+    along = y * nx - x * ny
+    beside = half_length - abs(along)
+    goes_on = depth > 0.0 and beside >= 0.0 and (not turns or admits(owner, corner, nx, ny))
+    spot = spot_at(x if is_own else ox, y if is_own else oy, side * nx, side * ny, depth, motion, step)
+    if beside < max(depth, IMPACT_STEPS * abs(spot.closing)):
+        other = 1.0 if along > 0.0 else -1.0
+        goes_on = goes_on and not admits(owner, corner, -other * ny, other * nx)
+    return goes_on, spot
+
+
+@kernel
+def spot_at(x: float, y: float, nx: float, ny: float, depth: float, motion: Motion, step: float) -> Spot:
+    """Return a contact with its displacements in the last drift and its rates at the end of it."""
+    ux = motion.vx - motion.spin * y
+    uy = motion.vy + motion.spin * x
+    ex = motion.end_vx - motion.end_spin * y
+    ey = motion.end_vy + motion.end_spin * x
+    closing = -step * (nx * ux + ny * uy)
+    slip = step * (nx * uy - ny * ux)
+    return Spot(x, y, nx, ny, depth, closing, slip, -(nx * ex + ny * ey), nx * ey - ny * ex)
+
+
+@kernel
+def arms(spot: Spot, dx: float, dy: float, direction: int) -> tuple[float, float]:
+    """Return the lever arms (m) of the normal or the tangent of a contact about the centres of a and b."""
+    if direction == NORMAL:
+        arm = spot.x * spot.ny - spot.y * spot.nx
+        return arm - (dx * spot.ny - dy * spot.nx), arm
+    arm = spot.x * spot.nx + spot.y * spot.ny
+    return arm - (dx * spot.nx + dy * spot.ny), arm
+
+
+@rare_kernel
+def renew_single(
+    operator: Record, a: Record, b: Record, spot: Spot, direction: int, ratio: float, step: float, stiffness: float
+) -> None:
+    """Make the operator of a single contact anew."""
+    arm_a, arm_b = arms(spot, a.x - b.x, a.y - b.y, direction)
+    mass = a.inverse_mass + b.inverse_mass + arm_a * arm_a * a.inverse_inertia + arm_b * arm_b * b.inverse_inertia
+    half = 0.5 * shared_step(a, b, step)
+    keep_masses(operator, 1, half, mass, mass, mass)
+    fill_single(operator, 0, ratio, half, mass, stiffness, 1.0)
+
+
+@rare_kernel
+def renew_double(
+    operator: Record,
+    a: Record,
+    b: Record,
+    one: Spot,
+    two: Spot,
+    direction: int,
+    pattern: int,
+    ratio: float,
+    step: float,
+    stiffness: float,
+) -> None:
+    """Make the operator of two contacts anew, of which those in `pattern` have a dashpot."""
+    dx = a.x - b.x
+    dy = a.y - b.y
+    one_a, one_b = arms(one, dx, dy, direction)
+    two_a, two_b = arms(two, dx, dy, direction)
+    translation = a.inverse_mass + b.inverse_mass
+    cosine = one.nx * two.nx + one.ny * two.ny
+    m_one = translation + one_a * one_a * a.inverse_inertia + one_b * one_b * b.inverse_inertia
+    m_two = translation + two_a * two_a * a.inverse_inertia + two_b * two_b * b.inverse_inertia
+    m_mixed = cosine * translation + one_a * two_a * a.inverse_inertia + one_b * two_b * b.inverse_inertia
+    half = 0.5 * shared_step(a, b, step)
+    keep_masses(operator, pattern, half, m_one, m_mixed, m_two)
+    if pattern == BOTH:
+        fill_alike(operator, 2.0 * ratio * math.sqrt(stiffness), half, m_one, m_mixed, m_two)
+    else:
+        fill_single(operator, pattern - 1, ratio, half, m_one if pattern == 1 else m_two, stiffness, 1.0)

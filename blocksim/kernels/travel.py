@@ -1,0 +1,62 @@
+"""When the pair list has to be made anew: how far bodies have come since it was made, and when to look again."""
+
+import math
+
+from blocksim.kernels.arrays import Record, World
+from blocksim.kernels.broad_phase import rebuild_pairs
+from blocksim.kernels.jit import rare_kernel
+
+PAIR_SHARE = 0.4  # of the skin, that a body may move; two use up 0.8 skins, the rest covers what was not foreseen
+GROWTH = 4.0  # until the next look a body may become this many times as fast as the fastest one is now
+MOST_UNSEEN = 1000  # steps
+MOST_UNSEEN_DRIVEN = 8  # steps, where a support moves: how fast it will, nothing here knows
+
+
+@rare_kernel
+def travel(body: Record) -> float:
+    """Return how far (m) a corner of a body may have come since the pair list was made."""
+    moved = abs(body.x - body.list_x) + abs(body.y - body.list_y)
+    return moved + body.radius * abs(body.angle - body.list_angle)
+
+
+@rare_kernel
+def unseen_steps(world: World, farthest: float, fastest: float) -> int:
+    """Return for how many steps no body can come beyond its share of the skin.
+
+    `farthest` (m) is how far one has come already and `fastest` (m/s) the speed of the fastest point of any. Falls over
+    what is left are counted in: they add at most sqrt(2 g left) to a speed.
+    """
+    controls = world.controls[0]
+    left = PAIR_SHARE * controls.skin - farthest
+    if left <= 0.0:
+        return 0
+    gravity = math.sqrt(controls.gravity_x**2 + controls.gravity_y**2)
+    most = MOST_UNSEEN if controls.motion_x == 0.0 and controls.motion_y == 0.0 else MOST_UNSEEN_DRIVEN
+    drift = controls.step * (GROWTH * fastest + math.sqrt(2.0 * gravity * left))
+    return most if left > drift * most else int(left / drift)
+
+
+@rare_kernel
+def look(world: World) -> bool:
+    """Make the pair list anew if a body has come too far since, and fix the step of the next look.
+
+    Returns False where the list does not fit into its arrays; nothing has changed then.
+    """
+    clock = world.clock[0]
+    farthest = 0.0
+    fastest = 0.0
+    for i in range(world.bodies.size):
+        body = world.bodies[i]
+        fastest = max(fastest, math.sqrt(body.vx**2 + body.vy**2) + body.radius * abs(body.spin))
+        if body.y > -math.inf:  # else the half-plane, out of reach
+            farthest = max(farthest, travel(body))
+    if not math.isfinite(fastest + farthest):  # the next check ends the run
+        clock.next_look = clock.steps + MOST_UNSEEN
+        return True
+    steps = unseen_steps(world, farthest, fastest) if clock.rebuilds > 0 else 0
+    if steps == 0:
+        if not rebuild_pairs(world):
+            return False
+        steps = max(1, unseen_steps(world, 0.0, fastest))
+    clock.next_look = clock.steps + steps
+    return True

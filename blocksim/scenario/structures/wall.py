@@ -1,0 +1,115 @@
+"""A wall of whole blocks in courses, in running bond or stack bond, with or without holes."""
+
+from collections.abc import Sequence
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, model_validator
+
+from blocksim.scenario import quantities as q
+from blocksim.scenario.models.base import OneOf
+from blocksim.scenario.models.geometry import Block
+from blocksim.scenario.structures.base import Count, Courses, Pose, Seed, draws, poses_at
+
+Bond = Literal["running", "stack"]
+BONDS: tuple[Bond, ...] = ("running", "stack")
+PLACE = 2  # numbers that say where a hole is
+
+
+def _hole(value: object) -> object:
+    if not isinstance(value, list | tuple) or len(value) != PLACE:
+        message = f"{q.shown(value)} is no place for a hole; write [row, column], counted from 1 at the lower left"
+        raise q.invalid(message)
+    return value
+
+
+Hole = Annotated[tuple[Count, Count], BeforeValidator(_hole)]
+
+
+class BlockWall(Courses):
+    """Block j of course i (both from 0) begins at x = left + j (size_x + gap) and y = bottom + i size_y.
+
+    In running bond every second course is shifted to the right by half of that distance; all courses have whole blocks
+    and the same number of them, so that the ends are toothed. Where a block is left out nothing carries the ones above,
+    which fall into the hole as far as their neighbours let them.
+    """
+
+    kind: Literal["wall"] = Field(description="kind of structure")
+    columns: Count = Field(description="number of blocks in a course")
+    bond: Annotated[Bond, OneOf(BONDS)] = Field(
+        default="running", description="running: every second course is shifted by half a block; stack: none is"
+    )
+    gap: q.NonNegativeLength = Field(default=0.0, description="distance of neighbours in a course")
+    holes: tuple[Hole, ...] = Field(
+        default=(), description="blocks left out, [row, column] from 1, the lowest and leftmost first"
+    )
+    missing: q.Share = Field(default=0.0, description="share of the other blocks left out at random")
+    offset: q.NonNegativeLength = Field(
+        default=0.0, description="largest random shift of a block along x, to either side; at most half of the gap"
+    )
+    seed: Seed = Field(default=0, description="chooses among random shifts and blocks left out")
+
+    @model_validator(mode="after")
+    def _holes_are_inside(self) -> Self:
+        seen = set()
+        for number, (row, column) in enumerate(self.holes):
+            if row > self.rows or column > self.columns:
+                message = f"[{row}, {column}] is outside a wall of {self.rows} rows and {self.columns} columns"
+                raise q.invalid(message, "holes", number)
+            if (row, column) in seen:
+                message = f"[{row}, {column}] is left out twice"
+                raise q.invalid(message, "holes", number)
+            seen.add((row, column))
+        return self
+
+    @model_validator(mode="after")
+    def _something_is_left(self) -> Self:
+        if self.size == 0:
+            message = "no block is left in this wall"
+            raise q.invalid(message, "holes" if len(self.holes) == self.rows * self.columns else "missing")
+        return self
+
+    @model_validator(mode="after")
+    def _neighbours_stay_apart(self) -> Self:
+        if self.offset > 0.5 * self.gap:
+            message = (
+                f"two neighbours shifted by {self.offset * 1e3:g} mm could overlap; "
+                f"at most half of the gap, {0.5e3 * self.gap:g} mm, is possible"
+            )
+            raise q.invalid(message, "offset")
+        return self
+
+    @property
+    def size(self) -> int:
+        """Number of blocks that are not left out."""
+        others = self.rows * self.columns - len(self.holes)
+        return others - self._random_holes(others)
+
+    def _random_holes(self, others: int) -> int:
+        return round(self.missing * others)
+
+    def height(self, block: Block) -> float:
+        """All courses, whether or not the highest has a block left."""
+        return self.rows * block.size_y
+
+    def place(self, block: Block) -> Sequence[Pose]:
+        """Return the poses course by course, each from left to right."""
+        random = draws(self.seed, 2, self.rows, self.columns)
+        pitch = block.size_x + self.gap
+        row, column = np.indices((self.rows, self.columns))
+        shift = np.where(row % 2 == 1, 0.5 * pitch, 0.0) if self.bond == "running" else np.zeros(row.shape)
+        x = self.left + 0.5 * block.size_x + column * pitch + shift + self.offset * (2.0 * random[0] - 1.0)
+        y = self.bottom + (row.astype(np.float64) + 0.5) * block.size_y
+        kept = self._kept(random[1])
+        return poses_at(x[kept], y[kept])
+
+    def _kept(self, rank: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Leave out the holes, then the blocks of lowest rank; `rank` in [0, 1) for every place."""
+        kept = np.ones(rank.shape, dtype=np.bool_)
+        for row, column in self.holes:
+            kept[row - 1, column - 1] = False
+        others = np.flatnonzero(kept)
+        lowest = np.argsort(rank.ravel()[others], kind="stable")[: self._random_holes(others.size)]
+        kept.ravel()[others[lowest]] = False
+        return kept

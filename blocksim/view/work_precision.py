@@ -1,0 +1,144 @@
+"""How accurate an answer is for the computing time it takes: a panel for each scene, a line for each method."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.view import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+PANEL_WIDTH, PANEL_HEIGHT = 3.6, 2.9  # inches
+LEFT, RIGHT, HEAD, FOOT, GAP = 0.62, 0.15, 0.62, 0.48, 0.72  # inches
+LEGEND_ROW = 0.17  # inches
+MARKERS = "os^D"
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")  # as in style, the well visible ones
+MANY_DECADES = 100.0  # ratio of the ends of an axis
+SMALLEST_SHARE = 1e-4  # of the largest error: what is less is drawn there
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One method: n settings from coarse to fine. Methods of one group share a colour."""
+
+    label: str
+    group: str
+    seconds: Floats  # (n,) CPU time
+    error: Floats  # (n,)
+    low: Floats | None = None  # (n,) ends of the spread, where there is one
+    high: Floats | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One scene."""
+
+    title: str
+    quantity: str  # what is on the vertical axis, with its unit
+    curves: tuple[Curve, ...]
+    level: float | None = None  # an error worth a line, such as a tolerance
+    meaning: str = ""  # what is written at that line
+
+
+def draw_work_precision(panels: Sequence[Panel], path: Path | str, title: str | None = None) -> None:
+    """Draw the panels side by side and write them as PNG, SVG or PDF; the same input gives the same bytes.
+
+    Raises InvalidInputError for an unknown picture format and OutputError when the file cannot be written.
+    """
+    path = Path(path)
+    style.picture_suffix(path)
+    groups = tuple(dict.fromkeys(curve.group for panel in panels for curve in panel.curves))
+    rows = max(len(panel.curves) for panel in panels)
+    foot = FOOT + LEGEND_ROW * -(-rows // 2)
+    width = LEFT + len(panels) * PANEL_WIDTH + (len(panels) - 1) * GAP + RIGHT
+    height = HEAD + PANEL_HEIGHT + foot
+    with style.styled_figure(width, height) as figure:
+        for index, panel in enumerate(panels):
+            left = LEFT + index * (PANEL_WIDTH + GAP)
+            axes = figure.add_axes((left / width, foot / height, PANEL_WIDTH / width, PANEL_HEIGHT / height))
+            _draw_panel(axes, panel, groups)
+            anchor = (left / width, 0.04 / height)
+            handles = axes.get_legend_handles_labels()
+            figure.legend(*handles, loc="lower left", bbox_to_anchor=anchor, ncols=2, frameon=False)
+        if title:
+            figure.suptitle(
+                title, x=0.12 / width, y=1.0 - 0.06 / height, ha="left", va="top", fontsize=style.TITLE_SIZE
+            )
+        style.save_figure(figure, path)
+
+
+def floor_of(panel: Panel) -> float:
+    """Return the least error that is drawn: an axis of logarithms has no zero."""
+    errors = np.concatenate([curve.error for curve in panel.curves])
+    errors = errors[np.isfinite(errors) & (errors > 0.0)]
+    if errors.size == 0:
+        return panel.level or 1.0
+    return max(float(errors.min()), SMALLEST_SHARE * float(errors.max()))
+
+
+def _draw_panel(axes: "Axes", panel: Panel, groups: Sequence[str]) -> None:
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    least = floor_of(panel)
+    drawn: dict[str, int] = {}
+    for curve in panel.curves:
+        number = drawn.get(curve.group, 0)
+        drawn[curve.group] = number + 1
+        _draw_curve(axes, curve, _look(groups.index(curve.group), number), least)
+    if panel.level is not None:
+        _draw_level(axes, panel.level, panel.meaning)
+    _number_axes(axes)
+    axes.spines[["right", "top"]].set_visible(False)
+    axes.set_xlabel("CPU time of the steps (s)", labelpad=2.0)
+    axes.set_ylabel(panel.quantity)
+    axes.set_title(panel.title, loc="left")
+
+
+def _draw_level(axes: "Axes", level: float, meaning: str) -> None:
+    axes.axhline(level, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (5, 3)))
+    axes.annotate(
+        meaning,
+        (1.0, level),
+        (-2.0, 2.0),
+        ("axes fraction", "data"),
+        "offset points",
+        color=style.FAINT_INK,
+        ha="right",
+    )
+
+
+def _number_axes(axes: "Axes") -> None:
+    """Write plain numbers; between the powers of ten too where an axis has less than two of them."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: PLC0415 - see style
+
+    for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+        between = (1.0, 2.0, 5.0) if high < MANY_DECADES * low else (1.0,)
+        axis.set_major_locator(LogLocator(subs=between))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
+
+
+def _look(group: int, number: int) -> dict[str, Any]:
+    """Return the look of the curve with this number (from 0) in its group: later ones are dashed and hollow."""
+    colour = COLOURS[group % len(COLOURS)]
+    return {
+        "color": colour,
+        "marker": MARKERS[group % len(MARKERS)],
+        "markersize": 4.0,
+        "markerfacecolor": "#FFFFFF" if number else colour,
+        "linewidth": 1.2,
+        "linestyle": (0, (4, 2)) if number else "-",
+    }
+
+
+def _draw_curve(axes: "Axes", curve: Curve, look: dict[str, Any], least: float) -> None:
+    axes.plot(curve.seconds, np.maximum(curve.error, least), **look, label=curve.label, zorder=3)
+    if curve.low is not None and curve.high is not None:
+        low, high = np.maximum(curve.low, least), np.maximum(curve.high, least)
+        axes.vlines(curve.seconds, low, high, color=look["color"], linewidth=style.LINE_WIDTH, alpha=0.6)

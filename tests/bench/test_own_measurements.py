@@ -1,0 +1,65 @@
+"""Three blocks, walls and start-up, at their quick sizes."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.bench import startup, three_blocks, walls
+from blocksim.bench.measurement import Setting, single
+from blocksim.bench.startup import StartError
+from blocksim.bench.three_blocks import CLOSE, Level, settled
+
+QUICK = Setting(quick=True, repeats=2)
+
+
+def level(scale: float, x: float, seconds: float = 1.0) -> Level:
+    """Return one whose third block ends at x (m)."""
+    return Level(scale, 0.05, np.array([[0.0, 0.0, x], [0.0, 0.0, 0.0]]), (seconds,), 10)
+
+
+def test_levels_count_as_converged_from_where_all_stiffer_ones_agree() -> None:
+    levels = [level(1e-4, 0.9 * CLOSE), level(1e-3, 2.0 * CLOSE), level(1e-2, -0.9 * CLOSE), level(1.0, 0.0)]
+    assert [one.scale for one in settled(levels, levels[-1])] == [1.0, 1e-2]
+
+
+def test_three_blocks_tell_the_cheapest_converged_setting() -> None:
+    found = three_blocks.measure(QUICK)
+    step, answer, stiffest = found.numbers
+    assert all(len(one.samples) == 2 for one in found.numbers)
+    assert 20.0 < step.median < 1e5
+    assert 0.0 < answer.median < stiffest.median
+    off = {(row["stiffness_scale"], row["safety"]): float(str(row["off_mm"])) for row in found.details}
+    assert len(off) == 6
+    assert off[1e-2, 0.05] == 0.0
+    assert off[1e-4, 0.05] > 0.2
+    assert "stiffness_scale 0.001" in found.notes[0]
+
+
+def test_walls_tell_time_memory_and_growth() -> None:
+    found = walls.measure(QUICK)
+    assert [one.quantity for one in found.numbers[:2]] == ["100 blocks", "400 blocks"]
+    assert all(20.0 < one.median < 1e5 for one in found.numbers[:2])
+    assert all(one.median > 1000.0 for one in found.numbers[2:4])
+    assert math.isfinite(found.numbers[4].median)
+    assert {row["rebuilds"] for row in found.details} != {0}  # making pair lists is part of what is timed
+
+
+def test_growth_is_the_exponent_of_a_power_law() -> None:
+    found = [
+        walls.Wall(size, single("", "ns", 5.0 * size.blocks**0.25), 1.0, 0, 1.0) for size in walls.SIZES
+    ]  # ns per block and step, so the time of a step goes with the power 1.25
+    assert walls.growth(found) == pytest.approx(1.25)
+
+
+def test_starts_are_timed_in_processes_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    version, run = startup.measure(Setting(quick=True, repeats=1)).numbers
+    assert 0.01 < version.median < run.median
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_start_that_fails_is_told() -> None:
+    with pytest.raises(StartError, match=r"rnu: exit code 2: .*No such command 'rnu'"):
+        startup._seconds(startup.MAIN, "rnu")

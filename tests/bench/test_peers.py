@@ -1,0 +1,153 @@
+"""Other engines on the same scenes; those that are not installed are left out."""
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from blocksim.bench.measurement import Setting
+from blocksim.bench.peers import peer_three_blocks, peer_wall
+from blocksim.bench.peers.blocksim_engine import Blocksim
+from blocksim.bench.peers.box2d_engine import Box2D
+from blocksim.bench.peers.packages import MissingPackageError, require_all
+from blocksim.bench.peers.peer_three_blocks import Level, settled, starts
+from blocksim.bench.peers.peer_wall import Computed, distances, wasserstein
+from blocksim.bench.peers.pymunk_engine import Pymunk
+from blocksim.bench.peers.scene import Final, Scene, Series, Solver
+from blocksim.bench.scenes import three_blocks
+from blocksim.errors import ExitCode
+from blocksim.scenario import Scenario
+
+ENGINES = pytest.mark.parametrize(
+    ("module", "solver"), [("pymunk", Pymunk(2e-4, 30)), ("Box2D", Box2D(2e-4, 30)), ("blocksim", Blocksim(1e-3, 0.1))]
+)
+QUICK = Setting(quick=True)
+
+
+@dataclass(frozen=True)
+class Shifted:
+    """An engine that puts all blocks so far (m) from the start, for a second of computing a metre."""
+
+    by: float
+
+    @property
+    def setting(self) -> str:
+        return f"by {self.by:g}"
+
+    def solve(self, scene: Scene) -> Final:
+        placed = scene.placed()
+        x, y = np.array([(body.x, body.y) for body in placed]).T
+        return Final(x + self.by, y, self.by)
+
+
+def solved(module: str, solver: Solver, scene: Scene) -> Final:
+    if module == "Box2D":
+        pytest.importorskip(module, exc_type=ImportError)
+    pytest.importorskip(module)
+    return solver.solve(scene)
+
+
+@ENGINES
+@pytest.mark.filterwarnings("ignore:builtin type .* has no __module__ attribute:DeprecationWarning")  # Box2D's wrapper
+def test_blocks_start_alike_fall_freely_and_land_on_the_ground(module: str, solver: Solver) -> None:
+    (scene,) = starts(1)
+    soon = solved(module, solver, replace(scene, end=2e-3))
+    assert soon.x == pytest.approx([0.016, 0.038, 0.060], abs=1e-5)
+    assert soon.y == pytest.approx([0.025, 0.075, 0.125], abs=3e-5)
+    rest = solved(module, solver, scene)
+    assert rest.y == pytest.approx([0.025, 0.016, 0.016], abs=3e-5)  # upright, and two on their sides
+    assert rest.x == pytest.approx([0.016, 0.068, 0.131], abs=3e-3)
+    assert rest.seconds > 0.0
+
+
+@ENGINES
+@pytest.mark.filterwarnings("ignore:builtin type .* has no __module__ attribute:DeprecationWarning")
+def test_a_sliding_wall_is_stopped_by_the_friction_of_the_ground(module: str, solver: Solver) -> None:
+    """One block, pushed with 0.5 m/s at its centre, slides v^2 / (2 mu g)."""
+    scene = replace(peer_wall.SMALL._replace(columns=1, rows=1).scene(), end=0.3)
+    final = solved(module, solver, scene)
+    assert final.x[0] - 0.025 == pytest.approx(0.5**2 / (2.0 * 0.38 * 9.81), rel=0.02)
+    assert final.y[0] == pytest.approx(0.016, abs=3e-5)
+
+
+def test_starts_differ_by_a_micrometre_and_are_the_same_every_time() -> None:
+    shifts = np.array([scene.shift for scene in starts(16)])
+    assert np.abs(shifts).max() <= 1e-6
+    assert len(np.unique(shifts)) == shifts.size
+    assert np.array_equal(shifts, [scene.shift for scene in starts(16)])
+    scene = starts(2)[1]
+    assert [body.x for body in scene.placed()] == (np.array([0.016, 0.038, 0.060]) + scene.shift).tolist()
+
+
+def test_only_levels_after_the_last_large_error_count() -> None:
+    levels = [Level(Shifted(off), np.array([off]), np.array([1.0])) for off in (0.1, 0.3, 0.1, 0.05)]
+    assert [float(level.off[0]) for level in settled(levels)] == [0.05, 0.1]
+
+
+def test_error_is_the_distance_from_the_reference_of_the_same_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    levels = tuple(Shifted(by) for by in (3e-3, 2.1e-3, 2.05e-3))
+    series = (Series("made up", "made up, a", levels, Shifted(2e-3)), Series("made up", "b", levels[:1], Shifted(9.0)))
+    monkeypatch.setattr(peer_three_blocks, "all_series", lambda **_: series)
+    monkeypatch.setattr(peer_three_blocks, "require_all", lambda: None)
+    monkeypatch.setattr(peer_three_blocks, "_calls", list)
+    found = peer_three_blocks.measure(QUICK)
+    assert [row["error_mm"] for row in found.details] == pytest.approx([1.0, 0.1, 0.05, 1.0])
+    best, none = found.numbers
+    assert best.quantity == "made up, a: by 0.00205"  # of two that are close it takes less time
+    assert best.median == pytest.approx(2.05)
+    assert (none.quantity, none.median) == ("b: no setting", np.inf)
+    assert found.panel is not None
+    assert [curve.label for curve in found.panel.curves] == ["made up, a", "b"]
+
+
+def test_wasserstein_distance_is_the_area_between_cumulative_curves() -> None:
+    generator = np.random.Generator(np.random.PCG64(3))
+    one, two = generator.normal(size=200), generator.normal(0.3, 2.0, size=200)
+    edges = np.sort(np.concatenate([one, two]))
+    heights = [np.searchsorted(np.sort(sample), edges[:-1], side="right") / 200 for sample in (one, two)]
+    area = float((np.abs(heights[0] - heights[1]) * np.diff(edges)).sum())
+    assert wasserstein(one, two) == pytest.approx(area)
+    assert wasserstein(one, generator.permutation(one)) == 0.0
+
+
+def test_heaps_are_compared_level_by_level() -> None:
+    scene = peer_wall.SMALL.scene()
+    levels = tuple(Shifted(by) for by in (7e-3, 5e-3, 4e-3))
+    finals = tuple(solver.solve(scene) for solver in levels)
+    one = Computed(Series("made up", "made up", levels, levels[-1]), finals, finals[0])
+    assert one.changes == pytest.approx(np.array([[2.0, 0.0], [1.0, 0.0]]))
+    assert one.scatter == pytest.approx((2.0, 0.0))
+    assert distances(finals[0], finals[2]) == pytest.approx((3.0, 0.0))
+
+
+def test_a_wall_is_measured_by_blocksim_alone_where_it_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    series = tuple(one for one in peer_wall.all_series(quick=True) if one.engine == "blocksim")
+    monkeypatch.setattr(peer_wall, "all_series", lambda **_: series)
+    monkeypatch.setattr(peer_wall, "require_all", lambda: None)
+    found = peer_wall.measure(QUICK)
+    coarse, fine, change = found.numbers
+    assert 0.0 < coarse.median < fine.median
+    assert 0.0 < change.median < 2.0
+    assert found.details[1]["change_x_mm"] is None
+
+
+def test_a_run_of_blocksim_that_breaks_off_has_no_answer() -> None:
+    def make(*, contact: Mapping[str, object] | None = None, time: Mapping[str, object] | None = None) -> Scenario:
+        return three_blocks(contact={**(contact or {}), "max_overlap": 1e-6}, time=time)
+
+    (scene,) = starts(1)
+    assert np.isfinite(Blocksim(1e-4, 0.1).solve(scene).x).all()
+    assert np.isnan(Blocksim(1e-4, 0.1).solve(replace(scene, make=make)).x).all()
+
+
+@pytest.mark.parametrize(("module", "package"), [("pymunk", "pymunk"), ("Box2D", "box2d")])
+def test_a_missing_package_names_the_extra(monkeypatch: pytest.MonkeyPatch, module: str, package: str) -> None:
+    for name in ("pymunk", "Box2D"):
+        monkeypatch.setitem(sys.modules, name, sys)  # there, whatever it is
+    require_all()
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(MissingPackageError, match=rf"package {package} .*blocksim\[bench\]") as caught:
+        require_all()
+    assert caught.value.exit_code == ExitCode.UNAVAILABLE

@@ -1,0 +1,34 @@
+"""The scenes that are measured are those that they are said to be."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.bench.scenes import pushed_wall, three_blocks
+from blocksim.scenario import load_scenario, place_bodies
+
+NOMINAL = Path(__file__).parents[2] / "scenarios" / "three_blocks_nominal.toml"
+
+
+def test_three_blocks_are_those_of_the_scenario_that_ships() -> None:
+    ours, shipped = three_blocks(), load_scenario(NOMINAL)
+    assert place_bodies(ours) == place_bodies(shipped)
+    for table in ("materials", "blocks", "ground", "friction", "contact", "time", "gravity"):
+        assert getattr(ours, table) == getattr(shipped, table), table
+
+
+def test_keys_of_contact_and_time_can_be_given() -> None:
+    scenario = three_blocks(contact={"stiffness_scale": 0.01}, time={"end": 0.4, "stop_at_rest": False})
+    assert scenario.contact.stiffness_scale == 0.01
+    assert (scenario.time.end, scenario.time.stop_at_rest) == (0.4, False)
+    assert scenario.contact.restitution == three_blocks().contact.restitution
+
+
+def test_a_wall_is_pushed_in_proportion_to_height() -> None:
+    placed = place_bodies(pushed_wall(4, 3))
+    y, vx = np.array([(body.y, body.vx) for body in placed]).T
+    assert len(placed) == 12
+    assert {(body.size_x, body.size_y, body.depth) for body in placed} == {(0.05, 0.032, 0.025)}
+    assert vx == pytest.approx(1.0 * y / 0.096)
+    assert not any(body.vy or body.spin for body in placed)

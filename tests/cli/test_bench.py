@@ -1,0 +1,104 @@
+"""blocksim bench: the table on a screen, for programs, its file, and wrong usage."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.bench import measurements
+from blocksim.bench.measurement import Findings, Measurement, Number, Setting, single
+from blocksim.view.work_precision import Curve, Panel
+from tests.cli.conftest import Command
+
+
+def measured(setting: Setting) -> Findings:
+    numbers = (Number("a step", "ns", (3.0, 1.0, 2.0)[: setting.repeats]), single("memory", "bytes/block", 5000.0))
+    return Findings(numbers, notes=("soft",), details=({"quick": setting.quick},))
+
+
+def stopped(_: Setting) -> Findings:
+    raise KeyboardInterrupt
+
+
+@pytest.fixture(autouse=True)
+def registry(monkeypatch: pytest.MonkeyPatch) -> None:
+    table = (
+        Measurement("first", "made up", measured, quick="half of it"),
+        Measurement("stop", "stopped", stopped, quick=""),
+    )
+    monkeypatch.setattr(measurements, "MEASUREMENTS", table)
+
+
+def test_table_fits_80_columns_and_names_the_machine(blocksim: Command) -> None:
+    answer = blocksim("bench", "first", "--repeats", 3, "--quick")
+    assert answer.code == 0
+    lines = answer.out.splitlines()
+    assert lines[0].split() == ["quantity", "unit", "median", "smallest", "largest"]
+    assert lines[2] == "first: made up"
+    assert lines[3].split() == ["a", "step", "ns", "2", "1", "3"]
+    assert lines[4].split() == ["memory", "bytes/block", "5000", "–", "–"]
+    assert max(map(len, lines)) <= 80
+    for told in ("first: soft", "first shortened: half of it", "cores, load", "numba", "blocksim 0"):
+        assert told in answer.err
+
+
+def test_json_and_file_hold_the_same(blocksim: Command) -> None:
+    answer = blocksim("bench", "first", "--json", "--out", "bench.json")
+    assert answer.err == ""
+    data = json.loads(answer.out)
+    assert json.loads(Path("bench.json").read_text(encoding="utf-8")) == data
+    assert {"processor", "cores", "platform", "python", "numba", "numpy", "blocksim", "load", "busy"} <= set(
+        data["machine"]
+    )
+    assert data["measurements"][0]["numbers"][0]["samples"] == [3.0, 1.0, 2.0]
+    assert data["measurements"][0]["details"] == [{"quick": False}]
+
+
+def test_quiet_prints_the_table_only(blocksim: Command) -> None:
+    answer = blocksim("bench", "first", "--quiet")
+    assert (answer.code, answer.err) == (0, "")
+    assert answer.out.startswith("quantity")
+
+
+def test_a_stop_keeps_what_was_measured(blocksim: Command) -> None:
+    answer = blocksim("bench", "--out", "bench.json")
+    assert answer.code == 75
+    assert "a step" in answer.out
+    assert "stopped" in answer.err
+    assert len(json.loads(Path("bench.json").read_text(encoding="utf-8"))["measurements"]) == 1
+
+
+def test_an_unknown_name_is_told(blocksim: Command) -> None:
+    answer = blocksim("bench", "fisrt")
+    assert (answer.code, answer.out) == (2, "")
+    assert answer.err == ("bench: NAME 'fisrt': no such measurement, did you mean 'first'? There are: first, stop\n")
+
+
+def test_a_place_that_cannot_be_written_is_told_before_anything_is_measured(blocksim: Command) -> None:
+    for out in ("nix/bench.json", "scenarios"):
+        answer = blocksim("bench", "stop", "--out", out)
+        assert (answer.code, answer.out) == (74, "")
+        assert answer.err.startswith(f"{out}: cannot be written: ")
+
+
+def test_peers_without_their_packages_name_the_extra(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pymunk", None)
+    answer = blocksim("bench", "--peers")
+    assert (answer.code, answer.out) == (69, "")
+    assert "pip install 'blocksim[bench]'" in answer.err
+
+
+def test_peers_draw_a_picture_beside_the_file(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    panel = Panel("made up", "error (mm)", (Curve("a", "a", np.ones(2), np.ones(2)),))
+    findings = Findings((single("time", "CPU ms", 1.0),), panel=panel)
+    table = (Measurement("drawn", "made up", lambda _: findings, quick=""),)
+    monkeypatch.setattr(measurements, "PEERS", table)
+    for module in ("pymunk", "Box2D"):
+        monkeypatch.setitem(sys.modules, module, sys)
+    assert blocksim("bench", "--peers").code == 0
+    assert Path("work_precision.png").stat().st_size > 0
+    answer = blocksim("bench", "--peers", "drawn", "--out", "peers.json")
+    assert "written: peers.png" in answer.err
+    assert Path("peers.png").stat().st_size > 0

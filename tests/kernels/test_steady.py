@@ -1,0 +1,298 @@
+"""Pairs whose contacts go on: the same forces as in contact.py, taken by nearly all pairs, and by none that changes."""
+
+from __future__ import annotations
+
+import copy
+from math import cos, pi, sin
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from blocksim.kernels.advance import begin_step
+from blocksim.kernels.arrays import NORMAL, SHEAR
+from blocksim.kernels.broad_phase import rebuild_pairs
+from blocksim.kernels.contact import IMPACT_STEPS, pair_forces
+from blocksim.kernels.damping import BOTH
+from blocksim.kernels.steady import CHANGED, steady_forces
+from blocksim.verification.scene import HEIGHT, WIDTH
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from blocksim.kernels.arrays import Record, World
+    from tests.conftest import Start
+    from tests.kernels.conftest import Pose
+
+STEP = 1e-6
+ROUND_OFF = 64 * np.finfo(float).eps  # of places, which are some ten sums and products
+
+
+class Tally(NamedTuple):
+    """How many pairs went either way, and which contacts those had that were steady."""
+
+    steady: int  # with contacts
+    general: int  # contacts before or after
+    kinds: frozenset[tuple[bool, ...]]  # for every contact whether its corner is one of b
+
+
+def evaluate(world: World) -> tuple[Tally, World, World]:
+    """Evaluate all pairs at the end of the next drift: in the steady way where it goes, and in a copy generally."""
+    step = float(world.controls[0].step)
+    quick, slow = copy.deepcopy(world), copy.deepcopy(world)
+    steady, general, kinds = 0, 0, set()
+    for copied in (quick, slow):
+        begin_step(copied, step)
+        for name in ("dashpot", "friction", "broken"):
+            copied.ledger[name] = 0.0
+    for p, pair in enumerate(quick.pairs[: world.clock[0].pair_count]):
+        before, book = int(pair.active), quick.ledger[0]
+        is_steady, dashpot, friction = steady_forces(quick, p, step, quick.particles)
+        book.dashpot += dashpot
+        book.friction += friction
+        if not is_steady:
+            pair_forces(quick, p, step, book)
+        pair_forces(slow, p, step, slow.ledger[0])
+        if pair.active or before:
+            steady, general = steady + is_steady, general + (not is_steady)
+            if is_steady:
+                kinds.add(tuple((quick.contacts["slot"][p, : pair.active] > 3).tolist()))
+    return Tally(steady, general, frozenset(kinds)), quick, slow
+
+
+def assert_same(quick: World, slow: World) -> None:
+    """Compare totals, contacts, dashpots and losses of two worlds to what round-off in places can do to forces."""
+    stiffness = float(quick.interactions.normal_stiffness.max())
+    bodies: Any = quick.bodies[:-1]
+    reach = float(np.abs([bodies.x, bodies.y]).max()) + float(bodies.radius.max())
+    place = ROUND_OFF * reach
+    moved = float(quick.controls[0].step) * float(np.hypot(quick.bodies.vx, quick.bodies.vy).max())
+    force = stiffness * place + ROUND_OFF * float(slow.contacts.normal_force.max())
+    for name, size in (("fx", force), ("fy", force), ("torque", force * reach)):
+        assert quick.bodies[name] == pytest.approx(slow.bodies[name], abs=4.0 * size), name
+    assert quick.bodies.pairs_now.tolist() == slow.bodies.pairs_now.tolist()
+    count = int(quick.clock[0].pair_count)
+    for name in ("active", "near", "twins", "idle"):
+        assert quick.pairs[name][:count].tolist() == slow.pairs[name][:count].tolist(), name
+    for p in range(count):
+        one, other = (world.contacts[p, : world.pairs[p].active] for world in (quick, slow))
+        assert one["slot"].tolist() == other["slot"].tolist()
+        assert one["face"].tolist() == other["face"].tolist()
+        for name, size in (("spring", place), ("depth", place), ("normal_force", force), ("shear_force", force)):
+            assert one[name] == pytest.approx(other[name], abs=size), name
+        for direction in (NORMAL, SHEAR):
+            assert_same_dashpots(quick.operators[p, direction], slow.operators[p, direction])
+    for name in ("dashpot", "friction", "broken"):
+        assert quick.ledger[name] == pytest.approx(slow.ledger[name], rel=1e-9, abs=8.0 * force * (moved + place)), name
+
+
+def assert_same_dashpots(one: Record, other: Record) -> None:
+    assert one.left == other.left
+    if one.left > 0:
+        assert one.pattern == other.pattern
+        for names in (("e_one", "e_mixed", "e_two"), ("h_one", "h_mixed", "h_two")):
+            numbers = np.array([[operator[name] for name in names] for operator in (one, other)])
+            assert numbers[0] == pytest.approx(numbers[1], rel=1e-6, abs=1e-9 * np.abs(numbers).max())
+
+
+def tip(angle: float) -> float:
+    """Return the height (m) of the centre of a block that stands on its corner."""
+    return 0.5 * (abs(sin(angle)) * WIDTH + cos(angle) * HEIGHT)
+
+
+FIXED = {"y": 0.5 * HEIGHT, "fixed": True}
+ABOVE = 1.5 * HEIGHT
+RESTING = [{"y": 0.5 * HEIGHT}, {"x": 0.004, "y": ABOVE}, {"x": 0.06, "y": 0.5 * HEIGHT}]
+SITUATIONS: dict[str, tuple[Sequence[Mapping[str, object]], dict[str, Any]]] = {
+    "rest": (RESTING, {}),
+    "rest on a slope": (RESTING, {"tilt": -0.2}),
+    "sliding": ([{"y": 0.5 * HEIGHT, "velocity": [0.5, 0.0]}, {"x": 0.004, "y": ABOVE, "velocity": [-0.5, 0.0]}], {}),
+    "sliding on a slope": ([FIXED, {"x": -0.003, "y": ABOVE}], {"tilt": -0.5}),
+    "no friction": (RESTING, {"tilt": -0.2, "friction": 0.0, "ground_friction": 0.0}),
+    "no dashpots": (RESTING, {"restitution": 1.0, "tilt": -0.2}),
+    "impact on a corner": ([{"y": tip(0.3) + 1e-7, "angle": 0.3, "velocity": [0.2, -1.0]}], {}),
+    "flat impact": ([{"y": 0.5 * HEIGHT + 1e-7, "velocity": [0.1, -1.0]}], {}),
+    "impact of a's corner": ([{"y": HEIGHT + tip(0.3) + 1e-7, "angle": 0.3, "velocity": [0.2, -1.0]}, FIXED], {}),
+    "impact of b's corner": ([FIXED, {"y": HEIGHT + tip(-0.3) + 1e-7, "angle": -0.3, "velocity": [0.2, -1.0]}], {}),
+    "impact of two free blocks": (
+        [{"y": 0.1, "spin": 3.0}, {"x": 2e-3, "y": 0.1 + HEIGHT + 1e-7, "velocity": [0.1, -1.0], "spin": -2.0}],
+        {"gravity": 0.0},
+    ),
+    "narrow on wide": ([{"y": 0.5 * HEIGHT}, {"y": ABOVE, "width": 0.02}], {}),
+    "wide on narrow": ([{"y": 0.5 * HEIGHT, "width": 0.02}, {"y": ABOVE, "spin": 0.01}], {}),
+    "aligned": ([{"y": 0.5 * HEIGHT}, {"y": ABOVE, "velocity": [0.01, 0.0]}], {}),
+    "rocking": ([{"y": tip(0.002), "angle": 0.002, "spin": -0.3}, {"x": 0.1, "y": 0.5 * HEIGHT}], {}),
+    "wall of three": ([{"y": 0.5 * HEIGHT}, {"x": 0.033, "y": 0.5 * HEIGHT}, {"x": 0.0165, "y": ABOVE}], {}),
+    "soft": (RESTING, {"tilt": -0.2, "contact": {"stiffness_scale": 1e-4}}),
+}
+
+
+@pytest.mark.parametrize("situation", SITUATIONS)
+def test_steady_pairs_have_the_forces_and_losses_of_the_general_way(start: Start, situation: str, pace: int) -> None:
+    bodies, values = SITUATIONS[situation]
+    scene = start(bodies, **values)
+    seen = 0
+    for n in range(120 // pace):
+        tally, quick, slow = evaluate(scene.world)
+        assert_same(quick, slow)
+        seen += tally.steady
+        scene.to_step(scene.steps + 1 + n % 4)
+    assert seen > 20 // pace
+
+
+def test_situations_have_one_and_two_contacts_and_corners_of_either_body(start: Start, pace: int) -> None:
+    kinds: set[tuple[bool, ...]] = set()
+    for situation in ("impact of a's corner", "impact of b's corner", "rest", "narrow on wide", "wide on narrow"):
+        bodies, values = SITUATIONS[situation]
+        scene = start(bodies, **values).to_step(60 // pace)
+        kinds |= evaluate(scene.world)[0].kinds
+    assert kinds == {(False,), (True,), (False, False), (False, True), (True, True)}
+
+
+@pytest.mark.parametrize("situation", ["rest", "rest on a slope", "sliding", "sliding on a slope", "wall of three"])
+def test_nearly_all_pairs_of_a_lasting_scene_are_steady(start: Start, situation: str, pace: int) -> None:
+    bodies, values = SITUATIONS[situation]
+    scene = start(bodies, contact={"stiffness_scale": 1e-3}, **values).to_step(600 // pace)
+    steady = general = 0
+    for _ in range(100 // pace):
+        tally, _, _ = evaluate(scene.to_step(scene.steps + 1).world)
+        steady, general = steady + tally.steady, general + tally.general
+    assert steady >= 100 // pace
+    assert general <= 0.02 * steady
+
+
+def is_untouched(world: World, before: World) -> bool:
+    """Tell whether neither bodies nor contacts, candidates and ledger have changed."""
+    return all(
+        np.array_equal(getattr(world, name), getattr(before, name))
+        for name in ("bodies", "contacts", "candidates", "ledger", "points")
+    )
+
+
+def on_ground(pose: Pose, **tables: object) -> World:
+    """Return a block that stands on the ground, 1 um deep, with its two contacts."""
+    world = pose((0.0, 0.5 * HEIGHT - 1e-6, 0.0), **tables)
+    pair_forces(world, 0, 0.0, world.ledger[0])
+    assert world.pairs[0].active == 2
+    return world
+
+
+def on_block(pose: Pose, shift: float, **tables: object) -> World:
+    """Return a block that stands on another one, 1 um deep, with its two contacts."""
+    world = pose((shift, 1.0 + HEIGHT - 1e-6, 0.0), (0.0, 1.0, 0.0), **tables)
+    pair_forces(world, 0, 0.0, world.ledger[0])
+    assert world.pairs[0].active == 2
+    return world
+
+
+def assert_changed(world: World) -> None:
+    """Assert that the pair is left to contact.py, as it was."""
+    before = copy.deepcopy(world)
+    assert steady_forces(world, 0, STEP, world.particles) == CHANGED
+    assert is_untouched(world, before)
+
+
+def test_contacts_that_go_on_are_steady(pose: Pose) -> None:
+    for world in (on_ground(pose), on_block(pose, 0.003)):
+        assert steady_forces(world, 0, STEP, world.particles)[0]
+
+
+@pytest.mark.parametrize("up", [1.1e-6, 1.0])
+def test_contact_that_ends_is_not_steady(pose: Pose, up: float) -> None:
+    for world in (on_ground(pose), on_block(pose, 0.003)):
+        world.bodies[0].y += up
+        assert_changed(world)
+
+
+@pytest.mark.parametrize("shift", [0.003 - WIDTH, WIDTH + 1e-4])
+def test_corner_beyond_the_end_of_its_face_is_not_steady(pose: Pose, shift: float) -> None:
+    world = on_block(pose, 0.003)
+    world.bodies[0].x = shift
+    assert_changed(world)
+
+
+@pytest.mark.parametrize(("down", "changes"), [(-0.9e-6, True), (0.0, False)])
+def test_corner_that_begins_is_not_steady(pose: Pose, down: float, changes: bool) -> None:
+    world = pose((0.0, tip(1e-4) - 1e-6, 1e-4))  # on its lower left corner, the other one 2 um above the ground
+    pair_forces(world, 0, 0.0, world.ledger[0])
+    assert (world.pairs[0].active, world.pairs[0].idle) == (1, 1)
+    world.bodies[0].y += down - 1.5e-6 if changes else 0.0
+    if changes:
+        assert_changed(world)
+    assert steady_forces(world, 0, STEP, world.particles)[0] is not changes
+
+
+@pytest.mark.parametrize(("steps", "changes"), [(0.9 * IMPACT_STEPS, True), (1.2 * IMPACT_STEPS, False)])
+def test_corner_about_to_lose_a_face_while_another_one_is_near_is_not_steady(
+    pose: Pose, steps: float, changes: bool
+) -> None:
+    # tilted, so that its lower left corner may touch the upper face of the other block or its side
+    world = pose((0.0, 2.0, 0.1), (0.0, 1.0, 0.0))
+    a, b = world.bodies[:2]
+    beside, speed = 2e-5, 0.5
+    foot_x, foot_y = -cos(0.1) * a.half_x + sin(0.1) * a.half_y, -sin(0.1) * a.half_x - cos(0.1) * a.half_y
+    a.x, a.y = b.half_x - beside - foot_x, 1.0 + b.half_y - 1e-6 - foot_y
+    a.vy = -speed
+    assert rebuild_pairs(world)
+    pair_forces(world, 0, 0.0, world.ledger[0])
+    assert world.contacts[0, 0].slot == 0
+    assert world.contacts[0, 0].face == 1
+    is_steady, *_ = steady_forces(world, 0, beside / (steps * speed), world.particles)
+    assert is_steady is not changes
+
+
+def test_other_laws_models_and_straight_ground_are_never_steady(pose: Pose) -> None:
+    profile = {"ground": {"profile": [[-1.0, 0.0], [1.0, 0.0]]}}
+    for tables in ({"contact": {"law": "hertz-mindlin"}}, profile):
+        world = on_ground(pose, **tables)
+        assert_changed(world)
+    for model in ("kernel", "particles"):
+        world = pose((0.0, 0.5 * HEIGHT - 5e-4, 0.0), contact={"model": model})
+        pair_forces(world, 0, 0.0, world.ledger[0])
+        assert world.pairs[0].active > 2
+        assert_changed(world)
+
+
+def test_oblique_corners_that_meet_are_not_steady_and_aligned_ones_are(pose: Pose) -> None:
+    aligned = on_block(pose, 0.0)
+    assert aligned.pairs[0].twins != 0
+    assert steady_forces(aligned, 0, STEP, aligned.particles)[0]
+    oblique = pose((0.0, 0.0, pi / 4), (0.0, 1.0, 0.0))
+    a, b = oblique.bodies[:2]
+    a.x, a.y = b.half_x - 1e-7, 1.0 + b.half_y - 1e-6 + 0.5 * (WIDTH + HEIGHT) * sin(pi / 4)
+    a.x += 0.5 * (WIDTH - HEIGHT) * sin(pi / 4)
+    assert rebuild_pairs(oblique)
+    pair_forces(oblique, 0, 0.0, oblique.ledger[0])
+    assert oblique.pairs[0].active == 1
+    assert oblique.pairs[0].twins != 0
+    assert_changed(oblique)
+
+
+@pytest.mark.parametrize("sliding", [0, 1])
+def test_contact_that_slides_beside_one_that_sticks_has_no_dashpot(pose: Pose, sliding: int) -> None:
+    quick = on_block(pose, 0.003)
+    assert steady_forces(quick, 0, STEP, quick.particles)[0]
+    assert quick.operators[0, SHEAR].pattern == BOTH
+    assert quick.operators[0, SHEAR].left > 0
+    quick.contacts[0, sliding].spring = 1e-3
+    quick.bodies[0].vx = 0.1
+    slow = copy.deepcopy(quick)
+    is_steady, dashpot, friction = steady_forces(quick, 0, STEP, quick.particles)
+    quick.ledger[0].dashpot += dashpot
+    quick.ledger[0].friction += friction
+    pair_forces(slow, 0, STEP, slow.ledger[0])
+    assert is_steady
+    assert quick.operators[0, SHEAR].pattern == (2, 1)[sliding]
+    assert_same(quick, slow)
+
+
+def test_dashpots_are_made_anew_where_the_number_of_neighbours_has_changed(pose: Pose) -> None:
+    world = on_block(pose, 0.003)
+    steady_forces(world, 0, STEP, world.particles)
+    left = world.operators.left[0].tolist()
+    assert min(left) > 2
+    steady_forces(world, 0, STEP, world.particles)
+    assert world.operators.left[0].tolist() == [n - 1 for n in left]
+    world.bodies[1].pairs_changed = 1
+    steady_forces(world, 0, STEP, world.particles)
+    assert world.operators.left[0].tolist() == left

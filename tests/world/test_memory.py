@@ -1,0 +1,171 @@
+"""What a run needs is told from the arrays that it will have; what there is from files as Linux writes them."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.errors import ExitCode
+from blocksim.kernels.arrays import World
+from blocksim.scenario import load_scenario, place_bodies
+from blocksim.simulation.recorder import Recorder
+from blocksim.world import build_world, memory
+from blocksim.world.memory import (
+    SceneSize,
+    SceneTooLargeError,
+    available_bytes,
+    file_bytes,
+    readable,
+    refuse_if_too_large,
+)
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+GIB = 1 << 30
+
+
+def size_of(world: World, bodies: int) -> SceneSize:
+    pairs, slots = world.candidates.shape
+    return SceneSize(bodies, pairs, slots, has_particles=world.particles is not None)
+
+
+@pytest.mark.parametrize("model", ["surface", "kernel", "particles"])
+def test_the_estimate_is_that_of_the_arrays_of_a_world(model: str) -> None:
+    scenario = load_scenario(SCENARIOS / "dominoes.toml", {"contact.model": model})
+    world = build_world(scenario)
+    bodies = len(place_bodies(scenario))
+    arrays = sum(array.nbytes for array in world if isinstance(array, np.ndarray) and array is not world.particles)
+    estimate = size_of(world, bodies).world_bytes - bodies * memory.OBJECT_BYTES
+    assert arrays == pytest.approx(estimate, rel=0.1)
+
+
+def test_the_estimate_of_frames_is_that_of_the_recorder() -> None:
+    scenario = load_scenario(SCENARIOS / "dominoes.toml")
+    recorder = Recorder(place_bodies(scenario), scenario.output.every, step=1e-6)
+    recorder.sample(build_world(scenario))
+    kept = sum(array.nbytes for array in (*recorder.motion, *recorder.measured))
+    size = SceneSize(len(recorder.placed), 0, 0, 1)
+    assert size.record_bytes == pytest.approx(memory.COPIES * kept, rel=0.05)
+    assert size.record_bytes >= memory.COPIES * kept
+    assert file_bytes(24, 100) == pytest.approx(100 * kept, rel=0.05)
+
+
+def test_every_part_of_the_size_counts() -> None:
+    size = SceneSize(bodies=10, pairs=80, slots=8, frames=100)
+    for more in (
+        size._replace(bodies=11),
+        size._replace(pairs=81),
+        size._replace(slots=9),
+        size._replace(frames=101),
+    ):
+        assert more.bytes_needed > size.bytes_needed
+
+
+def test_a_scene_that_fits_is_not_refused() -> None:
+    refuse_if_too_large(SceneSize(bodies=1000, pairs=8000, slots=8, frames=100))
+
+
+def test_a_scene_that_does_not_fit_is_refused_with_both_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "available_bytes", lambda: 12 * GIB)
+    size = SceneSize(bodies=10**6, pairs=8 * 10**6, slots=8, frames=2001)
+    with pytest.raises(SceneTooLargeError) as caught:
+        refuse_if_too_large(size)
+    assert caught.value.exit_code == ExitCode.INVALID_INPUT
+    assert (caught.value.needed, caught.value.available) == (size.bytes_needed, 12 * GIB)
+    message = str(caught.value)
+    assert f"needs about {readable(size.bytes_needed)} of memory and 12.9 GB are free" in message
+    assert "for 1000000 bodies and 8000000 pairs" in message
+    assert "for 2001 frames (output.every)" in message
+
+
+@pytest.mark.parametrize("spare", [-1, 0])
+def test_the_last_byte_decides(monkeypatch: pytest.MonkeyPatch, spare: int) -> None:
+    size = SceneSize(bodies=10, pairs=80, slots=8)
+    monkeypatch.setattr(memory, "available_bytes", lambda: size.bytes_needed + spare)
+    if spare < 0:
+        with pytest.raises(SceneTooLargeError):
+            refuse_if_too_large(size)
+    else:
+        refuse_if_too_large(size)
+
+
+def test_nothing_is_refused_where_memory_cannot_be_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "available_bytes", lambda: None)
+    refuse_if_too_large(SceneSize(bodies=10**6, pairs=10**7, slots=8, frames=10**6))
+
+
+@pytest.mark.parametrize(
+    ("count", "text"),
+    [
+        (0, "0 bytes"),
+        (999, "999 bytes"),
+        (1000, "1 kB"),
+        (1234, "1.23 kB"),
+        (999_600, "1 MB"),
+        (3_149_000_000, "3.15 GB"),
+        (10**24, "1e+06 EB"),
+    ],
+)
+def test_bytes_are_readable(count: int, text: str) -> None:
+    assert readable(count) == text
+
+
+MEMINFO = {"proc/meminfo": f"MemTotal: {16 * GIB // 1024} kB\nMemAvailable: {8 * GIB // 1024} kB\nHugePages_Total: 0\n"}
+GROUP_1 = {
+    "proc/self/cgroup": "9:name=systemd:/\n4:memory:/batch/job\n",
+    "sys/fs/cgroup/memory/batch/job/memory.limit_in_bytes": f"{4 * GIB}\n",
+    "sys/fs/cgroup/memory/batch/job/memory.usage_in_bytes": f"{3 * GIB}\n",
+    "sys/fs/cgroup/memory/batch/job/memory.stat": f"cache 1\ntotal_inactive_file {GIB}\n",
+}
+GROUP_2 = {
+    "proc/self/cgroup": "0::/batch/job\n",
+    "sys/fs/cgroup/batch/job/memory.max": f"{4 * GIB}\n",
+    "sys/fs/cgroup/batch/job/memory.current": f"{3 * GIB}\n",
+    "sys/fs/cgroup/batch/job/memory.stat": f"anon 1\ninactive_file {GIB}\n",
+}
+
+
+@pytest.mark.parametrize(
+    ("files", "available"),
+    [
+        (MEMINFO, 8 * GIB),
+        (MEMINFO | GROUP_1, 2 * GIB),
+        (MEMINFO | GROUP_2, 2 * GIB),
+        (GROUP_2, 2 * GIB),
+        (MEMINFO | GROUP_2 | {"sys/fs/cgroup/batch/job/memory.max": "max\n"}, 8 * GIB),
+        (  # the limit of a group around the own one
+            MEMINFO
+            | GROUP_2
+            | {"sys/fs/cgroup/batch/memory.max": f"{5 * GIB}\n", "sys/fs/cgroup/batch/memory.current": f"{4 * GIB}\n"},
+            GIB,
+        ),
+        (MEMINFO | GROUP_2 | {"sys/fs/cgroup/batch/job/memory.max": f"{GIB}\n"}, 0),  # lowered below what is in use
+        (MEMINFO | GROUP_1 | {"sys/fs/cgroup/memory/batch/job/memory.limit_in_bytes": f"{2**63}\n"}, 8 * GIB),
+        (MEMINFO | {"proc/self/cgroup": "0::/gone\n"}, 8 * GIB),
+        (MEMINFO | GROUP_2 | {"sys/fs/cgroup/batch/job/memory.stat": ""}, GIB),
+    ],
+)
+def test_available_memory_is_the_least_of_all_limits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, files: Mapping[str, str], available: int
+) -> None:
+    monkeypatch.setattr("os.sysconf_names", {})
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    assert available_bytes(tmp_path) == available
+
+
+def test_a_system_that_tells_nothing_has_no_number(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.sysconf_names", {})
+    assert available_bytes(tmp_path) is None
+
+
+def test_a_system_without_proc_counts_free_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.sysconf_names", {"SC_AVPHYS_PAGES": 1})
+    monkeypatch.setattr("os.sysconf", {"SC_AVPHYS_PAGES": 1000, "SC_PAGE_SIZE": 4096}.__getitem__)
+    assert available_bytes(tmp_path) == 4_096_000
+
+
+def test_this_machine_has_some_memory() -> None:
+    available = available_bytes()
+    assert available is None or 0 < available < 1 << 60
