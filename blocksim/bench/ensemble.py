@@ -30,12 +30,12 @@ THREADS = (1, 2)
 def measure(setting: Setting) -> Findings:
     """Advance the same members on one thread and on two."""
     members = scattered(QUICK_MEMBERS if setting.quick else MEMBERS)
-    cpu, *walls = (_rates(members, threads, setting) for threads in THREADS)
+    rates = [_rates(members, threads, setting) for threads in THREADS]
     note = (
         f"{len(members)} members with friction scattered by {SCATTER:.0%}, stiffness_scale "
         f"{LEVEL['stiffness_scale']:g}, safety {SAFETY:g}, until rest; building the scenes is not counted"
     )
-    return Findings((cpu[0], *(wall[1] for wall in walls)), notes=(note,))
+    return Findings((rates[0][0], *(clock for _, clock in rates)), notes=(note,))
 
 
 def scattered(count: int) -> list[Scenario]:
@@ -59,4 +59,4 @@ def _rates(members: Sequence[Scenario], threads: int, setting: Setting) -> tuple
             return len(members) / (time.process_time() - cpu)
 
     rate = repeated("collapses per second and core", "1/s", sample, setting.repeats)
-    return rate, Number(f"collapses per second, {threads} threads", "1/s", tuple(clock))
+    return rate, Number(f"collapses per second, {threads} thread{'s' if threads > 1 else ''}", "1/s", tuple(clock))

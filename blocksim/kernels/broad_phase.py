@@ -47,7 +47,7 @@ def add_pair(world: World, count: int, a: int, b: int) -> int:
 @rare_kernel
 def cell_of(place: float, width: float) -> int:
     """Return the number of the cell along one axis."""
-    return int(math.floor(min(max(place / width, -FARTHEST_CELL), FARTHEST_CELL)))
+    return math.floor(min(max(place / width, -FARTHEST_CELL), FARTHEST_CELL))
 
 
 @rare_kernel

@@ -1,5 +1,6 @@
 """The time loop and what it leaves behind: frames, final table, summary, and the folder that keeps them."""
 
+from blocksim.simulation.ensemble import MemberEnd, run_ensemble
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.loop import Progress, Watcher
 from blocksim.simulation.result import Result, read_result
@@ -8,12 +9,14 @@ from blocksim.simulation.summary import Summary
 
 __all__ = [
     "Frames",
+    "MemberEnd",
     "Progress",
     "Result",
     "Summary",
     "Watcher",
     "read_result",
     "renew_copies",
+    "run_ensemble",
     "simulate",
     "simulate_into",
 ]

@@ -45,7 +45,7 @@ LARGE_RATIO = 4.0  # over the smallest body; nothing is large below that
 def build_world(scenario: Scenario) -> World:
     """Return the world at time zero: arrays as described in blocksim.kernels.arrays, pair lists still empty.
 
-    Raises SceneTooLargeError when there is not enough memory for the run, and StepTooLargeError when the scenario asks
+    Raises SceneTooLargeError when there is not enough memory for it, and StepTooLargeError when the scenario asks
     for an inadmissible step without forcing it.
     """
     placed = place_bodies(scenario)
@@ -54,12 +54,12 @@ def build_world(scenario: Scenario) -> World:
     bodies = body_records(scenario, placed, classes)
     particles = place_particles(bodies, scenario.contact.model, scenario.contact.particle_spacing)
     bodies[-1].half_x = math.inf  # the half-plane has one face without ends
-    slots = slots_of_a_pair(bodies, scenario.contact.model)
-    _refuse_if_too_large(scenario, first_capacity(bodies), len(placed), slots)
+    capacity, slots = first_capacity(bodies), slots_of_a_pair(bodies, scenario.contact.model)
+    refuse_if_too_large(SceneSize(bodies.size, capacity, slots, has_particles=particles is not None))
     contacts = zeros(contacts_of_a_pair(slots, scenario.contact.model), contact_type(scenario.contact.model))
     world = World(
         bodies=bodies,
-        **empty_lists(first_capacity(bodies), slots, contacts),
+        **empty_lists(capacity, slots, contacts),
         **_grid(bodies),
         interactions=table,
         particles=particles,
@@ -77,11 +77,6 @@ def build_world(scenario: Scenario) -> World:
 def _kinetic_energy(bodies: Records) -> float:
     speed_squared = bodies.vx**2 + bodies.vy**2
     return 0.5 * float(np.sum(bodies.mass * speed_squared + bodies.inertia * bodies.spin**2))
-
-
-def _refuse_if_too_large(scenario: Scenario, pairs: int, blocks: int, slots: int) -> None:
-    frames = round(min(scenario.time.end / scenario.output.every, MOST_STEPS)) + 1
-    refuse_if_too_large(SceneSize(blocks, pairs, slots, frames, scenario.contact.model != "surface"))
 
 
 def contact_type(model: str) -> np.dtype[np.void]:

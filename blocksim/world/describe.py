@@ -14,8 +14,10 @@ from blocksim.world.build import build_world
 from blocksim.world.interactions import ContactClass, contact_classes, pair_of
 from blocksim.world.memory import SceneSize, file_bytes
 
-# measured on one core: a step costs about this for every body with its contacts (three to a hundred blocks)
+# measured on one core: a step costs about this for every body with its contacts
 SECONDS_PER_BODY_AND_STEP = 75e-9
+SECONDS_IN_A_CROWD = 250e-9  # where bodies have neighbours on all sides
+CROWD = 50  # bodies
 STIFFNESS_UNITS = {"linear": "N/m", "hertz-mindlin": "N/m^1.5"}
 
 
@@ -76,7 +78,7 @@ def describe(scenario: Scenario) -> Description:
         step=step,
         steps=steps,
         frames=frames,
-        seconds=steps * len(placed) * SECONDS_PER_BODY_AND_STEP,
+        seconds=steps * len(placed) * (SECONDS_IN_A_CROWD if len(placed) > CROWD else SECONDS_PER_BODY_AND_STEP),
         bytes=file_bytes(len(placed), frames),
         memory=SceneSize(
             len(placed), world.pairs.size, world.candidates.shape[1], frames, world.particles is not None

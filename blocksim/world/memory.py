@@ -34,10 +34,10 @@ class SceneTooLargeError(InvalidInputError):
         """Say both, and what the need consists of."""
         self.needed = size.bytes_needed
         self.available = available
+        frames = f", {readable(size.record_bytes)} for {size.frames} frames (output.every)" if size.frames else ""
         super().__init__(
             f"this scene is too large: it needs about {readable(self.needed)} of memory and {readable(available)} are "
-            f"free; {readable(size.world_bytes)} for {size.bodies} bodies and {size.pairs} pairs of neighbours, "
-            f"{readable(size.record_bytes)} for {size.frames} frames (output.every)"
+            f"free; {readable(size.world_bytes)} for {size.bodies} bodies and {size.pairs} pairs of neighbours{frames}"
         )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.bench import startup, three_blocks, walls
+from blocksim.bench import ensemble, startup, three_blocks, walls
 from blocksim.bench.measurement import Setting, single
 from blocksim.bench.startup import StartError
 from blocksim.bench.three_blocks import CLOSE, Level, settled
@@ -35,6 +35,13 @@ def test_three_blocks_tell_the_cheapest_converged_setting() -> None:
     assert off[1e-2, 0.05] == 0.0
     assert off[1e-4, 0.05] > 0.2
     assert "stiffness_scale 0.001" in found.notes[0]
+
+
+def test_ensemble_tells_its_rate_and_its_members_differ() -> None:
+    found = ensemble.measure(QUICK)
+    assert found.numbers[0].quantity == "collapses per second and core"
+    assert all(len(one.samples) == 2 and one.median > 1.0 for one in found.numbers)
+    assert len({scenario.friction.model_dump_json() for scenario in ensemble.scattered(5)}) == 5
 
 
 def test_walls_tell_time_memory_and_growth() -> None:

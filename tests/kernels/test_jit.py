@@ -212,3 +212,34 @@ def test_mark_without_any_writable_folder_does_nothing(file_in_the_way: Path, mo
     monkeypatch.setattr(tempfile, "tempdir", str(file_in_the_way))
     jit.mark("seen")
     assert not jit.is_marked("seen")
+
+
+CLOSED = """
+import os
+del os.environ["BLOCKSIM_OPEN_KERNELS"]
+from blocksim.kernels.geometry import turn
+from blocksim.kernels.sph.functions import support_radius
+
+try:
+    turn(1.0, 0.0, 0.1)
+except TypeError as error:
+    print(error)
+print(support_radius(0, 0.5))
+"""
+
+
+@pytest.mark.usefixtures("compiler")
+def test_kernels_that_python_cannot_call_say_so_instead_of_killing_the_process(tmp_path: Path) -> None:
+    words = python(CLOSED, folder=PACKAGE.parent, BLOCKSIM_CACHE_DIR=str(tmp_path))
+    message = "turn is compiled for other kernels only; BLOCKSIM_OPEN_KERNELS=1 lets Python call it too"
+    assert " ".join(words[:-1]) == message
+    assert float(words[-1]) == 1.0
+
+
+def test_open_and_closed_kernels_do_not_share_a_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(tmp_path))
+    folders = set()
+    for is_open in (True, False):
+        monkeypatch.setattr(jit, "IS_OPEN", is_open)
+        folders.add(jit.cache_folder.__wrapped__())
+    assert len(folders) == 2
