@@ -191,7 +191,7 @@ def idle_candidates(pair: Record) -> int:
     """
     twins = 0
     for k in range(16):
-        twins += (pair.twins >> k) & 1
+        twins += int(pair.twins >> k) & 1
     return max(0, int(pair.near) - int(pair.active) - twins)
 
 
