@@ -10,7 +10,7 @@ import numpy as np
 
 from blocksim.bench.measurement import Findings, Number, Setting, repeated
 from blocksim.bench.scenes import FRICTION, three_blocks
-from blocksim.simulation.ensemble import Ensemble
+from blocksim.simulation.ensemble import Ensemble, run_ensemble
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ THREADS = (1, 2)
 def measure(setting: Setting) -> Findings:
     """Advance the same members on one thread and on two."""
     members = scattered(QUICK_MEMBERS if setting.quick else MEMBERS)
+    run_ensemble(members[:1])  # compiles what single runs do not need
     rates = [_rates(members, threads, setting) for threads in THREADS]
     note = (
         f"{len(members)} members with friction scattered by {SCATTER:.0%}, stiffness_scale "
