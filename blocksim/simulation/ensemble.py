@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from blocksim.kernels.arrays import CACHE_LINE, PAIRS_FULL, World
+from blocksim.kernels.arrays import PAIRS_FULL, World, zeros
 from blocksim.kernels.energy import LEDGER_ROW
 from blocksim.kernels.ensemble import advance_members
 from blocksim.scenario import Scenario, place_bodies
@@ -90,11 +90,9 @@ def stack(worlds: Sequence[World]) -> World:
 def _stacked(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """Return arrays of one shape as one, whose memory starts on a cache line."""
     first = arrays[0]
-    memory = np.empty(len(arrays) * first.nbytes + CACHE_LINE, dtype=np.uint8)
-    begin = -memory.ctypes.data % CACHE_LINE
-    whole = memory[begin : begin + len(arrays) * first.nbytes].view(first.dtype).reshape(len(arrays), *first.shape)
+    whole = zeros((len(arrays), *first.shape), first.dtype).view(type(first))
     np.stack(arrays, out=whole)
-    return whole.view(type(first))
+    return whole
 
 
 def _member(worlds: World, m: int) -> World:

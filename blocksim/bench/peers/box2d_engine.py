@@ -9,15 +9,16 @@ would cut the motion of long steps short, ten times less would end bounces at 50
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from blocksim.bench.peers.packages import loaded
-from blocksim.bench.peers.scene import Final, Scene
+from blocksim.bench.peers.stepper import Stepper
 from blocksim.bench.scenes import FRICTION
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from blocksim.bench.peers.scene import Scene
 
 UNITS = 200.0  # a metre
 GRAVITY = 9.81  # m/s2
@@ -25,30 +26,17 @@ MASS = 1.0  # among equal blocks it has no influence
 GROUND_LENGTH, GROUND_DEPTH = 150.0, 1.0  # m
 
 
-@dataclass(frozen=True)
-class Box2D:
+class Box2D(Stepper):
     """One step length and numbers of iterations, for velocities and for positions."""
 
-    step: float  # s
-    iterations: int
+    units = UNITS
 
-    @property
-    def setting(self) -> str:
-        """For people."""
-        return f"step {1e3 * self.step:g} ms"
+    def call(self, world: Any) -> tuple[Callable[..., object], tuple[Any, ...]]:
+        """Return what is called for a step, and with what."""
+        return world.Step, (self.step, self.iterations, self.iterations)
 
-    def solve(self, scene: Scene) -> Final:
-        """Compute the scene. Not counted: making it."""
-        world, bodies = self._made(scene)
-        count = round(scene.end / self.step)
-        began = time.process_time()
-        for _ in range(count):
-            world.Step(self.step, self.iterations, self.iterations)
-        seconds = time.process_time() - began
-        x, y = np.array([body.position for body in bodies]).T / UNITS
-        return Final(x, y, seconds)
-
-    def _made(self, scene: Scene) -> tuple[Any, list[Any]]:
+    def made(self, scene: Scene) -> tuple[Any, list[Any]]:
+        """Return world and blocks, lengths in the engine's units."""
         box2d = loaded("Box2D")
         world = empty_world()
         # Friction of a pair is the root of the product, restitution the larger one.
@@ -90,12 +78,3 @@ def _mass_data(box2d: Any, half_x: float, half_y: float) -> Any:
     data.center = (0.0, 0.0)
     data.I = MASS * (half_x**2 + half_y**2) / 3.0
     return data
-
-
-def call_time(count: int = 20_000) -> float:
-    """Return the seconds that a call from Python costs where there is nothing to compute."""
-    world = empty_world()
-    began = time.process_time()
-    for _ in range(count):
-        world.Step(1e-3, 1, 1)
-    return (time.process_time() - began) / count

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blocksim.bench.measurement import Findings, Number, Setting, single
-from blocksim.bench.peers import box2d_engine, pymunk_engine
 from blocksim.bench.peers.blocksim_engine import Blocksim
-from blocksim.bench.peers.box2d_engine import Box2D
+from blocksim.bench.peers.box2d_engine import Box2D, empty_world
 from blocksim.bench.peers.packages import require_all
-from blocksim.bench.peers.pymunk_engine import Pymunk
+from blocksim.bench.peers.pymunk_engine import Pymunk, empty_space
 from blocksim.bench.peers.scene import Final, Scene, Series, Solver
+from blocksim.bench.peers.stepper import call_time
 from blocksim.bench.scenes import RESTITUTION, three_blocks
 from blocksim.view.work_precision import Curve, Panel
 
@@ -123,8 +123,8 @@ def settled(levels: list[Level]) -> list[Level]:
 def _calls() -> list[Number]:
     """Return what the others' figures hold of Python: one call a step, of an empty scene."""
     return [
-        single("pymunk: a call, empty scene", "µs", 1e6 * pymunk_engine.call_time()),
-        single("Box2D: a call, empty scene", "µs", 1e6 * box2d_engine.call_time()),
+        single("pymunk: a call, empty scene", "µs", 1e6 * call_time(Pymunk(1e-3, 1), empty_space())),
+        single("Box2D: a call, empty scene", "µs", 1e6 * call_time(Box2D(1e-3, 1), empty_world())),
     ]
 
 

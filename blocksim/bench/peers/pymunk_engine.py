@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-import time
-from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from blocksim.bench.peers.packages import loaded
-from blocksim.bench.peers.scene import Final, Scene
+from blocksim.bench.peers.stepper import Stepper
 from blocksim.bench.scenes import FRICTION
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from blocksim.bench.peers.scene import Scene
 
 # Overlap that is left alone so that contacts last. The default of 0.1 is a tenth of a pixel; here it would be 0.1 m.
 SLOP = 1e-6  # m
@@ -19,30 +20,14 @@ GROUND = ((-50.0, -1.0), (100.0, -1.0), (100.0, 0.0), (-50.0, 0.0))  # m
 MASS = 1.0  # kg; among equal blocks it has no influence
 
 
-@dataclass(frozen=True)
-class Pymunk:
+class Pymunk(Stepper):
     """One step length and number of iterations."""
 
-    step: float  # s
-    iterations: int
+    def call(self, world: Any) -> tuple[Callable[..., object], tuple[Any, ...]]:
+        """Return what is called for a step, and with what."""
+        return world.step, (self.step,)
 
-    @property
-    def setting(self) -> str:
-        """For people."""
-        return f"step {1e3 * self.step:g} ms"
-
-    def solve(self, scene: Scene) -> Final:
-        """Compute the scene. Not counted: making it."""
-        space, bodies = self._made(scene)
-        count = round(scene.end / self.step)
-        began = time.process_time()
-        for _ in range(count):
-            space.step(self.step)
-        seconds = time.process_time() - began
-        x, y = np.array([body.position for body in bodies]).T
-        return Final(x, y, seconds)
-
-    def _made(self, scene: Scene) -> tuple[Any, list[Any]]:
+    def made(self, scene: Scene) -> tuple[Any, list[Any]]:
         """Sleeping is off by default, and so is any damping of free motion.
 
         `collision_bias` stays as it is: a tenth of the overlap beyond the slop goes in a sixtieth of a second, by
@@ -76,12 +61,3 @@ def empty_space() -> Any:
     space.gravity = (0.0, -9.81)
     space.collision_slop = SLOP
     return space
-
-
-def call_time(count: int = 20_000) -> float:
-    """Return the seconds that a call from Python costs where there is nothing to compute."""
-    space = empty_space()
-    began = time.process_time()
-    for _ in range(count):
-        space.step(1e-3)
-    return (time.process_time() - began) / count
