@@ -10,6 +10,7 @@ import numpy as np
 
 from blocksim.bench.measurement import Findings, Number, Setting, repeated
 from blocksim.bench.scenes import FRICTION, three_blocks
+from blocksim.scenario.structures.base import draws
 from blocksim.simulation.ensemble import Ensemble, run_ensemble
 from blocksim.world.build import build_world
 
@@ -41,7 +42,7 @@ def measure(setting: Setting) -> Findings:
 
 def scattered(count: int) -> list[Scenario]:
     """Return three blocks with different friction."""
-    scatter = np.random.default_rng(SEED).uniform(-SCATTER, SCATTER, (count, len(FRICTION)))
+    scatter = SCATTER * (2.0 * draws(SEED, count, len(FRICTION)) - 1.0)
     values = np.array([*FRICTION.values()]) * (1.0 + scatter)
     frictions = (dict(zip(FRICTION, row, strict=True)) for row in values.tolist())
     return [three_blocks(LEVEL, {"safety": SAFETY}, friction) for friction in frictions]

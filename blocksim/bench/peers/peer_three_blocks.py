@@ -16,6 +16,7 @@ from blocksim.bench.peers.pymunk_engine import Pymunk, empty_space
 from blocksim.bench.peers.scene import Final, Scene, Series, Solver
 from blocksim.bench.peers.stepper import call_time
 from blocksim.bench.scenes import RESTITUTION, three_blocks
+from blocksim.scenario.structures.base import draws
 from blocksim.view.work_precision import Curve, Panel
 
 if TYPE_CHECKING:
@@ -71,8 +72,7 @@ def _stiffnesses(scales: tuple[float, ...], safety: float) -> tuple[Solver, ...]
 
 def starts(count: int) -> list[Scene]:
     """Return the scene with all blocks shifted at random by up to a micrometre."""
-    draws = np.random.Generator(np.random.PCG64(SEED)).random((count, 3))
-    return [Scene(three_blocks, JITTER * (2.0 * row - 1.0), RESTITUTION, END) for row in draws]
+    return [Scene(three_blocks, JITTER * (2.0 * row - 1.0), RESTITUTION, END) for row in draws(SEED, count, 3)]
 
 
 def measure(setting: Setting) -> Findings:

@@ -20,6 +20,7 @@ from blocksim.bench.peers.packages import require_all
 from blocksim.bench.peers.pymunk_engine import Pymunk
 from blocksim.bench.peers.scene import Final, Scene, Series, Solver
 from blocksim.bench.scenes import WALL_RESTITUTION, pushed_wall
+from blocksim.scenario.structures.base import draws
 from blocksim.view.work_precision import Curve, Panel
 
 if TYPE_CHECKING:
@@ -42,9 +43,8 @@ class Size(NamedTuple):
 
     def scene(self, shift: float = 0.0) -> Scene:
         """Return it with every block shifted at random by up to `shift` (m)."""
-        draws = np.random.Generator(np.random.PCG64(SEED)).random(self.columns * self.rows)
         make = functools.partial(pushed_wall, self.columns, self.rows)
-        return Scene(make, shift * (2.0 * draws - 1.0), WALL_RESTITUTION, self.end)
+        return Scene(make, shift * (2.0 * draws(SEED, self.columns * self.rows) - 1.0), WALL_RESTITUTION, self.end)
 
 
 FULL, SMALL = Size(40, 25, 1.0), Size(8, 5, 0.1)

@@ -1,7 +1,7 @@
 """What every kind of structure has in common."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, NamedTuple, Self
 
 import numpy as np
@@ -21,22 +21,24 @@ MAX_SEED = 2**32 - 1
 Floats = NDArray[np.float64]
 
 
-def _count(value: object) -> object:
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MAX_COUNT:
-        message = f"{q.shown(value)} is not a whole number from 1 to {MAX_COUNT}"
-        raise q.invalid(message)
-    return value
+def _whole(least: int, most: int) -> Callable[[object], object]:
+    """Return a check that a value is a whole number in a range."""
+
+    def check(value: object) -> object:
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            message = f"{q.shown(value)} is not a whole number from {least} to {most}"
+            raise q.invalid(message)
+        return value
+
+    return check
 
 
-def _seed(value: object) -> object:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MAX_SEED:
-        message = f"{q.shown(value)} is not a whole number from 0 to {MAX_SEED}"
-        raise q.invalid(message)
-    return value
-
-
-Count = Annotated[int, BeforeValidator(_count), Field(json_schema_extra={"minimum": 1, "maximum": MAX_COUNT})]
-Seed = Annotated[int, BeforeValidator(_seed), Field(json_schema_extra={"minimum": 0, "maximum": MAX_SEED})]
+Count = Annotated[
+    int, BeforeValidator(_whole(1, MAX_COUNT)), Field(json_schema_extra={"minimum": 1, "maximum": MAX_COUNT})
+]
+Seed = Annotated[
+    int, BeforeValidator(_whole(0, MAX_SEED)), Field(json_schema_extra={"minimum": 0, "maximum": MAX_SEED})
+]
 
 
 class Pose(NamedTuple):
