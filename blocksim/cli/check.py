@@ -127,6 +127,7 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
     return [
         *_motion(description.motion),
         f"boundary   {description.particles} particles ({_use_of_particles(scenario.contact)})",
+        f"neighbours are listed up to {MILLI * description.skin:.3g} mm apart",
         f"time step  {description.step:.3e} s, at most {description.steps} steps",
         f"solving    at most about {_duration(description.seconds)} on one core",
         f"memory     at most about {readable(description.memory)}",

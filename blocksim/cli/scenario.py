@@ -7,14 +7,17 @@ from pathlib import Path
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.findings import Finding
+from blocksim.world.skin import SkinTooSmallError
 from blocksim.world.step import StepError
 
 
 @contextmanager
 def read_scenario(path: Path, settings: Sequence[str]) -> Iterator[Scenario]:
-    """Give the validated scenario; a step that turns out not to fit is shown where it was written."""
+    """Give the validated scenario; a step or skin that turns out not to fit is shown where it was written."""
     document = Document.read(path).with_settings(settings)
     try:
         yield document.build()
     except StepError as error:
         raise ScenarioError([document.problem(Finding(("time", "step"), str(error)))]) from None
+    except SkinTooSmallError as error:
+        raise ScenarioError([document.problem(Finding(("contact", "skin"), str(error)))]) from None

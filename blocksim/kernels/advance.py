@@ -1,74 +1,29 @@
-"""The time loop between two outputs, in one compiled call."""
+"""The time loop between two outputs, in one compiled call for every thread."""
 
 import math
 
 from blocksim.kernels.arrays import (
     AT_REST,
-    GROUP,
     NOT_FINITE,
     OVERLAP_LIMIT,
     PAIRS_FULL,
     REACHED,
+    STATUS,
+    TEAM_SIZE,
     Record,
     Records,
     World,
 )
-from blocksim.kernels.contact import pair_forces
 from blocksim.kernels.energy import has_excessive_overlap, weights_power
-from blocksim.kernels.integrate import (
-    accelerate_and_kick,
-    go_on,
-    kick_and_drift,
-    kinetic_energy,
-    place_all_corners,
-    renew_rotations,
-)
+from blocksim.kernels.forces import forces_between, forces_within
+from blocksim.kernels.integrate import kinetic_energy, place_all_corners, renew_rotations, start_all
 from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
-from blocksim.kernels.steady import steady_forces
-from blocksim.kernels.support import book_support, is_support_at_rest, move_support
+from blocksim.kernels.shares import add_from_before, divide
+from blocksim.kernels.support import book_support, has_motion, is_support_at_rest, move_support
+from blocksim.kernels.team import meet
 from blocksim.kernels.travel import look
 
-
-@kernel
-def has_motion(controls: Record) -> bool:
-    """Tell whether the support moves at all."""
-    return controls.motion_x != 0.0 or controls.motion_y != 0.0
-
-
-@kernel
-def group_forces(world: World, first: int, last: int, step: float, book: Record) -> None:
-    """Evaluate the contacts of the pairs from `first` to before `last`; what they lose goes into one book."""
-    dashpot = 0.0
-    friction = 0.0
-    for p in range(first, last):
-        is_steady, lost, rubbed = steady_forces(world, p, step, world.particles)
-        dashpot += lost
-        friction += rubbed
-        if not is_steady:
-            pair_forces(world, p, step, book)
-    book.dashpot += dashpot
-    book.friction += friction
-
-
-@kernel
-def contact_forces(world: World, step: float) -> None:
-    """Evaluate all contacts at the present positions.
-
-    `step` is the length (s) of the drift that led here, zero at the start.
-    """
-    count = world.clock[0].pair_count
-    for first in range(0, count, GROUP):
-        group_forces(world, first, min(first + GROUP, count), step, world.ledger[first // GROUP])
-    if has_motion(world.controls[0]):
-        book_support(world, step)
-
-
-@kernel
-def begin_step(world: World, step: float) -> None:
-    """Bring everything to the end of the drift."""
-    kick_and_drift(world.bodies, step)
-    if has_motion(world.controls[0]):
-        move_support(world, step)
+LOOK, CHECK, MOVE, BOOK = range(4)  # what one thread does for all
 
 
 @rare_kernel
@@ -114,7 +69,143 @@ def check(world: World) -> int:
     return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
 
 
+@rare_kernel
+def look_ahead(world: World) -> int:
+    """Look after the pair list; return PAIRS_FULL where it does not fit, else REACHED."""
+    rebuilds = world.clock[0].rebuilds
+    if not look(world):
+        return PAIRS_FULL
+    if world.clock[0].rebuilds != rebuilds:
+        divide(world, world.team[TEAM_SIZE])
+    return REACHED
+
+
+@rare_kernel
+def supervise(world: World, k: int, task: int, step: float) -> int:
+    """Let the first thread do something for all while the others wait; return the status code that all go by."""
+    meet(world.team)
+    if k == 0:
+        world.clock[0].steps = world.shares[0].steps
+        world.team[STATUS] = REACHED
+        if task == LOOK:
+            world.team[STATUS] = look_ahead(world)
+        elif task == CHECK:
+            world.team[STATUS] = check(world)
+        elif task == MOVE:
+            move_support(world, step)
+        else:
+            book_support(world, step)
+    meet(world.team)
+    return world.team[STATUS]
+
+
+@rare_kernel
+def exchange_forces(world: World, k: int, step: float) -> None:
+    """Evaluate the pairs between shares, everyone some of them, and add what comes from shares before."""
+    forces_between(world, world.shares[k], step)
+    meet(world.team)
+    add_from_before(world, world.shares[k])
+
+
+@rare_kernel
+def open_call(world: World, k: int, last_step: int) -> None:
+    """Get ready for the steps of one call."""
+    clock = world.clock[0]
+    if k == 0:
+        if clock.is_started == 0:
+            place_all_corners(world.bodies)
+        divide(world, world.team[TEAM_SIZE])
+    meet(world.team)
+    every = world.controls[0].check_every
+    share = world.shares[k]
+    share.steps = clock.steps
+    share.is_started = clock.is_started
+    share.last_step = last_step
+    share.next_check = (clock.steps // every + 1) * every
+    share.until = 0
+    share.status = REACHED
+
+
+@rare_kernel
+def close_call(world: World, k: int) -> int:
+    """Note how far the run is and return its status code, once all threads are done."""
+    share = world.shares[k]
+    meet(world.team)
+    if k == 0:
+        world.clock[0].steps = share.steps
+        world.clock[0].is_started = share.is_started
+    return share.status
+
+
+@rare_kernel
+def begin_steps(world: World, k: int, step: float) -> bool:
+    """Start a step of `step` (s), and fix up to which one nothing has to be looked at; tell whether the run goes on."""
+    share = world.shares[k]
+    if share.steps >= world.clock[0].next_look:
+        share.status = supervise(world, k, LOOK, step)
+        if share.status != REACHED:
+            return False
+    start_all(world.bodies, share.first_body, share.last_body, step)
+    if has_motion(world.controls[0]):
+        supervise(world, k, MOVE, step)
+        return True
+    meet(world.team)
+    if share.is_started != 0:
+        share.until = min(share.last_step, share.next_check, world.clock[0].next_look)
+    return True
+
+
+@rare_kernel
+def end_steps(world: World, k: int, step: float) -> bool:
+    """Look at what has to be looked at after some steps; tell whether the run goes on."""
+    share = world.shares[k]
+    if has_motion(world.controls[0]):
+        supervise(world, k, BOOK, step)
+    if share.steps == share.next_check:
+        share.next_check += world.controls[0].check_every
+        share.status = supervise(world, k, CHECK, step)
+    return share.status == REACHED
+
+
+@rare_kernel
+def march(world: World, last_step: int, k: int) -> int:
+    """Be thread k of those that step a world until `last_step`, or until something ends the run."""
+    open_call(world, k, last_step)
+    share = world.shares[k]
+    is_team = world.team[TEAM_SIZE] > 1
+    while share.steps < last_step or share.is_started == 0:
+        step = world.controls[0].step if share.is_started else 0.0
+        if share.steps >= share.until and not begin_steps(world, k, step):
+            break
+        share.steps += share.is_started
+        share.is_started = 1
+        goes_on = share.steps < share.until
+        if is_team:
+            exchange_forces(world, k, step)
+        forces_within(world, share, step, goes_on)
+        if goes_on:
+            meet(world.team)
+        elif not end_steps(world, k, step):
+            break
+    return close_call(world, k)
+
+
+@kernel
+def march_alone(world: World, last_step: int) -> int:
+    """Step a world with one thread; see advance."""
+    world.team[TEAM_SIZE] = 1
+    return march(world, last_step, 0)
+
+
 @entry_kernel
+def advance_in_team(world: World, last_step: int, k: int) -> int:
+    """Be thread k of the world.team[TEAM_SIZE] that advance one world together; see advance. All get the same answer.
+
+    Every thread comes with work space of its own (points, matrices, before, action) and shares all other arrays.
+    """
+    return march(world, last_step, k)
+
+
 def advance(world: World, last_step: int) -> int:
     """Step until `last_step` or until something ends the run; return one of the status codes of arrays.py.
 
@@ -123,30 +214,5 @@ def advance(world: World, last_step: int) -> int:
     depend on where outputs interrupt it. PAIRS_FULL returns before anything has moved: give the lists more room and
     call again.
     """
-    controls = world.controls[0]
-    clock = world.clock[0]
-    next_check = (clock.steps // controls.check_every + 1) * controls.check_every
-    if clock.is_started == 0:
-        place_all_corners(world.bodies)
-    has_begun = False
-    while clock.steps < last_step or clock.is_started == 0:
-        step = controls.step if clock.is_started else 0.0
-        if not has_begun:
-            if clock.steps >= clock.next_look and not look(world):
-                return PAIRS_FULL
-            begin_step(world, step)
-        contact_forces(world, step)
-        clock.steps += clock.is_started
-        has_begun = clock.is_started and clock.steps < min(last_step, next_check, clock.next_look)
-        clock.is_started = 1
-        if has_begun and not has_motion(controls):
-            go_on(world.bodies, controls, step)
-            continue
-        has_begun = False
-        accelerate_and_kick(world.bodies, controls, step)
-        if clock.steps == next_check:
-            next_check += controls.check_every
-            status = check(world)
-            if status != REACHED:
-                return status
-    return REACHED
+    world.team[TEAM_SIZE] = 1
+    return int(advance_in_team(world, last_step, 0))

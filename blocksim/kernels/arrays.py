@@ -30,7 +30,7 @@ Record = Any  # one element of Records: a pointer in compiled code, numpy.record
 SLOTS = 8  # of a pair in the surface model
 HALF = SLOTS // 2  # slots of each body's corners
 CONTACTS = 2  # of a pair in the surface model, see models/surface.py
-GROUP = 64  # pairs that share one book of the ledger
+GROUP = 16  # bodies whose pairs share one book of the ledger
 CACHE_LINE = 64  # bytes
 NO_FACE = -1
 ALL = 15  # bits of all four faces or corners
@@ -39,40 +39,62 @@ ALL = 15  # bits of all four faces or corners
 REACHED, AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL = range(5)
 
 
-def record_type(floats: str, counters: str = "", indices: str = "", small: str = "") -> np.dtype[np.void]:
-    """Return a dtype from space-separated names: 8-byte floats, 8-byte integers, 4-byte indices, 2-byte counts.
+def record_type(
+    floats: str, counters: str = "", indices: str = "", small: str = "", flags: str = ""
+) -> np.dtype[np.void]:
+    """Return a dtype from space-separated names: 8-byte floats and integers, 4-, 2- and 1-byte counts.
 
-    Indices and small counts are unsigned: compiled code then need not look for negative ones, which count from the end.
+    Indices and counts are unsigned: compiled code then need not look for negative ones, which count from the end.
     """
     kinds: list[tuple[str, type]] = [
         (floats, np.float64),
         (counters, np.int64),
         (indices, np.uint32),
         (small, np.uint16),
+        (flags, np.uint8),
     ]
     fields = [(name, kind) for names, kind in kinds for name in names.split()]
     return np.dtype(fields, align=True)
 
 
-BODY = record_type(
-    "x y angle "  # m, m, rad: centre and total turned angle of the body axes, never wrapped
-    "cos sin "  # of angle, advanced beside it and renewed at fixed steps
-    "upper_x upper_y lower_x lower_y "  # m: from the centre to the upper and the lower right corner, world axes
-    "vx vy spin "  # m/s, m/s, rad/s
-    "ax ay spin_rate "  # m/s2, m/s2, rad/s2: of the last force evaluation
-    "fx fy torque "  # N, N, N m: contact totals of the evaluation under way
-    "half_x half_y radius "  # m: half sides along the body's own axes, half diagonal
-    "inverse_mass inverse_inertia "  # 1/kg, 1/(kg m2): zero for fixed bodies and the ground
-    "mass inertia "  # kg, kg m2 about the centre, out of the plane: zero for fixed bodies too
-    "list_x list_y list_angle "  # m, m, rad: where the body was when the pair list was made
-    "base_x base_y "  # m: where a body that moves with the support was at the start
-    "before_fx before_fy",  # N: contact totals on it in the evaluation before
-    indices="contact_class "  # index into the interaction table; class 0 is the ground
-    "first_particle particle_count",  # its part of the particles
-    small="pairs_now pairs_before pairs_changed "  # pairs in contact in this evaluation and the one before; flag
-    "faces corners "  # bits of those that can touch; pieces of ground have their upper face and its free ends
-    "is_moved "  # flag: moves with the support
-    "row_x row_y",  # intervals between particles on the faces along x and along y
+def joined(*types: np.dtype[np.void]) -> np.dtype[np.void]:
+    """Return a dtype with the fields of several, one after the other."""
+    return np.dtype([(name, one[name]) for one in types for name in one.names or ()], align=True)
+
+
+def on_own_lines(one: np.dtype[np.void]) -> np.dtype[np.void]:
+    """Return a dtype with the same fields whose records share no cache line: threads write to them all the time."""
+    names = one.names or ()
+    size = -(-one.itemsize // CACHE_LINE) * CACHE_LINE
+    offsets = [one.fields[name][1] for name in names] if one.fields else []
+    return np.dtype({"names": names, "formats": [one[name] for name in names], "offsets": offsets, "itemsize": size})
+
+
+# Four cache lines, of which a step needs the first three.
+BODY = joined(
+    record_type(
+        "x y angle "  # m, m, rad: centre and total turned angle of the body axes, never wrapped
+        "cos sin "  # of angle, advanced beside it and renewed at fixed steps
+        "upper_x upper_y lower_x lower_y "  # m: from the centre to the upper and the lower right corner, world axes
+        "vx vy spin "  # m/s, m/s, rad/s
+        "ax ay spin_rate "  # m/s2, m/s2, rad/s2: of the last force evaluation
+        "fx fy torque "  # N, N, N m: contact totals of the evaluation under way
+        "half_x half_y "  # m: half sides along the body's own axes
+        "inverse_mass inverse_inertia",  # 1/kg, 1/(kg m2): zero for fixed bodies and the ground
+        indices="contact_class",  # index into the interaction table; class 0 is the ground
+        small="pairs_now pairs_before",  # pairs in contact in this evaluation and the one before
+        flags="pairs_changed "  # flag: those two differ
+        "faces corners "  # bits of those that can touch; pieces of ground have their upper face and its free ends
+        "is_moved "  # flag: moves with the support
+        "counts",  # flag: forces on it matter, as it is free or moves with the support
+    ),
+    record_type(
+        "radius "  # m: half diagonal
+        "mass inertia "  # kg, kg m2 about the centre, out of the plane: zero for fixed bodies too
+        "list_x list_y list_angle",  # m, m, rad: where the body was when the pair list was made
+        indices="first_particle particle_count",  # its part of the particles
+        small="row_x row_y",  # intervals between particles on the faces along x and along y
+    ),
 )
 PARTICLE = record_type(
     "x y "  # m: place in the body frame
@@ -85,9 +107,12 @@ PAIR = record_type(
     "",
     indices="a b",  # bodies, sorted
     small="near active "  # number of candidate slots; of contacts
-    "idle "  # candidates that are neither in contact nor a twin
-    "twins "  # bits of the slots whose corner is in touch, but marks the same end of a face contact as another one
-    "axis",  # along which the two were apart when last looked at; 0, 1: x, y of body b, 2, 3: of body a
+    "idle",  # candidates that are neither in contact nor a twin
+    flags="twins "  # bits of the slots whose corner is in touch, but marks the same end of a face contact as another
+    "axis "  # along which the two were apart when last looked at; 0, 1: x, y of body b, 2, 3: of body a
+    "is_between "  # flag: its bodies are of two shares
+    "normal_left shear_left "  # steps until the dashpots along normals and tangents are made anew
+    "sticking",  # bits of the points that have a dashpot along the tangent
 )
 CONTACT = record_type(
     "spring depth "  # m: shear spring, overlap
@@ -122,7 +147,6 @@ POINT = record_type(
 OPERATOR = record_type(
     "e_one e_mixed e_two "  # N s/m: dashpot force of points one and two per free rate of each
     "h_one h_mixed h_two",  # m/(s N): half a step times the inverse masses, change of rate per change of force
-    indices="left pattern",  # steps until it is made anew; bits of the points that have a dashpot
 )
 NORMAL, SHEAR = 0, 1
 CONTROLS = record_type(
@@ -142,6 +166,36 @@ CLOCK = record_type(
     "is_started",  # flag
 )
 LEDGER = record_type("dashpot friction broken to_support travel_work largest_kinetic")  # J
+ACTION = record_type(
+    "fx fy torque_a torque_b "  # N, N m: force of a pair on body a and its torque; torque on b is against torque_b
+    "dashpot friction broken",  # J: lost in the drift that led here
+    indices="pair",  # its number
+    flags="touches is_changed",  # whether it has contacts; whether they have changed
+)
+SHARE = on_own_lines(
+    record_type(
+        "",
+        "steps last_step "  # how far the thread of this share is, and how far it is to go in this call
+        "until "  # step up to which steps follow upon one another, with nothing to be looked at between them
+        "next_check "  # step
+        "is_started status",  # flag; status code that it has come to
+        # all of these from the first one to before the last one
+        indices="first_body last_body "
+        "first_pair last_pair "  # those whose body a is of the share
+        "first_between last_between "  # those of them whose body b is of another share, among all such
+        "next_pair next_between "  # where the evaluation of those is
+        "first_task last_task",  # pairs between shares that this thread evaluates
+    )
+)
+# words of World.team, each on a cache line of its own: how many threads take part, have arrived at the meeting under
+# way, how many meetings there were, the status code that all of them go by
+TEAM_SIZE, ARRIVED, MEETINGS, STATUS = 0, 8, 16, 24
+TEAM_WORDS = 32
+MOVED = record_type(
+    "x y "  # m: where a body that moves with the support was at the start
+    "fx fy",  # N: contact totals on it in the evaluation before
+    indices="body",
+)
 MOTION_PIECE = record_type("start c0 c1 c2 c3")  # s, m, m/s ...: c0 + c1 t + c2 t^2 + c3 t^3 with t from the start
 
 
@@ -162,12 +216,17 @@ class World(NamedTuple):
     links: Any  # (n,) uint32: the next body of the same bucket, numbers from 1
     large: Any  # (l,) uint32: bodies too large for the grid, sorted
     neighbours: Any  # (n + 1,) uint32, work space of the broad phase
+    action: Records  # (1,) ACTION, work space of one pair
     before: Records  # (c,) CONTACT or PARTICLE_CONTACT, work space of one pair whose contacts change
     matrices: Floats  # (8, 3, 3) work space of one pair
+    moved: Records  # (f,) MOVED, all bodies that move with the support
     motion: Records  # (m,) MOTION_PIECE, displacement of the support over time
     controls: Records  # (1,) CONTROLS
     clock: Records  # (1,) CLOCK
-    ledger: Records  # (g,) LEDGER, one for each group of pairs; what is not of pairs is in the first one
+    ledger: Records  # (g,) LEDGER, one for each group of bodies; what is not of pairs is in the first one
+    shares: Records  # (t,) SHARE, one for each thread
+    between: Records  # (1,) or, with threads, (p,) ACTION of the pairs whose bodies are of two shares, sorted
+    team: Integers  # (32,) what threads tell one another
 
 
 def zeros(shape: int | tuple[int, ...], dtype: np.dtype[np.void]) -> Records:

@@ -11,6 +11,7 @@ from blocksim.kernels.arrays import NORMAL, SHEAR, Integers, Record, World
 from blocksim.kernels.geometry import ground_gap, separation
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.models import near_slots
+from blocksim.kernels.support import has_motion
 
 FARTHEST_CELL = 1e9  # bodies beyond it share cells
 PRIME_COLUMN, PRIME_ROW = 73856093, 19349663  # M. Teschner et al., Proc. VMV (2003) 47-54
@@ -41,6 +42,8 @@ def add_pair(world: World, count: int, a: int, b: int) -> int:
         pair.active = 0
         pair.twins = 0
         pair.axis = 0
+        pair.normal_left = 0
+        pair.shear_left = 0
     return count + 1 if near > 0 else count
 
 
@@ -114,10 +117,11 @@ def neighbours_of(world: World, i: int) -> int:
     if body.radius > controls.cell_radius:
         return neighbours_of_large(world, i)
     count = 0
-    for column in range(-1, 2):
-        for row in range(-1, 2):
-            x = cell_of(body.x, controls.cell_width) + column
-            count = neighbours_in_cell(world, i, x, cell_of(body.y, controls.cell_width) + row, count)
+    column = cell_of(body.x, controls.cell_width)
+    row = cell_of(body.y, controls.cell_width)
+    for x in range(column - 1, column + 2):
+        for y in range(row - 1, row + 2):
+            count = neighbours_in_cell(world, i, x, y, count)
     for j in world.large:
         if j > i and are_near(body, world.bodies[j], controls.skin):
             count = insert_sorted(world.neighbours, count, j)
@@ -175,6 +179,9 @@ def carry_history(world: World, count: int) -> None:
             if world.pairs[q].active > 0:
                 new.active = world.pairs[q].active
                 new.twins = world.pairs[q].twins
+                new.normal_left = world.pairs[q].normal_left
+                new.shear_left = world.pairs[q].shear_left
+                new.sticking = world.pairs[q].sticking
                 move_contacts(world, q, kept, new.active)
                 kept += 1
     for p in range(count - 1, -1, -1):
@@ -206,9 +213,6 @@ def rebuild_pairs(world: World) -> bool:
         pair = world.pairs[p]
         world.pairs[p] = world.spare_pairs[p]
         pair.idle = idle_candidates(pair)
-        if pair.active == 0:
-            world.operators[p, NORMAL].left = 0
-            world.operators[p, SHEAR].left = 0
         for k in range(pair.near):
             world.candidates[p, k] = world.spare_candidates[p, k]
     for i in range(world.bodies.size):
@@ -216,6 +220,7 @@ def rebuild_pairs(world: World) -> bool:
         body.list_x = body.x
         body.list_y = body.y
         body.list_angle = body.angle
+        body.counts = body.inverse_mass > 0.0 or (body.is_moved != 0 and has_motion(world.controls[0]))
     world.clock[0].pair_count = count
     world.clock[0].rebuilds += 1
     return True

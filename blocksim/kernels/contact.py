@@ -10,7 +10,19 @@ go on as they were, which is what nearly all pairs do at nearly all steps.
 
 from blocksim.kernels.arrays import NORMAL, SHEAR, Record, World
 from blocksim.kernels.coupled import MOBILITY, add_coupled_dashpots, fill_mobility
-from blocksim.kernels.damping import BOTH, damp_one, damp_two, fill_alike, fill_different, fill_single, keep_masses
+from blocksim.kernels.damping import (
+    BOTH,
+    OPERATOR_LIFE,
+    are_dashpots_due,
+    damp_one,
+    damp_two,
+    fill_alike,
+    fill_different,
+    fill_single,
+    keep_dashpots,
+    keep_masses,
+    renew_dashpots,
+)
 from blocksim.kernels.friction import clip_to_cone, draw_spring
 from blocksim.kernels.history import change_contacts, keep_places
 from blocksim.kernels.jit import kernel, rare_kernel
@@ -54,8 +66,7 @@ def spare_lost_faces(world: World, p: int, count: int) -> None:
         point = world.points[i]
         if point.beside < IMPACT_STEPS * abs(point.closing):
             point.weight = 0.0
-            world.operators[p, NORMAL].left = 0
-            world.operators[p, SHEAR].left = 0
+            renew_dashpots(world.pairs[p])
 
 
 @kernel
@@ -87,10 +98,8 @@ def damp(world: World, p: int, count: int, direction: int, pattern: int, ratio: 
         damp_many(world, p, count, direction, ratio, step)
         return
     operator = world.operators[p, direction]
-    if operator.left == 0:
+    if are_dashpots_due(world.pairs[p], direction):
         fill_operator(world, p, count, direction, pattern, ratio, step)
-    else:
-        operator.left -= 1
     one = world.points[0]
     if count == 1:
         one.force = damp_one(operator, one.force, one.before, one.rate)
@@ -112,7 +121,7 @@ def fill_operator(world: World, p: int, count: int, direction: int, pattern: int
     m_one = mutual_mass(one, one, a, b, direction)
     m_mixed = mutual_mass(one, two, a, b, direction)
     m_two = mutual_mass(two, two, a, b, direction)
-    keep_masses(operator, pattern, half, m_one, m_mixed, m_two)
+    keep_masses(operator, half, m_one, m_mixed, m_two)
     if pattern == 1:
         fill_single(operator, 0, ratio, half, m_one, one.stiffness, one.weight)
     elif pattern != BOTH:
@@ -122,8 +131,8 @@ def fill_operator(world: World, p: int, count: int, direction: int, pattern: int
         fill_alike(operator, g, half, m_one, m_mixed, m_two)
     else:
         fill_different(operator, ratio, half, m_one, m_mixed, m_two, one, two)
-    if one.weight != 1.0 or two.weight != 1.0:
-        operator.left = 0
+    lasts = half > 0.0 and one.weight == 1.0 and two.weight == 1.0
+    keep_dashpots(pair, direction, pattern, OPERATOR_LIFE if lasts else 0)
 
 
 @rare_kernel
@@ -203,9 +212,9 @@ def draw_springs(world: World, p: int, count: int, values: Record, book: Record)
 def shear_pass(world: World, p: int, count: int, values: Record, step: float, book: Record) -> None:
     """Clip the normal forces; springs with history along the tangents and dashpots where a point sticks."""
     sticking = draw_springs(world, p, count, values, book)
-    operator = world.operators[p, SHEAR]
-    if operator.pattern != sticking or sticking == 0:
-        operator.left = 0
+    pair = world.pairs[p]
+    if pair.sticking != sticking or sticking == 0:
+        pair.shear_left = 0
     if sticking > 0 and values.shear_damping > 0.0:
         damp(world, p, count, SHEAR, sticking, values.shear_damping, step)
     for i in range(count):
@@ -217,59 +226,56 @@ def shear_pass(world: World, p: int, count: int, values: Record, step: float, bo
 
 
 @rare_kernel
-def force_pass(world: World, p: int, count: int) -> None:
-    """Add all forces of the pair to the totals of both bodies.
+def force_pass(world: World, count: int, action: Record) -> None:
+    """Sum all forces of the pair.
 
     `force` is the resistance to slip of a ahead of b, along the tangent (-ny, nx).
     """
-    pair = world.pairs[p]
-    fx = 0.0
-    fy = 0.0
-    torque_a = 0.0
-    torque_b = 0.0
     for i in range(count):
         point = world.points[i]
-        fx += point.nx * point.normal_force + point.ny * point.force
-        fy += point.ny * point.normal_force - point.nx * point.force
-        torque_a += point.normal_arm_a * point.normal_force - point.shear_arm_a * point.force
-        torque_b += point.normal_arm_b * point.normal_force - point.shear_arm_b * point.force
-    add_totals(world.bodies[pair.a], world.bodies[pair.b], fx, fy, torque_a, torque_b)
-
-
-@kernel
-def add_totals(a: Record, b: Record, fx: float, fy: float, torque_a: float, torque_b: float) -> None:
-    """Add the force (N) of a pair on body a, and the torques (N m) on a and against b, to the totals of both."""
-    a.fx += fx
-    a.fy += fy
-    a.torque += torque_a
-    a.pairs_now += 1
-    b.fx -= fx
-    b.fy -= fy
-    b.torque -= torque_b
-    b.pairs_now += 1
+        action.fx += point.nx * point.normal_force + point.ny * point.force
+        action.fy += point.ny * point.normal_force - point.nx * point.force
+        action.torque_a += point.normal_arm_a * point.normal_force - point.shear_arm_a * point.force
+        action.torque_b += point.normal_arm_b * point.normal_force - point.shear_arm_b * point.force
+    action.touches = 1
 
 
 @rare_kernel
-def pair_forces(world: World, p: int, step: float, book: Record) -> None:
-    """Find the contact points of pair p and add their forces to the totals of its bodies.
+def clear_action(action: Record) -> None:
+    """Set all sums to zero."""
+    action.fx = 0.0
+    action.fy = 0.0
+    action.torque_a = 0.0
+    action.torque_b = 0.0
+    action.dashpot = 0.0
+    action.friction = 0.0
+    action.broken = 0.0
+    action.touches = 0
+    action.is_changed = 1
+
+
+@rare_kernel
+def pair_forces(world: World, p: int, step: float) -> None:
+    """Find the contact points of pair p and write what it does into world.action.
 
     `step` is the length (s) of the drift that led here, zero for a first evaluation before any motion.
     """
     pair = world.pairs[p]
+    action = world.action[0]
+    clear_action(action)
     count = contact_points(world, p)
     if count == 0:
         if pair.active > 0:
-            change_contacts(world, p, 0, step, book)
+            change_contacts(world, p, 0, step, action)
         return
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
     values = world.interactions[a.contact_class, b.contact_class]
     if has_new_neighbours(a, b) or not has_constant_stiffness(world.controls[0].law):
-        world.operators[p, NORMAL].left = 0
-        world.operators[p, SHEAR].left = 0
-    resolve_points(world, p, count, step, book)
+        renew_dashpots(pair)
+    resolve_points(world, p, count, step, action)
     shared = shared_step(a, b, step)
     normal_pass(world, p, count, values, shared)
-    shear_pass(world, p, count, values, shared, book)
-    force_pass(world, p, count)
+    shear_pass(world, p, count, values, shared, action)
+    force_pass(world, count, action)
     keep_places(world, p, count)

@@ -14,7 +14,7 @@ stable as an implicit dashpot.
 
 import math
 
-from blocksim.kernels.arrays import Record
+from blocksim.kernels.arrays import NORMAL, Record
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.matrices import RANK_TOLERANCE, inverse_root_2
 
@@ -106,10 +106,38 @@ def fill_different(
 
 
 @kernel
-def keep_masses(operator: Record, pattern: int, half: float, a: float, b: float, d: float) -> None:
-    """Note in an operator which points it is for, and half a step (s) times the inverse masses [[a, b], [b, d]]."""
-    operator.pattern = pattern
+def keep_masses(operator: Record, half: float, a: float, b: float, d: float) -> None:
+    """Note in an operator half a step (s) times the inverse masses [[a, b], [b, d]] (1/kg)."""
     operator.h_one = half * a
     operator.h_mixed = half * b
     operator.h_two = half * d
-    operator.left = OPERATOR_LIFE if half > 0.0 else 0
+
+
+@kernel
+def renew_dashpots(pair: Record) -> None:
+    """Have all operators of a pair made anew when they are needed next."""
+    pair.normal_left = 0
+    pair.shear_left = 0
+
+
+@kernel
+def are_dashpots_due(pair: Record, direction: int) -> bool:
+    """Tell whether an operator of a pair has to be made anew before it is used now; if not, count down."""
+    left = pair.normal_left if direction == NORMAL else pair.shear_left
+    if left == 0:
+        return True
+    if direction == NORMAL:
+        pair.normal_left = left - 1
+    else:
+        pair.shear_left = left - 1
+    return False
+
+
+@kernel
+def keep_dashpots(pair: Record, direction: int, pattern: int, left: int) -> None:
+    """Note for how many steps an operator of a pair holds, and the bits of the points that have a dashpot in it."""
+    if direction == NORMAL:
+        pair.normal_left = left
+    else:
+        pair.shear_left = left
+        pair.sticking = pattern

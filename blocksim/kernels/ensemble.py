@@ -1,6 +1,6 @@
 """Many copies of one scene with different numbers in them, one after the other in one compiled call."""
 
-from blocksim.kernels.advance import advance
+from blocksim.kernels.advance import march_alone
 from blocksim.kernels.arrays import PAIRS_FULL, Floats, Integers, Records, World
 from blocksim.kernels.energy import measure
 from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
@@ -32,12 +32,17 @@ def member(worlds: World, m: int) -> World:
         worlds.links[m],
         worlds.large[m],
         worlds.neighbours[m],
+        worlds.action[m],
         worlds.before[m],
         worlds.matrices[m],
+        worlds.moved[m],
         worlds.motion[m],
         worlds.controls[m],
         worlds.clock[m],
         worlds.ledger[m],
+        worlds.shares[m],
+        worlds.between[m],
+        worlds.team[m],
     )
 
 
@@ -51,7 +56,7 @@ def advance_members(worlds: World, members: Integers, last_steps: Integers, star
     """
     for m in members:
         world = member(worlds, m)
-        codes[m] = advance(world, 0)
+        codes[m] = march_alone(world, 0)
         if codes[m] != PAIRS_FULL:
             measure(world, starts[m])
-            codes[m] = advance(world, last_steps[m])
+            codes[m] = march_alone(world, last_steps[m])

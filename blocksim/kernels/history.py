@@ -5,8 +5,9 @@ another face; what its springs hold is then lost and booked. Where two corners p
 exactly aligned), the contact itself goes on under another corner, and its history goes with it.
 """
 
-from blocksim.kernels.arrays import NORMAL, SHEAR, Record, Records, World
+from blocksim.kernels.arrays import Record, Records, World
 from blocksim.kernels.broad_phase import idle_candidates
+from blocksim.kernels.damping import renew_dashpots
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.kinematics import has_just_begun, resolve_point, weigh_first_step
 from blocksim.kernels.memory import normal_loss, shear_loss, shear_stiffness_before
@@ -114,8 +115,7 @@ def change_contacts(world: World, p: int, count: int, step: float, book: Record)
     for j in range(before):
         if world.before[j].slot != TAKEN:
             release(world, p, world.before[j], step, book)
-    world.operators[p, NORMAL].left = 0
-    world.operators[p, SHEAR].left = 0
+    renew_dashpots(pair)
     pair.active = count
     pair.idle = idle_candidates(pair)
 

@@ -26,9 +26,9 @@ def start_step(body: Record, step: float) -> None:
 
 
 @kernel
-def kick_and_drift(bodies: Records, step: float) -> None:
-    """Start a step of all bodies."""
-    for i in range(bodies.size - 1):
+def start_all(bodies: Records, first: int, last: int, step: float) -> None:
+    """Start a step of the bodies from `first` to before `last`; the ground, the last of all, never moves by itself."""
+    for i in range(first, min(last, bodies.size - 1)):
         start_step(bodies[i], step)
 
 
@@ -53,7 +53,7 @@ def renew_rotations(bodies: Records) -> None:
 def finish_step(body: Record, controls: Record, step: float) -> None:
     """Turn gravity and contact totals of a body into accelerations, advance its velocities by half a step with them.
 
-    Fixed bodies and the ground have no acceleration. Clears the totals.
+    Clears the totals. Fixed bodies and the ground have no acceleration; their totals are the support's affair.
     """
     half = 0.5 * step
     if body.inverse_mass > 0.0:
@@ -65,26 +65,10 @@ def finish_step(body: Record, controls: Record, step: float) -> None:
         body.spin += half * body.spin_rate
         body.pairs_changed = body.pairs_now != body.pairs_before
         body.pairs_before = body.pairs_now
-    body.pairs_now = 0
-    body.fx = 0.0
-    body.fy = 0.0
-    body.torque = 0.0
-
-
-@kernel
-def accelerate_and_kick(bodies: Records, controls: Record, step: float) -> None:
-    """Finish the step of all bodies."""
-    for i in range(bodies.size):
-        finish_step(bodies[i], controls, step)
-
-
-@kernel
-def go_on(bodies: Records, controls: Record, step: float) -> None:
-    """Finish a step of all bodies and start the next one, where nothing has to be looked at between them."""
-    for i in range(bodies.size - 1):
-        finish_step(bodies[i], controls, step)
-        start_step(bodies[i], step)
-    finish_step(bodies[bodies.size - 1], controls, step)
+        body.pairs_now = 0
+        body.fx = 0.0
+        body.fy = 0.0
+        body.torque = 0.0
 
 
 @rare_kernel

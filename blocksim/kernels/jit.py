@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 from numba import config as numba_config
+from numba import types as numba_types
 from numba.core.registry import CPUDispatcher
 
 Function = TypeVar("Function", bound=Callable[..., object])
@@ -32,6 +33,7 @@ OPEN = "BLOCKSIM_OPEN_KERNELS"
 IS_OPEN = bool(os.environ.get(OPEN))
 
 config: Any = numba_config  # its settings are attributes made at run time
+types: Any = numba_types
 njit: Any = numba.njit  # _nrt is an option that its types leave out
 
 KERNEL_FOLDER = Path(__file__).resolve().parent
@@ -81,9 +83,9 @@ def cache_folder() -> Path | None:
 
 
 def is_compiled() -> bool:
-    """Tell whether a compiled `advance` of this exact source lies in the cache (or nothing has to be compiled)."""
+    """Tell whether a compiled time loop of this exact source lies in the cache (or nothing has to be compiled)."""
     folder = cache_folder()
-    return bool(config.DISABLE_JIT) or (folder is not None and any(folder.rglob("advance.advance-*.nbc")))
+    return bool(config.DISABLE_JIT) or (folder is not None and any(folder.rglob("advance.advance_in_team-*.nbc")))
 
 
 def is_marked(name: str) -> bool:
@@ -111,7 +113,27 @@ def _compiled(function: Function, **options: object) -> Function:
     return compiled
 
 
-class _Inner(CPUDispatcher):
+def plain_type(one: Any) -> Any:
+    """Return the type that a number is passed as: constants and short integers as integers of 8 bytes."""
+    one = types.unliteral(one)
+    is_short = isinstance(one, types.Integer) and one.bitwidth < types.int64.bitwidth
+    return types.int64 if is_short else one
+
+
+class _Shared(CPUDispatcher):
+    """A function compiled once for all that call it.
+
+    numba would compile it anew for every constant, and every width of integer, that it is called with: nearly half of
+    all machine code.
+    """
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Look for the compiled version that serves a call, and have it compiled where there is none."""
+        named = {name: plain_type(one) for name, one in kws.items()}
+        return super().get_call_template(tuple(plain_type(one) for one in args), named)
+
+
+class _Inner(_Shared):
     """A compiled function without the code that Python needs to call it."""
 
     def __call__(self, *_: object, **__: object) -> None:
@@ -122,10 +144,10 @@ class _Inner(CPUDispatcher):
 
 def _inner(function: Function, **options: object) -> Function:
     """Compile a function that Python does not call, unless all are open."""
-    if IS_OPEN or config.DISABLE_JIT:
-        return _compiled(function, **options)
-    compiled: Any = _compiled(function, no_cpython_wrapper=True, **options)
-    compiled.__class__ = _Inner
+    if config.DISABLE_JIT:
+        return function
+    compiled: Any = _compiled(function, no_cpython_wrapper=not IS_OPEN, **options)
+    compiled.__class__ = _Shared if IS_OPEN else _Inner
     inner: Function = compiled
     return inner
 

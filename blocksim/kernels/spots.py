@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from blocksim.kernels.arrays import HALF, NORMAL, Record
 from blocksim.kernels.contact import IMPACT_STEPS, shared_step
-from blocksim.kernels.damping import BOTH, fill_alike, fill_single, keep_masses
+from blocksim.kernels.damping import BOTH, OPERATOR_LIFE, fill_alike, fill_single, keep_dashpots, keep_masses
 from blocksim.kernels.geometry import corner_offset
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.models.twins import CONE_TOLERANCE, corner_signs
@@ -124,19 +124,29 @@ def arms(spot: Spot, dx: float, dy: float, direction: int) -> tuple[float, float
 
 @rare_kernel
 def renew_single(
-    operator: Record, a: Record, b: Record, spot: Spot, direction: int, ratio: float, step: float, stiffness: float
+    operator: Record,
+    pair: Record,
+    a: Record,
+    b: Record,
+    spot: Spot,
+    direction: int,
+    ratio: float,
+    step: float,
+    stiffness: float,
 ) -> None:
     """Make the operator of a single contact anew."""
     arm_a, arm_b = arms(spot, a.x - b.x, a.y - b.y, direction)
     mass = a.inverse_mass + b.inverse_mass + arm_a * arm_a * a.inverse_inertia + arm_b * arm_b * b.inverse_inertia
     half = 0.5 * shared_step(a, b, step)
-    keep_masses(operator, 1, half, mass, mass, mass)
+    keep_masses(operator, half, mass, mass, mass)
+    keep_dashpots(pair, direction, 1, OPERATOR_LIFE if half > 0.0 else 0)
     fill_single(operator, 0, ratio, half, mass, stiffness, 1.0)
 
 
 @rare_kernel
 def renew_double(
     operator: Record,
+    pair: Record,
     a: Record,
     b: Record,
     one: Spot,
@@ -158,7 +168,8 @@ def renew_double(
     m_two = translation + two_a * two_a * a.inverse_inertia + two_b * two_b * b.inverse_inertia
     m_mixed = cosine * translation + one_a * two_a * a.inverse_inertia + one_b * two_b * b.inverse_inertia
     half = 0.5 * shared_step(a, b, step)
-    keep_masses(operator, pattern, half, m_one, m_mixed, m_two)
+    keep_masses(operator, half, m_one, m_mixed, m_two)
+    keep_dashpots(pair, direction, pattern, OPERATOR_LIFE if half > 0.0 else 0)
     if pattern == BOTH:
         fill_alike(operator, 2.0 * ratio * math.sqrt(stiffness), half, m_one, m_mixed, m_two)
     else:

@@ -5,45 +5,59 @@ searched, and nothing is written before it is certain that no contact begins, en
 `steady_forces` leaves the pair as it was and contact.py deals with it.
 """
 
+from typing import NamedTuple
+
 from blocksim.kernels.apart import begins_contact, choose_axis, gap_along
 from blocksim.kernels.arrays import ALL, NORMAL, SHEAR, Record, Records, World
-from blocksim.kernels.contact import add_totals, has_new_neighbours
-from blocksim.kernels.damping import BOTH, damp_one, damp_two
+from blocksim.kernels.contact import has_new_neighbours
+from blocksim.kernels.damping import BOTH, are_dashpots_due, damp_one, damp_two, renew_dashpots
 from blocksim.kernels.friction import clip_to_cone, draw_same_spring
 from blocksim.kernels.jit import kernel
 from blocksim.kernels.laws import has_constant_stiffness
 from blocksim.kernels.models.twins import is_oblique
 from blocksim.kernels.spots import Spot, follow, relative_motion, renew_double, renew_single
 
-CHANGED = False, 0.0, 0.0
-UNTOUCHED = True, 0.0, 0.0
+CHANGED, UNTOUCHED, TOUCHING = range(3)
 
-Losses = tuple[bool, float, float]  # whether the pair was steady; J lost to dashpots, J lost to friction
+
+class Effect(NamedTuple):
+    """What a pair does in one step."""
+
+    fx: float  # N, on body a
+    fy: float
+    torque_a: float  # N m, on body a
+    torque_b: float  # against body b
+    dashpot: float  # J, lost to dashpots
+    friction: float  # J, lost to friction
+
+
+NOTHING = Effect(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
-def steady_forces(world: World, p: int, step: float, particles: Records | None) -> Losses:
-    """Add the forces of pair p if its contacts go on; tell whether, and the energies (J) lost to dashpots and friction.
+def steady_forces(world: World, p: int, step: float, particles: Records | None) -> tuple[int, Effect]:
+    """Return what pair p does if its contacts go on (TOUCHING) or there are none (UNTOUCHED).
 
-    `step` is the length (s) of the drift that led here. Where `particles` is not None no pair is steady.
+    Otherwise (CHANGED) nothing has been written. `step` is the length (s) of the drift that led here. Where `particles`
+    is not None no pair is steady.
     """
     if particles is not None:
-        return CHANGED
+        return CHANGED, NOTHING
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
     dx = a.x - b.x
     dy = a.y - b.y
     if pair.active == 0 and gap_along(pair.axis, a, b, dx, dy) >= 0.0:
-        return UNTOUCHED
+        return UNTOUCHED, NOTHING
     if is_unsettled(world, p, a, b, dx, dy):
-        return CHANGED
+        return CHANGED, NOTHING
     if pair.active == 1:
         return single(world, p, a, b, dx, dy, step)
     if pair.active == 2:
         return double(world, p, a, b, dx, dy, step)
     choose_axis(pair, a, b, dx, dy, pair.b == world.bodies.size - 1)
-    return UNTOUCHED
+    return UNTOUCHED, NOTHING
 
 
 @kernel
@@ -58,36 +72,36 @@ def is_unsettled(world: World, p: int, a: Record, b: Record, dx: float, dy: floa
     if pair.idle > 0 and begins_contact(world, p, a, b, dx, dy):
         return True
     if pair.active > 0 and has_new_neighbours(a, b):
-        world.operators[p, NORMAL].left = 0
-        world.operators[p, SHEAR].left = 0
+        renew_dashpots(pair)
     return pair.active > 0 and (b.faces != ALL or not has_constant_stiffness(world.controls[0].law))
 
 
 @kernel
-def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float) -> Losses:
-    """Add the forces of a pair with one contact, if it goes on; see steady_forces."""
+def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float) -> tuple[int, Effect]:
+    """Return what a pair with one contact does, if it goes on; see steady_forces."""
     contact = world.contacts[p, 0]
+    pair = world.pairs[p]
     operator = world.operators[p, NORMAL]
     values = world.interactions[a.contact_class, b.contact_class]
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
-    goes_on, spot = follow(contact, a, b, dx, dy, motion, step, operator.left == 0)
+    goes_on, spot = follow(contact, a, b, dx, dy, motion, step, pair.normal_left == 0)
     if not goes_on:
-        return CHANGED
+        return CHANGED, NOTHING
     k = values.normal_stiffness
     spring = k * spot.depth
     force = spring
     if values.normal_damping > 0.0:
-        if operator.left == 0:
-            renew_single(operator, a, b, spot, NORMAL, values.normal_damping, step, k)
-        else:
-            operator.left -= 1
+        if are_dashpots_due(pair, NORMAL):
+            renew_single(operator, pair, a, b, spot, NORMAL, values.normal_damping, step, k)
         force = damp_one(operator, spring, contact.normal_force, spot.closing_rate)
     normal = max(force, 0.0)
     dashpot = 0.5 * (contact.normal_force - k * contact.depth + (normal - spring)) * spot.closing
     drawn, shear, lost, friction = shear_of_one(world, p, a, b, spot, normal, step)
     keep(contact, drawn, spot.depth, normal, shear)
-    add_one(a, b, spot, normal, shear, dx, dy)
-    return True, dashpot + lost, friction
+    fx = spot.nx * normal + spot.ny * shear
+    fy = spot.ny * normal - spot.nx * shear
+    torque = spot.x * fy - spot.y * fx
+    return TOUCHING, Effect(fx, fy, torque - (dx * fy - dy * fx), torque, dashpot + lost, friction)
 
 
 @kernel
@@ -96,6 +110,7 @@ def shear_of_one(
 ) -> tuple[float, float, float, float]:
     """Return shear spring (m), shear force (N) and the losses (J) to dashpot and friction of a single contact."""
     contact = world.contacts[p, 0]
+    pair = world.pairs[p]
     operator = world.operators[p, SHEAR]
     values = world.interactions[a.contact_class, b.contact_class]
     k = values.shear_ratio * values.normal_stiffness
@@ -103,12 +118,10 @@ def shear_of_one(
     elastic = k * drawn
     shear = elastic
     if slides:
-        operator.left = 0
+        pair.shear_left = 0
     elif values.shear_damping > 0.0:
-        if operator.left == 0:
-            renew_single(operator, a, b, spot, SHEAR, values.shear_damping, step, k)
-        else:
-            operator.left -= 1
+        if are_dashpots_due(pair, SHEAR):
+            renew_single(operator, pair, a, b, spot, SHEAR, values.shear_damping, step, k)
         shear = damp_one(operator, elastic, contact.shear_force, spot.slip_rate)
         shear = clip_to_cone(values, shear, limit, normal, spot.slip_rate)
     dashpot = 0.5 * (contact.shear_force - k * contact.spring + (shear - elastic)) * spot.slip
@@ -125,36 +138,26 @@ def keep(contact: Record, spring: float, depth: float, normal_force: float, shea
 
 
 @kernel
-def add_one(a: Record, b: Record, spot: Spot, normal: float, shear: float, dx: float, dy: float) -> None:
-    """Add the forces (N) of a single contact to the totals of both bodies."""
-    fx = spot.nx * normal + spot.ny * shear
-    fy = spot.ny * normal - spot.nx * shear
-    torque = spot.x * fy - spot.y * fx
-    add_totals(a, b, fx, fy, torque - (dx * fy - dy * fx), torque)
-
-
-@kernel
-def double(world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float) -> Losses:
-    """Add the forces of a pair with two contacts, if both go on; see steady_forces."""
+def double(world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float) -> tuple[int, Effect]:
+    """Return what a pair with two contacts does, if both go on; see steady_forces."""
     first = world.contacts[p, 0]
     second = world.contacts[p, 1]
+    pair = world.pairs[p]
     operator = world.operators[p, NORMAL]
     values = world.interactions[a.contact_class, b.contact_class]
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
-    goes_1, one = follow(first, a, b, dx, dy, motion, step, operator.left == 0)
-    goes_2, two = follow(second, a, b, dx, dy, motion, step, operator.left == 0)
+    goes_1, one = follow(first, a, b, dx, dy, motion, step, pair.normal_left == 0)
+    goes_2, two = follow(second, a, b, dx, dy, motion, step, pair.normal_left == 0)
     if not (goes_1 and goes_2):
-        return CHANGED
+        return CHANGED, NOTHING
     k = values.normal_stiffness
     spring_1 = k * one.depth
     spring_2 = k * two.depth
     force_1 = spring_1
     force_2 = spring_2
     if values.normal_damping > 0.0:
-        if operator.left == 0:
-            renew_double(operator, a, b, one, two, NORMAL, BOTH, values.normal_damping, step, k)
-        else:
-            operator.left -= 1
+        if are_dashpots_due(pair, NORMAL):
+            renew_double(operator, pair, a, b, one, two, NORMAL, BOTH, values.normal_damping, step, k)
         force_1, force_2 = damp_two(
             operator, spring_1, spring_2, first.normal_force, second.normal_force, one.closing_rate, two.closing_rate
         )
@@ -167,8 +170,22 @@ def double(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
     )
     keep(first, drawn_1, one.depth, normal_1, shear_1)
     keep(second, drawn_2, two.depth, normal_2, shear_2)
-    add_two(a, b, one, two, normal_1, normal_2, shear_1, shear_2, dx, dy)
-    return True, 0.5 * (lost_1 + lost_2) + lost, friction
+    fx, fy, torque = sum_of_two(one, two, normal_1, normal_2, shear_1, shear_2)
+    dashpot = 0.5 * (lost_1 + lost_2) + lost
+    return TOUCHING, Effect(fx, fy, torque - (dx * fy - dy * fx), torque, dashpot, friction)
+
+
+@kernel
+def sum_of_two(
+    one: Spot, two: Spot, normal_1: float, normal_2: float, shear_1: float, shear_2: float
+) -> tuple[float, float, float]:
+    """Return the force (N) of two contacts on body a and its torque (N m) about the centre of b."""
+    fx_1 = one.nx * normal_1 + one.ny * shear_1
+    fy_1 = one.ny * normal_1 - one.nx * shear_1
+    fx_2 = two.nx * normal_2 + two.ny * shear_2
+    fy_2 = two.ny * normal_2 - two.nx * shear_2
+    torque = one.x * fy_1 - one.y * fx_1 + (two.x * fy_2 - two.y * fx_2)
+    return fx_1 + fx_2, fy_1 + fy_2, torque
 
 
 @kernel
@@ -186,6 +203,7 @@ def shear_of_two(
     """Return shear springs (m) and forces (N) of two contacts, and their losses (J) to dashpots and friction."""
     first = world.contacts[p, 0]
     second = world.contacts[p, 1]
+    pair = world.pairs[p]
     operator = world.operators[p, SHEAR]
     values = world.interactions[a.contact_class, b.contact_class]
     k = values.shear_ratio * values.normal_stiffness
@@ -197,12 +215,10 @@ def shear_of_two(
     shear_2 = elastic_2
     sticking = (0 if slides_1 else 1) + (0 if slides_2 else 2)
     if sticking == 0:
-        operator.left = 0
+        pair.shear_left = 0
     elif values.shear_damping > 0.0:
-        if operator.left == 0 or operator.pattern != sticking:
-            renew_double(operator, a, b, one, two, SHEAR, sticking, values.shear_damping, step, k)
-        else:
-            operator.left -= 1
+        if pair.sticking != sticking or are_dashpots_due(pair, SHEAR):
+            renew_double(operator, pair, a, b, one, two, SHEAR, sticking, values.shear_damping, step, k)
         shear_1, shear_2 = damp_two(
             operator, elastic_1, elastic_2, first.shear_force, second.shear_force, one.slip_rate, two.slip_rate
         )
@@ -212,27 +228,3 @@ def shear_of_two(
     lost_1 = (first.shear_force - k * first.spring + (shear_1 - elastic_1)) * one.slip
     lost_2 = (second.shear_force - k * second.spring + (shear_2 - elastic_2)) * two.slip
     return drawn_1, drawn_2, shear_1, shear_2, 0.5 * (lost_1 + lost_2), work_1 + work_2
-
-
-@kernel
-def add_two(
-    a: Record,
-    b: Record,
-    one: Spot,
-    two: Spot,
-    normal_1: float,
-    normal_2: float,
-    shear_1: float,
-    shear_2: float,
-    dx: float,
-    dy: float,
-) -> None:
-    """Add the forces (N) of two contacts to the totals of both bodies."""
-    fx_1 = one.nx * normal_1 + one.ny * shear_1
-    fy_1 = one.ny * normal_1 - one.nx * shear_1
-    fx_2 = two.nx * normal_2 + two.ny * shear_2
-    fy_2 = two.ny * normal_2 - two.nx * shear_2
-    fx = fx_1 + fx_2
-    fy = fy_1 + fy_2
-    torque = one.x * fy_1 - one.y * fx_1 + (two.x * fy_2 - two.y * fx_2)
-    add_totals(a, b, fx, fy, torque - (dx * fy - dy * fx), torque)

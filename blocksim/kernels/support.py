@@ -1,7 +1,13 @@
 """Prescribed motion of the support: the ground, its pieces, walls and all fixed bodies together."""
 
 from blocksim.kernels.arrays import Record, Records, World
-from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.jit import kernel, rare_kernel
+
+
+@kernel
+def has_motion(controls: Record) -> bool:
+    """Tell whether the support moves at all."""
+    return controls.motion_x != 0.0 or controls.motion_y != 0.0
 
 
 @rare_kernel
@@ -42,27 +48,32 @@ def move_support(world: World, step: float) -> None:
     moved = displacement(piece, now)
     rate = (moved - last) / step if step > 0.0 else piece.c1
     change = acceleration(piece, now)
-    for i in range(world.bodies.size):
-        body = world.bodies[i]
-        if body.is_moved:
-            body.x = body.base_x + controls.motion_x * moved
-            body.y = body.base_y + controls.motion_y * moved
-            body.vx = controls.motion_x * rate
-            body.vy = controls.motion_y * rate
-            body.ax = controls.motion_x * change
-            body.ay = controls.motion_y * change
+    for base in world.moved:
+        body = world.bodies[base.body]
+        body.x = base.x + controls.motion_x * moved
+        body.y = base.y + controls.motion_y * moved
+        body.vx = controls.motion_x * rate
+        body.vy = controls.motion_y * rate
+        body.ax = controls.motion_x * change
+        body.ay = controls.motion_y * change
 
 
 @rare_kernel
 def book_support(world: World, step: float) -> None:
-    """Book the work that contacts have done on the support over the last drift, by the trapezoid rule as all work."""
+    """Book the work that contacts have done on the support over the last drift, by the trapezoid rule as all work.
+
+    Clears the totals.
+    """
     total = 0.0
-    for i in range(world.bodies.size):
-        body = world.bodies[i]
-        if body.is_moved:
-            total += (body.before_fx + body.fx) * body.vx + (body.before_fy + body.fy) * body.vy
-            body.before_fx = body.fx
-            body.before_fy = body.fy
+    for before in world.moved:
+        body = world.bodies[before.body]
+        total += (before.fx + body.fx) * body.vx + (before.fy + body.fy) * body.vy
+        before.fx = body.fx
+        before.fy = body.fy
+        body.fx = 0.0
+        body.fy = 0.0
+        body.torque = 0.0
+        body.pairs_now = 0
     world.ledger[0].to_support += 0.5 * step * total
 
 

@@ -15,8 +15,9 @@ MOST_UNSEEN_DRIVEN = 8  # steps, where a support moves: how fast it will, nothin
 @rare_kernel
 def travel(body: Record) -> float:
     """Return how far (m) a corner of a body may have come since the pair list was made."""
-    moved = abs(body.x - body.list_x) + abs(body.y - body.list_y)
-    return moved + body.radius * abs(body.angle - body.list_angle)
+    dx = body.x - body.list_x
+    dy = body.y - body.list_y
+    return math.sqrt(dx * dx + dy * dy) + body.radius * abs(body.angle - body.list_angle)
 
 
 @rare_kernel

@@ -21,6 +21,13 @@ MAX_OVERLAPS = 20
 MAX_PIECES = 1_000_000
 SHORTEST_SHARE = 0.01
 """Least length of a piece of boundary, in smallest sides of the blocks."""
+LEAST_SKIN = 1e-4
+"""Least skin, in smallest sides of the blocks. Below it the list of neighbours is made anew at every step, even where
+steps are as short as with the full stiffness of a metal: at 1 m/s a block moves 1e-5 of its side in one of them, and a
+list is kept only where 0.4 skins last for a step at four times the speed."""
+ROUND_OFFS = 100
+"""Least skin, in roundings of the farthest coordinate: a fifth of the skin is left for what nobody foresaw, and
+distances are differences of a few rounded places."""
 
 
 def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
@@ -43,6 +50,8 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
         return
     smallest = min(min(body.size_x, body.size_y) for body in bodies)
     yield from _coarse_particles(scenario, smallest)
+    farthest = max(max(abs(body.x), abs(body.y)) for body in bodies)
+    yield from _unfit_skin(scenario, smallest, farthest)
     yield from _short_segments(scenario, SHORTEST_SHARE * smallest)
     yield from _equal_names(origins, bodies)
     yield from _below_ground(scenario, origins, bodies)
@@ -124,6 +133,23 @@ def _coarse_particles(scenario: Scenario, smallest: float) -> Iterator[Finding]:
         length = _mm(contact.resolved_smoothing_length)
         message = f"a {contact.kernel} of smoothing length {length} reaches {_mm(contact.support_radius)} far"
         yield Finding(("contact", key), f"{message}, through {side}", relation=True)
+
+
+def _unfit_skin(scenario: Scenario, smallest: float, farthest: float) -> Iterator[Finding]:
+    """Find a skin that does not go with the smallest side (m) of the blocks and their farthest coordinate (m)."""
+    skin = scenario.contact.skin
+    if skin is None:
+        return
+    least, why = max(
+        (LEAST_SKIN * smallest, f"{100 * LEAST_SKIN:g} % of the smallest side of a block"),
+        (ROUND_OFFS * math.ulp(farthest), f"{ROUND_OFFS} times the round-off of places {farthest:g} m away"),
+    )
+    if skin > smallest:
+        message = f"{_mm(skin)} is more than the smallest side of a block, {_mm(smallest)}"
+        yield Finding(("contact", "skin"), f"{message}; blocks far away would be listed as neighbours", relation=True)
+    elif skin < least:
+        message = f"{_mm(skin)} is too small; at least {_mm(least)} is needed, {why}"
+        yield Finding(("contact", "skin"), message, relation=True)
 
 
 def _short_segments(scenario: Scenario, least: float) -> Iterator[Finding]:

@@ -4,13 +4,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from blocksim.kernels.advance import advance
-from blocksim.kernels.arrays import PAIRS_FULL, REACHED, World
+from blocksim.kernels.arrays import REACHED, World
 from blocksim.simulation import outcome as ends
 from blocksim.simulation.ledger import EnergyLedger, energy_ledger, start_energy
 from blocksim.simulation.outcome import Outcome
 from blocksim.simulation.recorder import Recorder
-from blocksim.world.build import with_more_room
+from blocksim.simulation.team import ALONE, Team
 
 BODY_STEPS_A_CALL = 1_000_000  # a tenth of a second or so; after that Ctrl-C is heard and progress is shown
 
@@ -30,26 +29,18 @@ Watcher = Callable[[Progress], None]
 
 @dataclass(frozen=True)
 class LoopResult:
-    """The world at the end, why it ended, where the energy went, and the seconds spent in compiled code."""
+    """The world at the end, why it ended, where the energy went, the seconds spent in compiled code and its threads."""
 
     world: World
     outcome: Outcome
     ledger: EnergyLedger
     solver_seconds: float
+    threads: int
 
 
 def last_step_of(end: float, step: float) -> int:
     """Return the number of steps (at least one) that comes nearest to `end` (s)."""
     return max(1, round(end / step))
-
-
-def advance_with_room(world: World, last_step: int) -> tuple[World, int]:
-    """Advance to a step, giving the pair lists more room as often as needed; return world and status code."""
-    status = int(advance(world, last_step))
-    while status == PAIRS_FULL:
-        world = with_more_room(world)
-        status = int(advance(world, last_step))
-    return world, status
 
 
 def outcome_of(code: int, ledger: EnergyLedger) -> Outcome:
@@ -65,6 +56,7 @@ def run_loop(
     recorder: Recorder,
     end: float,
     *,
+    team: Team = ALONE,
     on_progress: Watcher = lambda _: None,
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> LoopResult:
@@ -73,7 +65,7 @@ def run_loop(
     last = last_step_of(end, step)
     most = max(1, BODY_STEPS_A_CALL // world.bodies.size)
     seconds = -time.perf_counter()
-    world, status = advance_with_room(world, 0)
+    world, status = team.advance(world, 0)
     seconds += time.perf_counter()
     start = start_energy(world)
     recorder.sample(world)
@@ -81,7 +73,7 @@ def run_loop(
     while status == REACHED and done < last and not is_stopped():
         wanted = min(recorder.next_step(done), last) if done == wanted else wanted
         seconds -= time.perf_counter()
-        world, status = advance_with_room(world, min(wanted, done + most))
+        world, status = team.advance(world, min(wanted, done + most))
         seconds += time.perf_counter()
         done = int(world.clock[0].steps)
         if done == wanted:
@@ -90,4 +82,4 @@ def run_loop(
     recorder.sample(world)  # wherever it ended
     ledger = energy_ledger(world, start)
     outcome = ends.INTERRUPTED if status == REACHED and done < last else outcome_of(status, ledger)
-    return LoopResult(world, outcome, ledger, seconds)
+    return LoopResult(world, outcome, ledger, seconds, team.threads)

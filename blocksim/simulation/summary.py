@@ -26,6 +26,7 @@ class Summary(BaseModel, frozen=True):
     compile_seconds: float
     solver_seconds: float
     total_seconds: float
+    threads: int = 1
     energy_J: EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
     warnings: tuple[str, ...]
     environment: dict[str, str]

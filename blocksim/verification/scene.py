@@ -11,7 +11,7 @@ from blocksim.kernels.arrays import REACHED
 from blocksim.kernels.energy import LEDGER_ROW
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.simulation.ledger import energy_ledger, energy_row
-from blocksim.simulation.loop import advance_with_room
+from blocksim.simulation.team import advance_with_room
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:

@@ -33,7 +33,6 @@ def body_records(scenario: Scenario, placed: tuple[PlacedBody, ...], classes: tu
     if scenario.ground.profile is not None:
         bodies[-1].y = -math.inf
     bodies.is_moved = bodies.inverse_mass == 0.0
-    bodies.base_x, bodies.base_y = bodies.x, bodies.y
     return bodies
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from blocksim.kernels.arrays import (
+    ACTION,
     CLOCK,
     CONTACT,
     CONTACTS,
@@ -16,6 +17,8 @@ from blocksim.kernels.arrays import (
     PAIR,
     PARTICLE_CONTACT,
     POINT,
+    SHARE,
+    TEAM_WORDS,
     Records,
     World,
     zeros,
@@ -27,14 +30,14 @@ from blocksim.scenario import Scenario, place_bodies
 from blocksim.world.bodies import body_records
 from blocksim.world.interactions import contact_classes, interaction_table
 from blocksim.world.memory import SceneSize, refuse_if_too_large
-from blocksim.world.motion import motion_records, support_direction
+from blocksim.world.motion import motion_records, moved_records, support_direction
 from blocksim.world.particles import place_particles, slots_of_a_pair
+from blocksim.world.skin import choose_skin
 from blocksim.world.step import MOST_STEPS, choose_step
 
 CHECK_INTERVAL = 1e-4  # s of simulated time between looks at rest, overlap and finiteness
 CHEAP_CHECKS = 50  # steps between looks, from which on they cost next to nothing; where steps are long, at most for
 LONGEST_CHECK = 1e-3  # s
-SKIN_SHARE = 0.05  # of the smallest side
 LEAST_PAIRS = 16
 PAIRS_PER_BODY = 3
 GROWTH = 1.25  # of the room for pairs, each time that it does not suffice
@@ -45,8 +48,8 @@ LARGE_RATIO = 4.0  # over the smallest body; nothing is large below that
 def build_world(scenario: Scenario) -> World:
     """Return the world at time zero: arrays as described in blocksim.kernels.arrays, pair lists still empty.
 
-    Raises SceneTooLargeError when there is not enough memory for it, and StepTooLargeError when the scenario asks
-    for an inadmissible step without forcing it.
+    Raises SceneTooLargeError when there is not enough memory for it, StepTooLargeError when the scenario asks for an
+    inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
     """
     placed = place_bodies(scenario)
     classes = contact_classes(scenario, placed)
@@ -63,12 +66,18 @@ def build_world(scenario: Scenario) -> World:
         **_grid(bodies),
         interactions=table,
         particles=particles,
+        ledger=zeros(bodies.size // GROUP + 1, LEDGER),
         points=_points(slots),
+        action=zeros(1, ACTION),
         before=contacts,
         matrices=np.zeros((8, 3, 3)),
+        moved=moved_records(bodies),
         motion=motion_records(scenario),
         controls=_controls(scenario, bodies, len(placed), choose_step(scenario, bodies, table)),
         clock=zeros(1, CLOCK),
+        shares=zeros(1, SHARE),
+        between=zeros(1, ACTION),
+        team=np.zeros(TEAM_WORDS, dtype=np.int64),
     )
     world.ledger[0].largest_kinetic = _kinetic_energy(bodies)
     return world
@@ -108,7 +117,6 @@ def empty_lists(capacity: int, slots: int, contacts: Records) -> dict[str, Any]:
         "operators": zeros((capacity, 2), OPERATOR),
         "spare_pairs": zeros(capacity, PAIR),
         "spare_candidates": np.zeros((capacity, slots), dtype=kind),
-        "ledger": zeros(capacity // GROUP + 1, LEDGER),
     }
 
 
@@ -120,8 +128,13 @@ def with_more_room(world: World) -> World:
     lists = empty_lists(capacity, slots, world.before)
     for name in ("pairs", "contacts", "candidates", "operators"):
         lists[name][:used] = getattr(world, name)
-    lists["ledger"][: world.ledger.size] = world.ledger
-    return world._replace(**lists)
+    return with_threads(world._replace(**lists), world.shares.size)
+
+
+def with_threads(world: World, threads: int) -> World:
+    """Return the same world with room for what that many threads tell one another."""
+    between = world.pairs.size if threads > 1 else 1  # memory that nobody has written to is not there yet
+    return world._replace(shares=zeros(threads, SHARE), between=zeros(between, ACTION))
 
 
 def _grid(bodies: Records) -> dict[str, Any]:
@@ -160,7 +173,7 @@ def _controls(scenario: Scenario, bodies: Records, blocks: int, step: float) -> 
     record.gravity_x = -scenario.gravity * math.sin(scenario.ground.tilt)
     record.gravity_y = -scenario.gravity * math.cos(scenario.ground.tilt)
     record.motion_x, record.motion_y = support_direction(scenario)
-    record.skin = SKIN_SHARE * smallest
+    record.skin = choose_skin(scenario, bodies, smallest, step)
     record.cell_radius = cell_radius(bodies)
     record.cell_width = 2.0 * record.cell_radius + record.skin
     record.max_overlap = 0.0 if given_limit is None else given_limit

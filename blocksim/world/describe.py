@@ -62,6 +62,7 @@ class Description:
     bytes: int  # estimated size of run.h5, at most
     memory: int  # bytes that the run needs, at most
     particles: int  # on all boundaries, corners included
+    skin: float  # m, how far apart bodies are listed as neighbours
 
 
 def describe(scenario: Scenario) -> Description:
@@ -84,6 +85,7 @@ def describe(scenario: Scenario) -> Description:
             len(placed), world.pairs.size, world.candidates.shape[1], frames, world.particles is not None
         ).bytes_needed,
         particles=_particles(scenario, placed),
+        skin=float(world.controls[0].skin),
     )
 
 

@@ -1,6 +1,8 @@
 """Prescribed motion of the support as the kernels want it: a cubic polynomial of displacement for every stretch."""
 
-from blocksim.kernels.arrays import MOTION_PIECE, Records, zeros
+import numpy as np
+
+from blocksim.kernels.arrays import MOTION_PIECE, MOVED, Records, zeros
 from blocksim.scenario import Scenario
 from blocksim.scenario.motion import motion_direction, motion_pieces
 
@@ -8,6 +10,15 @@ from blocksim.scenario.motion import motion_direction, motion_pieces
 def support_direction(scenario: Scenario) -> tuple[float, float]:
     """Return the direction (unit vector) of the support's motion; zero where it does not move."""
     return (0.0, 0.0) if scenario.motion is None else motion_direction(scenario)
+
+
+def moved_records(bodies: Records) -> Records:
+    """Return where all bodies that move with the support start."""
+    numbers = np.flatnonzero(bodies.is_moved)
+    records = zeros(numbers.size, MOVED)
+    records["body"] = numbers
+    records["x"], records["y"] = bodies.x[numbers], bodies.y[numbers]
+    return records
 
 
 def motion_records(scenario: Scenario) -> Records:

@@ -155,6 +155,24 @@ def test_step_that_is_too_large_is_told_where_it_stands(blocksim: Command, tmp_p
     assert '| step = "1 ms"' in answer.err
 
 
+def test_skin_is_told_as_it_follows_from_the_blocks_or_as_it_is_given(blocksim: Command) -> None:
+    usual = blocksim("check", "scenarios/three_blocks_nominal.toml")
+    assert "neighbours are listed up to 8 mm apart\n" in usual.out  # a quarter of 32 mm
+    given = ("check", "scenarios/three_blocks_nominal.toml", "--set", "contact.skin=0.25 mm")
+    assert "neighbours are listed up to 0.25 mm apart\n" in blocksim(*given).out
+    assert json.loads(blocksim(*given, "--json").out)["skin"] == 2.5e-4
+
+
+def test_skin_that_a_step_outruns_is_told_where_it_stands(blocksim: Command, tmp_path: Path) -> None:
+    text = (tmp_path / "scenarios" / "slide.toml").read_text()
+    (tmp_path / "thin.toml").write_text(text.replace("[contact]\n", '[contact]\nskin = "5 um"\n'))
+    assert blocksim("check", "thin.toml", "--set", "contact.stiffness_scale=1", "--quiet").code == 0
+    answer = blocksim("check", "thin.toml", "--set", "contact.stiffness_scale=3e-4")
+    assert answer.code == 65
+    assert "contact.skin: 0.005 mm is too small for this time step: two blocks that meet at " in answer.err
+    assert '| skin = "5 um"' in answer.err
+
+
 def tables_of(out: str) -> list[str]:
     """Return the lines below the resolved values."""
     lines = out.splitlines()

@@ -10,8 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import LEDGER, NORMAL, SHEAR, zeros
-from blocksim.kernels.contact import damp, draw_springs, has_new_neighbours, shared_step, spare_lost_faces
+from blocksim.kernels.arrays import NORMAL, SHEAR
+from blocksim.kernels.contact import (
+    damp,
+    draw_springs,
+    has_new_neighbours,
+    pair_forces,
+    shared_step,
+    spare_lost_faces,
+)
 from blocksim.kernels.damping import BOTH, OPERATOR_LIFE
 from blocksim.kernels.kinematics import mutual_mass, resolve_point
 from tests.kernels.conftest import dashpots_by_definition
@@ -127,6 +134,11 @@ def two_points(pose: Pose, seed: int, direction: int) -> World:
     return world
 
 
+def lives(world: World) -> list[int]:
+    """Return for how many steps the dashpots of the first pair hold, along the normals and the tangents."""
+    return [int(world.pairs[0].normal_left), int(world.pairs[0].shear_left)]
+
+
 @pytest.mark.parametrize("direction", [NORMAL, SHEAR])
 @pytest.mark.parametrize("weights", [(1.0, 1.0), (0.7, 0.7), (0.6, 1.2), (0.0, 1.0)])
 @pytest.mark.parametrize(("count", "pattern"), [(1, 1), (2, BOTH), (2, 1), (2, 2)])
@@ -144,7 +156,9 @@ def test_dashpots_of_a_pair_follow_the_definition(
     expected = points.force + dashpots_by_definition(points, masses, 0.7, STEP)
     damp(world, 0, count, direction, pattern, 0.7, STEP)
     assert points.force == pytest.approx(expected, rel=1e-7, abs=1e-9 * np.abs(expected).max())
-    assert world.operators[0, direction].left == (OPERATOR_LIFE if weights[0] == weights[count - 1] == 1.0 else 0)
+    assert lives(world)[direction] == (OPERATOR_LIFE if weights[0] == weights[count - 1] == 1.0 else 0)
+    assert lives(world)[1 - direction] == 0
+    assert direction == NORMAL or world.pairs[0].sticking == pattern
     assert world.operators[0, 1 - direction].tobytes() == bytes(world.operators.itemsize)
 
 
@@ -156,28 +170,28 @@ def test_operator_is_kept_for_lasting_contacts_and_then_made_anew(pose: Pose) ->
     world.points.stiffness = 4.0 * K
     for left in range(OPERATOR_LIFE - 1, -1, -1):
         damp(world, 0, 2, NORMAL, BOTH, 0.7, STEP)
-        assert (operator.left, operator.e_one) == (left, first)
+        assert (lives(world)[NORMAL], operator.e_one) == (left, first)
     damp(world, 0, 2, NORMAL, BOTH, 0.7, STEP)
-    assert operator.left == OPERATOR_LIFE
+    assert lives(world)[NORMAL] == OPERATOR_LIFE
     assert operator.e_one > 1.1 * first
 
 
 def test_operator_of_a_step_without_length_is_not_kept(pose: Pose) -> None:
     world = two_points(pose, 1, NORMAL)
     damp(world, 0, 2, NORMAL, BOTH, 0.7, 0.0)
-    assert world.operators[0, NORMAL].left == 0
+    assert lives(world)[NORMAL] == 0
     assert world.operators[0, NORMAL].e_one > 0.0
 
 
 def test_point_that_slides_has_no_dashpot_and_the_other_one_keeps_its_own(pose: Pose) -> None:
     world = two_points(pose, 1, SHEAR)
-    values, book = world.interactions[1, 1], zeros(1, LEDGER)[0]
+    values, action = world.interactions[1, 1], world.action[0]
     one, two = world.points[:2]
     one.force, two.force = 100.0, 0.0
     one.slipping, two.slipping = 1e-9, 1e-9
     stiffness = float(values.shear_ratio) * K
     values.normal_stiffness = K
-    assert draw_springs(world, 0, 2, values, book) == 1
+    assert draw_springs(world, 0, 2, values, action) == 1
     assert (one.stiffness, two.stiffness) == (pytest.approx(stiffness), 0.0)
     assert (one.force, two.force) == (pytest.approx(stiffness * 1e-9), 0.0)
     assert world.contacts[0].spring.tolist() == [1e-9, 0.0]
@@ -191,8 +205,57 @@ def test_corner_about_to_lose_its_face_has_no_dashpot_on_it(
 ) -> None:
     world = two_points(pose, 1, NORMAL)
     point = world.points[0]
-    world.operators["left"], point.closing, point.beside = 5, closing, beside
+    world.pairs["normal_left"] = world.pairs["shear_left"] = 5
+    point.closing, point.beside = closing, beside
     world.points.beside[1] = np.inf
     spare_lost_faces(world, 0, 2)
     assert world.points.weight[:2].tolist() == [0.0 if lost else 1.0, 1.0]
-    assert world.operators["left"][0].tolist() == ([0, 0] if lost else [5, 5])
+    assert lives(world) == ([0, 0] if lost else [5, 5])
+
+
+def standing(pose: Pose) -> World:
+    """Return a block that stands on another one, 1 um deep, and slides; nothing has been evaluated."""
+    world = pose((0.003, 1.025 - 1e-6, 0.0), (0.0, 1.0, 0.0))
+    world.bodies[0].vx = 20.0
+    return world
+
+
+def test_pair_writes_what_it_does_and_adds_to_no_body_and_to_no_book(pose: Pose) -> None:
+    world = standing(pose)
+    bodies, ledger, action = world.bodies.tobytes(), world.ledger.tobytes(), world.action[0]
+    pair_forces(world, 0, STEP)
+    assert (world.bodies.tobytes(), world.ledger.tobytes()) == (bodies, ledger)
+    a, contacts = world.bodies[0], world.contacts[0]
+    pushes, pulls = float(contacts.normal_force.sum()), float(contacts.shear_force.sum())
+    assert (action.touches, action.is_changed) == (1, 1)
+    assert (action.fy, action.fx) == pytest.approx((pushes, pulls))
+    assert action.fx < 0.0 < action.fy
+    assert action.friction > 0.0
+    # both torques are of the same forces, about centres that are apart
+    shift_x, shift_y = float(a.x - world.bodies[1].x), float(a.y - world.bodies[1].y)
+    assert action.torque_b - action.torque_a == pytest.approx(shift_x * action.fy - shift_y * action.fx)
+
+
+def test_nothing_is_left_of_what_another_pair_has_done(pose: Pose) -> None:
+    once, after = standing(pose), standing(pose)
+    for name in ("fx", "fy", "torque_a", "torque_b", "dashpot", "friction", "broken"):
+        after.action[name] = 7.0
+    for world in (once, after):
+        pair_forces(world, 0, STEP)
+    assert after.action.tobytes() == once.action.tobytes()
+
+
+def test_pair_whose_contacts_have_ended_does_nothing_but_lose_what_they_held(pose: Pose) -> None:
+    world = standing(pose)
+    pair_forces(world, 0, STEP)
+    world.contacts["spring"][0] = 1e-6
+    world.bodies[0].vx = 0.0
+    world.bodies[0].y += 1e-3
+    pair_forces(world, 0, STEP)
+    action = world.action[0]
+    assert (action.touches, action.is_changed) == (0, 1)
+    assert (action.fx, action.fy, action.torque_a, action.torque_b) == (0.0, 0.0, 0.0, 0.0)
+    assert action.broken > 0.0
+    assert world.pairs[0].active == 0
+    pair_forces(world, 0, STEP)
+    assert (action.dashpot, action.friction, action.broken) == (0.0, 0.0, 0.0)

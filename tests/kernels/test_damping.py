@@ -9,16 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import OPERATOR, POINT, zeros
+from blocksim.kernels.arrays import NORMAL, OPERATOR, PAIR, POINT, SHEAR, zeros
 from blocksim.kernels.damping import (
     BOTH,
-    OPERATOR_LIFE,
+    are_dashpots_due,
     damp_one,
     damp_two,
     fill_alike,
     fill_different,
     fill_single,
+    keep_dashpots,
     keep_masses,
+    renew_dashpots,
 )
 from tests.kernels.conftest import dashpots_by_definition
 
@@ -55,7 +57,7 @@ def operator_of(points: Records, masses: np.ndarray, ratio: float, pattern: int,
     operator, half = zeros(1, OPERATOR)[0], 0.5 * step
     one, two = points[0], points[-1]
     a, b, d = masses[0, 0], masses[0, -1], masses[-1, -1]
-    keep_masses(operator, pattern, half, a, b, d)
+    keep_masses(operator, half, a, b, d)
     if pattern != BOTH:
         i = pattern - 1
         fill_single(operator, i, ratio, half, masses[i, i], points[i].stiffness, points[i].weight)
@@ -164,9 +166,28 @@ def test_sliding_point_beside_a_sticking_one_has_no_dashpot(sticking: int, seed:
     assert forces == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize(("half", "left"), [(0.5 * STEP, OPERATOR_LIFE), (0.0, 0)])
-def test_operator_keeps_its_masses_unless_the_step_has_no_length(half: float, left: int) -> None:
+@pytest.mark.parametrize("half", [0.5 * STEP, 0.0])
+def test_operator_keeps_half_a_step_times_its_masses(half: float) -> None:
     operator = zeros(1, OPERATOR)[0]
-    keep_masses(operator, BOTH, half, 3.0, 1.0, 2.0)
+    keep_masses(operator, half, 3.0, 1.0, 2.0)
     assert [operator.h_one, operator.h_mixed, operator.h_two] == [3.0 * half, half, 2.0 * half]
-    assert (operator.pattern, operator.left) == (BOTH, left)
+
+
+@pytest.mark.parametrize("direction", [NORMAL, SHEAR])
+def test_operator_of_one_direction_is_due_after_as_many_uses_as_it_was_kept_for(direction: int) -> None:
+    pair = zeros(1, PAIR)[0]
+    keep_dashpots(pair, NORMAL, BOTH, 9)
+    keep_dashpots(pair, SHEAR, 2, 9)
+    keep_dashpots(pair, direction, 1, 3)
+    assert [are_dashpots_due(pair, direction) for _ in range(5)] == [False] * 3 + [True] * 2
+    assert (pair.normal_left, pair.shear_left) == ((0, 9) if direction == NORMAL else (9, 0))
+    assert pair.sticking == (2 if direction == NORMAL else 1)  # normals have their dashpots always
+
+
+def test_renewed_dashpots_are_due_in_both_directions() -> None:
+    pair = zeros(1, PAIR)[0]
+    for direction in (NORMAL, SHEAR):
+        keep_dashpots(pair, direction, BOTH, 9)
+    renew_dashpots(pair)
+    assert are_dashpots_due(pair, NORMAL)
+    assert are_dashpots_due(pair, SHEAR)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from blocksim.kernels.arrays import LEDGER, NORMAL, SHEAR, zeros
+from blocksim.kernels.arrays import ACTION, zeros
 from blocksim.kernels.history import TAKEN, change_contacts, was_in_contact
 from blocksim.kernels.kinematics import has_just_begun, resolve_point
 from blocksim.kernels.models.surface import face_normal, slot_normal
@@ -40,7 +40,7 @@ def stacked(pose: Pose, *before: Contact) -> World:
     pair = world.pairs[0]
     assert (pair.a, pair.b, pair.near) == (0, 1, 4)
     pair.active = len(before)
-    world.operators.left = 5
+    world.pairs["normal_left"] = world.pairs["shear_left"] = 5
     for n, (contact, (slot, face)) in enumerate(zip(world.contacts[0], before, strict=False), start=1):
         contact.slot, contact.face = slot, face
         contact.spring, contact.depth, contact.normal_force, contact.shear_force = np.array([1e-7, 1e-6, 50, 5]) * n
@@ -48,7 +48,7 @@ def stacked(pose: Pose, *before: Contact) -> World:
 
 
 def find(world: World, *now: Contact, closing: float = 0.0) -> Record:
-    """Let the pair have these contacts now, 1 um deep, and return the book of what was lost; `closing` m/s."""
+    """Let the pair have these contacts now, 1 um deep, and return what was lost; `closing` m/s."""
     a, b = world.bodies[:2]
     a.vy = -closing
     for point, (slot, face) in zip(world.points, now, strict=False):
@@ -58,9 +58,9 @@ def find(world: World, *now: Contact, closing: float = 0.0) -> Record:
         point.x, point.y = own.x, other.y  # anywhere
         point.nx, point.ny = sign * normal[0], sign * normal[1]
         resolve_point(point, a, b, STEP)
-    book = zeros(1, LEDGER)[0]
-    change_contacts(world, 0, len(now), STEP, book)
-    return book
+    action = zeros(1, ACTION)[0]
+    change_contacts(world, 0, len(now), STEP, action)
+    return action
 
 
 def kept(world: World) -> list[tuple[Contact, int]]:
@@ -101,12 +101,13 @@ def test_contact_goes_on_only_with_the_same_corner_on_the_same_face(
     pose: Pose, before: list[Contact], now: list[Contact], expected: list[int], broken: list[int]
 ) -> None:
     world = stacked(pose, *before)
-    book = find(world, *now, closing=2.0)  # those that are new close by more than they are deep
+    lost = find(world, *now, closing=2.0)  # those that are new close by more than they are deep
     assert kept(world) == list(zip(now, expected, strict=True))
-    assert book.broken == pytest.approx(held(world, *broken))
+    assert lost.broken == pytest.approx(held(world, *broken))
     assert world.pairs[0].idle == 4 - len(now)
-    assert world.operators[0].left.tolist() == [0, 0]
-    assert (world.operators["left"][1:] == 5).all()
+    for name in ("normal_left", "shear_left"):
+        assert world.pairs[name][0] == 0
+        assert (world.pairs[name][1:] == 5).all()
 
 
 @pytest.mark.parametrize(
@@ -125,10 +126,10 @@ def test_contact_deeper_than_it_closed_takes_the_place_of_one_that_has_ended(
     pose: Pose, before: list[Contact], now: list[Contact], expected: list[int], broken: list[int]
 ) -> None:
     world = stacked(pose, *before)
-    book = find(world, *now)
+    lost = find(world, *now)
     assert not has_just_begun(world.points[0])
     assert kept(world) == list(zip(now, expected, strict=True))
-    assert book.broken == pytest.approx(held(world, *broken))
+    assert lost.broken == pytest.approx(held(world, *broken))
 
 
 @pytest.mark.parametrize(("closing", "weight"), [(2.0, 1.0), (1.0, 1.5), (0.0, 1.0)])
@@ -144,13 +145,13 @@ def test_only_a_contact_that_begins_has_the_weight_of_a_first_step(pose: Pose, c
 def test_ended_contact_books_half_the_work_of_its_last_step(pose: Pose) -> None:
     world = stacked(pose, ONE)
     world.bodies[0].vx = 0.3
-    book = find(world, closing=2.0)
+    lost = find(world, closing=2.0)
     values = world.interactions[1, 1]
     stiffness = float(values.shear_ratio * values.normal_stiffness)
     closing, slip = 2.0 * STEP, -0.3 * STEP  # the tangent is the normal turned by a quarter
     dashpots = 50.0 - float(values.normal_stiffness) * 1e-6, 5.0 - stiffness * 1e-7
-    assert book.dashpot == pytest.approx(0.5 * (dashpots[0] * closing + dashpots[1] * slip))
-    assert book.broken == pytest.approx(0.5 * stiffness * 1e-7 * (1e-7 + slip))
+    assert lost.dashpot == pytest.approx(0.5 * (dashpots[0] * closing + dashpots[1] * slip))
+    assert lost.broken == pytest.approx(0.5 * stiffness * 1e-7 * (1e-7 + slip))
 
 
 def test_corner_was_in_contact_on_whichever_face(pose: Pose) -> None:
@@ -173,7 +174,7 @@ def test_broken_contact_books_its_shear_springs_and_forgets_everything(start: St
     assert scene.contacts == 0
     assert scene.touching.size == 0
     assert scene.world.ledger[0].broken == pytest.approx(0.5 * stiffness * float((springs**2).sum()), rel=1e-2)
-    assert scene.world.operators.left[0, [NORMAL, SHEAR]].tolist() == [0, 0]
+    assert (scene.world.pairs[0].normal_left, scene.world.pairs[0].shear_left) == (0, 0)
     scene.world.bodies[0].y -= 1e-4
     touching = scene.to_step(scene.steps + 1).touching
     assert touching.size == 2

@@ -14,10 +14,12 @@ import numpy as np
 import pytest
 
 from blocksim.kernels import jit
+from blocksim.kernels.arrays import PAIR, zeros
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from blocksim.kernels.arrays import Record
     from tests.conftest import Simulation
 
 PACKAGE = Path(jit.__file__).parents[1]
@@ -150,7 +152,7 @@ def test_user_is_told_whether_kernels_have_to_be_compiled(tmp_path: Path, monkey
     assert not jit.is_compiled()
     below = tmp_path / f"{jit.source_hash()}-open" / "kernels"
     below.mkdir(parents=True)
-    (below / "advance.advance-1.py311.1.nbc").touch()
+    (below / "advance.advance_in_team-1.py311.1.nbc").touch()
     assert jit.is_compiled()
 
 
@@ -243,3 +245,26 @@ def test_open_and_closed_kernels_do_not_share_a_cache(monkeypatch: pytest.Monkey
         monkeypatch.setattr(jit, "IS_OPEN", is_open)
         folders.add(jit.cache_folder.__wrapped__())
     assert len(folders) == 2
+
+
+@pytest.mark.usefixtures("compiler")
+def test_kernel_is_compiled_once_whatever_integers_it_is_called_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jit, "cache_folder", lambda: None)
+
+    @jit.rare_kernel
+    def twice(number: int) -> int:
+        return 2 * number
+
+    @jit.entry_kernel
+    def add_up(pair: Record) -> int:
+        return twice(3) + twice(pair.a) + twice(pair.near) + twice(pair.axis)
+
+    pair = zeros(1, PAIR)[0]
+    pair.a, pair.near, pair.axis = 4_000_000_000, 60_000, 200
+    assert add_up(pair) == 2 * (3 + 4_000_000_000 + 60_000 + 200)
+    assert [str(one) for (one,) in twice.overloads] == ["int64"]  # type: ignore[attr-defined]
+
+
+def test_numbers_of_other_kinds_are_passed_as_they_are() -> None:
+    for kind in (jit.types.float64, jit.types.boolean, jit.types.uint64, jit.types.none, jit.types.unicode_type):
+        assert jit.plain_type(kind) == kind

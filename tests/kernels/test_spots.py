@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import NORMAL, OPERATOR, SHEAR, zeros
+from blocksim.kernels.arrays import NORMAL, OPERATOR, PAIR, SHEAR, zeros
 from blocksim.kernels.contact import fill_operator, shared_step
 from blocksim.kernels.kinematics import resolve_point
 from blocksim.kernels.models import contact_points
@@ -85,13 +85,14 @@ def test_dashpots_are_those_of_the_general_way(
         resolve_point(point, a, b, STEP)
         point.stiffness = 1e8
     fill_operator(world, 0, len(spots), direction, pattern, 0.7, shared_step(a, b, STEP))
-    expected, operator = world.operators[0, direction], zeros(1, OPERATOR)[0]
+    expected, operator, pair = world.operators[0, direction], zeros(1, OPERATOR)[0], zeros(1, PAIR)[0]
     if len(spots) == 1:
-        renew_single(operator, a, b, spots[0], direction, 0.7, STEP, 1e8)
+        renew_single(operator, pair, a, b, spots[0], direction, 0.7, STEP, 1e8)
     else:
-        renew_double(operator, a, b, spots[0], spots[1], direction, pattern, 0.7, STEP, 1e8)
-    assert (operator.left, operator.pattern) == (expected.left, expected.pattern)
-    assert operator.left > 0
+        renew_double(operator, pair, a, b, spots[0], spots[1], direction, pattern, 0.7, STEP, 1e8)
+    kept = [(made.normal_left, made.shear_left, made.sticking) for made in (pair, world.pairs[0])]
+    assert kept[0] == kept[1]
+    assert kept[0][direction] > 0
     for names in (("e_one", "e_mixed", "e_two"), ("h_one", "h_mixed", "h_two")):
         numbers = np.array([[made[name] for name in names] for made in (operator, expected)])
         assert numbers[0] == pytest.approx(numbers[1], abs=1e-12 * np.abs(numbers).max())

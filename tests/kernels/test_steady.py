@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pytest
 
-from blocksim.kernels.advance import begin_step
 from blocksim.kernels.arrays import NORMAL, SHEAR
 from blocksim.kernels.broad_phase import rebuild_pairs
 from blocksim.kernels.contact import IMPACT_STEPS, pair_forces
 from blocksim.kernels.damping import BOTH
-from blocksim.kernels.steady import CHANGED, steady_forces
+from blocksim.kernels.integrate import start_all
+from blocksim.kernels.shares import add_kept, keep
+from blocksim.kernels.steady import CHANGED, NOTHING, TOUCHING, UNTOUCHED, steady_forces
 from blocksim.verification.scene import HEIGHT, WIDTH
 
 if TYPE_CHECKING:
@@ -36,23 +37,38 @@ class Tally(NamedTuple):
     kinds: frozenset[tuple[bool, ...]]  # for every contact whether its corner is one of b
 
 
+def take_generally(world: World, p: int, step: float) -> None:
+    """Evaluate a pair in the general way and add what it does."""
+    pair_forces(world, p, step)
+    add_kept(world, world.pairs[p], world.action[0], world.ledger[0])
+
+
+def take_steadily(world: World, p: int, step: float) -> bool:
+    """Evaluate a pair in the steady way and add what it does; tell whether that goes."""
+    kind, effect = steady_forces(world, p, step, world.particles)
+    if kind != CHANGED:
+        keep(world.action[0], effect, kind == TOUCHING)
+        dashpot, friction = add_kept(world, world.pairs[p], world.action[0], world.ledger[0])
+        world.ledger[0].dashpot += dashpot
+        world.ledger[0].friction += friction
+    return kind != CHANGED
+
+
 def evaluate(world: World) -> tuple[Tally, World, World]:
     """Evaluate all pairs at the end of the next drift: in the steady way where it goes, and in a copy generally."""
     step = float(world.controls[0].step)
     quick, slow = copy.deepcopy(world), copy.deepcopy(world)
     steady, general, kinds = 0, 0, set()
     for copied in (quick, slow):
-        begin_step(copied, step)
+        start_all(copied.bodies, 0, copied.bodies.size, step)
         for name in ("dashpot", "friction", "broken"):
             copied.ledger[name] = 0.0
     for p, pair in enumerate(quick.pairs[: world.clock[0].pair_count]):
-        before, book = int(pair.active), quick.ledger[0]
-        is_steady, dashpot, friction = steady_forces(quick, p, step, quick.particles)
-        book.dashpot += dashpot
-        book.friction += friction
+        before = int(pair.active)
+        is_steady = take_steadily(quick, p, step)
         if not is_steady:
-            pair_forces(quick, p, step, book)
-        pair_forces(slow, p, step, slow.ledger[0])
+            take_generally(quick, p, step)
+        take_generally(slow, p, step)
         if pair.active or before:
             steady, general = steady + is_steady, general + (not is_steady)
             if is_steady:
@@ -72,7 +88,7 @@ def assert_same(quick: World, slow: World) -> None:
         assert quick.bodies[name] == pytest.approx(slow.bodies[name], abs=4.0 * size), name
     assert quick.bodies.pairs_now.tolist() == slow.bodies.pairs_now.tolist()
     count = int(quick.clock[0].pair_count)
-    for name in ("active", "near", "twins", "idle"):
+    for name in ("active", "near", "twins", "idle", "normal_left", "shear_left"):
         assert quick.pairs[name][:count].tolist() == slow.pairs[name][:count].tolist(), name
     for p in range(count):
         one, other = (world.contacts[p, : world.pairs[p].active] for world in (quick, slow))
@@ -80,19 +96,18 @@ def assert_same(quick: World, slow: World) -> None:
         assert one["face"].tolist() == other["face"].tolist()
         for name, size in (("spring", place), ("depth", place), ("normal_force", force), ("shear_force", force)):
             assert one[name] == pytest.approx(other[name], abs=size), name
-        for direction in (NORMAL, SHEAR):
-            assert_same_dashpots(quick.operators[p, direction], slow.operators[p, direction])
+        for direction, name in ((NORMAL, "normal_left"), (SHEAR, "shear_left")):
+            if quick.pairs[name][p] > 0:
+                assert_same_dashpots(quick.operators[p, direction], slow.operators[p, direction])
+        assert quick.pairs[p].shear_left == 0 or quick.pairs[p].sticking == slow.pairs[p].sticking
     for name in ("dashpot", "friction", "broken"):
         assert quick.ledger[name] == pytest.approx(slow.ledger[name], rel=1e-9, abs=8.0 * force * (moved + place)), name
 
 
 def assert_same_dashpots(one: Record, other: Record) -> None:
-    assert one.left == other.left
-    if one.left > 0:
-        assert one.pattern == other.pattern
-        for names in (("e_one", "e_mixed", "e_two"), ("h_one", "h_mixed", "h_two")):
-            numbers = np.array([[operator[name] for name in names] for operator in (one, other)])
-            assert numbers[0] == pytest.approx(numbers[1], rel=1e-6, abs=1e-9 * np.abs(numbers).max())
+    for names in (("e_one", "e_mixed", "e_two"), ("h_one", "h_mixed", "h_two")):
+        numbers = np.array([[operator[name] for name in names] for operator in (one, other)])
+        assert numbers[0] == pytest.approx(numbers[1], rel=1e-6, abs=1e-9 * np.abs(numbers).max())
 
 
 def tip(angle: float) -> float:
@@ -162,17 +177,17 @@ def test_nearly_all_pairs_of_a_lasting_scene_are_steady(start: Start, situation:
 
 
 def is_untouched(world: World, before: World) -> bool:
-    """Tell whether neither bodies nor contacts, candidates and ledger have changed."""
+    """Tell whether nothing has changed that lasts, nor the work space of contact.py."""
     return all(
         np.array_equal(getattr(world, name), getattr(before, name))
-        for name in ("bodies", "contacts", "candidates", "ledger", "points")
+        for name in ("bodies", "pairs", "contacts", "candidates", "operators", "ledger", "points", "action")
     )
 
 
 def on_ground(pose: Pose, **tables: object) -> World:
     """Return a block that stands on the ground, 1 um deep, with its two contacts."""
     world = pose((0.0, 0.5 * HEIGHT - 1e-6, 0.0), **tables)
-    pair_forces(world, 0, 0.0, world.ledger[0])
+    pair_forces(world, 0, 0.0)
     assert world.pairs[0].active == 2
     return world
 
@@ -180,7 +195,7 @@ def on_ground(pose: Pose, **tables: object) -> World:
 def on_block(pose: Pose, shift: float, **tables: object) -> World:
     """Return a block that stands on another one, 1 um deep, with its two contacts."""
     world = pose((shift, 1.0 + HEIGHT - 1e-6, 0.0), (0.0, 1.0, 0.0), **tables)
-    pair_forces(world, 0, 0.0, world.ledger[0])
+    pair_forces(world, 0, 0.0)
     assert world.pairs[0].active == 2
     return world
 
@@ -188,13 +203,13 @@ def on_block(pose: Pose, shift: float, **tables: object) -> World:
 def assert_changed(world: World) -> None:
     """Assert that the pair is left to contact.py, as it was."""
     before = copy.deepcopy(world)
-    assert steady_forces(world, 0, STEP, world.particles) == CHANGED
+    assert steady_forces(world, 0, STEP, world.particles) == (CHANGED, NOTHING)
     assert is_untouched(world, before)
 
 
 def test_contacts_that_go_on_are_steady(pose: Pose) -> None:
     for world in (on_ground(pose), on_block(pose, 0.003)):
-        assert steady_forces(world, 0, STEP, world.particles)[0]
+        assert steady_forces(world, 0, STEP, world.particles)[0] == TOUCHING
 
 
 @pytest.mark.parametrize("up", [1.1e-6, 1.0])
@@ -214,12 +229,12 @@ def test_corner_beyond_the_end_of_its_face_is_not_steady(pose: Pose, shift: floa
 @pytest.mark.parametrize(("down", "changes"), [(-0.9e-6, True), (0.0, False)])
 def test_corner_that_begins_is_not_steady(pose: Pose, down: float, changes: bool) -> None:
     world = pose((0.0, tip(1e-4) - 1e-6, 1e-4))  # on its lower left corner, the other one 2 um above the ground
-    pair_forces(world, 0, 0.0, world.ledger[0])
+    pair_forces(world, 0, 0.0)
     assert (world.pairs[0].active, world.pairs[0].idle) == (1, 1)
     world.bodies[0].y += down - 1.5e-6 if changes else 0.0
     if changes:
         assert_changed(world)
-    assert steady_forces(world, 0, STEP, world.particles)[0] is not changes
+    assert steady_forces(world, 0, STEP, world.particles)[0] == (CHANGED if changes else TOUCHING)
 
 
 @pytest.mark.parametrize(("steps", "changes"), [(0.9 * IMPACT_STEPS, True), (1.2 * IMPACT_STEPS, False)])
@@ -234,11 +249,11 @@ def test_corner_about_to_lose_a_face_while_another_one_is_near_is_not_steady(
     a.x, a.y = b.half_x - beside - foot_x, 1.0 + b.half_y - 1e-6 - foot_y
     a.vy = -speed
     assert rebuild_pairs(world)
-    pair_forces(world, 0, 0.0, world.ledger[0])
+    pair_forces(world, 0, 0.0)
     assert world.contacts[0, 0].slot == 0
     assert world.contacts[0, 0].face == 1
-    is_steady, *_ = steady_forces(world, 0, beside / (steps * speed), world.particles)
-    assert is_steady is not changes
+    kind, _ = steady_forces(world, 0, beside / (steps * speed), world.particles)
+    assert kind == (CHANGED if changes else TOUCHING)
 
 
 def test_other_laws_models_and_straight_ground_are_never_steady(pose: Pose) -> None:
@@ -248,7 +263,7 @@ def test_other_laws_models_and_straight_ground_are_never_steady(pose: Pose) -> N
         assert_changed(world)
     for model in ("kernel", "particles"):
         world = pose((0.0, 0.5 * HEIGHT - 5e-4, 0.0), contact={"model": model})
-        pair_forces(world, 0, 0.0, world.ledger[0])
+        pair_forces(world, 0, 0.0)
         assert world.pairs[0].active > 2
         assert_changed(world)
 
@@ -256,13 +271,13 @@ def test_other_laws_models_and_straight_ground_are_never_steady(pose: Pose) -> N
 def test_oblique_corners_that_meet_are_not_steady_and_aligned_ones_are(pose: Pose) -> None:
     aligned = on_block(pose, 0.0)
     assert aligned.pairs[0].twins != 0
-    assert steady_forces(aligned, 0, STEP, aligned.particles)[0]
+    assert steady_forces(aligned, 0, STEP, aligned.particles)[0] == TOUCHING
     oblique = pose((0.0, 0.0, pi / 4), (0.0, 1.0, 0.0))
     a, b = oblique.bodies[:2]
     a.x, a.y = b.half_x - 1e-7, 1.0 + b.half_y - 1e-6 + 0.5 * (WIDTH + HEIGHT) * sin(pi / 4)
     a.x += 0.5 * (WIDTH - HEIGHT) * sin(pi / 4)
     assert rebuild_pairs(oblique)
-    pair_forces(oblique, 0, 0.0, oblique.ledger[0])
+    pair_forces(oblique, 0, 0.0)
     assert oblique.pairs[0].active == 1
     assert oblique.pairs[0].twins != 0
     assert_changed(oblique)
@@ -271,28 +286,51 @@ def test_oblique_corners_that_meet_are_not_steady_and_aligned_ones_are(pose: Pos
 @pytest.mark.parametrize("sliding", [0, 1])
 def test_contact_that_slides_beside_one_that_sticks_has_no_dashpot(pose: Pose, sliding: int) -> None:
     quick = on_block(pose, 0.003)
-    assert steady_forces(quick, 0, STEP, quick.particles)[0]
-    assert quick.operators[0, SHEAR].pattern == BOTH
-    assert quick.operators[0, SHEAR].left > 0
+    assert steady_forces(quick, 0, STEP, quick.particles)[0] == TOUCHING
+    assert quick.pairs[0].sticking == BOTH
+    assert quick.pairs[0].shear_left > 0
     quick.contacts[0, sliding].spring = 1e-3
     quick.bodies[0].vx = 0.1
     slow = copy.deepcopy(quick)
-    is_steady, dashpot, friction = steady_forces(quick, 0, STEP, quick.particles)
-    quick.ledger[0].dashpot += dashpot
-    quick.ledger[0].friction += friction
-    pair_forces(slow, 0, STEP, slow.ledger[0])
-    assert is_steady
-    assert quick.operators[0, SHEAR].pattern == (2, 1)[sliding]
+    assert take_steadily(quick, 0, STEP)
+    take_generally(slow, 0, STEP)
+    assert quick.pairs[0].sticking == (2, 1)[sliding]
     assert_same(quick, slow)
+
+
+def steps_left(world: World) -> list[int]:
+    return [int(world.pairs[0].normal_left), int(world.pairs[0].shear_left)]
 
 
 def test_dashpots_are_made_anew_where_the_number_of_neighbours_has_changed(pose: Pose) -> None:
     world = on_block(pose, 0.003)
     steady_forces(world, 0, STEP, world.particles)
-    left = world.operators.left[0].tolist()
+    left = steps_left(world)
     assert min(left) > 2
     steady_forces(world, 0, STEP, world.particles)
-    assert world.operators.left[0].tolist() == [n - 1 for n in left]
+    assert steps_left(world) == [n - 1 for n in left]
     world.bodies[1].pairs_changed = 1
     steady_forces(world, 0, STEP, world.particles)
-    assert world.operators.left[0].tolist() == left
+    assert steps_left(world) == left
+
+
+def test_steady_pair_adds_to_no_body_and_to_no_book_itself(pose: Pose) -> None:
+    for world in (on_ground(pose), on_block(pose, 0.003)):
+        world.bodies[0].vx = 20.0  # it slides
+        bodies, ledger = world.bodies.copy(), world.ledger.copy()
+        kind, effect = steady_forces(world, 0, STEP, world.particles)
+        assert kind == TOUCHING
+        assert effect.fy > 0.0
+        assert effect.friction != 0.0
+        assert np.array_equal(world.bodies, bodies)
+        assert np.array_equal(world.ledger, ledger)
+
+
+@pytest.mark.parametrize("up", [1e-5, 1e-3, 3e-3])
+def test_pair_without_contacts_that_stays_apart_does_nothing(pose: Pose, up: float) -> None:
+    world = pose((0.003, 1.0 + HEIGHT + up, 0.0), (0.0, 1.0, 0.0))
+    before = copy.deepcopy(world)
+    for _ in range(2):  # along another axis than at first
+        assert steady_forces(world, 0, STEP, world.particles) == (UNTOUCHED, NOTHING)
+    world.pairs.axis = before.pairs.axis  # along which they were found to be apart
+    assert is_untouched(world, before)

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import AT_REST, MOTION_PIECE, REACHED, Records, World, zeros
-from blocksim.kernels.support import acceleration, displacement, piece_at
-from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
+from blocksim.kernels.arrays import AT_REST, CONTROLS, MOTION_PIECE, REACHED, Records, World, zeros
+from blocksim.kernels.support import acceleration, book_support, displacement, has_motion, piece_at
+from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
@@ -260,15 +260,48 @@ def test_bodies_on_the_support_return_to_where_they_were_to_the_last_bit() -> No
     wall = {"y": 0.1, "x": 0.2, "fixed": True, "angle": 0.3}
     scene = on_support([LYING, wall], there_and_back, direction=0.7)
     scene.to_time(0.01)
-    moved = scene.world.bodies[scene.world.bodies.is_moved == 1]
-    assert np.hypot(moved.x - moved.base_x, moved.y - moved.base_y) == pytest.approx(0.003, rel=1e-2)
+    base: Any = scene.world.moved
+    moved: Any = scene.world.bodies[base.body]
+    assert (moved.is_moved == 1).all()
+    assert np.hypot(moved.x - base.x, moved.y - base.y) == pytest.approx(0.003, rel=1e-2)
     scene.to_time(0.03)
     fixed: Any = scene.world.bodies[scene.world.bodies.is_moved == 1]
-    assert (fixed.x == fixed.base_x).all()
-    assert (fixed.y == fixed.base_y).all()
+    assert fixed.x.tolist() == base.x.tolist() == [0.2, 0.0]
+    assert fixed.y.tolist() == base.y.tolist() == [0.1, 0.0]
     assert not fixed.vx.any()
     assert fixed.size == 2
     assert scene.world.bodies[0].is_moved == 0
+
+
+def test_work_on_the_support_is_booked_by_the_trapezoid_rule_and_its_totals_are_used_up() -> None:
+    world = on_support([LYING, {"y": 0.1, "x": 0.2, "fixed": True}], pieces_of((0.0, 0.0, 0.3))).world
+    wall, ground, step = world.bodies[1], world.bodies[2], 1e-3
+    assert world.moved.body.tolist() == [1, 2]
+    world.moved.fx, world.moved.fy = (1.0, 2.0), (3.0, 4.0)
+    for body, force in ((wall, 5.0), (ground, -7.0)):
+        body.vx, body.vy, body.fx, body.fy, body.torque = 0.2, -0.1, force, 2.0 * force, 1.0
+    before = float(world.ledger[0].to_support)
+    book_support(world, step)
+    work = 0.5 * step * (0.2 * (1.0 + 2.0 + 5.0 - 7.0) - 0.1 * (3.0 + 4.0 + 10.0 - 14.0))
+    assert world.ledger[0].to_support - before == pytest.approx(work)
+    assert world.moved["fx"].tolist() == [5.0, -7.0]
+    assert world.moved["fy"].tolist() == [10.0, -14.0]
+    assert [(body.fx, body.fy, body.torque) for body in (wall, ground)] == [(0.0, 0.0, 0.0)] * 2
+
+
+@pytest.mark.parametrize(("x", "y", "moves"), [(0.0, 0.0, False), (1.0, 0.0, True), (0.0, -1.0, True)])
+def test_support_moves_where_its_motion_has_a_direction(x: float, y: float, moves: bool) -> None:
+    controls = zeros(1, CONTROLS)[0]
+    controls.motion_x, controls.motion_y = x, y
+    assert has_motion(controls) == moves
+
+
+@pytest.mark.parametrize("is_driven", [False, True])
+def test_forces_count_on_fixed_bodies_only_where_the_support_moves(is_driven: bool) -> None:
+    bodies = [LYING, {"y": HEIGHT / 2, "x": WIDTH, "fixed": True}]
+    world = on_support(bodies, pieces_of((0.0, 0.0, 0.3)) if is_driven else None).to_step(3).world
+    assert world.bodies.counts.tolist() == [1, is_driven, is_driven]
+    assert world.moved.fy.any() == is_driven
 
 
 @pytest.mark.parametrize("last", [(0.02,), (0.02, 0.0, 1e-3)])

@@ -47,6 +47,70 @@ bad.toml:21: contact.contact_radius: 0 is too small; a length above 0 such as "3
       |                  ^
 """,
     ),
+    "skin of zero": (
+        "\n[contact]\nskin = 0\n",
+        """
+bad.toml:21: contact.skin: 0 is too small; a length above 0 such as "32 mm" is needed
+   21 | skin = 0
+      |        ^
+""",
+    ),
+    "negative skin": (
+        '\n[contact]\nskin = "-1 mm"\n',
+        """
+bad.toml:21: contact.skin: "-1 mm" is too small; a length above 0 such as "32 mm" is needed
+   21 | skin = "-1 mm"
+      |        ^^^^^^^
+""",
+    ),
+    "skin that is not a number": (
+        "\n[contact]\nskin = nan\n",
+        """
+bad.toml:21: contact.skin: nan is not a finite number; a length above 0 such as "32 mm" is needed
+   21 | skin = nan
+      |        ^^^
+""",
+    ),
+    "endless skin": (
+        "\n[contact]\nskin = inf\n",
+        """
+bad.toml:21: contact.skin: inf is not a finite number; a length above 0 such as "32 mm" is needed
+   21 | skin = inf
+      |        ^^^
+""",
+    ),
+    "skin that is a time": (
+        '\n[contact]\nskin = "1 ms"\n',
+        """
+bad.toml:21: contact.skin: "1 ms" is a time; a length above 0 such as "32 mm" is needed
+   21 | skin = "1 ms"
+      |        ^^^^^^
+""",
+    ),
+    "skin that is used up at every step": (
+        '\n[contact]\nskin = "1.9 um"\n',
+        """
+bad.toml:21: contact.skin: 0.0019 mm is too small; at least 0.002 mm is needed, 0.01 % of the smallest side of a block
+   21 | skin = "1.9 um"
+      |        ^^^^^^^^
+""",
+    ),
+    "skin lost in the round-off of places far away": (
+        '\n[contact]\nskin = "0.01 mm"\n\n[[bodies]]\nblock = "brick"\nx = -1e9\ny = 1\n',
+        """
+bad.toml:21: contact.skin: 0.01 mm is too small; at least 0.0119209 mm is needed, 100 times the round-off of places 1e+09 m away
+   21 | skin = "0.01 mm"
+      |        ^^^^^^^^^
+""",
+    ),
+    "skin beyond the smallest block": (
+        '\n[contact]\nskin = "20.1 mm"\n',
+        """
+bad.toml:21: contact.skin: 20.1 mm is more than the smallest side of a block, 20 mm; blocks far away would be listed as neighbours
+   21 | skin = "20.1 mm"
+      |        ^^^^^^^^^
+""",
+    ),
     "smoothing length with no neighbours": (
         '\n[contact]\nmodel = "kernel"\nsmoothing_length = "0.79 mm"\n',
         """

@@ -48,7 +48,7 @@ def test_the_defaults_are_the_documented_ones(file: Path) -> None:
     assert (scenario.contact.restitution.block_block, scenario.contact.restitution.block_ground) == (0.2, 0.2)
     assert scenario.contact.stiffness_scale == 1.0
     assert scenario.contact.normal_stiffness is scenario.contact.shear_stiffness_ratio is None
-    assert scenario.contact.shear_damping_ratio is scenario.contact.max_overlap is None
+    assert scenario.contact.shear_damping_ratio is scenario.contact.max_overlap is scenario.contact.skin is None
     assert (scenario.contact.contact_radius, scenario.contact.particle_spacing) == (0.001, 0.001)
     assert (scenario.contact.smoothing_length, scenario.contact.kernel) == (None, "wendland-c2")
     assert scenario.ground.profile is None

@@ -238,6 +238,7 @@ HASHED = {
     "contact.shear_stiffness_ratio": 0.82,
     "contact.shear_damping_ratio": 0.1,
     "contact.max_overlap": 0.1,
+    "contact.skin": 0.1,
     "contact.contact_radius": 0.1,
     "contact.particle_spacing": 0.1,
     "contact.smoothing_length": 0.1,

@@ -10,7 +10,7 @@ from blocksim.errors import ScenarioError
 from blocksim.scenario import place_bodies, scenario_from_mapping
 
 MATERIAL = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
-BRICK = {"width": 0.2, "height": 0.1, "length": 0.1, "material": "oak"}
+BRICK: dict[str, Any] = {"width": 0.2, "height": 0.1, "length": 0.1, "material": "oak"}
 SLOPE = math.atan(0.5)
 
 
@@ -93,6 +93,25 @@ def test_spacings_count_for_the_blocks_in_use_and_the_models_that_use_them() -> 
     assert mistakes(scenario_data(used, blocks=blocks, contact=coarse)) == [
         "30 mm is more than half of the smallest side of a block, 1 mm"
     ]
+
+
+@pytest.mark.parametrize("share", [1e-4, 1.0])
+def test_a_skin_may_be_as_small_and_as_large_as_its_limits(share: float) -> None:
+    assert mistakes(scenario_data([{"x": 0, "y": 1}], contact={"skin": share * BRICK["height"]})) == []
+
+
+def test_the_skin_is_held_against_the_smallest_block_in_use_whatever_the_model() -> None:
+    blocks = {"brick": BRICK, "tiny": {"width": 0.01, "height": 0.001, "length": 0.01, "material": "oak"}}
+    contact = {"skin": 0.0011, "model": "particles", "particle_spacing": 5e-4}
+    assert mistakes(scenario_data([{"x": 0, "y": 1}], blocks=blocks, contact=contact)) == []
+    used: list[dict[str, object]] = [{"x": 0, "y": 1}, {"x": 1, "y": 1, "block": "tiny"}]
+    assert mistakes(scenario_data(used, blocks=blocks, contact=contact)) == [
+        "1.1 mm is more than the smallest side of a block, 1 mm; blocks far away would be listed as neighbours"
+    ]
+
+
+def test_round_off_of_places_far_away_refuses_no_scenario_that_names_no_skin() -> None:
+    assert mistakes(scenario_data([{"x": 0, "y": 1e13}])) == []
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from tests.conftest import PaperBlock, Start
 
 # work space
-NOT_STATE = {"points", "matrices", "before", "spare_pairs", "spare_candidates", "heads", "links", "neighbours"}
+WORK_SPACE = {"points", "matrices", "before", "action", "heads", "links", "neighbours", "shares", "between", "team"}
+NOT_STATE = {*WORK_SPACE, "spare_pairs", "spare_candidates"}
 END = 0.24  # s, after the first impacts
 
 
@@ -114,6 +115,18 @@ def test_a_crowd_moves_the_same_to_the_last_bit_with_any_reach(contact: dict[str
         rebuilds.append(int(scene.world.clock[0].rebuilds))
     assert ends[0] == ends[1] == ends[2]
     assert rebuilds[0] > rebuilds[1] > rebuilds[2] > 10
+
+
+def test_skin_of_the_scenario_does_not_change_a_bit_of_a_collapse(start_shipped: Callable[..., Simulation]) -> None:
+    ends, rebuilds = [], []
+    skins: list[dict[str, str]] = [{}, {"contact__skin": "0.1 mm"}, {"contact__skin": "32 mm"}]
+    for skin in skins:
+        scene = start_shipped("three_blocks_nominal", contact__stiffness_scale=3e-4, **skin).to_time(0.3)
+        assert scene.status == REACHED
+        ends.append(motion_bits(scene))
+        rebuilds.append(int(scene.world.clock[0].rebuilds))
+    assert ends[0] == ends[1] == ends[2]
+    assert rebuilds[1] > 10 * rebuilds[0] > 20 * rebuilds[2] > 0
 
 
 @pytest.mark.parametrize(("slope", "slides"), [(0.3, False), (0.5, True)])

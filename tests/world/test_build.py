@@ -9,8 +9,19 @@ import numpy as np
 import pytest
 
 from blocksim.errors import ExitCode
+from blocksim.kernels.arrays import (
+    ARRIVED,
+    CACHE_LINE,
+    CONTACT,
+    GROUP,
+    MEETINGS,
+    PARTICLE_CONTACT,
+    STATUS,
+    TEAM_SIZE,
+    TEAM_WORDS,
+    zeros,
+)
 from blocksim.kernels.arrays import BODY as BODY_RECORD
-from blocksim.kernels.arrays import CONTACT, GROUP, PARTICLE_CONTACT, zeros
 from blocksim.kernels.energy import booked
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.world import memory
@@ -22,6 +33,7 @@ from blocksim.world.build import (
     cell_radius,
     empty_lists,
     with_more_room,
+    with_threads,
 )
 from blocksim.world.memory import SceneTooLargeError
 from blocksim.world.restitution import damping_ratio
@@ -164,7 +176,8 @@ def test_more_room_keeps_what_there_is(model: str) -> None:
     world.pairs.a[:] = np.arange(world.pairs.size)
     world.contacts.spring[:] = 7.0
     world.candidates[:] = 3
-    world.operators.left[:] = 5
+    world.operators.h_one[:] = 5.0
+    world.pairs.normal_left[:] = 5
     world.ledger[0].friction = 11.0
     wider = with_more_room(world)
     used = world.pairs.size
@@ -178,15 +191,31 @@ def test_more_room_keeps_what_there_is(model: str) -> None:
     assert wider.bodies is world.bodies
 
 
-def test_every_group_of_pairs_has_a_book_of_its_own() -> None:
-    world = build_world(scenario())
-    for _ in range(20):
-        last = (world.pairs.size - 1) // GROUP
-        assert world.ledger.size > last
-        world.ledger.friction[last] = world.pairs.size
-        world = with_more_room(world)
-        assert world.ledger[last].friction > 0.0
-    assert world.ledger.size > 5
+@pytest.mark.parametrize("more", [0, GROUP - 2, GROUP - 1, GROUP, 3 * GROUP])
+def test_every_group_of_bodies_has_a_book_of_its_own_whatever_the_room_for_pairs(more: int) -> None:
+    world = build_world(scenario(more=tuple({**BODY, "x": 0.1 * i} for i in range(2, 2 + more))))
+    last = (world.bodies.size - 1) // GROUP
+    assert world.ledger.size > last
+    world.ledger.friction[last] = 11.0
+    wider = with_more_room(world)
+    assert wider.ledger is world.ledger
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_threads_have_a_share_each_and_as_much_room_between_them_as_there_is_for_pairs(threads: int) -> None:
+    world = with_threads(build_world(scenario()), threads)
+    for roomy in (world, with_more_room(world)):
+        assert roomy.shares.size == threads
+        assert roomy.between.size == (1 if threads == 1 else roomy.pairs.size)
+
+
+def test_threads_write_to_no_common_cache_line() -> None:
+    world = with_threads(build_world(scenario()), 5)
+    places = [world.shares[k : k + 1].ctypes.data for k in range(5)]
+    assert all(place % CACHE_LINE == 0 for place in places)
+    assert (np.diff(places) >= CACHE_LINE).all()
+    assert np.diff([TEAM_SIZE, ARRIVED, MEETINGS, STATUS, TEAM_WORDS]).min() * world.team.itemsize >= CACHE_LINE
+    assert world.team.size == TEAM_WORDS
 
 
 def test_more_room_than_there_is_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ import pytest
 from blocksim.kernels.support import acceleration, displacement, piece_at
 from blocksim.verification.scene import scenario_of
 from blocksim.world.build import build_world
-from blocksim.world.motion import motion_records, support_direction
+from blocksim.world.motion import motion_records, moved_records, support_direction
 
 if TYPE_CHECKING:
     from blocksim.scenario import Scenario
@@ -69,3 +69,14 @@ def test_pieces_join_without_jump_of_place_or_velocity() -> None:
     speeds = one.c1 + lengths * (2.0 * one.c2 + lengths * 3.0 * one.c3)
     assert ends == pytest.approx(two.c0, abs=1e-15)
     assert speeds == pytest.approx(two.c1, abs=1e-12)
+
+
+def test_all_that_moves_with_the_support_is_listed_where_it_starts() -> None:
+    bodies = [{"y": 0.5, "fixed": True}, {"x": 0.2, "y": 0.5}, {"x": 0.4, "y": 0.7, "fixed": True}]
+    world = build_world(scenario_of(bodies, motion=SHAKING, time={"end": 2.0}))
+    for moved in (world.moved, moved_records(world.bodies)):
+        assert moved.body.tolist() == [0, 2, 3]
+        assert moved.x.tolist() == [0.0, 0.4, 0.0]
+        assert moved.y.tolist() == [0.5, 0.7, 0.0]
+        assert not moved.fx.any()
+        assert not moved.fy.any()

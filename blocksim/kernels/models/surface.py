@@ -8,7 +8,7 @@ steps, there was never a third.) Should there be one after all, the shallowest d
 
 import math
 
-from blocksim.kernels.arrays import ALL, CONTACTS, HALF, NO_FACE, SLOTS, Integers, Record, Records, World
+from blocksim.kernels.arrays import ALL, CONTACTS, HALF, NO_FACE, Integers, Record, Records, World
 from blocksim.kernels.geometry import corner_offset, relative_pose, slab_depth, to_world
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.models.twins import CONE_TOLERANCE, corner_signs, drop_point, drop_twins
@@ -127,16 +127,6 @@ def ground_points(owner: Record, near: int, candidates: Integers, level: float, 
 
 
 @rare_kernel
-def lies_near(owner: Record, touched: Record, corner: int, reach: float) -> bool:
-    """Tell whether a corner of `owner` lies inside `touched` grown by `reach` (m) on every side."""
-    x0, y0, c, s = relative_pose(owner, touched)
-    sx, sy = corner_signs(corner)
-    px = x0 + sx * c * owner.half_x - sy * s * owner.half_y
-    py = y0 + sx * s * owner.half_x + sy * c * owner.half_y
-    return abs(px) <= touched.half_x + reach and abs(py) <= touched.half_y + reach
-
-
-@rare_kernel
 def block_points(a: Record, b: Record, pair: Record, candidates: Integers, contacts: Records, points: Records) -> int:
     """Fill `points` with the contact points of two blocks and return how many there are; marks twins in `pair`."""
     x0, y0, c, s = relative_pose(a, b)
@@ -195,26 +185,40 @@ def corner_height(body: Record, corner: int) -> float:
 
 
 @rare_kernel
-def is_near(world: World, a: int, b: int, k: int, reach: float) -> bool:
-    """Tell whether the corner of slot k of a pair may come into contact: it is within `reach` (m) of the other body."""
-    one = world.bodies[a]
-    two = world.bodies[b]
-    if b == world.bodies.size - 1:
-        return k < HALF and corner_height(one, k) <= two.y + reach
-    if k < HALF:
-        return (one.corners >> k) & 1 == 1 and lies_near(one, two, k, reach)
-    return (two.corners >> (k - HALF)) & 1 == 1 and lies_near(two, one, k - HALF, reach)
+def corners_near_ground(body: Record, level: float, out: Integers) -> int:
+    """Write the corners of a body that are below a height (m) into `out` and return how many there are."""
+    count = 0
+    for corner in range(HALF):
+        if corner_height(body, corner) <= level:
+            out[count] = corner
+            count += 1
+    return count
+
+
+@rare_kernel
+def corners_near(owner: Record, touched: Record, reach: float, first: int, out: Integers, count: int) -> int:
+    """Append the corners of `owner` inside `touched` grown by `reach` (m), as slots from `first`; return the count."""
+    x0, y0, c, s = relative_pose(owner, touched)
+    for corner in range(HALF):
+        sx, sy = corner_signs(corner)
+        px = x0 + sx * c * owner.half_x - sy * s * owner.half_y
+        py = y0 + sx * s * owner.half_x + sy * c * owner.half_y
+        is_inside = abs(px) <= touched.half_x + reach and abs(py) <= touched.half_y + reach
+        if is_inside and (owner.corners >> corner) & 1 == 1:
+            out[count] = first + corner
+            count += 1
+    return count
 
 
 @rare_kernel
 def near_slots(world: World, a: int, b: int, reach: float, out: Integers) -> int:
-    """Write the slots of a pair whose corners are near into `out` and return how many there are."""
-    count = 0
-    for k in range(SLOTS):
-        if is_near(world, a, b, k, reach):
-            out[count] = k
-            count += 1
-    return count
+    """Write the slots of a pair whose corners are within `reach` (m) into `out` and return how many there are."""
+    one = world.bodies[a]
+    two = world.bodies[b]
+    if b == world.bodies.size - 1:
+        return corners_near_ground(one, two.y + reach, out)
+    count = corners_near(one, two, reach, 0, out, 0)
+    return corners_near(two, one, reach, HALF, out, count)
 
 
 @rare_kernel

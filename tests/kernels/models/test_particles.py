@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import LEDGER, zeros
 from blocksim.kernels.broad_phase import rebuild_pairs
 from blocksim.kernels.contact import pair_forces
 from blocksim.kernels.geometry import to_world
@@ -126,10 +125,10 @@ def test_contact_keeps_its_history_while_its_disc_begins_and_ends_to_touch_other
     block.vx = drag / STEP
     assert rebuild_pairs(world)
     before: dict[tuple[int, int], float] = {}
-    met, parted, book = 0, 0, zeros(1, LEDGER)[0]
+    met, parted = 0, 0
     for n in range(1200 // pace):
         block.x = n * drag
-        pair_forces(world, 0, STEP, book)
+        pair_forces(world, 0, STEP)
         contacts = world.contacts[0, : world.pairs[0].active]
         now = {(int(contact.slot), int(contact.face)): float(contact.spring) for contact in contacts}
         for key, spring in now.items():

@@ -10,17 +10,19 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import CONTACT, CONTACTS, LEDGER, PAIR, POINT, SLOTS, zeros
+from blocksim.kernels.arrays import CONTACT, CONTACTS, HALF, PAIR, POINT, SLOTS, zeros
 from blocksim.kernels.contact import pair_forces
 from blocksim.kernels.geometry import ground_gap, separation, to_world
 from blocksim.kernels.models.surface import (
     block_points,
+    corners_near,
+    corners_near_ground,
     face_below_corner,
     face_normal,
     find_points,
     ground_points,
     keep_deepest,
-    lies_near,
+    near_slots,
 )
 from blocksim.kernels.models.twins import CONE_TOLERANCE, corner_signs
 
@@ -185,7 +187,7 @@ def test_block_deep_under_ground_has_its_two_deepest_points_and_no_room_is_overr
     world.contacts[1] = beside = np.full(CONTACTS, 7.0).astype(world.contacts.dtype).view(np.recarray)
     assert find_points(world, 0) == CONTACTS
     assert world.points.slot[:CONTACTS].tolist() == slots
-    pair_forces(world, 0, 1e-6, zeros(1, LEDGER)[0])
+    pair_forces(world, 0, 1e-6)
     assert world.pairs[0].active == CONTACTS
     assert world.contacts[0].slot.tolist() == slots
     heights = [corner_of(world.bodies[0], k)[1] for k in slots]
@@ -201,7 +203,7 @@ def test_two_blocks_in_one_place_have_two_points_at_most(
     world = pose((x, 1.0 + y, one), (0.0, 1.0, two))
     count = find_points(world, 0)
     assert count <= CONTACTS
-    pair_forces(world, 0, 1e-6, zeros(1, LEDGER)[0])
+    pair_forces(world, 0, 1e-6)
     assert world.pairs[0].active == count
     assert not world.contacts["normal_force"][1:].any()
 
@@ -211,11 +213,38 @@ def test_corner_is_near_when_it_lies_in_the_grown_rectangle(
     make_body: MakeBody, x: float, y: float, one: float, two: float
 ) -> None:
     a, b = make_body(x, y, one), make_body(0.0, 0.0, two)
+    expected = []
     for corner in range(4):
         local = np.abs(in_frame(b, corner_of(a, corner)))
         beyond = float(max(local[0] - b.half_x, local[1] - b.half_y))
         assume(abs(beyond - 0.01) > 1e-12)
-        assert lies_near(a, b, corner, 0.01) == (beyond <= 0.01)
+        if beyond <= 0.01:
+            expected.append(corner)
+    slots = np.full(SLOTS, 99)
+    slots[0] = 7  # there already
+    for first in (0, HALF):
+        count = corners_near(a, b, 0.01, first, slots, 1)
+        assert slots[:count].tolist() == [7] + [first + corner for corner in expected]
+        assert (slots[count:] == 99).all()  # there is no room for more
+
+
+@given(y=st.floats(-0.02, 0.06), angle=st.floats(-4.0, 4.0))
+def test_corner_is_near_the_ground_when_it_is_below_the_height(make_body: MakeBody, y: float, angle: float) -> None:
+    body, slots = make_body(0.3, y, angle), np.full(SLOTS, 99)
+    heights = [corner_of(body, k)[1] for k in range(4)]
+    assume(min(abs(height - 0.02) for height in heights) > 1e-12)
+    count = corners_near_ground(body, 0.02, slots)
+    assert slots[:count].tolist() == [k for k in range(4) if heights[k] <= 0.02]
+
+
+def test_candidates_of_a_pair_are_corners_of_the_first_and_then_of_the_second_that_can_touch(pose: Pose) -> None:
+    world, slots = pose((0.0, 1.0 + H, 0.0), (0.0, 1.0, 0.0)), np.full(SLOTS, 99)
+    count = near_slots(world, 0, 1, 1e-3, slots)
+    assert slots[:count].tolist() == [0, 1, 6, 7]
+    world.bodies[0].corners = 0b1110  # its lower left one lies within other bodies
+    world.bodies[1].corners = 0b0111
+    count = near_slots(world, 0, 1, 1e-3, slots)
+    assert slots[:count].tolist() == [1, 6]
 
 
 def test_corner_a_quarter_turn_apart_touches_the_side_it_came_through(make_body: MakeBody) -> None:
