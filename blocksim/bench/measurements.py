@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from blocksim.bench import ensemble, startup, three_blocks, walls
+from blocksim.bench import ensemble, startup, threads, three_blocks, walls
 from blocksim.bench.measurement import Measurement
 from blocksim.bench.peers import peer_three_blocks, peer_wall
 from blocksim.errors import BlocksimError, ExitCode
@@ -14,6 +14,7 @@ MEASUREMENTS = (
     Measurement("three-blocks", "collapse of the three blocks", three_blocks.measure, quick=three_blocks.QUICK),
     Measurement("ensemble", "many collapses together", ensemble.measure, quick=ensemble.QUICK),
     Measurement("walls", "pushed walls", walls.measure, quick=walls.QUICK),
+    Measurement("threads", "two threads on one wall", threads.measure, quick=threads.QUICK),
     Measurement("start-up", "starting the command", startup.measure, quick=startup.QUICK),
 )
 PEERS = (

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from blocksim.errors import BlocksimError, ExitCode
-from blocksim.simulation.loop import advance_with_room
 from blocksim.simulation.outcome import BY_CODE
+from blocksim.simulation.team import ALONE, Team
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Rerun:
 
     def __init__(self, scenario: Scenario) -> None:
         """Build the world and keep its state."""
-        self.world, _ = advance_with_room(build_world(scenario), 0)
+        self.world, _ = ALONE.advance(build_world(scenario), 0)
         self._arrays = [array for array in self.world if isinstance(array, np.ndarray)]
         self._saved = [array.copy() for array in self._arrays]
 
@@ -67,12 +67,20 @@ class Rerun:
 
         Raises RunFailedError: the time of a run that broke off says nothing.
         """
+        self.restore()
+        began = time.process_time()
+        world = self.advance(last_step)
+        return Timed(world, time.process_time() - began)
+
+    def restore(self) -> None:
+        """Go back to the start."""
         for array, saved in zip(self._arrays, self._saved, strict=True):
             np.copyto(array, saved)
-        began = time.process_time()
-        world, status = advance_with_room(self.world, last_step)
-        seconds = time.process_time() - began
+
+    def advance(self, last_step: int, team: Team = ALONE) -> World:
+        """Go on from wherever it is. Raises RunFailedError."""
+        world, status = team.advance(self.world, last_step)
         outcome = BY_CODE[status]
         if not outcome.is_finished:
             raise RunFailedError(f"a run that was to be timed failed: {outcome.reason}")
-        return Timed(world, seconds)
+        return world

@@ -11,7 +11,7 @@ from blocksim.bench.measurement import Findings, Number, Setting, repeated, sing
 from blocksim.bench.scenes import pushed_wall
 from blocksim.bench.timing import Rerun
 
-QUICK = "walls of 100 and 400 blocks, 40 steps instead of 300"
+QUICK = "walls of 100 and 400 blocks, 150 steps instead of 300"
 
 
 class Size(NamedTuple):
@@ -29,7 +29,7 @@ class Size(NamedTuple):
 SIZES = (Size(10, 10), Size(40, 25), Size(125, 80), Size(400, 250))
 QUICK_SIZES = (Size(10, 10), Size(25, 16))
 STIFFNESS_SCALE = 1e-4  # long steps, so that blocks move on and pair lists are made anew, as in a whole collapse
-STEPS, QUICK_STEPS = 300, 40
+STEPS, QUICK_STEPS = 300, 150
 FEWEST_BLOCKS = 3000  # of one sample: smaller walls are advanced several times
 
 

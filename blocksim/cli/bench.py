@@ -30,7 +30,10 @@ LARGE = 100.0
 def bench_command(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAME]...", help="three-blocks, walls, start-up; with --peers three-blocks, wall."),
+        typer.Argument(
+            metavar="[NAME]...",
+            help="three-blocks, ensemble, walls, threads, start-up; with --peers three-blocks, wall.",
+        ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Make everything small; said at the end how.")] = False,
     repeats: Annotated[int, typer.Option(min=1, metavar="N", help="Samples of each number.")] = REPEATS,

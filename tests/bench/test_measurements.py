@@ -35,10 +35,14 @@ def test_chosen_keeps_the_order_of_the_registry() -> None:
         (
             "wals",
             False,
-            "NAME 'wals': no such measurement, did you mean 'walls'? There are: three-blocks, ensemble, walls",
+            "NAME 'wals': no such measurement, did you mean 'walls'? There are: three-blocks, ensemble, walls, threads",
         ),
         ("wals", True, "did you mean 'wall'? There are with --peers: three-blocks, wall"),
-        ("memory", False, "NAME 'memory': no such measurement; there are: three-blocks, ensemble, walls, start-up"),
+        (
+            "memory",
+            False,
+            "NAME 'memory': no such measurement; there are: three-blocks, ensemble, walls, threads, start-up",
+        ),
     ],
 )
 def test_unknown_names_are_wrong_usage(name: str, peers: bool, told: str) -> None:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from blocksim.bench.peers.scene import Final, Scene
-from blocksim.simulation.loop import advance_with_room, last_step_of
+from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.outcome import BY_CODE
+from blocksim.simulation.team import advance_with_room
 from blocksim.world.build import build_world
 
 
