@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from blocksim.scenario import load_scenario as load
-    from blocksim.study import compare, run, sweep
+    from blocksim.study.many import sweep
+    from blocksim.study.single import compare, run
 
 __version__ = "0.1.0"
 __all__ = ["compare", "load", "run", "sweep"]

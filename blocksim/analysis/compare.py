@@ -15,17 +15,19 @@ prediction interval for one more test, t_(n-1, 0.975) s sqrt(1 + 1/n).
 """
 
 from collections import Counter
-from collections.abc import Hashable
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from math import inf, isfinite, nan, sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-
-from blocksim.analysis.experiment import QUANTITIES, ExperimentTable
+from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, Statistics
 from blocksim.analysis.student import quantile
 from blocksim.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import pandas as pd
 
 ROTATION_TOLERANCE = 5.0  # deg, either side of the measured mean
 READING = 0.5  # mm, uncertainty of one reading of a position
@@ -80,8 +82,10 @@ class Comparison:
         """Whether every quantity with data is inside; there is always at least one."""
         return all(row.verdict is not Verdict.OUTSIDE for row in self.rows)
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """Return one row a quantity, columns as in ComparisonRow."""
+        import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+
         frame = pd.DataFrame([asdict(row) for row in self.rows])
         frame["verdict"] = [row.verdict.value for row in self.rows]
         return frame
@@ -97,14 +101,14 @@ class Comparison:
         }
 
 
-def compare_final(final: pd.DataFrame, table: ExperimentTable) -> Comparison:
-    """Compare a run's final table (`block`, `x_mm`, `rotation_deg`, ...) with the measured repeats.
+def compare_final(final: "pd.DataFrame | Mapping[str, Sequence[Any]]", table: ExperimentTable) -> Comparison:
+    """Compare a run's final table or its columns (`block`, `x_mm`, `rotation_deg`, ...) with the measured repeats.
 
     Raises InvalidInputError when the final table lacks a measured block or quantity, or names a block twice.
     A block that was not measured has rows with the verdict "no data" and a message.
     """
     simulated = _simulated(final, table)
-    measured = {(row["block"], row["quantity"]): row for row in table.statistics().to_dict(orient="records")}
+    measured = {(row.block, row.quantity): row for row in table.summaries()}
     rows = [
         _row(block, quantity, value, measured.get((block, quantity)))
         for block, values in simulated.items()
@@ -136,10 +140,12 @@ def prediction_half_width(s: float, n: int) -> float:
     return quantile(0.5 * (1.0 + CONFIDENCE), n - 1) * s * sqrt(1.0 + 1.0 / n)
 
 
-def _simulated(final: pd.DataFrame, table: ExperimentTable) -> dict[str, dict[str, float]]:
+def _simulated(
+    final: "pd.DataFrame | Mapping[str, Sequence[Any]]", table: ExperimentTable
+) -> dict[str, dict[str, float]]:
     """Return the measured quantities of the final table by block name, in the run's order."""
     columns = {quantity: QUANTITIES[quantity].final_column for quantity in table.quantities}
-    missing = [column for column in ["block", *columns.values()] if column not in final.columns]
+    missing = [column for column in ["block", *columns.values()] if column not in final]
     if missing:
         message = f"the final table has no column {', '.join(missing)}, which {table.source} is compared with"
         raise InvalidInputError(message)
@@ -152,17 +158,16 @@ def _simulated(final: pd.DataFrame, table: ExperimentTable) -> dict[str, dict[st
     if absent:
         message = f"{table.source} measures block {_quoted(absent)}, but the run has only {_quoted(names)}"
         raise InvalidInputError(message)
-    values = {quantity: final[column].astype(float).tolist() for quantity, column in columns.items()}
+    values = {quantity: [float(value) for value in final[column]] for quantity, column in columns.items()}
     return {name: {quantity: values[quantity][i] for quantity in columns} for i, name in enumerate(names)}
 
 
-def _row(block: str, quantity: str, value: float, measured: dict[Hashable, Any] | None) -> ComparisonRow:
+def _row(block: str, quantity: str, value: float, measured: Statistics | None) -> ComparisonRow:
     """Judge one quantity of one block; `measured` is its row of the statistics, None where there is none."""
     unit = QUANTITIES[quantity].unit
     if measured is None:
         return _row_without_data(block, quantity, value)
-    mean, s, n = float(measured["mean"]), float(measured["s"]), int(measured["n"])
-    minimum, maximum = float(measured["minimum"]), float(measured["maximum"])
+    mean, s, n, minimum, maximum = measured[3:]
     lower, upper = limits(quantity, mean, minimum, maximum)
     distance = max(lower - value, value - upper, 0.0) if isfinite(value) else inf
     return ComparisonRow(

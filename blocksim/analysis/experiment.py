@@ -1,13 +1,16 @@
 """Measured tables: the repeats of a laboratory experiment, as a tidy table and as statistics."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from math import fsum, nan, sqrt
 from pathlib import Path
-from typing import NamedTuple
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from blocksim.analysis.cells import Cell, Table, raise_problems, read_table, suggestion
 from blocksim.analysis.units import unit_factor
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COLUMNS = ("block", "quantity", "unit", "replicate", "value")
 LONGEST_NAME = 100  # characters in a block name
@@ -43,46 +46,79 @@ class Measurement(NamedTuple):
     value: float
 
 
+class Statistics(NamedTuple):
+    """What the repeats of one quantity of one block come to, in mm or degrees; `s` is NaN for a single repeat."""
+
+    block: str
+    quantity: str
+    unit: str
+    mean: float
+    s: float  # sample standard deviation, divisor n - 1
+    n: int
+    minimum: float
+    maximum: float
+
+
 @dataclass(frozen=True, eq=False)
 class ExperimentTable:
     """The measured repeats of one experiment.
 
-    `data` is long: block (str), quantity (key of QUANTITIES), unit (mm or deg), replicate (int), value
-    (float), one row a measurement in the file's order. `source` is the path as it was given, `notes` the
-    comment lines.
+    `measurements` stand in the file's order. `source` is the path as it was given, `notes` the comment lines.
     """
 
-    data: pd.DataFrame
+    measurements: tuple[Measurement, ...]
     source: str
     notes: tuple[str, ...] = ()
 
     @property
+    def data(self) -> "pd.DataFrame":
+        """Block, quantity, unit (mm or deg), replicate and value, one row a measurement."""
+        return _frame(self.measurements)
+
+    @property
     def blocks(self) -> tuple[str, ...]:
         """The measured blocks, in order of first appearance."""
-        return tuple(str(name) for name in self.data["block"].unique())
+        return tuple(dict.fromkeys(one.block for one in self.measurements))
 
     @property
     def quantities(self) -> tuple[str, ...]:
         """The measured quantities, in order of first appearance."""
-        return tuple(str(name) for name in self.data["quantity"].unique())
+        return tuple(dict.fromkeys(one.quantity for one in self.measurements))
 
     @property
     def replicates(self) -> tuple[int, ...]:
         """The numbers of the repeats, ascending; a block need not appear in all of them."""
-        return tuple(sorted(int(number) for number in self.data["replicate"].unique()))
+        return tuple(sorted({one.replicate for one in self.measurements}))
 
-    def values(self, block: str, quantity: str) -> pd.Series:
+    def values(self, block: str, quantity: str) -> "pd.Series":
         """Return the repeats (mm or deg) of one quantity of one block by replicate; empty if unmeasured."""
-        chosen = self.data[(self.data["block"] == block) & (self.data["quantity"] == quantity)]
+        data = self.data
+        chosen = data[(data["block"] == block) & (data["quantity"] == quantity)]
         return chosen.set_index("replicate")["value"].sort_index()
 
-    def statistics(self) -> pd.DataFrame:
-        """Return block, quantity, unit, mean, s, n, minimum, maximum; pairs in order of first appearance.
+    def statistics(self) -> "pd.DataFrame":
+        """Return `summaries` as a table, a row a pair."""
+        return _frame(self.summaries())
 
-        `s` is the sample standard deviation (divisor n - 1), NaN for a single repeat.
-        """
-        grouped = self.data.groupby(["block", "quantity", "unit"], sort=False)["value"]
-        return grouped.agg(mean="mean", s="std", n="count", minimum="min", maximum="max").reset_index()
+    def summaries(self) -> tuple[Statistics, ...]:
+        """Return what was measured of every pair of block and quantity, in order of first appearance."""
+        repeats: dict[tuple[str, str, str], list[float]] = {}
+        for one in self.measurements:
+            repeats.setdefault((one.block, one.quantity, one.unit), []).append(one.value)
+        return tuple(_statistics(*pair, values) for pair, values in repeats.items())
+
+
+def _frame(rows: Iterable[Any]) -> "pd.DataFrame":
+    """Return rows with names as a table of pandas."""
+    import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+
+    return pd.DataFrame(list(rows))
+
+
+def _statistics(block: str, quantity: str, unit: str, values: list[float]) -> Statistics:
+    n, mean = len(values), fsum(values) / len(values)
+    s = sqrt(fsum((value - mean) ** 2 for value in values) / (n - 1)) if n > 1 else nan
+    return Statistics(block, quantity, unit, mean, s, n, min(values), max(values))
 
 
 def load_table(path: Path | str) -> ExperimentTable:
@@ -103,7 +139,7 @@ def load_table(path: Path | str) -> ExperimentTable:
         table.problems.append(table.header.problem("the table has a header and no rows"))
     if table.problems:
         raise_problems(table.problems)
-    return ExperimentTable(data=pd.DataFrame(measurements), source=str(path), notes=table.notes)
+    return ExperimentTable(measurements=tuple(measurements), source=str(path), notes=table.notes)
 
 
 def _measurement(row: dict[str, Cell], table: Table) -> Measurement | None:

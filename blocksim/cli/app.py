@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from blocksim import __version__
+from blocksim.cli.collector import leave_all
 from blocksim.cli.commands import CommandGroup, add_commands
 from blocksim.cli.failures import tell_internal_error
 from blocksim.errors import ExitCode
@@ -50,3 +51,5 @@ def main() -> None:
     except Exception as error:  # noqa: BLE001 - the last line of defence
         tell_internal_error(error)
         sys.exit(ExitCode.INTERNAL)
+    finally:
+        leave_all()

@@ -9,6 +9,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from blocksim.cli.collector import loading
 from blocksim.cli.failures import told
 
 COMMANDS = {  # name: module in this folder, function in it, first line of its help
@@ -41,8 +42,10 @@ class CommandGroup(TyperGroup):
 def loaded(name: str) -> Any:
     """Return the command of a name, ready to be called."""
     module, function, summary = COMMANDS[name]
+    with loading():
+        command = getattr(import_module(f"blocksim.cli.{module}"), function)
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
-    alone.command(name, short_help=summary)(getattr(import_module(f"blocksim.cli.{module}"), function))
+    alone.command(name, short_help=summary)(command)
     return typer.main.get_command(alone)
 
 

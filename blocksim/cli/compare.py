@@ -6,15 +6,12 @@ from typing import Annotated
 
 import typer
 
-from blocksim.analysis.compare import Comparison, ComparisonRow, Verdict
 from blocksim.cli import options
-from blocksim.cli.output import answer, number, print_json, table_lines
+from blocksim.cli.output import answer, print_json
+from blocksim.cli.verdict import comparison_table, verdict_lines
 from blocksim.errors import ExitCode, InputMissingError
 from blocksim.study.many import TABLE, read_sweep
 from blocksim.study.single import compare, find_run
-
-COLUMNS = ("block", "quantity", "simulated", "mean ± s", "[min, max]", "error", "verdict")
-SIGNS = {"deg": "°"}
 
 
 @dataclass(frozen=True)
@@ -89,27 +86,3 @@ def _near(path: str) -> str:
     """Return a path as seen from here, where it lies below."""
     here = Path.cwd()
     return str(Path(path).relative_to(here)) if Path(path).is_relative_to(here) else path
-
-
-def comparison_table(comparison: Comparison) -> list[str]:
-    """Return the table of a comparison, for a screen 80 columns wide."""
-    return table_lines(COLUMNS, [_cells(row) for row in comparison.rows], left=2)
-
-
-def _cells(row: ComparisonRow) -> tuple[str, ...]:
-    return (
-        row.block,
-        f"{row.quantity} {SIGNS.get(row.unit, row.unit)}",
-        number(row.simulated),
-        f"{number(row.mean)} ± {number(row.s)}",
-        f"[{number(row.minimum)}, {number(row.maximum)}]",
-        number(row.error),
-        str(row.verdict),
-    )
-
-
-def verdict_lines(comparison: Comparison) -> list[str]:
-    """Return what is outside and by how much, or that all is inside."""
-    outside = [row for row in comparison.rows if row.verdict == Verdict.OUTSIDE]
-    found = [f"outside: {row.quantity} of block {row.block} by {number(row.distance)} {row.unit}" for row in outside]
-    return [*comparison.messages, *(found or ["all inside"])]

@@ -19,6 +19,12 @@ SweepFolder = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results (default: results/NAME/sweep-HASH).")
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Run again and replace what is there.")]
+Threads = Annotated[
+    int,
+    typer.Option(
+        "--threads", min=1, metavar="N", help="Threads, for scenes of 200 blocks and more. The result stays the same."
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the answer as JSON, for programs.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but the answer.")]
 ExperimentPath = Annotated[

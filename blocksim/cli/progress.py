@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from blocksim.cli.collector import loading
 from blocksim.cli.output import note
 from blocksim.simulation import Progress as Where
 from blocksim.simulation.compilation import compile_kernels, is_compiled
@@ -18,10 +18,11 @@ LIVE_SECONDS = 0.1
 @contextmanager
 def watching(*, quiet: bool) -> Iterator[Callable[[Where], None]]:
     """Give a function that shows where a run stands; on a terminal the line disappears at the end."""
-    console = Console(stderr=True)
     if quiet:
         yield lambda _: None
-    elif console.is_terminal:
+        return
+    console = Console(stderr=True)
+    if console.is_terminal:
         with _live_line(console) as show:
             yield show
     else:
@@ -30,7 +31,11 @@ def watching(*, quiet: bool) -> Iterator[Callable[[Where], None]]:
 
 def tell_compilation(model: str, *, quiet: bool) -> None:
     """Compile the kernels for a contact model where that is still to be done, and say so: it is no part of a run."""
-    if quiet or is_compiled(model):
+    if is_compiled(model):
+        with loading():
+            compile_kernels(model)
+        return
+    if quiet:
         compile_kernels(model)
         return
     note("Compiling the solver, once after installation (less than a minute) ...")
@@ -39,6 +44,8 @@ def tell_compilation(model: str, *, quiet: bool) -> None:
 
 @contextmanager
 def _live_line(console: Console) -> Iterator[Callable[[Where], None]]:
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
     columns = (
         TextColumn("{task.completed:.3f} of {task.total:g} s"),
         BarColumn(bar_width=None),

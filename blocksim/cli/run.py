@@ -1,14 +1,18 @@
 """blocksim run: simulate one scenario."""
 
+import os
+from itertools import islice
+
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.compare import comparison_table, verdict_lines
 from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.progress import tell_compilation, watching
 from blocksim.cli.scenario import read_scenario
+from blocksim.cli.verdict import comparison_table, verdict_lines
 from blocksim.simulation import Result
 from blocksim.simulation.folder import default_folder, holds_run
+from blocksim.simulation.table import rows_of
 from blocksim.study.single import FINISHED, check_experiment, compare, run
 
 MOST_ROWS = 40  # of the final table on the screen; of a longer one the first are shown
@@ -20,6 +24,7 @@ def run_command(
     settings: options.Settings = None,
     out: options.OutFolder = None,
     overwrite: options.Overwrite = False,
+    threads: options.Threads = 1,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -36,13 +41,28 @@ def run_command(
         known = not overwrite and holds_run(folder, ready)
         if not known:
             check_experiment(ready)
+            warn_of_threads(threads)
             tell_compilation(ready.contact.model, quiet=silent)
         with watching(quiet=silent or known) as on_progress:
-            result = run(ready, out=folder, overwrite=overwrite, on_progress=on_progress)
+            result = run(ready, out=folder, overwrite=overwrite, threads=threads, on_progress=on_progress)
     if known and not silent:
         note(f"already there, --overwrite repeats it: {folder}")
     show_result(result, as_json=as_json, quiet=silent)
     raise typer.Exit(result.summary.exit_code)
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def warn_of_threads(threads: int) -> None:
+    """Warn of more threads than there are cores, as all wait for one another at every step."""
+    count = cores()
+    if threads > count:
+        note(
+            f"warning: {threads} threads on {count} core{'s' if count > 1 else ''} take turns; {count} would be faster"
+        )
 
 
 def show_result(result: Result, *, as_json: bool, quiet: bool) -> None:
@@ -50,8 +70,9 @@ def show_result(result: Result, *, as_json: bool, quiet: bool) -> None:
     if not quiet:
         _tell_end(result)
     if as_json:
-        final = result.final.to_dict(orient="records")
-        print_json({"folder": str(result.folder), "final": final, "summary": result.summary.model_dump()})
+        print_json(
+            {"folder": str(result.folder), "final": rows_of(result.columns), "summary": result.summary.model_dump()}
+        )
     else:
         answer("\n".join(_answer_lines(result)))
     if result.status != FINISHED:
@@ -65,16 +86,12 @@ def _answer_lines(result: Result) -> list[str]:
     if result.experiment is not None and result.status == FINISHED:
         comparison = compare(result)
         return [*comparison_table(comparison), *verdict_lines(comparison)]
-    count = len(result.final)
-    final = result.final.head(count if count <= MOST_ROWS else FIRST_ROWS)
-    rows = [
-        (block, number(x), number(y), number(rotation))
-        for block, x, y, rotation in zip(
-            final["block"], final["x_mm"], final["y_mm"], final["rotation_deg"], strict=True
-        )
-    ]
+    blocks, *values = (result.columns[name] for name in ("block", "x_mm", "y_mm", "rotation_deg"))
+    count = len(blocks)
+    shown = count if count <= MOST_ROWS else FIRST_ROWS
+    rows = [(block, *map(number, row)) for block, *row in islice(zip(blocks, *values, strict=True), shown)]
     lines = table_lines(("block", "x mm", "y mm", "rotation °"), rows)
-    return lines if len(final) == count else [*lines, f"... and {count - len(final)} blocks more, see final.csv"]
+    return lines if shown == count else [*lines, f"... and {count - shown} blocks more, see final.csv"]
 
 
 def _tell_end(result: Result) -> None:

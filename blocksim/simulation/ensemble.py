@@ -9,10 +9,9 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from blocksim.kernels.arrays import PAIRS_FULL, World, zeros
@@ -22,11 +21,15 @@ from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation.compilation import compile_kernels
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.ledger import ROW_LENGTH, EnergyLedger, energy_ledger, energy_row, start_energy
-from blocksim.simulation.loop import advance_with_room, last_step_of, outcome_of
+from blocksim.simulation.loop import last_step_of, outcome_of
 from blocksim.simulation.outcome import Outcome
 from blocksim.simulation.recorder import MOTION, frames_from_rows
 from blocksim.simulation.table import final_table
+from blocksim.simulation.team import advance_with_room
 from blocksim.world.build import build_world, with_more_room
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 BATCH = 256  # members in memory at the same time
 CHUNK = 4  # members that a thread takes at a time: few enough that all threads end together
@@ -41,7 +44,7 @@ class MemberEnd:
     ledger: EnergyLedger
 
     @property
-    def final(self) -> pd.DataFrame:
+    def final(self) -> "pd.DataFrame":
         """The final table, as `final.csv` has it."""
         return final_table(self.frames)
 

@@ -1,28 +1,36 @@
 """A finished, failed or interrupted run as an object, and back from its folder."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from blocksim.scenario import Scenario, load_scenario
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import Summary, read_summary
-from blocksim.simulation.table import read_table
+from blocksim.simulation.table import Columns, as_frame, read_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
 class Result:
-    """One run: final table (mm, degrees), frames (SI), and the summary that run.json holds."""
+    """One run: columns of the final table (mm, degrees), frames (SI), and the summary that run.json holds."""
 
     name: str
-    final: pd.DataFrame
+    columns: Columns
     frames: Frames
     summary: Summary
     scenario: Scenario
     folder: Path | None = None
+
+    @cached_property
+    def final(self) -> "pd.DataFrame":
+        """The final table, a row a block."""
+        return as_frame(self.columns)
 
     @property
     def status(self) -> str:

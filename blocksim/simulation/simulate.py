@@ -19,7 +19,8 @@ from blocksim.simulation.result import Result
 from blocksim.simulation.stopping import stop_requests
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 from blocksim.simulation.summary import Summary, read_summary
-from blocksim.simulation.table import final_table
+from blocksim.simulation.table import csv_text, final_columns
+from blocksim.simulation.team import team_for
 from blocksim.world.build import build_world
 
 COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION)
@@ -29,19 +30,22 @@ def _ignore(_: Progress) -> None:
     pass
 
 
-def simulate(scenario: Scenario, *, on_progress: Watcher = _ignore) -> Result:
-    """Run a scenario in memory, without writing anything. Ctrl-C ends it with the status `interrupted`."""
+def simulate(scenario: Scenario, *, threads: int = 1, on_progress: Watcher = _ignore) -> Result:
+    """Run a scenario in memory, without writing anything. Ctrl-C ends it with the status `interrupted`.
+
+    The result does not depend on the number of threads; small scenes do not use them all.
+    """
     compile_kernels(scenario.contact.model)
     began = time.perf_counter()
     world = build_world(scenario)
     recorder = Recorder(place_bodies(scenario), scenario.output.every, float(world.controls[0].step))
-    with stop_requests() as is_stopped:
-        ended = run_loop(world, recorder, scenario.time.end, on_progress=on_progress, is_stopped=is_stopped)
+    with stop_requests() as is_stopped, team_for(world, threads) as team:
+        ended = run_loop(world, recorder, scenario.time.end, team=team, on_progress=on_progress, is_stopped=is_stopped)
     return _result(scenario, recorder, ended, began)
 
 
 def simulate_into(
-    scenario: Scenario, folder: Path, *, overwrite: bool = False, on_progress: Watcher = _ignore
+    scenario: Scenario, folder: Path, *, overwrite: bool = False, threads: int = 1, on_progress: Watcher = _ignore
 ) -> Result:
     """Run a scenario and keep everything in a folder, frames while it runs, the mark of a finished run last.
 
@@ -56,10 +60,11 @@ def simulate_into(
     toml = _keep_scenario(scenario, tables, folder)
     placed = place_bodies(scenario)
     step = float(world.controls[0].step)
-    with stop_requests() as is_stopped:
+    end = scenario.time.end
+    with stop_requests() as is_stopped, team_for(world, threads) as team:
         with FrameFile(folder / files.FRAMES, placed, step, toml) as sink:
             recorder = Recorder(placed, scenario.output.every, step, sink)
-            ended = run_loop(world, recorder, scenario.time.end, on_progress=on_progress, is_stopped=is_stopped)
+            ended = run_loop(world, recorder, end, team=team, on_progress=on_progress, is_stopped=is_stopped)
         return _keep_result(_result(scenario, recorder, ended, began), folder)
 
 
@@ -91,7 +96,7 @@ def _keep_scenario(scenario: Scenario, tables: Mapping[str, bytes], folder: Path
 def _result(scenario: Scenario, recorder: Recorder, ended: LoopResult, began: float) -> Result:
     frames = recorder.frames()
     summary = _summary(scenario, ended, time.perf_counter() - began)
-    return Result(scenario.name, final_table(frames), frames, summary, scenario)
+    return Result(scenario.name, final_columns(frames), frames, summary, scenario)
 
 
 def _summary(scenario: Scenario, ended: LoopResult, seconds: float) -> Summary:
@@ -113,6 +118,7 @@ def _summary(scenario: Scenario, ended: LoopResult, seconds: float) -> Summary:
         solver_seconds=ended.solver_seconds,
         total_seconds=seconds,
         energy_J=ended.ledger,
+        threads=ended.threads,
         warnings=_warnings(ended),
         environment=environment(),
     )
@@ -131,9 +137,9 @@ def _with_checksums(summary: Summary, folder: Path) -> Summary:
 
 
 def _keep_result(result: Result, folder: Path) -> Result:
-    write_text(folder / files.FINAL, result.final.to_csv(index=False, lineterminator="\n"))
+    write_text(folder / files.FINAL, csv_text(result.columns))
     summary = _with_checksums(result.summary, folder)
     write_text(folder / files.SUMMARY, summary.to_json())
     if result.status == "finished":
         write_text(folder / files.DONE, json.dumps({"run": summary.run, "status": summary.status}) + "\n")
-    return Result(result.name, result.final, result.frames, summary, result.scenario, folder)
+    return Result(result.name, result.columns, result.frames, summary, result.scenario, folder)

@@ -11,8 +11,6 @@ from multiprocessing import active_children, get_context, parent_process
 from os import _exit
 from pathlib import Path
 
-import pandas as pd
-
 from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import load_table
 from blocksim.errors import BlocksimError
@@ -21,7 +19,7 @@ from blocksim.simulation import Summary
 from blocksim.simulation import folder as files
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.summary import read_summary
-from blocksim.simulation.table import read_table
+from blocksim.simulation.table import Columns, read_table
 from blocksim.study.single import FINISHED, run
 
 INTERRUPTED = "interrupted"
@@ -92,7 +90,7 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
         row = _known_row(scenario, folder)
         if row is None:
             result = run(scenario, out=folder, overwrite=True)
-            row = _row(scenario, result.summary, result.final)
+            row = _row(scenario, result.summary, result.columns)
     except BlocksimError as error:
         return {"status": "failed", "reason": str(error), "seconds": time.perf_counter() - began}
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
@@ -111,11 +109,11 @@ def _known_row(scenario: Scenario, folder: Path) -> Row | None:
     return None
 
 
-def _row(scenario: Scenario, summary: Summary, final: pd.DataFrame) -> Row:
+def _row(scenario: Scenario, summary: Summary, final: Columns) -> Row:
     row: Row = {"status": summary.status, "reason": summary.reason, "seconds": summary.total_seconds}
     if scenario.experiment is not None and summary.status == FINISHED:
         row["inside"] = compare_final(final, load_table(scenario.experiment.table)).inside
-    for block in final.itertuples():
-        row[f"{block.block}.x_mm"] = block.x_mm
-        row[f"{block.block}.rotation_deg"] = block.rotation_deg
+    for block, x, rotation in zip(final["block"], final["x_mm"], final["rotation_deg"], strict=True):
+        row[f"{block}.x_mm"] = x
+        row[f"{block}.rotation_deg"] = rotation
     return row

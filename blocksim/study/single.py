@@ -2,8 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from blocksim.analysis.compare import Comparison, compare_final
 from blocksim.analysis.experiment import ExperimentTable, load_table
@@ -13,6 +12,9 @@ from blocksim.simulation import Progress, Result, Watcher, read_result, renew_co
 from blocksim.simulation import folder as files
 from blocksim.simulation.summary import read_summary
 from blocksim.simulation.table import COLUMNS, read_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FINISHED = "finished"
 
@@ -26,45 +28,47 @@ def run(
     *,
     out: Path | str | None = None,
     overwrite: bool = False,
+    threads: int = 1,
     on_progress: Watcher = _ignore,
 ) -> Result:
     """Simulate a scenario and return the result; with `out` it is kept in that folder as well.
 
     A folder that holds the finished run of exactly this scenario and code is read instead, unless `overwrite` is
-    given. Ctrl-C returns what there is by then, with the status `interrupted`. Raises ScenarioError, InvalidInputError
-    for an experiment table that does not go with the blocks, OutputExistsError, OutputError.
+    given. The result does not depend on the number of threads. Ctrl-C returns what there is by then, with the status
+    `interrupted`. Raises ScenarioError, InvalidInputError for an experiment table that does not go with the blocks or
+    for more threads than the system has, OutputExistsError, OutputError.
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
     check_experiment(scenario)
     if out is None:
-        return simulate(scenario, on_progress=on_progress)
+        return simulate(scenario, threads=threads, on_progress=on_progress)
     folder = Path(out)
     if not overwrite and files.holds_run(folder, scenario):
         renew_copies(scenario, folder)
         return read_result(folder)
-    return simulate_into(scenario, folder, overwrite=overwrite, on_progress=on_progress)
+    return simulate_into(scenario, folder, overwrite=overwrite, threads=threads, on_progress=on_progress)
 
 
 def check_experiment(scenario: Scenario) -> None:
     """Read the table that a scenario names and look whether it goes with the blocks: better now than after the run."""
     if scenario.experiment is not None:
         names = [body.name for body in place_bodies(scenario)]
-        unknown = dict.fromkeys(COLUMNS[1:], 0.0)
-        compare_final(pd.DataFrame({"block": names, **unknown}), load_table(scenario.experiment.table))
+        unknown = dict.fromkeys(COLUMNS[1:], [0.0] * len(names))
+        compare_final({"block": names, **unknown}, load_table(scenario.experiment.table))
 
 
-def compare(run: Result | pd.DataFrame | Path | str, experiment: Path | str | None = None) -> Comparison:
+def compare(run: "Result | pd.DataFrame | Path | str", experiment: Path | str | None = None) -> Comparison:
     """Compare a result, a final table or what `find_run` understands with an experiment table.
 
     Without `experiment` the table that the run's scenario names is taken. Raises InputMissingError without any table,
     InvalidInputError for a run that did not finish.
     """
-    if isinstance(run, pd.DataFrame):
-        return compare_final(run, _table(experiment, None))
     if isinstance(run, Result):
         _refuse_unfinished(run.name, run.status, run.reason)
-        return compare_final(run.final, _table(experiment, run.experiment))
+        return compare_final(run.columns, _table(experiment, run.experiment))
+    if not isinstance(run, Path | str):
+        return compare_final(run, _table(experiment, None))
     folder = find_run(run)
     summary = read_summary(folder / files.SUMMARY)
     _refuse_unfinished(str(folder), summary.status, summary.reason)

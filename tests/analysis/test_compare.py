@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from blocksim.analysis.compare import Comparison, ComparisonRow, Verdict, compare_final
-from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.analysis.experiment import ExperimentTable, Measurement, load_table
 from blocksim.errors import InvalidInputError
 
 TABLE = load_table(Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks.csv")
@@ -31,18 +31,8 @@ def row(comparison: Comparison, block: str, quantity: str) -> ComparisonRow:
 
 
 def table_of(*values: float) -> ExperimentTable:
-    return ExperimentTable(
-        data=pd.DataFrame(
-            {
-                "block": "1",
-                "quantity": "x",
-                "unit": "mm",
-                "replicate": range(1, len(values) + 1),
-                "value": values,
-            }
-        ),
-        source="made up",
-    )
+    repeats = tuple(Measurement("1", "x", "mm", number, value) for number, value in enumerate(values, 1))
+    return ExperimentTable(repeats, source="made up")
 
 
 def test_the_paper_s_own_result_is_inside() -> None:

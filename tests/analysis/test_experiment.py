@@ -122,6 +122,7 @@ def test_spreadsheet_habits_are_understood(tmp_path: Path) -> None:
 
 def test_a_single_repeat_has_no_scatter(tmp_path: Path) -> None:
     statistics = load_table(write(tmp_path, HEADER + "1,x,mm,1,3\n")).statistics()
+    assert list(statistics.columns) == ["block", "quantity", "unit", "mean", "s", "n", "minimum", "maximum"]
     assert np.isnan(statistics["s"].iloc[0])
     assert list(statistics["n"]) == [1]
 

@@ -4,14 +4,16 @@ import inspect
 import subprocess
 import sys
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
 from blocksim import __version__
 from blocksim.cli.commands import COMMANDS
-from tests.cli.conftest import Command
+from tests.cli.conftest import SOFT, Command
 
 HEAVY = ("numba", "pandas", "h5py", "matplotlib", "pint", "numpy")
+UNUSED_BY_A_RUN = ("pandas", "matplotlib", "pint", "multiprocessing.pool", "blocksim.study.many")
 
 
 def test_help_lists_all_commands_in_80_columns(blocksim: Command) -> None:
@@ -58,6 +60,18 @@ def test_wrong_usage_is_told_with_exit_code_2(blocksim: Command, arguments: list
     assert answer.code == 2
     assert told in answer.err
     assert answer.out == ""
+
+
+def test_a_run_compared_with_an_experiment_does_without_pandas_and_matplotlib(tmp_path: Path) -> None:
+    scenario = Path(__file__).parents[2] / "scenarios" / "three_blocks.toml"
+    code = (
+        "import sys; from typer.testing import CliRunner; from blocksim.cli.app import app;"
+        "ended = CliRunner().invoke(app, ['run', *sys.argv[1:]]);"
+        f"print(ended.exit_code, [name for name in {UNUSED_BY_A_RUN!r} if name in sys.modules])"
+    )
+    arguments = (scenario, "--out", tmp_path / "run", *SOFT)
+    found = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "0 []"
 
 
 def test_help_does_not_wait_for_heavy_packages() -> None:

@@ -160,3 +160,40 @@ def test_steps_that_cannot_be_counted_are_told(blocksim: Command, setting: str) 
 @pytest.mark.parametrize("setting", ["time.rest_hold=1e30", "time.end=1e-300", 'contact.particle_spacing="1 nm"'])
 def test_extreme_but_meaningful_values_are_valid(blocksim: Command, setting: str) -> None:
     assert blocksim("check", "scenarios/three_blocks.toml", "--set", setting).code == 0
+
+
+WALL = """schema = 1
+name = "wall"
+materials.aluminium = { unit_weight = "26.7 kN/m^3", young_modulus = "69 GPa", poisson_ratio = 0.3 }
+blocks.brick = { width = "50 mm", height = "32 mm", length = "25 mm", material = "aluminium" }
+contact.stiffness_scale = 2e-4
+time = { end = "2 ms", stop_at_rest = false, safety = 0.1 }
+structures = [{ kind = "wall", block = "brick", columns = 20, rows = 10, shear_velocity = "1 m/s" }]
+"""
+
+
+def test_threads_change_nothing_but_the_time(blocksim: Command) -> None:
+    Path("wall.toml").write_text(WALL, encoding="utf-8")
+    summaries = []
+    for threads in ("1", "2"):
+        answer = blocksim("run", "wall.toml", "--threads", threads, "--json", "--out", threads)
+        summaries.append(json.loads(answer.out)["summary"])
+    one, two = summaries
+    assert (one["threads"], two["threads"]) == (1, 2)
+    for name in ("final_state_sha256", "run", "scenario_hash", "energy_J", "steps"):
+        assert one[name] == two[name], name
+
+
+def test_threads_are_at_least_one(blocksim: Command) -> None:
+    answer = blocksim(*RUN, "--threads", "0")
+    assert answer.code == 2
+    assert "--threads" in answer.err
+    assert "greater than or equal to 1" in answer.err
+
+
+def test_more_threads_than_cores_are_a_warning(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("blocksim.cli.run.cores", lambda: 2)
+    assert "warning" not in blocksim(*RUN, "--threads", "2", "--out", "two").err
+    answer = blocksim(*RUN, "--threads", "3", "--out", "three")
+    assert answer.code == 0
+    assert answer.err.startswith("warning: 3 threads on 2 cores take turns; 2 would be faster\n")

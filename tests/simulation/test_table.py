@@ -1,5 +1,6 @@
 """The final table: extents of turned blocks, and back from its file to the last bit."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.simulation import Frames, Result
-from blocksim.simulation.table import COLUMNS, final_table, read_table
+from blocksim.simulation.table import COLUMNS, as_frame, csv_text, final_table, read_table
 
 
 def frames_of(angle: float, start_angle: float) -> Frames:
@@ -48,7 +49,20 @@ def test_rotation_counts_from_the_start_and_is_not_wrapped() -> None:
 
 def test_file_gives_the_table_back_to_the_last_bit(kept: Result) -> None:
     assert kept.folder is not None
-    pd.testing.assert_frame_equal(read_table(kept.folder / "final.csv"), kept.final, check_exact=True)
+    pd.testing.assert_frame_equal(as_frame(read_table(kept.folder / "final.csv")), kept.final, check_exact=True)
+
+
+def test_csv_text_is_what_pandas_writes() -> None:
+    numbers = [0.1 + 0.2, -0.0, 1e16, 1e-5, 123456789.125, np.pi * 1e-300, math.inf, math.nan]
+    names = ["1", "with, comma", 'with "quotes"', "two\nlines", "ä", " ", "#", "nan"]
+    columns = {name: names if name == "block" else numbers for name in COLUMNS}
+    assert csv_text(columns) == as_frame(columns).to_csv(index=False, lineterminator="\n")
+
+
+def test_file_of_odd_names_and_numbers_gives_the_columns_back(tmp_path: Path) -> None:
+    columns = {name: ['a "b",\nc', "nan"] if name == "block" else [math.nan, -1e-17] for name in COLUMNS}
+    (tmp_path / "final.csv").write_text(csv_text(columns), encoding="utf-8")
+    assert repr(read_table(tmp_path / "final.csv")) == repr(columns)
 
 
 @pytest.mark.parametrize(

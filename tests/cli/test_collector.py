@@ -1,0 +1,38 @@
+"""The garbage collector is kept away while code is loaded, and comes back."""
+
+import gc
+from collections.abc import Iterator
+
+import pytest
+
+from blocksim.cli.collector import loading
+
+
+@pytest.fixture(autouse=True)
+def collector() -> Iterator[None]:
+    """Leave the collector as it was, and its objects to it."""
+    was_enabled = gc.isenabled()
+    yield
+    gc.unfreeze()
+    (gc.enable if was_enabled else gc.disable)()
+
+
+def failing_load() -> None:
+    with loading():
+        assert not gc.isenabled()
+        raise ImportError
+
+
+@pytest.mark.parametrize("is_on", [True, False])
+def test_collector_is_afterwards_as_it_was(*, is_on: bool) -> None:
+    (gc.enable if is_on else gc.disable)()
+    with pytest.raises(ImportError):
+        failing_load()
+    assert gc.isenabled() == is_on
+
+
+def test_what_was_loaded_is_out_of_its_sight() -> None:
+    before = gc.get_freeze_count()
+    with loading():
+        loaded: list[list[int]] = [[] for _ in range(1000)]
+    assert gc.get_freeze_count() > before + len(loaded)
