@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from blocksim.bench.measurement import Findings, Number, Setting
 from blocksim.bench.scenes import pushed_wall
 from blocksim.bench.timing import Rerun
-from blocksim.bench.walls import STIFFNESS_SCALE, Size
+from blocksim.bench.walls import Size
 from blocksim.simulation.team import ALONE, Team, useful_threads
 
 if TYPE_CHECKING:
@@ -20,7 +20,8 @@ QUICK_SIZES = (Size(10, 10), Size(25, 16))
 THREADS = 2
 BLOCK_STEPS = 2_000_000  # of one sample
 QUICK_BLOCK_STEPS = 200_000
-MOST_STEPS = 5000  # about the length of a collapse
+MOST_STEPS = 5000
+STIFFNESS_SCALE = 1e-3  # a wall of a hundred blocks has fallen by then; softer ones would overlap too far
 
 
 def measure(setting: Setting) -> Findings:
