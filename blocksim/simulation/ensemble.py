@@ -25,7 +25,7 @@ from blocksim.simulation.loop import last_step_of, outcome_of
 from blocksim.simulation.outcome import Outcome
 from blocksim.simulation.recorder import MOTION, frames_from_rows
 from blocksim.simulation.table import final_table
-from blocksim.simulation.team import advance_with_room
+from blocksim.simulation.team import ALONE
 from blocksim.world.build import build_world, with_more_room
 
 if TYPE_CHECKING:
@@ -138,9 +138,9 @@ class Ensemble:
 def _run_alone(world: World, last_step: int, start: float) -> tuple[World, int, float]:
     """Go on with a world whose pair list is full."""
     if not world.clock[0].is_started:
-        world, _ = advance_with_room(with_more_room(world), 0)
+        world, _ = ALONE.advance(with_more_room(world), 0)
         start = start_energy(world)
-    world, code = advance_with_room(world, last_step)
+    world, code = ALONE.advance(world, last_step)
     return world, code, start
 
 

@@ -3,7 +3,7 @@
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.advance import advance, advance_in_team
@@ -18,12 +18,13 @@ START_SECONDS = 60.0
 
 def useful_threads(threads: int, bodies: int) -> int:
     """Return how many of `threads` are of use for a scene; the result is the same for any number, bit for bit."""
-    return 1 if config.DISABLE_JIT else max(1, min(threads, bodies // BODIES_A_THREAD))
+    most = 1 if config.DISABLE_JIT else max(1, bodies // BODIES_A_THREAD)
+    return min(threads, most)
 
 
 def team_for(world: World, threads: int) -> "Team":
     """Return a team for a world, of as many of `threads` as are of use. Raises ValueError for less than one."""
-    return Team(min(threads, useful_threads(threads, world.bodies.size - 1)))
+    return Team(useful_threads(threads, world.bodies.size - 1))
 
 
 class Team:
@@ -36,7 +37,6 @@ class Team:
             raise ValueError(message)
         self.threads = threads
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
-        self._spaces: list[dict[str, Any]] = []
 
     def __enter__(self) -> Self:
         """Start the other threads. Raises InvalidInputError where the system does not give that many."""
@@ -72,22 +72,16 @@ class Team:
     def _advance(self, world: World, last_step: int) -> int:
         if self._pool is None:
             return advance(world, last_step)
-        if not self._spaces:
-            self._spaces = [_work_space(world) for _ in range(self.threads - 1)]
         world.team[TEAM_SIZE] = self.threads
-        for k, space in enumerate(self._spaces, start=1):
-            self._pool.submit(advance_in_team, world._replace(**space), last_step, k)
+        others = [_with_own_work_space(world) for _ in range(1, self.threads)]
+        for k, other in enumerate(others, start=1):
+            self._pool.submit(advance_in_team, other, last_step, k)
         return int(advance_in_team(world, last_step, 0))
 
 
-def _work_space(world: World) -> dict[str, Any]:
-    """Return arrays like those of a world that every thread needs for itself."""
-    return {name: getattr(world, name).copy() for name in WORK_SPACE}
+def _with_own_work_space(world: World) -> World:
+    """Return the same world for one more thread: with arrays of its own where one pair is worked on."""
+    return world._replace(**{name: getattr(world, name).copy() for name in WORK_SPACE})
 
 
 ALONE = Team()
-
-
-def advance_with_room(world: World, last_step: int) -> tuple[World, int]:
-    """Advance with one thread; see Team.advance."""
-    return ALONE.advance(world, last_step)

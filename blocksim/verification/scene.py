@@ -11,7 +11,7 @@ from blocksim.kernels.arrays import REACHED
 from blocksim.kernels.energy import LEDGER_ROW
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.simulation.ledger import energy_ledger, energy_row
-from blocksim.simulation.team import advance_with_room
+from blocksim.simulation.team import ALONE
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class Simulation:
 
     def to_step(self, last_step: int) -> Simulation:
         """Go on to a step number."""
-        self.world, self.status = advance_with_room(self.world, last_step)
+        self.world, self.status = ALONE.advance(self.world, last_step)
         return self
 
     def to_time(self, time: float) -> Simulation:

@@ -12,7 +12,7 @@ from blocksim.bench.scenes import pushed_wall
 from blocksim.errors import InvalidInputError
 from blocksim.simulation import simulate
 from blocksim.simulation.provenance import state_hash
-from blocksim.simulation.team import BODIES_A_THREAD, Team, advance_with_room, team_for, useful_threads
+from blocksim.simulation.team import ALONE, BODIES_A_THREAD, Team, team_for, useful_threads
 from blocksim.world import build
 from blocksim.world.build import build_world
 
@@ -38,7 +38,7 @@ def same_bits(one: World, other: World) -> bool:
 @pytest.fixture(scope="module")
 def alone() -> World:
     """Return the wall as one thread leaves it."""
-    return advance_with_room(build_world(wall()), STEPS)[0]
+    return ALONE.advance(build_world(wall()), STEPS)[0]
 
 
 @pytest.mark.parametrize("threads", [2, 3, 4])
@@ -66,9 +66,17 @@ def test_team_makes_room_for_more_pairs_and_goes_on(alone: World, monkeypatch: p
 def test_one_thread_takes_over_from_a_team_and_a_team_from_one(alone: World) -> None:
     with Team(3) as together, Team(2) as couple:
         world, _ = together.advance(build_world(wall()), STEPS // 3)
-        world, _ = advance_with_room(world, STEPS // 2)
+        world, _ = ALONE.advance(world, STEPS // 2)
         world, _ = couple.advance(world, STEPS)
     assert same_bits(world, alone)
+
+
+def test_team_goes_from_one_scene_to_another_whatever_room_that_takes() -> None:
+    few, many = (pushed_wall(8, 4, contact={"model": "kernel", "particle_spacing": d}) for d in (5e-3, 1e-3))
+    with Team(2) as together:
+        for scenario in (few, many):
+            worlds = [one.advance(build_world(scenario), 20)[0] for one in (together, ALONE)]
+            assert same_bits(*worlds)
 
 
 def test_run_with_threads_ends_in_the_same_state_and_says_how_many_there_were() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from blocksim.bench.peers.scene import Final, Scene
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.outcome import BY_CODE
-from blocksim.simulation.team import advance_with_room
+from blocksim.simulation.team import ALONE
 from blocksim.world.build import build_world
 
 
@@ -36,7 +36,7 @@ class Blocksim:
         world.bodies.x[:-1] += scene.shift
         last = last_step_of(scene.end, float(world.controls[0].step))
         began = time.process_time()
-        world, status = advance_with_room(world, last)
+        world, status = ALONE.advance(world, last)
         seconds = time.process_time() - began
         found = np.array([world.bodies.x[:-1], world.bodies.y[:-1]])
         if not BY_CODE[status].is_finished:
