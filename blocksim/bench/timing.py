@@ -9,12 +9,14 @@ import numpy as np
 
 from blocksim.errors import BlocksimError, ExitCode
 from blocksim.simulation.outcome import BY_CODE
+from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.stacking import arrays_of
 from blocksim.simulation.team import ALONE, Team
-from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
     from blocksim.kernels.arrays import World
     from blocksim.scenario import Scenario
+    from blocksim.simulation.schemes import AnyScene
 
 
 class RunFailedError(BlocksimError):
@@ -24,10 +26,15 @@ class RunFailedError(BlocksimError):
 
 
 class Timed(NamedTuple):
-    """The world at the end, and the CPU seconds of this process that it took to get there."""
+    """The scene at the end, and the CPU seconds of this process that it took to get there."""
 
-    world: World
+    scene: AnyScene
     seconds: float
+
+    @property
+    def world(self) -> World:
+        """The arrays that all schemes have."""
+        return self.scene.world
 
     @property
     def steps(self) -> int:
@@ -41,25 +48,25 @@ class Timed(NamedTuple):
 
 
 class Rerun:
-    """A world after its first contacts were found, to be advanced from there any number of times.
+    """A scene after its first contacts were found, to be advanced from there any number of times.
 
     It starts again in the same memory: where arrays lie changes times by some per cent.
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        """Build the world and keep its state."""
-        self.world, _ = ALONE.advance(build_world(scenario), 0)
-        self._arrays = [array for array in self.world if isinstance(array, np.ndarray)]
+        """Build the scene and keep its state."""
+        self.scene, _ = ALONE.advance(build_scene(scenario), 0)
+        self._arrays = arrays_of(self.scene)
         self._saved = [array.copy() for array in self._arrays]
 
     @property
     def step(self) -> float:
         """Length of a step (s)."""
-        return float(self.world.controls[0].step)
+        return float(self.scene.world.controls[0].step)
 
     @property
     def bytes(self) -> int:
-        """Memory of all arrays of the world."""
+        """Memory of all arrays of the scene."""
         return sum(array.nbytes for array in self._arrays)
 
     def run(self, last_step: int) -> Timed:
@@ -69,18 +76,18 @@ class Rerun:
         """
         self.restore()
         began = time.process_time()
-        world = self.advance(last_step)
-        return Timed(world, time.process_time() - began)
+        scene = self.advance(last_step)
+        return Timed(scene, time.process_time() - began)
 
     def restore(self) -> None:
         """Go back to the start."""
         for array, saved in zip(self._arrays, self._saved, strict=True):
             np.copyto(array, saved)
 
-    def advance(self, last_step: int, team: Team = ALONE) -> World:
+    def advance(self, last_step: int, team: Team = ALONE) -> AnyScene:
         """Go on from wherever it is. Raises RunFailedError."""
-        world, status = team.advance(self.world, last_step)
+        scene, status = team.advance(self.scene, last_step)
         outcome = BY_CODE[status]
         if not outcome.is_finished:
             raise RunFailedError(f"a run that was to be timed failed: {outcome.reason}")
-        return world
+        return scene

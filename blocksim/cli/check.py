@@ -11,7 +11,7 @@ from blocksim.cli.scenario import read_scenario
 from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
 from blocksim.study.single import check_experiment
-from blocksim.world.describe import Description, MotionDescription, PairDescription, describe
+from blocksim.world.describe import Description, MotionDescription, PairDescription, SagDescription, describe
 from blocksim.world.memory import readable
 
 MOST_BODIES = 12
@@ -20,6 +20,7 @@ NO_KEY = (DEFAULT, MATERIALS)
 LEAST_ROOM = 24
 HARD_SPACE = "\N{NO-BREAK SPACE}"
 MILLI = 1e3
+MICRO = 1e6
 LONG_TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))  # s
 
 
@@ -90,12 +91,20 @@ def _pairs(scenario: Scenario, pairs: Sequence[PairDescription]) -> list[str]:
     cells = [_pair_cells(pair) for pair in pairs]
     if all(pair.shear_damping_ratio == pair.normal_damping_ratio for pair in pairs):
         for row in cells:
-            del row["ζ shear"]
+            row.pop("ζ shear", None)
+    return [*table_lines(list(cells[0]), [list(row.values()) for row in cells]), *_meanings(scenario, pairs[0])]
+
+
+def _meanings(scenario: Scenario, pair: PairDescription) -> list[str]:
+    if pair.normal_damping_ratio is None:
+        return [
+            "μs static and μk kinetic friction, e restitution; contacts are rigid: K in N/m is",
+            "what one point (a face has two) gives way by at rest, for this step",
+        ]
     points = "a face has two" if scenario.contact.model == "surface" else "the particles of a face share 2 K"
     return [
-        *table_lines(list(cells[0]), [list(row.values()) for row in cells]),
         "μs static and μk kinetic friction, e restitution, ζ damping ratio, k/K in shear,",
-        f"K stiffness in {pairs[0].stiffness_unit} of one contact point ({points})",
+        f"K stiffness in {pair.stiffness_unit} of one contact point ({points})",
     ]
 
 
@@ -109,7 +118,8 @@ def _rules(pairs: Sequence[PairDescription]) -> list[str]:
     room = max(LEAST_ROOM, width_of_screen() - len(GAP) - max(map(len, found), default=0))
     rows = [cells for key in sorted(found, key=_specific_first) for cells in _wrapped(key, found[key], room)]
     lines = table_lines(("set by", "for"), rows, left=2) if found else []
-    return [*lines, "where no key is named: defaults; stiffness from E and ν of the materials"]
+    is_rigid = pairs[0].normal_damping_ratio is None
+    return [*lines, f"where no key is named: defaults{'' if is_rigid else '; stiffness from E and ν of the materials'}"]
 
 
 def _specific_first(key: str) -> bool:
@@ -126,12 +136,30 @@ def _wrapped(key: str, pairs: Iterable[str], room: int) -> Iterator[tuple[str, s
 def _cost(scenario: Scenario, description: Description) -> list[str]:
     return [
         *_motion(description.motion),
-        f"boundary   {description.particles} particles ({_use_of_particles(scenario.contact)})",
+        *_boundary(scenario, description),
         f"neighbours are listed up to {MILLI * description.skin:.3g} mm apart",
         f"time step  {description.step:.3e} s, at most {description.steps} steps",
+        *_sag(description.rigid),
         f"solving    at most about {_duration(description.seconds)} on one core",
         f"memory     at most about {readable(description.memory)}",
         f"results    at most {description.frames} frames, about {readable(description.bytes)}",
+    ]
+
+
+def _boundary(scenario: Scenario, description: Description) -> list[str]:
+    if description.rigid is not None:
+        return []
+    return [f"boundary   {description.particles} particles ({_use_of_particles(scenario.contact)})"]
+
+
+def _sag(rigid: SagDescription | None) -> list[str]:
+    """Tell what the step of the non-smooth scheme implies."""
+    if rigid is None:
+        return []
+    solved = f"each solved to {MILLI * rigid.tolerance:g} mm/s"
+    return [
+        f"           in {rigid.substeps} substeps, {solved}; by hand at most {rigid.longest_step:.1e} s",
+        f"sag        {MICRO * rigid.sag:.3g} µm at the top of a column of {rigid.blocks}; goes with the step squared",
     ]
 
 
@@ -173,8 +201,12 @@ def _pair_cells(pair: PairDescription) -> dict[str, str]:
         "μs": f"{pair.static_friction:.3g}",
         "μk": f"{pair.kinetic_friction:.3g}",
         "e": f"{pair.restitution:.3g}",
-        "ζ": f"{pair.normal_damping_ratio:.3f}",
-        "ζ shear": f"{pair.shear_damping_ratio:.3f}",
+        **_optional("ζ", pair.normal_damping_ratio),
+        **_optional("ζ shear", pair.shear_damping_ratio),
         "K": f"{pair.normal_stiffness:.2e}",
-        "k/K": f"{pair.shear_stiffness_ratio:.3f}",
+        **_optional("k/K", pair.shear_stiffness_ratio),
     }
+
+
+def _optional(name: str, value: float | None) -> dict[str, str]:
+    return {} if value is None else {name: f"{value:.3f}"}

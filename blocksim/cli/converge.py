@@ -1,4 +1,4 @@
-"""blocksim converge: time step, stiffness and spacing refined until the run-out stays."""
+"""blocksim converge: time step, stiffness, spacing and tolerance refined until the run-out stays."""
 
 import shlex
 from collections.abc import Sequence
@@ -15,12 +15,13 @@ from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.progress import tell_compilation
 from blocksim.cli.scenario import read_scenario
 from blocksim.errors import ExitCode
+from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.folder import RESULTS
 from blocksim.study.converge import FEWEST_LEVELS, LEVELS, TOLERANCE_MM, converge
 from blocksim.study.convergence import Convergence, Joint, Level, Study, Verdict
 from blocksim.study.picture import draw_convergence
 from blocksim.study.pool import Row
-from blocksim.study.refinement import SPACING, STEP, STIFFNESS
+from blocksim.study.refinement import SPACING, STEP, STIFFNESS, TOLERANCE
 from blocksim.view.style import picture_suffix
 
 MOST_BLOCKS = 3
@@ -34,6 +35,7 @@ class Which(StrEnum):
     STEP = STEP
     STIFFNESS = STIFFNESS
     SPACING = SPACING
+    TOLERANCE = TOLERANCE
 
 
 def converge_command(
@@ -59,9 +61,10 @@ def converge_command(
 ) -> None:
     """Refine step, stiffness and spacing until the run-out stays.
 
-    One of time step, contact stiffness and particle spacing is refined at a time, the others stay as the scenario has
-    them, until two refinements in a row move no block by more than the tolerance. Exit code 0 says that the question is
-    answered, whatever the answer. Called again, only runs that are missing are done.
+    One of time step, contact stiffness and particle spacing (with rigid contacts: of step and tolerance) is refined at
+    a time, the others stay as the scenario has them, until two refinements in a row move no block by more than the
+    tolerance. Exit code 0 says that the question is answered, whatever the answer. Called again, only runs that are
+    missing are done.
 
     Example: blocksim converge scenarios/three_blocks_nominal.toml
     """
@@ -69,7 +72,7 @@ def converge_command(
     with read_scenario(scenario, settings or []) as ready:
         path = out or RESULTS / ready.name / "converge.png"
         picture_suffix(path)
-        tell_compilation(ready.contact.model, quiet=silent)
+        tell_compilation(kernels_of(ready), quiet=silent)
         result = converge(
             ready,
             tolerance_mm=tolerance,

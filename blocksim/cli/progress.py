@@ -29,17 +29,17 @@ def watching(*, quiet: bool) -> Iterator[Callable[[Where], None]]:
         yield _plain_lines()
 
 
-def tell_compilation(model: str, *, quiet: bool) -> None:
-    """Compile the kernels for a contact model where that is still to be done, and say so: it is no part of a run."""
-    if is_compiled(model):
+def tell_compilation(kernels: str, *, quiet: bool) -> None:
+    """Compile a set of kernels where that is still to be done, and say so: it is no part of a run."""
+    if is_compiled(kernels):
         with loading():
-            compile_kernels(model)
+            compile_kernels(kernels)
         return
     if quiet:
-        compile_kernels(model)
+        compile_kernels(kernels)
         return
     note("Compiling the solver, once after installation (less than a minute) ...")
-    note(f"Compiled in {compile_kernels(model):.0f} s.")
+    note(f"Compiled in {compile_kernels(kernels):.0f} s.")
 
 
 @contextmanager

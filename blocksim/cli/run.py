@@ -11,6 +11,7 @@ from blocksim.cli.progress import tell_compilation, watching
 from blocksim.cli.scenario import read_scenario
 from blocksim.cli.verdict import comparison_table, verdict_lines
 from blocksim.simulation import Result
+from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.folder import default_folder, holds_run
 from blocksim.simulation.table import rows_of
 from blocksim.study.single import FINISHED, check_experiment, compare, run
@@ -42,7 +43,7 @@ def run_command(
         if not known:
             check_experiment(ready)
             warn_of_threads(threads)
-            tell_compilation(ready.contact.model, quiet=silent)
+            tell_compilation(kernels_of(ready), quiet=silent)
         with watching(quiet=silent or known) as on_progress:
             result = run(ready, out=folder, overwrite=overwrite, threads=threads, on_progress=on_progress)
     if known and not silent:

@@ -13,7 +13,7 @@ from blocksim.cli.progress import tell_compilation
 from blocksim.cli.vary import with_vary
 from blocksim.errors import ExitCode
 from blocksim.scenario import Document
-from blocksim.study.many import TABLE, SweepResult, models_of, sweep
+from blocksim.study.many import TABLE, SweepResult, kernels_for, sweep
 from blocksim.study.pool import Row
 from blocksim.study.single import FINISHED
 
@@ -53,8 +53,8 @@ def sweep_command(
         Document.read(scenario).with_settings(settings or []), vary or [], None if mode is None else mode.value
     )
     short = short_keys(document)
-    for model in models_of(document):
-        tell_compilation(model, quiet=silent)
+    for kernels in kernels_for(document):
+        tell_compilation(kernels, quiet=silent)
 
     def on_row(done: int, total: int, row: Row) -> None:
         if not silent:

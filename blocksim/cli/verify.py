@@ -10,6 +10,7 @@ from blocksim.cli import options
 from blocksim.cli.output import answer, note, print_json, table_lines
 from blocksim.cli.progress import tell_compilation
 from blocksim.errors import ExitCode
+from blocksim.simulation.compilation import kernel_set
 from blocksim.verification.case import Case, Row, Setting, Verdict
 from blocksim.verification.cases import chosen
 from blocksim.verification.verify import (
@@ -55,7 +56,7 @@ def verify_command(
     """
     silent = quiet or as_json
     wanted = chosen(cases or [])
-    tell_compilation(model.value, quiet=silent)
+    tell_compilation(kernel_set("explicit", model.value), quiet=silent)
     outcomes: list[Outcome] = []
     try:
         outcomes.extend(_run(wanted, Setting(model.value, law.value, quick), quiet=silent))

@@ -129,7 +129,8 @@ INTERACTION = record_type(
     "normal_stiffness "  # of one corner contact: N/m for the linear law, N/m^1.5 for Hertz-Mindlin
     "shear_ratio "  # -: shear stiffness over the slope of the normal force
     "normal_damping shear_damping "  # damping ratios
-    "static_friction kinetic_friction transition_speed"  # -, -, m/s
+    "static_friction kinetic_friction transition_speed "  # -, -, m/s
+    "restitution"  # -: what the damping follows from; rigid contacts take it as it is
 )
 POINT = record_type(
     "x y nx ny depth "  # m: contact point; normal; m: overlap
@@ -227,6 +228,11 @@ class World(NamedTuple):
     shares: Records  # (t,) SHARE, one for each thread
     between: Records  # (1,) or, with threads, (p,) ACTION of the pairs whose bodies are of two shares, sorted
     team: Integers  # (32,) what threads tell one another
+
+    @property
+    def world(self) -> "World":
+        """Itself, as the scenes of all schemes have a world."""
+        return self
 
 
 def zeros(shape: int | tuple[int, ...], dtype: np.dtype[np.void]) -> Records:

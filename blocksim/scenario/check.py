@@ -14,6 +14,7 @@ from blocksim.scenario.models.study import Sweep
 from blocksim.scenario.overrides import Data, UnfitOverrideError, with_value
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.references import wrong_names
+from blocksim.scenario.rigid import unfit_choices
 from blocksim.scenario.start import impossible_starts
 
 MAX_TRIED = 100
@@ -38,7 +39,7 @@ def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Finding]]:
     findings += islice(wrong_names(data), MAX_FINDINGS)
     findings += [*_sweep(data, folder), *_provenance(data)]
     if scenario is not None and not findings:
-        findings += impossible_starts(scenario)
+        findings += [*unfit_choices(scenario), *impossible_starts(scenario)]
     return (None if findings else scenario), findings
 
 

@@ -10,6 +10,7 @@ from pydantic_core import ErrorDetails
 
 from blocksim.scenario.keys import MISSING, KeyPath, field_at, follow, keys_of, table_at
 from blocksim.scenario.models.motion import MOTIONS
+from blocksim.scenario.models.stepping import SCHEMES, scheme_of
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.spelling import nearest
 from blocksim.scenario.structures import KINDS
@@ -75,7 +76,7 @@ def _path(loc: Sequence[str | int]) -> KeyPath:
     path = tuple(loc)
     if path[:1] == ("structures",):
         return (*path[:2], *path[3:])
-    if path[:1] == ("motion",):
+    if path[:1] in (("motion",), ("time",)):
         return (*path[:1], *path[2:])
     return (path[0], *path[2:]) if path[:2] == ("sweep", "vary") else path
 
@@ -98,6 +99,12 @@ def _missing(path: KeyPath, data: object) -> Finding:
 
 
 def _unknown_key(path: KeyPath, data: object) -> Finding:
+    schemes = [word for word, table in SCHEMES.items() if path[0] == "time" and path[-1] in keys_of(table)]
+    if schemes:
+        present = scheme_of(follow(data, path[:-1]))
+        return Finding(
+            path, f"this key is for scheme {shown(schemes[0])}; the scheme here is {shown(present)}", at="key"
+        )
     table = table_at(path[:-1], data)
     known = keys_of(table) if table is not None else ()
     meant = similar_word(str(path[-1]), known)

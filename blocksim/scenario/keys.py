@@ -17,6 +17,9 @@ KeyPath = tuple[str | int, ...]
 NAMED: dict[str | int, int] = {"materials": 2, "blocks": 2, "structures": 2, "bodies": 2, "walls": 2, "pairs": 3}
 """Tables of named or numbered entries: how many parts of a path lead to one entry."""
 
+TAGS = ("kind", "scheme")
+"""Keys whose word tells which of several tables stands at a place."""
+
 MISSING = object()
 """What `follow` returns where there is nothing."""
 
@@ -139,15 +142,24 @@ def _inside(annotation: object, part: str | int, node: object) -> object:
 def _table(annotation: object, node: object) -> type[Table] | None:
     tables = [option for option in options(annotation) if isinstance(option, type) and issubclass(option, Table)]
     if len(tables) > 1:
-        kind = node.get("kind") if isinstance(node, Mapping) else None
-        return next((table for table in tables if kind in kinds_of(table)), None)
+        return next((table for table in tables if _word(table, node) in kinds_of(table)), None)
     return tables[0] if tables else None
+
+
+def _word(table: type[Table], node: object) -> object:
+    """Return the word of a table that tells it from its alternatives, or the one that is meant without."""
+    tag = _tag(table)
+    word = node.get(tag, MISSING) if isinstance(node, Mapping) else MISSING
+    return table.model_fields[tag].default if word is MISSING else word
+
+
+def _tag(table: type[Table]) -> str:
+    return next(tag for tag in TAGS if tag in table.model_fields)
 
 
 def kinds_of(table: type[Table]) -> tuple[str, ...]:
     """Return the words that tell this table from its alternatives."""
-    field = table.model_fields.get("kind")
-    return () if field is None else get_args(field.annotation)
+    return get_args(table.model_fields[_tag(table)].annotation)
 
 
 def options(annotation: Any) -> Iterator[Any]:

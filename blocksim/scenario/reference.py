@@ -17,7 +17,7 @@ from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFricti
 from blocksim.scenario.models.geometry import Block, BodySpec, Material
 from blocksim.scenario.models.motion import MOTIONS
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.stepping import Output, Time
+from blocksim.scenario.models.stepping import SCHEMES, Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.quantities import Quantity
 from blocksim.scenario.structures import KINDS, Structure
@@ -46,6 +46,7 @@ def key_table() -> str:
         ("contact", Contact),
         ("contact.restitution", Restitution),
         ("time", Time),
+        *((f'time, scheme = "{scheme}"', model) for scheme, model in SCHEMES.items()),
         ("output", Output),
         ("experiment", Experiment),
         ("sweep", Sweep),
@@ -63,7 +64,7 @@ def with_key_table(text: str) -> str:
 def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
     place = prefix.partition(",")[0]
     note = prefix.partition(", ")[2]
-    told = Structure.model_fields if issubclass(model, Structure) and model is not Structure else {}
+    told = next((base.model_fields for base in (Structure, Time) if issubclass(model, base) and model is not base), {})
     for name, info in model.model_fields.items():
         has_rows_of_its_own = _is_table(info) and model not in {Friction, Pair, Sweep} and name != "provenance"
         if name == "kind" or name in told or has_rows_of_its_own:

@@ -4,13 +4,16 @@ import functools
 import time
 
 from blocksim.kernels import jit
-from blocksim.kernels.advance import advance
-from blocksim.scenario import scenario_from_mapping
-from blocksim.simulation.ledger import energy_row
-from blocksim.world.build import build_world
+from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.simulation.schemes import build_scene, measured_row
+from blocksim.simulation.team import ALONE
 
-SURFACE = "surface"  # all other models have boundary particles, and machine code of their own that serves them all
-PARTICLES_MARK = "with-particles"
+SURFACE, PARTICLES, RIGID = "surface", "with-particles", "nonsmooth"  # sets of machine code
+CHANGES: dict[str, dict[str, object]] = {  # in the smallest scene, so that it needs them
+    SURFACE: {},
+    PARTICLES: {"contact": {"model": "kernel", "particle_spacing": 0.1}},  # the code serves all models with particles
+    RIGID: {"time": {"scheme": "nonsmooth"}},
+}
 
 SMALLEST_SCENE = {
     "schema": 1,
@@ -21,26 +24,32 @@ SMALLEST_SCENE = {
 }
 
 
-def compile_kernels(model: str = SURFACE) -> float:
-    """Compile the kernels for a contact model, or load them from the cache on disk; return the seconds it took.
-
-    Works once a process.
-    """
-    return _compiled(has_particles=model != SURFACE)
+def kernels_of(scenario: Scenario) -> str:
+    """Return which set of kernels a scenario needs."""
+    return kernel_set(scenario.time.scheme, scenario.contact.model)
 
 
-def is_compiled(model: str = SURFACE) -> bool:
-    """Tell whether the kernels for a contact model lie in the cache (or nothing has to be compiled)."""
-    return jit.is_compiled() and (model == SURFACE or jit.is_marked(PARTICLES_MARK))
+def kernel_set(scheme: str, model: str) -> str:
+    """Return which set of kernels a stepping scheme with a contact model needs."""
+    if scheme != "explicit":
+        return RIGID
+    return SURFACE if model == "surface" else PARTICLES
 
 
 @functools.cache
-def _compiled(*, has_particles: bool) -> float:
+def compile_kernels(kernels: str = SURFACE) -> float:
+    """Compile a set of kernels, or load it from the cache on disk; return the seconds it took.
+
+    Works once a process.
+    """
     began = time.perf_counter()
-    contact = {"model": "kernel", "particle_spacing": 0.1} if has_particles else {}
-    world = build_world(scenario_from_mapping({**SMALLEST_SCENE, "contact": contact}))
-    advance(world, 0)
-    energy_row(world)
-    if has_particles:
-        jit.mark(PARTICLES_MARK)
+    scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **CHANGES[kernels]})), 0)
+    measured_row(scene)
+    if kernels != SURFACE:
+        jit.mark(kernels)
     return time.perf_counter() - began
+
+
+def is_compiled(kernels: str = SURFACE) -> bool:
+    """Tell whether a set of kernels lies in the cache (or nothing has to be compiled)."""
+    return jit.is_compiled() if kernels == SURFACE else jit.is_marked(kernels)

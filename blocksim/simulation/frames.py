@@ -20,7 +20,7 @@ class Frames:
     vx: Floats  # (n, b) m/s
     vy: Floats  # (n, b) m/s
     spin: Floats  # (n, b) rad/s
-    energy: dict[str, Floats]  # (n,) J each: kinetic, potential, stored_normal, stored_shear, dashpot, friction, broken
+    energy: dict[str, Floats]  # (n,) J each, by name: the scheme's `ledger`
     contact_count: Floats  # (n,) contacts
     largest_overlap: Floats  # (n,) m
     names: tuple[str, ...]  # b names of bodies

@@ -4,15 +4,12 @@ import math
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, computed_field
 
-from blocksim.kernels.arrays import World
-from blocksim.kernels.energy import LEDGER_ROW, measure
+from blocksim.simulation.schemes import AnyScene, measured_row, scheme_of
 
 SMALLEST_HEIGHT = 1e-3  # m; the energy in play is at least that of lifting everything by this much
 STANDARD_GRAVITY = 9.81
-ROW_LENGTH = len(LEDGER_ROW) + 2
 
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]  # JSON has no NaN
 
@@ -20,16 +17,20 @@ Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is Non
 class EnergyLedger(BaseModel, frozen=True):
     """All in J. The residual is what total + losses has drifted since the start.
 
-    `to_support` is the work done on a support that moves; negative where the support drives the scene.
+    `to_support` is the work done on a support that moves; negative where the support drives the scene. What a scheme
+    does not know is zero: springs, dashpots and contacts that break are of the explicit one, impacts and correction
+    (blocksim.kernels.nonsmooth.energy) of the non-smooth one.
     """
 
     kinetic: Number
     potential: Number
-    stored_normal: Number
-    stored_shear: Number
-    dashpot: Number
+    stored_normal: Number = 0.0
+    stored_shear: Number = 0.0
+    dashpot: Number = 0.0
     friction: Number
-    broken: Number
+    broken: Number = 0.0
+    impacts: Number = 0.0
+    correction: Number = 0.0
     to_support: Number = 0.0
     start: Number
     in_play: Number
@@ -39,7 +40,8 @@ class EnergyLedger(BaseModel, frozen=True):
     def residual(self) -> float:
         """Energy now plus all losses, minus the energy at the start (J)."""
         now = self.kinetic + self.potential + self.stored_normal + self.stored_shear
-        return now + self.dashpot + self.friction + self.broken + self.to_support - self.start
+        lost = self.dashpot + self.friction + self.broken + self.impacts + self.correction + self.to_support
+        return now + lost - self.start
 
     @computed_field  # type: ignore[prop-decorator]
     @property
@@ -48,28 +50,21 @@ class EnergyLedger(BaseModel, frozen=True):
         return abs(self.residual) / self.in_play if self.in_play else abs(self.residual)
 
 
-def energy_row(world: World) -> NDArray[np.float64]:
-    """Return the measured row of the present state (see `measure`)."""
-    row = np.zeros(ROW_LENGTH)
-    measure(world, row)
-    return row
+def start_energy(scene: AnyScene) -> float:
+    """Return all energy (J) that a scene holds and has lost: constant, if the ledger is complete."""
+    return float(measured_row(scene)[: len(scheme_of(scene).ledger)].sum())
 
 
-def start_energy(world: World) -> float:
-    """Return the energy (J) of a world that has not moved yet."""
-    return float(energy_row(world)[: len(LEDGER_ROW)].sum())
-
-
-def energy_ledger(world: World, start: float) -> EnergyLedger:
+def energy_ledger(scene: AnyScene, start: float) -> EnergyLedger:
     """Return the ledger of the present state; `start` is the energy (J) at the start.
 
     Energy in play: largest kinetic energy + sum of the weights' travel |m g v| dt + |work of the support|, at least
     m_total g 1 mm.
     """
-    ledger = world.ledger[0]
-    row = energy_row(world)
-    weight = float(np.sum(world.bodies.mass)) * STANDARD_GRAVITY
-    driven = float(ledger.largest_kinetic + ledger.travel_work) + abs(float(ledger.to_support))
+    ledger = scene.world.ledger[0]
+    row = measured_row(scene)
+    entries = {name: float(value) for name, value in zip(scheme_of(scene).ledger, row, strict=False)}
+    weight = float(np.sum(scene.world.bodies.mass)) * STANDARD_GRAVITY
+    driven = float(ledger.largest_kinetic + ledger.travel_work) + abs(entries["to_support"])
     in_play = max(driven, weight * SMALLEST_HEIGHT)
-    entries = {name: float(value) for name, value in zip(LEDGER_ROW, row, strict=False)}
     return EnergyLedger(**entries, start=start, in_play=in_play)

@@ -9,6 +9,7 @@ from blocksim.simulation import outcome as ends
 from blocksim.simulation.ledger import EnergyLedger, energy_ledger, start_energy
 from blocksim.simulation.outcome import Outcome
 from blocksim.simulation.recorder import Recorder
+from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.team import ALONE, Team
 
 BODY_STEPS_A_CALL = 1_000_000  # a tenth of a second or so; after that Ctrl-C is heard and progress is shown
@@ -52,7 +53,7 @@ def outcome_of(code: int, ledger: EnergyLedger) -> Outcome:
 
 
 def run_loop(
-    world: World,
+    scene: AnyScene,
     recorder: Recorder,
     end: float,
     *,
@@ -60,26 +61,26 @@ def run_loop(
     on_progress: Watcher = lambda _: None,
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> LoopResult:
-    """Advance the world to `end` (s) or until it rests, fails or `is_stopped`; the recorder samples on the way."""
-    step = float(world.controls[0].step)
+    """Advance a scene to `end` (s) or until it rests, fails or `is_stopped`; the recorder samples on the way."""
+    step = float(scene.world.controls[0].step)
     last = last_step_of(end, step)
-    most = max(1, BODY_STEPS_A_CALL // world.bodies.size)
+    most = max(1, BODY_STEPS_A_CALL // scene.world.bodies.size)
     seconds = -time.perf_counter()
-    world, status = team.advance(world, 0)
+    scene, status = team.advance(scene, 0)
     seconds += time.perf_counter()
-    start = start_energy(world)
-    recorder.sample(world)
+    start = start_energy(scene)
+    recorder.sample(scene)
     done, wanted = 0, 0
     while status == REACHED and done < last and not is_stopped():
         wanted = min(recorder.next_step(done), last) if done == wanted else wanted
         seconds -= time.perf_counter()
-        world, status = team.advance(world, min(wanted, done + most))
+        scene, status = team.advance(scene, min(wanted, done + most))
         seconds += time.perf_counter()
-        done = int(world.clock[0].steps)
+        done = int(scene.world.clock[0].steps)
         if done == wanted:
-            recorder.sample(world)
-        on_progress(Progress(done * step, end, done, energy_ledger(world, start).relative_residual))
-    recorder.sample(world)  # wherever it ended
-    ledger = energy_ledger(world, start)
+            recorder.sample(scene)
+        on_progress(Progress(done * step, end, done, energy_ledger(scene, start).relative_residual))
+    recorder.sample(scene)  # wherever it ended
+    ledger = energy_ledger(scene, start)
     outcome = ends.INTERRUPTED if status == REACHED and done < last else outcome_of(status, ledger)
-    return LoopResult(world, outcome, ledger, seconds, team.threads)
+    return LoopResult(scene.world, outcome, ledger, seconds, team.threads)

@@ -6,13 +6,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.arrays import World
-from blocksim.kernels.energy import LEDGER_ROW, measure
 from blocksim.scenario import PlacedBody
 from blocksim.simulation.frames import Frames
+from blocksim.simulation.schemes import AnyScene, measured_row, scheme_of
 
 MOTION = ("x", "y", "angle", "vx", "vy", "spin")
-MEASURED = (*LEDGER_ROW, "contact_count", "largest_overlap")
 
 
 class Frame(NamedTuple):
@@ -20,7 +18,7 @@ class Frame(NamedTuple):
 
     step: int
     motion: NDArray[np.float64]  # (6, b) as MOTION
-    measured: NDArray[np.float64]  # (10,) as MEASURED
+    measured: NDArray[np.float64]  # as the scheme's `measured`
 
 
 class FrameSink(Protocol):
@@ -42,6 +40,7 @@ class Recorder:
         self.steps: list[int] = []
         self.motion: list[NDArray[np.float64]] = []
         self.measured: list[NDArray[np.float64]] = []
+        self.ledger: tuple[str, ...] = ()
 
     def next_step(self, done: int) -> int:
         """Return the next step to record after `done` steps."""
@@ -50,14 +49,14 @@ class Recorder:
             number += 1
         return round(number * self.steps_per_frame)
 
-    def sample(self, world: World) -> None:
+    def sample(self, scene: AnyScene) -> None:
         """Add a frame of the present state, unless this step has one already."""
-        step = int(world.clock[0].steps)
+        step = int(scene.world.clock[0].steps)
         if self.steps and self.steps[-1] == step:
             return
-        row = np.zeros(len(MEASURED))
-        measure(world, row)
-        motion = np.stack([world.bodies[name][: len(self.placed)] for name in MOTION])
+        row = measured_row(scene)
+        motion = np.stack([scene.world.bodies[name][: len(self.placed)] for name in MOTION])
+        self.ledger = scheme_of(scene).ledger
         self.steps.append(step)
         self.motion.append(motion)
         self.measured.append(row)
@@ -67,29 +66,33 @@ class Recorder:
     def frames(self) -> Frames:
         """Return all frames so far."""
         steps = np.array(self.steps, dtype=np.int64)
-        return frames_from_rows(self.placed, steps, self.time_step, np.stack(self.motion), np.stack(self.measured))
+        rows = Rows(steps, np.stack(self.motion), np.stack(self.measured), self.ledger)
+        return frames_from_rows(self.placed, self.time_step, rows)
 
 
-def frames_from_rows(
-    placed: Sequence[PlacedBody],
-    steps: NDArray[np.int64],
-    time_step: float,
-    motion: NDArray[np.float64],
-    measured: NDArray[np.float64],
-) -> Frames:
-    """Return frames from step numbers (n,), motion (n, 6, b) and measured values (n, 10)."""
-    columns = measured.T
-    x, y, angle, vx, vy, spin = motion.swapaxes(0, 1)
+class Rows(NamedTuple):
+    """What n frames of b bodies consist of."""
+
+    steps: NDArray[np.int64]  # (n,)
+    motion: NDArray[np.float64]  # (n, 6, b) as MOTION
+    measured: NDArray[np.float64]  # (n, e + 2): energies, number of contacts, largest overlap
+    ledger: tuple[str, ...]  # names of the e energies
+
+
+def frames_from_rows(placed: Sequence[PlacedBody], time_step: float, rows: Rows) -> Frames:
+    """Return frames of bodies with these steps (s)."""
+    columns = rows.measured.T
+    x, y, angle, vx, vy, spin = rows.motion.swapaxes(0, 1)
     return Frames(
-        step=steps,
-        time=np.multiply(steps, time_step, dtype=np.float64),
+        step=rows.steps,
+        time=np.multiply(rows.steps, time_step, dtype=np.float64),
         x=x,
         y=y,
         angle=angle,
         vx=vx,
         vy=vy,
         spin=spin,
-        energy=dict(zip(LEDGER_ROW, columns, strict=False)),
+        energy=dict(zip(rows.ledger, columns, strict=False)),
         contact_count=columns[-2],
         largest_overlap=columns[-1],
         names=tuple(body.name for body in placed),

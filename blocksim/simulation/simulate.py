@@ -9,19 +9,19 @@ from pathlib import Path
 from blocksim.scenario import Scenario, place_bodies, scenario_hash
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import sha256_of, write_text
-from blocksim.simulation.compilation import compile_kernels
+from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
 from blocksim.simulation.loop import LoopResult, Progress, Watcher, run_loop
 from blocksim.simulation.outcome import RESIDUAL_PROMISE
 from blocksim.simulation.provenance import environment, run_hash, state_hash
 from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.result import Result
+from blocksim.simulation.schemes import build_scene, scheme_named
 from blocksim.simulation.stopping import stop_requests
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import csv_text, final_columns
 from blocksim.simulation.team import team_for
-from blocksim.world.build import build_world
 
 COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION)
 
@@ -35,12 +35,12 @@ def simulate(scenario: Scenario, *, threads: int = 1, on_progress: Watcher = _ig
 
     The result does not depend on the number of threads; small scenes do not use them all.
     """
-    compile_kernels(scenario.contact.model)
+    compile_kernels(kernels_of(scenario))
     began = time.perf_counter()
-    world = build_world(scenario)
-    recorder = Recorder(place_bodies(scenario), scenario.output.every, float(world.controls[0].step))
-    with stop_requests() as is_stopped, team_for(world, threads) as team:
-        ended = run_loop(world, recorder, scenario.time.end, team=team, on_progress=on_progress, is_stopped=is_stopped)
+    scene = build_scene(scenario)
+    recorder = Recorder(place_bodies(scenario), scenario.output.every, float(scene.world.controls[0].step))
+    with stop_requests() as is_stopped, team_for(scene, threads) as team:
+        ended = run_loop(scene, recorder, scenario.time.end, team=team, on_progress=on_progress, is_stopped=is_stopped)
     return _result(scenario, recorder, ended, began)
 
 
@@ -52,19 +52,19 @@ def simulate_into(
     Raises OutputExistsError where the folder is not free and OutputError where writing fails. Ctrl-C ends it with the
     status `interrupted`, and what there is by then is kept.
     """
-    compile_kernels(scenario.contact.model)
+    compile_kernels(kernels_of(scenario))
     began = time.perf_counter()
-    world = build_world(scenario)
+    scene = build_scene(scenario)
     tables = read_tables(scenario)
     files.prepare_folder(folder, overwrite=overwrite)
     toml = _keep_scenario(scenario, tables, folder)
     placed = place_bodies(scenario)
-    step = float(world.controls[0].step)
-    end = scenario.time.end
-    with stop_requests() as is_stopped, team_for(world, threads) as team:
-        with FrameFile(folder / files.FRAMES, placed, step, toml) as sink:
+    step = float(scene.world.controls[0].step)
+    end, ledger = scenario.time.end, scheme_named(scenario).ledger
+    with stop_requests() as is_stopped, team_for(scene, threads) as team:
+        with FrameFile(folder / files.FRAMES, placed, step, toml, ledger=ledger) as sink:
             recorder = Recorder(placed, scenario.output.every, step, sink)
-            ended = run_loop(world, recorder, end, team=team, on_progress=on_progress, is_stopped=is_stopped)
+            ended = run_loop(scene, recorder, end, team=team, on_progress=on_progress, is_stopped=is_stopped)
         return _keep_result(_result(scenario, recorder, ended, began), folder)
 
 
@@ -114,7 +114,7 @@ def _summary(scenario: Scenario, ended: LoopResult, seconds: float) -> Summary:
         time_step_s=step,
         simulated_time_s=steps * step,
         ended_at=datetime.now(UTC).isoformat(timespec="seconds"),
-        compile_seconds=compile_kernels(scenario.contact.model),
+        compile_seconds=compile_kernels(kernels_of(scenario)),
         solver_seconds=ended.solver_seconds,
         total_seconds=seconds,
         energy_J=ended.ledger,

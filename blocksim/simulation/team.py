@@ -6,25 +6,26 @@ from types import TracebackType
 from typing import Self
 
 from blocksim.errors import InvalidInputError
-from blocksim.kernels.advance import advance, advance_in_team
-from blocksim.kernels.arrays import PAIRS_FULL, TEAM_SIZE, World
+from blocksim.kernels.arrays import PAIRS_FULL, TEAM_SIZE
 from blocksim.kernels.jit import config
-from blocksim.world.build import with_more_room, with_threads
+from blocksim.simulation.schemes import SCHEMES, AnyScene, Scene, scheme_of
 
-BODIES_A_THREAD = 100  # at least; with fewer, threads wait for one another longer than they work
-WORK_SPACE = ("points", "matrices", "before", "action")
+BODIES_A_THREAD = SCHEMES["explicit"].least_bodies
 START_SECONDS = 60.0
 
 
-def useful_threads(threads: int, bodies: int) -> int:
-    """Return how many of `threads` are of use for a scene; the result is the same for any number, bit for bit."""
-    most = 1 if config.DISABLE_JIT else max(1, bodies // BODIES_A_THREAD)
+def useful_threads(threads: int, bodies: int, least_bodies: int = BODIES_A_THREAD) -> int:
+    """Return how many of `threads` are of use for a scene; the result is the same for any number, bit for bit.
+
+    `least_bodies` is the scheme's, by default that of the explicit one.
+    """
+    most = 1 if config.DISABLE_JIT else max(1, bodies // least_bodies)
     return min(threads, most)
 
 
-def team_for(world: World, threads: int) -> "Team":
-    """Return a team for a world, of as many of `threads` as are of use. Raises ValueError for less than one."""
-    return Team(useful_threads(threads, world.bodies.size - 1))
+def team_for(scene: AnyScene, threads: int) -> "Team":
+    """Return a team for a scene, of as many of `threads` as are of use. Raises ValueError for less than one."""
+    return Team(useful_threads(threads, scene.world.bodies.size - 1, scheme_of(scene).least_bodies))
 
 
 class Team:
@@ -59,29 +60,26 @@ class Team:
         if self._pool is not None:
             self._pool.shutdown()
 
-    def advance(self, world: World, last_step: int) -> tuple[World, int]:
-        """Advance to a step, giving the pair lists more room as often as needed; return world and status code."""
-        if world.shares.size != self.threads:
-            world = with_threads(world, self.threads)
-        status = self._advance(world, last_step)
+    def advance(self, scene: Scene, last_step: int) -> tuple[Scene, int]:
+        """Advance to a step, giving the pair lists more room as often as needed; return scene and status code."""
+        scheme = scheme_of(scene)
+        if scheme.threads_of(scene) != self.threads:
+            scene = scheme.with_threads(scene, self.threads)
+        status = self._advance(scene, last_step)
         while status == PAIRS_FULL:
-            world = with_more_room(world)
-            status = self._advance(world, last_step)
-        return world, status
+            scene = scheme.with_more_room(scene)
+            status = self._advance(scene, last_step)
+        return scene, status
 
-    def _advance(self, world: World, last_step: int) -> int:
+    def _advance(self, scene: Scene, last_step: int) -> int:
+        scheme = scheme_of(scene)
         if self._pool is None:
-            return advance(world, last_step)
-        world.team[TEAM_SIZE] = self.threads
-        others = [_with_own_work_space(world) for _ in range(1, self.threads)]
+            return scheme.advance(scene, last_step)
+        scene.world.team[TEAM_SIZE] = self.threads
+        others = [scheme.for_another_thread(scene) for _ in range(1, self.threads)]
         for k, other in enumerate(others, start=1):
-            self._pool.submit(advance_in_team, other, last_step, k)
-        return int(advance_in_team(world, last_step, 0))
-
-
-def _with_own_work_space(world: World) -> World:
-    """Return the same world for one more thread: with arrays of its own where one pair is worked on."""
-    return world._replace(**{name: getattr(world, name).copy() for name in WORK_SPACE})
+            self._pool.submit(scheme.advance_in_team, other, last_step, k)
+        return int(scheme.advance_in_team(scene, last_step, 0))
 
 
 ALONE = Team()

@@ -12,15 +12,15 @@ from pathlib import Path
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, load_scenario
 from blocksim.simulation import folder as files
-from blocksim.simulation.compilation import compile_kernels
+from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.provenance import run_hash
+from blocksim.simulation.schemes import build_scene
 from blocksim.simulation.stopping import interruptible
 from blocksim.simulation.summary import read_summary
 from blocksim.study.convergence import Convergence, Coordinates, Joint, Study, Verdict, distance, judge
 from blocksim.study.pool import Row, run_all
-from blocksim.study.refinement import Refinement, has_particles, refinements_of, spacing_note, with_setting
+from blocksim.study.refinement import Refinement, effects_note, has_particles, refinements_of, with_setting
 from blocksim.study.single import FINISHED, check_experiment
-from blocksim.world.build import build_world
 
 FOLDER = "converge"
 TOLERANCE_MM = 0.1
@@ -42,9 +42,9 @@ def converge(  # noqa: PLR0913 - one argument for each option of the command
 ) -> Convergence:
     """Refine each setting until two refinements in a row move no block by more than the tolerance.
 
-    `studies` names some of step, stiffness, spacing (default: all that mean something); `levels` is how often the
-    scenario's own value is refined at most. The runs are kept in `out` (default: results/NAME/converge). With more than
-    one job (None: one a core), a script needs the guard `if __name__ == "__main__":`. Raises ScenarioError,
+    `studies` names some of step, stiffness, spacing, tolerance (default: all that mean something); `levels` is how
+    often the scenario's own value is refined at most. The runs are kept in `out` (default: results/NAME/converge). With
+    more than one job (None: one a core), a script needs the guard `if __name__ == "__main__":`. Raises ScenarioError,
     InvalidInputError, StepTooLargeError for the scenario as it is, and StoppedEarlyError on Ctrl-C.
     """
     if not isinstance(scenario, Scenario):
@@ -54,9 +54,9 @@ def converge(  # noqa: PLR0913 - one argument for each option of the command
         raise InvalidInputError(message)
     scenario = scenario.model_copy(update={"sweep": None})
     check_experiment(scenario)
-    build_world(scenario)
+    build_scene(scenario)
     refinements = refinements_of(scenario, studies)
-    compile_kernels(scenario.contact.model)
+    compile_kernels(kernels_of(scenario))
     folder = Path(out) if out is not None else files.RESULTS / scenario.name / FOLDER
     runs = _Runs(folder, jobs or os.cpu_count() or 1, on_run)
     found = _refine(scenario, refinements, runs, tolerance_mm, levels)
@@ -155,7 +155,7 @@ def _notes(scenario: Scenario, runs: _Runs, studies: Iterable[str] | None) -> tu
     """Say what was not studied, and what the numbers cannot mean."""
     notes = []
     if studies is None and not has_particles(scenario):
-        notes.append(f"{spacing_note(scenario)}: not studied")
+        notes.append(f"{effects_note(scenario)}: not studied")
     reasons = {str(row["reason"]) for row in runs.rows.values() if row["status"] == FINISHED}
     if scenario.time.stop_at_rest and "end of simulated time" in reasons:
         notes.append("some runs ended before everything was at rest: their final positions depend on time.end")

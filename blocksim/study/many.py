@@ -24,7 +24,7 @@ from blocksim.scenario import Document, Scenario, scenario_hash
 from blocksim.scenario.models.study import Sweep
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import write_text
-from blocksim.simulation.compilation import compile_kernels
+from blocksim.simulation.compilation import compile_kernels, kernel_set
 from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.simulation.stopping import interruptible
@@ -98,8 +98,8 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     name = sweep_hash(base, base.sweep)
     folder = Path(out) if out is not None else files.RESULTS / base.name / f"sweep-{name}"
     _prepare(folder, base, name, overwrite=overwrite)
-    for model in models_of(document):
-        compile_kernels(model)
+    for kernels in kernels_for(document):
+        compile_kernels(kernels)
     return _run_cases(folder, cases, jobs or os.cpu_count() or 1, on_row)
 
 
@@ -116,11 +116,13 @@ def sweep_hash(base: Scenario, plan: Sweep) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
 
 
-def models_of(document: Document) -> tuple[str, ...]:
-    """Return the contact models that the cases of a sweep use: there is machine code for each kind."""
+def kernels_for(document: Document) -> tuple[str, ...]:
+    """Return the sets of kernels that the cases of a sweep need."""
     base = document.build()
-    varied = base.sweep.vary.get("contact.model", ()) if base.sweep else ()
-    return tuple(dict.fromkeys((base.contact.model, *map(str, varied))))
+    vary = base.sweep.vary if base.sweep else {}
+    schemes = (base.time.scheme, *map(str, vary.get("time.scheme", ())))
+    models = (base.contact.model, *map(str, vary.get("contact.model", ())))
+    return tuple(dict.fromkeys(kernel_set(scheme, model) for scheme in schemes for model in models))
 
 
 def _prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool) -> None:

@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 from math import log10, sqrt
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Scenario
-from blocksim.world.build import build_world
+from blocksim.scenario import Scenario, place_bodies
+from blocksim.scenario.models.stepping import Explicit, Nonsmooth
+from blocksim.simulation.schemes import build_scene
+from blocksim.world.nonsmooth import velocity_tolerance
 
-STEP, STIFFNESS, SPACING = "step", "stiffness", "spacing"
-STUDIES = (STEP, STIFFNESS, SPACING)
+STEP, STIFFNESS, SPACING, TOLERANCE = "step", "stiffness", "spacing", "tolerance"
+STUDIES = (STEP, STIFFNESS, SPACING, TOLERANCE)
 PARTICLE_MODELS = frozenset({"particles", "kernel"})
 SOFTEST = 1e-3  # stiffness scale
 DIGITS = 6  # of a level's value, so that the value that is told gives the same run when it is set
@@ -55,13 +57,17 @@ def refinements_of(scenario: Scenario, studies: Iterable[str] | None = None) -> 
     if unknown:
         message = f"'{unknown[0]}' is no study of convergence; there are {', '.join(STUDIES)}"
         raise InvalidInputError(message)
-    possible = [_step(scenario), _stiffness(scenario)]
-    if has_particles(scenario):
-        possible.append(_spacing(scenario))
-    chosen = tuple(one for one in possible if one.study in asked)
+    chosen = tuple(one for one in _possible(scenario) if one.study in asked)
     if not chosen:
-        raise InvalidInputError(f"nothing to study: {spacing_note(scenario)}")
+        raise InvalidInputError(f"nothing to study: {effects_note(scenario)}")
     return chosen
+
+
+def _possible(scenario: Scenario) -> list[Refinement]:
+    if isinstance(scenario.time, Nonsmooth):
+        return [_rigid_step(scenario), _tolerance(scenario, scenario.time)]
+    spacing = [_spacing(scenario)] if has_particles(scenario) else []
+    return [_step(scenario, scenario.time), _stiffness(scenario), *spacing]
 
 
 def has_particles(scenario: Scenario) -> bool:
@@ -69,25 +75,44 @@ def has_particles(scenario: Scenario) -> bool:
     return scenario.contact.model in PARTICLE_MODELS
 
 
-def spacing_note(scenario: Scenario) -> str:
-    """Say why the spacing is not studied."""
+def effects_note(scenario: Scenario) -> str:
+    """Say what is not studied, and why; nothing where all is."""
+    if isinstance(scenario.time, Nonsmooth):
+        return "contacts are rigid: neither a stiffness nor the particle spacing has an effect"
+    if has_particles(scenario):
+        return "the explicit scheme solves every step exactly and has no tolerance"
     return f'the particle spacing has no effect on contact.model = "{scenario.contact.model}"'
 
 
-def _step(scenario: Scenario) -> Refinement:
+def _step(scenario: Scenario, time: Explicit) -> Refinement:
     """Halve the safety of the automatic step, or the step given by hand; double it where that is safe."""
-    by_hand = scenario.time.step != "auto"
-    key, own = ("time.step", scenario.time.step) if by_hand else ("time.safety", scenario.time.safety)
-    halved = Refinement(STEP, "time step", key, float(own), 0.5, 0)
+    by_hand = time.step != "auto"
+    key, own = ("time.step", time.step) if by_hand else ("time.safety", time.safety)
+    return _halved(scenario, key, float(own))
+
+
+def _rigid_step(scenario: Scenario) -> Refinement:
+    """Halve the step, as given or as it was chosen; double it where that is safe."""
+    return _halved(scenario, "time.step", float(build_scene(scenario).world.controls[0].step))
+
+
+def _halved(scenario: Scenario, key: str, own: float) -> Refinement:
+    halved = Refinement(STEP, "time step", key, own, 0.5, 0)
     coarser = next((n for n in (2, 1) if _is_safe(halved.at(scenario, -n))), 0)
     return replace(halved, coarser=coarser)
+
+
+def _tolerance(scenario: Scenario, time: Nonsmooth) -> Refinement:
+    """Tighten the tolerance of the velocity pass by half a decade, also from ten times the scenario's."""
+    own = velocity_tolerance(time, len(place_bodies(scenario)))
+    return Refinement(TOLERANCE, "velocity tolerance", "time.velocity_tolerance", own, sqrt(0.1), 2)
 
 
 def _is_safe(scenario: Scenario) -> bool:
     """Tell whether a scenario's step is admissible."""
     try:
         type(scenario.time).model_validate(scenario.time.model_dump())
-        build_world(scenario)
+        build_scene(scenario)
     except (ValueError, InvalidInputError):
         return False
     return True

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from blocksim.kernels.arrays import AT_REST, REACHED
 from blocksim.scenario import load_scenario, place_bodies
+from blocksim.simulation.schemes import build_scene
 from blocksim.verification.case import Row, Setting, absolute, at_least
 from blocksim.verification.scene import Simulation
 from blocksim.verification.throws import GOLDEN, Throw, Thrower, kinetic_energy
-from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -74,7 +74,7 @@ def worst_residual(setting: Setting, path: Path) -> float:
     if is_crowd:
         overrides["time.end"] = CROWD_END if setting.model == "surface" else CROWD_END_PARTICLES
     scenario = load_scenario(path, overrides)
-    run = Simulation(build_world(scenario))
+    run = Simulation(build_scene(scenario))
     outputs = round(scenario.time.end / scenario.output.every)
     worst = 0.0
     for k in range(1, outputs + 1):

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.kernels.arrays import REACHED
-from blocksim.kernels.energy import LEDGER_ROW
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.simulation.ledger import energy_ledger, energy_row
+from blocksim.simulation.ledger import energy_ledger, start_energy
+from blocksim.simulation.schemes import AnyScene, build_scene, measured_row
 from blocksim.simulation.team import ALONE
-from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -53,11 +52,11 @@ class PaperBlock:
 
 
 class Simulation:
-    """A world under way."""
+    """A scene under way, of any scheme."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, scene: AnyScene) -> None:
         """Find the first contacts and remember the energy."""
-        self.world = world
+        self.scene = scene
         self.status = REACHED
         self.to_step(0)
         self.start_energy = self.energy()
@@ -68,8 +67,13 @@ class Simulation:
         return self.world.bodies[:-1]
 
     @property
+    def world(self) -> World:
+        """The arrays that all schemes have."""
+        return self.scene.world
+
+    @property
     def touching(self) -> Any:
-        """Records of all contacts there are, pair after pair."""
+        """Records of all contacts there are, pair after pair; of the explicit scheme."""
         count = int(self.world.clock[0].pair_count)
         is_active = np.arange(self.world.contacts.shape[1]) < self.world.pairs.active[:count, np.newaxis]
         return self.world.contacts[:count][is_active]
@@ -91,7 +95,7 @@ class Simulation:
 
     def to_step(self, last_step: int) -> Simulation:
         """Go on to a step number."""
-        self.world, self.status = ALONE.advance(self.world, last_step)
+        self.scene, self.status = ALONE.advance(self.scene, last_step)
         return self
 
     def to_time(self, time: float) -> Simulation:
@@ -99,8 +103,8 @@ class Simulation:
         return self.to_step(round(time / self.step))
 
     def measured(self) -> NDArray[np.float64]:
-        """Return the energies (J) of LEDGER_ROW, the number of contacts and the largest overlap (m)."""
-        return energy_row(self.world)
+        """Return the energies (J) of the scheme's ledger, the number of contacts and the largest overlap (m)."""
+        return measured_row(self.scene)
 
     @property
     def kinetic(self) -> float:
@@ -110,15 +114,15 @@ class Simulation:
     @property
     def contacts(self) -> int:
         """Number of contact points."""
-        return int(self.measured()[len(LEDGER_ROW)])
+        return int(self.measured()[-2])
 
     def energy(self) -> float:
         """Return everything the scene holds and has lost (J): constant, if the ledger is complete."""
-        return float(self.measured()[: len(LEDGER_ROW)].sum())
+        return start_energy(self.scene)
 
     def residual(self) -> float:
         """Return what the ledger lacks, as a share of the energy in play."""
-        return energy_ledger(self.world, self.start_energy).relative_residual
+        return energy_ledger(self.scene, self.start_energy).relative_residual
 
     def state(self) -> NDArray[np.float64]:
         """Return x, y, angle, vx, vy, spin of all bodies, one row a body."""
@@ -141,10 +145,10 @@ class Scene:
 
     def start(self, change: Callable[[World], None] | None = None) -> Simulation:
         """Start it; `change` edits the world before the first contacts are found."""
-        world = build_world(self.scenario())
+        scene = build_scene(self.scenario())
         if change is not None:
-            change(world)
-        return Simulation(world)
+            change(scene.world)
+        return Simulation(scene)
 
     def scenario(self) -> Scenario:
         """Return the scenario."""

@@ -1,7 +1,7 @@
 """Build the flat arrays of a scene from a scenario."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from blocksim.kernels.arrays import (
 from blocksim.kernels.laws import LAW_CODES
 from blocksim.kernels.models import MODEL_CODES
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
-from blocksim.scenario import Scenario, place_bodies
+from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.world.bodies import body_records
 from blocksim.world.interactions import contact_classes, interaction_table
 from blocksim.world.memory import SceneSize, refuse_if_too_large
@@ -45,35 +45,55 @@ MOST_LARGE = 64  # bodies that are looked at one by one, outside the grid of the
 LARGE_RATIO = 4.0  # over the smallest body; nothing is large below that
 
 
+class Parts(NamedTuple):
+    """What every scheme begins with."""
+
+    placed: tuple[PlacedBody, ...]
+    bodies: Records  # (n + 1,) BODY
+    interactions: Records  # (k, k) INTERACTION
+
+
+def scene_parts(scenario: Scenario) -> Parts:
+    """Return bodies and interactions of a scenario; the ground's face still has the length of the block above it."""
+    placed = place_bodies(scenario)
+    classes = contact_classes(scenario, placed)
+    return Parts(placed, body_records(scenario, placed, classes), interaction_table(scenario, classes))
+
+
 def build_world(scenario: Scenario) -> World:
     """Return the world at time zero: arrays as described in blocksim.kernels.arrays, pair lists still empty.
 
     Raises SceneTooLargeError when there is not enough memory for it, StepTooLargeError when the scenario asks for an
     inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
     """
-    placed = place_bodies(scenario)
-    classes = contact_classes(scenario, placed)
-    table = interaction_table(scenario, classes)
-    bodies = body_records(scenario, placed, classes)
-    particles = place_particles(bodies, scenario.contact.model, scenario.contact.particle_spacing)
-    bodies[-1].half_x = math.inf  # the half-plane has one face without ends
-    capacity, slots = first_capacity(bodies), slots_of_a_pair(bodies, scenario.contact.model)
+    parts = scene_parts(scenario)
+    bodies, model = parts.bodies, scenario.contact.model
+    particles = place_particles(bodies, model, scenario.contact.particle_spacing)
+    capacity, slots = first_capacity(bodies), slots_of_a_pair(bodies, model)
     refuse_if_too_large(SceneSize(bodies.size, capacity, slots, has_particles=particles is not None))
-    contacts = zeros(contacts_of_a_pair(slots, scenario.contact.model), contact_type(scenario.contact.model))
+    contacts = zeros(contacts_of_a_pair(slots, model), contact_type(model))
+    lists = {**empty_lists(capacity, slots, contacts), "points": _points(slots), "before": contacts}
+    controls = empty_controls(scenario, parts, choose_step(scenario, bodies, parts.interactions))
+    controls[0].skin = choose_skin(scenario, bodies, smallest_side(parts), controls[0].step)
+    controls[0].cell_width = 2.0 * controls[0].cell_radius + controls[0].skin
+    return assembled(scenario, parts, controls, particles=particles, **lists)
+
+
+def assembled(scenario: Scenario, parts: Parts, controls: Records, **arrays: Any) -> World:
+    """Return a world at time zero from its parts and the arrays that are the scheme's own affair."""
+    bodies = parts.bodies
+    bodies[-1].half_x = math.inf  # the half-plane has one face without ends
     world = World(
         bodies=bodies,
-        **empty_lists(capacity, slots, contacts),
+        **arrays,
         **_grid(bodies),
-        interactions=table,
-        particles=particles,
+        interactions=parts.interactions,
         ledger=zeros(bodies.size // GROUP + 1, LEDGER),
-        points=_points(slots),
         action=zeros(1, ACTION),
-        before=contacts,
         matrices=np.zeros((8, 3, 3)),
         moved=moved_records(bodies),
         motion=motion_records(scenario),
-        controls=_controls(scenario, bodies, len(placed), choose_step(scenario, bodies, table)),
+        controls=controls,
         clock=zeros(1, CLOCK),
         shares=zeros(1, SHARE),
         between=zeros(1, ACTION),
@@ -81,6 +101,13 @@ def build_world(scenario: Scenario) -> World:
     )
     world.ledger[0].largest_kinetic = _kinetic_energy(bodies)
     return world
+
+
+def without_lists(scenario: Scenario, parts: Parts, controls: Records) -> World:
+    """Return a world at time zero for a scheme that keeps pairs and contacts elsewhere."""
+    contacts = zeros(1, CONTACT)
+    lists = empty_lists(1, 1, contacts)
+    return assembled(scenario, parts, controls, particles=None, points=_points(1), before=contacts, **lists)
 
 
 def _kinetic_energy(bodies: Records) -> float:
@@ -164,8 +191,14 @@ def _points(slots: int) -> Records:
     return points
 
 
-def _controls(scenario: Scenario, bodies: Records, blocks: int, step: float) -> Records:
-    smallest = 2.0 * float(min(bodies.half_x[:blocks].min(), bodies.half_y[:blocks].min()))
+def smallest_side(parts: Parts) -> float:
+    """Return the smallest side (m) of all blocks."""
+    bodies, blocks = parts.bodies, len(parts.placed)
+    return 2.0 * float(min(bodies.half_x[:blocks].min(), bodies.half_y[:blocks].min()))
+
+
+def empty_controls(scenario: Scenario, parts: Parts, step: float) -> Records:
+    """Return the controls of a run with steps of this length (s), but for skin and width of a cell."""
     given_limit = scenario.contact.max_overlap
     controls = zeros(1, CONTROLS)
     record = controls[0]
@@ -173,9 +206,7 @@ def _controls(scenario: Scenario, bodies: Records, blocks: int, step: float) -> 
     record.gravity_x = -scenario.gravity * math.sin(scenario.ground.tilt)
     record.gravity_y = -scenario.gravity * math.cos(scenario.ground.tilt)
     record.motion_x, record.motion_y = support_direction(scenario)
-    record.skin = choose_skin(scenario, bodies, smallest, step)
-    record.cell_radius = cell_radius(bodies)
-    record.cell_width = 2.0 * record.cell_radius + record.skin
+    record.cell_radius = cell_radius(parts.bodies)
     record.max_overlap = 0.0 if given_limit is None else given_limit
     record.rest_speed = scenario.time.rest_speed
     record.model = MODEL_CODES[scenario.contact.model]

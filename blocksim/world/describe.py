@@ -1,23 +1,29 @@
 """What a scenario comes to before it runs: masses, pair parameters, step, cost and size of the results."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from blocksim.kernels.arrays import Record, World
 from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, place_bodies
+from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
 from blocksim.world.boundary import particle_count
-from blocksim.world.build import build_world
+from blocksim.world.build import build_world, scene_parts, smallest_side
 from blocksim.world.interactions import ContactClass, contact_classes, pair_of
-from blocksim.world.memory import SceneSize, file_bytes
+from blocksim.world.memory import RigidSize, SceneSize, file_bytes
+from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
+from blocksim.world.rigid_step import longest_step
+from blocksim.world.sag import column_sag, inverse_mass, point_stiffness
 
 # measured on one core: a step costs about this for every body with its contacts
 SECONDS_PER_BODY_AND_STEP = 75e-9
 SECONDS_IN_A_CROWD = 250e-9  # where bodies have neighbours on all sides
 CROWD = 50  # bodies
+SECONDS_IN_A_SUBSTEP = 400e-9  # a block, where contacts are rigid
+RIGID_RULES = ("friction", "restitution")  # what decides where contacts are rigid
 STIFFNESS_UNITS = {"linear": "N/m", "hertz-mindlin": "N/m^1.5"}
 
 
@@ -31,11 +37,11 @@ class PairDescription:
     kinetic_friction: float
     transition_speed: float  # m/s
     restitution: float
-    normal_damping_ratio: float
-    shear_damping_ratio: float
-    normal_stiffness: float  # of one contact point, in `stiffness_unit`
+    normal_damping_ratio: float | None  # None: contacts are rigid, they have no dashpots and no springs in shear
+    shear_damping_ratio: float | None
+    normal_stiffness: float  # of one contact point, in `stiffness_unit`; of rigid ones see world/sag.py
     stiffness_unit: str  # N/m, with the law of Hertz N/m^1.5
-    shear_stiffness_ratio: float  # shear stiffness over (tangent) normal stiffness
+    shear_stiffness_ratio: float | None  # shear stiffness over (tangent) normal stiffness
     rules: Mapping[str, str]  # quantity and what decided it, as in ResolvedPair
 
 
@@ -46,6 +52,17 @@ class MotionDescription:
     displacement: float  # m, greatest
     speed: float  # m/s, greatest
     final_speed: float  # m/s
+
+
+@dataclass(frozen=True)
+class SagDescription:
+    """By how much blocks sink into one another at rest where contacts are rigid, SI; it goes with the step squared."""
+
+    substeps: int
+    tolerance: float  # m/s, of the velocity pass
+    longest_step: float  # s, that may be given by hand
+    blocks: int  # in the column: as many of the lowest block as reach to the top of the scene
+    sag: float  # m, of the top of that column
 
 
 @dataclass(frozen=True)
@@ -63,11 +80,12 @@ class Description:
     memory: int  # bytes that the run needs, at most
     particles: int  # on all boundaries, corners included
     skin: float  # m, how far apart bodies are listed as neighbours
+    rigid: SagDescription | None  # where contacts are
 
 
 def describe(scenario: Scenario) -> Description:
-    """Build the scene and tell what is in it. Raises what build_world raises."""
-    world = build_world(scenario)
+    """Build the scene and tell what is in it. Raises what building it raises."""
+    world, size = _built(scenario)
     placed = place_bodies(scenario)
     step = float(world.controls[0].step)
     steps = max(1, round(scenario.time.end / step))
@@ -79,13 +97,45 @@ def describe(scenario: Scenario) -> Description:
         step=step,
         steps=steps,
         frames=frames,
-        seconds=steps * len(placed) * (SECONDS_IN_A_CROWD if len(placed) > CROWD else SECONDS_PER_BODY_AND_STEP),
+        seconds=steps * len(placed) * _seconds_per_step(scenario, len(placed)),
         bytes=file_bytes(len(placed), frames),
-        memory=SceneSize(
-            len(placed), world.pairs.size, world.candidates.shape[1], frames, world.particles is not None
-        ).bytes_needed,
+        memory=replace(size, frames=frames).bytes_needed,
         particles=_particles(scenario, placed),
         skin=float(world.controls[0].skin),
+        rigid=_rigid(scenario, step, placed),
+    )
+
+
+def _built(scenario: Scenario) -> tuple[World, SceneSize | RigidSize]:
+    """Build the scene; return the arrays that all schemes have, and its size."""
+    count = len(place_bodies(scenario))
+    if isinstance(scenario.time, Nonsmooth):
+        scene = build_nonsmooth(scenario)
+        return scene.world, RigidSize(count, scene.contacts.rows.size)
+    world = build_world(scenario)
+    slots = world.candidates.shape[1]
+    return world, SceneSize(count, world.pairs.size, slots, has_particles=world.particles is not None)
+
+
+def _seconds_per_step(scenario: Scenario, blocks: int) -> float:
+    """Return what a step costs a block (s)."""
+    if isinstance(scenario.time, Nonsmooth):
+        return SECONDS_IN_A_SUBSTEP * scenario.time.substeps
+    return SECONDS_IN_A_CROWD if blocks > CROWD else SECONDS_PER_BODY_AND_STEP
+
+
+def _rigid(scenario: Scenario, step: float, placed: Sequence[PlacedBody]) -> SagDescription | None:
+    if not isinstance(scenario.time, Nonsmooth):
+        return None
+    lowest = min(placed, key=lambda body: body.y)
+    blocks = max(1, round((max(body.y for body in placed) + 0.5 * lowest.size_y) / lowest.size_y))
+    parts = scene_parts(scenario)
+    return SagDescription(
+        substeps=scenario.time.substeps,
+        tolerance=velocity_tolerance(scenario.time, len(placed)),
+        longest_step=longest_step(scenario, parts.bodies, smallest_side(parts)),
+        blocks=blocks,
+        sag=column_sag(step / scenario.time.substeps, lowest, blocks, scenario.gravity),
     )
 
 
@@ -113,7 +163,28 @@ def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> 
             if not block.is_ground and (other.is_ground or j <= i):
                 materials = (str(block.material), names[j] if other.is_ground else str(other.material))
                 pair, row = pair_of(scenario, block, other), world.interactions[i, j]
-                yield _pair((names[i], names[j]), materials, pair, row, scenario.contact.law)
+                found = _pair((names[i], names[j]), materials, pair, row, scenario.contact.law)
+                touching = [body for one in (block, other) for body in _softest(placed, one)]
+                yield (
+                    found
+                    if not isinstance(scenario.time, Nonsmooth)
+                    else replace(
+                        found,
+                        normal_stiffness=point_stiffness(
+                            float(world.controls[0].step) / scenario.time.substeps, touching
+                        ),
+                        normal_damping_ratio=None,
+                        shear_damping_ratio=None,
+                        shear_stiffness_ratio=None,
+                        rules={key: rule for key, rule in pair.rules.items() if key in RIGID_RULES},
+                    )
+                )
+
+
+def _softest(placed: Sequence[PlacedBody], one: ContactClass) -> list[PlacedBody]:
+    """Return the block of a class that gives way most; none for the ground and walls."""
+    blocks = [body for body in placed if (body.material, body.depth) == (one.material, one.depth)]
+    return [max(blocks, key=inverse_mass)] if blocks and not one.is_ground else []
 
 
 def _pair(

@@ -83,6 +83,7 @@ def fill_interaction(record: Record, scenario: Scenario, a: ContactClass, b: Con
     record.static_friction = pair.friction.static
     record.kinetic_friction = pair.friction.kinetic
     record.transition_speed = pair.friction.transition_speed
+    record.restitution = pair.restitution
 
 
 def interaction_table(scenario: Scenario, classes: tuple[ContactClass, ...]) -> Records:

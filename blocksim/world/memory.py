@@ -4,7 +4,9 @@ Sizes follow from the types in blocksim.kernels.arrays, so that they change with
 """
 
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +14,7 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.arrays import BODY, CONTACT, CONTACTS, OPERATOR, PAIR, PARTICLE_CONTACT, POINT
+from blocksim.kernels.nonsmooth.arrays import BEFORE, BOOK, KEPT, LINE, PART, ROW, SPOT
 
 LISTS = 2  # of candidate pairs: the present one and the one being built
 OPERATORS = 2  # of a pair: along the normal and along the tangent
@@ -30,7 +33,7 @@ KIBI = 1024
 class SceneTooLargeError(InvalidInputError):
     """A scene needs more memory than there is; both in bytes."""
 
-    def __init__(self, size: "SceneSize", available: int) -> None:
+    def __init__(self, size: "Size", available: int) -> None:
         """Say both, and what the need consists of."""
         self.needed = size.bytes_needed
         self.available = available
@@ -41,25 +44,17 @@ class SceneTooLargeError(InvalidInputError):
         )
 
 
-class SceneSize(NamedTuple):
+class Size(ABC):
     """What the memory of a run depends on."""
 
     bodies: int
     pairs: int  # of neighbours that there is room for
-    slots: int  # corners or particles of a pair that can come into contact
-    frames: int = 0  # recorded, at most
-    has_particles: bool = False
+    frames: int  # recorded, at most
 
     @property
+    @abstractmethod
     def world_bytes(self) -> int:
-        """Bytes of the arrays of a world and of the bodies as they were placed."""
-        if self.has_particles:
-            contacts, candidates = self.slots * PARTICLE_CONTACT.itemsize, self.slots * INDEX
-        else:
-            contacts, candidates = CONTACTS * CONTACT.itemsize, self.slots
-        pair = LISTS * (PAIR.itemsize + candidates) + OPERATORS * OPERATOR.itemsize + contacts
-        work = (self.slots + 1) * POINT.itemsize + contacts
-        return self.bodies * (BODY.itemsize + OBJECT_BYTES) + self.pairs * pair + work
+        """Bytes of the arrays of a scene and of the bodies as they were placed."""
 
     @property
     def record_bytes(self) -> int:
@@ -72,12 +67,50 @@ class SceneSize(NamedTuple):
         return self.world_bytes + self.record_bytes
 
 
+@dataclass(frozen=True)
+class SceneSize(Size):
+    """Of the explicit scheme."""
+
+    bodies: int
+    pairs: int
+    slots: int  # corners or particles of a pair that can come into contact
+    frames: int = 0
+    has_particles: bool = False
+
+    @property
+    def world_bytes(self) -> int:
+        """As Size."""
+        if self.has_particles:
+            contacts, candidates = self.slots * PARTICLE_CONTACT.itemsize, self.slots * INDEX
+        else:
+            contacts, candidates = CONTACTS * CONTACT.itemsize, self.slots
+        pair = LISTS * (PAIR.itemsize + candidates) + OPERATORS * OPERATOR.itemsize + contacts
+        work = (self.slots + 1) * POINT.itemsize + contacts
+        return self.bodies * (BODY.itemsize + OBJECT_BYTES) + self.pairs * pair + work
+
+
+@dataclass(frozen=True)
+class RigidSize(Size):
+    """Of the non-smooth scheme."""
+
+    bodies: int
+    pairs: int
+    frames: int = 0
+
+    @property
+    def world_bytes(self) -> int:
+        """As Size."""
+        body = BODY.itemsize + LINE.itemsize + BEFORE.itemsize + SPOT.itemsize + 2 * VALUE + OBJECT_BYTES
+        pair = ROW.itemsize + KEPT.itemsize + INDEX + -(-BOOK.itemsize // PART)
+        return self.bodies * body + self.pairs * pair
+
+
 def file_bytes(bodies: int, frames: int) -> int:
     """Return the bytes that frames take in a file."""
     return frames * VALUE * (FRAME_VALUES + MOTION_VALUES * bodies)
 
 
-def refuse_if_too_large(size: SceneSize) -> None:
+def refuse_if_too_large(size: Size) -> None:
     """Raise SceneTooLargeError where a run needs more memory than there is; nothing where that cannot be told."""
     available = available_bytes()
     if available is not None and size.bytes_needed > available:

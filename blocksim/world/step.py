@@ -8,6 +8,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.arrays import ALL, Records
 from blocksim.scenario import Scenario
+from blocksim.scenario.models.stepping import Explicit
 from blocksim.world.stable_step import ContactBody, ContactStiffness, Load, stable_step, steepest
 
 MOST_STEPS = 2**53  # beyond that a step number is no exact float
@@ -58,14 +59,30 @@ def _kinds(blocks: Records) -> list[tuple[ContactBody, int]]:
 
 def expected_load(scenario: Scenario, bodies: Records) -> Load:
     """Return the speed that the fastest point may reach by falling, or by sliding all the time, and the weight."""
-    blocks: Records = bodies[bodies.faces == ALL][:-1].view(np.recarray)
+    along = scenario.gravity * abs(math.sin(scenario.ground.tilt))
+    speed = fastest_start(bodies) + fastest_fall(scenario, bodies) + along * scenario.time.end
+    blocks = _blocks(bodies)
+    return Load(speed, scenario.gravity * float(np.sum(blocks.mass[blocks.inverse_mass > 0.0])))
+
+
+def fastest_start(bodies: Records) -> float:
+    """Return an upper bound (m/s) of the speed of any point of a block at the start."""
+    blocks = _blocks(bodies)
+    return float(np.max(np.hypot(blocks.vx, blocks.vy) + blocks.radius * np.abs(blocks.spin)))
+
+
+def fastest_fall(scenario: Scenario, bodies: Records) -> float:
+    """Return the speed (m/s) at which the highest corner would reach the lowest ground, from rest."""
+    blocks = _blocks(bodies)
     lowest = min((y for _, y in scenario.ground.profile or ()), default=0.0)
     height = max(0.0, float(np.max(blocks.y + blocks.radius)) - lowest)
-    start = float(np.max(np.hypot(blocks.vx, blocks.vy) + blocks.radius * np.abs(blocks.spin)))
-    down = scenario.gravity * math.cos(scenario.ground.tilt)
-    along = scenario.gravity * abs(math.sin(scenario.ground.tilt))
-    speed = start + math.sqrt(2.0 * down * height) + along * scenario.time.end
-    return Load(speed, scenario.gravity * float(np.sum(blocks.mass[blocks.inverse_mass > 0.0])))
+    return math.sqrt(2.0 * scenario.gravity * math.cos(scenario.ground.tilt) * height)
+
+
+def _blocks(bodies: Records) -> Records:
+    """Return all bodies but the ground and its pieces."""
+    blocks: Records = bodies[bodies.faces == ALL][:-1].view(np.recarray)
+    return blocks
 
 
 class UncountableStepsError(StepError):
@@ -78,6 +95,9 @@ class UncountableStepsError(StepError):
 
 def choose_step(scenario: Scenario, bodies: Records, table: Records) -> float:
     """Return the step (s) the run will take; raises StepTooLargeError."""
+    if not isinstance(scenario.time, Explicit):
+        message = f"scenario {scenario.name} is not one of the explicit scheme"
+        raise ValueError(message)  # noqa: TRY004 - the scenario is of the right type
     with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused below
         load = expected_load(scenario, bodies)
         limit = admissible_step(bodies, table, scenario.time.safety, scenario.contact.law, load)

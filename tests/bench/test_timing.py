@@ -34,4 +34,5 @@ def test_a_run_that_breaks_off_is_told_and_not_timed() -> None:
 
 def test_bytes_are_those_of_all_arrays() -> None:
     scene = Rerun(pushed_wall(4, 3, contact=SOFT))
-    assert scene.bytes > scene.world.bodies.nbytes + scene.world.pairs.nbytes + scene.world.contacts.nbytes
+    world = scene.scene.world
+    assert scene.bytes > world.bodies.nbytes + world.pairs.nbytes + world.contacts.nbytes

@@ -98,13 +98,49 @@ bad.toml:21: contact.law: "lineal" is not known here, did you mean "linear"?
       |       ^^^^^^^^
 """,
     ),
-    "scheme not there yet": (
+    "key of the other scheme": (
         None,
-        '\n[time]\nscheme = "nonsmooth"\n',
+        '\n[time]\nscheme = "nonsmooth"\nsafety = 0.1\n',
         """
-bad.toml:21: time.scheme: "nonsmooth" is not available yet; use "explicit"
-   21 | scheme = "nonsmooth"
-      |          ^^^^^^^^^^^
+bad.toml:22: time.safety: this key is for scheme "explicit"; the scheme here is "nonsmooth"
+   22 | safety = 0.1
+      | ^^^^^^
+""",
+    ),
+    "key of the other scheme, which is the usual one": (
+        None,
+        "\n[time]\nsubsteps = 4\n",
+        """
+bad.toml:21: time.substeps: this key is for scheme "nonsmooth"; the scheme here is "explicit"
+   21 | substeps = 4
+      | ^^^^^^^^
+""",
+    ),
+    "no scheme": (
+        None,
+        '\n[time]\nscheme = "nonsmoth"\n',
+        """
+bad.toml:21: time.scheme: "nonsmoth" is not known here, did you mean "nonsmooth"?
+   21 | scheme = "nonsmoth"
+      |          ^^^^^^^^^^
+""",
+    ),
+    "model of springs with rigid contacts": (
+        None,
+        '\n[contact]\nmodel = "particles"\n[time]\nscheme = "nonsmooth"\n',
+        """
+bad.toml:21: contact.model: "particles" needs springs, time.scheme = "explicit"; here contacts are rigid
+   21 | model = "particles"
+      |         ^^^^^^^^^^^
+""",
+    ),
+    "law of springs with rigid contacts": (
+        None,
+        '\n[contact]\nlaw = "hertz-mindlin"\n[time]\nscheme = "nonsmooth"\n',
+        """
+bad.toml:21: contact.law: "hertz-mindlin" needs springs, time.scheme = "explicit"; here contacts are rigid
+   21 | law = "hertz-mindlin"
+      |       ^^^^^^^^^^^^^^^
 """,
     ),
     "overlap longer than the block": (

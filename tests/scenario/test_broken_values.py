@@ -52,6 +52,51 @@ bad.toml:21: ground.tilt: "90 deg" is too large; an angle above -90 deg and belo
       |        ^^^^^^^^
 """,
     ),
+    "no substeps": (
+        None,
+        '\n[time]\nscheme = "nonsmooth"\nsubsteps = 0\n',
+        """
+bad.toml:22: time.substeps: 0 is not a whole number from 1 to 1000
+   22 | substeps = 0
+      |            ^
+""",
+    ),
+    "absurd substeps": (
+        None,
+        '\n[time]\nscheme = "nonsmooth"\nsubsteps = 1001\n',
+        """
+bad.toml:22: time.substeps: 1001 is not a whole number from 1 to 1000
+   22 | substeps = 1001
+      |            ^^^^
+""",
+    ),
+    "half a sweep": (
+        None,
+        '\n[time]\nscheme = "nonsmooth"\nvelocity_sweeps = 0.5\n',
+        """
+bad.toml:22: time.velocity_sweeps: 0.5 is not a whole number from 1 to 1000000
+   22 | velocity_sweeps = 0.5
+      |                   ^^^
+""",
+    ),
+    "tolerance below round-off": (
+        None,
+        '\n[time]\nscheme = "nonsmooth"\nvelocity_tolerance = 1e-15\n',
+        """
+bad.toml:22: time.velocity_tolerance: 1e-15 is too small; a speed of at least 1e-12 m/s such as "5 mm/s" is needed
+   22 | velocity_tolerance = 1e-15
+      |                      ^^^^^
+""",
+    ),
+    "restitution that creates energy": (
+        None,
+        '\n[contact]\nrestitution = 1.1\n[time]\nscheme = "nonsmooth"\n',
+        """
+bad.toml:21: contact.restitution: 1.1 is too large; a plain number of at least 0 and at most 1 is needed
+   21 | restitution = 1.1
+      |               ^^^
+""",
+    ),
     "friction angle of 90 degrees": (
         None,
         '\n[friction]\nblock_ground = "90 deg"\n',

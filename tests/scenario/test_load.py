@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import Document, Scenario, load_scenario, scenario_from_mapping
+from blocksim.scenario.models.stepping import Explicit
 
 
 @pytest.fixture
@@ -54,6 +55,7 @@ def test_the_defaults_are_the_documented_ones(file: Path) -> None:
     assert scenario.ground.profile is None
     assert scenario.motion is None
     assert (scenario.walls, scenario.pairs) == ((), {})
+    assert isinstance(scenario.time, Explicit)
     assert (scenario.time.end, scenario.time.step, scenario.time.safety) == (2.0, "auto", 0.05)
     assert (scenario.time.stop_at_rest, scenario.time.rest_speed, scenario.time.rest_hold) == (
         True,

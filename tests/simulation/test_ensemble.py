@@ -8,7 +8,8 @@ import pytest
 
 from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import ensemble, simulate
-from blocksim.simulation.ensemble import MemberEnd, run_ensemble
+from blocksim.simulation.ensemble import Ensemble, MemberEnd, run_ensemble
+from blocksim.simulation.stacking import stack
 from blocksim.world.build import build_world, empty_lists
 
 if TYPE_CHECKING:
@@ -80,15 +81,15 @@ def test_a_member_whose_pair_list_is_full_gets_more_room(monkeypatch: pytest.Mon
         world = build_world(given)
         return world._replace(**empty_lists(1, world.candidates.shape[1], world.before))
 
-    monkeypatch.setattr(ensemble, "build_world", cramped)
+    monkeypatch.setattr(ensemble, "build_scene", cramped)
     calls: list[int] = []
-    alone = ensemble._run_alone
+    alone = Ensemble._run_alone
 
-    def counted(world: World, last_step: int, start: float) -> tuple[World, int, float]:
+    def counted(self: Ensemble[World], scene: World, last_step: int, start: float) -> tuple[World, int, float]:
         calls.append(last_step)
-        return alone(world, last_step, start)
+        return alone(self, scene, last_step, start)
 
-    monkeypatch.setattr(ensemble, "_run_alone", counted)
+    monkeypatch.setattr(Ensemble, "_run_alone", counted)
     (end,) = run_ensemble([scenario])
     assert len(calls) == 1
     assert_same(end, scenario)
@@ -125,7 +126,7 @@ def test_less_than_one_thread_is_refused(threads: int) -> None:
 
 def test_stacked_arrays_start_on_a_cache_line() -> None:
     worlds = [build_world(scenario) for scenario in collapses({}, {})]
-    stacked = ensemble.stack(worlds)
+    stacked = stack(worlds)
     arrays = [array for array in stacked if array is not None and array.size]
     assert all(array.ctypes.data % 64 == 0 for array in arrays)
     assert np.array_equal(stacked.bodies[1], worlds[1].bodies)

@@ -1,6 +1,7 @@
 """What a run needs is told from the arrays that it will have; what there is from files as Linux writes them."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,10 +54,10 @@ def test_the_estimate_of_frames_is_that_of_the_recorder() -> None:
 def test_every_part_of_the_size_counts() -> None:
     size = SceneSize(bodies=10, pairs=80, slots=8, frames=100)
     for more in (
-        size._replace(bodies=11),
-        size._replace(pairs=81),
-        size._replace(slots=9),
-        size._replace(frames=101),
+        replace(size, bodies=11),
+        replace(size, pairs=81),
+        replace(size, slots=9),
+        replace(size, frames=101),
     ):
         assert more.bytes_needed > size.bytes_needed
 

@@ -1,5 +1,6 @@
 """What every table of a scenario has in common, and field types that are no quantities."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -49,6 +50,18 @@ class OneOf:
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Check the word first, then let pydantic see its literal."""
         return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+
+def whole(least: int, most: int) -> Callable[[object], object]:
+    """Return a check that a value is a whole number in a range."""
+
+    def check(value: object) -> object:
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            message = f"{shown(value)} is not a whole number from {least} to {most}"
+            raise invalid(message)
+        return value
+
+    return check
 
 
 def _identifier(value: object) -> object:

@@ -10,7 +10,7 @@ from blocksim.scenario.models.boundary import Ground, Wall
 from blocksim.scenario.models.contact import Contact, Friction, Pair
 from blocksim.scenario.models.geometry import Block, BodySpec, Material
 from blocksim.scenario.models.motion import AnyMotion
-from blocksim.scenario.models.stepping import Output, Time
+from blocksim.scenario.models.stepping import AnyTime, Explicit, Output
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure
 
@@ -42,7 +42,7 @@ class Scenario(Table):
         default={}, description="pairs of materials that differ, as in [pairs.aluminium.ground]"
     )
     contact: Contact = Field(default=Contact(), description="contact model and its numbers")
-    time: Time = Field(default=Time(), description="time stepping")
+    time: AnyTime = Field(default=Explicit(), description="time stepping")
     output: Output = Field(default=Output(), description="what is recorded")
     experiment: Experiment | None = Field(default=None, description="measurements to compare with")
     sweep: Sweep | None = Field(default=None, description="what `blocksim sweep` varies")

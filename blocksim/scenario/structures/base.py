@@ -1,7 +1,7 @@
 """What every kind of structure has in common."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Annotated, NamedTuple, Self
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import Table
+from blocksim.scenario.models.base import Table, whole
 from blocksim.scenario.models.geometry import Block
 
 MAX_COUNT = 100_000
@@ -21,24 +21,10 @@ MAX_SEED = 2**32 - 1
 Floats = NDArray[np.float64]
 
 
-def _whole(least: int, most: int) -> Callable[[object], object]:
-    """Return a check that a value is a whole number in a range."""
-
-    def check(value: object) -> object:
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            message = f"{q.shown(value)} is not a whole number from {least} to {most}"
-            raise q.invalid(message)
-        return value
-
-    return check
-
-
 Count = Annotated[
-    int, BeforeValidator(_whole(1, MAX_COUNT)), Field(json_schema_extra={"minimum": 1, "maximum": MAX_COUNT})
+    int, BeforeValidator(whole(1, MAX_COUNT)), Field(json_schema_extra={"minimum": 1, "maximum": MAX_COUNT})
 ]
-Seed = Annotated[
-    int, BeforeValidator(_whole(0, MAX_SEED)), Field(json_schema_extra={"minimum": 0, "maximum": MAX_SEED})
-]
+Seed = Annotated[int, BeforeValidator(whole(0, MAX_SEED)), Field(json_schema_extra={"minimum": 0, "maximum": MAX_SEED})]
 
 
 class Pose(NamedTuple):

@@ -4,7 +4,8 @@ Every data set says its unit in the attribute `unit`. `n_committed` is the numbe
 takes no more.
 """
 
-from blocksim.kernels.energy import LEDGER_ROW
+from collections.abc import Iterable
+
 from blocksim.simulation.recorder import MOTION
 
 BLOCKS = "particles/blocks"
@@ -15,6 +16,11 @@ TIME = f"{BLOCKS}/time"
 SCENARIO_TEXT = "parameters/scenario"
 
 MOTION_UNITS = dict(zip(MOTION, ("m", "m", "rad", "m s-1", "m s-1", "rad s-1"), strict=True))
-MEASURED_UNITS = {**dict.fromkeys(LEDGER_ROW, "J"), "contact_count": "1", "largest_overlap": "m"}
+COUNTED_UNITS = {"contact_count": "1", "largest_overlap": "m"}
 BODY_UNITS = {"size_x": "m", "size_y": "m", "depth": "m", "mass": "kg", "inertia": "kg m2"}
 TEXT_UNIT = "TOML"
+
+
+def measured_units(ledger: Iterable[str]) -> dict[str, str]:
+    """Return the units of all that is measured at every frame, given the names of the energies."""
+    return {**dict.fromkeys(ledger, "J"), **COUNTED_UNITS}

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import OutputError
 from blocksim.scenario import PlacedBody
-from blocksim.simulation.recorder import MEASURED, MOTION, Frame
+from blocksim.simulation.recorder import MOTION, Frame
 from blocksim.simulation.stores import hdf5_layout as layout
 
 FLUSH_SECONDS = 0.25
@@ -40,16 +40,25 @@ def _try_room(path: Path) -> None:
 class FrameFile:
     """Writes frames as they come; use as a context manager."""
 
-    def __init__(self, path: Path, placed: Sequence[PlacedBody], time_step: float, scenario_toml: str) -> None:
-        """Create the file with all its data sets; raises OutputError when that fails."""
+    def __init__(
+        self,
+        path: Path,
+        placed: Sequence[PlacedBody],
+        time_step: float,
+        scenario_toml: str,
+        *,
+        ledger: Sequence[str],
+    ) -> None:
+        """Create the file with all its data sets, `ledger` names the energies; raises OutputError when that fails."""
         self.path = path
+        self.units = layout.measured_units(ledger)
         self.time_step = time_step
         self.count = 0
         self.chunk_rows = min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // len(placed)))
         self.is_broken = False
         self.waiting: list[Frame] = []
         self.flushed_at = -np.inf
-        self.row_bytes = 8 * (2 + len(MOTION) * len(placed) + len(MEASURED))
+        self.row_bytes = 8 * (2 + len(MOTION) * len(placed) + len(self.units))
         unnamed = path.with_name(f".{path.name}.new")
         with self._telling_trouble():
             _try_room(unnamed)
@@ -68,7 +77,7 @@ class FrameFile:
         self._growing(layout.TIME, np.float64, "s")
         for name, unit in layout.MOTION_UNITS.items():
             self._growing(f"{layout.BLOCKS}/{name}", np.float64, unit, len(placed))
-        for name, unit in layout.MEASURED_UNITS.items():
+        for name, unit in self.units.items():
             self._growing(f"{layout.OBSERVABLES}/{name}", np.float64, unit)
         for name, unit in layout.BODY_UNITS.items():
             values = np.array([getattr(body, name) for body in placed])
@@ -110,7 +119,7 @@ class FrameFile:
         self._put(layout.TIME, np.array(steps) * self.time_step)
         for name, values in zip(MOTION, np.stack(motions, axis=1), strict=True):
             self._put(f"{layout.BLOCKS}/{name}", values)
-        for name, values in zip(MEASURED, np.stack(rows, axis=1), strict=True):
+        for name, values in zip(self.units, np.stack(rows, axis=1), strict=True):
             self._put(f"{layout.OBSERVABLES}/{name}", values)
         self.count += len(self.waiting)
         self.waiting.clear()

@@ -11,12 +11,16 @@ import pytest
 from blocksim.errors import InputMissingError, InvalidInputError, OutputError
 from blocksim.scenario import place_bodies
 from blocksim.simulation import Result
-from blocksim.simulation.recorder import MEASURED, MOTION, Frame
+from blocksim.simulation.recorder import MOTION, Frame
+from blocksim.simulation.schemes import SCHEMES
 from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 from tests.simulation.conftest import Shipped
 
 UNITS = {"x": "m", "angle": "rad", "vy": "m s-1", "spin": "rad s-1", "time": "s", "mass": "kg", "inertia": "kg m2"}
+
+
+MEASURED = SCHEMES["explicit"].measured
 
 
 def file_of(result: Result) -> Path:
@@ -25,7 +29,7 @@ def file_of(result: Result) -> Path:
 
 
 def open_file(path: Path, soft: Shipped) -> FrameFile:
-    return FrameFile(path, place_bodies(soft()), 1e-6, "schema = 1\n")
+    return FrameFile(path, place_bodies(soft()), 1e-6, "schema = 1\n", ledger=SCHEMES["explicit"].ledger)
 
 
 def add_frames(sink: FrameFile, count: int) -> None:

@@ -1,0 +1,26 @@
+"""The second stepping scheme: rigid blocks, impulses, small implicit substeps.
+
+Contact laws are Newton's restitution and Coulomb's friction, both as impulses; nothing is as stiff as the blocks, so
+that steps are 0.1 to 1 ms long. A step of length dt is
+
+    look       is the list of pairs still good? else make it and its colours anew           neighbours.py, colours.py
+    collide    the contact manifold of every pair, kept for the whole step                  manifold.py
+    substeps   each of length h: kick, warm start, position pass, drift, velocity pass      passes.py, motion.py
+    finish     poses and velocities back to the bodies                                      motion.py
+
+For every contact point with the unit normal n (from body b to body a), gap s, approach J v = n (v_a - v_b) at the
+point and A = J M^-1 J^T, one impulse lambda >= 0 acts along n.
+
+Position pass (soft, J. Baumgarte's feedback with a spring and a dashpot, after E. Catto, GDC 2011):
+
+    0 <= lambda  complementary to  J v + b s + gamma lambda >= 0,   s <= 0:  b = w / (h w + 2 zeta),
+    gamma = A / (h^2 w^2 + 2 zeta w h),  w = 2 pi f / h;            s > 0:  b = 1 / h,  gamma = 0 (may just touch)
+
+At rest (J v = 0) that is a spring: s = -gamma lambda / b = -F A / w^2 with the force F = lambda / h.
+
+Velocity pass: points with an impulse after the position pass, or s <= 0, have 0 <= lambda  complementary to
+J v - t >= 0, with the target t = -e u where the approach u before the substep was faster than a threshold, and
+-max(s, 0) / h elsewhere. What the position pass adds to velocities moves bodies, but is gone after the velocity pass.
+
+Gravity kicks half a substep at first and whole ones then: velocities live half a substep before positions (leap-frog).
+"""

@@ -1,0 +1,169 @@
+"""The time loop of the non-smooth scheme between two outputs, in one compiled call for every thread."""
+
+import math
+
+from blocksim.kernels.advance import fastest_point
+from blocksim.kernels.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL, REACHED, STATUS, TEAM_SIZE
+from blocksim.kernels.energy import weights_power
+from blocksim.kernels.integrate import kinetic_energy, renew_rotations
+from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
+from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.kernels.nonsmooth.energy import has_excessive_overlap
+from blocksim.kernels.nonsmooth.manifold import collide
+from blocksim.kernels.nonsmooth.motion import place_all
+from blocksim.kernels.nonsmooth.neighbours import look
+from blocksim.kernels.nonsmooth.substep import bodies_of, kick_share, substep
+from blocksim.kernels.nonsmooth.supports import place_supports
+from blocksim.kernels.nonsmooth.sweeps import gather, part_of
+from blocksim.kernels.support import is_support_at_rest
+from blocksim.kernels.team import meet
+
+LOOK, GATHER, CHECK = range(3)  # what one thread does for all
+
+
+@rare_kernel
+def is_supported(scene: Nonsmooth) -> bool:
+    """Tell whether every free body has a contact that presses, where there is gravity."""
+    world = scene.world
+    controls = world.controls[0]
+    if controls.gravity_x == 0.0 and controls.gravity_y == 0.0:
+        return True
+    scene.used[:] = 0
+    contacts = scene.contacts
+    for m in range(contacts.stepping[0].active_count):
+        row = contacts.rows[contacts.active[m]]
+        if row.normal_one > 0.0 or row.normal_two > 0.0:
+            scene.used[row.a] = 1
+            scene.used[row.b] = 1
+    for i in range(world.bodies.size - 1):
+        if world.bodies[i].inverse_mass > 0.0 and scene.used[i] == 0:
+            return False
+    return True
+
+
+@rare_kernel
+def check(scene: Nonsmooth) -> int:
+    """Look whether the run may go on: finite, not at rest for the hold time."""
+    world = scene.world
+    controls = world.controls[0]
+    clock = world.clock[0]
+    renew_rotations(world.bodies)
+    ledger = world.ledger[0]
+    ledger.travel_work += controls.check_every * controls.step * weights_power(world)
+    ledger.largest_kinetic = max(ledger.largest_kinetic, kinetic_energy(world))
+    fastest = fastest_point(world.bodies)
+    if math.isinf(fastest):
+        return NOT_FINITE
+    if has_excessive_overlap(scene):
+        return OVERLAP_LIMIT
+    rests = fastest < controls.rest_speed and is_supported(scene) and is_support_at_rest(world)
+    clock.checks_at_rest = clock.checks_at_rest + 1 if rests else 0
+    return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
+
+
+@rare_kernel
+def supervise(scene: Nonsmooth, k: int, task: int) -> int:
+    """Let the first thread do something for all while the others wait; return the status code that all go by."""
+    team = scene.world.team
+    meet(team)
+    if k == 0:
+        team[STATUS] = REACHED
+        if task == LOOK:
+            if not look(scene):
+                team[STATUS] = PAIRS_FULL
+        elif task == GATHER:
+            gather(scene.contacts, scene.begins)
+        else:
+            place_supports(scene)
+            scene.world.clock[0].steps += 1
+            if scene.world.clock[0].steps % scene.world.controls[0].check_every == 0:
+                team[STATUS] = check(scene)
+    meet(team)
+    return team[STATUS]
+
+
+@rare_kernel
+def collide_rows(scene: Nonsmooth, begin: int, end: int) -> None:
+    """Find the manifolds of some rows."""
+    bodies = scene.world.bodies
+    ground = bodies.size - 1
+    margin = scene.contacts.stepping[0].margin
+    for r in range(begin, end):
+        row = scene.contacts.rows[r]
+        row.is_on = collide(row, bodies[row.a], bodies[row.b], row.b == ground, margin)
+
+
+@rare_kernel
+def load_lines(scene: Nonsmooth) -> None:
+    """Bring velocities and inverse masses of all bodies into their lines: at the start of a run."""
+    controls = scene.world.controls[0]
+    h = scene.contacts.stepping[0].substep
+    for i in range(scene.world.bodies.size):
+        body = scene.world.bodies[i]
+        line = scene.contacts.lines[i]
+        line.vx = body.vx
+        line.vy = body.vy
+        line.spin = body.spin
+        line.inverse_mass = body.inverse_mass
+        line.inverse_inertia = body.inverse_inertia
+        line.dx = line.dy = line.turned = 0.0
+        scene.contacts.before[i].lifted = h * (controls.gravity_x * body.vx + controls.gravity_y * body.vy)
+
+
+@rare_kernel
+def do_step(scene: Nonsmooth, k: int) -> int:
+    """Take one step as thread k; return the status code."""
+    world = scene.world
+    contacts = scene.contacts
+    size = world.team[TEAM_SIZE]
+    status = supervise(scene, k, LOOK)
+    if status != REACHED:
+        return status
+    first, last = part_of(0, contacts.stepping[0].row_count, k, size)
+    collide_rows(scene, first, last)
+    supervise(scene, k, GATHER)
+    is_first = world.clock[0].steps == 0
+    count = contacts.stepping[0].substeps
+    for number in range(count):
+        substep(scene, k, number, is_first)
+    first, last = bodies_of(contacts, k, size)
+    gravity = (world.controls[0].gravity_x, world.controls[0].gravity_y)
+    place_all(world.bodies, contacts, first, last, kick_share(count - 1, is_first), gravity)
+    return supervise(scene, k, CHECK)
+
+
+@rare_kernel
+def march(scene: Nonsmooth, last_step: int, k: int) -> int:
+    """Be thread k of those that step a world until `last_step`, or until something ends the run."""
+    if k == 0 and scene.world.clock[0].is_started == 0:
+        load_lines(scene)
+        renew_rotations(scene.world.bodies)
+        scene.world.clock[0].is_started = 1
+    meet(scene.world.team)
+    status = REACHED
+    while status == REACHED and scene.world.clock[0].steps < last_step:
+        status = do_step(scene, k)
+    meet(scene.world.team)
+    return status
+
+
+@kernel
+def march_alone(scene: Nonsmooth, last_step: int) -> int:
+    """Step a world with one thread; see advance."""
+    scene.world.team[TEAM_SIZE] = 1
+    return march(scene, last_step, 0)
+
+
+@entry_kernel
+def advance_nonsmooth_in_team(scene: Nonsmooth, last_step: int, k: int) -> int:
+    """Be thread k of the team[TEAM_SIZE] that advance one world together. All get the same answer."""
+    return march(scene, last_step, k)
+
+
+def advance_nonsmooth(scene: Nonsmooth, last_step: int) -> int:
+    """Step until `last_step` or until something ends the run; return one of the status codes of arrays.py.
+
+    PAIRS_FULL returns before anything of the step has moved: give the lists more room and call again.
+    """
+    scene.world.team[TEAM_SIZE] = 1
+    return int(advance_nonsmooth_in_team(scene, last_step, 0))

@@ -1,0 +1,85 @@
+"""The arrays of the non-smooth scheme beside those of the world; SI units and signs as in blocksim.kernels.arrays.
+
+A step walks through lines and rows many times, so both are as small as they can be: one cache line a body, two a row.
+"""
+
+from typing import Any, NamedTuple
+
+from blocksim.kernels.arrays import Floats, Integers, Records, World, record_type
+
+LINE = record_type(
+    "vx vy spin "  # m/s, m/s, rad/s
+    "inverse_mass inverse_inertia "  # 1/kg, 1/(kg m2): zero for what is fixed
+    "dx dy turned"  # m, m, rad: since the step began
+)
+BEFORE = record_type(
+    "vx vy spin "  # m/s, m/s, rad/s: when the substep began, before gravity
+    "lifted"  # J/kg: work of the weight on the ways so far, less that on the ways that the velocities alone would give
+)
+ROW = record_type(
+    "nx ny "  # normal, from body b to body a; the tangent is the normal turned by +90 degrees
+    "arm_a arm_b "  # m: r x n of point one about both bodies; that of point two is smaller by the width
+    "width "  # m: from point one to point two along the tangent
+    "shear_arm_a shear_arm_b "  # m: r x t, the same for both points, as they lie on one face
+    "gap_one gap_two "  # m: when the step began; FAR where there is no such point
+    "normal_one normal_two shear "  # N s: impulses of the last substep: pushing apart, on body a along the tangent
+    "target_one target_two",  # m/s: least approach that the velocity pass leaves; -FAR where a point does not count
+    indices="a b touch",  # bodies; place in the table of interactions
+    flags="is_on",  # flag: one point or two are within the margin
+)
+SPOT = record_type(
+    "x y "  # m
+    "radius "  # m: half diagonal and reach
+    "reach",  # m: how far beyond itself the body's neighbours were looked for
+)
+KEPT = record_type(
+    "nx ny normal_one normal_two shear",  # of a row whose pair is in the next list too
+    indices="a b colour next",  # bodies of a listed pair, its colour; the next old row with the same body a, from 1
+)
+STEPPING = record_type(
+    "substep "  # s
+    "least_reach most_reach "  # m: of a body beyond itself, to find neighbours in
+    "closed_bias "  # 1/s: b of points in contact
+    "open_bias "  # 1/s: b of points with a gap
+    "softness "  # -: gamma / A of points in contact
+    "threshold "  # m/s: slower approaches do not rebound
+    "tolerance "  # m/s: the velocity pass ends when no impulse changes a velocity by more
+    "margin "  # m: points with a larger gap are left out of the step under way
+    "support_vx support_vy",  # m/s: of the ground and all that is fixed, in the substep under way
+    "substeps "
+    "velocity_sweeps "  # at most
+    "colours row_count active_count "  # now
+    "sweeps "  # of the velocity pass, in all so far
+    "is_guarded",  # flag: restitution is so high that impacts could create energy
+)
+BOOK = record_type("impacts friction to_support")  # J: what normal and shear impulses have taken, and given, so far
+
+FAR = 1e9  # m or m/s: of points that are not there, or do not count
+COLOURS = 64  # the last one is for pairs that found no other; one thread goes through it
+PART = 16  # rows that share a book; threads take whole ones
+
+
+class Contacts(NamedTuple):
+    """What a substep needs, and nothing else: compiled functions pass every array as several numbers."""
+
+    lines: Records  # (n + 1,) LINE
+    before: Records  # (n + 1,) BEFORE
+    rows: Records  # (p,) ROW, colour after colour, in the order of the pair list
+    active: Any  # (p,) uint32: rows with a point within the margin, colour after colour
+    ends: Integers  # (COLOURS + 1,) where every colour begins among the active ones, and where the last one ends
+    touches: Records  # (k k,) INTERACTION of all pairs of contact classes, those of the world in one row
+    books: Records  # (p / PART + 1,) BOOK
+    residuals: Floats  # (2, 8 t) m/s: the largest change of velocity that each thread found in a sweep, twice
+    stepping: Records  # (1,) STEPPING
+
+
+class Nonsmooth(NamedTuple):
+    """A world and what stepping it without springs needs."""
+
+    world: World
+    contacts: Contacts
+    kept: Records  # (p,) KEPT, work space of a new pair list
+    spots: Records  # (n + 1,) SPOT, where bodies were when the list was made
+    firsts: Integers  # (n + 1,) work space: the first old row of a body a, from 1; 0 where there is none
+    begins: Integers  # (COLOURS + 1,) where every colour begins among the rows
+    used: Integers  # (n + 1,) work space: bits of the colours that a body's pairs have

@@ -1,0 +1,109 @@
+"""The rows of a new pair list: colours, and impulses carried over.
+
+No two pairs of one colour share a free body, so that threads can go through a colour in parts, and what comes out does
+not depend on who takes which part. Greedy in the order of the list: the same list has the same colours.
+"""
+
+from blocksim.kernels.arrays import Record
+from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.nonsmooth.arrays import COLOURS, Nonsmooth
+
+ONE = 1
+
+
+@rare_kernel
+def lowest_free(used: int) -> int:
+    """Return the first colour whose bit is not set; the last one where there is none."""
+    colour = 0
+    while colour < COLOURS - 1 and (used >> colour) & ONE == ONE:
+        colour += 1
+    return colour
+
+
+@kernel
+def forget(one: Record) -> None:
+    """Set what a row keeps from step to step to zero."""
+    one.nx = 0.0
+    one.ny = 0.0
+    one.normal_one = 0.0
+    one.normal_two = 0.0
+    one.shear = 0.0
+
+
+@kernel
+def copy_impulses(source: Record, target: Record) -> None:
+    """Copy what a row keeps from step to step."""
+    target.nx = source.nx
+    target.ny = source.ny
+    target.normal_one = source.normal_one
+    target.normal_two = source.normal_two
+    target.shear = source.shear
+
+
+@rare_kernel
+def keep_impulses(scene: Nonsmooth, count: int) -> None:
+    """Copy the impulses of pairs that are in the old list and in the new one of `count` pairs."""
+    rows = scene.contacts.rows
+    kept = scene.kept
+    for i in range(scene.firsts.size):
+        scene.firsts[i] = 0
+    for r in range(scene.contacts.stepping[0].row_count):
+        if rows[r].is_on:
+            kept[r].next = scene.firsts[rows[r].a]
+            scene.firsts[rows[r].a] = r + 1
+    for p in range(count):
+        one = kept[p]
+        r = scene.firsts[one.a]
+        while r > 0 and rows[r - 1].b != one.b:
+            r = kept[r - 1].next
+        if r > 0:
+            copy_impulses(rows[r - 1], one)
+        else:
+            forget(one)
+
+
+@rare_kernel
+def colour_pairs(scene: Nonsmooth, count: int) -> None:
+    """Give every pair a colour, and fix where the rows of every colour begin."""
+    lines = scene.contacts.lines
+    used = scene.used
+    for i in range(used.size):
+        used[i] = 0
+    for colour in range(COLOURS + 1):
+        scene.begins[colour] = 0
+    last = 0
+    for p in range(count):
+        pair = scene.kept[p]
+        free_a = lines[pair.a].inverse_mass > 0.0
+        free_b = lines[pair.b].inverse_mass > 0.0
+        colour = lowest_free((used[pair.a] if free_a else 0) | (used[pair.b] if free_b else 0))
+        if free_a:
+            used[pair.a] |= ONE << colour
+        if free_b:
+            used[pair.b] |= ONE << colour
+        pair.colour = colour
+        scene.begins[colour + 1] += 1
+        last = max(last, colour + 1)
+    for colour in range(COLOURS):
+        scene.begins[colour + 1] += scene.begins[colour]
+    scene.contacts.stepping[0].colours = last
+
+
+@rare_kernel
+def place_rows(scene: Nonsmooth, count: int) -> None:
+    """Make the rows of all pairs, sorted by colour, with the impulses that were kept."""
+    bodies = scene.world.bodies
+    classes = scene.world.interactions.shape[0]
+    next_place = scene.contacts.ends
+    for colour in range(next_place.size):
+        next_place[colour] = scene.begins[colour]
+    for p in range(count):
+        pair = scene.kept[p]
+        row = scene.contacts.rows[next_place[pair.colour]]
+        next_place[pair.colour] += 1
+        row.a = pair.a
+        row.b = pair.b
+        row.touch = bodies[pair.a].contact_class * classes + bodies[pair.b].contact_class
+        row.is_on = 0
+        copy_impulses(pair, row)
+    scene.contacts.stepping[0].row_count = count

@@ -1,0 +1,91 @@
+"""Energy ledger of the non-smooth scheme.
+
+Impulses are booked when they are final: what those along the normals take is lost in impacts, those along the tangents
+in friction. A drift moves bodies by velocities that have the position pass in them, which are gone afterwards: what the
+weights work on that way is the correction, negative where the pass lifts bodies. The sum is exact to round-off: with x
+at t and v at t - h/2, K(v + h g/2) + V(x) changes in a substep by  J ((v1 + v2)/2 - h g/2) + h g (J - J_p), where the
+impulses J lead from v1 to v2 and those of the position pass, J_p, from v1 to the velocity of the drift.
+"""
+
+from blocksim.kernels.arrays import Floats, Records
+from blocksim.kernels.energy import OVERLAP_SHARE, potential_energy, smallest_side
+from blocksim.kernels.integrate import kinetic_energy
+from blocksim.kernels.jit import entry_kernel, rare_kernel
+from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+
+NONSMOOTH_LEDGER = ("kinetic", "potential", "impacts", "friction", "correction", "to_support")
+
+
+@rare_kernel
+def booked(books: Records) -> tuple[float, float, float]:
+    """Return what has gone (J) into impacts, friction and supports, summed over all books in order."""
+    impacts = 0.0
+    friction = 0.0
+    to_support = 0.0
+    for book in books:
+        impacts += book.impacts
+        friction += book.friction
+        to_support += book.to_support
+    return impacts, friction, to_support
+
+
+@rare_kernel
+def correction(scene: Nonsmooth) -> float:
+    """Return the work (J) of the weights on the ways of the position passes.
+
+    With it goes what the velocities that are shown, `bodies`, have less than those half a kick after the last substep.
+    """
+    controls = scene.world.controls[0]
+    h = scene.contacts.stepping[0].substep
+    hx = h * controls.gravity_x
+    hy = h * controls.gravity_y
+    half = 0.5 if scene.world.clock[0].steps > 0 else 0.0
+    total = 0.0
+    for i in range(scene.world.bodies.size - 1):
+        body = scene.world.bodies[i]
+        line = scene.contacts.lines[i]
+        if body.inverse_mass > 0.0:
+            vx = line.vx + half * hx
+            vy = line.vy + half * hy
+            total += body.mass * (scene.contacts.before[i].lifted - line.vx * hx - line.vy * hy)
+            total += 0.5 * body.mass * (vx * vx - body.vx * body.vx + vy * vy - body.vy * body.vy)
+    return total
+
+
+@rare_kernel
+def contact_points(scene: Nonsmooth) -> tuple[int, float]:
+    """Return how many points press, and the largest overlap (m), of the last substep and of the start of the step."""
+    count = 0
+    largest = 0.0
+    contacts = scene.contacts
+    for m in range(contacts.stepping[0].active_count):
+        row = contacts.rows[contacts.active[m]]
+        count += (1 if row.normal_one > 0.0 else 0) + (1 if row.normal_two > 0.0 else 0)
+        largest = max(largest, -row.gap_one, -row.gap_two)
+    return count, largest
+
+
+@rare_kernel
+def has_excessive_overlap(scene: Nonsmooth) -> bool:
+    """Tell whether an overlap exceeds the limit given, or a share of the smallest side of its pair."""
+    given = scene.world.controls[0].max_overlap
+    contacts = scene.contacts
+    bodies = scene.world.bodies
+    for m in range(contacts.stepping[0].active_count):
+        row = contacts.rows[contacts.active[m]]
+        overlap = max(-row.gap_one, -row.gap_two)
+        if overlap > 0.0:
+            side = min(smallest_side(bodies[row.a]), smallest_side(bodies[row.b]))
+            if overlap > (given if given > 0.0 else OVERLAP_SHARE * side):
+                return True
+    return False
+
+
+@entry_kernel
+def measure_nonsmooth(scene: Nonsmooth, row: Floats) -> None:
+    """Write one row of the ledger: energies (J) as in `NONSMOOTH_LEDGER`, number of contacts, largest overlap (m)."""
+    row[0] = kinetic_energy(scene.world)
+    row[1] = potential_energy(scene.world)
+    row[2], row[3], row[5] = booked(scene.contacts.books)
+    row[4] = correction(scene)
+    row[6], row[7] = contact_points(scene)

@@ -1,0 +1,216 @@
+"""The pair list: when it has to be made anew, and who is in it.
+
+Every body looks for neighbours within its reach: farther where it is faster, so that a few that fly do not have the
+list of all made anew at every step. A pair is listed where two reaches meet, and the list is good until a body has used
+up its own, less what it may move in the step to come.
+
+Bodies that all move alike come no nearer to each other, and over level ground only their way down counts. So travel is
+measured against the mean motion along x, unless something fixed stands in its way: then against that of the supports,
+which are at rest or move together.
+"""
+
+import math
+from typing import NamedTuple
+
+from blocksim.kernels.arrays import Record, World
+from blocksim.kernels.broad_phase import bucket, cell_of
+from blocksim.kernels.geometry import ground_gap, separation
+from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.kernels.nonsmooth.colours import colour_pairs, keep_impulses, place_rows
+from blocksim.kernels.support import has_motion
+
+STEPS = 16.0  # that a body should be able to go on before its reach is used up
+MOST_MARGIN = 0.5  # of the least reach of two bodies
+
+
+class Frame(NamedTuple):
+    """Motion that brings nobody nearer to anything: way since the list was made (m), and velocity (m/s)."""
+
+    x: float
+    y: float
+    vx: float
+    vy: float
+
+
+@rare_kernel
+def frame_of_supports(scene: Nonsmooth) -> Frame:
+    """Return the motion of the supports."""
+    world = scene.world
+    ground = world.bodies.size - 1
+    spot = scene.spots[ground]
+    body = world.bodies[ground]
+    return Frame(body.x - spot.x, body.y - spot.y, body.vx, body.vy)
+
+
+@rare_kernel
+def common_frame(scene: Nonsmooth) -> Frame:
+    """Return the mean motion of the bodies along x, or that of the supports where anything but the ground is fixed."""
+    bodies = scene.world.bodies
+    way = 0.0
+    speed = 0.0
+    if has_motion(scene.world.controls[0]):
+        return frame_of_supports(scene)
+    for i in range(bodies.size - 1):
+        body = bodies[i]
+        if body.inverse_mass == 0.0:
+            return frame_of_supports(scene)
+        way += body.x - scene.spots[i].x
+        speed += body.vx
+    count = max(1, bodies.size - 1)
+    return Frame(way / count, 0.0, speed / count, 0.0)
+
+
+@kernel
+def corner_speed(body: Record, frame: Frame) -> float:
+    """Return an upper bound (m/s) of the speed of a body's points in a frame."""
+    return math.sqrt((body.vx - frame.vx) ** 2 + (body.vy - frame.vy) ** 2) + body.radius * abs(body.spin)
+
+
+@rare_kernel
+def look(scene: Nonsmooth) -> bool:
+    """Fix the margin of the step to come, and make the pair list anew if bodies have come too far.
+
+    Returns False where the list does not fit into its arrays; nothing has changed then.
+    """
+    world = scene.world
+    controls = world.controls[0]
+    stepping = scene.contacts.stepping[0]
+    frame = common_frame(scene)
+    falls = 2.0 * controls.step * math.sqrt(controls.gravity_x**2 + controls.gravity_y**2)
+    fastest = 0.0
+    is_good = world.clock[0].rebuilds > 0
+    for i in range(world.bodies.size - 1):
+        body = world.bodies[i]
+        spot = scene.spots[i]
+        rate = corner_speed(body, frame) + falls
+        fastest = max(fastest, rate)
+        dx = body.x - spot.x - frame.x
+        dy = body.y - spot.y - frame.y
+        gone = math.sqrt(dx * dx + dy * dy) + body.radius * abs(body.angle - body.list_angle)
+        is_good = is_good and gone + min(2.0 * rate * controls.step, MOST_MARGIN * spot.reach) <= spot.reach
+    stepping.margin = min(2.0 * controls.step * fastest, 2.0 * MOST_MARGIN * stepping.least_reach)
+    return is_good or not math.isfinite(fastest) or rebuild(scene, frame)
+
+
+@rare_kernel
+def note_places(scene: Nonsmooth, frame: Frame) -> None:
+    """Write where all bodies are and how far they reach."""
+    world = scene.world
+    stepping = scene.contacts.stepping[0]
+    for i in range(world.bodies.size):
+        body = world.bodies[i]
+        spot = scene.spots[i]
+        ahead = STEPS * world.controls[0].step * corner_speed(body, frame)
+        spot.x = body.x
+        spot.y = body.y
+        spot.reach = min(max(ahead, stepping.least_reach), stepping.most_reach)
+        spot.radius = body.radius + spot.reach
+        body.list_angle = body.angle
+
+
+@rare_kernel
+def link_cells(world: World) -> None:
+    """Link the bodies of every bucket of the grid, in the order of their numbers; large ones stay out."""
+    controls = world.controls[0]
+    for k in range(world.heads.size):
+        world.heads[k] = 0
+    for i in range(world.bodies.size - 2, -1, -1):
+        body = world.bodies[i]
+        if body.radius <= controls.cell_radius:
+            k = bucket(cell_of(body.x, controls.cell_width), cell_of(body.y, controls.cell_width), world.heads.size)
+            world.links[i] = world.heads[k]
+            world.heads[k] = i + 1
+
+
+@kernel
+def add(scene: Nonsmooth, count: int, i: int, j: int) -> int:
+    """List a pair, if there is room; return the count needed."""
+    if count < scene.kept.size:
+        scene.kept[count].a = min(i, j)
+        scene.kept[count].b = max(i, j)
+    return count + 1
+
+
+@kernel
+def are_near(scene: Nonsmooth, i: int, j: int) -> bool:
+    """Tell whether the reaches of two bodies meet, at least one of them free."""
+    one = scene.spots[i]
+    two = scene.spots[j]
+    dx = one.x - two.x
+    dy = one.y - two.y
+    limit = one.radius + two.radius
+    if dx * dx + dy * dy > limit * limit:
+        return False
+    lines = scene.contacts.lines
+    if lines[i].inverse_mass + lines[j].inverse_mass == 0.0:
+        return False
+    return separation(scene.world.bodies[i], scene.world.bodies[j]) <= one.reach + two.reach
+
+
+@rare_kernel
+def add_from_cell(scene: Nonsmooth, i: int, column: int, row: int, least: int, count: int) -> int:
+    """List the neighbours of body i in one cell, from body number `least` on; return the count needed."""
+    world = scene.world
+    width = world.controls[0].cell_width
+    j = world.heads[bucket(column, row, world.heads.size)]
+    while j > 0:
+        if j > least and are_near(scene, i, j - 1):
+            other = scene.spots[j - 1]  # cells share buckets
+            if cell_of(other.x, width) == column and cell_of(other.y, width) == row:
+                count = add(scene, count, i, j - 1)
+        j = world.links[j - 1]
+    return count
+
+
+@rare_kernel
+def add_large(scene: Nonsmooth, i: int, count: int) -> int:
+    """List the neighbours of body i among those too large for the grid."""
+    for j in scene.world.large:
+        is_new = j > i or scene.world.bodies[i].radius <= scene.world.controls[0].cell_radius
+        if j != i and is_new and are_near(scene, i, j):
+            count = add(scene, count, i, j)
+    return count
+
+
+@rare_kernel
+def list_pairs(scene: Nonsmooth) -> int:
+    """List all pairs whose reaches meet; return how many there are, fitting or not.
+
+    Every two neighbouring cells are looked at from one of them only.
+    """
+    world = scene.world
+    width = world.controls[0].cell_width
+    ground = world.bodies.size - 1
+    level = world.bodies[ground].y
+    link_cells(world)
+    count = 0
+    for i in range(ground):
+        body = world.bodies[i]
+        if body.radius <= world.controls[0].cell_radius:
+            column = cell_of(body.x, width)
+            row = cell_of(body.y, width)
+            count = add_from_cell(scene, i, column, row, i + 1, count)
+            count = add_from_cell(scene, i, column + 1, row, 0, count)
+            for x in range(column - 1, column + 2):
+                count = add_from_cell(scene, i, x, row + 1, 0, count)
+        count = add_large(scene, i, count)
+        if body.inverse_mass > 0.0 and ground_gap(body) <= level + scene.spots[i].reach:
+            count = add(scene, count, i, ground)
+    return count
+
+
+@rare_kernel
+def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
+    """Make the pair list anew; return False, with the rows untouched, where it does not fit."""
+    note_places(scene, frame)
+    count = list_pairs(scene)
+    if count > scene.kept.size:
+        scene.world.clock[0].rebuilds = 0
+        return False
+    keep_impulses(scene, count)
+    colour_pairs(scene, count)
+    place_rows(scene, count)
+    scene.world.clock[0].pair_count = count
+    scene.world.clock[0].rebuilds += 1
+    return True
