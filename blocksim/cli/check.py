@@ -98,7 +98,7 @@ def _pairs(scenario: Scenario, pairs: Sequence[PairDescription]) -> list[str]:
 def _meanings(scenario: Scenario, pair: PairDescription) -> list[str]:
     if pair.normal_damping_ratio is None:
         return [
-            "μs static and μk kinetic friction, e restitution; contacts are rigid: K in N/m is",
+            "μs static and μk kinetic friction, e restitution; rigid contacts: K in N/m is",
             "what one point (a face has two) gives way by at rest, for this step",
         ]
     points = "a face has two" if scenario.contact.model == "surface" else "the particles of a face share 2 K"
@@ -159,7 +159,7 @@ def _sag(rigid: SagDescription | None) -> list[str]:
     solved = f"each solved to {MILLI * rigid.tolerance:g} mm/s"
     return [
         f"           in {rigid.substeps} substeps, {solved}; by hand at most {rigid.longest_step:.1e} s",
-        f"sag        {MICRO * rigid.sag:.3g} µm at the top of a column of {rigid.blocks}; goes with the step squared",
+        f"sag        {MICRO * rigid.sag:.3g} µm at the top of a column of {rigid.blocks}, with the step squared",
     ]
 
 

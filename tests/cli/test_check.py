@@ -214,3 +214,22 @@ def test_json_of_a_crowd_has_every_block(blocksim: Command) -> None:
     data = json.loads(blocksim("check", "scenarios/wall.toml", "--json").out)
     assert [body["name"] for body in data["bodies"]] == [str(i + 1) for i in range(1000)]
     assert data["memory"] > data["bytes"] > 0
+
+
+def test_rigid_contacts_show_what_their_step_implies_in_80_columns(blocksim: Command) -> None:
+    answer = blocksim("check", "scenarios/tower.toml", "--set", "time.scheme=nonsmooth")
+    assert "sag        142 µm at the top of a column of 10, with the step squared" in answer.out
+    assert "in 4 substeps, each solved to 1 mm/s; by hand at most 4.4e-03 s" in answer.out
+    tables = answer.out[answer.out.index("block   x mm") :]
+    assert "ζ" not in tables
+    assert "stiffness from E" not in tables
+    assert max(map(len, tables.splitlines())) <= 80
+
+
+def test_step_that_is_too_long_for_rigid_contacts_is_shown_where_it_stands(blocksim: Command) -> None:
+    answer = blocksim("check", "scenarios/tower.toml", "--set", "time.scheme=nonsmooth", "--set", "time.step=20 ms")
+    assert answer.code == 65
+    assert answer.err.startswith("--set time.step=20 ms: 0.02 s is too long: blocks could move farther than a tenth")
+    forced = ["--set", "time.force_step=true"]
+    again = ("check", "scenarios/tower.toml", "--set", "time.scheme=nonsmooth", "--set", "time.step=20 ms", *forced)
+    assert blocksim(*again, "--quiet").code == 0

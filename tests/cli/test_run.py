@@ -197,3 +197,17 @@ def test_more_threads_than_cores_are_a_warning(blocksim: Command, monkeypatch: p
     answer = blocksim(*RUN, "--threads", "3", "--out", "three")
     assert answer.code == 0
     assert answer.err.startswith("warning: 3 threads on 2 cores take turns; 2 would be faster\n")
+
+
+def test_rigid_contacts_run_compare_and_sweep_like_springs(blocksim: Command, tmp_path: Path) -> None:
+    rigid = ("--set", "time.scheme=nonsmooth")
+    run = blocksim("run", "scenarios/three_blocks_nominal.toml", *rigid, "--out", "run")
+    assert run.code == 0
+    assert "at rest" in run.err
+    assert "1      x mm" in blocksim("compare", "run").out
+    sweep = ("--vary", "contact.restitution=0,0.2", "--vary", "time.scheme=explicit,nonsmooth", "--jobs", "1")
+    soft = ("--set", "contact.stiffness_scale=0.001")
+    assert blocksim("sweep", "scenarios/three_blocks_nominal.toml", *soft, *sweep, "--out", "sweep").code == 0
+    table = (tmp_path / "sweep" / "sweep.csv").read_text().splitlines()
+    assert len(table) == 5
+    assert all("finished" in line for line in table[1:])

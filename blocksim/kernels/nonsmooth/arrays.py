@@ -45,7 +45,9 @@ STEPPING = record_type(
     "threshold "  # m/s: slower approaches do not rebound
     "tolerance "  # m/s: the velocity pass ends when no impulse changes a velocity by more
     "margin "  # m: points with a larger gap are left out of the step under way
-    "support_vx support_vy",  # m/s: of the ground and all that is fixed, in the substep under way
+    "support_vx support_vy "  # m/s: of the ground and all that is fixed, in the substep under way
+    "support_x support_y "  # m: how far they have come
+    "listed_x listed_y",  # m: how far they had come when the pair list was made
     "substeps "
     "velocity_sweeps "  # at most
     "colours row_count active_count "  # now

@@ -36,11 +36,8 @@ class Frame(NamedTuple):
 @rare_kernel
 def frame_of_supports(scene: Nonsmooth) -> Frame:
     """Return the motion of the supports."""
-    world = scene.world
-    ground = world.bodies.size - 1
-    spot = scene.spots[ground]
-    body = world.bodies[ground]
-    return Frame(body.x - spot.x, body.y - spot.y, body.vx, body.vy)
+    one = scene.contacts.stepping[0]
+    return Frame(one.support_x - one.listed_x, one.support_y - one.listed_y, one.support_vx, one.support_vy)
 
 
 @rare_kernel
@@ -80,6 +77,7 @@ def look(scene: Nonsmooth) -> bool:
     falls = 2.0 * controls.step * math.sqrt(controls.gravity_x**2 + controls.gravity_y**2)
     fastest = 0.0
     is_good = world.clock[0].rebuilds > 0
+    is_finite = True
     for i in range(world.bodies.size - 1):
         body = world.bodies[i]
         spot = scene.spots[i]
@@ -88,9 +86,10 @@ def look(scene: Nonsmooth) -> bool:
         dx = body.x - spot.x - frame.x
         dy = body.y - spot.y - frame.y
         gone = math.sqrt(dx * dx + dy * dy) + body.radius * abs(body.angle - body.list_angle)
+        is_finite = is_finite and math.isfinite(rate + gone)
         is_good = is_good and gone + min(2.0 * rate * controls.step, MOST_MARGIN * spot.reach) <= spot.reach
     stepping.margin = min(2.0 * controls.step * fastest, 2.0 * MOST_MARGIN * stepping.least_reach)
-    return is_good or not math.isfinite(fastest) or rebuild(scene, frame)
+    return is_good or not is_finite or rebuild(scene, frame)  # what is not finite is found after the step
 
 
 @rare_kernel
@@ -98,6 +97,8 @@ def note_places(scene: Nonsmooth, frame: Frame) -> None:
     """Write where all bodies are and how far they reach."""
     world = scene.world
     stepping = scene.contacts.stepping[0]
+    stepping.listed_x = stepping.support_x
+    stepping.listed_y = stepping.support_y
     for i in range(world.bodies.size):
         body = world.bodies[i]
         spot = scene.spots[i]

@@ -1,7 +1,6 @@
 """Prescribed motion of the supports: the ground, its pieces, walls and all fixed bodies together."""
 
 from blocksim.kernels.arrays import World
-from blocksim.kernels.geometry import place_corners
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.support import displacement, has_motion, piece_at
@@ -44,13 +43,15 @@ def place_supports(scene: Nonsmooth) -> None:
     now = (clock.steps + 1) * controls.step
     clock.motion_piece = piece_at(world.motion, clock.motion_piece, now)
     moved = displacement(world.motion[clock.motion_piece], now)
+    stepping = scene.contacts.stepping[0]
+    stepping.support_x = controls.motion_x * moved
+    stepping.support_y = controls.motion_y * moved
     for one in world.moved:
         body = world.bodies[one.body]
         line = scene.contacts.lines[one.body]
-        body.x = one.x + controls.motion_x * moved
-        body.y = one.y + controls.motion_y * moved
+        body.x = one.x + stepping.support_x
+        body.y = one.y + stepping.support_y
         body.vx = line.vx
         body.vy = line.vy
-        place_corners(body)
         line.dx = 0.0
         line.dy = 0.0
