@@ -98,6 +98,8 @@ pictures: $(RUN_STAMP) ## Draw the pictures of the README anew
 	$(BLOCKSIM) plot $(PICTURES)/stiffness --out results/stiffness_levels.png
 	$(BLOCKSIM) sweep scenarios/start_jitter.toml --out $(PICTURES)/jitter --overwrite --quiet
 	$(BLOCKSIM) plot $(PICTURES)/jitter --out results/start_jitter.png
+	$(BLOCKSIM) sweep scenarios/impact_laws.toml --out $(PICTURES)/laws --overwrite --quiet
+	$(BLOCKSIM) plot $(PICTURES)/laws --out results/impact_laws.png
 
 .PHONY: setup
 setup: $(DEV_STAMP) ## Create or update .venv, with the tools for developers

@@ -12,20 +12,26 @@ from pydantic.fields import FieldInfo
 
 from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.stepping import Time
 from blocksim.scenario.models.study import Sweep
 from blocksim.scenario.motion_table import MotionTable
 from blocksim.scenario.quantities import ANGLE, Quantity
 
 HEADER = "# Resolved by blocksim: every value that was used, in SI units (m, kg, s, N, Pa), angles in rad.\n"
+SCHEME = "time.scheme"
 UNHASHED = {"description", "experiment", "sweep", "provenance"}
 
 
 def scenario_to_toml(scenario: Scenario, experiment_table: str | None = None, motion_table: str | None = None) -> str:
     """Write every key with its value; loading the text gives an equal scenario, floats to the last bit.
 
-    `experiment_table` and `motion_table` replace the paths of tables, for copies kept beside the resolved file.
+    Where a sweep varies the scheme, keys that only one of them has are left out; a sweep is refused unless they have
+    their defaults. `experiment_table` and `motion_table` replace the paths of tables, for copies kept beside the
+    resolved file.
     """
     data = _plain(scenario)
+    if scenario.sweep is not None and SCHEME in scenario.sweep.vary:
+        data["time"] = {key: value for key, value in data["time"].items() if key in Time.model_fields}
     if experiment_table is not None and "experiment" in data:
         data["experiment"] = {"table": experiment_table}
     if motion_table is not None and isinstance(scenario.motion, FromTable):

@@ -326,6 +326,22 @@ def test_the_hash_ignores_what_does_not_move_anything(data: dict[str, Any], valu
     assert scenario_hash(document.with_values(values).build()) == scenario_hash(document.build())
 
 
+def test_resolved_sweep_over_schemes_can_be_read_again(data: dict[str, Any]) -> None:
+    sweep = {"time.scheme": ["explicit", "nonsmooth"]}
+    swept = Document.from_mapping({**data, "sweep": sweep}).build()
+    again = Document.parse(scenario_to_toml(swept)).build()
+    assert again.sweep == swept.sweep
+    assert scenario_hash(again) == scenario_hash(swept)
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
+def test_resolved_scenario_has_the_keys_of_its_scheme(data: dict[str, Any], scheme: str) -> None:
+    scenario = Document.from_mapping({**data, "time": {"scheme": scheme}}).build()
+    text = scenario_to_toml(scenario)
+    assert ("safety" in text, "substeps" in text) == (scheme == "explicit", scheme == "nonsmooth")
+    assert Document.parse(text).build() == scenario
+
+
 def test_the_hash_is_the_same_in_every_process() -> None:
     scenario = load_scenario(REPOSITORY / "scenarios" / "slide.toml")
     assert len(scenario_hash(scenario)) == 64
