@@ -159,7 +159,7 @@ def kernel(function: Function) -> Function:
 
 def rare_kernel(function: Function) -> Function:
     """Compile a function that most steps do not call; kept out of the hot path, which it would only lengthen."""
-    return _inner(function)
+    return _inner(function, forceinline=False)  # said here, as numba would take it over from the first caller
 
 
 def entry_kernel(function: Function) -> Function:

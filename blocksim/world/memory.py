@@ -14,7 +14,8 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.arrays import BODY, CONTACT, CONTACTS, OPERATOR, PAIR, PARTICLE_CONTACT, POINT
-from blocksim.kernels.nonsmooth.arrays import BEFORE, BOOK, KEPT, LINE, PART, ROW, SPOT
+from blocksim.kernels.lanes import WIDTH
+from blocksim.kernels.nonsmooth.arrays import BEFORE, BOOK, GROUP, KEPT, LINE, PART, ROW, SPOT
 
 LISTS = 2  # of candidate pairs: the present one and the one being built
 OPERATORS = 2  # of a pair: along the normal and along the tangent
@@ -101,7 +102,7 @@ class RigidSize(Size):
     def world_bytes(self) -> int:
         """As Size."""
         body = BODY.itemsize + LINE.itemsize + BEFORE.itemsize + SPOT.itemsize + 2 * VALUE + OBJECT_BYTES
-        pair = ROW.itemsize + KEPT.itemsize + INDEX + -(-BOOK.itemsize // PART)
+        pair = ROW.itemsize + KEPT.itemsize + -(-GROUP.itemsize // WIDTH) + -(-BOOK.itemsize // (WIDTH * PART))
         return self.bodies * body + self.pairs * pair
 
 

@@ -6,10 +6,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from blocksim.kernels.arrays import CACHE_LINE, Records, World, zeros
+from blocksim.kernels.lanes import WIDTH
 from blocksim.kernels.nonsmooth.arrays import (
     BEFORE,
     BOOK,
     COLOURS,
+    GROUP,
     KEPT,
     LINE,
     PART,
@@ -98,10 +100,10 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
         lines=zeros(bodies, LINE),
         before=zeros(bodies, BEFORE),
         rows=zeros(capacity, ROW),
-        active=np.zeros(capacity, dtype=np.uint32),
+        groups=zeros(groups_for(capacity), GROUP),
         ends=np.zeros(COLOURS + 1, dtype=np.int64),
         touches=world.interactions.reshape(-1).view(np.recarray),
-        books=zeros(capacity // PART + 1, BOOK),
+        books=zeros(groups_for(capacity) // PART + 1, BOOK),
         residuals=_residuals(threads),
         stepping=stepping,
     )
@@ -114,6 +116,11 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
         begins=np.zeros(COLOURS + 1, dtype=np.int64),
         used=np.zeros(bodies, dtype=np.int64),
     )
+
+
+def groups_for(capacity: int) -> int:
+    """Return how many groups there is room for: full ones, and one in every colour that is not."""
+    return min(capacity, capacity // WIDTH + COLOURS)
 
 
 def _residuals(threads: int) -> Any:
@@ -131,7 +138,7 @@ def with_more_rows(scene: Nonsmooth) -> Nonsmooth:
     capacity = math.ceil(GROWTH * old.rows.size)
     refuse_if_too_large(RigidSize(scene.world.bodies.size, capacity))
     larger = with_lists(scene.world, old.stepping, capacity)
-    for name in ("rows", "active", "books"):
+    for name in ("rows", "books"):
         getattr(larger.contacts, name)[: getattr(old, name).size] = getattr(old, name)
     contacts = larger.contacts._replace(lines=old.lines, before=old.before, ends=old.ends, residuals=old.residuals)
     return larger._replace(contacts=contacts, spots=scene.spots, begins=scene.begins)

@@ -7,21 +7,23 @@ from blocksim.kernels.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FU
 from blocksim.kernels.energy import weights_power
 from blocksim.kernels.integrate import kinetic_energy, renew_rotations
 from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
+from blocksim.kernels.lanes import WIDTH
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.energy import has_excessive_overlap
-from blocksim.kernels.nonsmooth.manifold import collide
+from blocksim.kernels.nonsmooth.groups import gather, pack_groups, unpack_groups
+from blocksim.kernels.nonsmooth.manifold import are_four_of_blocks, collide, collide_four
 from blocksim.kernels.nonsmooth.motion import place_all
 from blocksim.kernels.nonsmooth.neighbours import look
 from blocksim.kernels.nonsmooth.substep import bodies_of, kick_share, substep
 from blocksim.kernels.nonsmooth.supports import place_supports
-from blocksim.kernels.nonsmooth.sweeps import gather, part_of
+from blocksim.kernels.nonsmooth.sweeps import part_of
 from blocksim.kernels.support import is_support_at_rest
 from blocksim.kernels.team import meet
 
 LOOK, GATHER, CHECK = range(3)  # what one thread does for all
 
 
-@rare_kernel
+@kernel
 def is_supported(scene: Nonsmooth) -> bool:
     """Tell whether every free body has a contact that presses, where there is gravity."""
     world = scene.world
@@ -30,8 +32,8 @@ def is_supported(scene: Nonsmooth) -> bool:
         return True
     scene.used[:] = 0
     contacts = scene.contacts
-    for m in range(contacts.stepping[0].active_count):
-        row = contacts.rows[contacts.active[m]]
+    for r in range(contacts.stepping[0].row_count):
+        row = contacts.rows[r]
         if row.normal_one > 0.0 or row.normal_two > 0.0:
             scene.used[row.a] = 1
             scene.used[row.b] = 1
@@ -41,7 +43,7 @@ def is_supported(scene: Nonsmooth) -> bool:
     return True
 
 
-@rare_kernel
+@kernel
 def check(scene: Nonsmooth) -> int:
     """Look whether the run may go on: finite, not at rest for the hold time."""
     world = scene.world
@@ -61,7 +63,7 @@ def check(scene: Nonsmooth) -> int:
     return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
 
 
-@rare_kernel
+@kernel
 def supervise(scene: Nonsmooth, k: int, task: int) -> int:
     """Let the first thread do something for all while the others wait; return the status code that all go by."""
     team = scene.world.team
@@ -82,15 +84,22 @@ def supervise(scene: Nonsmooth, k: int, task: int) -> int:
     return team[STATUS]
 
 
-@rare_kernel
+@kernel
 def collide_rows(scene: Nonsmooth, begin: int, end: int) -> None:
     """Find the manifolds of some rows."""
     bodies = scene.world.bodies
     ground = bodies.size - 1
     margin = scene.contacts.stepping[0].margin
-    for r in range(begin, end):
-        row = scene.contacts.rows[r]
-        row.is_on = collide(row, bodies[row.a], bodies[row.b], row.b == ground, margin)
+    rows = scene.contacts.rows
+    r = begin
+    while r < end:
+        if r + WIDTH <= end and are_four_of_blocks(rows, r, bodies):
+            collide_four(rows, r, bodies, margin)
+            r += WIDTH
+        else:
+            row = rows[r]
+            row.is_on = collide(row, bodies[row.a], bodies[row.b], row.b == ground, margin)
+            r += 1
 
 
 @rare_kernel
@@ -110,7 +119,7 @@ def load_lines(scene: Nonsmooth) -> None:
         scene.contacts.before[i].lifted = h * (controls.gravity_x * body.vx + controls.gravity_y * body.vy)
 
 
-@rare_kernel
+@kernel
 def do_step(scene: Nonsmooth, k: int) -> int:
     """Take one step as thread k; return the status code."""
     world = scene.world
@@ -122,17 +131,20 @@ def do_step(scene: Nonsmooth, k: int) -> int:
     first, last = part_of(0, contacts.stepping[0].row_count, k, size)
     collide_rows(scene, first, last)
     supervise(scene, k, GATHER)
+    begin, end = part_of(0, contacts.stepping[0].group_count, k, size)
+    pack_groups(contacts, begin, end)
     is_first = world.clock[0].steps == 0
     count = contacts.stepping[0].substeps
     for number in range(count):
         substep(scene, k, number, is_first)
+    unpack_groups(contacts, begin, end)
     first, last = bodies_of(contacts, k, size)
     gravity = (world.controls[0].gravity_x, world.controls[0].gravity_y)
     place_all(world.bodies, contacts, first, last, kick_share(count - 1, is_first), gravity)
     return supervise(scene, k, CHECK)
 
 
-@rare_kernel
+@kernel
 def march(scene: Nonsmooth, last_step: int, k: int) -> int:
     """Be thread k of those that step a world until `last_step`, or until something ends the run."""
     if k == 0 and scene.world.clock[0].is_started == 0:

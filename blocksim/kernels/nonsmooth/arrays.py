@@ -3,9 +3,12 @@
 A step walks through lines and rows many times, so both are as small as they can be: one cache line a body, two a row.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from blocksim.kernels.arrays import Floats, Integers, Records, World, record_type
+import numpy as np
+
+from blocksim.kernels.arrays import Floats, Integers, Records, World, on_own_lines, record_type
+from blocksim.kernels.lanes import WIDTH
 
 LINE = record_type(
     "vx vy spin "  # m/s, m/s, rad/s
@@ -22,10 +25,25 @@ ROW = record_type(
     "width "  # m: from point one to point two along the tangent
     "shear_arm_a shear_arm_b "  # m: r x t, the same for both points, as they lie on one face
     "gap_one gap_two "  # m: when the step began; FAR where there is no such point
-    "normal_one normal_two shear "  # N s: impulses of the last substep: pushing apart, on body a along the tangent
-    "target_one target_two",  # m/s: least approach that the velocity pass leaves; -FAR where a point does not count
+    "normal_one normal_two shear",  # N s: impulses of the last substep: pushing apart, on body a along the tangent
     indices="a b touch",  # bodies; place in the table of interactions
     flags="is_on",  # flag: one point or two are within the margin
+)
+# four active rows of one colour, field by field; see groups.py
+LANE_FLOATS = (
+    "nx ny arm_a arm_b width shear_arm_a shear_arm_b gap_one gap_two normal_one normal_two shear "  # as in ROW
+    "target_one target_two "  # m/s: least approach that the velocity pass leaves; -FAR where a point does not count
+    "restitution friction "  # -: friction is kinetic
+    "pressed needed mass"  # N s, N s, 1/kg: work space for static friction
+)
+LANE_INDICES = "a b row"  # bodies; number of the row
+GROUP = on_own_lines(
+    np.dtype(
+        [(name, np.float64, (WIDTH,)) for name in LANE_FLOATS.split()]
+        + [(name, np.uint32, (WIDTH,)) for name in LANE_INDICES.split()]
+        + [("count", np.uint8), ("is_simple", np.uint8)],  # rows, the others are copies; flag: static is kinetic
+        align=True,
+    )
 )
 SPOT = record_type(
     "x y "  # m
@@ -50,7 +68,7 @@ STEPPING = record_type(
     "listed_x listed_y",  # m: how far they had come when the pair list was made
     "substeps "
     "velocity_sweeps "  # at most
-    "colours row_count active_count "  # now
+    "colours row_count active_count group_count "  # now
     "sweeps "  # of the velocity pass, in all so far
     "is_guarded",  # flag: restitution is so high that impacts could create energy
 )
@@ -58,7 +76,7 @@ BOOK = record_type("impacts friction to_support")  # J: what normal and shear im
 
 FAR = 1e9  # m or m/s: of points that are not there, or do not count
 COLOURS = 64  # the last one is for pairs that found no other; one thread goes through it
-PART = 16  # rows that share a book; threads take whole ones
+PART = 4  # groups that share a book; threads take whole ones
 
 
 class Contacts(NamedTuple):
@@ -67,8 +85,8 @@ class Contacts(NamedTuple):
     lines: Records  # (n + 1,) LINE
     before: Records  # (n + 1,) BEFORE
     rows: Records  # (p,) ROW, colour after colour, in the order of the pair list
-    active: Any  # (p,) uint32: rows with a point within the margin, colour after colour
-    ends: Integers  # (COLOURS + 1,) where every colour begins among the active ones, and where the last one ends
+    groups: Records  # (g,) GROUP of the rows with a point within the margin, colour after colour
+    ends: Integers  # (COLOURS + 1,) where every colour begins among the groups, and where the last one ends
     touches: Records  # (k k,) INTERACTION of all pairs of contact classes, those of the world in one row
     books: Records  # (p / PART + 1,) BOOK
     residuals: Floats  # (2, 8 t) m/s: the largest change of velocity that each thread found in a sweep, twice

@@ -6,6 +6,7 @@ not depend on who takes which part. Greedy in the order of the list: the same li
 
 from blocksim.kernels.arrays import Record
 from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.lanes import WIDTH
 from blocksim.kernels.nonsmooth.arrays import COLOURS, Nonsmooth
 
 ONE = 1
@@ -87,6 +88,16 @@ def colour_pairs(scene: Nonsmooth, count: int) -> None:
     for colour in range(COLOURS):
         scene.begins[colour + 1] += scene.begins[colour]
     scene.contacts.stepping[0].colours = last
+
+
+@rare_kernel
+def most_groups(scene: Nonsmooth) -> int:
+    """Return how many groups the rows of all colours can make; those of the last colour are solved one by one."""
+    count = 0
+    for colour in range(COLOURS):
+        size = scene.begins[colour + 1] - scene.begins[colour]
+        count += size if colour == COLOURS - 1 else (size + WIDTH - 1) // WIDTH
+    return count
 
 
 @rare_kernel

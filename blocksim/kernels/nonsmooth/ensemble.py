@@ -18,7 +18,7 @@ def member(scenes: Nonsmooth, m: int) -> Nonsmooth:
             contacts.lines[m],
             contacts.before[m],
             contacts.rows[m],
-            contacts.active[m],
+            contacts.groups[m],
             contacts.ends[m],
             contacts.touches[m],
             contacts.books[m],

@@ -8,6 +8,7 @@ any rebound never create energy: with lambda_n t = 0 and friction against the sl
 """
 
 from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.lanes import load, select, store
 from blocksim.kernels.nonsmooth.arrays import Contacts
 
 TRIES = 4  # with half of the rebound each; then there is none
@@ -36,10 +37,9 @@ def gains(contacts: Contacts, gx: float, gy: float) -> bool:
 
 @rare_kernel
 def weaken(contacts: Contacts, begin: int, end: int, share: float) -> None:
-    """Leave a share of the rebound of some active rows."""
+    """Leave a share of the rebound of the rows of some groups."""
     for m in range(begin, end):
-        row = contacts.rows[contacts.active[m]]
-        if row.target_one > 0.0:
-            row.target_one *= share
-        if row.target_two > 0.0:
-            row.target_two *= share
+        group = contacts.groups[m]
+        for target in (group.target_one, group.target_two):
+            least = load(None, target)
+            store(None, target, select(least > 0.0, share * least, least))

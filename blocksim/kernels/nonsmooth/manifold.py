@@ -6,8 +6,24 @@ which the other body reaches least (separating axes). The opposite face of the o
 
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import ALL, Record
+from blocksim.kernels.arrays import ALL, Record, Records
 from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.lanes import (
+    WIDTH,
+    Lanes,
+    Mask,
+    fields_0,
+    fields_4,
+    fields_8,
+    fields_16,
+    greater,
+    lesser,
+    select,
+    split,
+    write_fields_0,
+    write_fields_4,
+    write_fields_8,
+)
 from blocksim.kernels.nonsmooth.arrays import FAR
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
@@ -23,12 +39,12 @@ UPPER_RIGHT, UPPER_LEFT = 2, 3  # corners
 class Face(NamedTuple):
     """A reference face: unit normal, centre of its body, distance of the face from there and half of its length (m)."""
 
-    nx: float
-    ny: float
-    x: float
-    y: float
-    distance: float
-    half: float
+    nx: Lanes
+    ny: Lanes
+    x: Lanes
+    y: Lanes
+    distance: Lanes
+    half: Lanes
 
 
 class Edge(NamedTuple):
@@ -37,33 +53,64 @@ class Edge(NamedTuple):
     The first is the left one. `is_left`, `is_right` tell whether the ends themselves can touch.
     """
 
-    left: float
-    left_gap: float
-    right: float
-    right_gap: float
-    is_left: bool
-    is_right: bool
+    left: Lanes
+    left_gap: Lanes
+    right: Lanes
+    right_gap: Lanes
+    is_left: Mask
+    is_right: Mask
+
+
+class Block(NamedTuple):
+    """What of bodies decides where they touch; fields as in BODY."""
+
+    x: Lanes
+    y: Lanes
+    cos: Lanes
+    sin: Lanes
+    half_x: Lanes
+    half_y: Lanes
+
+
+class Points(NamedTuple):
+    """A manifold, fields as in ROW."""
+
+    nx: Lanes
+    ny: Lanes
+    arm_a: Lanes
+    arm_b: Lanes
+    width: Lanes
+    shear_arm_a: Lanes
+    shear_arm_b: Lanes
+    gap_one: Lanes
+    gap_two: Lanes
 
 
 @kernel
-def face_of(body: Record, mx: float, my: float, along_x: bool) -> Face:
+def block_of(body: Record) -> Block:
+    """Return what of a body decides where it touches."""
+    return Block(body.x, body.y, body.cos, body.sin, body.half_x, body.half_y)
+
+
+@kernel
+def face_of(body: Block, mx: Lanes, my: Lanes, along_x: Mask) -> Face:
     """Return the face of a body with the outward normal (mx, my), on its own x axis or y axis."""
-    distance = body.half_x if along_x else body.half_y
-    half = body.half_y if along_x else body.half_x
+    distance = select(along_x, body.half_x, body.half_y)
+    half = select(along_x, body.half_y, body.half_x)
     return Face(mx, my, body.x, body.y, distance, half)
 
 
 @kernel
-def face_towards(body: Record, x: float, y: float, along_x: bool) -> Face:
+def face_towards(body: Block, x: Lanes, y: Lanes, along_x: Mask) -> Face:
     """Return the face on one of a body's axes that is on the side of a place (m), given in the body's own frame."""
-    sign = 1.0 if (x if along_x else y) >= 0.0 else -1.0
-    return face_of(
-        body, sign * (body.cos if along_x else -body.sin), sign * (body.sin if along_x else body.cos), along_x
-    )
+    sign = select(select(along_x, x, y) >= 0.0, 1.0, -1.0)
+    mx = sign * select(along_x, body.cos, -body.sin)
+    my = sign * select(along_x, body.sin, body.cos)
+    return face_of(body, mx, my, along_x)
 
 
 @kernel
-def in_frame(face: Face, x: float, y: float) -> tuple[float, float]:
+def in_frame(face: Face, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes]:
     """Return a place (m) in the frame of a face: to the right along it, and above it."""
     dx = x - face.x
     dy = y - face.y
@@ -71,98 +118,134 @@ def in_frame(face: Face, x: float, y: float) -> tuple[float, float]:
 
 
 @kernel
-def opposite_edge(face: Face, body: Record) -> Edge:
+def opposite_edge(face: Face, body: Block) -> Edge:
     """Return the face of a body that looks most towards a reference face."""
     x, y = in_frame(face, body.x, body.y)
     # the body's own x axis in the frame of the face; its y axis is (-s, c)
     c = body.cos * face.ny - body.sin * face.nx
     s = body.cos * face.nx + body.sin * face.ny
-    if abs(s) > abs(c):
-        sign = -1.0 if s > 0.0 else 1.0
-        x += sign * c * body.half_x
-        y += sign * s * body.half_x
-        ex = -s * body.half_y
-        ey = c * body.half_y
-    else:
-        sign = -1.0 if c > 0.0 else 1.0
-        x -= sign * s * body.half_y
-        y += sign * c * body.half_y
-        ex = c * body.half_x
-        ey = s * body.half_x
-    if ex < 0.0:
-        ex = -ex
-        ey = -ey
-    return Edge(x - ex, y - ey, x + ex, y + ey, True, True)
+    is_side = abs(s) > abs(c)
+    sign = select(select(is_side, s, c) > 0.0, -1.0, 1.0)
+    away = sign * select(is_side, body.half_x, body.half_y)
+    along = select(is_side, body.half_y, body.half_x)
+    x = x + away * select(is_side, c, -s)
+    y = y + away * select(is_side, s, c)
+    ex = along * select(is_side, -s, c)
+    ey = along * select(is_side, c, s)
+    turned = select(ex < 0.0, -1.0, 1.0)
+    ex = turned * ex
+    ey = turned * ey
+    are_all = abs(ex) >= 0.0
+    return Edge(x - ex, y - ey, x + ex, y + ey, are_all, are_all)
 
 
 @kernel
-def clip(edge: Edge, half: float) -> Edge:
+def clip(edge: Edge, half: Lanes) -> Edge:
     """Cut an edge at both ends of the reference face; empty (left > right) where it lies beyond."""
     left, left_gap, right, right_gap, is_left, is_right = edge
-    slope = (right_gap - left_gap) / (right - left) if right > left else 0.0
-    if left < -half:
-        left_gap += slope * (-half - left)
-        left = -half
-        is_left = True
-    if right > half:
-        right_gap -= slope * (right - half)
-        right = half
-        is_right = True
-    return Edge(left, left_gap, right, right_gap, is_left, is_right)
+    slope = select(right > left, (right_gap - left_gap) / (right - left), 0.0)
+    is_cut_left = left < -half
+    is_cut_right = right > half
+    return Edge(
+        select(is_cut_left, -half, left),
+        select(is_cut_left, left_gap + slope * (-half - left), left_gap),
+        select(is_cut_right, half, right),
+        select(is_cut_right, right_gap - slope * (right - half), right_gap),
+        is_left | is_cut_left,
+        is_right | is_cut_right,
+    )
 
 
 @kernel
-def write_points(row: Record, face: Face, edge: Edge, a: Record, b: Record, is_of_b: bool, margin: float) -> bool:
-    """Write normal, arms and gaps of a manifold into a row; tell whether it has a point.
+def points_of(face: Face, edge: Edge, a: Block, b: Block, is_of_b: Mask, margin: float) -> Points:
+    """Return normal, arms and gaps of a manifold.
 
     Seen along the tangent, point one is the first: the right one of a face of b, the left one of a face of a.
     """
-    sign = 1.0 if is_of_b else -1.0
+    sign = select(is_of_b, 1.0, -1.0)
     nx = sign * face.nx
     ny = sign * face.ny
-    if nx * row.nx + ny * row.ny < TURNED:
-        row.normal_one = row.normal_two = row.shear = 0.0
-    row.nx = nx
-    row.ny = ny
-    left_gap = edge.left_gap if edge.is_left and edge.left_gap <= margin else FAR
-    right_gap = edge.right_gap if edge.is_right and edge.right_gap <= margin else FAR
+    left_gap = select(edge.is_left & (edge.left_gap <= margin), edge.left_gap, FAR)
+    right_gap = select(edge.is_right & (edge.right_gap <= margin), edge.right_gap, FAR)
     width = edge.right - edge.left
-    if width < SLIVER * min(a.half_x + a.half_y, b.half_x + b.half_y):
-        left_gap, right_gap = (left_gap, FAR) if left_gap <= right_gap else (FAR, right_gap)
-    one = edge.right if is_of_b else edge.left
+    is_sliver = width < SLIVER * lesser(a.half_x + a.half_y, b.half_x + b.half_y)
+    is_left_less = left_gap <= right_gap
+    right_gap = select(is_sliver & is_left_less, FAR, right_gap)
+    left_gap = select(is_sliver & (is_left_less ^ is_sliver), FAR, left_gap)
+    one = select(is_of_b, edge.right, edge.left)
     # point one in world axes, on the face
     x = face.x + face.nx * face.distance + face.ny * one
     y = face.y + face.ny * face.distance - face.nx * one
-    row.arm_a = (x - a.x) * ny - (y - a.y) * nx
-    row.arm_b = (x - b.x) * ny - (y - b.y) * nx
-    row.shear_arm_a = (x - a.x) * nx + (y - a.y) * ny
-    row.shear_arm_b = (x - b.x) * nx + (y - b.y) * ny
-    row.width = width
-    row.gap_one = right_gap if is_of_b else left_gap
-    row.gap_two = left_gap if is_of_b else right_gap
-    return row.gap_one < FAR or row.gap_two < FAR
+    return Points(
+        nx,
+        ny,
+        (x - a.x) * ny - (y - a.y) * nx,
+        (x - b.x) * ny - (y - b.y) * nx,
+        width,
+        (x - a.x) * nx + (y - a.y) * ny,
+        (x - b.x) * nx + (y - b.y) * ny,
+        select(is_of_b, right_gap, left_gap),
+        select(is_of_b, left_gap, right_gap),
+    )
 
 
 @kernel
-def passes_edge(best: float, other: float, a: Record, b: Record) -> bool:
+def has_point(points: Points) -> Mask:
+    """Tell whether a manifold has a point."""
+    return lesser(points.gap_one, points.gap_two) < FAR
+
+
+@kernel
+def write_points(row: Record, points: Points) -> bool:
+    """Write a manifold into a row; tell whether it has a point. Impulses along another normal are forgotten."""
+    if points.nx * row.nx + points.ny * row.ny < TURNED:
+        row.normal_one = row.normal_two = row.shear = 0.0
+    row.nx = points.nx
+    row.ny = points.ny
+    row.arm_a = points.arm_a
+    row.arm_b = points.arm_b
+    row.width = points.width
+    row.shear_arm_a = points.shear_arm_a
+    row.shear_arm_b = points.shear_arm_b
+    row.gap_one = points.gap_one
+    row.gap_two = points.gap_two
+    return has_point(points)
+
+
+@kernel
+def passes_edge(best: Lanes, other: Lanes, a: Block, b: Block) -> Mask:
     """Tell whether two faces at a distance `best` (m) overlap so little that the blocks meet at other faces.
 
     `other` is the distance (m) along the other axis, which is negative by what they overlap. A block that slides over
     the flush joint of two others would else be stopped by the side of the second, as it sinks in by a little.
     """
-    least = min(a.half_x, a.half_y, b.half_x, b.half_y)
-    return -EDGE * least < other < best
+    least = lesser(lesser(a.half_x, a.half_y), lesser(b.half_x, b.half_y))
+    return (-EDGE * least < other) & (other < best)
 
 
-@rare_kernel
-def collide_blocks(row: Record, a: Record, b: Record, margin: float) -> bool:
-    """Find the contact manifold of two blocks; tell whether there is one within the margin (m)."""
+@kernel
+def chosen(is_one: Mask, one: Block, two: Block) -> Block:
+    """Return one block or the other."""
+    return Block(
+        select(is_one, one.x, two.x),
+        select(is_one, one.y, two.y),
+        select(is_one, one.cos, two.cos),
+        select(is_one, one.sin, two.sin),
+        select(is_one, one.half_x, two.half_x),
+        select(is_one, one.half_y, two.half_y),
+    )
+
+
+@kernel
+def points_of_blocks(a: Block, b: Block, margin: float) -> tuple[Points, Mask]:
+    """Return the contact manifold of two blocks within the margin (m), and whether there is one.
+
+    Which faces meet no processor can guess, so that nothing branches.
+    """
     dx = a.x - b.x
     dy = a.y - b.y
-    c = a.cos * b.cos + a.sin * b.sin
-    s = a.sin * b.cos - a.cos * b.sin
-    c_abs = abs(c)
-    s_abs = abs(s)
+    c_abs = abs(a.cos * b.cos + a.sin * b.sin)
+    s_abs = abs(a.sin * b.cos - a.cos * b.sin)
     bx = b.cos * dx + b.sin * dy
     by = b.cos * dy - b.sin * dx
     ax = a.cos * dx + a.sin * dy
@@ -171,30 +254,71 @@ def collide_blocks(row: Record, a: Record, b: Record, margin: float) -> bool:
     gap_by = abs(by) - b.half_y - s_abs * a.half_x - c_abs * a.half_y
     gap_ax = abs(ax) - a.half_x - c_abs * b.half_x - s_abs * b.half_y
     gap_ay = abs(ay) - a.half_y - s_abs * b.half_x - c_abs * b.half_y
-    best_b = max(gap_bx, gap_by)
-    best_a = max(gap_ax, gap_ay)
-    if max(best_a, best_b) > margin:
-        return False
+    best_b = greater(gap_bx, gap_by)
+    best_a = greater(gap_ax, gap_ay)
     is_of_b = best_b + TIE >= best_a
-    of_x, of_y = (gap_bx, gap_by) if is_of_b else (gap_ax, gap_ay)
-    along_x = of_x > of_y
-    if min(c_abs, s_abs) < LEVEL and passes_edge(max(of_x, of_y), min(of_x, of_y), a, b):
-        along_x = not along_x
-    if is_of_b:
-        face = face_towards(b, bx, by, along_x)
-        edge = clip(opposite_edge(face, a), face.half)
-    else:
-        face = face_towards(a, -ax, -ay, along_x)
-        edge = clip(opposite_edge(face, b), face.half)
-    return edge.right > edge.left and write_points(row, face, edge, a, b, is_of_b, margin)
+    of_x = select(is_of_b, gap_bx, gap_ax)
+    of_y = select(is_of_b, gap_by, gap_ay)
+    is_level = lesser(c_abs, s_abs) < LEVEL
+    along_x = (of_x > of_y) ^ (is_level & passes_edge(greater(of_x, of_y), lesser(of_x, of_y), a, b))
+    face = face_towards(chosen(is_of_b, b, a), select(is_of_b, bx, -ax), select(is_of_b, by, -ay), along_x)
+    edge = clip(opposite_edge(face, chosen(is_of_b, a, b)), face.half)
+    points = points_of(face, edge, a, b, is_of_b, margin)
+    is_near = (greater(best_a, best_b) <= margin) & (edge.right > edge.left)
+    return points, is_near & has_point(points)
+
+
+@rare_kernel
+def collide_blocks(row: Record, a: Record, b: Record, margin: float) -> bool:
+    """Find the contact manifold of two blocks; tell whether there is one within the margin (m)."""
+    points, is_on = points_of_blocks(block_of(a), block_of(b), margin)
+    write_points(row, points)
+    return is_on
+
+
+@kernel
+def blocks_at(bodies: Records, places: tuple[int, int, int, int]) -> Block:
+    """Return four blocks."""
+    x, y, _, cos = fields_0(None, bodies, places)
+    sin, _, _, _ = fields_4(None, bodies, places)
+    _, _, half_x, half_y = fields_16(None, bodies, places)
+    return Block(x, y, cos, sin, half_x, half_y)
+
+
+@kernel
+def collide_four(rows: Records, first: int, bodies: Records, margin: float) -> None:
+    """Find the contact manifolds of four pairs of blocks, from row `first` on, within the margin (m)."""
+    places = (first, first + 1, first + 2, first + 3)
+    one, two, three, four = rows[first], rows[first + 1], rows[first + 2], rows[first + 3]
+    a = blocks_at(bodies, (one.a, two.a, three.a, four.a))
+    b = blocks_at(bodies, (one.b, two.b, three.b, four.b))
+    points, is_on = points_of_blocks(a, b, margin)
+    nx, ny, _, _ = fields_0(None, rows, places)
+    _, normal_one, normal_two, shear = fields_8(None, rows, places)
+    are_kept = is_on & (points.nx * nx + points.ny * ny >= TURNED)
+    normal_one = select(are_kept, normal_one, 0.0)
+    normal_two = select(are_kept, normal_two, 0.0)
+    shear = select(are_kept, shear, 0.0)
+    are_all = points.width <= FAR
+    write_fields_0(None, rows, places, are_all, (points.nx, points.ny, points.arm_a, points.arm_b))
+    columns = (points.width, points.shear_arm_a, points.shear_arm_b, points.gap_one)
+    write_fields_4(None, rows, places, are_all, columns)
+    write_fields_8(None, rows, places, are_all, (points.gap_two, normal_one, normal_two, shear))
+    is_one, is_two, is_three, is_four = split(select(is_on, 1.0, 0.0))
+    one.is_on = is_one > 0.0
+    two.is_on = is_two > 0.0
+    three.is_on = is_three > 0.0
+    four.is_on = is_four > 0.0
 
 
 @rare_kernel
 def collide_ground(row: Record, a: Record, b: Record, margin: float) -> bool:
     """Find the contact manifold of a block and the half-plane."""
     face = Face(0.0, 1.0, a.x, b.y, 0.0, FAR)
-    edge = opposite_edge(face, a)
-    return min(edge.left_gap, edge.right_gap) <= margin and write_points(row, face, edge, a, b, True, margin)
+    edge = opposite_edge(face, block_of(a))
+    if min(edge.left_gap, edge.right_gap) > margin:
+        return False
+    return write_points(row, points_of(face, edge, block_of(a), block_of(b), True, margin))
 
 
 @kernel
@@ -215,8 +339,8 @@ def collide_slab(row: Record, block: Record, slab: Record, is_first: bool, margi
     `is_first` tells whether the block is body a. Where an end of the piece is an edge that blocks can touch, a face of
     the block that looks down on it may be the reference.
     """
-    face = face_of(slab, -slab.sin, slab.cos, False)
-    edge = opposite_edge(face, block)
+    face = face_of(block_of(slab), -slab.sin, slab.cos, False)
+    edge = opposite_edge(face, block_of(block))
     best = min(edge.left_gap, edge.right_gap)
     if best > margin:
         return False
@@ -230,7 +354,7 @@ def collide_slab(row: Record, block: Record, slab: Record, is_first: bool, margi
             mx = sign * (block.cos if along_x else -block.sin)
             my = sign * (block.sin if along_x else block.cos)
             if my * slab.cos - mx * slab.sin < FACING:
-                other = face_of(block, mx, my, along_x)
+                other = face_of(block_of(block), mx, my, along_x)
                 up = upper_edge(other, slab)
                 if min(up.left_gap, up.right_gap) > best + TIE:
                     best = min(up.left_gap, up.right_gap)
@@ -240,7 +364,17 @@ def collide_slab(row: Record, block: Record, slab: Record, is_first: bool, margi
     if best > margin or edge.right <= edge.left or not (is_above or is_of_block):
         return False
     a, b = (block, slab) if is_first else (slab, block)
-    return write_points(row, face, edge, a, b, is_of_block != is_first, margin)
+    return write_points(row, points_of(face, edge, block_of(a), block_of(b), is_of_block != is_first, margin))
+
+
+@kernel
+def are_four_of_blocks(rows: Records, first: int, bodies: Records) -> bool:
+    """Tell whether four pairs, from row `first` on, are of blocks only, not of pieces of ground or the ground."""
+    for r in range(first, first + WIDTH):
+        row = rows[r]
+        if row.b == bodies.size - 1 or bodies[row.a].faces != ALL or bodies[row.b].faces != ALL:
+            return False
+    return True
 
 
 @rare_kernel

@@ -2,7 +2,7 @@
 
 from blocksim.kernels.arrays import Record, Records
 from blocksim.kernels.geometry import place_corners, turn
-from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.jit import kernel
 from blocksim.kernels.nonsmooth.arrays import Contacts
 
 IN_FLIGHT = 1e-9  # of a kick: bodies whose velocity changes by no more beside it touch nothing
@@ -38,7 +38,7 @@ def kick_warm(line: Record, before: Record, last: float, hx: float, hy: float) -
     before.spin = spin
 
 
-@rare_kernel
+@kernel
 def kick_all(lines: Records, before: Records, first: int, last: int, share: float, hx: float, hy: float) -> None:
     """Kick the free bodies from `first` to before `last`."""
     for i in range(first, last):
@@ -46,7 +46,7 @@ def kick_all(lines: Records, before: Records, first: int, last: int, share: floa
             kick(lines[i], before[i], share, hx, hy)
 
 
-@rare_kernel
+@kernel
 def kick_all_warm(
     lines: Records, before: Records, first: int, last: int, last_share: float, hx: float, hy: float
 ) -> None:
@@ -56,7 +56,7 @@ def kick_all_warm(
             kick_warm(lines[i], before[i], last_share, hx, hy)
 
 
-@rare_kernel
+@kernel
 def drift_all(lines: Records, first: int, last: int, h: float) -> None:
     """Move the bodies from `first` to before `last` for h (s)."""
     for i in range(first, last):
@@ -99,7 +99,7 @@ def place(body: Record, line: Record, before: Record, share: float, h: float, gr
     line.turned = 0.0
 
 
-@rare_kernel
+@kernel
 def place_all(
     bodies: Records, contacts: Contacts, first: int, last: int, share: float, gravity: tuple[float, float]
 ) -> None:

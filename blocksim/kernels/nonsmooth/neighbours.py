@@ -17,7 +17,7 @@ from blocksim.kernels.broad_phase import bucket, cell_of
 from blocksim.kernels.geometry import ground_gap, separation
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-from blocksim.kernels.nonsmooth.colours import colour_pairs, keep_impulses, place_rows
+from blocksim.kernels.nonsmooth.colours import colour_pairs, keep_impulses, most_groups, place_rows
 from blocksim.kernels.support import has_motion
 
 STEPS = 16.0  # that a body should be able to go on before its reach is used up
@@ -33,14 +33,14 @@ class Frame(NamedTuple):
     vy: float
 
 
-@rare_kernel
+@kernel
 def frame_of_supports(scene: Nonsmooth) -> Frame:
     """Return the motion of the supports."""
     one = scene.contacts.stepping[0]
     return Frame(one.support_x - one.listed_x, one.support_y - one.listed_y, one.support_vx, one.support_vy)
 
 
-@rare_kernel
+@kernel
 def common_frame(scene: Nonsmooth) -> Frame:
     """Return the mean motion of the bodies along x, or that of the supports where anything but the ground is fixed."""
     bodies = scene.world.bodies
@@ -64,7 +64,7 @@ def corner_speed(body: Record, frame: Frame) -> float:
     return math.sqrt((body.vx - frame.vx) ** 2 + (body.vy - frame.vy) ** 2) + body.radius * abs(body.spin)
 
 
-@rare_kernel
+@kernel
 def look(scene: Nonsmooth) -> bool:
     """Fix the margin of the step to come, and make the pair list anew if bodies have come too far.
 
@@ -211,6 +211,9 @@ def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
         return False
     keep_impulses(scene, count)
     colour_pairs(scene, count)
+    if most_groups(scene) > scene.contacts.groups.size:
+        scene.world.clock[0].rebuilds = 0
+        return False
     place_rows(scene, count)
     scene.world.clock[0].pair_count = count
     scene.world.clock[0].rebuilds += 1

@@ -1,29 +1,43 @@
-"""What a substep does to the rows: warm start, position pass, velocity pass, books. Formulas: __init__.py.
+"""What a substep does to the rows, four at a time: warm start, position pass, velocity pass, books.
 
-Velocities are read, changed by all impulses of a row and written back; effective masses are computed anew each time,
-which is cheaper than to load them. Bodies that are fixed are never written to, so that rows of one colour share
-nothing that changes.
+Formulas: __init__.py. Velocities are read, changed by all impulses of a row and written back; effective masses are
+computed anew each time, which is cheaper than to load them. Bodies that are fixed are never written to, so that rows of
+one colour share nothing that changes.
 """
 
 from typing import NamedTuple
 
 from blocksim.kernels.arrays import Record
 from blocksim.kernels.friction import friction_coefficient
-from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.jit import kernel
+from blocksim.kernels.lanes import (
+    WIDTH,
+    Lane,
+    Lanes,
+    fields_0,
+    greater,
+    is_all,
+    lesser,
+    load,
+    select,
+    store,
+    write_fields_0,
+)
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
+from blocksim.kernels.nonsmooth.groups import Bodies, Rows, bodies_at, rows_of
 from blocksim.kernels.nonsmooth.solve import solve_two
 
 
 class Slip(NamedTuple):
     """Velocity of body a against body b at the contact points: along the normal, twice, and along the tangent (m/s)."""
 
-    one: float
-    two: float
-    shear: float
+    one: Lanes
+    two: Lanes
+    shear: Lanes
 
 
 @kernel
-def slip_of(row: Record, vx: float, vy: float, spin_a: float, spin_b: float) -> Slip:
+def slip_of(row: Rows, vx: Lanes, vy: Lanes, spin_a: Lanes, spin_b: Lanes) -> Slip:
     """Return the velocities at the points, given that of centre a against centre b and both spins."""
     one = row.nx * vx + row.ny * vy + row.arm_a * spin_a - row.arm_b * spin_b
     shear = row.nx * vy - row.ny * vx + row.shear_arm_a * spin_a - row.shear_arm_b * spin_b
@@ -31,23 +45,33 @@ def slip_of(row: Record, vx: float, vy: float, spin_a: float, spin_b: float) -> 
 
 
 @kernel
-def push(row: Record, a: Record, b: Record, normal: float, second: float, shear: float) -> None:
-    """Change the velocities of both bodies by a normal impulse (N s) in all, of which `second` at point two."""
+def push(
+    contacts: Contacts,
+    group: Record,
+    lane: Lane,
+    row: Rows,
+    a: Bodies,
+    b: Bodies,
+    normal: Lanes,
+    second: Lanes,
+    shear: Lanes,
+) -> None:
+    """Change the velocities of the bodies by a normal impulse (N s) in all, of which `second` at point two."""
     px = row.nx * normal - row.ny * shear
     py = row.ny * normal + row.nx * shear
     turn = row.width * second
-    if a.inverse_mass > 0.0:
-        a.vx += a.inverse_mass * px
-        a.vy += a.inverse_mass * py
-        a.spin += a.inverse_inertia * (row.arm_a * normal - turn + row.shear_arm_a * shear)
-    if b.inverse_mass > 0.0:
-        b.vx -= b.inverse_mass * px
-        b.vy -= b.inverse_mass * py
-        b.spin -= b.inverse_inertia * (row.arm_b * normal - turn + row.shear_arm_b * shear)
+    vx = a.vx + a.inverse_mass * px
+    vy = a.vy + a.inverse_mass * py
+    spin = a.spin + a.inverse_inertia * (row.arm_a * normal - turn + row.shear_arm_a * shear)
+    write_fields_0(lane, contacts.lines, group.a, a.inverse_mass > 0.0, (vx, vy, spin, a.inverse_mass))
+    vx = b.vx - b.inverse_mass * px
+    vy = b.vy - b.inverse_mass * py
+    spin = b.spin - b.inverse_inertia * (row.arm_b * normal - turn + row.shear_arm_b * shear)
+    write_fields_0(lane, contacts.lines, group.b, b.inverse_mass > 0.0, (vx, vy, spin, b.inverse_mass))
 
 
 @kernel
-def masses(row: Record, a: Record, b: Record) -> tuple[float, float, float]:
+def masses(row: Rows, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes, Lanes]:
     """Return A (1/kg) of the two normals: of one, mixed, of two."""
     together = a.inverse_mass + b.inverse_mass
     two_a = row.arm_a - row.width
@@ -61,62 +85,74 @@ def masses(row: Record, a: Record, b: Record) -> tuple[float, float, float]:
 
 
 @kernel
-def warm_row(row: Record, a: Record, b: Record) -> None:
+def warm_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     """Begin with the impulses of the last substep."""
-    push(row, a, b, row.normal_one + row.normal_two, row.normal_two, row.shear)
+    second = load(lane, group.normal_two)
+    normal = load(lane, group.normal_one) + second
+    if not is_all(normal <= 0.0):
+        a = bodies_at(contacts, group.a, lane)
+        b = bodies_at(contacts, group.b, lane)
+        push(contacts, group, lane, rows_of(group, lane), a, b, normal, second, load(lane, group.shear))
 
 
 @kernel
-def gaps(row: Record, a: Record, b: Record) -> tuple[float, float]:
+def gaps(group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes]:
     """Return both gaps (m) as they are now."""
     slip = slip_of(row, a.dx - b.dx, a.dy - b.dy, a.turned, b.turned)
-    return row.gap_one + slip.one, row.gap_two + slip.two
+    return load(lane, group.gap_one) + slip.one, load(lane, group.gap_two) + slip.two
 
 
 @kernel
-def position_row(row: Record, a: Record, b: Record, stepping: Record) -> None:
-    """Solve both normals of a row with soft contacts and gaps that may just close."""
-    gap_one, gap_two = gaps(row, a, b)
+def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
+    """Solve both normals of rows with soft contacts and gaps that may just close."""
+    stepping = contacts.stepping[0]
+    row = rows_of(group, lane)
+    a = bodies_at(contacts, group.a, lane)
+    b = bodies_at(contacts, group.b, lane)
+    gap_one, gap_two = gaps(group, lane, row, a, b)
     slip = slip_of(row, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
     one, mixed, two = masses(row, a, b)
-    old_one = row.normal_one
-    old_two = row.normal_two
-    k_one = one + (0.0 if gap_one > 0.0 else stepping.softness) * one
-    k_two = two + (0.0 if gap_two > 0.0 else stepping.softness) * two
-    q_one = slip.one + (stepping.open_bias if gap_one > 0.0 else stepping.closed_bias) * gap_one
-    q_two = slip.two + (stepping.open_bias if gap_two > 0.0 else stepping.closed_bias) * gap_two
-    q_one -= one * old_one + mixed * old_two
-    q_two -= mixed * old_one + two * old_two
+    old_one = load(lane, group.normal_one)
+    old_two = load(lane, group.normal_two)
+    k_one = one + select(gap_one > 0.0, 0.0, stepping.softness) * one
+    k_two = two + select(gap_two > 0.0, 0.0, stepping.softness) * two
+    free_one = slip.one + select(gap_one > 0.0, stepping.open_bias, stepping.closed_bias) * gap_one
+    free_two = slip.two + select(gap_two > 0.0, stepping.open_bias, stepping.closed_bias) * gap_two
+    q_one = free_one - (one * old_one + mixed * old_two)
+    q_two = free_two - (mixed * old_one + two * old_two)
     new_one, new_two = solve_two(k_one, mixed, k_two, q_one, q_two)
-    row.normal_one = new_one
-    row.normal_two = new_two
+    store(lane, group.normal_one, new_one)
+    store(lane, group.normal_two, new_two)
     second = new_two - old_two
-    push(row, a, b, new_one - old_one + second, second, 0.0)
+    push(contacts, group, lane, row, a, b, new_one - old_one + second, second, 0.0 * second)
 
 
 @kernel
-def target(impulse: float, gap: float, approach: float, restitution: float, stepping: Record) -> float:
+def target(impulse: Lanes, gap: Lanes, approach: Lanes, restitution: Lanes, stepping: Record) -> Lanes:
     """Return what J v of a point has to be at least (m/s) after the velocity pass; -FAR where it does not count.
 
     A gap that is still open must not slow an approach down: it would take a part of it in the substep before the
     impact, and restitution would vanish for small substeps.
     """
     rebounds = (approach < -stepping.threshold) & (restitution > 0.0)
-    least = -restitution * approach if rebounds else -max(gap, 0.0) * stepping.open_bias
-    return least if (impulse > 0.0) | (gap <= 0.0) else -FAR
+    least = select(rebounds, -restitution * approach, -greater(gap, 0.0) * stepping.open_bias)
+    return select((impulse > 0.0) | (gap <= 0.0), least, -FAR)
 
 
-@rare_kernel
-def aim(contacts: Contacts, row: Record, a: Record, b: Record) -> None:
-    """Fix what the velocity pass has to reach at the points of a row."""
+@kernel
+def aim(contacts: Contacts, group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes]:
+    """Fix what the velocity pass has to reach at the points of rows."""
     stepping = contacts.stepping[0]
-    gap_one, gap_two = gaps(row, a, b)
-    restitution = contacts.touches[row.touch].restitution
-    before_a = contacts.before[row.a]
-    before_b = contacts.before[row.b]
-    u = slip_of(row, before_a.vx - before_b.vx, before_a.vy - before_b.vy, before_a.spin, before_b.spin)
-    row.target_one = target(row.normal_one, gap_one, u.one, restitution, stepping)
-    row.target_two = target(row.normal_two, gap_two, u.two, restitution, stepping)
+    gap_one, gap_two = gaps(group, lane, row, a, b)
+    restitution = load(lane, group.restitution)
+    vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
+    vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
+    u = slip_of(row, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
+    t_one = target(load(lane, group.normal_one), gap_one, u.one, restitution, stepping)
+    t_two = target(load(lane, group.normal_two), gap_two, u.two, restitution, stepping)
+    store(lane, group.target_one, t_one)
+    store(lane, group.target_two, t_two)
+    return t_one, t_two
 
 
 @kernel
@@ -136,21 +172,57 @@ def shear_limit(touch: Record, normal: float, needed: float, mass: float) -> flo
 
 
 @kernel
-def velocity_row(row: Record, a: Record, b: Record, touch: Record) -> float:
-    """Solve both normals of a row without softness, then friction; return the largest change of velocity (m/s)."""
-    t_one = row.target_one
-    t_two = row.target_two
-    if max(t_one, t_two) == -FAR and row.shear == 0.0:  # no normal impulse, so no friction either
-        return 0.0
+def shear_limits(contacts: Contacts, group: Record, lane: Lane, normal: Lanes, needed: Lanes, mass: Lanes) -> Lanes:
+    """Return the largest shear impulses (N s) of rows; see shear_limit."""
+    if group.is_simple:
+        return load(lane, group.friction) * normal
+    store(lane, group.pressed, normal)
+    store(lane, group.needed, needed)
+    store(lane, group.mass, mass)
+    for k in range(group.count):
+        touch = contacts.touches[contacts.rows[group.row[k]].touch]
+        group.pressed[k] = shear_limit(touch, group.pressed[k], group.needed[k], group.mass[k])
+    for k in range(group.count, WIDTH):
+        group.pressed[k] = group.pressed[group.count - 1]
+    return load(lane, group.pressed)
+
+
+@kernel
+def first_velocity_group(contacts: Contacts, group: Record, lane: Lane) -> Lanes:
+    """Begin the velocity pass of rows; return the largest changes of velocity (m/s)."""
+    row = rows_of(group, lane)
+    a = bodies_at(contacts, group.a, lane)
+    b = bodies_at(contacts, group.b, lane)
+    t_one, t_two = aim(contacts, group, lane, row, a, b)
+    return reach(contacts, group, lane, row, a, b, t_one, t_two)
+
+
+@kernel
+def velocity_group(contacts: Contacts, group: Record, lane: Lane) -> Lanes:
+    """Go on with the velocity pass of rows; return the largest changes of velocity (m/s)."""
+    row = rows_of(group, lane)
+    a = bodies_at(contacts, group.a, lane)
+    b = bodies_at(contacts, group.b, lane)
+    return reach(contacts, group, lane, row, a, b, load(lane, group.target_one), load(lane, group.target_two))
+
+
+@kernel
+def reach(
+    contacts: Contacts, group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies, t_one: Lanes, t_two: Lanes
+) -> Lanes:
+    """Solve both normals of rows without softness, then friction; return the largest changes of velocity (m/s)."""
+    if is_all((greater(t_one, t_two) <= -FAR) & (abs(load(lane, group.shear)) <= 0.0)):
+        return 0.0 * t_one  # no normal impulse, so no friction either
     slip = slip_of(row, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
     one, mixed, two = masses(row, a, b)
-    old_one = row.normal_one
-    old_two = row.normal_two
+    old_one = load(lane, group.normal_one)
+    old_two = load(lane, group.normal_two)
+    old_shear = load(lane, group.shear)
     q_one = slip.one - t_one - one * old_one - mixed * old_two
     q_two = slip.two - t_two - mixed * old_one - two * old_two
     new_one, new_two = solve_two(one, mixed, two, q_one, q_two)
-    row.normal_one = new_one
-    row.normal_two = new_two
+    store(lane, group.normal_one, new_one)
+    store(lane, group.normal_two, new_two)
     d_one = new_one - old_one
     d_two = new_two - old_two
     normal = d_one + d_two
@@ -160,38 +232,44 @@ def velocity_row(row: Record, a: Record, b: Record, touch: Record) -> float:
     turn = row.width * d_two
     rate = slip.shear + coupled_a * (row.arm_a * normal - turn) + coupled_b * (row.arm_b * normal - turn)
     mass = a.inverse_mass + b.inverse_mass + coupled_a * row.shear_arm_a + coupled_b * row.shear_arm_b
-    needed = row.shear - rate * (1.0 / mass)
-    limit = shear_limit(touch, new_one + new_two, abs(needed), mass)
-    shear = min(max(needed, -limit), limit)
-    d_shear = shear - row.shear
-    row.shear = shear
-    push(row, a, b, normal, d_two, d_shear)
-    return (a.inverse_mass + b.inverse_mass) * max(abs(d_one), abs(d_two), abs(d_shear))
+    needed = old_shear - rate * (1.0 / mass)
+    limit = shear_limits(contacts, group, lane, new_one + new_two, abs(needed), mass)
+    shear = lesser(greater(needed, -limit), limit)
+    d_shear = shear - old_shear
+    store(lane, group.shear, shear)
+    push(contacts, group, lane, row, a, b, normal, d_two, d_shear)
+    return (a.inverse_mass + b.inverse_mass) * greater(greater(abs(d_one), abs(d_two)), abs(d_shear))
 
 
 @kernel
-def book_row(contacts: Contacts, row: Record, gx: float, gy: float, hx: float, hy: float, book: Record) -> None:
-    """Book what the impulses of a row have taken from the energy in this substep, and brought into the supports.
+def taken_by(
+    contacts: Contacts, group: Record, lane: Lane, gx: float, gy: float, hx: float, hy: float
+) -> tuple[Lanes, Lanes, Lanes]:
+    """Return what normal and shear impulses of rows have taken from the energy in this substep (J), both twice.
+
+    The third is what they have brought into the supports (J).
 
     An impulse times the mean of the velocities before and after all impulses is the energy that it brings; summed over
     all rows that is exact, whatever the order in which impulses were found. Velocities live half a substep before
     positions: the velocity before the impulses has a kick of gravity (`gx`, `gy`, m/s) in it, of which a supported
     body does not fall. The weight's part in the drift, half of `hx`, `hy` (m/s, a whole kick), is not lost.
     """
-    if row.normal_one == 0.0 and row.normal_two == 0.0:
-        return
-    a = contacts.lines[row.a]
-    b = contacts.lines[row.b]
-    c = contacts.before[row.a]
-    d = contacts.before[row.b]
-    free = (1.0 if a.inverse_mass > 0.0 else 0.0) - (1.0 if b.inverse_mass > 0.0 else 0.0)
-    vx = a.vx - b.vx + c.vx - d.vx + free * (gx - hx)
-    vy = a.vy - b.vy + c.vy - d.vy + free * (gy - hy)
-    slip = slip_of(row, vx, vy, a.spin + c.spin, b.spin + d.spin)
-    book.impacts -= 0.5 * (slip.one * row.normal_one + slip.two * row.normal_two)
-    book.friction -= 0.5 * slip.shear * row.shear
-    if free != 0.0:
-        normal = row.normal_one + row.normal_two
-        ux = contacts.stepping[0].support_vx
-        uy = contacts.stepping[0].support_vy
-        book.to_support -= free * (normal * (row.nx * ux + row.ny * uy) + row.shear * (row.nx * uy - row.ny * ux))
+    normal_one = load(lane, group.normal_one)
+    normal_two = load(lane, group.normal_two)
+    if is_all(normal_one + normal_two <= 0.0):
+        return 0.0 * normal_one, 0.0 * normal_one, 0.0 * normal_one
+    stepping = contacts.stepping[0]
+    row = rows_of(group, lane)
+    shear = load(lane, group.shear)
+    a = bodies_at(contacts, group.a, lane)
+    b = bodies_at(contacts, group.b, lane)
+    vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
+    vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
+    free = select(a.inverse_mass > 0.0, 1.0, 0.0) - select(b.inverse_mass > 0.0, 1.0, 0.0)
+    vx = a.vx - b.vx + vx_a - vx_b + free * (gx - hx)
+    vy = a.vy - b.vy + vy_a - vy_b + free * (gy - hy)
+    slip = slip_of(row, vx, vy, a.spin + spin_a, b.spin + spin_b)
+    along_normal = row.nx * stepping.support_vx + row.ny * stepping.support_vy
+    along_tangent = row.nx * stepping.support_vy - row.ny * stepping.support_vx
+    given = free * ((normal_one + normal_two) * along_normal + shear * along_tangent)
+    return slip.one * normal_one + slip.two * normal_two, slip.shear * shear, -given

@@ -1,5 +1,7 @@
 """One substep of all bodies and rows, shared by threads."""
 
+import math
+
 from blocksim.kernels.arrays import TEAM_SIZE, Integers
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import COLOURS, Contacts, Nonsmooth
@@ -21,7 +23,7 @@ WARM, POSITION, FIRST_VELOCITY, VELOCITY = range(4)
 
 @kernel
 def rows_of(contacts: Contacts, task: int, begin: int, end: int) -> float:
-    """Do one task for some active rows; return the largest change of velocity (m/s) where it is of interest."""
+    """Do one task for some groups; return the largest change of velocity (m/s) where it is of interest."""
     if task == WARM:
         warm_rows(contacts, begin, end)
     elif task == POSITION:
@@ -33,9 +35,9 @@ def rows_of(contacts: Contacts, task: int, begin: int, end: int) -> float:
     return 0.0
 
 
-@rare_kernel
+@kernel
 def sweep(contacts: Contacts, task: int, team: Integers, k: int) -> float:
-    """Do one task for all active rows, colour after colour; return the largest change of velocity (m/s) of thread k."""
+    """Do one task for all groups, colour after colour; return the largest change of velocity (m/s) of thread k."""
     largest = 0.0
     size = team[TEAM_SIZE]
     for colour in range(contacts.stepping[0].colours):
@@ -52,11 +54,12 @@ def sweep(contacts: Contacts, task: int, team: Integers, k: int) -> float:
 def velocity_pass(contacts: Contacts, team: Integers, k: int, task: int) -> None:
     """Sweep until no impulse changes a velocity by more than the tolerance, or as often as allowed."""
     stepping = contacts.stepping[0]
-    sweeps = 1
-    largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
+    largest = math.inf
+    sweeps = 0
     while largest > stepping.tolerance and sweeps < stepping.velocity_sweeps:
         sweeps += 1
-        largest = agree(contacts, team, k, sweeps, sweep(contacts, VELOCITY, team, k))
+        largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
+        task = VELOCITY
     if k == 0:
         stepping.sweeps += sweeps
 
@@ -64,7 +67,7 @@ def velocity_pass(contacts: Contacts, team: Integers, k: int, task: int) -> None
 @rare_kernel
 def calm(contacts: Contacts, team: Integers, k: int, gx: float, gy: float) -> None:
     """Solve the velocity pass again with weaker rebounds while its impulses create energy; every thread finds out."""
-    first, last = part_of(0, contacts.stepping[0].active_count, k, team[TEAM_SIZE])
+    first, last = part_of(0, contacts.stepping[0].group_count, k, team[TEAM_SIZE])
     for i in range(TRIES + 1):
         if not gains(contacts, gx, gy):
             return
@@ -74,7 +77,7 @@ def calm(contacts: Contacts, team: Integers, k: int, gx: float, gy: float) -> No
         velocity_pass(contacts, team, k, VELOCITY)
 
 
-@rare_kernel
+@kernel
 def agree(contacts: Contacts, team: Integers, k: int, sweeps: int, largest: float) -> float:
     """Return the largest of what all threads have found; `sweeps` tells one question from the next."""
     size = team[TEAM_SIZE]
@@ -101,7 +104,7 @@ def bodies_of(contacts: Contacts, k: int, size: int) -> tuple[int, int]:
     return count * k // size, count * (k + 1) // size
 
 
-@rare_kernel
+@kernel
 def substep(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
     """Go through substep `number` of a step as thread k; the first one of a run has half a kick of gravity."""
     contacts = scene.contacts
@@ -128,6 +131,6 @@ def substep(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
     velocity_pass(contacts, team, k, FIRST_VELOCITY)
     if stepping.is_guarded:
         calm(contacts, team, k, share * hx, share * hy)
-    first, last = part_of(0, stepping.active_count, k, team[TEAM_SIZE])
+    first, last = part_of(0, stepping.group_count, k, team[TEAM_SIZE])
     book_rows(contacts, first, last, share * hx, share * hy, hx, hy)
     meet(team)

@@ -1,9 +1,10 @@
 """Sweeps over the rows, colour after colour. Rows of one colour share no free body: threads divide them."""
 
-from blocksim.kernels.arrays import Integers
-from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.jit import kernel
+from blocksim.kernels.lanes import greater, spread
 from blocksim.kernels.nonsmooth.arrays import PART, Contacts
-from blocksim.kernels.nonsmooth.passes import aim, book_row, position_row, velocity_row, warm_row
+from blocksim.kernels.nonsmooth.groups import highest, total
+from blocksim.kernels.nonsmooth.passes import first_velocity_group, position_group, taken_by, velocity_group, warm_group
 
 
 @kernel
@@ -15,65 +16,69 @@ def part_of(begin: int, end: int, k: int, size: int) -> tuple[int, int]:
     return min(end, begin + blocks * k // size * PART), min(end, begin + blocks * (k + 1) // size * PART)
 
 
-@rare_kernel
+@kernel
 def warm_rows(contacts: Contacts, begin: int, end: int) -> None:
-    """Warm-start some active rows."""
+    """Warm-start the rows of some groups."""
     for m in range(begin, end):
-        row = contacts.rows[contacts.active[m]]
-        warm_row(row, contacts.lines[row.a], contacts.lines[row.b])
+        group = contacts.groups[m]
+        if group.count == 1:
+            warm_group(contacts, group, 0)
+        else:
+            warm_group(contacts, group, None)
 
 
-@rare_kernel
+@kernel
 def position_rows(contacts: Contacts, begin: int, end: int) -> None:
-    """Go through the position pass of some active rows."""
-    stepping = contacts.stepping[0]
+    """Go through the position pass of some groups."""
     for m in range(begin, end):
-        row = contacts.rows[contacts.active[m]]
-        position_row(row, contacts.lines[row.a], contacts.lines[row.b], stepping)
+        group = contacts.groups[m]
+        if group.count == 1:
+            position_group(contacts, group, 0)
+        else:
+            position_group(contacts, group, None)
 
 
-@rare_kernel
+@kernel
 def first_velocity_rows(contacts: Contacts, begin: int, end: int) -> float:
-    """Begin the velocity pass of some active rows; return the largest change of velocity (m/s)."""
-    largest = 0.0
+    """Begin the velocity pass of some groups; return the largest change of velocity (m/s)."""
+    largest = spread(0.0)
+    single = 0.0
     for m in range(begin, end):
-        row = contacts.rows[contacts.active[m]]
-        a = contacts.lines[row.a]
-        b = contacts.lines[row.b]
-        aim(contacts, row, a, b)
-        largest = max(largest, velocity_row(row, a, b, contacts.touches[row.touch]))
-    return largest
+        group = contacts.groups[m]
+        if group.count == 1:
+            single = greater(first_velocity_group(contacts, group, 0), single)
+        else:
+            largest = greater(first_velocity_group(contacts, group, None), largest)
+    return max(single, highest(largest))
 
 
-@rare_kernel
+@kernel
 def velocity_rows(contacts: Contacts, begin: int, end: int) -> float:
-    """Go once more through the velocity pass of some active rows; return the largest change of velocity (m/s)."""
-    largest = 0.0
+    """Go once more through the velocity pass of some groups; return the largest change of velocity (m/s)."""
+    largest = spread(0.0)
+    single = 0.0
     for m in range(begin, end):
-        row = contacts.rows[contacts.active[m]]
-        a = contacts.lines[row.a]
-        b = contacts.lines[row.b]
-        largest = max(largest, velocity_row(row, a, b, contacts.touches[row.touch]))
-    return largest
+        group = contacts.groups[m]
+        if group.count == 1:
+            single = greater(velocity_group(contacts, group, 0), single)
+        else:
+            largest = greater(velocity_group(contacts, group, None), largest)
+    return max(single, highest(largest))
 
 
-@rare_kernel
+@kernel
 def book_rows(contacts: Contacts, begin: int, end: int, gx: float, gy: float, hx: float, hy: float) -> None:
-    """Book some active rows."""
+    """Book the rows of some groups."""
     for m in range(begin, end):
-        book_row(contacts, contacts.rows[contacts.active[m]], gx, gy, hx, hy, contacts.books[m // PART])
-
-
-@rare_kernel
-def gather(contacts: Contacts, begins: Integers) -> None:
-    """List the rows that are on, colour after colour."""
-    stepping = contacts.stepping[0]
-    count = 0
-    for colour in range(stepping.colours):
-        contacts.ends[colour] = count
-        for r in range(begins[colour], begins[colour + 1]):
-            if contacts.rows[r].is_on:
-                contacts.active[count] = r
-                count += 1
-    contacts.ends[stepping.colours] = count
-    stepping.active_count = count
+        group = contacts.groups[m]
+        book = contacts.books[m // PART]
+        if group.count == 1:
+            normal, shear, given = taken_by(contacts, group, 0, gx, gy, hx, hy)
+            book.impacts -= 0.5 * normal
+            book.friction -= 0.5 * shear
+            book.to_support += given
+        else:
+            normals, shears, gifts = taken_by(contacts, group, None, gx, gy, hx, hy)
+            book.impacts -= 0.5 * total(normals, group.count)
+            book.friction -= 0.5 * total(shears, group.count)
+            book.to_support += total(gifts, group.count)

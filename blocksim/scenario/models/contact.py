@@ -142,7 +142,9 @@ class Contact(Table):
         default=None, description="damping ratio in shear (default: the normal one)"
     )
     max_overlap: q.PositiveLength | None = Field(
-        default=None, description="overlap that stops the run (default: 5 % of the smallest side of each pair)"
+        default=None,
+        description="overlap that stops the run (default: 5 % of the smallest side of each pair, 50 % where contacts "
+        "are rigid)",
     )
     skin: q.PositiveLength | None = Field(
         default=None,

@@ -1,0 +1,172 @@
+"""Rows in fours: the active rows of a step, packed for the registers of a processor, and their impulses brought back.
+
+The rows of a group are of one colour, so they share no free body and can be solved at the same time. A group that is
+not full has its last row several times: all of these copies find the same, so that no lane needs to be left out.
+"""
+
+from typing import NamedTuple
+
+from blocksim.kernels.arrays import Integers, Record
+from blocksim.kernels.jit import kernel
+from blocksim.kernels.lanes import (
+    WIDTH,
+    Lane,
+    Lanes,
+    fields_0,
+    fields_4,
+    fields_8,
+    load,
+    split,
+    store,
+)
+from blocksim.kernels.nonsmooth.arrays import COLOURS, Contacts
+
+
+class Rows(NamedTuple):
+    """What four rows are, the same for all substeps of a step; fields as in ROW."""
+
+    nx: Lanes
+    ny: Lanes
+    arm_a: Lanes
+    arm_b: Lanes
+    width: Lanes
+    shear_arm_a: Lanes
+    shear_arm_b: Lanes
+
+
+class Bodies(NamedTuple):
+    """Four bodies, fields as in LINE."""
+
+    vx: Lanes
+    vy: Lanes
+    spin: Lanes
+    inverse_mass: Lanes
+    inverse_inertia: Lanes
+    dx: Lanes
+    dy: Lanes
+    turned: Lanes
+
+
+@kernel
+def rows_of(group: Record, lane: Lane) -> Rows:
+    """Return the rows of a group."""
+    return Rows(
+        load(lane, group.nx),
+        load(lane, group.ny),
+        load(lane, group.arm_a),
+        load(lane, group.arm_b),
+        load(lane, group.width),
+        load(lane, group.shear_arm_a),
+        load(lane, group.shear_arm_b),
+    )
+
+
+@kernel
+def bodies_at(contacts: Contacts, places: Integers, lane: Lane) -> Bodies:
+    """Return the bodies of a group."""
+    vx, vy, spin, inverse_mass = fields_0(lane, contacts.lines, places)
+    inverse_inertia, dx, dy, turned = fields_4(lane, contacts.lines, places)
+    return Bodies(vx, vy, spin, inverse_mass, inverse_inertia, dx, dy, turned)
+
+
+@kernel
+def gather(contacts: Contacts, begins: Integers) -> None:
+    """Make groups of the rows that are on, colour after colour."""
+    stepping = contacts.stepping[0]
+    rows = contacts.rows
+    count = 0
+    number = 0
+    for colour in range(stepping.colours):
+        contacts.ends[colour] = number
+        most = 1 if colour == COLOURS - 1 else WIDTH
+        lane = 0
+        for r in range(begins[colour], begins[colour + 1]):
+            if rows[r].is_on:
+                contacts.groups[number].row[lane] = r
+                lane += 1
+                count += 1
+                if lane == most:
+                    close(contacts.groups[number], lane)
+                    number += 1
+                    lane = 0
+        if lane > 0:
+            close(contacts.groups[number], lane)
+            number += 1
+    contacts.ends[stepping.colours] = number
+    stepping.active_count = count
+    stepping.group_count = number
+
+
+@kernel
+def close(group: Record, count: int) -> None:
+    """Fill a group of `count` rows up with the last one."""
+    group.count = count
+    for lane in range(count, WIDTH):
+        group.row[lane] = group.row[count - 1]
+
+
+@kernel
+def pack_groups(contacts: Contacts, begin: int, end: int) -> None:
+    """Copy the rows of some groups into them."""
+    for m in range(begin, end):
+        group = contacts.groups[m]
+        if group.count == 1:
+            pack(contacts, group, 0)
+        else:
+            pack(contacts, group, None)
+        group.is_simple = 1
+        for lane in range(1 if group.count == 1 else WIDTH):
+            row = contacts.rows[group.row[lane]]
+            touch = contacts.touches[row.touch]
+            group.a[lane] = row.a
+            group.b[lane] = row.b
+            group.restitution[lane] = touch.restitution
+            group.friction[lane] = touch.kinetic_friction
+            if touch.static_friction != touch.kinetic_friction:
+                group.is_simple = 0
+
+
+@kernel
+def pack(contacts: Contacts, group: Record, lane: Lane) -> None:
+    """Copy the numbers of the rows of a group into it."""
+    nx, ny, arm_a, arm_b = fields_0(lane, contacts.rows, group.row)
+    width, shear_arm_a, shear_arm_b, gap_one = fields_4(lane, contacts.rows, group.row)
+    gap_two, normal_one, normal_two, shear = fields_8(lane, contacts.rows, group.row)
+    store(lane, group.nx, nx)
+    store(lane, group.ny, ny)
+    store(lane, group.arm_a, arm_a)
+    store(lane, group.arm_b, arm_b)
+    store(lane, group.width, width)
+    store(lane, group.shear_arm_a, shear_arm_a)
+    store(lane, group.shear_arm_b, shear_arm_b)
+    store(lane, group.gap_one, gap_one)
+    store(lane, group.gap_two, gap_two)
+    store(lane, group.normal_one, normal_one)
+    store(lane, group.normal_two, normal_two)
+    store(lane, group.shear, shear)
+
+
+@kernel
+def unpack_groups(contacts: Contacts, begin: int, end: int) -> None:
+    """Bring the impulses of some groups back to their rows."""
+    for m in range(begin, end):
+        group = contacts.groups[m]
+        for lane in range(group.count):
+            row = contacts.rows[group.row[lane]]
+            row.normal_one = group.normal_one[lane]
+            row.normal_two = group.normal_two[lane]
+            row.shear = group.shear[lane]
+
+
+@kernel
+def total(x: Lanes, count: int) -> float:
+    """Return the sum of the first `count` lanes, at least two."""
+    one, two, three, four = split(x)
+    return (one + two) + ((three if count > 2 else 0.0) + (four if count > 3 else 0.0))
+
+
+@kernel
+def highest(x: Lanes) -> float:
+    """Return the largest number."""
+    one, two, three, four = split(x)
+    return max(one, two, three, four)
