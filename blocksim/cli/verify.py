@@ -59,7 +59,7 @@ def verify_command(
     """Run the verification cases and show the table.
 
     Exit code 1 says that a number is outside its tolerance. All cases take some four minutes on one core, half a minute
-    with --scheme nonsmooth, which leaves out those that are about springs.
+    with --scheme nonsmooth, which leaves out those that are about springs and shortens none.
 
     Example: blocksim verify V3 V7 --law hertz-mindlin
     """

@@ -53,7 +53,7 @@ def before_impact(setting: Setting) -> Iterator[Row]:
         yield absolute(f"{time:.2f} s, angle off by", "°", 0.0, angle, 0.15)
     if setting.rigid:
         worst = max(place for place, _ in off_reference(setting.stepped(LONG_STEP)).values())
-        yield absolute("steps of 1 ms, place off by", "mm", 0.0, worst, RIGID_PLACE * LONG_STEP)
+        yield absolute("1 ms step, place off", "mm", 0.0, worst, RIGID_PLACE * LONG_STEP)
 
 
 def off_reference(setting: Setting) -> dict[float, tuple[float, float]]:

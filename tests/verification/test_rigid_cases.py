@@ -14,6 +14,7 @@ from blocksim.verification import energy
 from blocksim.verification.case import Case, Row, Setting
 from blocksim.verification.cases import CASES, SettingError, chosen, left_out
 from blocksim.verification.reference import RIGID, STORE, read_store, stored_rows
+from blocksim.verification.scene import HEIGHT
 from blocksim.verification.throws import Throw, Thrower
 from blocksim.verification.verify import Outcome, run_case
 from blocksim.world import nonsmooth
@@ -123,6 +124,13 @@ def test_a_stack_on_leaning_ground_is_noticed() -> None:
             return replace(super().scene(bodies, **values), tilt=-0.03)
 
     assert rows_missed(Leaning(scheme="nonsmooth"), "V13")
+
+
+def test_energy_that_friction_took_and_nobody_booked_is_noticed() -> None:
+    slide = SETTING.start([{"y": HEIGHT / 2, "velocity": [0.5, 0.0]}]).to_time(0.1)
+    assert slide.residual() < energy.RIGID_LEDGER_TOLERANCE
+    slide.scene.contacts.books.friction[:] *= 0.999
+    assert slide.residual() > 1e-4
 
 
 def test_energy_from_rebounds_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
