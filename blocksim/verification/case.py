@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from blocksim.kernels.arrays import World
+
+
+RIGID_STEP = 1e-4
+"""Step (s) of the non-smooth scheme, which is first order in it, where a case does not say that it needs another."""
+VELOCITY_TOLERANCE = 1e-6
+"""Of the non-smooth scheme (m/s): closed forms know no unsolved impulses."""
 
 
 class Verdict(StrEnum):
@@ -55,6 +61,29 @@ class Setting:
     model: str = "surface"
     law: str = "linear"
     quick: bool = False  # the case's shortened size, where it has one
+    scheme: str = "explicit"
+    rigid_step: float = RIGID_STEP  # s, of the non-smooth scheme; the explicit one finds its own
+
+    @property
+    def rigid(self) -> bool:
+        """Tell whether contacts are rigid: impulses instead of springs, Newton's restitution."""
+        return self.scheme == "nonsmooth"
+
+    @property
+    def stepping(self) -> dict[str, object]:
+        """Keys of [time] that the scheme needs; contacts are found at every step, as there is but one substep."""
+        if not self.rigid:
+            return {}
+        steps = {"step": self.rigid_step, "substeps": 1, "velocity_tolerance": VELOCITY_TOLERANCE}
+        return {"scheme": self.scheme, **steps}
+
+    def distinct(self, spacings: Sequence[float]) -> Sequence[float]:
+        """Return the particle spacings (m) that a case has to try: one where there are no particles to any contact."""
+        return spacings[:1] if self.rigid else spacings
+
+    def stepped(self, step: float) -> Setting:
+        """Return the same setting with another step (s) of the non-smooth scheme; the explicit one is left as it is."""
+        return replace(self, rigid_step=step)
 
     @property
     def hertzian(self) -> bool:
@@ -64,7 +93,8 @@ class Setting:
     def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> Scene:
         """Return a scene with this model and law; `values` are more fields of Scene."""
         contact = {"model": self.model, "law": self.law, **values.pop("contact", {})}
-        return Scene(bodies, contact=contact, **values)
+        time = {**self.stepping, **values.pop("time", {})}
+        return Scene(bodies, contact=contact, time=time, **values)
 
     def start(
         self,
@@ -89,6 +119,8 @@ class Case:
     measure: Measure
     quick: str = ""  # what the quick size leaves out; empty where there is but one size
     remarks: Mapping[str, str] = field(default_factory=dict)  # model: why it may be outside
+    not_for: Mapping[str, str] = field(default_factory=dict)  # scheme: why the case says nothing about it
+    rigid_step: float | None = RIGID_STEP  # s, that the non-smooth scheme needs; None where scenarios have their own
 
 
 def absolute(quantity: str, unit: str, expected: float, measured: float, tolerance: float) -> Row:

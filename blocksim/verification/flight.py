@@ -35,7 +35,7 @@ def free_flight(setting: Setting) -> Iterator[Row]:
 
 def bounces(setting: Setting) -> Iterator[Row]:
     """Drop a block flat; apexes and flight time at four particle spacings, the farthest off counts."""
-    found = [observed(dropped(setting, spacing), 3) for spacing in SPACINGS]
+    found = [observed(dropped(setting, spacing), 3) for spacing in setting.distinct(SPACINGS)]
     for impact, tolerance in enumerate(BOUNCE_TOLERANCES, start=1):
         expected = forms.apex_height(DROP, RESTITUTION, impact)
         apex = farthest(expected, [apexes[impact - 1] for _, apexes in found])

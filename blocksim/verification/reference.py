@@ -1,7 +1,8 @@
 """The verification table of the README: measured, kept in results/verify.json, written as Markdown.
 
 `python -m blocksim.verification.reference README.md` writes the table anew from the kept results. With `--measure` all
-cases are run first (a quarter of an hour) and the results replaced; column heads after it limit that to these columns.
+cases are run first (a quarter of an hour) and the results replaced; column heads after it limit that to these columns:
+`--measure nonsmooth` takes half a minute and leaves all others as they are.
 """
 
 import json
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from blocksim.verification.case import Case, Row, Setting, Verdict
-from blocksim.verification.cases import CASES
+from blocksim.verification.cases import CASES, chosen, left_out
 from blocksim.verification.verify import expected_text, number, run_case, tolerance_text
 
 BEGIN = "<!-- verify: written by `make verify-table` -->"
@@ -24,15 +25,19 @@ COLUMNS = {  # head of the column: how it is measured
     "`kernel`": Setting("kernel", quick=True),
     "`particles`": Setting("particles", quick=True),
 }
+RIGID = "nonsmooth"  # head of the second table's column
+RIGID_HEADS = ("case", "step, ms", "quantity", "expected", "tolerance", "measured")
+SETTINGS = {**COLUMNS, RIGID: Setting(scheme="nonsmooth")}
 FIELDS = ("quantity", "unit", "expected", "measured", "tolerance", "relative", "at_least")
 SIGNS = {Verdict.INSIDE: "✓", Verdict.OUTSIDE: "✗"}
 Stored = dict[str, dict[str, list[dict[str, Any]]]]  # head of the column, case id, rows
 
 
 def _measured(setting: Setting) -> Iterator[tuple[str, list[dict[str, Any]]]]:
-    for case in CASES:
+    for case in chosen([], setting.scheme):
         outcome = run_case(case, setting)
-        print(f"{setting.model} {setting.law} {case.id}: {outcome.seconds:.1f} s", file=sys.stderr, flush=True)  # noqa: T201
+        name = f"{setting.scheme} {setting.model} {setting.law} {case.id}"
+        print(f"{name}: {outcome.seconds:.1f} s", file=sys.stderr, flush=True)  # noqa: T201
         yield case.id, [{name: getattr(row, name) for name in FIELDS} for row in outcome.rows]
 
 
@@ -46,11 +51,30 @@ def _number(value: float | None) -> float:
 
 
 def table(stored: Stored) -> str:
-    """Return the table as Markdown, and below it why models miss."""
-    head = ["case", "quantity", "expected", "tolerance", *COLUMNS]
-    lines = [f"| {' | '.join(head)} |", f"|{' --- |' * len(head)}"]
+    """Return the tables as Markdown: below the first why models miss, below that of rigid contacts what is left out."""
+    lines = _heads(["case", "quantity", "expected", "tolerance", *COLUMNS])
     lines += [line for case in CASES for line in _case_lines(stored, case)]
-    return "\n".join([*lines, *_remarks(stored)])
+    return "\n".join([*lines, *_remarks(stored), "", *_rigid_table(stored)])
+
+
+def _heads(heads: Sequence[str]) -> list[str]:
+    return [f"| {' | '.join(heads)} |", f"|{' --- |' * len(heads)}"]
+
+
+def _rigid_table(stored: Stored) -> Iterator[str]:
+    scheme = SETTINGS[RIGID].scheme
+    yield from [f"Rigid contacts, `blocksim verify --scheme {scheme}`:", "", *_heads(RIGID_HEADS)]
+    for case in chosen([], scheme):
+        yield from _rigid_lines(stored, case)
+    yield from ["", f"Left out: {'; '.join(left_out(scheme))}."]
+
+
+def _rigid_lines(stored: Stored, case: Case) -> Iterator[str]:
+    name, step = f"{case.id} {case.title}", number(1e3 * case.rigid_step) if case.rigid_step else "own"
+    for row in stored_rows(stored, RIGID, case):
+        quantity = f"{row.quantity}, {row.unit}" if row.unit else row.quantity
+        yield f"| {' | '.join([name, step, quantity, expected_text(row), tolerance_text(row), _cell(row)])} |"
+        name = step = ""
 
 
 def _case_lines(stored: Stored, case: Case) -> Iterator[str]:
@@ -119,7 +143,7 @@ def main(arguments: Sequence[str]) -> None:
     readme, *options = arguments
     store = Path(readme).parent / STORE
     if options[:1] == ["--measure"]:
-        measure(store, options[1:] or list(COLUMNS))
+        measure(store, options[1:] or list(SETTINGS))
     text = Path(readme).read_text(encoding="utf-8")
     Path(readme).write_text(with_table(text, read_store(store)), encoding="utf-8")
 
@@ -128,8 +152,8 @@ def measure(store: Path, heads: Sequence[str]) -> None:
     """Run all cases in the settings of some columns and keep the results, column by column."""
     for head in heads:
         stored = read_store(store) if store.is_file() else {}
-        stored[head] = dict(_measured(COLUMNS[head]))
-        write_store(store, {name: stored[name] for name in COLUMNS if name in stored})
+        stored[head] = dict(_measured(SETTINGS[head]))
+        write_store(store, {name: stored[name] for name in SETTINGS if name in stored})
 
 
 if __name__ == "__main__":

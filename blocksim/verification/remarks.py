@@ -1,9 +1,17 @@
-"""Why the contact models of particles miss tolerances: case, model, one line. Printed only where a case is outside."""
+"""Why contact models of particles miss tolerances and schemes have no part in cases: case, model or scheme, one line.
+
+Remarks about models are printed only where a case is outside.
+"""
 
 BUMPS = "equal spacings of the two boundaries interlock, so bodies climb over bumps as high as (1 − √3/2) spacing"
 SETTLING = "particles settle in the gaps between those opposite, (1 − √3/2) spacing deeper than flat faces"
 ROUNDING = "corners are rounded by half a spacing, which moves the contact point inwards"
 SAMPLING = "where the opposite particles lie decides by how much an edge is felt; small differences grow"
+
+NOT_FOR = {
+    "V2": {"nonsmooth": "rigid blocks have no stiffness; what they sink in by is the step's doing, see blocksim check"},
+    "V20": {"nonsmooth": "it is about the second order of springs; rigid contacts are first order in the step"},
+}
 
 REMARKS = {
     "V2": {"particles": SETTLING},

@@ -99,5 +99,5 @@ def climb(stack: Simulation, until: float) -> float:
     highest = 0.0
     for time in np.linspace(stack.time, until, 51)[1:]:
         stack.to_time(float(time))
-        highest = max(highest, float(stack.measured()[:4].sum()) - stack.start_energy)
+        highest = max(highest, stack.mechanical - stack.start_energy)
     return highest

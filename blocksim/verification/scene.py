@@ -10,7 +10,7 @@ import numpy as np
 from blocksim.kernels.arrays import REACHED
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.simulation.ledger import energy_ledger, start_energy
-from blocksim.simulation.schemes import AnyScene, build_scene, measured_row
+from blocksim.simulation.schemes import AnyScene, build_scene, measured_row, scheme_of
 from blocksim.simulation.team import ALONE
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from blocksim.kernels.arrays import World
 
+HELD = {"kinetic", "potential", "stored_normal", "stored_shear"}  # entries of a ledger that are no losses
 WIDTH, HEIGHT, DEPTH = 0.032, 0.025, 0.05  # m, the paper's block in the literal reading
 YOUNG_MODULUS, POISSON_RATIO, UNIT_WEIGHT = 69e9, 0.3, 26.7e3  # Pa, -, N/m3
 SIZES = {"width": WIDTH, "height": HEIGHT, "length": DEPTH}
@@ -110,6 +111,12 @@ class Simulation:
     def kinetic(self) -> float:
         """Kinetic energy (J)."""
         return float(self.measured()[0])
+
+    @property
+    def mechanical(self) -> float:
+        """Kinetic, potential and stored energy (J): the entries that any ledger begins with."""
+        held = sum(name in HELD for name in scheme_of(self.scene).ledger)
+        return float(self.measured()[:held].sum())
 
     @property
     def contacts(self) -> int:

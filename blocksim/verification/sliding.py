@@ -23,7 +23,7 @@ FRICTIONS = (0.31, 0.38)
 
 def sliding_to_rest(setting: Setting) -> Iterator[Row]:
     """Push a block along level ground at three particle spacings; the farthest off counts."""
-    slides = [slide(setting, spacing) for spacing in SPACINGS]
+    slides = [slide(setting, spacing) for spacing in setting.distinct(SPACINGS)]
     distance = forms.sliding_stop_distance(SPEED, LEVEL_FRICTION)
     time = forms.sliding_stop_time(SPEED, LEVEL_FRICTION)
     yield relative("distance", "mm", 1e3 * distance, 1e3 * farthest(distance, [end for end, _ in slides]), 0.005)

@@ -24,10 +24,18 @@ SHIFT = 1.0  # m
 CORNER = 0.03  # m, from the centre of a block
 PLINTH: dict[str, object] = {"x": 0.0, "y": 0.05, "width": 1.0, "height": 0.1, "fixed": True}
 LANDING = 0.3  # s
+SAME, REORDERED = 1e-9, 1e-6  # m, before impacts
+SOLVED = {"velocity_tolerance": 1e-12}  # m/s: round-off may decide on one sweep more or less of rigid contacts
 
 
 def symmetries(setting: Setting) -> Iterator[Row]:
-    """Let the three blocks collapse in a mirror, under other numbers, and one metre aside."""
+    """Let the three blocks collapse in a mirror, under other numbers, and one metre aside.
+
+    Rigid contacts are gone through one after the other, in an order that goes by the numbers of blocks, once a position
+    pass. So overlaps depend on the numbers by a share of themselves (1e-9 m at a step h of 1e-5 s), and with them the
+    step in which a point of a face lifts off, after 0.1 s. One step sooner changes a velocity by less than g h, and a
+    place by less than g h 0.1 s until the first impact, which is 1e-5 m; a tenth of that is allowed.
+    """
     usual = states(setting, staircase())
     mirrored = [state * MIRROR for state in states(setting, staircase(side=-1.0))]
     relabelled = [state[np.argsort(RELABELLED)] for state in states(setting, staircase(RELABELLED))]
@@ -35,13 +43,14 @@ def symmetries(setting: Setting) -> Iterator[Row]:
     moved = [state - back for state in states(setting, staircase(shift=SHIFT))]
     for name, other in (("mirrored", mirrored), ("relabelled", relabelled), ("moved 1 m", moved)):
         before, after = (distance(one, two) for one, two in zip(usual, other, strict=True))
-        yield absolute(f"{name}, before impacts", "m", 0.0, before, 1e-9)
+        allowed = REORDERED if setting.rigid and other is relabelled else SAME
+        yield absolute(f"{name}, before impacts", "m", 0.0, before, allowed)
         yield absolute(f"{name}, at the end", "mm", 0.0, 1e3 * after, 0.05)
 
 
 def states(setting: Setting, bodies: Sequence[dict[str, object]]) -> list[NDArray[np.float64]]:
     """Return the state just before the first impact and that after the last one."""
-    collapse = setting.start(bodies)
+    collapse = setting.start(bodies, time=SOLVED if setting.rigid else {})
     return [collapse.to_time(time).state() for time in (BEFORE, AFTER)]
 
 

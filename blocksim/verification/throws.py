@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.analysis import closed_forms as forms
-from blocksim.kernels.advance import advance
-from blocksim.kernels.energy import LEDGER_ROW, measure
+from blocksim.simulation.schemes import build_scene, scheme_of
 from blocksim.verification.scene import HEIGHT, WIDTH
-from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from blocksim.simulation.schemes import AnyScene
     from blocksim.verification.case import Setting
 
 POLL = 40  # steps; an impact takes thirty and more
@@ -44,10 +47,11 @@ class Thrower:
         body = {"y": 1.0, "velocity": [0.0, -speed]}
         scene = setting.scene([body], restitution=restitution, gravity=0.0, **values)
         self.speed = speed
-        self.world = build_world(scene.scenario())
-        arrays = self.world._asdict().items()
-        self.fresh = {name: array.copy() for name, array in arrays if array is not None}
-        self.row = np.zeros(len(LEDGER_ROW) + 2)
+        self.scene = build_scene(scene.scenario())
+        self.world = self.scene.world
+        self.scheme = scheme_of(self.scene)
+        self.fresh = [array.copy() for array in arrays_of(self.scene)]
+        self.row = np.zeros(len(self.scheme.measured))
 
     @property
     def step(self) -> float:
@@ -61,21 +65,30 @@ class Thrower:
         steps, before = 0, float(body.vy)
         while steps < MOST_STEPS:
             steps += POLL
-            advance(self.world, steps)
-            measure(self.world, self.row)
-            if self.row[len(LEDGER_ROW)] == 0.0 and body.vy != before:
+            self.scheme.advance(self.scene, steps)
+            self.scheme.measure(self.scene, self.row)
+            if self.row[len(self.scheme.ledger)] == 0.0 and body.vy != before:
                 break
         return body
 
     def _place(self, throw: Throw) -> None:
-        for name, fresh in self.fresh.items():
-            getattr(self.world, name)[...] = fresh
+        for array, fresh in zip(arrays_of(self.scene), self.fresh, strict=True):
+            array[...] = fresh
         body = self.world.bodies[0]
         lowest = forms.lowest_corner(WIDTH, HEIGHT, throw.angle)[1]
         body.y = self.speed * self.step * (STEPS_BEFORE + throw.phase) - lowest
         body.angle, body.cos, body.sin = throw.angle, cos(throw.angle), sin(throw.angle)
         self.world.interactions.static_friction[...] = throw.friction
         self.world.interactions.kinetic_friction[...] = throw.friction
+
+
+def arrays_of(scene: AnyScene | tuple[Any, ...]) -> Iterator[NDArray[Any]]:
+    """Return all arrays of a scene, those of its parts too."""
+    for part in scene:
+        if isinstance(part, np.ndarray):
+            yield part
+        elif part is not None:
+            yield from arrays_of(part)
 
 
 def kinetic_energy(body: Any) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from blocksim.verification.case import Case, Row, Setting, Verdict
 
@@ -36,6 +36,7 @@ class Outcome:
             "source": self.case.source,
             "model": self.setting.model,
             "law": self.setting.law,
+            "scheme": self.setting.scheme,
             "shortened": self.case.quick if self.setting.quick else "",
             "remark": self.remark,
         }
@@ -63,8 +64,16 @@ def tolerance_kind(row: Row) -> str:
     return "relative" if row.relative else "absolute"
 
 
+def prepared(case: Case, setting: Setting) -> Setting:
+    """Return the setting as a case wants it: rigid contacts with the case's own step and in full, as that is quick."""
+    if not setting.rigid:
+        return setting
+    return replace(setting, quick=False, rigid_step=case.rigid_step or setting.rigid_step)
+
+
 def run_case(case: Case, setting: Setting) -> Outcome:
     """Run one case."""
+    setting = prepared(case, setting)
     began = time.perf_counter()
     rows = tuple(case.measure(setting))
     return Outcome(case, setting, rows, time.perf_counter() - began)

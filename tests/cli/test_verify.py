@@ -8,7 +8,20 @@ from blocksim.verification import cases
 from blocksim.verification.case import Case, Row, Setting, absolute
 from tests.cli.conftest import Command
 
-KEYS = {"case", "title", "source", "model", "law", "shortened", "quantity", "unit", "expected", "measured", "error"}
+KEYS = {
+    "case",
+    "title",
+    "source",
+    "model",
+    "law",
+    "scheme",
+    "shortened",
+    "quantity",
+    "unit",
+    "expected",
+    "measured",
+    "error",
+}
 
 
 def test_table_fits_80_columns_and_says_that_all_is_inside(blocksim: Command) -> None:
@@ -78,3 +91,32 @@ def test_an_unknown_case_is_told(blocksim: Command) -> None:
     answer = blocksim("verify", "V2", "V99")
     assert answer.code == 65
     assert answer.err == "V99: no such case; there are V1 to V24\n"
+
+
+def test_rigid_contacts_say_that_they_are_and_what_is_left_out(
+    blocksim: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (row, *_) = json.loads(blocksim("verify", "V5", "--scheme", "nonsmooth", "--json").out)
+    assert (row["scheme"], row["verdict"]) == ("nonsmooth", "inside")
+    assert row["measured"] == pytest.approx(row["expected"], rel=1e-12)
+    few = tuple(case for case in cases.CASES if case.id in {"V2", "V5"})
+    monkeypatch.setattr(cases, "CASES", few)
+    answer = blocksim("verify", "--scheme", "nonsmooth")
+    assert answer.code == 0
+    assert "V2" not in answer.out
+    assert "left out: V2 (rigid blocks have no stiffness" in answer.err
+    assert "1 of 1 cases inside" in answer.err
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["V2", "V5"], "not for --scheme nonsmooth: V2 (rigid blocks"),
+        (["V5", "--law", "hertz-mindlin"], "--law hertz-mindlin needs springs"),
+        (["V5", "--model", "kernel"], "--model kernel needs springs"),
+    ],
+)
+def test_what_rigid_contacts_do_not_have_is_wrong_usage(blocksim: Command, options: list[str], reason: str) -> None:
+    answer = blocksim("verify", *options, "--scheme", "nonsmooth")
+    assert (answer.code, answer.out) == (2, "")
+    assert reason in answer.err

@@ -9,23 +9,18 @@ import pytest
 
 from blocksim.verification.case import Case, Row, Setting, Verdict, at_least
 from blocksim.verification.cases import CASES, chosen
-from blocksim.verification.reference import BEGIN, COLUMNS, END, STORE, read_store, stored_rows, table, with_table
+from blocksim.verification.reference import BEGIN, END, SETTINGS, STORE, read_store, stored_rows, table, with_table
 from blocksim.verification.verify import Outcome, run_case
+from tests.verification.rows import allowed, missed, same_kind
 
 ROOT = Path(__file__).parents[2]
 LAWS = {"linear": "linear", "Hertz–Mindlin": "hertz-mindlin"}  # head of the column in the README: law
-SHARE = 0.2  # of its tolerance by which a measured number may differ from the kept one
-ORDER_SHARE = 0.1  # of its bound, for a number with a lower bound only
 
 
 @functools.cache
 def outcome(case_id: str, law: str, *, quick: bool) -> Outcome:
     (case,) = chosen([case_id])
     return run_case(case, Setting(law=law, quick=quick))
-
-
-def missed(outcome: Outcome) -> list[Row]:
-    return [row for row in outcome.rows if row.verdict != Verdict.INSIDE]
 
 
 @pytest.mark.parametrize("law", LAWS.values())
@@ -52,24 +47,10 @@ def test_table_of_the_readme_is_that_of_the_kept_results() -> None:
 
 def test_kept_results_have_all_cases_in_every_column() -> None:
     stored = read_store(ROOT / STORE)
-    assert list(stored) == list(COLUMNS), "run: make verify-table"
-    for column in stored.values():
-        assert list(column) == [case.id for case in CASES]
+    assert list(stored) == list(SETTINGS), "run: make verify-table"
+    for head, column in stored.items():
+        assert list(column) == [case.id for case in chosen([], SETTINGS[head].scheme)]
         assert all(column.values())
-
-
-def same_kind(kept: Row, now: Row) -> bool:
-    """Tell whether two rows expect the same number to the same tolerance."""
-    told = (kept.quantity, kept.unit, kept.relative, kept.at_least)
-    numbers = pytest.approx([now.expected, now.tolerance], rel=1e-6)
-    return told == (now.quantity, now.unit, now.relative, now.at_least) and [kept.expected, kept.tolerance] == numbers
-
-
-def allowed(row: Row) -> float:
-    """Return by how much the kept number may differ from the one measured now."""
-    if row.at_least:
-        return ORDER_SHARE * row.expected
-    return SHARE * row.tolerance * (abs(row.expected) if row.relative else 1.0)
 
 
 @pytest.mark.parametrize("head", LAWS)

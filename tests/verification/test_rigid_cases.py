@@ -1,0 +1,140 @@
+"""Every case that says something about rigid contacts, inside its tolerances; and none of them with wrong physics."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, replace
+from math import radians
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from blocksim.verification import energy
+from blocksim.verification.case import Case, Row, Setting
+from blocksim.verification.cases import CASES, SettingError, chosen, left_out
+from blocksim.verification.reference import RIGID, STORE, read_store, stored_rows
+from blocksim.verification.scene import HEIGHT
+from blocksim.verification.throws import Throw, Thrower
+from blocksim.verification.verify import Outcome, run_case
+from blocksim.world import nonsmooth
+from tests.verification.rows import allowed, missed, same_kind
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from blocksim.verification.scene import Scene
+
+ROOT = Path(__file__).parents[2]
+SETTING = Setting(scheme="nonsmooth")
+APPLY = chosen([], SETTING.scheme)
+
+
+@functools.cache
+def outcome(case_id: str) -> Outcome:
+    (case,) = chosen([case_id], SETTING.scheme)
+    return run_case(case, SETTING)
+
+
+@pytest.mark.parametrize("case", APPLY, ids=lambda case: case.id)
+def test_case_is_inside_its_tolerances_with_rigid_contacts(case: Case) -> None:
+    found = outcome(case.id)
+    assert found.rows
+    assert missed(found) == []
+
+
+@pytest.mark.parametrize("case", APPLY, ids=lambda case: case.id)
+def test_kept_results_of_rigid_contacts_are_what_is_measured_now(case: Case) -> None:
+    kept = stored_rows(read_store(ROOT / STORE), RIGID, case)
+    rows = outcome(case.id).rows
+    assert len(kept) == len(rows), f"run: python -m blocksim.verification.reference README.md --measure {RIGID}"
+    for old, new in zip(kept, rows, strict=True):
+        assert same_kind(old, new)
+        assert old.measured == pytest.approx(new.measured, rel=1e-9, abs=allowed(new))
+
+
+def test_what_is_about_springs_is_left_out_and_says_why() -> None:
+    assert [case.id for case in CASES if case not in APPLY] == ["V2", "V20"]
+    assert all(len(reason) > 20 for reason in left_out(SETTING.scheme))
+    assert left_out("explicit") == ()
+    with pytest.raises(SettingError, match=r"V20 \(.*springs"):
+        chosen(["V1", "v20"], SETTING.scheme)
+
+
+def test_settings_of_rigid_contacts_do_not_reach_scenes_of_springs() -> None:
+    assert Setting().stepped(1.0).stepping == {}
+    body = [{"y": 1.0}]
+    assert Setting().stepped(1.0).scene(body) == Setting().scene(body)
+
+
+@dataclass(frozen=True)
+class Wrong(Setting):
+    """A setting whose scenes have some numbers multiplied by a factor, and others replaced."""
+
+    factor: float = 1.0
+    name: str = ""
+    stepping_too: tuple[tuple[str, object], ...] = ()
+
+    def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> Scene:
+        """Return the scene that is wrong."""
+        time = {**values.pop("time", {}), **dict(self.stepping_too)}
+        scene = super().scene(bodies, time=time, **values)
+        return replace(scene, **{self.name: self.factor * getattr(scene, self.name)}) if self.name else scene
+
+
+def rows_missed(wrong: Wrong, case_id: str) -> list[Row]:
+    (case,) = chosen([case_id], wrong.scheme)
+    return missed(run_case(case, wrong))
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "case_id"),
+    [
+        ("restitution", 0.95, "V3"),
+        ("restitution", 0.95, "V4"),
+        ("restitution", 0.95, "V5"),
+        ("restitution", 0.95, "V16"),
+        ("ground_friction", 1.03, "V7"),
+        ("ground_friction", 1.03, "V8"),
+        ("ground_friction", 1.03, "V9"),
+        ("ground_friction", 1.03, "V10"),
+        ("ground_friction", 1.03, "V17"),
+        ("ground_friction", 0.0, "V12"),
+        ("ground_friction", 0.01, "V18"),
+        ("friction", 1.2, "V22"),
+        ("gravity", 1.01, "V1"),
+        ("gravity", 1.03, "V11"),
+        ("gravity", 1.01, "V24"),
+    ],
+)
+def test_a_wrong_number_is_noticed(name: str, factor: float, case_id: str) -> None:
+    assert rows_missed(Wrong(scheme="nonsmooth", name=name, factor=factor), case_id)
+
+
+def test_an_impact_that_is_not_solved_is_noticed() -> None:
+    assert rows_missed(Wrong(scheme="nonsmooth", stepping_too=(("velocity_sweeps", 1),)), "V6")
+
+
+def test_a_stack_on_leaning_ground_is_noticed() -> None:
+    """By V13: its stacks stand within a hundredth of their limit."""
+
+    @dataclass(frozen=True)
+    class Leaning(Wrong):
+        def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> Scene:
+            return replace(super().scene(bodies, **values), tilt=-0.03)
+
+    assert rows_missed(Leaning(scheme="nonsmooth"), "V13")
+
+
+def test_energy_that_friction_took_and_nobody_booked_is_noticed() -> None:
+    slide = SETTING.start([{"y": HEIGHT / 2, "velocity": [0.5, 0.0]}]).to_time(0.1)
+    assert slide.residual() < energy.RIGID_LEDGER_TOLERANCE
+    slide.scene.contacts.books.friction[:] *= 0.999
+    assert slide.residual() > 1e-4
+
+
+def test_energy_from_rebounds_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    throws = [Throw(radians(4.0), friction, phase) for friction in (0.7, 1.0) for phase in (0.1, 0.3, 0.5, 0.7, 0.9)]
+    assert energy.largest_gain(Thrower(SETTING, 1.0), throws) < energy.ROUND_OFF
+    monkeypatch.setattr(nonsmooth, "SAFE_RESTITUTION", 2.0)  # nobody watches
+    assert energy.largest_gain(Thrower(SETTING, 1.0), throws) > 1e-3
