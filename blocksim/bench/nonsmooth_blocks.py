@@ -45,9 +45,8 @@ def measure(setting: Setting) -> Findings:
         f"{finest.told}; itself off by {1e3 * cheapest.off(finest):.2f} mm"
     )
     details = [level.detail(finest) for row in rows for level in row]
-    return Findings(
-        numbers, notes=(told, converged), details=(without.detail(without), *details, finest.detail(finest))
-    )
+    details += [finest.detail(finest), without.detail(without)]
+    return Findings(numbers, notes=(told, converged), details=tuple(details))
 
 
 def _members(setting: Setting) -> int:

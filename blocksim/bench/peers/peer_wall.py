@@ -15,14 +15,14 @@ import numpy as np
 
 from blocksim.bench.measurement import Findings, Number, Setting, single
 from blocksim.bench.peers.packages import require_all
-from blocksim.bench.peers.scene import Final, Scene, Series
-from blocksim.bench.peers.series import EXPLICIT, NONSMOOTH, wall_series
+from blocksim.bench.peers.scene import Final, Scene, Series, Solver
+from blocksim.bench.peers.series import wall_racers, wall_series
 from blocksim.bench.scenes import LOW_COURSES, WALL_RESTITUTION, pushed_wall
 from blocksim.scenario.structures.base import draws
 from blocksim.view.work_precision import Curve, Panel
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -83,8 +83,8 @@ def measure(setting: Setting) -> Findings:
     size = SMALL if setting.quick else FULL
     computed = [_computed(series, size) for series in wall_series(quick=setting.quick)]
     numbers = [number for one in computed for number in _numbers(one)]
-    numbers += _raced([one.series for one in computed], size, min(ROUNDS, setting.repeats))
-    last = computed[-1]
+    numbers += raced(wall_racers(), size, min(ROUNDS, setting.repeats))
+    last = computed[-1]  # the explicit one
     meaning = (
         f"{size.columns * size.rows} blocks, {size.end:g} s; change: mean distance of the sorted final x "
         "(Wasserstein-1) from a level to the next, with half the step"
@@ -113,20 +113,18 @@ def _numbers(one: Computed) -> list[Number]:
     return seconds + changes
 
 
-def _raced(series: Sequence[Series], size: Size, rounds: int) -> list[Number]:
-    """Return how many times as long as the non-smooth scheme others take at the step of the last but one level.
+def raced(racers: Mapping[str, Solver], size: Size, rounds: int) -> list[Number]:
+    """Return the CPU time of the first one, and how many times as long the others take.
 
     They run in turns, so that what else the machine does slows all of them.
     """
-    racers = {one.label: one.levels[-2] for one in series if one.engine != EXPLICIT}
-    own = next((one.label for one in series if one.engine == NONSMOOTH), None)
-    if own is None:
-        return []
-    times = [{label: solver.solve(size.scene()).seconds for label, solver in racers.items()} for _ in range(rounds)]
-    own_times = Number(f"{racers[own].setting}, in turns: {own}", "CPU s", tuple(one[own] for one in times))
-    others = [label for label in racers if label != own]
-    ratios = [Number(f"{label}: times that", "", tuple(one[label] / one[own] for one in times)) for label in others]
-    return [own_times, *ratios]
+    times = [{name: solver.solve(size.scene()).seconds for name, solver in racers.items()} for _ in range(rounds)]
+    first, *others = racers
+    own = Number(f"{first}, {racers[first].setting}, in turns", "CPU s", tuple(one[first] for one in times))
+    return [
+        own,
+        *(Number(f"{name}: times that", "", tuple(one[name] / one[first] for one in times)) for name in others),
+    ]
 
 
 def _compared(one: Computed, other: Computed) -> str:
