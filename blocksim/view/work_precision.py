@@ -110,6 +110,8 @@ def _draw_level(axes: "Axes", level: float, meaning: str) -> None:
         "offset points",
         color=style.FAINT_INK,
         ha="right",
+        zorder=4,  # over the curves, on white
+        bbox={"facecolor": "#FFFFFF", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
     )
 
 
