@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 QUICK = "8 members instead of 256, coarse steps against one that is not much finer"
 ONE_SWEEP = Stepping(1e-3, substeps=1, sweeps=1)  # enough without restitution
-STEPS = (2e-3, 1e-3, 5e-4, 2e-4, 1e-4)  # s
+STEPS = (1e-3, 5e-4, 2e-4, 1e-4)  # s
 QUICK_STEPS = (1e-3, 5e-4)
 SUBSTEPS = (1, 2, 4)
 FINEST, QUICK_FINEST = 1e-5, 2e-4  # s

@@ -45,13 +45,13 @@ def test_three_blocks_tell_times_alone_and_among_many_and_a_setting_that_finer_o
 
 def test_walls_tell_times_growth_and_where_the_first_one_ends() -> None:
     found = nonsmooth_walls.measure(QUICK)
-    whole, small, large, exponent, x, y = found.numbers
-    assert (whole.quantity, small.quantity, large.quantity) == (
+    whole, share, small, large, exponent, x, y = found.numbers
+    assert [one.quantity for one in (whole, small, large)] == [
         "40 blocks, 0.1 s",
         "40 blocks, a substep",
         "160 blocks, a substep",
-    )
-    assert small.median == pytest.approx(1e9 * whole.median / (100 * 4 * 40))
+    ]
+    assert share.median == pytest.approx(1e9 * whole.median / (100 * 4 * 40))
     assert math.isfinite(exponent.median)
     assert 100.0 < x.median < 250.0  # mm; the wall is 272 mm long
     assert 0.0 < y.median < 62.5  # mm: lower than it stood
