@@ -2,7 +2,16 @@
 
 from collections.abc import Sequence
 
-from blocksim.bench import ensemble, startup, threads, three_blocks, walls
+from blocksim.bench import (
+    ensemble,
+    nonsmooth_blocks,
+    nonsmooth_threads,
+    nonsmooth_walls,
+    startup,
+    threads,
+    three_blocks,
+    walls,
+)
 from blocksim.bench.measurement import Measurement
 from blocksim.bench.peers import peer_three_blocks, peer_wall
 from blocksim.errors import BlocksimError, ExitCode
@@ -15,6 +24,19 @@ MEASUREMENTS = (
     Measurement("ensemble", "many collapses together", ensemble.measure, quick=ensemble.QUICK),
     Measurement("walls", "pushed walls", walls.measure, quick=walls.QUICK),
     Measurement("threads", "two threads on one wall", threads.measure, quick=threads.QUICK),
+    Measurement(
+        "nonsmooth-blocks",
+        "collapse of the three blocks, non-smooth",
+        nonsmooth_blocks.measure,
+        quick=nonsmooth_blocks.QUICK,
+    ),
+    Measurement("nonsmooth-walls", "pushed walls, non-smooth", nonsmooth_walls.measure, quick=nonsmooth_walls.QUICK),
+    Measurement(
+        "nonsmooth-threads",
+        "two threads on one wall, non-smooth",
+        nonsmooth_threads.measure,
+        quick=nonsmooth_threads.QUICK,
+    ),
     Measurement("start-up", "starting the command", startup.measure, quick=startup.QUICK),
 )
 PEERS = (
@@ -22,6 +44,12 @@ PEERS = (
         "three-blocks",
         "three blocks to within 0.2 mm, also by pymunk and Box2D",
         peer_three_blocks.measure,
+        quick=peer_three_blocks.QUICK,
+    ),
+    Measurement(
+        "three-blocks-e0",
+        "the same without restitution",
+        peer_three_blocks.measure_without_restitution,
         quick=peer_three_blocks.QUICK,
     ),
     Measurement("wall", "pushed wall, also by pymunk and Box2D", peer_wall.measure, quick=peer_wall.QUICK),

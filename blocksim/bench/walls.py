@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
 from blocksim.bench.measurement import Findings, Number, Setting, repeated, single
 from blocksim.bench.scenes import pushed_wall
 from blocksim.bench.timing import Rerun
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 QUICK = "walls of 100 and 400 blocks, 150 steps instead of 300"
 
@@ -24,6 +27,18 @@ class Size(NamedTuple):
     def blocks(self) -> int:
         """Number of blocks."""
         return self.columns * self.rows
+
+
+class Sized(Protocol):
+    """A wall, and the time of its step."""
+
+    @property
+    def size(self) -> Size:
+        """Blocks in it."""
+
+    @property
+    def step_time(self) -> float:
+        """Time (ns) of one step of the whole wall."""
 
 
 SIZES = (Size(10, 10), Size(40, 25), Size(125, 80), Size(400, 250))
@@ -65,7 +80,7 @@ def measure(setting: Setting) -> Findings:
     return Findings(numbers, notes=(note,), details=tuple(_detail(wall) for wall in walls))
 
 
-def growth(walls: list[Wall]) -> float:
+def growth(walls: Sequence[Sized]) -> float:
     """Return the exponent that fits time per step over number of blocks best, both in logarithms."""
     blocks = np.log([wall.size.blocks for wall in walls])
     return float(np.polyfit(blocks, np.log([wall.step_time for wall in walls]), 1)[0])

@@ -32,7 +32,8 @@ def bench_command(
         list[str] | None,
         typer.Argument(
             metavar="[NAME]...",
-            help="three-blocks, ensemble, walls, threads, start-up; with --peers three-blocks, wall.",
+            help="three-blocks, ensemble, walls, threads, nonsmooth-blocks, nonsmooth-walls, nonsmooth-threads, "
+            "start-up; with --peers three-blocks, three-blocks-e0, wall.",
         ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Make everything small; said at the end how.")] = False,

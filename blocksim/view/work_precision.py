@@ -104,12 +104,12 @@ def _draw_level(axes: "Axes", level: float, meaning: str) -> None:
     axes.axhline(level, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (5, 3)))
     axes.annotate(
         meaning,
-        (1.0, level),
-        (-2.0, 2.0),
+        (0.0, level),
+        (2.0, 2.0),
         ("axes fraction", "data"),
         "offset points",
         color=style.FAINT_INK,
-        ha="right",
+        ha="left",  # where what takes little time is far off
     )
 
 

@@ -26,7 +26,7 @@ def test_every_repeat_is_a_sample_of_its_own() -> None:
 def test_chosen_keeps_the_order_of_the_registry() -> None:
     assert chosen([]) == MEASUREMENTS
     assert [one.name for one in chosen(["start-up", "walls", "walls"])] == ["walls", "start-up"]
-    assert chosen(["wall"], peers=True) == PEERS[1:]
+    assert chosen(["wall"], peers=True) == PEERS[2:]
 
 
 @pytest.mark.parametrize(
@@ -37,11 +37,11 @@ def test_chosen_keeps_the_order_of_the_registry() -> None:
             False,
             "NAME 'wals': no such measurement, did you mean 'walls'? There are: three-blocks, ensemble, walls, threads",
         ),
-        ("wals", True, "did you mean 'wall'? There are with --peers: three-blocks, wall"),
+        ("wals", True, "did you mean 'wall'? There are with --peers: three-blocks, three-blocks-e0, wall"),
         (
             "memory",
             False,
-            "NAME 'memory': no such measurement; there are: three-blocks, ensemble, walls, threads, start-up",
+            "NAME 'memory': no such measurement; there are: three-blocks, ensemble, walls, threads, nonsmooth-blocks",
         ),
     ],
 )

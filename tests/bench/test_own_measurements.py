@@ -3,25 +3,13 @@
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from blocksim.bench import ensemble, startup, threads, three_blocks, walls
 from blocksim.bench.measurement import Setting, single
 from blocksim.bench.startup import StartError
-from blocksim.bench.three_blocks import CLOSE, Level, settled
 
 QUICK = Setting(quick=True, repeats=2)
-
-
-def level(scale: float, x: float, seconds: float = 1.0) -> Level:
-    """Return one whose third block ends at x (m)."""
-    return Level(scale, 0.05, np.array([[0.0, 0.0, x], [0.0, 0.0, 0.0]]), (seconds,), 10)
-
-
-def test_levels_count_as_converged_from_where_all_stiffer_ones_agree() -> None:
-    levels = [level(1e-4, 0.9 * CLOSE), level(1e-3, 2.0 * CLOSE), level(1e-2, -0.9 * CLOSE), level(1.0, 0.0)]
-    assert [one.scale for one in settled(levels, levels[-1])] == [1.0, 1e-2]
 
 
 def test_three_blocks_tell_the_cheapest_converged_setting() -> None:
@@ -37,11 +25,17 @@ def test_three_blocks_tell_the_cheapest_converged_setting() -> None:
     assert "stiffness_scale 0.001" in found.notes[0]
 
 
-def test_ensemble_tells_its_rate_and_its_members_differ() -> None:
+def test_ensemble_tells_its_rates_by_both_schemes_and_its_members_differ() -> None:
     found = ensemble.measure(QUICK)
-    assert found.numbers[0].quantity == "collapses per second and core"
+    names = ["a second and core", "a second, 1 thread", "a second, 2 threads"]
+    assert [one.quantity for one in found.numbers] == [
+        f"{way}: {name}" for way in ("explicit", "nonsmooth") for name in names
+    ]
     assert all(len(one.samples) == 2 and one.median > 1.0 for one in found.numbers)
-    assert len({scenario.friction.model_dump_json() for scenario in ensemble.scattered(5)}) == 5
+    for way in ensemble.WAYS:
+        members = ensemble.scattered(5, way)
+        assert len({scenario.friction.model_dump_json() for scenario in members}) == 5
+        assert {scenario.time.scheme for scenario in members} == {way.scheme}
 
 
 def test_walls_tell_time_memory_and_growth() -> None:

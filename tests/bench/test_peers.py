@@ -9,37 +9,51 @@ import pytest
 
 from blocksim.bench.measurement import Setting
 from blocksim.bench.peers import peer_three_blocks, peer_wall
-from blocksim.bench.peers.blocksim_engine import Blocksim
+from blocksim.bench.peers.blocksim_engine import Explicit, Nonsmooth
 from blocksim.bench.peers.box2d_engine import Box2D
 from blocksim.bench.peers.packages import MissingPackageError, require_all
 from blocksim.bench.peers.peer_three_blocks import Level, settled, starts
 from blocksim.bench.peers.peer_wall import Computed, distances, wasserstein
 from blocksim.bench.peers.pymunk_engine import Pymunk
 from blocksim.bench.peers.scene import Final, Scene, Series, Solver
+from blocksim.bench.peers.series import three_blocks_series, wall_racers, wall_series
+from blocksim.bench.peers.stepper import Stepper
 from blocksim.bench.scenes import three_blocks
+from blocksim.bench.stepping import Stepping
 from blocksim.errors import ExitCode
 from blocksim.scenario import Scenario
 
 ENGINES = pytest.mark.parametrize(
-    ("module", "solver"), [("pymunk", Pymunk(2e-4, 30)), ("Box2D", Box2D(2e-4, 30)), ("blocksim", Blocksim(1e-3, 0.1))]
+    ("module", "solver"),
+    [
+        ("pymunk", Pymunk(2e-4, 30)),
+        ("Box2D", Box2D(2e-4, 30)),
+        ("blocksim", Explicit(1e-3, 0.1)),
+        ("blocksim", Nonsmooth(Stepping(2e-4))),
+    ],
+    ids=["pymunk", "Box2D", "explicit", "non-smooth"],
 )
 QUICK = Setting(quick=True)
 
 
 @dataclass(frozen=True)
 class Shifted:
-    """An engine that puts all blocks so far (m) from the start, for a second of computing a metre."""
+    """An engine that puts all blocks so far (m) from the start, for a second of computing a metre or so many."""
 
     by: float
+    seconds: float | None = None
 
     @property
     def setting(self) -> str:
         return f"by {self.by:g}"
 
+    def calls(self, scene: Scene) -> int:
+        return round(scene.end)
+
     def solve(self, scene: Scene) -> Final:
         placed = scene.placed()
         x, y = np.array([(body.x, body.y) for body in placed]).T
-        return Final(x + self.by, y, self.by)
+        return Final(x + self.by, y, self.by if self.seconds is None else self.seconds)
 
 
 def solved(module: str, solver: Solver, scene: Scene) -> Final:
@@ -68,8 +82,8 @@ def test_a_sliding_wall_is_stopped_by_the_friction_of_the_ground(module: str, so
     """One block, pushed with 0.5 m/s at its centre, slides v^2 / (2 mu g)."""
     scene = replace(peer_wall.SMALL._replace(columns=1, rows=1).scene(), end=0.3)
     final = solved(module, solver, scene)
-    assert final.x[0] - 0.025 == pytest.approx(0.5**2 / (2.0 * 0.38 * 9.81), rel=0.02)
-    assert final.y[0] == pytest.approx(0.016, abs=3e-5)
+    assert final.x[0] - 0.016 == pytest.approx(0.5**2 / (2.0 * 0.38 * 9.81), rel=0.02)
+    assert final.y[0] == pytest.approx(0.0125, abs=3e-5)
 
 
 def test_starts_differ_by_a_micrometre_and_are_the_same_every_time() -> None:
@@ -89,17 +103,78 @@ def test_only_levels_after_the_last_large_error_count() -> None:
 def test_error_is_the_distance_from_the_reference_of_the_same_start(monkeypatch: pytest.MonkeyPatch) -> None:
     levels = tuple(Shifted(by) for by in (3e-3, 2.1e-3, 2.05e-3))
     series = (Series("made up", "made up, a", levels, Shifted(2e-3)), Series("made up", "b", levels[:1], Shifted(9.0)))
-    monkeypatch.setattr(peer_three_blocks, "all_series", lambda **_: series)
+    monkeypatch.setattr(peer_three_blocks, "three_blocks_series", lambda *_, **__: series)
     monkeypatch.setattr(peer_three_blocks, "require_all", lambda: None)
-    monkeypatch.setattr(peer_three_blocks, "_calls", list)
+    monkeypatch.setattr(peer_three_blocks, "_calls", lambda _: {})
     found = peer_three_blocks.measure(QUICK)
     assert [row["error_mm"] for row in found.details] == pytest.approx([1.0, 0.1, 0.05, 1.0])
     best, none = found.numbers
     assert best.quantity == "made up, a: by 0.00205"  # of two that are close it takes less time
     assert best.median == pytest.approx(2.05)
-    assert (none.quantity, none.median) == ("b: no setting", np.inf)
+    assert (none.quantity, none.median) == ("b: none", np.inf)
     assert found.panel is not None
     assert [curve.label for curve in found.panel.curves] == ["made up, a", "b"]
+
+
+def test_others_are_told_as_multiples_of_the_non_smooth_scheme_with_and_without_calls(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of made up engines, that are called once a second."""
+    tables = {"pymunk": (9.0, 6.0), "Box2D": (8.0,), "explicit": (4.0,), "non-smooth": (2.0, 2.5)}
+    series = [
+        Series(engine, f"{engine} {seconds}", (Shifted(1.0, seconds),), Shifted(1.0))
+        for engine, row in tables.items()
+        for seconds in row
+    ]
+    monkeypatch.setattr(peer_three_blocks, "three_blocks_series", lambda *_, **__: series)
+    monkeypatch.setattr(peer_three_blocks, "require_all", lambda: None)
+    monkeypatch.setattr(peer_three_blocks, "END", 3.0)
+    monkeypatch.setattr(peer_three_blocks, "_calls", lambda _: {"pymunk": 1.0, "Box2D": 2.0, "non-smooth": 0.5})
+    found = {one.quantity: one.median for one in peer_three_blocks.measure(QUICK).numbers}
+    for engine, times in (("pymunk", 3.0), ("Box2D", 4.0), ("explicit", 2.0)):
+        assert found[f"{engine}: times non-smooth"] == pytest.approx(times)
+    assert found["pymunk: the same without calls"] == pytest.approx((6.0 - 3.0) / (2.0 - 1.5))
+    assert found["Box2D: the same without calls"] == pytest.approx((8.0 - 6.0) / (2.0 - 1.5))
+    assert "explicit: the same without calls" not in found
+
+
+def test_blocksim_is_called_once_a_run_and_the_others_once_a_step() -> None:
+    (scene,) = starts(1)
+    assert Nonsmooth(Stepping(1e-3)).calls(scene) == Explicit(1.0, 0.1).calls(scene) == 1
+    assert Pymunk(1e-3, 10).calls(scene) == Box2D(1e-3, 10).calls(scene) == 400
+    assert 0.0 < Nonsmooth(Stepping(1e-3)).call_time(scene) < 0.01
+
+
+def test_starts_have_the_restitution_that_is_asked_for() -> None:
+    (scene,) = starts(1, 0.0)
+    assert scene.restitution == 0.0
+    assert scene.make(time={"end": 0.1}).contact.restitution.block_block == 0.0
+    assert starts(1)[0].make().contact.restitution.block_block == 0.2
+
+
+@pytest.mark.parametrize("quick", [False, True])
+@pytest.mark.parametrize("restitution", [0.0, 0.2])
+def test_every_engine_has_one_finest_setting_finer_than_its_levels(restitution: float, quick: bool) -> None:
+    series = three_blocks_series(restitution, quick=quick)
+    assert {one.engine for one in series} == {"pymunk", "Box2D", "explicit", "non-smooth"}
+    for one in series:
+        assert {other.reference for other in series if other.engine == one.engine} == {one.reference}
+        assert one.reference not in one.levels
+        if isinstance(one.reference, Nonsmooth):
+            steppings = [level.stepping for level in one.levels if isinstance(level, Nonsmooth)]
+            assert one.reference.stepping.step < min(stepping.step for stepping in steppings)
+            assert {stepping.sweeps == 1 for stepping in steppings} == {restitution == 0.0}
+
+
+def test_levels_have_the_iterations_that_their_curve_is_labelled_with() -> None:
+    for one in (*three_blocks_series(0.2, quick=False), *wall_series(quick=False)):
+        for level in one.levels:
+            if isinstance(level, Stepper):
+                assert one.label == f"{one.engine}, {level.iterations} iterations"
+            if isinstance(level, Nonsmooth):
+                assert one.label.startswith(f"non-smooth, {level.stepping.substeps} substep")
+            if isinstance(level, Explicit):
+                assert one.label in ("explicit", f"explicit, safety {level.safety:g}")
 
 
 def test_wasserstein_distance_is_the_area_between_cumulative_curves() -> None:
@@ -123,14 +198,26 @@ def test_heaps_are_compared_level_by_level() -> None:
 
 
 def test_a_wall_is_measured_by_blocksim_alone_where_it_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    series = tuple(one for one in peer_wall.all_series(quick=True) if one.engine == "blocksim")
-    monkeypatch.setattr(peer_wall, "all_series", lambda **_: series)
+    series = tuple(one for one in wall_series(quick=True) if one.engine == "explicit")
+    monkeypatch.setattr(peer_wall, "wall_series", lambda **_: series)
+    monkeypatch.setattr(peer_wall, "wall_racers", lambda: {"made up": Shifted(1.0)})
     monkeypatch.setattr(peer_wall, "require_all", lambda: None)
     found = peer_wall.measure(QUICK)
-    coarse, fine, change = found.numbers
+    coarse, fine, change, _ = found.numbers
     assert 0.0 < coarse.median < fine.median
     assert 0.0 < change.median < 2.0
     assert found.details[1]["change_x_mm"] is None
+
+
+def test_walls_are_raced_in_turns_at_the_same_step() -> None:
+    racers: dict[str, Solver] = {"first": Shifted(2.0), "second": Shifted(6.0)}
+    own, other = peer_wall.raced(racers, peer_wall.SMALL, 2)
+    assert (own.quantity, own.samples) == ("first, by 2, in turns", (2.0, 2.0))
+    assert (other.quantity, other.samples) == ("second: times that", (3.0, 3.0))
+    first, *others = wall_racers().values()
+    assert isinstance(first, Nonsmooth)
+    steps = {one.step for one in others if isinstance(one, Stepper)}
+    assert steps == {first.stepping.step} == {1e-3}
 
 
 def test_a_run_of_blocksim_that_breaks_off_has_no_answer() -> None:
@@ -138,8 +225,8 @@ def test_a_run_of_blocksim_that_breaks_off_has_no_answer() -> None:
         return three_blocks(contact={**(contact or {}), "max_overlap": 1e-6}, time=time)
 
     (scene,) = starts(1)
-    assert np.isfinite(Blocksim(1e-4, 0.1).solve(scene).x).all()
-    assert np.isnan(Blocksim(1e-4, 0.1).solve(replace(scene, make=make)).x).all()
+    assert np.isfinite(Explicit(1e-4, 0.1).solve(scene).x).all()
+    assert np.isnan(Explicit(1e-4, 0.1).solve(replace(scene, make=make)).x).all()
 
 
 @pytest.mark.parametrize(("module", "package"), [("pymunk", "pymunk"), ("Box2D", "box2d")])

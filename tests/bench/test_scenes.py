@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.bench.scenes import pushed_wall, three_blocks
+from blocksim.bench.scenes import LOW_COURSES, pushed_wall, three_blocks
 from blocksim.scenario import load_scenario, place_bodies
 
 NOMINAL = Path(__file__).parents[2] / "scenarios" / "three_blocks_nominal.toml"
@@ -32,3 +32,12 @@ def test_a_wall_is_pushed_in_proportion_to_height() -> None:
     assert {(body.size_x, body.size_y, body.depth) for body in placed} == {(0.05, 0.032, 0.025)}
     assert vx == pytest.approx(1.0 * y / 0.096)
     assert not any(body.vy or body.spin for body in placed)
+
+
+def test_low_courses_are_those_of_the_wall_that_non_smooth_engines_are_compared_on() -> None:
+    scenario = pushed_wall(4, 3, upright=LOW_COURSES)
+    placed = place_bodies(scenario)
+    assert {(body.size_x, body.size_y) for body in placed} == {(0.032, 0.025)}
+    assert max(body.y for body in placed) == pytest.approx(2.5 * 0.025)
+    assert scenario.contact.restitution.block_block == 0.1
+    assert (scenario.friction.block_block.kinetic, scenario.friction.block_ground.kinetic) == (0.31, 0.38)

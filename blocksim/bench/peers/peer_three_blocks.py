@@ -9,18 +9,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blocksim.bench.measurement import Findings, Number, Setting, single
-from blocksim.bench.peers.blocksim_engine import Blocksim
+from blocksim.bench.peers.blocksim_engine import Nonsmooth
 from blocksim.bench.peers.box2d_engine import Box2D, empty_world
 from blocksim.bench.peers.packages import require_all
 from blocksim.bench.peers.pymunk_engine import Pymunk, empty_space
 from blocksim.bench.peers.scene import Final, Scene, Series, Solver
+from blocksim.bench.peers.series import BOX2D, NONSMOOTH, PYMUNK, three_blocks_series
 from blocksim.bench.peers.stepper import call_time
-from blocksim.bench.scenes import RESTITUTION, three_blocks
+from blocksim.bench.scenes import RESTITUTION, Table, three_blocks
+from blocksim.bench.stepping import Stepping
 from blocksim.scenario.structures.base import draws
 from blocksim.view.work_precision import Curve, Panel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from blocksim.scenario import Scenario
 
 QUICK = "2 starts and three coarse levels of each engine, against a level that is not much finer"
 STARTS, QUICK_STARTS = 16, 2
@@ -28,9 +32,6 @@ JITTER = 1e-6  # m
 SEED = 1
 END = 0.4  # s; the blocks rest from about 0.3 s
 CLOSE = 0.2  # mm
-STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5)  # s
-SCALES = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1)
-QUICK_LEVELS = 3
 
 
 @dataclass(frozen=True)
@@ -42,59 +43,68 @@ class Level:
     seconds: NDArray[np.float64]  # (starts,) CPU time
 
 
-def all_series(*, quick: bool) -> tuple[Series, ...]:
-    """Return every engine with few and many iterations, blocksim with long and short steps."""
-    if quick:
-        steps, scales = STEPS[:QUICK_LEVELS], SCALES[:QUICK_LEVELS]
-        finest: tuple[Solver, ...] = (Pymunk(STEPS[3], 30), Box2D(STEPS[3], 30), Blocksim(SCALES[3], 0.1))
-    else:
-        steps, scales = STEPS, SCALES
-        # single precision: with steps below 20 µs the answers of Box2D begin to wander
-        finest = (Pymunk(5e-6, 100), Box2D(2e-5, 50), Blocksim(1.0, 0.05))
-    return (
-        *(_peer("pymunk", Pymunk, steps, count, finest[0]) for count in (10, 30)),
-        *(_peer("Box2D", Box2D, steps, count, finest[1]) for count in (10, 50)),
-        *(
-            Series("blocksim", f"blocksim, safety {safety:g}", _stiffnesses(scales, safety), finest[2])
-            for safety in (0.1, 0.05)
-        ),
-    )
+@dataclass(frozen=True)
+class Answer:
+    """The cheapest setting of a series whose error is small, of which all finer ones' are too."""
+
+    series: Series
+    level: Level | None  # None where there is none
+
+    @property
+    def seconds(self) -> float:
+        """CPU time, infinite where there is none."""
+        return np.inf if self.level is None else float(np.median(self.level.seconds))
+
+    @property
+    def number(self) -> Number:
+        """For the table."""
+        if self.level is None:
+            return single(f"{self.series.label}: none", "CPU ms", np.inf)
+        samples = tuple((1e3 * self.level.seconds).tolist())
+        return Number(f"{self.series.label}: {self.level.solver.setting}", "CPU ms", samples)
 
 
-def _peer(name: str, engine: type[Pymunk | Box2D], steps: tuple[float, ...], iterations: int, finest: Solver) -> Series:
-    levels = tuple(engine(step, iterations) for step in steps)
-    return Series(name, f"{name}, {iterations} iterations", levels, finest)
-
-
-def _stiffnesses(scales: tuple[float, ...], safety: float) -> tuple[Solver, ...]:
-    return tuple(Blocksim(scale, safety) for scale in scales)
-
-
-def starts(count: int) -> list[Scene]:
+def starts(count: int, restitution: float = RESTITUTION) -> list[Scene]:
     """Return the scene with all blocks shifted at random by up to a micrometre."""
-    return [Scene(three_blocks, JITTER * (2.0 * row - 1.0), RESTITUTION, END) for row in draws(SEED, count, 3)]
+
+    def make(*, contact: Table | None = None, time: Table | None = None) -> Scenario:
+        return three_blocks({"restitution": restitution, **(contact or {})}, time)
+
+    return [Scene(make, JITTER * (2.0 * row - 1.0), restitution, END) for row in draws(SEED, count, 3)]
 
 
 def measure(setting: Setting) -> Findings:
+    """Measure all engines with the restitution of the paper's blocks."""
+    return measured(setting, RESTITUTION)
+
+
+def measure_without_restitution(setting: Setting) -> Findings:
+    """Measure all engines where they agree on the answer."""
+    return measured(setting, 0.0)
+
+
+def measured(setting: Setting, restitution: float) -> Findings:
     """Measure all engines."""
     require_all()
-    scenes = starts(QUICK_STARTS if setting.quick else STARTS)
+    scenes = starts(QUICK_STARTS if setting.quick else STARTS, restitution)
     references: dict[str, list[Final]] = {}
-    curves, numbers, details = [], [], []
-    for series in all_series(quick=setting.quick):
+    curves, answers, details = [], [], []
+    for series in three_blocks_series(restitution, quick=setting.quick):
         if series.engine not in references:
             references[series.engine] = [series.reference.solve(scene) for scene in scenes]
         levels = [_level(solver, scenes, references[series.engine]) for solver in series.levels]
         curves.append(_curve(series, levels))
-        numbers.append(_time_to_answer(series, levels))
+        answers.append(_answer(series, levels))
         details += [_detail(series, level) for level in levels]
-    numbers += _calls()
+    calls = _calls(scenes[0])
+    numbers = [*(answer.number for answer in answers), *_ratios(answers, calls, scenes[0])]
+    numbers += [single(f"{engine}: a call from Python", "µs", 1e6 * seconds) for engine, seconds in calls.items()]
     meaning = (
         f"error: of the block farthest from where the same engine's finest setting has it at {END:g} s, median of "
         f"{len(scenes)} starts within 1 µm; CPU time of the steps only"
     )
-    notes = (meaning, *(_answer(engine, finals) for engine, finals in references.items()))
-    panel = Panel("three blocks", "error (mm)", tuple(curves), CLOSE, f"{CLOSE:g} mm")
+    notes = (meaning, *(_ends(engine, finals) for engine, finals in references.items()))
+    panel = Panel(f"three blocks, restitution {restitution:g}", "error (mm)", tuple(curves), CLOSE, f"{CLOSE:g} mm")
     return Findings(tuple(numbers), notes=notes, details=tuple(details), panel=panel)
 
 
@@ -104,14 +114,9 @@ def _level(solver: Solver, scenes: list[Scene], references: list[Final]) -> Leve
     return Level(solver, 1e3 * np.array(off), np.array([final.seconds for final in finals]))
 
 
-def _time_to_answer(series: Series, levels: list[Level]) -> Number:
-    """Return the CPU time of the cheapest level whose error is small; infinite where there is none."""
+def _answer(series: Series, levels: list[Level]) -> Answer:
     close = settled(levels)
-    if not close:
-        return single(f"{series.label}: no setting", "CPU ms", np.inf)
-    best = min(close, key=lambda level: float(np.median(level.seconds)))
-    samples = tuple((1e3 * best.seconds).tolist())
-    return Number(f"{series.label}: {best.solver.setting}", "CPU ms", samples)
+    return Answer(series, min(close, key=lambda level: float(np.median(level.seconds)), default=None))
 
 
 def settled(levels: list[Level]) -> list[Level]:
@@ -120,12 +125,33 @@ def settled(levels: list[Level]) -> list[Level]:
     return list(close)
 
 
-def _calls() -> list[Number]:
-    """Return what the others' figures hold of Python: one call a step, of an empty scene."""
-    return [
-        single("pymunk: a call, empty scene", "µs", 1e6 * call_time(Pymunk(1e-3, 1), empty_space())),
-        single("Box2D: a call, empty scene", "µs", 1e6 * call_time(Box2D(1e-3, 1), empty_world())),
+def _calls(scene: Scene) -> dict[str, float]:
+    """Return what a call from Python takes (s) with nothing to compute: one a step, but for blocksim one a run."""
+    return {
+        PYMUNK: call_time(Pymunk(1e-3, 1), empty_space()),
+        BOX2D: call_time(Box2D(1e-3, 1), empty_world()),
+        NONSMOOTH: Nonsmooth(Stepping(1e-3)).call_time(scene),
+    }
+
+
+def _ratios(answers: list[Answer], calls: dict[str, float], scene: Scene) -> list[Number]:
+    """Return how many times as long as the non-smooth scheme others take, each at its cheapest; without calls too."""
+    best = {answer.series.engine: answer for answer in sorted(answers, key=lambda one: -one.seconds)}
+    if NONSMOOTH not in best or best[NONSMOOTH].level is None:
+        return []
+    own = best.pop(NONSMOOTH)
+    found = [single(f"{engine}: times non-smooth", "", one.seconds / own.seconds) for engine, one in best.items()]
+    computing = _without_calls(own, calls, scene)
+    return found + [
+        single(f"{engine}: the same without calls", "", _without_calls(one, calls, scene) / computing)
+        for engine, one in best.items()
+        if engine in calls
     ]
+
+
+def _without_calls(answer: Answer, calls: dict[str, float], scene: Scene) -> float:
+    count = 0 if answer.level is None else answer.level.solver.calls(scene)
+    return answer.seconds - count * calls[answer.series.engine]
 
 
 def _curve(series: Series, levels: list[Level]) -> Curve:
@@ -134,7 +160,7 @@ def _curve(series: Series, levels: list[Level]) -> Curve:
     return Curve(series.label, series.engine, seconds, error=off[:, 1], low=off[:, 0], high=off[:, 2])
 
 
-def _answer(engine: str, finals: list[Final]) -> str:
+def _ends(engine: str, finals: list[Final]) -> str:
     """Tell where an engine puts blocks 2 and 3, and how far its starts end apart."""
     x = 1e3 * np.array([final.x for final in finals])
     middle, apart = np.median(x, axis=0), np.ptp(x, axis=0)

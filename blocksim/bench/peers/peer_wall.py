@@ -14,24 +14,22 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from blocksim.bench.measurement import Findings, Number, Setting, single
-from blocksim.bench.peers.blocksim_engine import Blocksim
-from blocksim.bench.peers.box2d_engine import Box2D
 from blocksim.bench.peers.packages import require_all
-from blocksim.bench.peers.pymunk_engine import Pymunk
 from blocksim.bench.peers.scene import Final, Scene, Series, Solver
-from blocksim.bench.scenes import WALL_RESTITUTION, pushed_wall
+from blocksim.bench.peers.series import wall_racers, wall_series
+from blocksim.bench.scenes import LOW_COURSES, WALL_RESTITUTION, pushed_wall
 from blocksim.scenario.structures.base import draws
 from blocksim.view.work_precision import Curve, Panel
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
 QUICK = "a wall of 40 blocks for 0.1 s instead of 1000 for 1 s, two levels"
 JITTER = 1e-6  # m
 SEED = 2
-STEPS = (4e-3, 2e-3, 1e-3, 5e-4)  # s
-SCALES = (2.5e-4, 1e-3, 4e-3)  # four times the stiffness is half the step; softer blocks overlap too far
-QUICK_LEVELS = 2
+ROUNDS = 3  # of engines in turns, at most
 
 
 class Size(NamedTuple):
@@ -43,7 +41,7 @@ class Size(NamedTuple):
 
     def scene(self, shift: float = 0.0) -> Scene:
         """Return it with every block shifted at random by up to `shift` (m)."""
-        make = functools.partial(pushed_wall, self.columns, self.rows)
+        make = functools.partial(pushed_wall, self.columns, self.rows, upright=LOW_COURSES)
         return Scene(make, shift * (2.0 * draws(SEED, self.columns * self.rows) - 1.0), WALL_RESTITUTION, self.end)
 
 
@@ -79,32 +77,21 @@ def distances(one: Final, two: Final) -> tuple[float, float]:
     return 1e3 * wasserstein(one.x, two.x), 1e3 * wasserstein(one.y, two.y)
 
 
-def all_series(*, quick: bool) -> tuple[Series, ...]:
-    """Return every engine."""
-    steps, scales = (STEPS[:QUICK_LEVELS], SCALES[:QUICK_LEVELS]) if quick else (STEPS, SCALES)
-    found: list[tuple[str, str, tuple[Solver, ...]]] = [
-        ("pymunk", "pymunk, 10 iterations", tuple(Pymunk(step, 10) for step in steps)),
-        ("pymunk", "pymunk, 30 iterations", tuple(Pymunk(step, 30) for step in steps)),
-        ("Box2D", "Box2D, 10 iterations", tuple(Box2D(step, 10) for step in steps)),
-        ("blocksim", "blocksim", tuple(Blocksim(scale, 0.1) for scale in scales)),
-    ]
-    return tuple(Series(engine, label, levels, levels[-1]) for engine, label, levels in found)
-
-
 def measure(setting: Setting) -> Findings:
     """Measure all engines; one run a level, as each takes seconds to a minute."""
     require_all()
     size = SMALL if setting.quick else FULL
-    computed = [_computed(series, size) for series in all_series(quick=setting.quick)]
+    computed = [_computed(series, size) for series in wall_series(quick=setting.quick)]
     numbers = [number for one in computed for number in _numbers(one)]
-    blocksim = computed[-1].finals[-1]
+    numbers += raced(wall_racers(), size, min(ROUNDS, setting.repeats))
+    last = computed[-1]  # the explicit one
     meaning = (
         f"{size.columns * size.rows} blocks, {size.end:g} s; change: mean distance of the sorted final x "
         "(Wasserstein-1) from a level to the next, with half the step"
     )
     notes = (
         meaning,
-        *(_compared(one, blocksim) for one in computed[:-1]),
+        *(_compared(one, last) for one in computed[:-1]),
         *(_scattered(one) for one in computed),
     )
     curves = tuple(_curve(one) for one in computed)
@@ -120,15 +107,32 @@ def _computed(series: Series, size: Size) -> Computed:
 
 
 def _numbers(one: Computed) -> list[Number]:
-    names = [f"{one.series.label}, {solver.setting}" for solver in one.series.levels]
+    names = [f"{one.series.label}, {solver.setting.removeprefix('step ')}" for solver in one.series.levels]
     seconds = [single(name, "CPU s", final.seconds) for name, final in zip(names, one.finals, strict=True)]
     changes = [single(f"{name}, change", "mm", x) for name, (x, _) in zip(names, one.changes, strict=False)]
     return seconds + changes
 
 
-def _compared(one: Computed, other: Final) -> str:
-    x, y = distances(one.finals[-1], other)
-    return f"{one.series.label}: its finest heap differs from that of blocksim by {x:.1f} mm in x and {y:.1f} mm in y"
+def raced(racers: Mapping[str, Solver], size: Size, rounds: int) -> list[Number]:
+    """Return the CPU time of the first one, and how many times as long the others take.
+
+    They run in turns, so that what else the machine does slows all of them.
+    """
+    times = [{name: solver.solve(size.scene()).seconds for name, solver in racers.items()} for _ in range(rounds)]
+    first, *others = racers
+    own = Number(f"{first}, {racers[first].setting}, in turns", "CPU s", tuple(one[first] for one in times))
+    return [
+        own,
+        *(Number(f"{name}: times that", "", tuple(one[name] / one[first] for one in times)) for name in others),
+    ]
+
+
+def _compared(one: Computed, other: Computed) -> str:
+    x, y = distances(one.finals[-1], other.finals[-1])
+    return (
+        f"{one.series.label}: its finest heap differs from that of {other.series.label} by {x:.1f} mm in x and "
+        f"{y:.1f} mm in y"
+    )
 
 
 def _scattered(one: Computed) -> str:

@@ -55,6 +55,9 @@ class Solver(Protocol):
     def setting(self) -> str:
         """What is refined from level to level, for people."""
 
+    def calls(self, scene: Scene) -> int:
+        """Return how often Python calls the engine for a scene."""
+
     def solve(self, scene: Scene) -> Final:
         """Compute the scene up to its end."""
 

@@ -32,10 +32,14 @@ class Stepper(ABC):
         """For people."""
         return f"step {1e3 * self.step:g} ms"
 
+    def calls(self, scene: Scene) -> int:
+        """Return the number of steps: each is a call from Python."""
+        return round(scene.end / self.step)
+
     def solve(self, scene: Scene) -> Final:
         """Compute the scene. Not counted: making it."""
         world, bodies = self.made(scene)
-        seconds = timed(*self.call(world), count=round(scene.end / self.step))
+        seconds = timed(*self.call(world), count=self.calls(scene))
         x, y = np.array([body.position for body in bodies]).T / self.units
         return Final(x, y, seconds)
 

@@ -1,0 +1,86 @@
+"""Which settings of which engine are compared: one line a curve."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from blocksim.bench.peers.blocksim_engine import Explicit, Nonsmooth
+from blocksim.bench.peers.box2d_engine import Box2D
+from blocksim.bench.peers.pymunk_engine import Pymunk
+from blocksim.bench.peers.scene import Series
+from blocksim.bench.stepping import UNTIL_SOLVED, Stepping
+
+if TYPE_CHECKING:
+    from blocksim.bench.peers.scene import Solver
+
+PYMUNK, BOX2D, EXPLICIT, NONSMOOTH = "pymunk", "Box2D", "explicit", "non-smooth"
+STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5)  # s
+SCALES = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1)
+WALL_STEPS = (4e-3, 2e-3, 1e-3, 5e-4)  # s
+WALL_SCALES = (2.5e-4, 1e-3, 4e-3)  # four times the stiffness is half the step; softer blocks overlap too far
+WALL_PARTED = (1e-3, 5e-4, 2.5e-4)  # s, in four parts each: with longer ones blocks overlap too far
+RACE_STEP = 1e-3  # s
+QUICK_LEVELS, QUICK_WALL_LEVELS = 3, 2
+
+
+def three_blocks_series(restitution: float, *, quick: bool) -> tuple[Series, ...]:
+    """Return every engine with few and many iterations, explicit with long and short steps, non-smooth with parts.
+
+    Without restitution one velocity sweep is enough for the non-smooth scheme, and is another law than many: it has a
+    finest setting of its own.
+    """
+    steps, scales = (STEPS[:QUICK_LEVELS], SCALES[:QUICK_LEVELS]) if quick else (STEPS, SCALES)
+    finest = STEPS[QUICK_LEVELS]
+    sweeps = UNTIL_SOLVED if restitution else 1
+    # single precision: with steps below 20 µs the answers of Box2D begin to wander
+    references: dict[str, Solver] = {
+        PYMUNK: Pymunk(finest, 30) if quick else Pymunk(5e-6, 100),
+        BOX2D: Box2D(finest, 30) if quick else Box2D(2e-5, 50),
+        EXPLICIT: Explicit(SCALES[QUICK_LEVELS], 0.1) if quick else Explicit(1.0, 0.05),
+        NONSMOOTH: Nonsmooth(Stepping(finest if quick else 5e-6, 1, sweeps)),
+    }
+    found: list[tuple[str, str, tuple[Solver, ...]]] = [
+        *((PYMUNK, f"pymunk, {n} iterations", _stepped(Pymunk, steps, n)) for n in (10, 30)),
+        *((BOX2D, f"Box2D, {n} iterations", _stepped(Box2D, steps, n)) for n in (10, 50)),
+        *((EXPLICIT, f"explicit, safety {safety:g}", _explicit(scales, safety)) for safety in (0.1, 0.05)),
+        *((NONSMOOTH, f"non-smooth, {_parts(n)}", _nonsmooth(steps, n, sweeps)) for n in (1, 4)),
+    ]
+    return tuple(Series(engine, label, levels, references[engine]) for engine, label, levels in found)
+
+
+def wall_series(*, quick: bool) -> tuple[Series, ...]:
+    """Return every engine; the finest level is the reference."""
+    count = QUICK_WALL_LEVELS if quick else len(WALL_STEPS)
+    steps, scales, parted = WALL_STEPS[:count], WALL_SCALES[:count], WALL_PARTED[:count]
+    found: list[tuple[str, str, tuple[Solver, ...]]] = [
+        *((PYMUNK, f"pymunk, {n} iterations", _stepped(Pymunk, steps, n)) for n in (10, 30)),
+        (BOX2D, "Box2D, 10 iterations", _stepped(Box2D, steps, 10)),
+        (NONSMOOTH, f"non-smooth, {_parts(4)}", _nonsmooth(parted, 4, UNTIL_SOLVED)),
+        (EXPLICIT, "explicit", _explicit(scales, 0.1)),
+    ]
+    return tuple(Series(engine, label, levels, levels[-1]) for engine, label, levels in found)
+
+
+def wall_racers() -> dict[str, Solver]:
+    """Return those that are timed in turns at the same step, the non-smooth scheme first."""
+    return {
+        NONSMOOTH: Nonsmooth(Stepping(RACE_STEP)),
+        **{f"{PYMUNK}, {n} iterations": Pymunk(RACE_STEP, n) for n in (10, 30)},
+        f"{BOX2D}, 10 iterations": Box2D(RACE_STEP, 10),
+    }
+
+
+def _stepped(engine: type[Pymunk | Box2D], steps: tuple[float, ...], iterations: int) -> tuple[Solver, ...]:
+    return tuple(engine(step, iterations) for step in steps)
+
+
+def _explicit(scales: tuple[float, ...], safety: float) -> tuple[Solver, ...]:
+    return tuple(Explicit(scale, safety) for scale in scales)
+
+
+def _nonsmooth(steps: tuple[float, ...], parts: int, sweeps: int) -> tuple[Solver, ...]:
+    return tuple(Nonsmooth(Stepping(step, parts, sweeps)) for step in steps)
+
+
+def _parts(count: int) -> str:
+    return f"{count} substep{'s' if count > 1 else ''}"
