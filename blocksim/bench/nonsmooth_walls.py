@@ -16,7 +16,6 @@ SIZES = (Size(40, 25), Size(90, 56), Size(180, 112))
 QUICK_SIZES = (Size(8, 5), Size(16, 10))
 END = 1.0  # s, of the first wall; where it ends is known
 COMMON, QUICK_END = 0.5, 0.1  # s, of all walls
-MAX_OVERLAP = 2.5e-3  # m, a tenth of a block's height: walls of 5000 blocks press on their feet beyond the default
 USUAL = Stepping(1e-3)
 
 
@@ -84,15 +83,14 @@ def measure(setting: Setting) -> Findings:
         f"running bond of 32 x 25 mm, pushed with 1 m/s y/H, restitution 0.1, {USUAL.setting}; a substep and growth: "
         f"the first {common:g} s of every wall (the higher, the less of it has fallen by then), {first.rebuilds} to "
         f"{last.rebuilds} pair lists made anew, {first.sweeps / first.substeps:.2f} to "
-        f"{last.sweeps / last.substeps:.2f} velocity sweeps a substep; overlaps up to {1e3 * MAX_OVERLAP:g} mm allowed"
+        f"{last.sweeps / last.substeps:.2f} velocity sweeps a substep"
     )
     return Findings(numbers, notes=(note,), details=tuple(wall.detail() for wall in (whole, *walls)))
 
 
 def wall_scene(size: Size) -> Rerun:
     """Return the wall of the non-smooth scheme, at its start."""
-    contact = {"max_overlap": MAX_OVERLAP}
-    return Rerun(pushed_wall(size.columns, size.rows, contact, USUAL.time(), upright=LOW_COURSES))
+    return Rerun(pushed_wall(size.columns, size.rows, time=USUAL.time(), upright=LOW_COURSES))
 
 
 def _measured(size: Size, end: float, repeats: int) -> Wall:

@@ -105,7 +105,7 @@ def _unknown_key(path: KeyPath, data: object) -> Finding:
         return Finding(
             path, f"this key is for scheme {shown(schemes[0])}; the scheme here is {shown(present)}", at="key"
         )
-    table = table_at(path[:-1], data)
+    table = SCHEMES[scheme_of(follow(data, path[:-1]))] if path[0] == "time" else table_at(path[:-1], data)
     known = keys_of(table) if table is not None else ()
     meant = similar_word(str(path[-1]), known)
     hint = f"did you mean {meant!r}?" if meant else f"allowed are: {', '.join(known)}"

@@ -125,6 +125,21 @@ bad.toml:21: time.scheme: "nonsmoth" is not known here, did you mean "nonsmooth"
       |          ^^^^^^^^^^
 """,
     ),
+    "misspelt scheme, whose keys are judged as those that are meant": (
+        None,
+        '\n[time]\nscheme = "non-smooth"\nsubstep = 4\nvelocity_tolerance = "1 mm/s"\nsafety = 0.1\n',
+        """
+bad.toml:21: time.scheme: "non-smooth" is not known here, did you mean "nonsmooth"?
+   21 | scheme = "non-smooth"
+      |          ^^^^^^^^^^^^
+bad.toml:22: time.substep: unknown key, did you mean 'substeps'?
+   22 | substep = 4
+      | ^^^^^^^
+bad.toml:24: time.safety: this key is for scheme "explicit"; the scheme here is "nonsmooth"
+   24 | safety = 0.1
+      | ^^^^^^
+""",
+    ),
     "model of springs with rigid contacts": (
         None,
         '\n[contact]\nmodel = "particles"\n[time]\nscheme = "nonsmooth"\n',

@@ -149,8 +149,8 @@ class Contact(Table):
     skin: q.PositiveLength | None = Field(
         default=None,
         description="how far apart blocks may be that are listed as neighbours; decides how often the list is made and "
-        "how long it is, the motion stays the same bit for bit (default: 25 % of the smallest side of all blocks, with "
-        "particles 5 %)",
+        "how long it is, the motion on springs stays the same bit for bit (default: 25 % of the smallest side of all "
+        "blocks, with particles 5 %)",
     )
     contact_radius: q.PositiveLength = Field(
         default=0.001, description="radius of curvature R* of every contact (assumed; hertz-mindlin only)"

@@ -7,10 +7,13 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema
 
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import OneOf, Table, whole
+from blocksim.scenario.spelling import nearest
 
 Scheme = Literal["explicit", "nonsmooth"]
 _WORDS = OneOf(("explicit", "nonsmooth"))
 
+MOST_SLIPS = 2
+"""Of a misspelt scheme, so that the keys beside it are judged as those that are meant."""
 MOST_SUBSTEPS = 1000
 MOST_SWEEPS = 1_000_000
 LEAST_TOLERANCE = 1e-12
@@ -77,9 +80,10 @@ class Nonsmooth(Time):
 
 
 def scheme_of(value: object) -> str:
-    """Return which model reads a [time] table; one with a scheme that there is not is told so by the first."""
+    """Return which model reads a [time] table: that of its scheme, or of the one that a misspelt word is nearest to."""
     scheme = value.get("scheme") if isinstance(value, Mapping) else getattr(value, "scheme", None)
-    return scheme if isinstance(scheme, str) and scheme in SCHEMES else "explicit"
+    meant = nearest(scheme, SCHEMES, most=MOST_SLIPS) if isinstance(scheme, str) else None
+    return meant or "explicit"
 
 
 AnyTime = Annotated[
