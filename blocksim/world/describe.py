@@ -133,7 +133,7 @@ def _rigid(scenario: Scenario, step: float, placed: Sequence[PlacedBody]) -> Sag
     return SagDescription(
         substeps=scenario.time.substeps,
         tolerance=velocity_tolerance(scenario.time, len(placed)),
-        longest_step=longest_step(scenario, parts.bodies, smallest_side(parts)),
+        longest_step=longest_step(scenario, parts.bodies, parts.interactions, smallest_side(parts)),
         blocks=blocks,
         sag=column_sag(step / scenario.time.substeps, lowest, blocks, scenario.gravity),
     )

@@ -77,7 +77,7 @@ def build_nonsmooth(scenario: Scenario) -> Nonsmooth:
     capacity = first_capacity(parts.bodies)
     refuse_if_too_large(RigidSize(parts.bodies.size, capacity))
     smallest = smallest_side(parts)
-    controls = empty_controls(scenario, parts, choose_rigid_step(scenario, parts.bodies, smallest))
+    controls = empty_controls(scenario, parts, choose_rigid_step(scenario, parts.bodies, parts.interactions, smallest))
     stepping = zeros(1, STEPPING)
     record = stepping[0]
     record.substep = controls[0].step / time.substeps

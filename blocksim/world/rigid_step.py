@@ -9,6 +9,8 @@ start, or in one substep at that bound.
 
 import math
 
+import numpy as np
+
 from blocksim.kernels.arrays import Records
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Nonsmooth
@@ -32,11 +34,11 @@ class StepTooLongError(StepError):
         )
 
 
-def choose_rigid_step(scenario: Scenario, bodies: Records, smallest: float) -> float:
-    """Return the step (s) the run will take, given the smallest side (m); raises StepError."""
+def choose_rigid_step(scenario: Scenario, bodies: Records, table: Records, smallest: float) -> float:
+    """Return the step (s) the run will take, given interactions and the smallest side (m); raises StepError."""
     asked, end = scenario.time.step, scenario.time.end
-    step = min(automatic_step(scenario, bodies, smallest), end) if asked == "auto" else asked
-    limit = longest_step(scenario, bodies, smallest)
+    step = min(automatic_step(scenario, bodies, table, smallest), end) if asked == "auto" else asked
+    limit = longest_step(scenario, bodies, table, smallest)
     if not step > 0.0 or end / step > MOST_STEPS:
         raise UncountableStepsError(end, step)
     if step > limit and not scenario.time.force_step:
@@ -44,23 +46,33 @@ def choose_rigid_step(scenario: Scenario, bodies: Records, smallest: float) -> f
     return step
 
 
-def automatic_step(scenario: Scenario, bodies: Records, smallest: float) -> float:
+def automatic_step(scenario: Scenario, bodies: Records, table: Records, smallest: float) -> float:
     """Return the step (s) without one given by hand."""
-    speed = greatest_speed(scenario, bodies)
+    speed = greatest_speed(scenario, bodies, table)
     return min(USUAL_STEP, SHARE * smallest / speed) if speed > 0.0 else USUAL_STEP
 
 
-def greatest_speed(scenario: Scenario, bodies: Records) -> float:
+def greatest_speed(scenario: Scenario, bodies: Records, table: Records) -> float:
     """Return the bound (m/s) of the speed of any point of a block."""
-    frictions = [scenario.friction.block_ground.kinetic, scenario.friction.block_block.kinetic]
-    frictions += [pair.friction.kinetic for row in scenario.pairs.values() for pair in row.values() if pair.friction]
     tilt = abs(scenario.ground.tilt)
-    pull = scenario.gravity * max(0.0, math.sin(tilt) - min(frictions) * math.cos(tilt))
+    pull = scenario.gravity * max(0.0, math.sin(tilt) - least_support_friction(bodies, table) * math.cos(tilt))
     return math.hypot(fastest_start(bodies), fastest_fall(scenario, bodies)) + pull * scenario.time.end
 
 
-def longest_step(scenario: Scenario, bodies: Records, smallest: float) -> float:
+def least_support_friction(bodies: Records, table: Records) -> float:
+    """Return the least kinetic friction of free blocks with the ground, its pieces and fixed blocks.
+
+    On one another blocks do not slide farther than they are long.
+    """
+    is_free = bodies.inverse_mass > 0.0
+    free, support = (np.unique(bodies.contact_class[chosen]) for chosen in (is_free, ~is_free))
+    if free.size == 0:
+        return math.inf
+    return float(table[np.ix_(support, free)]["kinetic_friction"].min())
+
+
+def longest_step(scenario: Scenario, bodies: Records, table: Records, smallest: float) -> float:
     """Return the longest step (s) that may be given by hand."""
     substeps = scenario.time.substeps if isinstance(scenario.time, Nonsmooth) else 1
-    rate = max(fastest_start(bodies), greatest_speed(scenario, bodies) / substeps)
+    rate = max(fastest_start(bodies), greatest_speed(scenario, bodies, table) / substeps)
     return SHARE * smallest / rate if rate > 0.0 else scenario.time.end

@@ -43,6 +43,16 @@ def test_only_slopes_that_friction_does_not_hold_shrink_the_step() -> None:
     assert step_of(RESTING, ground={"tilt": "40 deg"}, friction=friction, end=10.0) < 0.5 * USUAL_STEP
 
 
+def test_friction_that_matters_is_that_of_what_blocks_can_slide_on_for_long() -> None:
+    friction = {"block_block": 0.1, "block_ground": 0.5}
+    values: dict[str, Any] = {"ground": {"tilt": "20 deg"}, "friction": friction, "end": 10.0}
+    assert step_of(RESTING, **values) == USUAL_STEP
+    plank = {"x": 1.0, "y": HEIGHT / 2, "width": 1.0, "fixed": True}
+    tables = {"ground": values["ground"], "friction": friction}
+    scenario = scenario_of([RESTING, plank], time={"scheme": "nonsmooth", "end": 10.0}, **tables)
+    assert build_nonsmooth(scenario).world.controls[0].step < 0.5 * USUAL_STEP
+
+
 @pytest.mark.parametrize(("step", "substeps", "is_fine"), [(1e-3, 4, True), (5e-3, 4, False), (1.5e-3, 1, False)])
 def test_step_by_hand_is_refused_where_a_fall_is_too_long_for_its_substeps(
     step: float, substeps: int, is_fine: bool
