@@ -14,14 +14,10 @@ import numpy as np
 
 from blocksim.analysis import closed_forms as forms
 from blocksim.simulation.schemes import build_scene, scheme_of
+from blocksim.simulation.stacking import arrays_of
 from blocksim.verification.scene import HEIGHT, WIDTH
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import NDArray
-
-    from blocksim.simulation.schemes import AnyScene
     from blocksim.verification.case import Setting
 
 POLL = 40  # steps; an impact takes thirty and more
@@ -80,15 +76,6 @@ class Thrower:
         body.angle, body.cos, body.sin = throw.angle, cos(throw.angle), sin(throw.angle)
         self.world.interactions.static_friction[...] = throw.friction
         self.world.interactions.kinetic_friction[...] = throw.friction
-
-
-def arrays_of(scene: AnyScene | tuple[Any, ...]) -> Iterator[NDArray[Any]]:
-    """Return all arrays of a scene, those of its parts too."""
-    for part in scene:
-        if isinstance(part, np.ndarray):
-            yield part
-        elif part is not None:
-            yield from arrays_of(part)
 
 
 def kinetic_energy(body: Any) -> float:

@@ -11,7 +11,7 @@ from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, place_
 from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
 from blocksim.world.boundary import particle_count
-from blocksim.world.build import build_world, scene_parts, smallest_side
+from blocksim.world.build import Parts, build_world, smallest_side
 from blocksim.world.interactions import ContactClass, contact_classes, pair_of
 from blocksim.world.memory import RigidSize, SceneSize, file_bytes
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
@@ -85,8 +85,8 @@ class Description:
 
 def describe(scenario: Scenario) -> Description:
     """Build the scene and tell what is in it. Raises what building it raises."""
-    world, size = _built(scenario)
     placed = place_bodies(scenario)
+    world, size = _built(scenario, len(placed))
     step = float(world.controls[0].step)
     steps = max(1, round(scenario.time.end / step))
     frames = min(steps, round(scenario.time.end / scenario.output.every)) + 1
@@ -102,13 +102,12 @@ def describe(scenario: Scenario) -> Description:
         memory=replace(size, frames=frames).bytes_needed,
         particles=_particles(scenario, placed),
         skin=float(world.controls[0].skin),
-        rigid=_rigid(scenario, step, placed),
+        rigid=_rigid(scenario, Parts(placed, world.bodies, world.interactions), step),
     )
 
 
-def _built(scenario: Scenario) -> tuple[World, SceneSize | RigidSize]:
-    """Build the scene; return the arrays that all schemes have, and its size."""
-    count = len(place_bodies(scenario))
+def _built(scenario: Scenario, count: int) -> tuple[World, SceneSize | RigidSize]:
+    """Build the scene of so many bodies; return the arrays that all schemes have, and its size."""
     if isinstance(scenario.time, Nonsmooth):
         scene = build_nonsmooth(scenario)
         return scene.world, RigidSize(count, scene.contacts.rows.size)
@@ -124,15 +123,14 @@ def _seconds_per_step(scenario: Scenario, blocks: int) -> float:
     return SECONDS_IN_A_CROWD if blocks > CROWD else SECONDS_PER_BODY_AND_STEP
 
 
-def _rigid(scenario: Scenario, step: float, placed: Sequence[PlacedBody]) -> SagDescription | None:
+def _rigid(scenario: Scenario, parts: Parts, step: float) -> SagDescription | None:
     if not isinstance(scenario.time, Nonsmooth):
         return None
-    lowest = min(placed, key=lambda body: body.y)
-    blocks = max(1, round((max(body.y for body in placed) + 0.5 * lowest.size_y) / lowest.size_y))
-    parts = scene_parts(scenario)
+    lowest = min(parts.placed, key=lambda body: body.y)
+    blocks = max(1, round((max(body.y for body in parts.placed) + 0.5 * lowest.size_y) / lowest.size_y))
     return SagDescription(
         substeps=scenario.time.substeps,
-        tolerance=velocity_tolerance(scenario.time, len(placed)),
+        tolerance=velocity_tolerance(scenario.time, len(parts.placed)),
         longest_step=longest_step(scenario, parts.bodies, parts.interactions, smallest_side(parts)),
         blocks=blocks,
         sag=column_sag(step / scenario.time.substeps, lowest, blocks, scenario.gravity),

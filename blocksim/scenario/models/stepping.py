@@ -1,7 +1,7 @@
 """How time passes and what is kept of it."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema
 
@@ -10,7 +10,7 @@ from blocksim.scenario.models.base import OneOf, Table, whole
 from blocksim.scenario.spelling import nearest
 
 Scheme = Literal["explicit", "nonsmooth"]
-_WORDS = OneOf(("explicit", "nonsmooth"))
+_WORDS = OneOf(get_args(Scheme))
 
 MOST_SLIPS = 2
 """Of a misspelt scheme, so that the keys beside it are judged as those that are meant."""
