@@ -139,7 +139,7 @@ $(VENV_PYTHON):
 
 $(RUN_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
 	@echo "Installing blocksim into $(VENV), a minute or so (versions: $(CONSTRAINTS))"
-	@$(PIP_INSTALL) --editable .
+	@$(PIP_INSTALL) --editable ".[study]"
 	@touch $@
 
 $(DEV_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
@@ -149,5 +149,5 @@ $(DEV_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
 
 $(BENCH_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
 	@echo "Installing the engines to compare with into $(VENV) (versions: $(CONSTRAINTS))"
-	@$(PIP_INSTALL) --editable ".[bench]"
+	@$(PIP_INSTALL) --editable ".[bench,study]"
 	@touch $(RUN_STAMP) $@
