@@ -8,10 +8,10 @@ from blocksim.kernels.energy import weights_power
 from blocksim.kernels.integrate import kinetic_energy, renew_rotations
 from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
 from blocksim.kernels.lanes import WIDTH
-from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.kernels.nonsmooth.arrays import AWAY, Nonsmooth
 from blocksim.kernels.nonsmooth.energy import has_excessive_overlap
 from blocksim.kernels.nonsmooth.groups import gather, pack_groups, unpack_groups
-from blocksim.kernels.nonsmooth.manifold import are_four_of_blocks, collide, collide_four
+from blocksim.kernels.nonsmooth.manifold import are_four_of_blocks, collide, collide_four, reach_of
 from blocksim.kernels.nonsmooth.motion import place_all
 from blocksim.kernels.nonsmooth.neighbours import look
 from blocksim.kernels.nonsmooth.substep import bodies_of, kick_share, substep
@@ -98,7 +98,8 @@ def collide_rows(scene: Nonsmooth, begin: int, end: int) -> None:
             r += WIDTH
         else:
             row = rows[r]
-            row.is_on = collide(row, bodies[row.a], bodies[row.b], row.b == ground, margin)
+            is_near = collide(row, bodies[row.a], bodies[row.b], row.b == ground, margin)
+            row.reach = reach_of(row) if is_near else AWAY
             r += 1
 
 

@@ -24,7 +24,7 @@ from blocksim.kernels.lanes import (
     write_fields_4,
     write_fields_8,
 )
-from blocksim.kernels.nonsmooth.arrays import FAR
+from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, OPEN, TOUCHING
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller half side: two faces that face each other over less are passed by
@@ -277,6 +277,13 @@ def collide_blocks(row: Record, a: Record, b: Record, margin: float) -> bool:
 
 
 @kernel
+def reach_of(row: Record) -> int:
+    """Tell whether a row within the margin has a point that touches or pressed in the last substep."""
+    is_touching = min(row.gap_one, row.gap_two) <= 0.0 or row.normal_one > 0.0 or row.normal_two > 0.0
+    return TOUCHING if is_touching else OPEN
+
+
+@kernel
 def blocks_at(bodies: Records, places: tuple[int, int, int, int]) -> Block:
     """Return four blocks."""
     x, y, _, cos = fields_0(None, bodies, places)
@@ -304,11 +311,11 @@ def collide_four(rows: Records, first: int, bodies: Records, margin: float) -> N
     columns = (points.width, points.shear_arm_a, points.shear_arm_b, points.gap_one)
     write_fields_4(None, rows, places, are_all, columns)
     write_fields_8(None, rows, places, are_all, (points.gap_two, normal_one, normal_two, shear))
-    is_one, is_two, is_three, is_four = split(select(is_on, 1.0, 0.0))
-    one.is_on = is_one > 0.0
-    two.is_on = is_two > 0.0
-    three.is_on = is_three > 0.0
-    four.is_on = is_four > 0.0
+    is_near_one, is_near_two, is_near_three, is_near_four = split(select(is_on, 1.0, 0.0))
+    one.reach = reach_of(one) if is_near_one > 0.0 else AWAY
+    two.reach = reach_of(two) if is_near_two > 0.0 else AWAY
+    three.reach = reach_of(three) if is_near_three > 0.0 else AWAY
+    four.reach = reach_of(four) if is_near_four > 0.0 else AWAY
 
 
 @rare_kernel
