@@ -15,6 +15,7 @@ from blocksim.kernels.lanes.functions import (
     fields_0,
     fields_4,
     fields_8,
+    fields_12,
     fields_16,
     four,
     greater,
@@ -233,7 +234,7 @@ def _define_memory() -> None:
         return lower_builtin(function, *kinds)
 
     columns, single = types.UniTuple(LANES, WIDTH), types.UniTuple(types.float64, WIDTH)
-    for function, part in ((fields_0, 0), (fields_4, 1), (fields_8, 2), (fields_16, 4)):
+    for function, part in ((fields_0, 0), (fields_4, 1), (fields_8, 2), (fields_12, 3), (fields_16, 4)):
         typed(function, columns, types.NoneType, types.Array, types.NestedArray)(_read_fields(part))
         typed(function, columns, types.NoneType, types.Array, types.UniTuple)(_read_fields(part))
         typed(function, single, types.Integer, types.Array, types.NestedArray)(_read_fields(part))

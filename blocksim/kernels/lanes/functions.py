@@ -84,6 +84,11 @@ def fields_8(lane: Lane, records: Records, places: Places) -> tuple[Lanes, Lanes
     return _fields(lane, records, places, 8)
 
 
+def fields_12(lane: Lane, records: Records, places: Places) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Return the four fields after those of the records at four places; what is no double there makes no sense."""
+    return _fields(lane, records, places, 12)
+
+
 def fields_16(lane: Lane, records: Records, places: Places) -> tuple[Lanes, Lanes, Lanes, Lanes]:
     """Return four fields of the records at four places, from the seventeenth on."""
     return _fields(lane, records, places, 16)

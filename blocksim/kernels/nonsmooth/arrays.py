@@ -25,13 +25,15 @@ ROW = record_type(
     "width "  # m: from point one to point two along the tangent
     "shear_arm_a shear_arm_b "  # m: r x t, the same for both points, as they lie on one face
     "gap_one gap_two "  # m: when the step began; FAR where there is no such point
-    "normal_one normal_two shear",  # N s: impulses of the last substep: pushing apart, on body a along the tangent
+    "normal_one normal_two shear "  # N s: impulses of the last substep: pushing apart, on body a along the tangent
+    "bend shear_bend",  # m/s: what the velocities at the points gain within half a substep, as the bodies turn
     indices="a b touch",  # bodies; place in the table of interactions
     flags="reach",  # of the manifold in the step under way: AWAY, OPEN or TOUCHING
 )
 # four active rows of one colour, field by field; see groups.py
 LANE_FLOATS = (
     "nx ny arm_a arm_b width shear_arm_a shear_arm_b gap_one gap_two normal_one normal_two shear "  # as in ROW
+    "bend shear_bend "  # as in ROW
     "target_one target_two"  # m/s: least approach that the velocity pass leaves; -FAR where a point does not count
 )
 LANE_INDICES = "a b row"  # bodies; number of the row

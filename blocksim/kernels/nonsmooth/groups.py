@@ -15,24 +15,14 @@ from blocksim.kernels.lanes import (
     fields_0,
     fields_4,
     fields_8,
+    fields_12,
     four,
     load,
     split,
     store,
 )
 from blocksim.kernels.nonsmooth.arrays import COLOURS, OPEN, TOUCHING, Contacts
-
-
-class Rows(NamedTuple):
-    """What four rows are, the same for all substeps of a step; fields as in ROW."""
-
-    nx: Lanes
-    ny: Lanes
-    arm_a: Lanes
-    arm_b: Lanes
-    width: Lanes
-    shear_arm_a: Lanes
-    shear_arm_b: Lanes
+from blocksim.kernels.nonsmooth.slip import Rows
 
 
 class Bodies(NamedTuple):
@@ -175,6 +165,9 @@ def pack(contacts: Contacts, group: Record, lane: Lane) -> None:
     nx, ny, arm_a, arm_b = fields_0(lane, contacts.rows, group.row)
     width, shear_arm_a, shear_arm_b, gap_one = fields_4(lane, contacts.rows, group.row)
     gap_two, normal_one, normal_two, shear = fields_8(lane, contacts.rows, group.row)
+    bend, shear_bend, _, _ = fields_12(lane, contacts.rows, group.row)
+    store(lane, group.bend, bend)
+    store(lane, group.shear_bend, shear_bend)
     store(lane, group.nx, nx)
     store(lane, group.ny, ny)
     store(lane, group.arm_a, arm_a)

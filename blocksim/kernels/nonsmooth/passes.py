@@ -5,8 +5,6 @@ computed anew each time, which is cheaper than to load them. Bodies that are fix
 one colour share nothing that changes.
 """
 
-from typing import NamedTuple
-
 from blocksim.kernels.arrays import Record
 from blocksim.kernels.friction import friction_coefficient
 from blocksim.kernels.jit import kernel
@@ -25,24 +23,9 @@ from blocksim.kernels.lanes import (
     write_fields_0,
 )
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
-from blocksim.kernels.nonsmooth.groups import Bodies, Rows, bodies_at, kinetic_frictions, restitutions, rows_of, touch_of
+from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, kinetic_frictions, restitutions, rows_of, touch_of
+from blocksim.kernels.nonsmooth.slip import Rows, slip_of
 from blocksim.kernels.nonsmooth.solve import solve_two
-
-
-class Slip(NamedTuple):
-    """Velocity of body a against body b at the contact points: along the normal, twice, and along the tangent (m/s)."""
-
-    one: Lanes
-    two: Lanes
-    shear: Lanes
-
-
-@kernel
-def slip_of(row: Rows, vx: Lanes, vy: Lanes, spin_a: Lanes, spin_b: Lanes) -> Slip:
-    """Return the velocities at the points, given that of centre a against centre b and both spins."""
-    one = row.nx * vx + row.ny * vy + row.arm_a * spin_a - row.arm_b * spin_b
-    shear = row.nx * vy - row.ny * vx + row.shear_arm_a * spin_a - row.shear_arm_b * spin_b
-    return Slip(one, one - row.width * (spin_a - spin_b), shear)
 
 
 @kernel
@@ -117,8 +100,9 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     old_two = load(lane, group.normal_two)
     k_one = one + select(gap_one > 0.0, 0.0, stepping.softness) * one
     k_two = two + select(gap_two > 0.0, 0.0, stepping.softness) * two
-    free_one = slip.one + select(gap_one > 0.0, stepping.open_bias, stepping.closed_bias) * gap_one
-    free_two = slip.two + select(gap_two > 0.0, stepping.open_bias, stepping.closed_bias) * gap_two
+    bend = load(lane, group.bend)
+    free_one = slip.one + bend + select(gap_one > 0.0, stepping.open_bias, stepping.closed_bias) * gap_one
+    free_two = slip.two + bend + select(gap_two > 0.0, stepping.open_bias, stepping.closed_bias) * gap_two
     q_one = free_one - (one * old_one + mixed * old_two)
     q_two = free_two - (mixed * old_one + two * old_two)
     if is_all((lesser(q_one, q_two) >= 0.0) & (greater(old_one, old_two) <= 0.0)):
@@ -229,8 +213,9 @@ def reach(
     old_one = load(lane, group.normal_one)
     old_two = load(lane, group.normal_two)
     old_shear = load(lane, group.shear)
-    q_one = slip.one - t_one - one * old_one - mixed * old_two
-    q_two = slip.two - t_two - mixed * old_one - two * old_two
+    bend = load(lane, group.bend)
+    q_one = slip.one + bend - t_one - one * old_one - mixed * old_two
+    q_two = slip.two + bend - t_two - mixed * old_one - two * old_two
     new_one, new_two = solve_two(one, mixed, two, q_one, q_two)
     store(lane, group.normal_one, new_one)
     store(lane, group.normal_two, new_two)
@@ -241,7 +226,12 @@ def reach(
     coupled_a = a.inverse_inertia * row.shear_arm_a
     coupled_b = b.inverse_inertia * row.shear_arm_b
     turn = row.width * d_two
-    rate = slip.shear + coupled_a * (row.arm_a * normal - turn) + coupled_b * (row.arm_b * normal - turn)
+    rate = (
+        slip.shear
+        + load(lane, group.shear_bend)
+        + coupled_a * (row.arm_a * normal - turn)
+        + coupled_b * (row.arm_b * normal - turn)
+    )
     mass = a.inverse_mass + b.inverse_mass + coupled_a * row.shear_arm_a + coupled_b * row.shear_arm_b
     needed = old_shear - rate * (1.0 / mass)
     limit = shear_limits(contacts, group, lane, new_one + new_two, abs(needed), mass)

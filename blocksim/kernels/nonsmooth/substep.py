@@ -50,7 +50,7 @@ def sweep(contacts: Contacts, task: int, team: Integers, k: int) -> float:
     return largest
 
 
-@rare_kernel
+@kernel
 def velocity_pass(contacts: Contacts, team: Integers, k: int, task: int) -> None:
     """Sweep until no impulse changes a velocity by more than the tolerance, or as often as allowed."""
     stepping = contacts.stepping[0]
