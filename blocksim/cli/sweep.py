@@ -26,15 +26,28 @@ class Mode(StrEnum):
 
     GRID = "grid"
     LIST = "list"
+    TABLE = "table"
+    LHS = "lhs"
+    SOBOL = "sobol"
+    NORMAL = "normal"
 
 
 def sweep_command(
     scenario: options.ScenarioPath,
     vary: Annotated[
         list[str] | None,
-        typer.Option("--vary", metavar="KEY=VALUES", help="KEY=a,b,c or KEY=from:to:count. Repeatable."),
+        typer.Option(
+            "--vary",
+            metavar="KEY=VALUES",
+            help="KEY=a,b,c or KEY=from:to:count; to be drawn from, KEY=from:to or KEY=mean+-sd. Repeatable.",
+        ),
     ] = None,
-    mode: Annotated[Mode | None, typer.Option(help="All combinations, or the k-th value of every key.")] = None,
+    mode: Annotated[
+        Mode | None,
+        typer.Option(help="All combinations, the k-th value of every key, the scenario's table, or random draws."),
+    ] = None,
+    samples: Annotated[int | None, typer.Option(metavar="N", help="How many cases are drawn (default: 128).")] = None,
+    seed: Annotated[int | None, typer.Option(metavar="S", help="The same seed draws the same (default: 0).")] = None,
     settings: options.Settings = None,
     jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes (default: one a core).")] = None,
     out: options.SweepFolder = None,
@@ -50,7 +63,11 @@ def sweep_command(
     """
     silent = quiet or as_json
     document = with_vary(
-        Document.read(scenario).with_settings(settings or []), vary or [], None if mode is None else mode.value
+        Document.read(scenario).with_settings(settings or []),
+        vary or [],
+        None if mode is None else mode.value,
+        samples=samples,
+        seed=seed,
     )
     short = short_keys(document)
     for kernels in kernels_for(document):

@@ -8,7 +8,7 @@ import math
 import re
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
@@ -42,9 +42,9 @@ def shown(value: object) -> str:
     return text
 
 
-def invalid(message: str, *key: str | int) -> PydanticCustomError:
+def invalid(message: str, *key: str | int, at: Literal["key", "value"] = "value") -> PydanticCustomError:
     """Build the error that carries a finished message through pydantic; `key` is the path of the guilty key."""
-    return PydanticCustomError("blocksim", "{message}", {"message": message, "key": key})
+    return PydanticCustomError("blocksim", "{message}", {"message": message, "key": key, "at": at})
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,7 +56,7 @@ def motion_table_content(scenario: Scenario) -> bytes | None:
 def _plain(table: BaseModel) -> dict[str, Any]:
     """Turn a table into what its TOML looks like; keys without a value are left out."""
     if isinstance(table, Sweep):
-        return {"mode": table.mode, **{key: _value(list(values)) for key, values in table.vary.items()}}
+        return {key: _value(entry) for key, entry in table.as_table().items()}
     fields = type(table).model_fields
     entries = {info.alias or name: _field(info, getattr(table, name)) for name, info in fields.items()}
     return {key: entry for key, entry in entries.items() if entry is not None}
