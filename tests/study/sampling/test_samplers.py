@@ -24,6 +24,11 @@ def places(sweep: Sweep, *keys: str) -> NDArray[np.float64]:
     return np.array([[row[key] for key in keys] for row in design_of(sweep)], dtype=float) - 1.0
 
 
+def correlation(points: NDArray[np.float64]) -> float:
+    one, other = (points - points.mean(axis=0)).T
+    return float(np.sum(one * other) / math.sqrt(np.sum(one * one) * np.sum(other * other)))
+
+
 @pytest.mark.parametrize("samples", [1, 7, 100])
 def test_a_latin_hypercube_has_one_value_in_every_interval(nominal: Document, samples: int) -> None:
     sweep = sweep_of(nominal, "lhs", {RATIO: UNIT, SCALE: UNIT}, samples=samples)
@@ -33,7 +38,7 @@ def test_a_latin_hypercube_has_one_value_in_every_interval(nominal: Document, sa
 
 def test_the_columns_of_a_latin_hypercube_are_not_in_step(nominal: Document) -> None:
     points = places(sweep_of(nominal, "lhs", {RATIO: UNIT, SCALE: UNIT}, samples=1000), RATIO, SCALE)
-    assert abs(np.corrcoef(points.T)[0, 1]) < 4 / math.sqrt(1000)
+    assert abs(correlation(points)) < 4 / math.sqrt(1000)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -66,7 +71,7 @@ def test_independent_draws_are_uniform_and_uncorrelated(nominal: Document) -> No
     n = 20_000
     points = places(sweep_of(nominal, "normal", {RATIO: UNIT, SCALE: UNIT}, samples=n), RATIO, SCALE)
     assert np.abs(points.mean(axis=0) - 0.5).max() < 4 * math.sqrt(1 / 12 / n)
-    assert abs(np.corrcoef(points.T)[0, 1]) < 4 / math.sqrt(n)
+    assert abs(correlation(points)) < 4 / math.sqrt(n)
     ranks = np.sort(points[:, 0])
     assert np.abs(ranks - (np.arange(n) + 0.5) / n).max() < 1.95 / math.sqrt(n)  # Kolmogorov-Smirnov, 0.1 %
 
