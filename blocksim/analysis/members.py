@@ -73,12 +73,16 @@ class Members:
         names = (str(name) for name in self.table.columns)
         return tuple(dict.fromkeys(name.rpartition(".")[0] for name in names if name.endswith(ends)))
 
+    def has(self, block: str, quantity: str) -> bool:
+        """Tell whether the table has this quantity of this block."""
+        return _column(block, quantity) in self.table
+
     def values(self, block: str, quantity: str) -> "NDArray[np.float64]":
         """Return one quantity of one block (mm or deg), shape (count,); NaN where a member has none.
 
         Raises InvalidInputError where the table has no such column, or a text in it.
         """
-        name = f"{block}.{QUANTITIES[quantity].final_column}"
+        name = _column(block, quantity)
         if name not in self.table:
             message = (
                 f"{self.source}: no column {name}, which the measured {quantity} of block '{block}' is compared with"
@@ -98,3 +102,7 @@ class Members:
             message = f"{self.source}: {name}: '{column.iloc[row]}' in row {row + 1} is not a number"
             raise InvalidInputError(message)
         return numbers.to_numpy(dtype=float, na_value=np.nan)
+
+
+def _column(block: str, quantity: str) -> str:
+    return f"{block}.{QUANTITIES[quantity].final_column}"

@@ -8,7 +8,8 @@ the true ones, so quantiles of the resampled areas d* would never reach 0; and f
 are resampled. Therefore the interval is d +- (q - d), cut at 0. q is the quantile of d* not at 0.975 but at
 Phi(t_(n-1, 0.975) sqrt(n/(n-1))), n the size of the smaller sample (the widening of Hesterberg, The American
 Statistician 69, 2015). For normal samples of 200 members and 6 repeats, 0 to 3 standard deviations apart, it covered
-the true area in 91 to 98 % of 400 trials, and in 84 % where both distributions are the same.
+the true area in 91 to 98 % of 400 trials, and in 84 % where both distributions are the same; with 4 repeats in 90 to
+95 % and 76 %. With 3 it was 71 to 92 %, with 2 less, so samples of fewer than 4 values have no interval.
 """
 
 from math import nan, sqrt
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 
 RESAMPLES = 2000
 SEED = 0
+FEWEST = 4  # values of a sample that is worth resampling
 
 
 class Steps:
@@ -69,15 +71,15 @@ def area_between(one: "Floats", other: "Floats") -> float:
 
 
 def area_interval(members: "Floats", repeats: "Floats", resamples: int = RESAMPLES, seed: int = SEED) -> Interval:
-    """Return the 95 % interval of the area, see above; NaN for a single repeat."""
-    sizes = [size for size in (members.size, repeats.size) if size > 1]
-    if repeats.size == 1:
+    """Return the 95 % interval of the area, see above; NaN where a sample is too small for one."""
+    smaller = min(members.size, repeats.size)
+    if smaller < FEWEST:
         return nan, nan
     random = np.random.default_rng(seed)
     steps = Steps(members, repeats)
     areas = [steps.area(_resampled(steps.one, random), _resampled(steps.other, random)) for _ in range(resamples)]
     area = steps.area(steps.one, steps.other)
-    half = max(float(np.quantile(areas, _widened(min(sizes)))) - area, 0.0)
+    half = max(float(np.quantile(areas, _widened(smaller))) - area, 0.0)
     return max(area - half, 0.0), area + half
 
 
@@ -93,9 +95,18 @@ def _widened(n: int) -> float:
 def _find(evidence: Evidence) -> Findings:
     lengths = [pair for pair in evidence.pairs if pair.is_length]
     rows = tuple(_row(pair) for pair in lengths)
-    without = [f"{shown_name(pair)}: repeats without scatter give no interval" for pair in lengths if not pair.scatters]
-    told = f"bootstrap of {RESAMPLES} resamples, seed {SEED}"
-    return Findings(rows, (*without, told) if any(pair.scatters for pair in lengths) else tuple(without))
+    messages = [f"{shown_name(pair)}: no interval, {why}" for pair in lengths if (why := _complaint(pair))]
+    if len(messages) < len(lengths):
+        messages.append(f"bootstrap of {RESAMPLES} resamples, seed {SEED}")
+    return Findings(rows, tuple(messages))
+
+
+def _complaint(pair: Pair) -> str:
+    """Say why there is no interval, or nothing."""
+    if not pair.scatters:
+        return "as the repeats do not scatter"
+    few = min(pair.known.size, len(pair.repeats)) < FEWEST
+    return f"which needs {FEWEST} members and {FEWEST} repeats" if few else ""
 
 
 def _row(pair: Pair) -> Row:
@@ -103,7 +114,7 @@ def _row(pair: Pair) -> Row:
     head: Row = {**pair.head, "members": int(members.size), "repeats": int(repeats.size)}
     if not members.size:
         return {**head, "area": None, "interval": None}
-    interval = area_interval(members, repeats) if pair.scatters else None
+    interval = None if _complaint(pair) else area_interval(members, repeats)
     return {**head, "area": area_between(members, repeats), "interval": interval}
 
 

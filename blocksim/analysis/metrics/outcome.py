@@ -34,7 +34,11 @@ def _turned(angle: float) -> str:
 def _find(evidence: Evidence) -> Findings:
     measured = [pair for pair in evidence.pairs if pair.measured.quantity == ROTATION]
     members = evidence.members
-    blocks = [pair.measured.block for pair in measured] or list(members.blocks)
+    blocks = [pair.measured.block for pair in measured] or [
+        block for block in members.blocks if members.has(block, ROTATION)
+    ]
+    if not blocks:
+        return Findings((), ("not computed: the sweep has no rotations",))
     rotations = np.column_stack([members.values(block, ROTATION) for block in blocks])
     repeats, incomplete = complete_repeats(measured)
     found, seen = Counter(_classes(rotations, members.finished)), Counter(map(outcome, repeats.tolist()))
