@@ -76,6 +76,12 @@ class InputMissingError(BlocksimError):
     exit_code = ExitCode.INPUT_MISSING
 
 
+class UnavailableError(BlocksimError):
+    """An optional package or a service is missing; the message names the extra to install."""
+
+    exit_code = ExitCode.UNAVAILABLE
+
+
 class OutputExistsError(BlocksimError):
     """The output folder holds something that must not be overwritten, or cannot be created."""
 

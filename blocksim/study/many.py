@@ -8,7 +8,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from multiprocessing import current_process
@@ -31,6 +31,7 @@ from blocksim.simulation.stopping import interruptible
 from blocksim.simulation.table import read_table
 from blocksim.study.plan import Case, Values, cases_of, with_sweep
 from blocksim.study.pool import Row, run_all
+from blocksim.study.sampling.design import levels_of
 from blocksim.study.single import FINISHED, check_experiment
 
 TABLE = "sweep.csv"
@@ -112,7 +113,7 @@ def _refuse_in_worker() -> None:
 
 def sweep_hash(base: Scenario, plan: Sweep) -> str:
     """Return the name of a sweep: a hash of its scenario, of what it varies, and of the code."""
-    text = json.dumps([scenario_hash(base), plan.mode, plan.vary, code_hash()])
+    text = json.dumps([scenario_hash(base), plan.as_table(), code_hash()])
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
 
 
@@ -120,8 +121,8 @@ def kernels_for(document: Document) -> tuple[str, ...]:
     """Return the sets of kernels that the cases of a sweep need."""
     base = document.build()
     vary = base.sweep.vary if base.sweep else {}
-    schemes = (base.time.scheme, *map(str, vary.get("time.scheme", ())))
-    models = (base.contact.model, *map(str, vary.get("contact.model", ())))
+    schemes = (base.time.scheme, *map(str, levels_of(vary.get("time.scheme", ()))))
+    models = (base.contact.model, *map(str, levels_of(vary.get("contact.model", ()))))
     return tuple(dict.fromkeys(kernel_set(scheme, model) for scheme in schemes for model in models))
 
 
@@ -155,7 +156,7 @@ def _make_free(folder: Path, head: str, *, overwrite: bool) -> None:
         raise OutputExistsError(message)
 
 
-def _run_cases(folder: Path, cases: list[Case], jobs: int, on_row: OnRow) -> SweepResult:
+def _run_cases(folder: Path, cases: Sequence[Case], jobs: int, on_row: OnRow) -> SweepResult:
     """Run what has to be run; cases of the same name are one run."""
     rows = _Rows(folder / TABLE, cases, on_row)
     tasks: dict[Path, Scenario] = {}
@@ -183,7 +184,7 @@ def _run_cases(folder: Path, cases: list[Case], jobs: int, on_row: OnRow) -> Swe
 class _Rows:
     """The rows so far, written to sweep.csv every now and then and at the end."""
 
-    def __init__(self, path: Path, cases: list[Case], on_row: OnRow) -> None:
+    def __init__(self, path: Path, cases: Sequence[Case], on_row: OnRow) -> None:
         self.path = path
         self.heads: list[dict[str, Any]] = [{"case": case.name, **case.settings} for case in cases]
         self.rows: dict[int, Row] = {}
