@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from blocksim.simulation import Result
 
-SAMPLED = ("lhs", "sobol", "normal")  # modes whose members are drawn from what is known of the inputs
-
 
 @overload
 def compare(run: SweepResult, experiment: Path | str | None = None, settings: Settings | None = None) -> Judgement: ...
@@ -76,10 +74,10 @@ def _scenario(folder: Path) -> Scenario | None:
 
 def _remarks(scenario: Scenario | None) -> tuple[str, ...]:
     """Say where shares of members are no probabilities."""
-    mode = scenario.sweep.mode if scenario is not None and scenario.sweep is not None else None
-    if mode is None or mode in SAMPLED:
+    plan = None if scenario is None else scenario.sweep
+    if plan is None or plan.is_sampled:
         return ()
     return (
-        f"mode {mode!r} chooses its members: shares count them, and are no probabilities",
+        f"mode {plan.mode!r} chooses its members: shares count them, and are no probabilities",
         "of the outcome; the 95 % limits hold for samples (modes lhs, sobol, normal)",
     )
