@@ -2,10 +2,14 @@
 
 import json
 import sys
+from math import sqrt
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from blocksim.analysis.metrics import METRICS
 from blocksim.analysis.metrics.metric import BLOCK
@@ -159,6 +163,37 @@ def test_judgement_as_json_has_every_row_and_the_meaning_of_every_number(blocksi
     assert len(told["metrics"]["outcome"]["rows"]) == 61
     assert told["metrics"]["validation"]["rows"][0]["u_num"] == 0.25
     assert set(told["metrics"]["area"]["rows"][0]) == set(told["metrics"]["area"]["columns"])
+
+
+def test_known_statistics_come_back(blocksim: Command, tmp_path: Path) -> None:
+    second, third = [72.0, 74.0, 76.0, 78.0, 80.0], [128.0, 131.0, 131.0, 136.0, 137.0]
+    columns = {"1.x_mm": [16.0] * 5, "2.x_mm": second, "3.x_mm": third, "1.rotation_deg": [0.1] * 5}
+    turned = {"2.rotation_deg": [-90.0] * 5, "3.rotation_deg": [-90.0, -90.0, -90.0, -180.0, -90.0]}
+    table = pd.DataFrame({"case": list("abcde"), "status": "finished", "reason": "", **columns, **turned})
+    table.to_csv(tmp_path / "sweep.csv", index=False)
+    metrics = json.loads(blocksim("compare", ".", "--experiment", TABLE, "--json").out)[0]["metrics"]
+
+    def numbers(metric: str, column: str) -> list[Any]:
+        return [row[column] for row in metrics[metric]["rows"]]
+
+    repeats = [[71.69, 76.57, 72.70, 73.22, 73.73, 78.53], [132.86, 136.05, 128.89, 128.55, 131.70, 129.92]]
+    # second: 72 to 78 are inside; third: 131, 131, 136; both: 74 and 76, as the member with 78 has turned too far
+    assert numbers("inside", "inside") == [5, 4, 3, 5, 5, 4, 2]
+    assert numbers("validation", "S") == pytest.approx([16.0, 76.0, 132.6], abs=1e-6)
+    assert numbers("validation", "u_input") == pytest.approx([0.0, sqrt(10.0), np.std(third, ddof=1)], abs=1e-6)
+    expected = [0.5, *(sqrt(np.var(values, ddof=1) / 6 + 0.25) for values in repeats)]
+    assert numbers("validation", "u_D") == pytest.approx(expected, abs=1e-6)
+    halves = [2.570581836 * np.std(values, ddof=1) * sqrt(7 / 6) for values in repeats]  # t_(5, 0.975) from tables
+    ends = [
+        end for mean, half in zip(np.mean(repeats, axis=1), halves, strict=True) for end in (mean - half, mean + half)
+    ]
+    assert np.ravel(numbers("prediction", "prediction")) == pytest.approx(ends, abs=1e-6)
+    areas = [stats.wasserstein_distance(*pair) for pair in zip((second, third), repeats, strict=True)]
+    assert numbers("area", "area") == pytest.approx([0.0, *areas], abs=1e-6)
+    difference = np.mean(repeats, axis=1) - [76.0, 132.6]
+    both = np.cov(repeats) / 6 + np.cov([second, third]) / 5
+    assert numbers("joint", "T2") == pytest.approx([difference @ np.linalg.inv(both) @ difference], abs=1e-6)
+    assert numbers("outcome", "share") == [0.8, 0.2]
 
 
 def test_help_explains_every_number_in_a_line(blocksim: Command) -> None:
