@@ -47,7 +47,7 @@ def compare_command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Compare runs and sweeps with measured repeats.
+    """Compare runs with measured repeats.
 
     Exit code 1 says that something is outside. A position is inside between the smallest and the largest repeat (0.5 mm
     either side where all repeats are equal), a rotation within 5 degrees of the mean. Of a sweep, at least the share
