@@ -51,11 +51,11 @@ def compare_command(
 
     Exit code 1 says that something is outside. A position is inside between the smallest and the largest repeat (0.5 mm
     either side where all repeats are equal), a rotation within 5 degrees of the mean. Of a sweep, at least the share
-    --threshold of its members has to be inside in everything; needs the extra blocksim[study].
+    --threshold of its members has to be inside in everything; needs the extra blocksim[study]. Its numbers:
+
+    {meanings}
 
     Example: blocksim compare scenarios/three_blocks.toml
-
-    The numbers of a sweep:
     """
     settings = Settings(threshold, u_num)
     judged = [_judge(run, experiment, settings) for run in runs]
@@ -66,7 +66,7 @@ def compare_command(
     raise typer.Exit(ExitCode.SUCCESS if all(one.inside for one in judged) else ExitCode.OUTSIDE)
 
 
-compare_command.__doc__ = f"{inspect.cleandoc(compare_command.__doc__ or '')}\n\n{meanings()}"
+compare_command.__doc__ = inspect.cleandoc(compare_command.__doc__ or "").replace("{meanings}", meanings())
 
 
 def _text(one: Judged, *, headed: bool) -> str:
