@@ -139,8 +139,8 @@ def interaction_tables(members: Sequence[Interactions]) -> Records:
 
 
 def _materials(a: ContactClass, b: ContactClass) -> tuple[str, str]:
-    names = (a.material or b.material, b.material or a.material)
-    if names[0] is None or names[1] is None:
+    one, other = a.material or b.material, b.material or a.material
+    if one is None or other is None:
         message = "the ground does not touch itself"
         raise ValueError(message)
-    return names[0], names[1]
+    return one, other

@@ -103,7 +103,9 @@ def cell_radius(bodies: Records) -> Floats:
 def joined(records: Sequence[Records]) -> Records:
     """Return records (k,) of m scenes as one array (m, k)."""
     whole = zeros((len(records), records[0].size), records[0].dtype)
-    np.stack(records, out=whole)
+    plain = whole.view(np.ndarray)
+    for m, one in enumerate(records):
+        plain[m] = one
     return whole
 
 
