@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import os
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 from blocksim.errors import OutputError
@@ -26,6 +27,28 @@ def write_bytes(path: Path, content: bytes) -> None:
                 Path(temporary).unlink()
         message = f"{path}: cannot be written: {error.strerror}"
         raise OutputError(message) from error
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a name beside a file, with its suffix, to write to; in the end the new file takes the place of the old one.
+
+    Raises OutputError when writing fails; whatever happens on the way, the old file stays and nothing else is left.
+    """
+    temporary: Path | None = None
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
+        os.close(handle)
+        temporary = Path(name)
+        yield temporary
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except OSError as error:
+        message = f"{path}: cannot be written: {error.strerror or error}"
+        raise OutputError(message) from error
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
