@@ -69,9 +69,9 @@ def _draw_run(run: Path, out: Path | None, moments: list[float] | None, experime
 
 
 def _refuse_for_sweeps(run: Path, times: str | None, kind: str | None) -> None:
-    for option, value in (("--times", times), ("--kind", kind)):
+    for option, value, picked in (("--times", times, "frames"), ("--kind", kind, "the picture")):
         if value is not None:
-            message = f"{option} picks frames of a run, but {run} is a sweep"
+            message = f"{option} picks {picked} of a run, but {run} is a sweep"
             raise InvalidInputError(message)
 
 

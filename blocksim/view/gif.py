@@ -17,10 +17,12 @@ if TYPE_CHECKING:
 TICK = 0.01  # s, of a GIF's clock
 SHORTEST = 2  # ticks; browsers slow down what is shorter
 COLOURS = 128
+UNKNOWN = 255
+Pixels = NDArray[np.uint8]  # (height, width, 3)
 MOST_BYTES = 1 << 30  # of all pictures together, which Pillow keeps in memory
 
 
-def write_gif(path: Path, pictures: Iterator[NDArray[np.uint8]], seconds: NDArray[np.float64]) -> None:
+def write_gif(path: Path, pictures: Iterator[Pixels], seconds: NDArray[np.float64]) -> None:
     """Write pictures (height, width, 3) that are shown for so many seconds each; it repeats for ever.
 
     Raises InvalidInputError for more than 50 pictures a second or more pictures than fit into memory, OutputError.
@@ -33,13 +35,13 @@ def write_gif(path: Path, pictures: Iterator[NDArray[np.uint8]], seconds: NDArra
     if len(seconds) * first[..., 0].size > MOST_BYTES:
         message = f"{path}: {len(seconds)} pictures are too many for a GIF; write .mp4, raise --speed or lower --width"
         raise InvalidInputError(message)
-    palette = _palette(first)
+    palette = Palette(first)
     buffer = BytesIO()
-    _reduced(first, palette).save(
+    palette.reduced(first).save(
         buffer,
         format="GIF",
         save_all=True,
-        append_images=(_reduced(picture, palette) for picture in pictures),
+        append_images=map(palette.reduced, pictures),
         duration=[int(10 * duration) for duration in durations],
         loop=0,
     )
@@ -52,19 +54,36 @@ def ticks(seconds: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.diff(ends, prepend=0)
 
 
-def _palette(picture: NDArray[np.uint8]) -> "Image":
-    """Return the most frequent colours of a picture, unchanged; all pictures of a film are shown in these."""
-    from PIL import Image  # noqa: PLC0415 - comes with matplotlib, only for films
+class Palette:
+    """The colours of a film: the most frequent ones of its first picture, unchanged; all others become the nearest."""
 
-    packed = picture.reshape(-1, 3) @ np.array([1 << 16, 1 << 8, 1])
-    colours, counts = np.unique(packed, return_counts=True)
-    frequent = colours[np.argsort(-counts, kind="stable")[:COLOURS]]
-    palette = Image.new("P", (1, 1))
-    palette.putpalette(np.stack([frequent >> 16, frequent >> 8 & 255, frequent & 255], axis=-1).ravel().tolist())
-    return palette
+    def __init__(self, picture: Pixels) -> None:
+        """Choose the colours."""
+        colours, counts = np.unique(_packed(picture), return_counts=True)
+        frequent = colours[np.argsort(-counts, kind="stable")[:COLOURS]]
+        self.colours = _unpacked(frequent)
+        self.numbers = np.full(1 << 24, UNKNOWN, dtype=np.uint8)  # of every colour, found when first met
+        self.numbers[frequent] = np.arange(len(frequent))
+
+    def reduced(self, picture: Pixels) -> "Image":
+        """Return a picture in these colours."""
+        from PIL import Image  # noqa: PLC0415 - comes with matplotlib, only for films
+
+        packed = _packed(picture)
+        unknown = np.unique(packed[self.numbers[packed] == UNKNOWN])
+        apart = np.abs(_unpacked(unknown)[:, None] - self.colours).sum(axis=-1)
+        self.numbers[unknown] = apart.argmin(axis=1)
+        image = Image.fromarray(self.numbers[packed])
+        image.putpalette(self.colours.astype(np.uint8).tobytes())
+        return image
 
 
-def _reduced(picture: NDArray[np.uint8], palette: "Image") -> "Image":
-    from PIL import Image  # noqa: PLC0415 - see _palette
+def _packed(picture: Pixels) -> NDArray[np.int32]:
+    """Return the colours of pixels as one number each."""
+    red, green, blue = np.moveaxis(picture.astype(np.int32), -1, 0)
+    return red << 16 | green << 8 | blue
 
-    return Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
+
+def _unpacked(colours: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return red, green and blue, (k, 3)."""
+    return np.stack([colours >> 16, colours >> 8 & 255, colours & 255], axis=-1)

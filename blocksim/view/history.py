@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -23,7 +24,8 @@ PANEL, GAP = 1.25, 0.14  # inches
 MOST_BLOCKS = len(style.BLOCK_COLOURS)  # that get a line of their own
 MOST_POINTS = 2000  # of a line
 MOST_PATHS = 50  # grey lines in an SVG or PDF; more of them are stored as an image
-LETTERS = 16  # of a name
+LETTERS, TITLE_LETTERS, NOTE_LETTERS = 16, 60, 105  # of a name, of the title, of a line below the panels
+LINE = 0.155  # inches, of each further line below the panels
 SMALL_SHARE = 1e-3  # of the largest energy; what stays below is not drawn
 ENERGIES = {  # how entries of the ledger are drawn together
     "kinetic": ("kinetic",),
@@ -85,16 +87,18 @@ def draw_history(
     chosen = _thinned(drawable_frames(frames))
     shown = farthest_blocks(frames, chosen, support or Support())
     energies = drawn_energies(frames.energy, chosen)
-    height = HEAD + 5 * PANEL + 4 * GAP + FOOT
+    notes = wrap(_legend(frames, shown, is_measured=measured is not None), NOTE_LETTERS)
+    foot = FOOT + (len(notes) - 1) * LINE
+    height = HEAD + 5 * PANEL + 4 * GAP + foot
     with style.styled_figure(WIDTH, height) as figure:
-        panels = _panels(figure, height)
+        panels = _panels(figure, foot)
         for axes, motion in zip(panels, _motions(frames, chosen), strict=False):
             _draw_motion(axes, frames.time[chosen], motion, shown)
             _draw_measured(axes, frames, motion, shown, measured)
         _draw_energies(panels[3], frames.time[chosen], energies)
         _draw_contacts(panels[4], frames.time[chosen], frames.contact_count[chosen])
         _draw_legends(panels, frames, shown)
-        _draw_texts(figure, height, title, _legend(frames, shown, is_measured=measured is not None))
+        _draw_texts(figure, height, title, "\n".join(notes))
         style.save_figure(figure, path)
 
 
@@ -143,11 +147,12 @@ def _motions(frames: FramesLike, chosen: Indices) -> list[Motion]:
     ]
 
 
-def _panels(figure: "Figure", height: float) -> list["Axes"]:
+def _panels(figure: "Figure", foot: float) -> list["Axes"]:
     """Add five panels, one below the other, with one axis of time."""
+    height = float(figure.get_figheight())
     width, panels = (WIDTH - LEFT - RIGHT) / WIDTH, []
     for row in range(5):
-        bottom = FOOT + (4 - row) * (PANEL + GAP)
+        bottom = foot + (4 - row) * (PANEL + GAP)
         axes = figure.add_axes((LEFT / WIDTH, bottom / height, width, PANEL / height))
         axes.spines[["right", "top"]].set_visible(False)
         axes.tick_params(axis="x", labelbottom=row == 4)  # noqa: PLR2004 - the last of five
@@ -162,7 +167,7 @@ def _draw_motion(axes: "Axes", time: Floats, motion: Motion, shown: Sequence[int
 
     others = np.setdiff1d(np.arange(motion.values.shape[1]), shown)
     lines = [np.stack([time, motion.values[:, block]], axis=-1) for block in others]
-    faint = min(0.35, 30.0 / max(len(lines), 1))
+    faint = min(0.35, max(0.12, 30.0 / max(len(lines), 1)))
     look: dict[str, Any] = {"colors": style.FAINT_INK, "linewidths": 0.4, "alpha": faint}
     axes.add_collection(LineCollection(lines, **look, rasterized=len(lines) > MOST_PATHS))
     for block in shown:
@@ -234,7 +239,7 @@ def _colour(shown: Sequence[int], block: int) -> str:
 def _draw_texts(figure: "Figure", height: float, title: str | None, legend: str) -> None:
     if title:
         place = 0.12 / WIDTH, 1.0 - 0.08 / height
-        figure.text(*place, style.shortened(title, 70), va="top", fontsize=style.TITLE_SIZE)
+        figure.text(*place, style.shortened(title, TITLE_LETTERS), va="top", fontsize=style.TITLE_SIZE)
     figure.text(0.12 / WIDTH, 0.06 / height, legend, color=style.FAINT_INK, va="bottom")
 
 

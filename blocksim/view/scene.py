@@ -16,6 +16,7 @@ Flags = NDArray[np.bool_]
 UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # counter-clockwise from lower left
 EDGE_INSET = 0.86  # where the mark of the upper side runs, as a part of half the height
 NAME_ROOM = 0.85, 0.7  # width and height for a block's name, as parts of its smaller side
+LETTERS = 100  # of a name; longer ones have no room anywhere
 FIXED_HATCH = "////"
 LEAST_HATCHED = 12.0  # points; on smaller blocks hatching is a few stray lines
 
@@ -93,7 +94,7 @@ def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: flo
             canvas.axes.text(
                 item.maximum + 3.0 / canvas.points_per_mm,
                 y,
-                item.block,
+                style.shortened(item.block, LETTERS),
                 fontsize=font,
                 rotation=float(np.degrees(canvas.extent.tilt)),
                 rotation_mode="anchor",
@@ -131,7 +132,7 @@ def _draw_names(canvas: Canvas, frames: FramesLike, places: Floats, fixed: Flags
             canvas.axes.text(
                 float(places[index, 0]),
                 float(places[index, 1]),
-                frames.names[index],
+                style.shortened(frames.names[index], LETTERS),
                 fontsize=fonts[index],
                 color=style.text_colour(fill),
                 ha="center",

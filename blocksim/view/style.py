@@ -1,11 +1,14 @@
 """The one place for colours, fonts and sizes, and for making a picture file."""
 
 import warnings
+from bisect import bisect_right
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
+from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from unicodedata import east_asian_width
 
 from blocksim.errors import InvalidInputError, OutputError
 
@@ -117,9 +120,12 @@ def no_word_of_missing_letters() -> Iterator[None]:
 
 
 def shortened(text: str, letters: int) -> str:
-    """Return a name in one line of at most this many letters; signs that are no letters become boxes."""
+    """Return a name in one line, no wider than this many letters; signs that are no letters become boxes."""
     line = "".join(sign if sign.isprintable() else "\N{WHITE SQUARE}" for sign in text)
-    return line if len(line) <= letters else f"{line[: letters - 1]}…"
+    ends = list(accumulate(1 + (east_asian_width(sign) in "WF") for sign in line))
+    if not ends or ends[-1] <= letters:
+        return line
+    return f"{line[: bisect_right(ends, letters - 1)]}…"
 
 
 def fitting_font(text: str, room: tuple[float, float], largest: float = FONT_SIZE) -> float:
