@@ -30,7 +30,7 @@ def animate_command(
     The default is a GIF, NAME.gif, at a quarter of the real speed; the last picture is held for a while. A run that was
     stopped or killed is shown as far as it came. MP4 needs the extra `video`.
 
-    Example: blocksim animate scenarios/three_blocks.toml --out film.mp4 --speed 0.1
+    Example: blocksim animate scenarios/three_blocks.toml --speed 0.1
     """
     if out is not None:
         writer_of(out)

@@ -32,7 +32,7 @@ def plot_command(
     experiment: options.ExperimentPath = None,
     quiet: options.Quiet = False,
 ) -> None:
-    """Draw a run as a strip of pictures.
+    """Draw a run: a strip of frames, its end, or its histories.
 
     Below the final state of a run stand the measured ranges. --kind final shows where the blocks end, with rotation and
     measured range below each of them; --kind history shows x, y, rotation, energies and contacts over time. A run that

@@ -81,7 +81,8 @@ class Palette:
 def _packed(picture: Pixels) -> NDArray[np.int32]:
     """Return the colours of pixels as one number each."""
     red, green, blue = np.moveaxis(picture.astype(np.int32), -1, 0)
-    return red << 16 | green << 8 | blue
+    packed: NDArray[np.int32] = red << 16 | green << 8 | blue
+    return packed
 
 
 def _unpacked(colours: NDArray[np.int32]) -> NDArray[np.int32]:

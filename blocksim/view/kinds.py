@@ -15,7 +15,7 @@ KINDS: dict[str, Callable[..., None]] = {
     "final": draw_final,
     "history": draw_history,
 }
-MOST_SLIPS = 3
+MOST_SLIPS = 2
 
 
 def kind_named(name: str) -> Callable[..., None]:

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from PIL import Image
+from PIL.GifImagePlugin import GifImageFile
 
 from tests.cli.conftest import Command
 
@@ -15,9 +15,9 @@ def test_film_has_the_name_of_the_scenario_and_is_told(blocksim: Command, finish
     answer = blocksim("animate", finished, *QUICK)
     assert (answer.code, answer.out) == (0, "")
     assert answer.err.startswith("film: three_blocks_nominal.gif (")
-    with Image.open("three_blocks_nominal.gif") as film:
+    with GifImageFile("three_blocks_nominal.gif") as film:
         assert film.width == 240
-        assert film.n_frames > 3
+        assert film.n_frames >= 3
     assert blocksim("animate", finished, *QUICK, "--out", "other.gif", "--no-trails", "--quiet").err == ""
     assert Path("other.gif").read_bytes() != Path("three_blocks_nominal.gif").read_bytes()
 

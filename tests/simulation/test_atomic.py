@@ -41,7 +41,12 @@ def test_a_file_that_is_not_finished_leaves_the_older_one(
     tmp_path: Path, error: Exception, told: type[Exception]
 ) -> None:
     (tmp_path / "a.mp4").write_text("old")
-    with pytest.raises(told), atomic.replacing(tmp_path / "a.mp4") as temporary:
-        temporary.write_text("half")
-        raise error
+
+    def begin() -> None:
+        with atomic.replacing(tmp_path / "a.mp4") as temporary:
+            temporary.write_text("half")
+            raise error
+
+    with pytest.raises(told):
+        begin()
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.mp4": "old"}

@@ -25,14 +25,14 @@ def test_a_finished_run_needs_no_remark(folder: Path) -> None:
     stored = stored_run(folder)
     assert stored.remark == ""
     assert stored.scenario.name == "bounce"
-    assert len(stored.frames) == 3
+    assert len(stored.frames) == 5
 
 
 def test_what_did_not_finish_is_told(folder: Path) -> None:
     summary = json.loads((folder / "run.json").read_text())
     for status, told in (("failed", "this run has failed (why)"), ("interrupted", "this run was interrupted (why)")):
         (folder / "run.json").write_text(json.dumps({**summary, "status": status, "reason": "why"}))
-        assert stored_run(folder).remark == f"{folder}: {told}; its 3 frames go to 0.002 s"
+        assert stored_run(folder).remark == f"{folder}: {told}; its 5 frames go to 0.002002 s"
     (folder / "run.json").write_text("{")
     assert "run.json of this run is damaged" in stored_run(folder).remark
     (folder / "run.json").unlink()

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
-from PIL import Image
+from PIL.GifImagePlugin import GifImageFile
 
 from blocksim.errors import InvalidInputError, OutputError, UnavailableError
 from blocksim.scenario.motion import MotionPieces
@@ -111,7 +111,7 @@ def test_a_single_frame_is_a_film() -> None:
 def test_gif_plays_as_long_as_it_should(tmp_path: Path) -> None:
     path = tmp_path / "film.gif"
     assert draw_film(toppling(3), path, Pace(0.5, 30.0), SMALL) == 37
-    with Image.open(path) as film:
+    with GifImageFile(path) as film:
         length = 0
         for index in range(film.n_frames):
             film.seek(index)
@@ -125,7 +125,7 @@ def test_gif_shows_the_blocks_in_their_own_colours(tmp_path: Path) -> None:
     frames = toppling(6)
     draw_film(frames, tmp_path / "film.gif", FAST, Look(400))
     drawn = Film(frames, Support(), Look(400))
-    with Image.open(tmp_path / "film.gif") as film:
+    with GifImageFile(tmp_path / "film.gif") as film:
         film.seek(film.n_frames - 1)
         last = np.asarray(film.convert("RGB"))
     for block in range(6):

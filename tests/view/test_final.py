@@ -67,7 +67,7 @@ def test_a_measured_range_is_drawn_where_it_was_measured(caught: list[Figure]) -
     draw_final(toppling(3), "final.png", measured=TABLE)
     panel, below = caught[0].axes
     ends = panel.transData.transform([(71.69, 0.0), (78.53, 0.0)])[:, 0]
-    bars = [below.transData.transform(line.get_xydata())[:, 0] for line in below.lines]  # type: ignore[arg-type]
+    bars = [below.transData.transform(line.get_xydata())[:, 0] for line in below.lines]
     assert any(len(bar) == 2 and np.allclose(bar, ends, atol=0.5) for bar in bars)
 
 

@@ -89,8 +89,11 @@ def times_of(reader: Any) -> list[float]:
 
 def points_of(grid: Any) -> NDArray[np.float64]:
     """Return the corners (m) of every cell, (b, 4, 2)."""
-    cells = [grid.GetCell(cell).GetPoints() for cell in range(grid.GetNumberOfCells())]
-    return np.array([[cell.GetPoint(corner)[:2] for corner in range(4)] for cell in cells])
+    cells = []
+    for number in range(grid.GetNumberOfCells()):
+        cell = grid.GetCell(number).GetPoints()  # the grid lends the same object for every cell
+        cells.append([cell.GetPoint(corner)[:2] for corner in range(4)])
+    return np.array(cells)
 
 
 def values(data: Any, name: str) -> NDArray[Any]:
