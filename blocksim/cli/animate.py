@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.output import note
+from blocksim.cli.output import note, replacement
 from blocksim.study.stored import stored_run
 from blocksim.view.animation import Look, Pace, draw_film, writer_of
 from blocksim.view.support import support_of
@@ -37,9 +37,10 @@ def animate_command(
     stored = stored_run(run)
     film = out or Path(f"{stored.scenario.name}.gif")
     support = support_of(stored.scenario)
+    older = replacement(film)
     look = Look(width, trails, stored.scenario.name)
     count = draw_film(stored.frames, film, Pace(speed, fps), look, support)
     if stored.remark:
         note(stored.remark)
     if not quiet:
-        note(f"film: {film} ({count} pictures)")
+        note(f"film: {film} ({older}{count} pictures)")

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.output import note
+from blocksim.cli.output import note, replacement
 from blocksim.errors import OutputExistsError
 from blocksim.simulation import folder as files
 from blocksim.simulation.stores.formats import format_named
@@ -34,11 +34,12 @@ def export_command(
     stored = stored_run(run)
     file = out or Path(f"{stored.scenario.name}.{kind}")
     _refuse_own_files(file, stored.folder)
+    older = replacement(file)
     count = write(file, stored.frames)
     if stored.remark:
         note(stored.remark)
     if not quiet:
-        note(f"file: {file} ({count} frames)")
+        note(f"file: {file} ({older}{count} frames)")
 
 
 def _refuse_own_files(file: Path, folder: Path) -> None:

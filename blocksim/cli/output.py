@@ -5,6 +5,7 @@ import math
 import shutil
 import sys
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 NARROW = 80
 GAP = "  "
@@ -15,6 +16,11 @@ LONG_TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))  # s
 def note(text: str) -> None:
     """Print a line about what is going on, to standard error."""
     print(text, file=sys.stderr, flush=True)  # noqa: T201 - this is the place for it
+
+
+def replacement(path: Path) -> str:
+    """Return what to tell of a file that is about to be written where an older one is; nothing where none is."""
+    return "replaces an older file, " if path.exists() else ""
 
 
 def answer(text: str) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,16 @@ def write_mp4(path: Path, pictures: Iterator[NDArray[np.uint8]], seconds: NDArra
     """
     package = _package()
     rate = 1.0 / float(seconds[0])
+    repeats = np.round(seconds * rate).astype(int)
     with replacing(path) as temporary:
-        _encode(package, temporary, pictures, np.round(seconds * rate).astype(int), rate)
+        try:
+            _encode(package, temporary, pictures, repeats, rate)
+            written, _ = package.count_frames_and_secs(str(temporary))
+        except (OSError, RuntimeError):
+            written = 0
+        if written != repeats.sum():  # nothing else tells of a disk that was full in the end
+            message = f"{path}: cannot be written: ffmpeg stopped before the end"
+            raise OutputError(message)
 
 
 def _encode(
@@ -35,13 +44,9 @@ def _encode(
     film = package.write_frames(str(path), size, **settings, ffmpeg_log_level="error")
     film.send(None)
     try:
-        for index, repeat in enumerate(repeats):
-            picture = np.ascontiguousarray(first if index == 0 else next(pictures))
+        for repeat, picture in zip(repeats, chain([first], pictures), strict=True):
             for _ in range(repeat):
-                film.send(picture)
-    except (OSError, RuntimeError) as error:
-        message = f"{path}: ffmpeg cannot write it: {str(error).strip().splitlines()[-1]}"
-        raise OutputError(message) from None
+                film.send(np.ascontiguousarray(picture))
     finally:
         film.close()
 

@@ -13,6 +13,7 @@ def test_csv_ends_where_the_final_table_does(blocksim: Command, finished: Path) 
     answer = blocksim("export", finished)
     assert (answer.code, answer.out) == (0, "")
     assert answer.err.startswith("file: three_blocks_nominal.csv (")
+    assert "(replaces an older file, " in blocksim("export", finished).err
     with Path("three_blocks_nominal.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     with (finished / "final.csv").open(encoding="utf-8", newline="") as file:
