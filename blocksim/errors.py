@@ -88,6 +88,12 @@ class OutputError(BlocksimError):
     exit_code = ExitCode.INPUT_OUTPUT
 
 
+class UnavailableError(BlocksimError):
+    """An optional package is not installed, or a service cannot be reached."""
+
+    exit_code = ExitCode.UNAVAILABLE
+
+
 class StoppedEarlyError(BlocksimError):
     """The run was stopped before its end and can be resumed."""
 

@@ -1,6 +1,7 @@
 """What a sweep varies, and the scenario of each of its cases."""
 
 import itertools
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -54,21 +55,46 @@ def _plain(value: object) -> object:
     return value.item() if hasattr(value, "item") else value
 
 
-def cases_of(document: Document, sweep: Sweep) -> list[Case]:
+def cases_of(document: Document, sweep: Sweep) -> "Cases":
     """Return all cases of a sweep. Raises InvalidInputError where they are too many or none can be simulated."""
-    count = len(next(iter(sweep.vary.values())))
-    if sweep.mode == "grid":
-        count = 1
-        for values in sweep.vary.values():
-            count *= len(values)
-    if count > MOST_CASES:
-        message = f"{count} cases are too many for one sweep; at most {MOST_CASES} are possible"
+    cases = Cases(document, sweep)
+    if len(cases) > MOST_CASES:
+        message = f"{len(cases)} cases are too many for one sweep; at most {MOST_CASES} are possible"
         raise InvalidInputError(message)
-    cases = [_case(document, values) for values in combinations(sweep)]
-    if all(case.scenario is None for case in cases):
-        message = f"none of the {count} cases can be simulated; the first: {cases[0].problem}"
+    if all(case.scenario is None for case in cases):  # looks no farther than to the first that can
+        message = f"none of the {len(cases)} cases can be simulated; the first: {next(iter(cases)).problem}"
         raise InvalidInputError(message)
     return cases
+
+
+@dataclass(frozen=True)
+class Cases:
+    """All cases of a sweep, in order; a scenario is made when it is asked for, and never kept."""
+
+    document: Document
+    sweep: Sweep
+
+    def __len__(self) -> int:
+        """Return how many cases there are."""
+        counts = [len(values) for values in self.sweep.vary.values()]
+        return math.prod(counts) if self.sweep.mode == "grid" else counts[0]
+
+    def __iter__(self) -> Iterator[Case]:
+        """Make one case after the other."""
+        return map(self.case, self.settings())
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The dotted keys that vary."""
+        return tuple(self.sweep.vary)
+
+    def settings(self) -> Iterator[dict[str, object]]:
+        """Yield the values of every case, which costs next to nothing."""
+        return combinations(self.sweep)
+
+    def case(self, settings: dict[str, object]) -> Case:
+        """Return the case with these values; mistakes that only show in the combination are kept in it."""
+        return _case(self.document, settings)
 
 
 def combinations(sweep: Sweep) -> Iterator[dict[str, object]]:

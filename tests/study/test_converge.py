@@ -10,7 +10,7 @@ from blocksim.scenario import Document, Scenario
 from blocksim.study import pool
 from blocksim.study.converge import converge
 from blocksim.study.convergence import Coordinates, Study, Verdict, judge
-from blocksim.study.pool import Row
+from blocksim.study.rows import Row
 from blocksim.study.refinement import Refinement, refinements_of, with_setting
 from tests.study.conftest import SCENARIOS
 
