@@ -76,6 +76,12 @@ class InputMissingError(BlocksimError):
     exit_code = ExitCode.INPUT_MISSING
 
 
+class UnavailableError(BlocksimError):
+    """An optional package or a service is missing; the message names the extra to install."""
+
+    exit_code = ExitCode.UNAVAILABLE
+
+
 class OutputExistsError(BlocksimError):
     """The output folder holds something that must not be overwritten, or cannot be created."""
 
@@ -86,12 +92,6 @@ class OutputError(BlocksimError):
     """Writing failed (disk full, read-only file system)."""
 
     exit_code = ExitCode.INPUT_OUTPUT
-
-
-class UnavailableError(BlocksimError):
-    """An optional package is not installed, or a service cannot be reached."""
-
-    exit_code = ExitCode.UNAVAILABLE
 
 
 class StoppedEarlyError(BlocksimError):

@@ -82,14 +82,46 @@ def read_table(path: Path, columns: Sequence[str]) -> Table:
     Rows of the wrong shape are left out and noted in `problems`. Raises InputMissingError when the file
     cannot be read and InvalidInputError when it is no text or its header is wrong.
     """
-    lines = _lines(path)
-    notes = tuple(line.text.strip()[1:].strip() for line in lines if _is_comment(line))
-    content = [line for line in lines if line.text.strip() and not _is_comment(line)]
+    notes, content = _content(_lines(path))
     if not content:
         raise_problems([Problem(where=str(path), message=f"the table is empty, {_expected(columns)}")])
     names = _header(content[0], columns)
-    table = Table(where=str(path), notes=notes, header=content[0])
-    for line in content[1:]:
+    return _filled(Table(where=str(path), notes=notes, header=content[0]), names, content[1:])
+
+
+def read_open_table(path: Path, limit: int) -> tuple[tuple[Cell, ...], Table]:
+    """Read a table whose columns are its own choice: the cells of its header, and the rest as `read_table`.
+
+    `limit` is the largest size in bytes. Raises as `read_table`; a header needs names, each once.
+    """
+    notes, content = _content(_lines(path, limit))
+    if not content:
+        raise_problems([Problem(where=str(path), message="the table is empty")])
+    line = content[0]
+    places = _cells(line)
+    if places is None:
+        raise_problems([line.problem(_shape_complaint(line, places, 0))])
+    heads = tuple(Cell("", *place) for place in places)
+    names = [head.text for head in heads]
+    problems = [
+        head.problem("column given twice" if head.text else "this column has no name")
+        for index, head in enumerate(heads)
+        if not head.text or head.text in names[:index]
+    ]
+    if problems:
+        raise_problems(problems)
+    return heads, _filled(Table(where=str(path), notes=notes, header=line), names, content[1:])
+
+
+def _content(lines: Sequence[Line]) -> tuple[tuple[str, ...], list[Line]]:
+    """Return the texts of the comments, and the lines that are neither comments nor empty."""
+    notes = tuple(line.text.strip()[1:].strip() for line in lines if _is_comment(line))
+    return notes, [line for line in lines if line.text.strip() and not _is_comment(line)]
+
+
+def _filled(table: Table, names: Sequence[str], lines: Sequence[Line]) -> Table:
+    """Add the rows, or what is wrong with their shape."""
+    for line in lines:
         cells = _cells(line)
         complaint = _shape_complaint(line, cells, len(names))
         if complaint or cells is None:
@@ -115,15 +147,15 @@ def suggestion(found: str, allowed: Sequence[str]) -> str:
     return f"did you mean '{close[0]}'?" if close else "allowed: " + ", ".join(allowed)
 
 
-def _lines(path: Path) -> list[Line]:
-    text = _text(path).replace("\r\n", "\n").replace("\r", "\n")
+def _lines(path: Path, limit: int = LARGEST_FILE) -> list[Line]:
+    text = _text(path, limit).replace("\r\n", "\n").replace("\r", "\n")
     return [Line(str(path), number, _printable(line)) for number, line in enumerate(text.split("\n"), 1)]
 
 
-def _text(path: Path) -> str:
-    raw = _bytes(path)
-    if len(raw) > LARGEST_FILE:
-        raise_problems([Problem(str(path), f"the file is too large for a table, limit {LARGEST_FILE} bytes")])
+def _text(path: Path, limit: int) -> str:
+    raw = _bytes(path, limit)
+    if len(raw) > limit:
+        raise_problems([Problem(str(path), f"the file is too large for a table, limit {limit} bytes")])
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -133,12 +165,12 @@ def _text(path: Path) -> str:
     return text
 
 
-def _bytes(path: Path) -> bytes:
+def _bytes(path: Path, limit: int) -> bytes:
     if path.is_dir():
         raise InputMissingError(Problem(str(path), "is a folder, not a table").render())
     try:
         with path.open("rb") as file:
-            return file.read(LARGEST_FILE + 1)
+            return file.read(limit + 1)
     except FileNotFoundError:
         raise InputMissingError(Problem(str(path), "no such file").render()) from None
     except (OSError, ValueError) as error:  # ValueError: a null character in the name

@@ -9,6 +9,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from blocksim.cli import options
+from blocksim.cli.dry_run import show_estimate
 from blocksim.cli.output import GAP, answer, note, print_json, table_lines, width_of_screen
 from blocksim.cli.progress import tell_compilation
 from blocksim.cli.reporter import Reporter, shown
@@ -40,15 +41,28 @@ class Mode(StrEnum):
 
     GRID = "grid"
     LIST = "list"
+    TABLE = "table"
+    LHS = "lhs"
+    SOBOL = "sobol"
+    NORMAL = "normal"
 
 
 def sweep_command(
     scenario: Annotated[Path | None, typer.Argument(metavar="SCENARIO", help="Scenario file (TOML).")] = None,
     vary: Annotated[
         list[str] | None,
-        typer.Option("--vary", metavar="KEY=VALUES", help="KEY=a,b,c or KEY=from:to:count. Repeatable."),
+        typer.Option(
+            "--vary",
+            metavar="KEY=VALUES",
+            help="KEY=a,b,c or KEY=from:to:count; to be drawn from, KEY=from:to or KEY=mean+-sd. Repeatable.",
+        ),
     ] = None,
-    mode: Annotated[Mode | None, typer.Option(help="All combinations, or the k-th value of every key.")] = None,
+    mode: Annotated[
+        Mode | None,
+        typer.Option(help="All combinations, the k-th value of every key, the scenario's table, or random draws."),
+    ] = None,
+    samples: Annotated[int | None, typer.Option(metavar="N", help="How many cases are drawn (default: 128).")] = None,
+    seed: Annotated[int | None, typer.Option(metavar="S", help="The same seed draws the same (default: 0).")] = None,
     settings: options.Settings = None,
     executor: Annotated[
         Executor | None,
@@ -74,6 +88,9 @@ def sweep_command(
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run failed cases again.")] = False,
     out: options.SweepFolder = None,
     overwrite: options.Overwrite = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Tell count, cost and size; run and write nothing.")
+    ] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -90,8 +107,15 @@ def sweep_command(
         raise typer.BadParameter("a scenario file is needed, or --merge DIR", param_hint="SCENARIO")
     silent = quiet or as_json
     document = with_vary(
-        Document.read(scenario).with_settings(settings or []), vary or [], None if mode is None else mode.value
+        Document.read(scenario).with_settings(settings or []),
+        vary or [],
+        None if mode is None else mode.value,
+        samples=samples,
+        seed=seed,
     )
+    if dry_run:
+        show_estimate(document, jobs, as_json=as_json)
+        return
     for kernels in kernels_for(document):
         tell_compilation(kernels, quiet=silent)
     result = _sweep(

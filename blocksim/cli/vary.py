@@ -7,15 +7,25 @@ from blocksim.scenario import Document
 from blocksim.scenario.overrides import UnfitOverrideError, parse_value
 from blocksim.study.plan import Values, with_sweep
 
-RANGE_PARTS = 3
+ENDS = ("from", "to", "count")
+LEAST_ENDS = 2
+PLUS_MINUS = ("+-", "±")
+FORMS = "KEY=a,b,c, KEY=from:to:count, KEY=from:to or KEY=mean+-sd"
 
 
-def with_vary(document: Document, texts: Sequence[str], mode: str | None) -> Document:
-    """Return the document with a [sweep] table from texts such as `key=a,b,c` and `key=from:to:count`.
+def with_vary(
+    document: Document,
+    texts: Sequence[str],
+    mode: str | None,
+    *,
+    samples: int | None = None,
+    seed: int | None = None,
+) -> Document:
+    """Return the document with a [sweep] table from texts such as `key=a,b,c`, `key=from:to:count` or `key=mean+-sd`.
 
-    Raises ScenarioError where a text is neither; wrong keys and values show when the document is built.
+    Raises ScenarioError where a text is none of them; wrong keys and values show when the document is built.
     """
-    problems = [Problem(f"--vary {text}", "write KEY=a,b,c or KEY=from:to:count") for text in texts if not _parts(text)]
+    problems = [Problem(f"--vary {text}", f"write {FORMS}") for text in texts if not _parts(text)]
     keys = [key for text in texts for key, _ in _parts(text)]
     problems += [
         Problem(f"--vary {key}", "given twice; list all its values once") for key in keys if keys.count(key) > 1
@@ -24,7 +34,8 @@ def with_vary(document: Document, texts: Sequence[str], mode: str | None) -> Doc
         raise ScenarioError(list(dict.fromkeys(problems)))
     split = {key: (text, values) for text in texts for key, values in _parts(text)}
     vary = {key: _values(values) for key, (_, values) in split.items()}
-    return with_sweep(document, vary, mode, {key: text for key, (text, _) in split.items()})
+    labels = {key: text for key, (text, _) in split.items()}
+    return with_sweep(document, vary, mode, labels, samples=samples, seed=seed)
 
 
 def _parts(text: str) -> list[tuple[str, str]]:
@@ -34,9 +45,13 @@ def _parts(text: str) -> list[tuple[str, str]]:
 
 
 def _values(text: str) -> Values:
+    sign = next((sign for sign in PLUS_MINUS if sign in text), None)
+    if sign is not None:
+        mean, _, sd = text.partition(sign)
+        return {"mean": _value(mean), "sd": _value(sd)}
     parts = [_value(part) for part in text.split(":")]
-    if len(parts) == RANGE_PARTS:
-        return dict(zip(("from", "to", "count"), parts, strict=True))
+    if LEAST_ENDS <= len(parts) <= len(ENDS):
+        return dict(zip(ENDS, parts, strict=False))
     return [_value(part) for part in text.split(",")]
 
 

@@ -3,15 +3,15 @@
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 from pydantic import ValidationError
 
 from blocksim.scenario import keys
 from blocksim.scenario.findings import MAX_FINDINGS, Finding, findings_of
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.study import Sweep
-from blocksim.scenario.overrides import Data, UnfitOverrideError, with_value
+from blocksim.scenario.models.study import OWN_KEYS, Mode, Sweep
+from blocksim.scenario.overrides import TWINS, Data, UnfitOverrideError, with_value
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.references import wrong_names
 from blocksim.scenario.rigid import unfit_choices
@@ -19,6 +19,9 @@ from blocksim.scenario.start import impossible_starts
 
 MAX_TRIED = 100
 MAX_VARIED = 100
+MODES = get_args(Mode)
+ENDS = ("from", "mean", "to")
+"""What a variation that is no list says of its values, in the order in which it is told."""
 UNVARIED = ("schema", "name", "description", "experiment", "sweep", "provenance")
 
 
@@ -60,29 +63,65 @@ def _sweep(data: Data, folder: Path) -> Iterator[Finding]:
         return
     bare = {key: entry for key, entry in data.items() if key not in ("sweep", "experiment")}
     before = _single_mistakes(bare, folder)
+    mode = {"mode": sweep["mode"]} if sweep.get("mode") in MODES else {}
     for key, values in sweep.items():
-        if key != "mode":
+        if key not in OWN_KEYS and _is_variation({**mode, key: values}):
             yield from islice(_varied(Trial(bare, folder, before), str(key), values), 1)
+    yield from _varied_twice(sweep)
+
+
+def _varied_twice(sweep: Data) -> Iterator[Finding]:
+    """Find keys beside which the other way to write the same thing is varied too."""
+    for key in sweep:
+        table, dot, word = str(key).rpartition(".")
+        twin = f"{table}{dot}{TWINS.get(word, word)}"
+        if word == "kinetic_ratio" and twin in sweep:
+            message = f"{twin} is varied too, and says the same thing; keep one of the two"
+            yield Finding(("sweep", key), message, at="key")
+
+
+def _is_variation(sweep: Mapping[str, object]) -> bool:
+    try:
+        Sweep.model_validate(sweep)
+    except ValidationError:
+        return False
+    return True
 
 
 def _varied(trial: Trial, key: str, values: object) -> Iterator[Finding]:
     """Yield what is wrong with a swept key, then with its values."""
     place: keys.KeyPath = ("sweep", key)
+    complaint = unfit_to_vary(key)
+    if complaint:
+        yield Finding(place, complaint, at="key")
+        return
+    path = keys.parse_key(key)
+    for part, value in _given(values):
+        yield from _tried(trial, path, value, (*place, part))
+
+
+def unfit_to_vary(key: str) -> str:
+    """Tell why a key can be in no sweep, or nothing; whether the scenario has the key shows when it is tried."""
     try:
-        path = keys.parse_key(key)
-        expanded = Sweep.model_validate({key: values}).vary[key]
-    except ValidationError:
-        return
+        first = keys.parse_key(key)[0]
     except ValueError:
-        yield Finding(place, f"{shown(key)} is not a dotted key", at="key")
-        return
-    if path[0] in UNVARIED:
-        yield Finding(place, f"{path[0]} cannot be varied", at="key")
-        return
-    tried = expanded[:MAX_TRIED] if isinstance(values, tuple) else (expanded[0], expanded[-1])
-    for index, value in enumerate(tried):
-        value_place = (*place, index) if isinstance(values, tuple) else place
-        yield from _tried(trial, path, value, value_place)
+        return f"{shown(key)} is not a dotted key"
+    return f"{first} cannot be varied" if first in UNVARIED else ""
+
+
+def _given(values: object) -> Iterator[tuple[str | int, object]]:
+    """Yield the values that a variation names, as they are written, so that their dimension is judged too."""
+    if isinstance(values, Mapping):
+        yield from ((end, values[end]) for end in ENDS if end in values)
+    elif isinstance(values, tuple):
+        yield from enumerate(values[:MAX_TRIED])
+
+
+def mistakes_of_value(data: Data, folder: Path, key: str, value: object) -> list[Finding]:
+    """List what is wrong with one value of one key by itself, in data that may have a sweep."""
+    bare = {name: entry for name, entry in data.items() if name not in ("sweep", "experiment")}
+    trial = Trial(bare, folder, _single_mistakes(bare, folder))
+    return list(_tried(trial, keys.parse_key(key), value, ("sweep", key)))
 
 
 def _tried(trial: Trial, path: keys.KeyPath, value: object, place: keys.KeyPath) -> Iterator[Finding]:

@@ -66,7 +66,7 @@ def _finding(entry: ErrorDetails, data: object) -> Finding:
             context = entry["ctx"]
             key = context["key"]
             known = (*path, *key)
-            return Finding(_existing(known, data), context["message"], relation=bool(key))
+            return Finding(_existing(known, data), context["message"], context["at"], relation=bool(key))
         case _:
             return Finding(_existing(path, data), _wrong_type(entry, path))
 

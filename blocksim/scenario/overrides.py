@@ -13,6 +13,8 @@ from blocksim.scenario.quantities import shown
 Data = Mapping[str, object]
 
 MAX_DEPTH = 16
+TWINS = {"kinetic": "kinetic_ratio", "kinetic_ratio": "kinetic"}
+"""Two keys that say the same thing; setting one takes the other away."""
 _NAMED = (("materials",), ("blocks",))
 _FRICTION = Friction()
 
@@ -89,9 +91,9 @@ def parse_value(text: str) -> object:
 def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tuple[Data, KeyPath]:
     """Return data with one value set, and the path that was set; raises UnfitOverrideError.
 
-    Tables on the way are made where they are missing. A bare friction c becomes { static = c }, whose kinetic
-    part follows the static one until it is set; the friction of a pair of materials starts as that of all pairs; a bare
-    restitution becomes a table of both.
+    Tables on the way are made where they are missing. A bare friction c becomes { static = c }, whose kinetic part
+    follows the static one until it is set, by itself or by its ratio, of which the later one holds; the friction of a
+    pair of materials starts as that of all pairs; a bare restitution becomes a table of both.
     """
     try:
         parts = parse_key(key) if isinstance(key, str) else tuple(key)
@@ -142,9 +144,15 @@ def _put(node: object, parts: Sequence[str | int], value: object, done: list[str
         raise UnfitOverrideError(message)
     done.append(part)
     return {
-        **node,
+        **_without_twin(node, part),
         part: _put(_opened(tuple(done), child) if len(parts) > 1 else child, parts[1:], value, done),
     }
+
+
+def _without_twin(node: Data, part: str) -> Data:
+    """Leave out the other way to write what is going to be set."""
+    twin = TWINS.get(part)
+    return {key: entry for key, entry in node.items() if key != twin} if twin in node else node
 
 
 def _index(entries: Sequence[object], part: str | int, done: Sequence[str | int]) -> int:

@@ -25,6 +25,7 @@ from blocksim.study.executors.task import Setting
 from blocksim.study.manifest import Manifest
 from blocksim.study.plan import Cases, Values, cases_of, with_sweep
 from blocksim.study.ranges import Ranges
+from blocksim.study.sampling.design import levels_of
 from blocksim.study.shard import WHOLE, Shard
 from blocksim.study.single import check_experiment
 from blocksim.study.sweep_folder import CASES, PLAN, prepare
@@ -72,8 +73,9 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     runner = executor_named(executor)
     document = with_sweep(scenario if isinstance(scenario, Document) else Document.read(scenario), vary, mode)
     base = document.build()
-    cases = cases_in(document, base)
-    name = sweep_hash(base, cases.sweep)
+    plan = _plan_of(base)
+    cases = cases_of(document, plan)
+    name = sweep_hash(base, plan)
     folder = Path(out) if out is not None else files.RESULTS / base.name / f"sweep-{name}"
     setting = Setting(jobs or os.cpu_count() or 1, scheduler=scheduler, folder=folder / CASES if keep_cases else None)
     runner.check(setting)
@@ -120,8 +122,8 @@ def _refuse_loss(shard: Shard, *, overwrite: bool) -> None:
         raise InvalidInputError("a shard cannot overwrite what other shards have done; remove the folder first")
 
 
-def cases_in(document: Document, base: Scenario) -> Cases:
-    """Return what is to be run. Raises InvalidInputError where that is nothing."""
+def _plan_of(base: Scenario) -> Sweep:
+    """Return what is varied. Raises InvalidInputError where that is nothing, and for a table that does not fit."""
     if base.sweep is None:
         message = "nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario"
         raise InvalidInputError(message)
@@ -129,7 +131,12 @@ def cases_in(document: Document, base: Scenario) -> Cases:
         message = f"{MEASURED} cannot be varied: compare --experiment judges by another table"
         raise InvalidInputError(message)
     check_experiment(base)
-    return cases_of(document, base.sweep)
+    return base.sweep
+
+
+def cases_in(document: Document) -> Cases:
+    """Return the cases of a document that has a sweep. Raises InvalidInputError where it has none."""
+    return cases_of(document, _plan_of(document.build()))
 
 
 def ranges_of(base: Scenario) -> Ranges | None:
@@ -139,7 +146,7 @@ def ranges_of(base: Scenario) -> Ranges | None:
 
 def sweep_hash(base: Scenario, plan: Sweep) -> str:
     """Return the name of a sweep: a hash of its scenario, of what it varies, and of the code."""
-    text = json.dumps([scenario_hash(base), plan.mode, plan.vary, code_hash()])
+    text = json.dumps([scenario_hash(base), plan.as_table(), code_hash()])
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
 
 
@@ -147,6 +154,6 @@ def kernels_for(document: Document) -> tuple[str, ...]:
     """Return the sets of kernels that the cases of a sweep need."""
     base = document.build()
     vary = base.sweep.vary if base.sweep else {}
-    schemes = (base.time.scheme, *map(str, vary.get("time.scheme", ())))
-    models = (base.contact.model, *map(str, vary.get("contact.model", ())))
+    schemes = (base.time.scheme, *map(str, levels_of(vary.get("time.scheme", ()))))
+    models = (base.contact.model, *map(str, levels_of(vary.get("contact.model", ()))))
     return tuple(dict.fromkeys(kernel_set(scheme, model) for scheme in schemes for model in models))

@@ -1,29 +1,58 @@
 """What a sweep varies, and the scenario of each of its cases."""
 
-import itertools
-import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
+from typing import overload
 
-from blocksim.errors import BlocksimError, InvalidInputError
-from blocksim.scenario import Document, Scenario
-from blocksim.scenario.models.study import Sweep
-from blocksim.scenario.overrides import Override, frozen
+from blocksim.errors import BlocksimError, InvalidInputError, ScenarioError
+from blocksim.scenario import Document, Scenario, Sweep
+from blocksim.scenario.check import mistakes_of_value
+from blocksim.scenario.findings import Finding
+from blocksim.scenario.models.motion import FromTable
+from blocksim.scenario.models.variation import Normal, written
+from blocksim.scenario.overrides import Override, frozen, with_value
 from blocksim.scenario.quantities import shown
 from blocksim.simulation.provenance import run_hash
+from blocksim.study.sampling.design import Design, Settings
+from blocksim.study.sampling.modes import design_of
+from blocksim.study.sampling.table import read_columns, refuse_wrong_values
 
-MOST_CASES = 20_000
-Values = Iterable[object] | Mapping[str, object]  # a list, or { from, to, count }
+MOST_CASES = 1_000_000
+MOST_LOOKED_AT = 1_000
+"""Cases that are built in search of one that can be simulated, before anything runs."""
+Values = Iterable[object] | Mapping[str, object]  # a list, { from, to, count }, { from, to } or { mean, sd }
 
 
 @dataclass(frozen=True)
 class Case:
     """One member of a sweep: the values of its keys, and its scenario or the reason why it has none."""
 
-    settings: dict[str, object]
+    settings: Settings
     scenario: Scenario | None
     problem: str = ""
     name: str = ""  # hash of its run
+
+
+@dataclass(frozen=True)
+class Cases(Sequence[Case]):
+    """All cases of a sweep; each is made when it is asked for, and none is kept."""
+
+    document: Document
+    design: Design
+
+    def __len__(self) -> int:
+        """Return the number of cases."""
+        return len(self.design)
+
+    @overload
+    def __getitem__(self, number: int) -> Case: ...
+    @overload
+    def __getitem__(self, number: slice) -> Sequence[Case]: ...
+    def __getitem__(self, number: int | slice) -> Case | Sequence[Case]:
+        if isinstance(number, slice):
+            return [self[index] for index in range(len(self))[number]]
+        return _case(self.document, self.design[number])
 
 
 def with_sweep(
@@ -31,10 +60,14 @@ def with_sweep(
     vary: Mapping[str, Values] | None,
     mode: str | None = None,
     labels: Mapping[str, str] | None = None,
+    *,
+    samples: int | None = None,
+    seed: int | None = None,
 ) -> Document:
     """Return the document with another [sweep] table; mistakes in it are shown at the text that `labels` has for a key.
 
-    Without `vary`, the document keeps the keys of its own table.
+    Without `vary`, the document keeps the keys of its own table. Where the mode is "table", the file is read and its
+    columns take its place as lists. Raises ScenarioError, InputMissingError or InvalidInputError for a wrong table.
     """
     present = document.data.get("sweep")
     table = dict(present) if isinstance(present, Mapping) and not vary else {}
@@ -43,11 +76,14 @@ def with_sweep(
         table[key] = frozen(values) if isinstance(values, Mapping) else tuple(_plain(value) for value in values)
         text = (labels or {}).get(key, f"{key}={shown(table[key])}")
         overrides.append(Override(f"--vary {text}" if labels else "vary", text, ("sweep", key)))
-    if mode is not None and table:
-        table["mode"] = mode
-        overrides.append(Override("--mode" if labels is not None else "mode", mode, ("sweep", "mode")))
+    own = {"mode": mode, "samples": samples, "seed": seed}
+    for name, value in own.items():
+        if value is not None and table:
+            table[name] = value
+            label = f"--{name}" if labels is not None else name
+            overrides.append(Override(label, f"{name}={value}", ("sweep", name)))
     data = {**document.data, "sweep": table} if table else document.data
-    return replace(document, data=data, overrides=tuple(overrides))
+    return _with_table_read(replace(document, data=data, overrides=tuple(overrides)))
 
 
 def _plain(value: object) -> object:
@@ -55,59 +91,78 @@ def _plain(value: object) -> object:
     return value.item() if hasattr(value, "item") else value
 
 
-def cases_of(document: Document, sweep: Sweep) -> "Cases":
-    """Return all cases of a sweep. Raises InvalidInputError where they are too many or none can be simulated."""
-    cases = Cases(document, sweep)
-    if len(cases) > MOST_CASES:
-        message = f"{len(cases)} cases are too many for one sweep; at most {MOST_CASES} are possible"
+def _with_table_read(document: Document) -> Document:
+    """Put the columns of a table of cases into the document, as lists."""
+    present = document.data.get("sweep")
+    if not isinstance(present, Mapping) or present.get("mode") != "table":
+        return document
+    sweep = document.build().sweep
+    if sweep is None or sweep.table is None:
+        return document
+    columns = read_columns(sweep.table)
+    refuse_wrong_values(document, columns)
+    lists = {column.key: tuple(column.values) for column in columns}
+    return replace(document, data={**document.data, "sweep": {"mode": "list", **lists}})
+
+
+def cases_of(document: Document, sweep: Sweep) -> Cases:
+    """Return all cases of a sweep, which are made one by one.
+
+    Raises InvalidInputError where they are too many or none can be simulated, ScenarioError where a distribution
+    gave a value that its key cannot have.
+    """
+    design = design_of(sweep)
+    if len(design) > MOST_CASES:
+        message = f"{len(design)} cases are too many for one sweep; at most {MOST_CASES} are possible"
         raise InvalidInputError(message)
-    if all(case.scenario is None for case in cases):  # looks no farther than to the first that can
-        message = f"none of the {len(cases)} cases can be simulated; the first: {next(iter(cases)).problem}"
+    _refuse_wrong_draws(document, sweep, design)
+    cases = Cases(_for_cases(document), design)
+    looked_at = min(len(cases), MOST_LOOKED_AT)
+    if all(case.scenario is None for case in islice(cases, looked_at)):
+        which = f"none of the {len(cases)} cases" if looked_at == len(cases) else f"none of the first {looked_at} cases"
+        message = f"{which} can be simulated; the first: {cases[0].problem}"
         raise InvalidInputError(message)
     return cases
 
 
-@dataclass(frozen=True)
-class Cases:
-    """All cases of a sweep, in order; a scenario is made when it is asked for, and never kept."""
-
-    document: Document
-    sweep: Sweep
-
-    def __len__(self) -> int:
-        """Return how many cases there are."""
-        counts = [len(values) for values in self.sweep.vary.values()]
-        return math.prod(counts) if self.sweep.mode == "grid" else counts[0]
-
-    def __iter__(self) -> Iterator[Case]:
-        """Make one case after the other."""
-        return map(self.case, self.settings())
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """The dotted keys that vary."""
-        return tuple(self.sweep.vary)
-
-    def settings(self) -> Iterator[dict[str, object]]:
-        """Yield the values of every case, which costs next to nothing."""
-        return combinations(self.sweep)
-
-    def case(self, settings: dict[str, object]) -> Case:
-        """Return the case with these values; mistakes that only show in the combination are kept in it."""
-        return _case(self.document, settings)
+def _for_cases(document: Document) -> Document:
+    """Return the document that cases are made from: no sweep, and tables found, or read, once for all of them."""
+    scenario = document.build()
+    data: Mapping[str, object] = {key: entry for key, entry in document.data.items() if key != "sweep"}
+    if scenario.experiment is not None:
+        data = {**data, "experiment": {"table": scenario.experiment.table}}
+    if isinstance(scenario.motion, FromTable):
+        data, _ = with_value(data, ("motion", "table"), scenario.motion.table)
+    return replace(document, data=data)
 
 
-def combinations(sweep: Sweep) -> Iterator[dict[str, object]]:
-    """Return the values of every case: all combinations (`grid`) or the k-th value of every key (`list`)."""
-    columns = sweep.vary.values()
-    rows = itertools.product(*columns) if sweep.mode == "grid" else zip(*columns, strict=True)
-    return (dict(zip(sweep.vary, row, strict=True)) for row in rows)
+def _refuse_wrong_draws(document: Document, sweep: Sweep, design: Design) -> None:
+    """Try the least and the greatest value that was drawn from each normal distribution."""
+    findings = [
+        Finding(("sweep", key), f"drawn: {message}; cut the distribution with from and to")
+        for key, values in sweep.vary.items()
+        if isinstance(values, Normal)
+        for value in _ends(values, design.columns[key])
+        for message in _mistakes(document, key, value)
+    ]
+    if findings:
+        raise ScenarioError([document.problem(finding) for finding in findings])
 
 
-def _case(document: Document, values: dict[str, object]) -> Case:
+def _ends(values: Normal, drawn: Iterable[object]) -> tuple[object, object]:
+    numbers = [float(str(value).removesuffix(" rad")) for value in drawn]
+    return written(min(numbers), angle=values.angle), written(max(numbers), angle=values.angle)
+
+
+def _mistakes(document: Document, key: str, value: object) -> Iterable[str]:
+    """Return what is wrong with a value, each thing once: one number may set two keys."""
+    return dict.fromkeys(found.message for found in mistakes_of_value(document.data, document.folder, key, value))
+
+
+def _case(document: Document, values: Settings) -> Case:
     """Return the case with these values; mistakes that only show in the combination are kept in it."""
     try:
-        scenario = document.with_values(values).build().model_copy(update={"sweep": None})
+        scenario = document.with_values(values).build()
     except BlocksimError as error:
         return Case(values, None, problem=str(error).splitlines()[0])
     return Case(values, scenario, name=run_hash(scenario))

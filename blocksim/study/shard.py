@@ -1,15 +1,12 @@
 """The part of a sweep that one job of an array does."""
 
 import re
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import count, islice
 from pathlib import PurePath
-from typing import Self, TypeVar
+from typing import Self
 
 from blocksim.errors import InvalidInputError
 
-T = TypeVar("T")
 FORM = re.compile(r"(\d{1,6})/(\d{1,6})")
 
 
@@ -36,12 +33,12 @@ class Shard:
 
     @property
     def slice(self) -> slice:
-        """The numbers of its cases."""
+        """The numbers of its cases, among those of all cases."""
         return slice(self.index, None, self.of)
 
-    def part(self, values: Iterable[T]) -> Iterator[tuple[int, T]]:
-        """Yield its own of the values of all cases, with their numbers."""
-        return islice(zip(count(), values, strict=False), self.index, None, self.of)
+    def numbers(self, count: int) -> range:
+        """Return the numbers of its cases where there are `count` in all."""
+        return range(count)[self.slice]
 
     def file(self, name: str) -> str:
         """Return the name of its own file: sweep.csv, or sweep-0-of-8.csv."""

@@ -78,14 +78,14 @@ class Sweeping:
 
     def _tasks(self) -> Iterator[Task]:
         """Make one task after the other; cases that cannot be run get their rows on the way."""
-        for number, settings in self.shard.part(self.cases.settings()):
-            if self.done.holds(number, settings):
+        for number in self.shard.numbers(len(self.cases)):
+            if self.done.holds(number, self.cases.design[number]):
                 continue
-            case = self.cases.case(settings)
+            case = self.cases[number]
             if case.scenario is not None:
-                yield Task(number, case.name, settings, case.scenario)
+                yield Task(number, case.name, case.settings, case.scenario)
                 continue
-            self.invalid.append(Ended(number, case.name, settings, invalid_row(case.problem)))
+            self.invalid.append(Ended(number, case.name, case.settings, invalid_row(case.problem)))
             if len(self.invalid) >= MOST_INVALID:
                 self._keep_invalid()
 

@@ -60,12 +60,13 @@ class SweepTable:
     def _columns(self) -> list[str]:
         verdict = [] if self.ranges is None else ["inside"]
         ends = [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
-        return ["case", *self.cases.keys, *OUTCOME, *verdict, *ends]
+        return ["case", *self.cases.design.columns, *OUTCOME, *verdict, *ends]
 
     def _rows(self) -> Iterator[list[object]]:
         ends = [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
         with closing(self.done.reader()) as reader:
-            for number, settings in self.shard.part(self.cases.settings()):
+            for number in self.shard.numbers(len(self.cases)):
+                settings = self.cases.design[number]
                 entry = reader.entry(number) if self.done.holds(number, settings) else None
                 if entry is not None:
                     row = entry.row
@@ -89,7 +90,7 @@ class SweepResult:
 
     @cached_property
     def table(self) -> "pd.DataFrame":
-        """The rows of the table, numbers to the last bit. Raises InputMissingError or InvalidInputError."""
+        """The rows of the table (pandas 3 reads every bit). Raises InputMissingError or InvalidInputError."""
         return _read(self.folder / self.name)
 
     @property
@@ -132,7 +133,7 @@ def _read(path: Path) -> "pd.DataFrame":
     import pandas as pd  # noqa: PLC0415 - a third of a second that a sweep need not wait for before it begins
 
     try:
-        table = pd.read_csv(path, dtype=TEXT_COLUMNS, float_precision="round_trip")
+        table = pd.read_csv(path, dtype=TEXT_COLUMNS)
     except FileNotFoundError:
         message = f"{path}: no such file"
         raise InputMissingError(message) from None

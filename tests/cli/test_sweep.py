@@ -76,7 +76,7 @@ def test_failed_case_is_77_and_its_reason_is_told(blocksim: Command) -> None:
     ("vary", "told"),
     [
         ("friction.block_blok=1,2", "--vary friction.block_blok=1,2: unknown key, did you mean 'block_block'?"),
-        (KINETIC, f"--vary {KINETIC}: write KEY=a,b,c or KEY=from:to:count"),
+        (KINETIC, f"--vary {KINETIC}: write KEY=a,b,c, KEY=from:to:count, KEY=from:to or KEY=mean+-sd"),
         ("=1,2", "write KEY=a,b,c"),
         (f"{KINETIC}=", "write KEY=a,b,c"),
         (f"{KINETIC}=0.1:x:3", f"--vary {KINETIC}=0.1:x:3: "),

@@ -52,12 +52,12 @@ bad.toml:20: sweep: nothing to vary; add a line such as "contact.stiffness_scale
       |  ^^^^^
 """,
     ),
-    "sweep mode not there yet": (
+    "misspelt sweep mode": (
         None,
-        '\n[sweep]\nmode = "sobol"\n"time.end" = [1, 2]\n',
+        '\n[sweep]\nmode = "sobel"\n"time.end" = [1, 2]\n',
         """
-bad.toml:21: sweep.mode: "sobol" is not available yet; use "grid" or "list"
-   21 | mode = "sobol"
+bad.toml:21: sweep.mode: "sobel" is not known here, did you mean "sobol"?
+   21 | mode = "sobel"
       |        ^^^^^^^
 """,
     ),
@@ -137,9 +137,9 @@ bad.toml:21: sweep."time.end".1: "2 m" is a length; a time above 0 such as "2 s"
         None,
         '\n[sweep]\n"contact.stiffness_scale" = { from = 0, to = 1, count = 5 }\n',
         """
-bad.toml:21: sweep."contact.stiffness_scale": 0.0 is too small; a plain number above 0 is needed
+bad.toml:21: sweep."contact.stiffness_scale".from: 0 is too small; a plain number above 0 is needed
    21 | "contact.stiffness_scale" = { from = 0, to = 1, count = 5 }
-      |                             ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+      |                                      ^
 """,
     ),
     "range with a count of one": (

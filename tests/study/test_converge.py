@@ -10,8 +10,8 @@ from blocksim.scenario import Document, Scenario
 from blocksim.study import pool
 from blocksim.study.converge import converge
 from blocksim.study.convergence import Coordinates, Study, Verdict, judge
-from blocksim.study.rows import Row
 from blocksim.study.refinement import Refinement, refinements_of, with_setting
+from blocksim.study.rows import Row
 from tests.study.conftest import SCENARIOS
 
 HALVED = Refinement("step", "time step", "time.safety", 0.05, 0.5, 1)

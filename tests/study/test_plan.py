@@ -6,7 +6,8 @@ import pytest
 from blocksim.errors import InvalidInputError, ScenarioError
 from blocksim.scenario import Document
 from blocksim.study import plan
-from blocksim.study.plan import Values, cases_of, combinations, with_sweep
+from blocksim.study.plan import Values, cases_of, with_sweep
+from blocksim.study.sampling.modes import design_of
 
 KINETIC = "friction.block_block.kinetic"
 SCALE = "contact.stiffness_scale"
@@ -15,7 +16,7 @@ SCALE = "contact.stiffness_scale"
 def settings(document: Document, vary: dict[str, Values], mode: str | None = None) -> list[tuple[object, ...]]:
     sweep = with_sweep(document, vary, mode).build().sweep
     assert sweep is not None
-    return [tuple(values.values()) for values in combinations(sweep)]
+    return [tuple(values.values()) for values in design_of(sweep)]
 
 
 def test_grid_takes_all_combinations(nominal: Document) -> None:

@@ -1,13 +1,15 @@
 """What the run is compared with, and what may be varied."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
     BeforeValidator,
     Field,
     GetJsonSchemaHandler,
+    PlainValidator,
     ValidationInfo,
     WithJsonSchema,
     model_validator,
@@ -16,10 +18,18 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario import units
-from blocksim.scenario.models.base import OneOf, Table
+from blocksim.scenario.models.base import OneOf, Table, whole
+from blocksim.scenario.models.variation import VALUES_SCHEMA, Variation, read_any, read_sampled, read_spread
+from blocksim.scenario.spelling import nearest
 
-MAX_VALUES = 100_000
+MAX_SAMPLES = 1_000_000
+MAX_SEED = 2**53
+
+Mode = Literal["grid", "list", "table", "lhs", "sobol", "normal"]
+SAMPLED = ("lhs", "sobol", "normal")
+"""Modes that draw `samples` values of every key."""
+KEYS_OF = {"samples": SAMPLED, "seed": SAMPLED, "table": ("table",)}
+"""Keys of [sweep] that only some modes have."""
 
 
 def _existing_table(value: object, info: ValidationInfo) -> object:
@@ -39,98 +49,109 @@ def _existing_table(value: object, info: ValidationInfo) -> object:
     return table
 
 
+TablePath = Annotated[Path, BeforeValidator(_existing_table), WithJsonSchema({"type": "string", "minLength": 1})]
+
+
 class Experiment(Table):
     """Measurements to compare with."""
 
-    table: Annotated[
-        Path,
-        BeforeValidator(_existing_table),
-        WithJsonSchema({"type": "string", "minLength": 1}),
-    ] = Field(description="CSV table of the experiment, relative to the scenario file")
+    table: TablePath = Field(description="CSV table of the experiment, relative to the scenario file")
 
 
-def _expanded(value: object) -> object:
-    """Turn a list or { from, to, count } into the tuple of values."""
-    if isinstance(value, Mapping) and set(value) == {"from", "to", "count"}:
-        return _spread(value)
-    if not isinstance(value, list | tuple):
-        message = f"{q.shown(value)} is no variation; write a list or {{ from, to, count }}, and the key in quotes"
-        raise q.invalid(message)
-    if not value:
-        message = "the list of values is empty"
-        raise q.invalid(message)
-    return tuple(value)
+@dataclass(frozen=True, slots=True)
+class _Slip:
+    """Stands for the value of a misspelt key of [sweep]."""
+
+    meant: str
 
 
-def _spread(value: Mapping[str, Any]) -> tuple[object, ...]:
-    """Return `count` evenly spaced values, both ends included; SI numbers, angles as texts in rad."""
-    count = value["count"]
-    if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MAX_VALUES:  # noqa: PLR2004
-        message = f"count {q.shown(count)} is not a whole number from 2 to {MAX_VALUES}"
-        raise q.invalid(message)
-    (first, dimension), (last, other) = (_end(value[name]) for name in ("from", "to"))
-    if dimension != other:
-        message = f"from {q.shown(value['from'])} and to {q.shown(value['to'])} are not of one kind"
-        raise q.invalid(message)
-    numbers = [first + (last - first) * i / (count - 1) for i in range(count - 1)] + [last]
-    return tuple(f"{number!r} rad" for number in numbers) if dimension == units.ANGLE else tuple(numbers)
+def _variation(value: object, info: ValidationInfo) -> Variation:
+    """Read what the mode allows; anything that some mode allows where the mode itself is wrong."""
+    if isinstance(value, _Slip):
+        message = f"unknown key, did you mean {value.meant!r}?"
+        raise q.invalid(message, at="key")
+    mode = info.data.get("mode")
+    if mode == "table":
+        message = 'mode "table" takes keys and values from its table'
+        raise q.invalid(message, at="key")
+    if mode is None:
+        return read_any(value)
+    return read_sampled(value) if mode in SAMPLED else read_spread(value)
 
 
-def _end(value: object) -> tuple[float, units.Dimension]:
-    if not isinstance(value, str):
-        return q.Quantity(q.NUMBER).read(value), units.NUMBER
-    try:
-        return q.parse_quantity(value, q.LENGTH)
-    except ValueError as error:
-        message = f"{q.shown(value)}: {error}"
-        raise q.invalid(message) from None
+def _of_the_mode(value: object, info: ValidationInfo) -> object:
+    """Refuse a key that belongs to other modes than the one chosen."""
+    modes = KEYS_OF[str(info.field_name)]
+    mode = info.data.get("mode")
+    if mode is not None and mode not in modes:
+        message = f"mode {q.shown(mode)} has no {info.field_name}; it belongs to {', '.join(map(q.shown, modes))}"
+        raise q.invalid(message, at="key")
+    return value
 
 
-_VALUES_SCHEMA: dict[str, Any] = {
-    "anyOf": [
-        {"type": "array", "minItems": 1},
-        {
-            "type": "object",
-            "properties": {
-                "from": {"type": ["number", "string"]},
-                "to": {"type": ["number", "string"]},
-                "count": {"type": "integer", "minimum": 2, "maximum": MAX_VALUES},
-            },
-            "required": ["from", "to", "count"],
-            "additionalProperties": False,
-        },
-    ]
-}
-Values = Annotated[tuple[Any, ...], BeforeValidator(_expanded)]
+Values = Annotated[Variation, PlainValidator(_variation), WithJsonSchema(VALUES_SCHEMA)]
 
 
 class Sweep(Table):
     """Which scenario keys to vary; in the file every dotted key stands in quotes beside `mode`."""
 
-    mode: Annotated[Literal["grid", "list"], OneOf(("grid", "list"), planned=("table", "lhs", "sobol", "normal"))] = (
-        Field(default="grid", description="grid: every combination; list: all first values, all second values …")
+    mode: Annotated[Mode, OneOf(get_args(Mode))] = Field(
+        default="grid",
+        description="grid: every combination; list: all first values, all second values …; table: rows of a file; "
+        "lhs: Latin hypercube; sobol: scrambled Sobol points; normal: independent random draws",
     )
-    vary: dict[str, Values] = Field(description="dotted key of the scenario and its values")
+    samples: Annotated[int, BeforeValidator(whole(1, MAX_SAMPLES)), BeforeValidator(_of_the_mode)] = Field(
+        default=128, description="how many cases are drawn (lhs, sobol, normal; sobol is balanced at powers of two)"
+    )
+    seed: Annotated[int, BeforeValidator(whole(0, MAX_SEED)), BeforeValidator(_of_the_mode)] = Field(
+        default=0, description="the same seed draws the same values (lhs, sobol, normal)"
+    )
+    table: Annotated[TablePath | None, BeforeValidator(_of_the_mode)] = Field(
+        default=None,
+        description="CSV table of cases, relative to the scenario file: a column a key, units as in `overlap [mm]`",
+    )
+    vary: dict[str, Values] = Field(
+        description="dotted key of the scenario, and a list, { from, to, count }, { from, to }, { mean, sd } or "
+        '{ mean, sd, from, to }; scale = "log" beside from and to'
+    )
 
     @model_validator(mode="before")
     @classmethod
     def _collect(cls, value: object) -> object:
         if not isinstance(value, Mapping) or "vary" in value:
             return value
-        keys = {key: entry for key, entry in value.items() if key != "mode"}
-        if not keys:
+        own = {key: entry for key, entry in value.items() if key in OWN_KEYS}
+        keys = {key: _Slip(meant) if (meant := slip_of(key)) else value[key] for key in value if key not in own}
+        if not keys and own.get("mode") != "table":
             message = 'nothing to vary; add a line such as "contact.stiffness_scale" = [0.1, 1.0]'
             raise q.invalid(message)
-        return {"mode": value.get("mode", "grid"), "vary": keys}
+        return {**own, "vary": keys}
 
     @model_validator(mode="after")
     def _equally_long(self) -> Self:
-        counts = {key: len(values) for key, values in self.vary.items()}
+        counts = {key: len(values) for key, values in self.vary.items() if isinstance(values, tuple)}
         if self.mode == "list" and len(set(counts.values())) > 1:
             told = ", ".join(f"{count} for {key}" for key, count in counts.items())
             message = f'mode "list" takes one value of every key at a time, but there are {told}'
             raise q.invalid(message, "mode")
         return self
+
+    @model_validator(mode="after")
+    def _names_its_table(self) -> Self:
+        if self.mode == "table" and self.table is None:
+            message = 'mode "table" needs the path of a table, as in table = "samples.csv"'
+            raise q.invalid(message, "mode")
+        return self
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether values are drawn at random."""
+        return self.mode in SAMPLED
+
+    def as_table(self) -> dict[str, Any]:
+        """Return the table of the file that says this, with all values in SI."""
+        own = {name: getattr(self, name) for name, modes in KEYS_OF.items() if self.mode in modes}
+        return {"mode": self.mode, **own, **{key: _as_table(values) for key, values in self.vary.items()}}
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -140,7 +161,19 @@ class Sweep(Table):
             "type": "object",
             "title": "Sweep",
             "description": table.get("description", ""),
-            "properties": {"mode": table["properties"]["mode"]},
-            "additionalProperties": _VALUES_SCHEMA,
+            "properties": {key: table["properties"][key] for key in OWN_KEYS},
+            "additionalProperties": VALUES_SCHEMA,
             "minProperties": 1,
         }
+
+
+OWN_KEYS = tuple(name for name in Sweep.model_fields if name != "vary")
+
+
+def slip_of(key: object) -> str | None:
+    """Return the key of [sweep] itself that a word was meant to be; the keys of a scenario are not near them."""
+    return nearest(str(key), OWN_KEYS, most=2)
+
+
+def _as_table(values: Variation) -> object:
+    return list(values) if isinstance(values, tuple) else values.as_table()

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import Document
-from blocksim.study.pool import Row, _outcome, run_all
+from blocksim.study.folders import _outcome, run_all
+from blocksim.study.rows import Row
 
 
 def test_dead_worker_fails_its_case_and_says_what_to_do() -> None:

@@ -1,0 +1,227 @@
+"""What may be said about one varied key: a list, evenly spread values, or a distribution to sample from."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from blocksim.scenario import quantities as q
+from blocksim.scenario import units
+from blocksim.scenario.models.base import OneOf
+from blocksim.scenario.spelling import nearest
+
+MAX_VALUES = 100_000
+SIGNIFICANT = 12
+"""Digits that spread and sampled values keep: mathematical libraries differ in the last ones."""
+FARTHEST = 8.0
+"""How far from the mean, in standard deviations, a truncated normal distribution may begin."""
+
+Scale = Literal["linear", "log"]
+
+
+@dataclass(frozen=True, slots=True)
+class Uniform:
+    """Evenly distributed from `low` to `high`, or their logarithms are; SI, radians where `angle`."""
+
+    low: float
+    high: float
+    scale: Scale = "linear"
+    angle: bool = False
+
+    def as_table(self) -> dict[str, object]:
+        """Return the table of the file that says this."""
+        ends = {"from": written(self.low, angle=self.angle), "to": written(self.high, angle=self.angle)}
+        return ends if self.scale == "linear" else {**ends, "scale": self.scale}
+
+
+@dataclass(frozen=True, slots=True)
+class Normal:
+    """Normally distributed, with nothing below `low` or above `high`; SI, radians where `angle`."""
+
+    mean: float
+    sd: float
+    low: float = -math.inf
+    high: float = math.inf
+    angle: bool = False
+
+    def as_table(self) -> dict[str, object]:
+        """Return the table of the file that says this."""
+        ends = {"mean": self.mean, "sd": self.sd, "from": self.low, "to": self.high}
+        return {name: written(end, angle=self.angle) for name, end in ends.items() if math.isfinite(end)}
+
+
+Distribution = Uniform | Normal
+Variation = tuple[Any, ...] | Distribution
+
+
+def written(number: float, *, angle: bool) -> object:
+    """Return a number as a scenario takes it: an angle as a text with its unit."""
+    return f"{number!r} rad" if angle else number
+
+
+def rounded(number: float) -> float:
+    """Return a number to the digits that are the same on every machine."""
+    return float(f"{number:.{SIGNIFICANT - 1}e}")
+
+
+def read_spread(value: object) -> tuple[Any, ...]:
+    """Return the values of a list or of { from, to, count }; raises a pydantic error where it is neither."""
+    if isinstance(value, Mapping):
+        _refuse_distribution(value)
+        _refuse_slips(value, ("from", "to", "count", "scale"), needed=("from", "to", "count"))
+        return _spread(value)
+    return _levels(value, "{ from, to, count }")
+
+
+def read_sampled(value: object) -> Variation:
+    """Return the levels of a list, or the distribution that a table says; raises a pydantic error."""
+    if not isinstance(value, Mapping):
+        return _levels(value, "{ from, to } or { mean, sd }")
+    if "count" in value:
+        message = 'count belongs to the modes "grid" and "list"; here `samples` says how many'
+        raise q.invalid(message, "count")
+    if "mean" in value or "sd" in value:
+        return _normal(value)
+    return _uniform(value)
+
+
+def read_any(value: object) -> Variation:
+    """Return what a value says where the mode is not known."""
+    if isinstance(value, Mapping) and "count" not in value and {"from", "to", "mean", "sd"} & set(value):
+        return read_sampled(value)
+    return read_spread(value)
+
+
+def _levels(value: object, tables: str) -> tuple[Any, ...]:
+    if not isinstance(value, list | tuple):
+        message = f"{q.shown(value)} is no variation; write a list or {tables}, and the key in quotes"
+        raise q.invalid(message)
+    if not value:
+        message = "the list of values is empty"
+        raise q.invalid(message)
+    return tuple(value)
+
+
+def _refuse_distribution(value: Mapping[str, Any]) -> None:
+    is_whole = {"from", "to"} <= set(value) and "count" not in value and set(value) <= {"from", "to", "scale"}
+    if is_whole or "mean" in value or "sd" in value:
+        message = "a distribution needs one of the modes lhs, sobol and normal; "
+        raise q.invalid(message + "otherwise write a list or { from, to, count }")
+
+
+def _refuse_slips(value: Mapping[str, Any], known: tuple[str, ...], needed: tuple[str, ...]) -> None:
+    """Refuse keys that a variation does not have, and tell which are missing."""
+    if not set(value) & set(known):
+        message = f"{q.shown(value)} is no variation; write a list or {{ {', '.join(needed)} }}, and the key in quotes"
+        raise q.invalid(message)
+    for key in value:
+        if key not in known:
+            meant = nearest(str(key), known, most=2)
+            hint = f"did you mean {meant!r}?" if meant else f"allowed are: {', '.join(known)}"
+            message = f"unknown key {q.shown(key)}, {hint}"
+            raise q.invalid(message)
+    missing = [key for key in needed if key not in value]
+    if missing:
+        message = f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        raise q.invalid(message)
+
+
+def _spread(value: Mapping[str, Any]) -> tuple[object, ...]:
+    """Return `count` evenly spaced values, both ends included; SI numbers, angles as texts in rad."""
+    count = value["count"]
+    if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MAX_VALUES:  # noqa: PLR2004
+        message = f"count {q.shown(count)} is not a whole number from 2 to {MAX_VALUES}"
+        raise q.invalid(message)
+    (first, last), angle = _numbers(value, "from", "to")
+    scale = _scale(value, first, last)
+    steps = (i / (count - 1) for i in range(1, count - 1))
+    if scale == "log":
+        inner = [rounded(first * (last / first) ** step) for step in steps]
+    else:
+        inner = [first + (last - first) * i / (count - 1) for i in range(1, count - 1)]
+    return tuple(written(number, angle=angle) for number in (first, *inner, last))
+
+
+def _uniform(value: Mapping[str, Any]) -> Uniform:
+    _refuse_slips(value, ("from", "to", "scale", "mean", "sd"), needed=("from", "to"))
+    (low, high), angle = _numbers(value, "from", "to")
+    scale = _scale(value, low, high)
+    _refuse_empty(value, low, high)
+    return Uniform(low, high, scale, angle)
+
+
+def _normal(value: Mapping[str, Any]) -> Normal:
+    _refuse_slips(value, ("mean", "sd", "from", "to"), needed=("mean", "sd"))
+    bounds = [name for name in ("from", "to") if name in value]
+    (mean, sd, *given), angle = _numbers(value, "mean", "sd", *bounds)
+    if sd <= 0.0:
+        message = f"the standard deviation {q.shown(value['sd'])} is not above 0"
+        raise q.invalid(message, "sd")
+    ends = dict(zip(bounds, given, strict=True))
+    low, high = ends.get("from", -math.inf), ends.get("to", math.inf)
+    if len(bounds) == 2:  # noqa: PLR2004 - both ends
+        _refuse_empty(value, low, high)
+    if low > mean + FARTHEST * sd or high < mean - FARTHEST * sd:
+        message = f"the bounds leave nothing within {FARTHEST:g} standard deviations of the mean"
+        raise q.invalid(message, "from" if low > mean else "to")
+    return Normal(mean, sd, low, high, angle)
+
+
+def _refuse_empty(value: Mapping[str, Any], low: float, high: float) -> None:
+    if low >= high:
+        message = f"from {q.shown(value['from'])} is not below to {q.shown(value['to'])}"
+        raise q.invalid(message, "from")
+
+
+def _scale(value: Mapping[str, Any], low: float, high: float) -> Scale:
+    scale = value.get("scale", "linear")
+    OneOf(("linear", "log")).read(scale)
+    if scale == "log" and not (low > 0.0 and high > 0.0):
+        message = 'scale = "log" needs from and to above 0'
+        raise q.invalid(message, "scale")
+    return "log" if scale == "log" else "linear"
+
+
+def _numbers(value: Mapping[str, Any], *names: str) -> tuple[list[float], bool]:
+    """Return the SI numbers of keys that have to be of one kind, and whether they are angles."""
+    ends = [_end(value[name]) for name in names]
+    kinds = {dimension for number, dimension in ends if number != 0.0 or dimension != units.NUMBER}
+    if len(kinds) > 1:
+        *others, last = (f"{name} {q.shown(value[name])}" for name in names)
+        message = f"{', '.join(others)} and {last} are not of one kind"
+        raise q.invalid(message)
+    return [number for number, _ in ends], units.ANGLE in kinds
+
+
+def _end(value: object) -> tuple[float, units.Dimension]:
+    if not isinstance(value, str):
+        return q.Quantity(q.NUMBER).read(value), units.NUMBER
+    try:
+        return q.parse_quantity(value, q.LENGTH)
+    except ValueError as error:
+        message = f"{q.shown(value)}: {error}"
+        raise q.invalid(message) from None
+
+
+_END: dict[str, Any] = {"type": ["number", "string"]}
+_SCALE: dict[str, Any] = {"enum": ["linear", "log"]}
+
+
+def _table_schema(properties: dict[str, Any], *required: str) -> dict[str, Any]:
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": list(required),
+        "additionalProperties": False,
+    }
+
+
+_COUNT: dict[str, Any] = {"type": "integer", "minimum": 2, "maximum": MAX_VALUES}
+VALUES_SCHEMA: dict[str, Any] = {
+    "anyOf": [
+        {"type": "array", "minItems": 1},
+        _table_schema({"from": _END, "to": _END, "count": _COUNT, "scale": _SCALE}, "from", "to"),
+        _table_schema({"mean": _END, "sd": _END, "from": _END, "to": _END}, "mean", "sd"),
+    ]
+}
+"""JSON Schema of everything that may stand at a varied key."""

@@ -1,0 +1,130 @@
+"""Mode "table": the rows of a CSV file, one case a row.
+
+    # overlaps measured with a feeler gauge
+    structures.0.overlap [mm],friction.block_block.kinetic,time.scheme
+    10.1,0.19,explicit
+    9.8,0.21,nonsmooth
+
+The header names keys of the scenario; a unit in brackets holds for its whole column, otherwise a cell is written as
+in a scenario ("10.1 mm"). Lines that begin with `#` are notes.
+"""
+
+import functools
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from blocksim.analysis.cells import NUMBER, Cell, raise_problems, read_open_table
+from blocksim.errors import Problem
+from blocksim.scenario import Document, Sweep
+from blocksim.scenario import quantities as q
+from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, unfit_to_vary
+from blocksim.scenario.overrides import parse_value
+from blocksim.study.sampling.design import Design, Together
+
+LARGEST_FILE = 20_000_000  # bytes
+MOST_TRIED = 50
+"""Different values of a column that are tried by themselves, beside its least and its greatest number."""
+HEAD = re.compile(r"(?P<key>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
+WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: the key that it varies, its head, and cell and value of every row."""
+
+    key: str
+    head: Cell
+    cells: Sequence[Cell]
+    values: Sequence[object]
+
+
+def table(sweep: Sweep) -> Design:
+    """Return one case a row. Raises InputMissingError or InvalidInputError with the lines of all mistakes."""
+    return Together({column.key: column.values for column in read_columns(sweep.table or Path())})
+
+
+def read_columns(path: Path) -> list[Column]:
+    """Read the columns of a table. Raises InputMissingError or InvalidInputError with the lines of all mistakes."""
+    heads, rows = read_open_table(path, LARGEST_FILE)
+    problems = list(rows.problems)
+    if not rows.rows and not problems:
+        problems.append(rows.header.problem("no row follows; every row is one case"))
+    if len(heads) > MAX_VARIED:
+        problems.append(rows.header.problem(f"{len(heads)} columns are too many; at most {MAX_VARIED} can be varied"))
+    columns = [_column(head, [row[head.text] for row in rows.rows], problems) for head in heads]
+    keys = [column.key for column in columns]
+    problems += [c.head.problem("key given twice") for i, c in enumerate(columns) if c.key in keys[:i]]
+    if problems:
+        raise_problems(problems)
+    return columns
+
+
+def _column(head: Cell, cells: Sequence[Cell], problems: list[Problem]) -> Column:
+    found = HEAD.fullmatch(head.text)
+    key, unit = (head.text, None) if found is None else (found["key"], found["unit"])
+    complaint = unfit_to_vary(key) or ("" if unit is None else _unit_complaint(unit))
+    if complaint:
+        problems.append(head.problem(complaint))
+        return Column(key, head, cells, ())
+    values = []
+    for cell in cells:
+        try:
+            values.append(_value(cell, unit))
+        except ValueError as error:
+            problems.append(cell.problem(str(error)))
+    return Column(key, head, cells, values)
+
+
+def _unit_complaint(unit: str) -> str:
+    try:
+        q.parse_quantity(f"1 {unit}", q.LENGTH)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def _value(cell: Cell, unit: str | None) -> object:
+    """Return a cell as a scenario takes it; raises ValueError with a message for the user."""
+    if not cell.text:
+        message = "this cell is empty"
+        raise ValueError(message)
+    if unit is not None:
+        cell.number()
+        return f"{cell.text} {unit}"
+    if WHOLE.fullmatch(cell.text):
+        return int(cell.text)
+    return cell.number() if NUMBER.fullmatch(cell.text) else _word(cell.text)
+
+
+@functools.lru_cache(maxsize=1024)
+def _word(text: str) -> object:
+    return parse_value(text)
+
+
+def refuse_wrong_values(document: Document, columns: Iterable[Column]) -> None:
+    """Try the values of each column by themselves; raises InvalidInputError with the cells of all wrong ones."""
+    problems = [problem for column in columns for problem in _wrong_values(document, column)]
+    if problems:
+        raise_problems(problems)
+
+
+def _wrong_values(document: Document, column: Column) -> Iterator[Problem]:
+    """Yield what is wrong with a column: its key, or its values."""
+    for cell, value in _tried(column):
+        for finding in mistakes_of_value(document.data, document.folder, column.key, value):
+            if finding.at == "key":
+                yield column.head.problem(finding.message)
+                return
+            yield cell.problem(finding.message)
+
+
+def _tried(column: Column) -> Iterator[tuple[Cell, object]]:
+    """Yield different values: the first ones, and the ends of all numbers."""
+    places = {value: index for index, value in reversed(list(enumerate(column.values)))}
+    first = sorted(places.values())[:MOST_TRIED]
+    numbers = [(cell.number(), index) for index, cell in enumerate(column.cells) if NUMBER.fullmatch(cell.text)]
+    ends = [min(numbers)[1], max(numbers)[1]] if numbers else []
+    for index in dict.fromkeys((*first, *ends)):
+        yield column.cells[index], column.values[index]
