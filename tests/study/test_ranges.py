@@ -16,8 +16,8 @@ NAMES = ("1", "2", "3")
 
 
 def final(rng: np.random.Generator) -> dict[str, list[object]]:
-    x = [16.0, 75.0, 132.0] + rng.normal(0.0, 0.4, 3) * [1.0, 6.0, 6.0]
-    rotation = [0.0, -90.0, -90.0] + rng.normal(0.0, 2.0, 3)
+    x = np.array([16.0, 75.0, 132.0]) + rng.normal(0.0, 0.4, 3) * [1.0, 6.0, 6.0]
+    rotation = np.array([0.0, -90.0, -90.0]) + rng.normal(0.0, 2.0, 3)
     return {"block": list(NAMES), "x_mm": x.tolist(), "rotation_deg": rotation.tolist()}
 
 

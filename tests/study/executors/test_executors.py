@@ -12,11 +12,12 @@ from blocksim.study.executors.batches import GROWTH, MOST, BatchSize, take
 from blocksim.study.executors.task import Setting, Task
 from blocksim.study.many import sweep
 from blocksim.study.merge import merge
+from blocksim.study.plan import Values
 from blocksim.study.shard import Shard
 
 KINETIC = "friction.block_block.kinetic"
 # values that finish, fail in the run, fail before it, and do not go together; other shapes and schemes beside them
-VARY = {
+VARY: dict[str, Values] = {
     KINETIC: [0.1, 0.2, 0.9],
     "contact.max_overlap": [1e-2, 1e-12],
     "structures.0.count": [2, 3],
