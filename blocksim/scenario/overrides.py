@@ -3,9 +3,10 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from blocksim.scenario.findings import did_you_mean_or_list
-from blocksim.scenario.keys import MISSING, KeyPath, follow, format_key, parse_key, read_key, skip_blank
+from blocksim.scenario.keys import MISSING, KeyPath, field_at, follow, format_key, parse_key, read_key, skip_blank
 from blocksim.scenario.models.contact import Friction
 from blocksim.scenario.pairs import GROUND
 from blocksim.scenario.quantities import shown
@@ -102,7 +103,8 @@ def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tup
         raise UnfitOverrideError(message) from None
     path: list[str | int] = []
     where = _in_given_order(data, parts)
-    result = _put(_with_own_friction(data, where), where, frozen(value), path)
+    start = _with_list_to_change(_with_own_friction(data, where), where)
+    result = _put(start, where, frozen(value), path)
     assert isinstance(result, Mapping)  # noqa: S101 - data is a mapping, so is its copy
     return result, tuple(path)
 
@@ -123,6 +125,18 @@ def _with_own_friction(data: Data, parts: Sequence[str | int]) -> Data:
     side = "block_ground" if GROUND in parts[1:3] else "block_block"
     general = follow(data, ("friction", side))
     return with_value(data, parts[:4], getattr(_FRICTION, side).static if general is MISSING else general)[0]
+
+
+def _with_list_to_change(data: Data, parts: Sequence[str | int]) -> Data:
+    """Write out the default of a list that is not there, before one of its entries is set (bodies.0.velocity.1)."""
+    path: KeyPath = ()
+    for part, following in pairwise(parts):
+        path = (*path, int(part) if isinstance(follow(data, path), tuple) and str(part).isdecimal() else part)
+        if str(following).isdecimal() and follow(data, path) is MISSING:
+            field = field_at(path, data)
+            default = () if field is None or not isinstance(field.default, tuple) else field.default
+            return with_value(data, path, default)[0] if default else data
+    return data
 
 
 def _put(node: object, parts: Sequence[str | int], value: object, done: list[str | int]) -> object:
