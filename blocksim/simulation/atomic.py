@@ -4,28 +4,42 @@ import contextlib
 import hashlib
 import os
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from blocksim.errors import OutputError
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file through a temporary one beside it; raises OutputError and leaves nothing behind when that fails."""
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[BinaryIO]:
+    """Give a temporary file beside `path` that takes its place at the end; what is read there is never half a file.
+
+    Raises OutputError, and leaves nothing behind when anything fails.
+    """
     temporary: str | None = None
     try:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
         with os.fdopen(handle, "wb") as file:
-            file.write(content)
+            yield file
             file.flush()
             os.fsync(file.fileno())
         Path(temporary).chmod(0o644)
         Path(temporary).replace(path)
-    except OSError as error:
+    except BaseException as error:
         if temporary is not None:
             with contextlib.suppress(OSError):
                 Path(temporary).unlink()
+        if not isinstance(error, OSError):
+            raise
         message = f"{path}: cannot be written: {error.strerror}"
         raise OutputError(message) from error
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file through a temporary one beside it; raises OutputError and leaves nothing behind when that fails."""
+    with writing(path) as file:
+        file.write(content)
 
 
 def write_text(path: Path, text: str) -> None:
