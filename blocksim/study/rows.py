@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 
 from blocksim.errors import BlocksimError
-from blocksim.simulation.ensemble import MemberEnd
-from blocksim.simulation.table import Columns, final_columns
+from blocksim.simulation import MemberEnd, MemberFailure
+from blocksim.simulation.table import Columns
 
 Row = dict[str, object]
 X = ".x_mm"
@@ -23,10 +23,11 @@ def row_of(status: str, reason: str, seconds: float, final: Columns) -> Row:
     return row
 
 
-def row_of_end(end: MemberEnd) -> Row:
+def row_of_member(member: MemberEnd | MemberFailure) -> Row:
     """Return the row of a member of an ensemble."""
-    frames = end.frames
-    return row_of(end.outcome.status, end.outcome.reason, float(frames.time[-1]), final_columns(frames))
+    if isinstance(member, MemberFailure):
+        return row_of_error(member.error)
+    return row_of(member.outcome.status, member.outcome.reason, member.seconds, member.columns)
 
 
 def row_of_error(error: Exception) -> Row:
