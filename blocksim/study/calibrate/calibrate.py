@@ -112,14 +112,19 @@ def _score(plan: Plan, members: Iterable[Values]) -> Score:
 
 def _provenance(plan: Plan, score: Score, trials: int) -> dict[str, str]:
     """Say of every fitted value where it comes from."""
-    low, high = score.interval
-    found = (
-        f"seed {plan.seed}, {trials} trials of {plan.members} members, P(all inside) {score.share_inside:.3f} "
-        f"[{low:.3f}, {high:.3f}] of {score.members} fresh members, {Path(plan.table.source).name}"
-    )
-    scatter = plan.scatter.described()
-    about = f", under scatter of {', '.join(f'{key} {words}' for key, words in scatter.items())}" if scatter else ""
-    return {prior.key: f"calibrated, prior {prior}, {found}{about}" for prior in plan.priors}
+    table = Path(plan.table.source).name
+    if plan.scatter.plan is None:
+        inside = "inside" if score.inside else "not inside"
+        found = f"seed {plan.seed}, {trials} trials of one run, {inside} all ranges of {table}"
+    else:
+        low, high = score.interval
+        scatter = ", ".join(f"{key} {words}" for key, words in plan.scatter.described().items())
+        found = (
+            f"seed {plan.seed}, {trials} trials of {plan.members} members, P(inside all ranges) "
+            f"{score.share_inside:.3f} [{low:.3f}, {high:.3f}] of {score.members} fresh members, {table}, "
+            f"scatter (SI): {scatter}"
+        )
+    return {prior.key: f"calibrated, prior {prior}, {found}" for prior in plan.priors}
 
 
 def _head(plan: Plan, best: Trial) -> str:

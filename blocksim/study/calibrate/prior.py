@@ -2,7 +2,7 @@
 
 import re
 from dataclasses import dataclass
-from math import exp, floor, log, log10
+from math import ceil, exp, log, log10
 
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.variation import Uniform
@@ -33,7 +33,7 @@ class Prior:
         """Return a number as a scenario takes it, rounded to what matters and never outside the bounds."""
         width = self.high - self.low
         finest = min(width, abs(number)) if self.log and number else width
-        digits = floor(log10(STEPS / finest)) + 1
+        digits = ceil(log10(STEPS / finest))
         within = min(max(round(number, digits), self.low), self.high)
         return f"{within:.12g} {self.unit}" if self.unit else within
 

@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from blocksim.errors import OutputError, OutputExistsError
+from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.study.calibrate.objective import Score
 from blocksim.study.calibrate.prior import Prior
 from blocksim.study.extras import loaded
@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 PURPOSE = "calibrate"
 FIRST = 16  # trials before the estimator: a power of two, as a Sobol sequence wants it
+STUDY = "calibrate"
 PLAN = "plan"
+BEGINNING = b'{"op_code":0,'  # of a journal of optuna: a study is created
 VALUES = "values"
 SCORE = "score"
 Evaluate = Callable[[Mapping[str, object]], Score]
@@ -100,25 +102,34 @@ def finished_trials(study: "Study") -> list[Trial]:
 def opened(journal: Path, plan: Mapping[str, object]) -> "Iterator[Study]":
     """Give the study of a journal, a new one where there is none, that nobody else writes to meanwhile.
 
-    Raises OutputExistsError where the journal is of another plan or in use, OutputError where it cannot be written.
+    Raises OutputExistsError where the journal is of another plan or in use, InvalidInputError where the file is none,
+    OutputError where it cannot be written.
     """
-    optuna = loaded("optuna", PURPOSE)
-    optuna.logging.set_verbosity(logging.ERROR)
-    backends = loaded("optuna.storages.journal", PURPOSE)
+    loaded("optuna", PURPOSE).logging.set_verbosity(logging.ERROR)
     try:
         with journal.open("ab") as file:
             _take(file, journal)
             _drop_torn_line(journal)
-            backend = backends.JournalFileBackend(str(journal), lock_obj=_AlreadyLocked())
-            storage = optuna.storages.JournalStorage(backend)
-            study = optuna.create_study(
-                storage=storage, study_name="calibrate", direction="maximize", load_if_exists=True
-            )
+            study = _study_in(journal)
             _refuse_other_plan(study, plan, journal)
             yield study
     except OSError as error:
         message = f"{journal}: cannot be written: {error.strerror}"
         raise OutputError(message) from error
+
+
+def _study_in(journal: Path) -> "Study":
+    """Return the study in a journal, or a new one."""
+    optuna = loaded("optuna", PURPOSE)
+    backend = loaded("optuna.storages.journal", PURPOSE).JournalFileBackend(str(journal), lock_obj=_AlreadyLocked())
+    try:
+        storage = optuna.storages.JournalStorage(backend)
+        if STUDY in optuna.get_all_study_names(storage):
+            return cast("Study", optuna.load_study(study_name=STUDY, storage=storage))
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        message = f"{journal}: not the journal of a calibration: {error}"
+        raise InvalidInputError(message) from None
+    return cast("Study", optuna.create_study(study_name=STUDY, storage=storage, direction="maximize"))
 
 
 class _AlreadyLocked:
@@ -145,8 +156,11 @@ def _take(file: Any, journal: Path) -> None:
 
 
 def _drop_torn_line(journal: Path) -> None:
-    """Cut off a last line that has no end: what was written when the power failed."""
+    """Cut off a last line that has no end: what was written when the power failed. Leaves other files alone."""
     content = journal.read_bytes()
+    if content and not content.startswith(BEGINNING[: len(content)]):
+        message = f"{journal}: not the journal of a calibration; choose another file with --out"
+        raise InvalidInputError(message)
     whole = content.rfind(b"\n") + 1
     if whole < len(content):
         with journal.open("r+b") as file:

@@ -40,14 +40,20 @@ def with_fitted(
     changed = changed.with_values({format_key(("provenance", key)): text for key, text in provenance.items()})
     scenario = changed.build()
     moved = _moved(changed, folder)
-    paths = dict.fromkeys([*(override.path for override in changed.overrides), *TABLES])
-    fitted = {override.path for override in changed.overrides[len(document.overrides) :]}
-    text = document.source.text
-    for path in paths:
-        if follow(moved.data, path) != follow(Document.parse(text).data if text else {}, path):
-            text = _edited(text, path, moved, is_fitted=path in fitted and path[0] != "provenance")
-    text = f"# {head}\n{text}"
-    return text if _says(text, scenario, folder) else f"# {head}\n{_resolved(scenario, moved)}"
+    with suppress(BlocksimError):  # no scenario any more, half-way through
+        text = f"# {head}\n{_with_values(document.source.text, moved, len(document.overrides))}"
+        if _says(text, scenario, folder):
+            return text
+    return f"# {head}\n{_resolved(scenario, moved)}"
+
+
+def _with_values(text: str, wanted: Document, settings: int) -> str:
+    """Return the text with all values that were set over it; the first so many are settings, the others are fitted."""
+    fitted = {override.path for override in wanted.overrides[settings:] if override.path[0] != "provenance"}
+    for path in dict.fromkeys([*(override.path for override in wanted.overrides), *TABLES]):
+        if follow(wanted.data, path) != follow(Document.parse(text).data if text else {}, path):
+            text = _edited(text, path, wanted, is_fitted=path in fitted)
+    return text
 
 
 def _moved(document: Document, folder: Path) -> Document:
@@ -70,7 +76,7 @@ def _edited(text: str, path: KeyPath, wanted: Document, *, is_fitted: bool) -> s
         return _appended(text, path, wanted)
     place = places[known]
     if not _is_header(lines, place):
-        note = f"{path[-1]} {NOTE}" if is_fitted else ""
+        note = (NOTE if known == path else f"{path[-1]} {NOTE}") if is_fitted else ""
         return _replaced(lines, place.value, toml_value(follow(wanted.data, known)), note)
     line = f"{format_key(path[len(known) :])} = {toml_value(follow(wanted.data, path))}"
     return "\n".join([*lines[: place.key.line], line, *lines[place.key.line :]])
@@ -87,7 +93,8 @@ def _replaced(lines: list[str], span: Span, value: str, note: str) -> str:
     comment = _COMMENT.fullmatch(rest)
     if note and comment is not None:
         before = f"; before: {comment[3]}" if comment[3] else ""
-        rest = f"{comment[1]}{comment[2] or GAP}# {note}{before}"
+        gap = " " * max(len(GAP), span.length + len(comment[2]) - len(value))  # the comment stays in its column
+        rest = f"{comment[1]}{gap}# {note}{before}"
     return "\n".join([*lines[: span.line - 1], line[: span.column] + value + rest, *lines[span.line :]])
 
 
@@ -112,7 +119,7 @@ def _says(text: str, scenario: Scenario, folder: Path) -> bool:
     """Tell whether a text, read in a folder, gives exactly this scenario."""
     with suppress(BlocksimError):
         found = Document.parse(text, folder=folder).build()
-        beside = [one.model_dump(mode="json", exclude={"motion"}) for one in (found, scenario)]
+        beside = [one.model_copy(update={"motion": None}) for one in (found, scenario)]  # the hash has its content
         return scenario_hash(found) == scenario_hash(scenario) and beside[0] == beside[1]
     return False
 
