@@ -57,7 +57,7 @@ def calibrate(  # noqa: PLR0913 - one argument for each option of the command
     UnavailableError without the extra `study`, and StoppedEarlyError on Ctrl-C.
     """
     path = out or files.RESULTS / plan.base.name / f"calibrate-{plan.name()}" / WRITTEN
-    journal = path.with_name(path.stem + JOURNAL)
+    journal = path.parent / (path.stem + JOURNAL)
     prepare(path, journal, resume=resume, overwrite=overwrite)
     best = _searched(plan, journal, trials, on_trial)
     fresh = plan.scatter.fresh_members(best.values, fresh_members if plan.scatter.plan else 1, plan.seed)

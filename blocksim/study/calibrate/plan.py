@@ -79,6 +79,7 @@ def read_plan(
     if not fit.tables:
         raise InvalidInputError(NO_FIT)
     if experiment is not None:
+        load_table(experiment)  # so that its mistakes are told of the option
         document = document.with_values({"experiment.table": str(experiment.absolute())})
     fits = varied(document, fit, FIT, MODE)
     scattered = _scattered(document, scatter)
