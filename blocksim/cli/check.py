@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 
 from blocksim.cli import options
-from blocksim.cli.output import GAP, answer, note, number, print_json, table_lines, width_of_screen
+from blocksim.cli.output import GAP, answer, duration, note, number, print_json, table_lines, width_of_screen
 from blocksim.cli.scenario import read_scenario
 from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
@@ -21,7 +21,6 @@ LEAST_ROOM = 24
 HARD_SPACE = "\N{NO-BREAK SPACE}"
 MILLI = 1e3
 MICRO = 1e6
-LONG_TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))  # s
 
 
 def check_command(
@@ -140,7 +139,7 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
         f"neighbours are listed up to {MILLI * description.skin:.3g} mm apart",
         f"time step  {description.step:.3e} s, at most {description.steps} steps",
         *_sag(description.rigid),
-        f"solving    at most about {_duration(description.seconds)} on one core",
+        f"solving    at most about {duration(description.seconds)} on one core",
         f"memory     at most about {readable(description.memory)}",
         f"results    at most {description.frames} frames, about {readable(description.bytes)}",
     ]
@@ -168,12 +167,6 @@ def _motion(motion: MotionDescription | None) -> list[str]:
         return []
     greatest = f"at most {number(MILLI * motion.displacement)} mm and {number(MILLI * motion.speed)} mm/s"
     return [f"supports   move {greatest}, {number(MILLI * motion.final_speed)} mm/s at the end"]
-
-
-def _duration(seconds: float) -> str:
-    """Return a time in the largest unit of which there are two."""
-    worth, unit = next((entry for entry in LONG_TIMES if seconds >= 2.0 * entry[0]), (1.0, "s"))
-    return f"{seconds / worth:.1f} {unit}"
 
 
 def _use_of_particles(contact: Contact) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 NARROW = 80
 GAP = "  "
 SHORTEST = 8
+LONG_TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))  # s
 
 
 def note(text: str) -> None:
@@ -73,3 +74,9 @@ def number(value: float, digits: int = 2) -> str:
         return "–"
     text = f"{value:.{digits}f}"
     return text[1:] if text.startswith("-") and not text.strip("-0.") else text
+
+
+def duration(seconds: float) -> str:
+    """Return a time in the largest unit of which there are two."""
+    worth, unit = next((entry for entry in LONG_TIMES if seconds >= 2.0 * entry[0]), (1.0, "s"))
+    return f"{seconds / worth:.1f} {unit}"

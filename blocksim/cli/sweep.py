@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from blocksim.cli import options
+from blocksim.cli.dry_run import show_estimate
 from blocksim.cli.output import GAP, answer, note, print_json, table_lines, width_of_screen
 from blocksim.cli.progress import tell_compilation
 from blocksim.cli.vary import with_vary
@@ -52,6 +53,9 @@ def sweep_command(
     jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes (default: one a core).")] = None,
     out: options.SweepFolder = None,
     overwrite: options.Overwrite = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Tell count, cost and size; run and write nothing.")
+    ] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -69,6 +73,9 @@ def sweep_command(
         samples=samples,
         seed=seed,
     )
+    if dry_run:
+        show_estimate(document, jobs, as_json=as_json)
+        return
     short = short_keys(document)
     for kernels in kernels_for(document):
         tell_compilation(kernels, quiet=silent)

@@ -11,7 +11,7 @@ from blocksim.scenario import keys
 from blocksim.scenario.findings import MAX_FINDINGS, Finding, findings_of
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.study import OWN_KEYS, Mode, Sweep
-from blocksim.scenario.overrides import Data, UnfitOverrideError, with_value
+from blocksim.scenario.overrides import TWINS, Data, UnfitOverrideError, with_value
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.references import wrong_names
 from blocksim.scenario.rigid import unfit_choices
@@ -67,6 +67,17 @@ def _sweep(data: Data, folder: Path) -> Iterator[Finding]:
     for key, values in sweep.items():
         if key not in OWN_KEYS and _is_variation({**mode, key: values}):
             yield from islice(_varied(Trial(bare, folder, before), str(key), values), 1)
+    yield from _varied_twice(sweep)
+
+
+def _varied_twice(sweep: Data) -> Iterator[Finding]:
+    """Find keys beside which the other way to write the same thing is varied too."""
+    for key in sweep:
+        table, dot, word = str(key).rpartition(".")
+        twin = f"{table}{dot}{TWINS.get(word, word)}"
+        if word == "kinetic_ratio" and twin in sweep:
+            message = f"{twin} is varied too, and says the same thing; keep one of the two"
+            yield Finding(("sweep", key), message, at="key")
 
 
 def _is_variation(sweep: Mapping[str, object]) -> bool:

@@ -1,5 +1,6 @@
 """Dotted keys: reading and writing them, following them into data and into the models."""
 
+import functools
 import re
 import tomllib
 import types
@@ -60,6 +61,7 @@ def skip_blank(text: str, start: int) -> int:
     return start if found is None else found.end()
 
 
+@functools.lru_cache(maxsize=1024)
 def parse_key(text: str) -> tuple[str, ...]:
     """Read a whole text as one dotted key; raises ValueError."""
     parts, end = read_key(text)
@@ -122,6 +124,7 @@ def keys_of(table: type[Table]) -> tuple[str, ...]:
     return tuple(str(key) for key in _fields(table))
 
 
+@functools.cache
 def _fields(table: type[Table]) -> dict[str | int, FieldInfo]:
     return {info.alias or name: info for name, info in table.model_fields.items()}
 

@@ -16,6 +16,8 @@ Pairs = tuple[Integers, Integers]
 
 MOST_AT_ONCE = 1_000_000
 """Pairs that are looked at together; more only takes more memory."""
+FEW = 32
+"""Of so few boxes all pairs are looked at; sorting them into cells would take longer."""
 ROOM = 1.01
 
 
@@ -112,6 +114,11 @@ def near_pairs(rectangles: Rectangles) -> Iterator[Pairs]:
     reach_x, reach_y = rectangles.reach(1.0, 0.0), rectangles.reach(0.0, 1.0)
     x, y = rectangles.x, rectangles.y
     boxes = _Boxes(x - reach_x, y - reach_y, x + reach_x, y + reach_y)
+    if x.size <= FEW:
+        one, other = np.triu_indices(x.size, 1)
+        near = _meet(boxes, one, other)
+        yield one[near], other[near]
+        return
     level = np.frexp(np.maximum(reach_x, reach_y))[1]
     for size in np.unique(level):
         members = np.flatnonzero(level <= size)
@@ -142,10 +149,15 @@ def _in_cells(boxes: _Boxes, is_small: NDArray[np.bool_], cell: tuple[float, flo
         i, j = box[one], box[other]
         # a pair may meet in several cells; it counts in that of the lower left corner of what it has in common
         is_first = (np.maximum(low[0][i], low[0][j]) == column[one]) & (np.maximum(low[1][i], low[1][j]) == row[one])
-        along = (boxes.low_x[i] <= boxes.high_x[j]) & (boxes.low_x[j] <= boxes.high_x[i])
-        across = (boxes.low_y[i] <= boxes.high_y[j]) & (boxes.low_y[j] <= boxes.high_y[i])
-        near = is_first & along & across
+        near = is_first & _meet(boxes, i, j)
         yield i[near], j[near]
+
+
+def _meet(boxes: _Boxes, i: Integers, j: Integers) -> NDArray[np.bool_]:
+    """Tell of each two boxes whether they touch or overlap."""
+    along = (boxes.low_x[i] <= boxes.high_x[j]) & (boxes.low_x[j] <= boxes.high_x[i])
+    across = (boxes.low_y[i] <= boxes.high_y[j]) & (boxes.low_y[j] <= boxes.high_y[i])
+    return along & across
 
 
 def _entries(low: tuple[Floats, Floats], high: tuple[Floats, Floats]) -> tuple[Integers, Floats, Floats]:

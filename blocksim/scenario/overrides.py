@@ -3,9 +3,10 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from blocksim.scenario.findings import did_you_mean_or_list
-from blocksim.scenario.keys import MISSING, KeyPath, follow, format_key, parse_key, read_key, skip_blank
+from blocksim.scenario.keys import MISSING, KeyPath, field_at, follow, format_key, parse_key, read_key, skip_blank
 from blocksim.scenario.models.contact import Friction
 from blocksim.scenario.pairs import GROUND
 from blocksim.scenario.quantities import shown
@@ -13,6 +14,8 @@ from blocksim.scenario.quantities import shown
 Data = Mapping[str, object]
 
 MAX_DEPTH = 16
+TWINS = {"kinetic": "kinetic_ratio", "kinetic_ratio": "kinetic"}
+"""Two keys that say the same thing; setting one takes the other away."""
 _NAMED = (("materials",), ("blocks",))
 _FRICTION = Friction()
 
@@ -89,9 +92,9 @@ def parse_value(text: str) -> object:
 def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tuple[Data, KeyPath]:
     """Return data with one value set, and the path that was set; raises UnfitOverrideError.
 
-    Tables on the way are made where they are missing. A bare friction c becomes { static = c }, whose kinetic
-    part follows the static one until it is set; the friction of a pair of materials starts as that of all pairs; a bare
-    restitution becomes a table of both.
+    Tables on the way are made where they are missing. A bare friction c becomes { static = c }, whose kinetic part
+    follows the static one until it is set, by itself or by its ratio, of which the later one holds; the friction of a
+    pair of materials starts as that of all pairs; a bare restitution becomes a table of both.
     """
     try:
         parts = parse_key(key) if isinstance(key, str) else tuple(key)
@@ -100,7 +103,8 @@ def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tup
         raise UnfitOverrideError(message) from None
     path: list[str | int] = []
     where = _in_given_order(data, parts)
-    result = _put(_with_own_friction(data, where), where, frozen(value), path)
+    start = _with_list_to_change(_with_own_friction(data, where), where)
+    result = _put(start, where, frozen(value), path)
     assert isinstance(result, Mapping)  # noqa: S101 - data is a mapping, so is its copy
     return result, tuple(path)
 
@@ -123,6 +127,18 @@ def _with_own_friction(data: Data, parts: Sequence[str | int]) -> Data:
     return with_value(data, parts[:4], getattr(_FRICTION, side).static if general is MISSING else general)[0]
 
 
+def _with_list_to_change(data: Data, parts: Sequence[str | int]) -> Data:
+    """Write out the default of a list that is not there, before one of its entries is set (bodies.0.velocity.1)."""
+    path: KeyPath = ()
+    for part, following in pairwise(parts):
+        path = (*path, int(part) if isinstance(follow(data, path), tuple) and str(part).isdecimal() else part)
+        if str(following).isdecimal() and follow(data, path) is MISSING:
+            field = field_at(path, data)
+            default = () if field is None or not isinstance(field.default, tuple) else field.default
+            return with_value(data, path, default)[0] if default else data
+    return data
+
+
 def _put(node: object, parts: Sequence[str | int], value: object, done: list[str | int]) -> object:
     """Copy `node` with the value at `parts` below it; `done` collects the path that was taken."""
     if not parts:
@@ -142,9 +158,15 @@ def _put(node: object, parts: Sequence[str | int], value: object, done: list[str
         raise UnfitOverrideError(message)
     done.append(part)
     return {
-        **node,
+        **_without_twin(node, part),
         part: _put(_opened(tuple(done), child) if len(parts) > 1 else child, parts[1:], value, done),
     }
+
+
+def _without_twin(node: Data, part: str) -> Data:
+    """Leave out the other way to write what is going to be set."""
+    twin = TWINS.get(part)
+    return {key: entry for key, entry in node.items() if key != twin} if twin in node else node
 
 
 def _index(entries: Sequence[object], part: str | int, done: Sequence[str | int]) -> int:

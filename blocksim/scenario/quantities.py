@@ -4,6 +4,7 @@ Every quantity type accepts a number, taken as SI, or a string with a unit ("32 
 dimension and its allowed range. An angle needs its unit unless it is zero.
 """
 
+import functools
 import math
 import re
 from dataclasses import dataclass
@@ -181,6 +182,7 @@ class Quantity:
         return {"anyOf": [number, _text_schema(self.kind.example)]}
 
 
+@functools.lru_cache(maxsize=1024)
 def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
     """Read "number unit" into an SI float and its dimension; raises ValueError whose text says what is wrong.
 
@@ -261,6 +263,7 @@ Number = Annotated[float, Quantity(NUMBER)]
 PositiveNumber = Annotated[float, Quantity(NUMBER, above=0.0)]
 NonNegativeNumber = Annotated[float, Quantity(NUMBER, at_least=0.0)]
 Share = Annotated[float, Quantity(NUMBER, at_least=0.0, at_most=1.0)]
+Ratio = Annotated[float, Quantity(NUMBER, above=0.0, at_most=1.0)]
 Safety = Annotated[float, Quantity(NUMBER, above=0.0, at_most=0.1)]
 PoissonRatio = Annotated[float, Quantity(NUMBER, above=-1.0, below=0.5)]
 Friction = Annotated[float, FrictionCoefficient()]

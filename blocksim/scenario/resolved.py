@@ -1,5 +1,6 @@
 """A scenario written out again, complete and exact, and its fingerprint."""
 
+import functools
 import hashlib
 import json
 from collections.abc import Mapping
@@ -10,6 +11,7 @@ import tomli_w
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from blocksim.scenario.models.contact import Friction, PairFriction
 from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Time
@@ -30,6 +32,8 @@ def scenario_to_toml(scenario: Scenario, experiment_table: str | None = None, mo
     resolved file.
     """
     data = _plain(scenario)
+    if scenario.sweep is not None:
+        _leave_to_static(scenario, data)
     if scenario.sweep is not None and SCHEME in scenario.sweep.vary:
         data["time"] = {key: value for key, value in data["time"].items() if key in Time.model_fields}
     if experiment_table is not None and "experiment" in data:
@@ -37,6 +41,19 @@ def scenario_to_toml(scenario: Scenario, experiment_table: str | None = None, mo
     if motion_table is not None and isinstance(scenario.motion, FromTable):
         data["motion"]["table"] = motion_table
     return HEADER + tomli_w.dumps(data)
+
+
+def _leave_to_static(scenario: Scenario, data: dict[str, Any]) -> None:
+    """Leave out kinetic frictions that nobody has set: a sweep may vary the static one, which they follow."""
+    sides = ((getattr(scenario.friction, side), ("friction", side)) for side in Friction.model_fields)
+    pairs = (
+        (pair.friction, ("pairs", one, other, "friction"))
+        for one, others in scenario.pairs.items()
+        for other, pair in others.items()
+    )
+    for friction, path in (*sides, *pairs):
+        if friction is not None and "kinetic" not in friction.model_fields_set:
+            functools.reduce(dict.__getitem__, path, data).pop("kinetic", None)
 
 
 def scenario_hash(scenario: Scenario) -> str:
@@ -59,6 +76,8 @@ def _plain(table: BaseModel) -> dict[str, Any]:
         return {key: _value(entry) for key, entry in table.as_table().items()}
     fields = type(table).model_fields
     entries = {info.alias or name: _field(info, getattr(table, name)) for name, info in fields.items()}
+    if isinstance(table, PairFriction) and table.kinetic_ratio is not None:
+        entries["kinetic"] = None
     return {key: entry for key, entry in entries.items() if entry is not None}
 
 

@@ -9,8 +9,9 @@ from blocksim.errors import BlocksimError, InvalidInputError, ScenarioError
 from blocksim.scenario import Document, Scenario, Sweep
 from blocksim.scenario.check import mistakes_of_value
 from blocksim.scenario.findings import Finding
+from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.models.variation import Normal, written
-from blocksim.scenario.overrides import Override, frozen
+from blocksim.scenario.overrides import Override, frozen, with_value
 from blocksim.scenario.quantities import shown
 from blocksim.simulation.provenance import run_hash
 from blocksim.study.sampling.design import Design, Settings
@@ -115,14 +116,24 @@ def cases_of(document: Document, sweep: Sweep) -> Cases:
         message = f"{len(design)} cases are too many for one sweep; at most {MOST_CASES} are possible"
         raise InvalidInputError(message)
     _refuse_wrong_draws(document, sweep, design)
-    bare = {key: entry for key, entry in document.data.items() if key != "sweep"}
-    cases = Cases(replace(document, data=bare), design)
+    cases = Cases(_for_cases(document), design)
     looked_at = min(len(cases), MOST_LOOKED_AT)
     if all(case.scenario is None for case in islice(cases, looked_at)):
         which = f"none of the {len(cases)} cases" if looked_at == len(cases) else f"none of the first {looked_at} cases"
         message = f"{which} can be simulated; the first: {cases[0].problem}"
         raise InvalidInputError(message)
     return cases
+
+
+def _for_cases(document: Document) -> Document:
+    """Return the document that cases are made from: no sweep, and tables found, or read, once for all of them."""
+    scenario = document.build()
+    data: Mapping[str, object] = {key: entry for key, entry in document.data.items() if key != "sweep"}
+    if scenario.experiment is not None:
+        data = {**data, "experiment": {"table": scenario.experiment.table}}
+    if isinstance(scenario.motion, FromTable):
+        data, _ = with_value(data, ("motion", "table"), scenario.motion.table)
+    return replace(document, data=data)
 
 
 def _refuse_wrong_draws(document: Document, sweep: Sweep, design: Design) -> None:

@@ -133,3 +133,45 @@ def test_key_given_twice_is_told(blocksim: Command) -> None:
     answer = blocksim(*SHORT, "--vary", "gravity=1,2", "--vary", "gravity=3,4")
     assert answer.code == 65
     assert answer.err == "--vary gravity: given twice; list all its values once\n"
+
+
+SAMPLED = ("--vary", f"{KINETIC}=0.1:0.3", "--vary", "structures.0.overlap=10 mm+-0.1 mm", "--mode", "lhs")
+
+
+def test_samples_from_the_command_line(blocksim: Command) -> None:
+    answer = blocksim(*SHORT, *SAMPLED, "--samples", 2, "--seed", 3)
+    assert answer.code == 0
+    kinetic = sorted(float(row[KINETIC]) for row in rows())
+    assert 0.1 < kinetic[0] < 0.2 < kinetic[1] < 0.3
+    assert all(0.0095 < float(row["structures.0.overlap"]) < 0.0105 for row in rows())
+    first = Path("out/sweep.csv").read_text()
+    blocksim(*SHORT[:-1], "again", *SAMPLED, "--samples", 2, "--seed", 3)
+    assert [row.split(",")[:3] for row in Path("again/sweep.csv").read_text().splitlines()] == [
+        row.split(",")[:3] for row in first.splitlines()
+    ]
+
+
+def test_mistakes_in_sampling_options_are_told_together(blocksim: Command) -> None:
+    answer = blocksim(*SHORT, *SAMPLED, "--vary", "time.end=1 s+-1 mm", "--samples", 0, "--seed", -1)
+    assert (answer.code, answer.out) == (65, "")
+    assert "--samples: 0 is not a whole number from 1 to 1000000" in answer.err
+    assert "--seed: -1 is not a whole number" in answer.err
+    assert '--vary time.end=1 s+-1 mm: mean "1 s" and sd "1 mm" are not of one kind' in answer.err
+
+
+def test_a_range_without_a_count_needs_a_sampled_mode(blocksim: Command) -> None:
+    answer = blocksim(*SHORT, "--vary", f"{KINETIC}=0.1:0.3")
+    assert answer.code == 65
+    assert "a distribution needs one of the modes lhs, sobol and normal" in answer.err
+
+
+def test_a_table_of_cases(blocksim: Command) -> None:
+    Path("cases.csv").write_text("structures.0.overlap [mm],time.scheme\n9,explicit\n10,nonsmooth\n")
+    short = Path("scenarios/three_blocks_nominal.toml").read_text().partition("[experiment]")[0]
+    Path("mine.toml").write_text(short + '\n[sweep]\nmode = "table"\ntable = "cases.csv"\n')
+    answer = blocksim("sweep", "mine.toml", *SHORT[2:])
+    assert answer.code == 0
+    assert [(row["structures.0.overlap"], row["time.scheme"]) for row in rows()] == [
+        ("9 mm", "explicit"),
+        ("10 mm", "nonsmooth"),
+    ]

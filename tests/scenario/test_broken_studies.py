@@ -178,6 +178,64 @@ bad.toml:21: sweep.mode: mode "list" takes one value of every key at a time, but
       |        ^^^^^^
 """,
     ),
+    "misspelt key of the sweep itself": (
+        None,
+        '\n[sweep]\nmode = "lhs"\nsmaples = 10\n"time.end" = { from = 1, to = 2 }\n',
+        """
+bad.toml:22: sweep.smaples: unknown key, did you mean 'samples'?
+   22 | smaples = 10
+      | ^^^^^^^
+""",
+    ),
+    "sampled sweep with everything wrong": (
+        None,
+        """
+[sweep]
+mode = "normal"
+samples = 0
+"time.end" = { mean = 1, sd = 0 }
+"ground.tilt" = { mean = "1 deg", sd = "1 mm" }
+"contact.restitution" = { from = 0.1, to = 1.1 }
+""",
+        """
+bad.toml:22: sweep.samples: 0 is not a whole number from 1 to 1000000
+   22 | samples = 0
+      |           ^
+bad.toml:23: sweep."time.end".sd: the standard deviation 0 is not above 0
+   23 | "time.end" = { mean = 1, sd = 0 }
+      |                               ^
+bad.toml:24: sweep."ground.tilt": mean "1 deg" and sd "1 mm" are not of one kind
+   24 | "ground.tilt" = { mean = "1 deg", sd = "1 mm" }
+      |                 ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+bad.toml:25: sweep."contact.restitution".to: 1.1 is too large; a plain number of at least 0 and at most 1 is needed
+   25 | "contact.restitution" = { from = 0.1, to = 1.1 }
+      |                                            ^^^
+""",
+    ),
+    "table mode without a table": (
+        None,
+        '\n[sweep]\nmode = "table"\n',
+        """
+bad.toml:21: sweep.mode: mode "table" needs the path of a table, as in table = "samples.csv"
+   21 | mode = "table"
+      |        ^^^^^^^
+""",
+    ),
+    "table and keys": (
+        None,
+        '\n[sweep]\nmode = "table"\ntable = "none.csv"\nseed = 3\n"time.end" = [1, 2]\n',
+        """
+bad.toml:22: sweep.table: "none.csv": no such file (paths are relative to the scenario file)
+   22 | table = "none.csv"
+      |         ^^^^^^^^^^
+bad.toml:23: sweep.seed: mode "table" has no seed; it belongs to "lhs", "sobol", "normal"
+   23 | seed = 3
+      | ^^^^
+bad.toml:24: sweep."time.end": mode "table" takes keys and values from its table
+   24 | "time.end" = [1, 2]
+      | ^^^^^^^^^^
+""",
+    ),
     "provenance of nothing": (
         None,
         '\n[provenance]\n"friction.blok" = "measured"\n',

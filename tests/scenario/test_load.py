@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from blocksim.errors import ScenarioError
 from blocksim.scenario import Document, Scenario, load_scenario, scenario_from_mapping
 from blocksim.scenario.models.stepping import Explicit
 
@@ -101,6 +102,13 @@ def test_an_element_of_a_list_is_set_by_its_number(file: Path) -> None:
     assert [structure.size for structure in scenario.structures] == [7]
 
 
+def test_an_element_of_a_list_that_is_not_given_starts_from_the_default(file: Path) -> None:
+    structure = load_scenario(file, {"structures.0.velocity.1": "2 m/s"}).structures[0]
+    assert structure.velocity == (0.0, 2.0)
+    with pytest.raises(ScenarioError, match=r"structures\.0\.velocity is a list of 2, numbered from 0"):
+        load_scenario(file, {"structures.0.velocity.2": 1.0})
+
+
 def test_a_quoted_key_is_set(file: Path) -> None:
     assert load_scenario(file, ['provenance."time.end"=assumed']).provenance == {"time.end": "assumed"}
 
@@ -158,8 +166,10 @@ def test_sweep_values_are_spread_evenly_with_both_ends(file: Path) -> None:
     ).sweep
     assert sweep is not None
     assert sweep.mode == "grid"
-    assert sweep.vary["structures.0.offset"] == pytest.approx((0.001, 0.002, 0.003, 0.004), abs=1e-18)
-    assert sweep.vary["structures.0.offset"][-1] == 0.004
+    offsets = sweep.vary["structures.0.offset"]
+    assert isinstance(offsets, tuple)
+    assert offsets == pytest.approx((0.001, 0.002, 0.003, 0.004), abs=1e-18)
+    assert offsets[-1] == 0.004
     assert sweep.vary["ground.tilt"] == ("0.0 rad", "0.25 rad", "0.5 rad")
     assert sweep.vary["contact.stiffness_scale"] == (0.1, 1)
     assert sweep.vary["time.step"] == ("auto", "1 us")

@@ -33,12 +33,15 @@ class PairFriction(Table):
     """Coulomb friction of one material pair, falling from static to kinetic with the sliding speed.
 
     mu(v) = kinetic + (static - kinetic) exp(-|v| / transition_speed). A bare number or friction angle in the
-    file means static = kinetic.
+    file means static = kinetic. With kinetic_ratio, kinetic follows the static one where that is varied.
     """
 
     static: q.Friction = Field(description="friction coefficient at rest")
+    kinetic_ratio: q.Ratio | None = Field(
+        default=None, exclude=True, description="kinetic over static friction, in place of kinetic"
+    )
     kinetic: q.Friction = Field(
-        default_factory=lambda known: known.get("static", math.inf),
+        default_factory=lambda known: known.get("static", math.inf) * (known.get("kinetic_ratio") or 1.0),
         description="friction coefficient in fast sliding (default: static)",
     )
     transition_speed: q.PositiveSpeed = Field(default=0.005, description="sliding speed of the change-over")
@@ -52,6 +55,13 @@ class PairFriction(Table):
             return {"static": value}
         message = f"{q.shown(value)} is no friction; write a number, an angle, or {{ static, kinetic }}"
         raise q.invalid(message)
+
+    @model_validator(mode="after")
+    def _kinetic_said_once(self) -> Self:
+        if self.kinetic_ratio is not None and "kinetic" in self.model_fields_set:
+            message = "kinetic and kinetic_ratio say the same thing; keep one of the two"
+            raise q.invalid(message, "kinetic_ratio", at="key")
+        return self
 
     @model_validator(mode="after")
     def _kinetic_not_above_static(self) -> Self:
@@ -69,11 +79,9 @@ class PairFriction(Table):
 class Friction(Table):
     """Friction between blocks, and between blocks and the ground; the defaults are the paper's."""
 
-    block_block: PairFriction = Field(
-        default=PairFriction(static=0.31, kinetic=0.31), description="friction between two blocks"
-    )
+    block_block: PairFriction = Field(default=PairFriction(static=0.31), description="friction between two blocks")
     block_ground: PairFriction = Field(
-        default=PairFriction(static=0.38, kinetic=0.38), description="friction between a block and the ground"
+        default=PairFriction(static=0.38), description="friction between a block and the ground"
     )
 
 

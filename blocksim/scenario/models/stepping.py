@@ -82,8 +82,9 @@ class Nonsmooth(Time):
 def scheme_of(value: object) -> str:
     """Return which model reads a [time] table: that of its scheme, or of the one that a misspelt word is nearest to."""
     scheme = value.get("scheme") if isinstance(value, Mapping) else getattr(value, "scheme", None)
-    meant = nearest(scheme, SCHEMES, most=MOST_SLIPS) if isinstance(scheme, str) else None
-    return meant or "explicit"
+    if not isinstance(scheme, str):
+        return "explicit"
+    return scheme if scheme in SCHEMES else nearest(scheme, SCHEMES, most=MOST_SLIPS) or "explicit"
 
 
 AnyTime = Annotated[

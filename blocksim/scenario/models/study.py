@@ -100,12 +100,20 @@ class Sweep(Table):
         description="grid: every combination; list: all first values, all second values …; table: rows of a file; "
         "lhs: Latin hypercube; sobol: scrambled Sobol points; normal: independent random draws",
     )
-    samples: Annotated[int, BeforeValidator(whole(1, MAX_SAMPLES)), BeforeValidator(_of_the_mode)] = Field(
+    samples: Annotated[
+        int,
+        BeforeValidator(whole(1, MAX_SAMPLES)),
+        BeforeValidator(_of_the_mode),
+        Field(json_schema_extra={"minimum": 1, "maximum": MAX_SAMPLES}),
+    ] = Field(
         default=128, description="how many cases are drawn (lhs, sobol, normal; sobol is balanced at powers of two)"
     )
-    seed: Annotated[int, BeforeValidator(whole(0, MAX_SEED)), BeforeValidator(_of_the_mode)] = Field(
-        default=0, description="the same seed draws the same values (lhs, sobol, normal)"
-    )
+    seed: Annotated[
+        int,
+        BeforeValidator(whole(0, MAX_SEED)),
+        BeforeValidator(_of_the_mode),
+        Field(json_schema_extra={"minimum": 0, "maximum": MAX_SEED}),
+    ] = Field(default=0, description="the same seed draws the same values (lhs, sobol, normal)")
     table: Annotated[TablePath | None, BeforeValidator(_of_the_mode)] = Field(
         default=None,
         description="CSV table of cases, relative to the scenario file: a column a key, units as in `overlap [mm]`",

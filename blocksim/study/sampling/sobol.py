@@ -30,5 +30,5 @@ def _points(seed: int, samples: int, dimensions: int) -> NDArray[np.float64]:
     """Return points in the middles of the finest cells of the net, shape (samples, dimensions)."""
     sequence = scipy_qmc().Sobol(DIMENSIONS, scramble=True, bits=BITS, seed=generator(seed, "sobol"))
     size = min(CHUNK, 1 << (samples - 1).bit_length())
-    chunks = [sequence.random(size)[:, :dimensions] for _ in range(0, samples, size)]
+    chunks = [sequence.random(size)[:, :dimensions].copy() for _ in range(0, samples, size)]
     return np.concatenate(chunks)[:samples] + 0.5 ** (BITS + 1)

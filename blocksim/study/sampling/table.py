@@ -105,9 +105,9 @@ def _word(text: str) -> object:
 
 def refuse_wrong_values(document: Document, columns: Iterable[Column]) -> None:
     """Try the values of each column by themselves; raises InvalidInputError with the cells of all wrong ones."""
-    problems = [problem for column in columns for problem in _wrong_values(document, column)]
+    problems = dict.fromkeys(problem for column in columns for problem in _wrong_values(document, column))
     if problems:
-        raise_problems(problems)
+        raise_problems(list(problems))
 
 
 def _wrong_values(document: Document, column: Column) -> Iterator[Problem]:

@@ -1,0 +1,33 @@
+"""blocksim sweep --dry-run: what a sweep will cost."""
+
+import os
+from dataclasses import asdict
+
+from blocksim.cli.output import answer, duration, note, print_json
+from blocksim.scenario import Document
+from blocksim.study.estimate import Estimate, estimate
+from blocksim.world.memory import readable
+
+
+def show_estimate(document: Document, jobs: int | None, *, as_json: bool) -> None:
+    """Print count, cost and size of the sweep of a document. Raises what `estimate` raises."""
+    found = estimate(document)
+    cores = jobs or os.cpu_count() or 1
+    if as_json:
+        print_json({**asdict(found), "jobs": cores})
+        return
+    answer("\n".join(_lines(found, cores)))
+    for remark in found.remarks:
+        note(remark)
+
+
+def _lines(found: Estimate, cores: int) -> list[str]:
+    lines = [
+        f"cases      {found.cases}",
+        f"solving    at most about {duration(found.seconds / cores)} on {cores} {'core' if cores == 1 else 'cores'}",
+        f"results    at most about {readable(found.bytes)}",
+        f"from the steps of {found.looked_at} cases and the measured speed of a step, as if nothing came to rest",
+    ]
+    if found.impossible:
+        lines.append(f"{found.impossible} of these {found.looked_at} cannot be simulated; the first: {found.reason}")
+    return lines

@@ -1,0 +1,48 @@
+"""blocksim sweep --dry-run: count, cost and size, and nothing done."""
+
+import json
+from pathlib import Path
+
+from tests.cli.conftest import SOFT, Command
+
+PLAN = ("sweep", "scenarios/three_blocks_nominal.toml", *SOFT, "--jobs", 2, "--dry-run")
+KINETIC = "friction.block_block.kinetic"
+
+
+def test_cost_is_told_and_nothing_written(blocksim: Command, tmp_path: Path) -> None:
+    before = sorted(tmp_path.rglob("*"))
+    answer = blocksim(*PLAN, "--vary", f"{KINETIC}=0.1:0.3:50", "--vary", "time.end=1:2:20")
+    assert (answer.code, answer.err) == (0, "")
+    cases, solving, results, source = answer.out.splitlines()
+    assert cases == "cases      1000"
+    assert solving.startswith("solving    at most about ")
+    assert solving.endswith(" on 2 cores")
+    assert results.startswith("results    at most about ")
+    assert source.startswith("from the steps of 32 cases and the measured speed of a step")
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_cost_grows_with_cases_and_steps(blocksim: Command) -> None:
+    def seconds(*vary: str) -> float:
+        return float(json.loads(blocksim(*PLAN, "--json", *vary).out)["seconds"])
+
+    one = seconds("--vary", f"{KINETIC}=0.2")
+    assert seconds("--vary", f"{KINETIC}=0.2,0.21,0.22") / one == 3.0
+    assert 1.9 < seconds("--vary", "time.end=4") / one < 2.1
+
+
+def test_cases_that_cannot_be_simulated_are_told_of(blocksim: Command) -> None:
+    answer = blocksim(*PLAN, "--vary", f"{KINETIC}=0.2,0.9")
+    assert answer.code == 0
+    assert "1 of these 2 cannot be simulated; the first: " in answer.out
+    assert "kinetic friction 0.9 is above static friction 0.31" in answer.out
+
+
+def test_unbalanced_sobol_points_are_remarked_on(blocksim: Command) -> None:
+    answer = blocksim(*PLAN, "--vary", f"{KINETIC}=0.2:0.3", "--mode", "sobol", "--samples", 10)
+    assert (answer.code, answer.err) == (0, "10 Sobol points are not balanced; 8 or 16 are\n")
+
+
+def test_a_plan_with_mistakes_is_refused_as_without_dry_run(blocksim: Command) -> None:
+    assert blocksim(*PLAN).code == 65
+    assert blocksim(*PLAN, "--vary", "gravty=1,2").code == 65

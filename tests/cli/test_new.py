@@ -1,0 +1,82 @@
+"""blocksim new: every template works as it is, and nothing is replaced."""
+
+from pathlib import Path
+
+import pytest
+
+from blocksim.cli.new import templates
+from blocksim.scenario import load_scenario
+from tests.cli.conftest import Command
+
+SCENARIOS = [kind for kind, file in templates().items() if file.name.endswith(".toml")]
+SWEEPS = [kind for kind in SCENARIOS if kind.startswith("sweep-")]
+
+
+def test_all_promised_kinds_are_there() -> None:
+    promised = "dominoes experiment pyramid slope stack sweep-grid sweep-normal sweep-sobol three-blocks wall"
+    assert list(templates()) == promised.split()
+
+
+@pytest.mark.parametrize("kind", SCENARIOS)
+def test_a_new_scenario_passes_the_check(blocksim: Command, kind: str) -> None:
+    made = blocksim("new", kind, "mine")
+    assert (made.code, made.out) == (0, "mine.toml\n")
+    assert made.err == f"next: blocksim {'sweep mine.toml --dry-run' if kind in SWEEPS else 'check mine.toml'}\n"
+    assert blocksim("check", "mine.toml").code == 0
+    assert load_scenario("mine.toml").name == "mine"
+    assert "@" not in Path("mine.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("kind", "key"),
+    [("wall", "missing"), ("sweep-grid", '"contact.stiffness_scale"'), ("sweep-sobol", '"contact.stiffness_scale"')],
+)
+def test_a_line_left_in_a_comment_works_too(blocksim: Command, kind: str, key: str) -> None:
+    blocksim("new", kind, "mine")
+    text = Path("mine.toml").read_text()
+    assert text.count(f"# {key} = ") == 1
+    Path("mine.toml").write_text(text.replace(f"# {key} = ", f"{key} = "))
+    assert blocksim("check", "mine.toml").code == 0
+
+
+@pytest.mark.parametrize("kind", SWEEPS)
+def test_a_new_sweep_passes_a_dry_run(blocksim: Command, kind: str) -> None:
+    blocksim("new", kind, "mine")
+    answer = blocksim("sweep", "mine.toml", "--dry-run")
+    assert (answer.code, answer.err) == (0, "")
+    assert "cannot be simulated" not in answer.out
+
+
+def test_a_new_table_can_be_compared_with(blocksim: Command) -> None:
+    assert blocksim("new", "experiment", "data.csv").out == "data.csv\n"
+    scenario = Path("scenarios/three_blocks_nominal.toml").read_text()
+    Path("mine.toml").write_text(scenario.replace("experiments/three_blocks.csv", "data.csv"))
+    assert blocksim("check", "mine.toml").code == 0
+
+
+def test_a_file_that_is_there_stays_as_it_is(blocksim: Command) -> None:
+    Path("mine.toml").write_text("precious")
+    answer = blocksim("new", "stack", "mine.toml")
+    assert (answer.code, answer.out) == (73, "")
+    assert answer.err == "mine.toml: is there already; choose another name\n"
+    assert Path("mine.toml").read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (("stak", "mine"), 2, "unknown kind 'stak', did you mean 'stack'?"),
+        (("xyz", "mine"), 2, "unknown kind 'xyz', use one of dominoes, experiment, "),
+        (("stack", "a b"), 2, '"a b" is not a name'),
+        (("stack", ".toml"), 2, "is not a name"),
+        (("stack", "no/where"), 73, "no/where.toml: cannot be created: No such file or directory"),
+    ],
+)
+def test_wrong_arguments_are_told(
+    blocksim: Command, tmp_path: Path, arguments: tuple[str, str], code: int, told: str
+) -> None:
+    before = sorted(tmp_path.rglob("*"))
+    answer = blocksim("new", *arguments)
+    assert answer.code == code
+    assert told in " ".join(answer.err.split())
+    assert sorted(tmp_path.rglob("*")) == before

@@ -1,0 +1,138 @@
+"""What each sampled mode promises of its points, and of the seed."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from blocksim.errors import UnavailableError
+from blocksim.scenario import Document, Sweep
+from blocksim.study.sampling import extra
+from blocksim.study.sampling.modes import design_of, remarks
+from tests.study.sampling.plans import OVERLAP, RATIO, SCALE, TILT, sweep_of
+
+UNIT = {"from": 1, "to": 2}  # minus 1: the places themselves
+SAMPLED = ("lhs", "sobol", "normal")
+
+
+def column(sweep: Sweep, key: str) -> list[object]:
+    return [row[key] for row in design_of(sweep)]
+
+
+def places(sweep: Sweep, *keys: str) -> NDArray[np.float64]:
+    return np.array([[row[key] for key in keys] for row in design_of(sweep)], dtype=float) - 1.0
+
+
+def correlation(points: NDArray[np.float64]) -> float:
+    one, other = (points - points.mean(axis=0)).T
+    return float(np.sum(one * other) / math.sqrt(np.sum(one * one) * np.sum(other * other)))
+
+
+@pytest.mark.parametrize("samples", [1, 7, 100])
+def test_a_latin_hypercube_has_one_value_in_every_interval(nominal: Document, samples: int) -> None:
+    sweep = sweep_of(nominal, "lhs", {RATIO: UNIT, SCALE: UNIT}, samples=samples)
+    strata = np.floor(places(sweep, RATIO, SCALE) * samples).astype(int)
+    assert [sorted(keys) for keys in strata.T] == [list(range(samples))] * 2
+
+
+def test_the_columns_of_a_latin_hypercube_are_not_in_step(nominal: Document) -> None:
+    points = places(sweep_of(nominal, "lhs", {RATIO: UNIT, SCALE: UNIT}, samples=1000), RATIO, SCALE)
+    assert abs(correlation(points)) < 4 / math.sqrt(1000)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_the_first_two_sobol_dimensions_are_a_net(nominal: Document, seed: int) -> None:
+    """A (0, 6, 2) net in base 2: every cell of 1/64 of the square, however long, has exactly one of 64 points."""
+    points = places(sweep_of(nominal, "sobol", {RATIO: UNIT, SCALE: UNIT}, samples=64, seed=seed), RATIO, SCALE)
+    for bits in range(7):
+        cells = np.floor(points * [2**bits, 2 ** (6 - bits)]).astype(int)
+        assert len({(x, y) for x, y in cells}) == 64
+
+
+def test_unbalanced_numbers_of_sobol_points_are_told(nominal: Document) -> None:
+    assert remarks(sweep_of(nominal, "sobol", {SCALE: UNIT}, samples=100)) == [
+        "100 Sobol points are not balanced; 64 or 128 are"
+    ]
+    assert remarks(sweep_of(nominal, "sobol", {SCALE: UNIT}, samples=64)) == []
+    assert remarks(sweep_of(nominal, "lhs", {SCALE: UNIT}, samples=100)) == []
+
+
+def test_sobol_points_beyond_one_chunk_continue_the_sequence(nominal: Document) -> None:
+    long = places(sweep_of(nominal, "sobol", {RATIO: UNIT, SCALE: UNIT}, samples=5000), RATIO, SCALE)
+    assert np.array_equal(
+        long[:100], places(sweep_of(nominal, "sobol", {RATIO: UNIT, SCALE: UNIT}, samples=100), RATIO, SCALE)
+    )
+    cells = np.floor(long[:4096] * 64).astype(int)
+    assert len({(x, y) for x, y in cells}) == 4096
+
+
+def test_independent_draws_are_uniform_and_uncorrelated(nominal: Document) -> None:
+    n = 20_000
+    points = places(sweep_of(nominal, "normal", {RATIO: UNIT, SCALE: UNIT}, samples=n), RATIO, SCALE)
+    assert np.abs(points.mean(axis=0) - 0.5).max() < 4 * math.sqrt(1 / 12 / n)
+    assert abs(correlation(points)) < 4 / math.sqrt(n)
+    ranks = np.sort(points[:, 0])
+    assert np.abs(ranks - (np.arange(n) + 0.5) / n).max() < 1.95 / math.sqrt(n)  # Kolmogorov-Smirnov, 0.1 %
+
+
+@pytest.mark.parametrize("mode", SAMPLED)
+def test_the_same_seed_draws_the_same_and_another_does_not(nominal: Document, mode: str) -> None:
+    one, same, other = (
+        column(sweep_of(nominal, mode, {SCALE: UNIT}, samples=16, seed=seed), SCALE) for seed in (5, 5, 6)
+    )
+    assert one == same
+    assert not set(one) & set(other)
+
+
+FIRST = {  # from seed 0; another machine, or another version of scipy, has to draw the same
+    "lhs": [(0.00997806719025, "0.0150627503951 rad"), (0.0096485136897, "0.00568704708097 rad")],
+    "sobol": [(0.0100960435651, "0.00999242410775 rad"), (0.00948605085194, "0.00825796093011 rad")],
+    "normal": [(0.00990748846648, "0.000488649724667 rad"), (0.0103717729413, "0.0135480266426 rad")],
+}
+
+
+@pytest.mark.parametrize("mode", SAMPLED)
+def test_the_values_of_a_seed_stay_the_same_for_good(nominal: Document, mode: str) -> None:
+    vary = {OVERLAP: {"mean": "10 mm", "sd": "0.3 mm"}, TILT: {"from": "0 deg", "to": "1 deg"}}
+    design = design_of(sweep_of(nominal, mode, vary, samples=4))
+    assert [tuple(row.values()) for row in design[:2]] == FIRST[mode]
+
+
+@pytest.mark.parametrize("mode", ["lhs", "normal"])
+def test_keys_added_removed_or_reordered_leave_the_values_of_others(nominal: Document, mode: str) -> None:
+    alone = column(sweep_of(nominal, mode, {SCALE: UNIT}, samples=16), SCALE)
+    among = sweep_of(nominal, mode, {RATIO: UNIT, SCALE: UNIT, TILT: ["0 deg", "1 deg"]}, samples=16)
+    assert column(among, SCALE) == alone
+    quoted = sweep_of(nominal, mode, {'contact."stiffness_scale"': UNIT}, samples=16)
+    assert column(quoted, 'contact."stiffness_scale"') == alone
+
+
+def test_a_key_added_at_the_end_leaves_the_sobol_points_of_others(nominal: Document) -> None:
+    alone = column(sweep_of(nominal, "sobol", {SCALE: UNIT}, samples=16), SCALE)
+    assert column(sweep_of(nominal, "sobol", {SCALE: UNIT, RATIO: UNIT}, samples=16), SCALE) == alone
+
+
+@pytest.mark.parametrize("mode", ["sobol", "normal"])
+def test_more_samples_begin_with_the_same_ones(nominal: Document, mode: str) -> None:
+    few, many = (column(sweep_of(nominal, mode, {SCALE: UNIT}, samples=n), SCALE) for n in (10, 40))
+    assert many[:10] == few
+
+
+@pytest.mark.parametrize("mode", SAMPLED)
+def test_levels_are_equally_likely(nominal: Document, mode: str) -> None:
+    drawn = column(sweep_of(nominal, mode, {"time.scheme": ["explicit", "nonsmooth"]}, samples=1024), "time.scheme")
+    spread = 4 * math.sqrt(1024) / 2 if mode == "normal" else 0
+    assert abs(drawn.count("explicit") - 512) <= spread
+    assert drawn.count("explicit") + drawn.count("nonsmooth") == 1024
+
+
+def test_a_missing_scipy_names_the_extra(nominal: Document, monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone(name: str) -> None:
+        raise ImportError(name)
+
+    sweep = sweep_of(nominal, "lhs", {SCALE: UNIT})
+    monkeypatch.setattr(extra, "import_module", gone)
+    with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[study\]'") as caught:
+        design_of(sweep)
+    assert caught.value.exit_code == 69
