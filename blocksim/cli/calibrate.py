@@ -54,15 +54,15 @@ def calibrate_command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Fit inputs to measured repeats.
+    """Fit inputs to measured repeats, within priors.
 
     What is maximised is the probability that a run is inside all measured ranges (as in compare) while the other inputs
     scatter as stated, not the agreement of one run. Writes the scenario with the fitted values and where they come from
     in [provenance]. Every trial is kept as it ends; a search that was stopped goes on with --resume. Needs the extra
-    blocksim[study].
+    blocksim[study]. The example takes the scatter from [sweep], as in "structures.0.overlap" = { mean = "10 mm", sd =
+    "0.3 mm" }; --scatter "structures.0.overlap=10 mm+-0.3 mm" says the same.
 
-    Example: blocksim calibrate scenarios/three_blocks_nominal.toml --fit friction.block_block.kinetic=0.17:0.31
-    --scatter structures.0.overlap="10 mm+-0.3 mm" --set contact.stiffness_scale=0.001
+    Example: blocksim calibrate mine.toml --fit contact.restitution=0.2:0.35
     """
     silent = quiet or as_json
     plan = read_plan(

@@ -68,14 +68,13 @@ def sensitivity_command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Show which inputs decide where the blocks end, and whether the outcome is the measured one.
+    """Show which inputs decide where the blocks end.
 
     The results looked at are all measured quantities (without an experiment, x of the blocks) and the class of the
     outcome: rotations rounded to quarters of a turn. Blocks of a design with a failed run are left out and counted.
     Needs the extra blocksim[study].
 
-    Example: blocksim sensitivity scenarios/slide.toml --vary friction.block_ground=0.3:0.4
-    --vary bodies.0.velocity.0=0.4:0.6 --method sobol
+    Example: blocksim sensitivity scenarios/slide.toml --vary gravity=9.7:9.9
     """
     silent = quiet or as_json
     _refuse_present(out, overwrite=overwrite)
