@@ -100,7 +100,7 @@ def _telling() -> Callable[[Trial, Trial, int], None]:
         now = time.monotonic()
         if trial is best or now - told_at > TOLD_SECONDS or trial.number == trials:
             told_at = now
-            values = ", ".join(f"{key.rpartition('.')[2]} {value}" for key, value in trial.values.items())
+            values = ", ".join(f"{'.'.join(key.split('.')[-2:])} {value}" for key, value in trial.values.items())
             share, most = trial.score.share_inside, best.score.share_inside
             note(f"{trial.number}/{trials}: {share:.0%} inside (best {most:.0%}): {values}")
 

@@ -142,6 +142,17 @@ def test_missing_package_names_the_extra(slide: Slide, monkeypatch: pytest.Monke
     assert "pip install 'blocksim[study]'" in answer.err
 
 
+def test_scatter_of_the_scenario_is_the_default_and_stays_in_the_file(slide: Slide, tmp_path: Path) -> None:
+    scenario = tmp_path / "mine" / "slide.toml"
+    own = f'\n[sweep]  # my scatter\nmode = "normal"\n"{SPEED}" = {{ mean = "0.5 m/s", sd = "0.01 m/s" }}\n'
+    scenario.write_text(scenario.read_text() + own)
+    few = (*FIT, "--trials", 4, "--members", 4, "--fresh", 4)
+    assert slide(*few, "--out", "own.toml").code == 0
+    assert slide(*few, *SCATTER, "--out", "given.toml").code == 0
+    assert own in Path("own.toml").read_text()
+    assert Path("own.toml").read_text() == Path("given.toml").read_text()
+
+
 def test_single_run_without_scatter_says_that_it_is_one(slide: Slide) -> None:
     answer = slide(*FIT, "--trials", 20, "--members", 1, "--out", "fitted.toml")
     assert answer.code == 0

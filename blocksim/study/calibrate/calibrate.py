@@ -107,7 +107,7 @@ def _searched(plan: Plan, journal: Path, trials: int, on_trial: OnTrial) -> Tria
 
 
 def _score(plan: Plan, members: Iterable[Values]) -> Score:
-    return score_of(run_members(plan.document, members), plan.ranges)
+    return score_of(run_members(plan.bare, members), plan.ranges)
 
 
 def _provenance(plan: Plan, score: Score, trials: int) -> dict[str, str]:

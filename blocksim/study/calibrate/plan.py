@@ -31,7 +31,8 @@ NO_SCATTER = (
 class Plan:
     """A scenario, what is fitted in it within which priors, the scatter that agreement has to bear, and the table."""
 
-    document: Document  # with settings and experiment table, without [sweep]
+    document: Document  # with settings and experiment table
+    bare: Document  # the same without [sweep], which no member needs
     base: Scenario
     priors: tuple[Prior, ...]
     scatter: Scatter
@@ -93,7 +94,7 @@ def read_plan(
     if scattered is None and members > 1:
         raise InvalidInputError(NO_SCATTER)
     priors = tuple(_prior(key, values, fit) for key, values in fits.vary.items())
-    return Plan(bare, base, priors, Scatter(scattered), load_table(base.experiment.table), members, seed)
+    return Plan(document, bare, base, priors, Scatter(scattered), load_table(base.experiment.table), members, seed)
 
 
 def _prior(key: str, values: object, fit: Variations) -> Prior:
