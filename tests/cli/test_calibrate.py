@@ -159,18 +159,23 @@ def test_single_run_without_scatter_says_that_it_is_one(slide: Slide) -> None:
     assert "one run, without input scatter: inside all ranges" in answer.out
 
 
-def test_killed_and_resumed_it_finds_the_same(slide: Slide, process: Process, tmp_path: Path) -> None:
+def test_stopped_killed_and_resumed_it_finds_the_same(slide: Slide, process: Process, tmp_path: Path) -> None:
     many = (*FIT, *SCATTER, "--trials", 22, "--members", 4, "--fresh", 4)
     assert slide(*many, "--out", "whole.toml", "--quiet").code == 0
-    command = ("calibrate", "mine/slide.toml", *SOFT, "--experiment", "measured.csv", *many, "--out", "cut.toml")
-    running = process(*command)
+    given = ("mine/slide.toml", *SOFT, "--experiment", "measured.csv", *many, "--out", "cut.toml", "--resume")
     journal = tmp_path / "cut.trials.jsonl"
-    until = time.monotonic() + 60
-    while not journal.exists() or journal.read_text().count("\n") < 10:
-        assert time.monotonic() < until
-        time.sleep(0.01)
-    running.send_signal(signal.SIGKILL)
-    running.communicate()
-    assert not (tmp_path / "cut.toml").exists()
+    for number, lines in ((signal.SIGTERM, 5), (signal.SIGKILL, 20)):
+        running = process("calibrate", *given)
+        until = time.monotonic() + 120
+        while not journal.exists() or journal.read_text().count("\n") < lines:
+            assert time.monotonic() < until
+            assert running.poll() is None
+            time.sleep(0.01)
+        running.send_signal(number)
+        _, told = running.communicate()
+        assert not (tmp_path / "cut.toml").exists()
+        if number == signal.SIGTERM:
+            assert running.returncode == 75
+            assert "of 22 trials; --resume does the others" in told
     assert slide(*many, "--out", "cut.toml", "--resume", "--quiet").code == 0
     assert (tmp_path / "cut.toml").read_text() == (tmp_path / "whole.toml").read_text()
