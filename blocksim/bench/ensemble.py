@@ -13,7 +13,8 @@ from blocksim.bench.scenes import FRICTION, Table, three_blocks
 from blocksim.bench.stepping import Stepping
 from blocksim.scenario.structures.base import draws
 from blocksim.simulation.ensemble import Ensemble, run_ensemble
-from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.schemes import build_stacks
+from blocksim.world.stacks import only
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -70,7 +71,7 @@ def rates(members: Sequence[Scenario], threads: int, repeats: int) -> tuple[Numb
     clock: list[float] = []
 
     def sample() -> float:
-        ensemble = Ensemble(members, [build_scene(scenario) for scenario in members])
+        ensemble = Ensemble(members, only(build_stacks(members)))
         with ThreadPoolExecutor(threads) as pool:
             cpu, began = time.process_time(), time.perf_counter()
             ensemble.advance(pool)

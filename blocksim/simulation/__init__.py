@@ -1,6 +1,7 @@
 """The time loop and what it leaves behind: frames, final table, summary, and the folder that keeps them."""
 
-from blocksim.simulation.ensemble import MemberEnd, run_ensemble
+from blocksim.simulation.ending import MemberEnd, MemberFailure
+from blocksim.simulation.ensemble import run_ensemble, run_in_batches
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.loop import Progress, Watcher
 from blocksim.simulation.result import Result, read_result
@@ -10,6 +11,7 @@ from blocksim.simulation.summary import Summary
 __all__ = [
     "Frames",
     "MemberEnd",
+    "MemberFailure",
     "Progress",
     "Result",
     "Summary",
@@ -17,6 +19,7 @@ __all__ = [
     "read_result",
     "renew_copies",
     "run_ensemble",
+    "run_in_batches",
     "simulate",
     "simulate_into",
 ]

@@ -8,8 +8,8 @@ import numpy as np
 from blocksim.kernels import jit
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.simulation.schemes import AnyScene, build_scene, measured_row, scheme_of
-from blocksim.simulation.stacking import stack
 from blocksim.simulation.team import ALONE
+from blocksim.world.stacks import stack_of_one
 
 SURFACE, PARTICLES, RIGID = "surface", "with-particles", "nonsmooth"  # sets of machine code
 CHANGES: dict[str, dict[str, object]] = {  # in the smallest scene, so that it needs them
@@ -49,17 +49,16 @@ def compile_kernels(kernels: str = SURFACE) -> float:
     scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **CHANGES[kernels]})), 0)
     measured_row(scene)
     if kernels == RIGID:
-        _compile_ensemble(scene)
+        _compile_ensemble(stack_of_one(scene))
     if kernels != SURFACE:
         jit.mark(kernels)
     return time.perf_counter() - began
 
 
-def _compile_ensemble(scene: AnyScene) -> None:
+def _compile_ensemble(scenes: AnyScene) -> None:
     """Compile the advance of members too: it shares all kernels but the outermost, so that it costs little now."""
-    scheme, nothing = scheme_of(scene), np.zeros(0, dtype=np.int64)
-    row = np.zeros((1, len(scheme.measured)))
-    scheme.advance_members(stack([scene]), nothing, nothing, row, nothing)
+    scheme, nothing = scheme_of(scenes), np.zeros(0, dtype=np.int64)
+    scheme.advance_members(scenes, nothing, nothing, np.zeros((1, len(scheme.measured))), nothing)
 
 
 def is_compiled(kernels: str = SURFACE) -> bool:

@@ -5,47 +5,28 @@ from a run of its own.
 """
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from itertools import groupby
-from typing import TYPE_CHECKING, Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.errors import BlocksimError
 from blocksim.kernels.arrays import PAIRS_FULL
-from blocksim.scenario import Scenario, place_bodies
+from blocksim.scenario import Scenario
 from blocksim.simulation.compilation import compile_kernels, kernels_of
-from blocksim.simulation.frames import Frames
-from blocksim.simulation.ledger import EnergyLedger, energy_ledger, start_energy
-from blocksim.simulation.loop import last_step_of, outcome_of
-from blocksim.simulation.outcome import Outcome
-from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
-from blocksim.simulation.schemes import Scene, build_scene, measured_row, scheme_of
-from blocksim.simulation.stacking import member, shape_of, stack
-from blocksim.simulation.table import final_table
+from blocksim.simulation.ending import Closing, MemberEnd, MemberFailure
+from blocksim.simulation.ledger import start_energy
+from blocksim.simulation.loop import last_step_of
+from blocksim.simulation.schemes import AnyScene, build_stacks, measured_row, scheme_of
 from blocksim.simulation.team import ALONE
-
-if TYPE_CHECKING:
-    import pandas as pd
+from blocksim.world.stacks import Refusal, Stack, member, stack_of_one
 
 BATCH = 256  # members in memory at the same time
+MOST_BODIES = 16_384  # of all members of a batch
 CHUNK = 4  # members that a thread takes at a time: few enough that all threads end together
 
-
-@dataclass(frozen=True)
-class MemberEnd:
-    """Where one member ended and how."""
-
-    frames: Frames  # one: the last
-    outcome: Outcome
-    ledger: EnergyLedger
-
-    @property
-    def final(self) -> "pd.DataFrame":
-        """The final table, as `final.csv` has it."""
-        return final_table(self.frames)
+Ended = MemberEnd | MemberFailure
 
 
 def run_ensemble(scenarios: Sequence[Scenario], *, threads: int | None = None) -> list[MemberEnd]:
@@ -55,43 +36,79 @@ def run_ensemble(scenarios: Sequence[Scenario], *, threads: int | None = None) -
     are advanced together, on `threads` threads (default: one a core). The result does not depend on that number. Raises
     what building a world raises, and ValueError for less than one thread.
     """
+    ends: list[MemberEnd] = []
+    for batch in run_in_batches(scenarios, threads=threads):
+        for end in batch:
+            if isinstance(end, MemberFailure):
+                raise end.error
+            ends.append(end)
+    return ends
+
+
+def run_in_batches(
+    scenarios: Iterable[Scenario], *, threads: int | None = None, most: int = BATCH
+) -> Iterator[list[Ended]]:
+    """Run scenarios as `run_ensemble` does, at most `most` at a time; yield where those of a batch ended, in order.
+
+    Scenarios are taken from where they come from as they are needed, and nothing of a batch is kept. One that cannot be
+    built is a MemberFailure in its place; the others go on. No result depends on which others are in its batch. Raises
+    ValueError for less than one thread or member.
+    """
     count = os.cpu_count() or 1 if threads is None else threads
-    if count < 1:
-        message = f"threads must be at least 1, not {count}"
-        raise ValueError(message)
-    for kernels in dict.fromkeys(map(kernels_of, scenarios)):
-        compile_kernels(kernels)
-    with ThreadPoolExecutor(count) as pool:
-        batches = (scenarios[first : first + BATCH] for first in range(0, len(scenarios), BATCH))
-        return [end for batch in batches for end in _run_batch(batch, pool)]
+    for what, number in (("threads", count), ("members", most)):
+        if number < 1:
+            message = f"{what} must be at least 1, not {number}"
+            raise ValueError(message)
+    return _run_all(scenarios, count, most)
 
 
-def _run_batch(scenarios: Sequence[Scenario], pool: ThreadPoolExecutor) -> list[MemberEnd]:
-    scenes = [build_scene(scenario) for scenario in scenarios]
-    keys = [(scenario.time.scheme, shape_of(scene)) for scenario, scene in zip(scenarios, scenes, strict=True)]
-    order = sorted(range(len(scenes)), key=keys.__getitem__)
-    ends: dict[int, MemberEnd] = {}
-    for _, group in groupby(order, key=keys.__getitem__):
-        numbers = list(group)
-        ensemble = Ensemble([scenarios[i] for i in numbers], [scenes[i] for i in numbers])
-        ensemble.advance(pool)
-        ends.update(zip(numbers, ensemble.ends(), strict=True))
-    return [ends[i] for i in range(len(scenes))]
+def _run_all(scenarios: Iterable[Scenario], threads: int, most: int) -> Iterator[list[Ended]]:
+    with ThreadPoolExecutor(threads) as pool:
+        for batch in _batches(scenarios, most):
+            for kernels in dict.fromkeys(map(kernels_of, batch)):
+                compile_kernels(kernels)
+            yield _run_batch(batch, pool)
 
 
-class Ensemble(Generic[Scene]):
+def _batches(scenarios: Iterable[Scenario], most: int) -> Iterator[list[Scenario]]:
+    batch: list[Scenario] = []
+    bodies = 0
+    for scenario in scenarios:
+        count = sum(structure.size for structure in scenario.structures) + len(scenario.bodies)
+        if batch and (len(batch) == most or bodies + count > MOST_BODIES):
+            yield batch
+            batch, bodies = [], 0
+        batch.append(scenario)
+        bodies += count
+    if batch:
+        yield batch
+
+
+def _run_batch(scenarios: Sequence[Scenario], pool: ThreadPoolExecutor) -> list[Ended]:
+    ends: dict[int, Ended] = {}
+    for one in build_stacks(scenarios):
+        if isinstance(one, Refusal):
+            ends[one.number] = MemberFailure(one.error)
+        else:
+            ensemble = Ensemble(scenarios, one)
+            ensemble.advance(pool)
+            ends.update(zip(one.numbers, ensemble.ends(), strict=True))
+    return [ends[i] for i in range(len(scenarios))]
+
+
+class Ensemble:
     """Scenes of one scheme and shape, stacked, to be advanced together once."""
 
-    def __init__(self, scenarios: Sequence[Scenario], scenes: Sequence[Scene]) -> None:
-        """Stack scenes that have not moved yet."""
-        self.scenarios = scenarios
-        self.scheme = scheme_of(scenes[0])
-        self.scenes: Scene = stack(scenes)
-        steps = [float(scene.world.controls[0].step) for scene in scenes]
-        ends = [last_step_of(scenario.time.end, step) for scenario, step in zip(scenarios, steps, strict=True)]
-        self.last_steps = np.array(ends, dtype=np.int64)
-        self.starts = np.zeros((len(scenes), len(self.scheme.measured)))
-        self.codes = np.zeros(len(scenes), dtype=np.int64)
+    def __init__(self, scenarios: Sequence[Scenario], stack: Stack) -> None:
+        """Take a stack of scenes that have not moved yet, and the scenarios that its numbers count."""
+        self.placed = stack.placed
+        self.scenes: AnyScene = stack.scenes
+        self.scheme = scheme_of(self.scenes)
+        self.time_steps: list[float] = self.scenes.world.controls["step"][:, 0].tolist()
+        ends = [scenarios[number].time.end for number in stack.numbers]
+        self.last_steps = np.array([*map(last_step_of, ends, self.time_steps)], dtype=np.int64)
+        self.starts = np.zeros((len(ends), len(self.scheme.measured)))
+        self.codes = np.zeros(len(ends), dtype=np.int64)
 
     def advance(self, pool: ThreadPoolExecutor) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
@@ -102,28 +119,29 @@ class Ensemble(Generic[Scene]):
     def _advance(self, members: NDArray[np.int64]) -> None:
         self.scheme.advance_members(self.scenes, members, self.last_steps, self.starts, self.codes)
 
-    def ends(self) -> Iterator[MemberEnd]:
-        """Yield where the members ended, in order."""
-        for m, scenario in enumerate(self.scenarios):
-            scene, code = member(self.scenes, m), int(self.codes[m])
-            start = float(self.starts[m, : len(self.scheme.ledger)].sum())
-            if code == PAIRS_FULL:
-                scene, code, start = self._run_alone(scene, int(self.last_steps[m]), start)
-            yield self._end(scenario, scene, code, start)
+    def ends(self) -> list[Ended]:
+        """Return where the members ended, in order."""
+        closing = Closing(self.scenes, self.placed, self._measured())
+        starts = [float(row.sum()) for row in self.starts[:, : len(self.scheme.ledger)]]
+        return [
+            self._run_alone(m, start) if code == PAIRS_FULL else closing.end(m, start, code)
+            for m, (start, code) in enumerate(zip(starts, self.codes.tolist(), strict=True))
+        ]
 
-    def _run_alone(self, scene: Scene, last_step: int, start: float) -> tuple[Scene, int, float]:
-        """Go on with a scene whose pair list is full."""
-        if not scene.world.clock[0].is_started:
-            scene, _ = ALONE.advance(self.scheme.with_more_room(scene), 0)
-            start = start_energy(scene)
-        scene, code = ALONE.advance(scene, last_step)
-        return scene, code, start
+    def _measured(self) -> NDArray[np.float64]:
+        """Return rows as `measured` of the scheme names them: a call that goes to no further step only measures."""
+        rows, nowhere = np.zeros_like(self.starts), np.zeros_like(self.codes)
+        self.scheme.advance_members(self.scenes, np.arange(len(rows)), nowhere, rows, nowhere.copy())
+        return rows
 
-    def _end(self, scenario: Scenario, scene: Scene, code: int, start: float) -> MemberEnd:
-        world, placed = scene.world, place_bodies(scenario)
-        ledger = energy_ledger(scene, start)
-        steps = np.array([world.clock[0].steps], dtype=np.int64)
-        motion = np.stack([world.bodies[name][: len(placed)] for name in MOTION])
-        rows = Rows(steps, motion[np.newaxis], measured_row(scene)[np.newaxis], self.scheme.ledger)
-        frames = frames_from_rows(placed, float(world.controls[0].step), rows)
-        return MemberEnd(frames, outcome_of(code, ledger), ledger)
+    def _run_alone(self, m: int, start: float) -> Ended:
+        """Go on with a member whose pair list is full."""
+        scene, placed = member(self.scenes, m), [self.placed[m]]
+        try:
+            if not scene.world.clock[0].is_started:
+                scene, _ = ALONE.advance(self.scheme.with_more_room(scene), 0)
+                start = start_energy(scene)
+            scene, code = ALONE.advance(scene, int(self.last_steps[m]))
+        except BlocksimError as error:
+            return MemberFailure(error)
+        return Closing(stack_of_one(scene), placed, measured_row(scene)[np.newaxis]).end(0, start, code)

@@ -1,9 +1,11 @@
 """The energy ledger of a run: where the energy went, and how much of it is unaccounted for."""
 
 import math
-from typing import Annotated
+from collections.abc import Sequence
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, computed_field
 
 from blocksim.simulation.schemes import AnyScene, measured_row, scheme_of
@@ -55,16 +57,27 @@ def start_energy(scene: AnyScene) -> float:
     return float(measured_row(scene)[: len(scheme_of(scene).ledger)].sum())
 
 
+class InPlay(NamedTuple):
+    """What the energy in play of a scene follows from, beside the work of its support."""
+
+    mass: float  # kg, of all bodies
+    moved: float  # J: largest kinetic energy + sum of the weights' travel |m g v| dt
+
+
 def energy_ledger(scene: AnyScene, start: float) -> EnergyLedger:
-    """Return the ledger of the present state; `start` is the energy (J) at the start.
+    """Return the ledger of the present state; `start` is the energy (J) at the start."""
+    book = scene.world.ledger[0]
+    in_play = InPlay(float(np.sum(scene.world.bodies.mass)), float(book.largest_kinetic + book.travel_work))
+    return ledger_of(scheme_of(scene).ledger, measured_row(scene), start, in_play)
+
+
+def ledger_of(names: Sequence[str], row: NDArray[np.float64], start: float, in_play: InPlay) -> EnergyLedger:
+    """Return the ledger of a state in which energies (J) of these names were measured.
 
     Energy in play: largest kinetic energy + sum of the weights' travel |m g v| dt + |work of the support|, at least
     m_total g 1 mm.
     """
-    ledger = scene.world.ledger[0]
-    row = measured_row(scene)
-    entries = {name: float(value) for name, value in zip(scheme_of(scene).ledger, row, strict=False)}
-    weight = float(np.sum(scene.world.bodies.mass)) * STANDARD_GRAVITY
-    driven = float(ledger.largest_kinetic + ledger.travel_work) + abs(entries["to_support"])
-    in_play = max(driven, weight * SMALLEST_HEIGHT)
-    return EnergyLedger(**entries, start=start, in_play=in_play)
+    entries = dict(zip(names, row.tolist(), strict=False))
+    driven = in_play.moved + abs(entries["to_support"])
+    weight = in_play.mass * STANDARD_GRAVITY
+    return EnergyLedger(**entries, start=start, in_play=max(driven, weight * SMALLEST_HEIGHT))

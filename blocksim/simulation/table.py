@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.frames import Floats, Frames
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,23 +42,37 @@ def final_columns(frames: Frames) -> Columns:
     x, y is the centre; rotation the angle turned since the start, counter-clockwise positive, not wrapped; left, right,
     bottom and top are the extents of the turned rectangle.
     """
-    x, y, angle = frames.x[-1], frames.y[-1], frames.angle[-1]
-    cos, sin = np.abs(np.cos(angle)), np.abs(np.sin(angle))
-    half_width = 0.5 * (cos * frames.size_x + sin * frames.size_y)
-    half_height = 0.5 * (sin * frames.size_x + cos * frames.size_y)
+    motion = np.stack([one[-1] for one in (frames.x, frames.y, frames.angle, frames.vx, frames.vy, frames.spin)])
+    shapes = np.stack([frames.size_x, frames.size_y, frames.start_angle])
+    return dict(zip(COLUMNS, (list(frames.names), *final_values(motion, shapes).tolist()), strict=True))
+
+
+def final_values(motion: Floats, shapes: Floats) -> Floats:
+    """Return the numbers (..., 10, b) of the tables of states, columns as in `COLUMNS`.
+
+    `motion` (..., 6, b) holds x, y, angle and their rates, `shapes` (..., 3, b) sides along the body's own axes and the
+    angle at the start, all SI.
+    """
+    x, y, angle, vx, vy, spin = (motion[..., k, :] for k in range(6))
+    size_x, size_y, start_angle = (shapes[..., k, :] for k in range(3))
+    # of one state at a time: what is computed together may decide on the last digit
+    cos, sin = (np.reshape([turn(one) for one in angle.reshape(-1, x.shape[-1])], x.shape) for turn in (np.cos, np.sin))
+    cos, sin = np.abs(cos), np.abs(sin)
+    half_width = 0.5 * (cos * size_x + sin * size_y)
+    half_height = 0.5 * (sin * size_x + cos * size_y)
     values = (
         MILLI * x,
         MILLI * y,
-        np.degrees(frames.rotation[-1]),
+        np.degrees(angle - start_angle),
         MILLI * (x - half_width),
         MILLI * (x + half_width),
         MILLI * (y - half_height),
         MILLI * (y + half_height),
-        MILLI * frames.vx[-1],
-        MILLI * frames.vy[-1],
-        np.degrees(frames.spin[-1]),
+        MILLI * vx,
+        MILLI * vy,
+        np.degrees(spin),
     )
-    return dict(zip(COLUMNS, (list(frames.names), *(column.tolist() for column in values)), strict=True))
+    return np.stack(values, axis=-2)
 
 
 def as_frame(columns: Columns) -> "pd.DataFrame":

@@ -11,8 +11,9 @@ from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, place_
 from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
 from blocksim.world.boundary import particle_count
-from blocksim.world.build import Parts, build_world, smallest_side
-from blocksim.world.interactions import ContactClass, contact_classes, pair_of
+from blocksim.world.bounds import bounds_of
+from blocksim.world.build import build_world
+from blocksim.world.interactions import ContactClass, contact_classes, interactions_of, pair_of
 from blocksim.world.memory import RigidSize, SceneSize, file_bytes
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
 from blocksim.world.rigid_step import longest_step
@@ -102,7 +103,7 @@ def describe(scenario: Scenario) -> Description:
         memory=replace(size, frames=frames).bytes_needed,
         particles=_particles(scenario, placed),
         skin=float(world.controls[0].skin),
-        rigid=_rigid(scenario, Parts(placed, world.bodies, world.interactions), step),
+        rigid=_rigid(scenario, placed, world, step),
     )
 
 
@@ -123,15 +124,16 @@ def _seconds_per_step(scenario: Scenario, blocks: int) -> float:
     return SECONDS_IN_A_CROWD if blocks > CROWD else SECONDS_PER_BODY_AND_STEP
 
 
-def _rigid(scenario: Scenario, parts: Parts, step: float) -> SagDescription | None:
+def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, step: float) -> SagDescription | None:
     if not isinstance(scenario.time, Nonsmooth):
         return None
-    lowest = min(parts.placed, key=lambda body: body.y)
-    blocks = max(1, round((max(body.y for body in parts.placed) + 0.5 * lowest.size_y) / lowest.size_y))
+    lowest = min(placed, key=lambda body: body.y)
+    blocks = max(1, round((max(body.y for body in placed) + 0.5 * lowest.size_y) / lowest.size_y))
+    (bounds,) = bounds_of(world.bodies[np.newaxis], len(placed))
     return SagDescription(
         substeps=scenario.time.substeps,
-        tolerance=velocity_tolerance(scenario.time, len(parts.placed)),
-        longest_step=longest_step(scenario, parts.bodies, parts.interactions, smallest_side(parts)),
+        tolerance=velocity_tolerance(scenario.time, len(placed)),
+        longest_step=longest_step(scenario, bounds, interactions_of(scenario, contact_classes(scenario, placed))),
         blocks=blocks,
         sag=column_sag(step / scenario.time.substeps, lowest, blocks, scenario.gravity),
     )

@@ -6,6 +6,8 @@ from blocksim.kernels.arrays import MOTION_PIECE, MOVED, Records, zeros
 from blocksim.scenario import Scenario
 from blocksim.scenario.motion import motion_direction, motion_pieces
 
+STANDSTILL = zeros(1, MOTION_PIECE)
+
 
 def support_direction(scenario: Scenario) -> tuple[float, float]:
     """Return the direction (unit vector) of the support's motion; zero where it does not move."""
@@ -13,20 +15,24 @@ def support_direction(scenario: Scenario) -> tuple[float, float]:
 
 
 def moved_records(bodies: Records) -> Records:
-    """Return where all bodies that move with the support start."""
-    numbers = np.flatnonzero(bodies.is_moved)
-    records = zeros(numbers.size, MOVED)
+    """Return where all bodies (..., n + 1) that move with the support start; in every scene there are equally many."""
+    is_moved = bodies["is_moved"] != 0
+    numbers = np.nonzero(is_moved)[-1].reshape(*is_moved.shape[:-1], -1)
+    records = zeros(numbers.shape, MOVED)
     records["body"] = numbers
-    records["x"], records["y"] = bodies.x[numbers], bodies.y[numbers]
+    for name in ("x", "y"):
+        records[name] = np.take_along_axis(bodies[name], numbers, -1)
     return records
 
 
 def motion_records(scenario: Scenario) -> Records:
     """Return the pieces of the displacement over time; where a motion ends before the run, the last one is constant."""
+    if scenario.motion is None:
+        return STANDSTILL
     pieces = motion_pieces(scenario)
-    records = zeros(max(1, len(pieces.coefficients)), MOTION_PIECE)
-    if len(pieces.coefficients) > 0:
-        records["start"] = pieces.times[:-1]
-        for k, name in enumerate(("c0", "c1", "c2", "c3")):
-            records[name] = pieces.coefficients[:, k]
+    count = len(pieces.coefficients)
+    records = zeros(max(1, count), MOTION_PIECE)
+    records["start"][:count] = pieces.times[:-1]
+    for k, name in enumerate(("c0", "c1", "c2", "c3")):
+        records[name][:count] = pieces.coefficients[:, k]
     return records

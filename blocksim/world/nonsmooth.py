@@ -1,7 +1,8 @@
 """Build what the non-smooth scheme needs from a scenario, beside the world that both schemes share."""
 
 import math
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,10 +24,14 @@ from blocksim.kernels.nonsmooth.arrays import (
 )
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Nonsmooth as Stepping
-from blocksim.world.build import GROWTH, empty_controls, first_capacity, scene_parts, smallest_side, without_lists
+from blocksim.world.bounds import Bounds
+from blocksim.world.build import GROWTH, empty_controls, first_capacity, numbers, without_lists
 from blocksim.world.memory import RigidSize, refuse_if_too_large
+from blocksim.world.outline import Outline
+from blocksim.world.parts import SURFACE, Parts
 from blocksim.world.rigid_step import choose_rigid_step
 from blocksim.world.skin import SKIN_SHARE
+from blocksim.world.stacks import Construction, Refusal, Stack, Stride, built, member, only
 
 FREQUENCY = 0.125  # of the soft contact, per substep: w h = 2 pi / 8. Above 0.15 walls spread like a fluid
 DAMPING = 10.0  # damping ratio of the soft contact
@@ -69,62 +74,91 @@ def velocity_tolerance(time: Stepping, blocks: int) -> float:
 def build_nonsmooth(scenario: Scenario) -> Nonsmooth:
     """Return a world at time zero with all that stepping it without springs needs.
 
-    Raises SceneTooLargeError when there is not enough memory for it, and StepTooLargeError when the scenario asks for
+    Raises SceneTooLargeError when there is not enough memory for it, and StepTooLongError when the scenario asks for
     an inadmissible step without forcing it.
     """
-    time = stepping_of(scenario)
-    parts = scene_parts(scenario)
-    capacity = first_capacity(parts.bodies)
-    refuse_if_too_large(RigidSize(parts.bodies.size, capacity))
-    smallest = smallest_side(parts)
-    controls = empty_controls(scenario, parts, choose_rigid_step(scenario, parts.bodies, parts.interactions, smallest))
-    stepping = zeros(1, STEPPING)
-    record = stepping[0]
-    record.substep = controls[0].step / time.substeps
-    record.closed_bias, record.softness, _ = soft_contact(record.substep)
-    record.open_bias = 1.0 / record.substep
-    record.threshold = time.restitution_threshold
-    record.tolerance = velocity_tolerance(time, len(parts.placed))
-    record.substeps, record.velocity_sweeps = time.substeps, time.velocity_sweeps
-    record.is_guarded = float(parts.interactions.restitution.max()) > SAFE_RESTITUTION
-    controls[0].skin = smallest * SKIN_SHARE if scenario.contact.skin is None else scenario.contact.skin
-    record.least_reach, record.most_reach = 0.5 * controls[0].skin, MOST_REACH * controls[0].skin
-    controls[0].cell_width = 2.0 * (controls[0].cell_radius + record.most_reach)
-    return with_lists(without_lists(scenario, parts, controls), stepping, capacity)
+    scene: Nonsmooth = member(only(build_nonsmooths([scenario])).scenes, 0)
+    return scene
+
+
+def build_nonsmooths(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
+    """Build many such scenes at time zero, those of one shape together."""
+    return built(scenarios, NONSMOOTH)
+
+
+def _choose(outline: Outline, bounds: Bounds) -> Stride:
+    scenario = outline.scenario
+    stepping_of(scenario)
+    step = choose_rigid_step(scenario, bounds, outline.interactions)
+    return Stride(step, bounds.smallest * SKIN_SHARE if scenario.contact.skin is None else scenario.contact.skin)
+
+
+def _size(parts: Parts) -> RigidSize:
+    bodies = parts.bodies.shape[1]
+    return RigidSize(bodies, first_capacity(bodies))
+
+
+def _assemble(parts: Parts, strides: Sequence[Stride]) -> Nonsmooth:
+    controls = empty_controls(parts, strides)
+    stepping = zeros(controls.shape, STEPPING)
+    rows = [_stepping(outline, stride) for outline, stride in zip(parts.outlines, strides, strict=True)]
+    for name in rows[0]:
+        stepping[name][:, 0] = [row[name] for row in rows]
+    controls["cell_width"] = 2.0 * (controls["cell_radius"] + stepping["most_reach"])
+    return with_lists(without_lists(parts, controls), stepping, first_capacity(parts.bodies.shape[1]))
+
+
+NONSMOOTH = Construction(_choose, lambda _: SURFACE, _size, _assemble)
+
+
+def _stepping(outline: Outline, stride: Stride) -> dict[str, float]:
+    time = stepping_of(outline.scenario)
+    substep = stride.step / time.substeps
+    soft = soft_contact(substep)
+    return {
+        "substep": substep,
+        "closed_bias": soft.bias,
+        "softness": soft.softness,
+        "open_bias": 1.0 / substep,
+        "threshold": time.restitution_threshold,
+        "tolerance": velocity_tolerance(time, len(outline.placed)),
+        "substeps": time.substeps,
+        "velocity_sweeps": time.velocity_sweeps,
+        "is_guarded": max(touch.restitution for row in outline.interactions for touch in row) > SAFE_RESTITUTION,
+        "least_reach": 0.5 * stride.skin,
+        "most_reach": MOST_REACH * stride.skin,
+    }
 
 
 def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1) -> Nonsmooth:
-    """Return a world with empty rows, as many as there is room for pairs."""
-    bodies = world.bodies.size
+    """Return worlds (one, or a stack) with empty rows, as many as there is room for pairs."""
+    *members, bodies = world.bodies.shape
+    groups = groups_for(capacity)
     contacts = Contacts(
-        lines=zeros(bodies, LINE),
-        before=zeros(bodies, BEFORE),
-        rows=zeros(capacity, ROW),
-        groups=zeros(groups_for(capacity), GROUP),
-        ends=np.zeros(COLOURS + 1, dtype=np.int64),
-        touches=world.interactions.reshape(-1).view(np.recarray),
-        books=zeros(groups_for(capacity) // PART + 1, BOOK),
-        residuals=_residuals(threads),
+        lines=zeros((*members, bodies), LINE),
+        before=zeros((*members, bodies), BEFORE),
+        rows=zeros((*members, capacity), ROW),
+        groups=zeros((*members, groups), GROUP),
+        ends=numbers((*members, COLOURS + 1), np.int64),
+        touches=world.interactions.reshape(*members, -1).view(np.recarray),
+        books=zeros((*members, groups // PART + 1), BOOK),
+        residuals=numbers((*members, 2, LINE_WORDS * threads), np.float64),
         stepping=stepping,
     )
     return Nonsmooth(
         world=world,
         contacts=contacts,
-        kept=zeros(capacity, KEPT),
-        spots=zeros(bodies, SPOT),
-        firsts=np.zeros(bodies, dtype=np.int64),
-        begins=np.zeros(COLOURS + 1, dtype=np.int64),
-        used=np.zeros(bodies, dtype=np.int64),
+        kept=zeros((*members, capacity), KEPT),
+        spots=zeros((*members, bodies), SPOT),
+        firsts=numbers((*members, bodies), np.int64),
+        begins=numbers((*members, COLOURS + 1), np.int64),
+        used=numbers((*members, bodies), np.int64),
     )
 
 
 def groups_for(capacity: int) -> int:
     """Return how many groups there is room for: full ones, and one in every colour that is not."""
     return min(capacity, capacity // WIDTH + COLOURS)
-
-
-def _residuals(threads: int) -> Any:
-    return np.zeros((2, LINE_WORDS * threads))
 
 
 def threads_of(scene: Nonsmooth) -> int:
@@ -146,4 +180,4 @@ def with_more_rows(scene: Nonsmooth) -> Nonsmooth:
 
 def with_more_threads(scene: Nonsmooth, threads: int) -> Nonsmooth:
     """Return the same scene with room for what that many threads tell one another."""
-    return scene._replace(contacts=scene.contacts._replace(residuals=_residuals(threads)))
+    return scene._replace(contacts=scene.contacts._replace(residuals=np.zeros((2, LINE_WORDS * threads))))

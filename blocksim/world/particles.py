@@ -89,7 +89,7 @@ def free_ends(body: Record, model: str) -> Records:
 
 def slots_of_a_pair(bodies: Records, model: str) -> int:
     """Return how many contact slots the pair of the two largest bodies needs."""
-    most = int(bodies.particle_count.max())
+    most = int(bodies["particle_count"].max())
     return {"surface": SLOTS, "kernel": 2 * most, "particles": PER_PARTICLE * most}[model]
 
 

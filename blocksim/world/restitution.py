@@ -18,7 +18,8 @@ import math
 # e = 0 would need infinite damping; this rebound counts as none (the promise is at most 1 % of the impact speed)
 SMALLEST_RESTITUTION = 0.009
 HERTZ_SHARE = math.sqrt(5.0 / 6.0)  # damping ratio of Hertz over that of the linear law, for the same restitution
-BISECTIONS = 200
+BISECTIONS = 200  # at most; neighbouring numbers are reached after some sixty
+MOST_KNOWN = 10_000  # ratios that are kept: a sweep may have a restitution of its own in every case
 NEARLY_CRITICAL = 1e-9
 
 
@@ -33,7 +34,7 @@ def restitution_of(damping_ratio: float) -> float:
     return math.exp(-zeta / root * math.log((zeta + root) / (zeta - root)))
 
 
-@functools.cache
+@functools.lru_cache(MOST_KNOWN)
 def damping_ratio(restitution: float, law: str = "linear") -> float:
     """Return the damping ratio (-) for a coefficient of restitution in [0, 1]; the inverse of `restitution_of`.
 
@@ -48,5 +49,7 @@ def damping_ratio(restitution: float, law: str = "linear") -> float:
     low, high = 0.0, 100.0
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
         low, high = (middle, high) if restitution_of(middle) > target else (low, middle)
     return 0.5 * (low + high) * (HERTZ_SHARE if law == "hertz-mindlin" else 1.0)

@@ -7,14 +7,14 @@ time; walls do not fall that fast. A step given by hand is therefore refused onl
 start, or in one substep at that bound.
 """
 
+import itertools
 import math
 
-import numpy as np
-
-from blocksim.kernels.arrays import Records
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Nonsmooth
-from blocksim.world.step import MOST_STEPS, StepError, UncountableStepsError, fastest_fall, fastest_start
+from blocksim.world.bounds import Bounds
+from blocksim.world.interactions import Interactions
+from blocksim.world.step import MOST_STEPS, StepError, UncountableStepsError, fastest_fall
 
 USUAL_STEP = 1e-3  # s
 SHARE = 0.1  # of the smallest side
@@ -34,45 +34,47 @@ class StepTooLongError(StepError):
         )
 
 
-def choose_rigid_step(scenario: Scenario, bodies: Records, table: Records, smallest: float) -> float:
-    """Return the step (s) the run will take, given interactions and the smallest side (m); raises StepError."""
+def choose_rigid_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
+    """Return the step (s) the run will take; raises StepError."""
     asked, end = scenario.time.step, scenario.time.end
-    step = min(automatic_step(scenario, bodies, table, smallest), end) if asked == "auto" else asked
-    limit = longest_step(scenario, bodies, table, smallest)
+    speed = greatest_speed(scenario, bounds, table)
+    step = min(_automatic_step(speed, bounds), end) if asked == "auto" else asked
+    limit = _longest_step(scenario, speed, bounds)
     if not step > 0.0 or end / step > MOST_STEPS:
         raise UncountableStepsError(end, step)
     if step > limit and not scenario.time.force_step:
-        raise StepTooLongError(step, limit, smallest)
+        raise StepTooLongError(step, limit, bounds.smallest)
     return step
 
 
-def automatic_step(scenario: Scenario, bodies: Records, table: Records, smallest: float) -> float:
-    """Return the step (s) without one given by hand."""
-    speed = greatest_speed(scenario, bodies, table)
-    return min(USUAL_STEP, SHARE * smallest / speed) if speed > 0.0 else USUAL_STEP
-
-
-def greatest_speed(scenario: Scenario, bodies: Records, table: Records) -> float:
+def greatest_speed(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
     """Return the bound (m/s) of the speed of any point of a block."""
     tilt = abs(scenario.ground.tilt)
-    pull = scenario.gravity * max(0.0, math.sin(tilt) - least_support_friction(bodies, table) * math.cos(tilt))
-    return math.hypot(fastest_start(bodies), fastest_fall(scenario, bodies)) + pull * scenario.time.end
+    pull = scenario.gravity * max(0.0, math.sin(tilt) - least_support_friction(bounds, table) * math.cos(tilt))
+    return math.hypot(bounds.speed, fastest_fall(scenario, bounds)) + pull * scenario.time.end
 
 
-def least_support_friction(bodies: Records, table: Records) -> float:
+def least_support_friction(bounds: Bounds, table: Interactions) -> float:
     """Return the least kinetic friction of free blocks with the ground, its pieces and fixed blocks.
 
     On one another blocks do not slide farther than they are long.
     """
-    is_free = bodies.inverse_mass > 0.0
-    free, support = (np.unique(bodies.contact_class[chosen]) for chosen in (is_free, ~is_free))
-    if free.size == 0:
-        return math.inf
-    return float(table[np.ix_(support, free)]["kinetic_friction"].min())
+    free = {kind.contact_class for kind in bounds.kinds if kind.inverse_mass > 0.0}
+    fixed = {kind.contact_class for kind in bounds.kinds if not kind.inverse_mass > 0.0}
+    pairs = itertools.product({*fixed, *bounds.grounds}, free)
+    return min((table[i][j].kinetic_friction for i, j in pairs), default=math.inf)
 
 
-def longest_step(scenario: Scenario, bodies: Records, table: Records, smallest: float) -> float:
+def longest_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
     """Return the longest step (s) that may be given by hand."""
+    return _longest_step(scenario, greatest_speed(scenario, bounds, table), bounds)
+
+
+def _automatic_step(speed: float, bounds: Bounds) -> float:
+    return min(USUAL_STEP, SHARE * bounds.smallest / speed) if speed > 0.0 else USUAL_STEP
+
+
+def _longest_step(scenario: Scenario, speed: float, bounds: Bounds) -> float:
     substeps = scenario.time.substeps if isinstance(scenario.time, Nonsmooth) else 1
-    rate = max(fastest_start(bodies), greatest_speed(scenario, bodies, table) / substeps)
-    return SHARE * smallest / rate if rate > 0.0 else scenario.time.end
+    rate = max(bounds.speed, speed / substeps)
+    return SHARE * bounds.smallest / rate if rate > 0.0 else scenario.time.end

@@ -7,8 +7,8 @@ those of the `kernel` model touch nothing before they are inside the other block
 """
 
 from blocksim.errors import InvalidInputError
-from blocksim.kernels.arrays import Records
 from blocksim.scenario import Scenario
+from blocksim.world.bounds import Bounds
 from blocksim.world.step import expected_load
 
 # Shares of the smallest side, measured: in the surface model a body has eight corners to look at, so that a long list
@@ -34,16 +34,17 @@ def nearer_in_a_step(speed: float, step: float) -> float:
     return 2.0 * speed * step
 
 
-def choose_skin(scenario: Scenario, bodies: Records, smallest: float, step: float) -> float:
-    """Return the skin (m) the run will have, given the smallest side (m) and the step (s).
+def choose_skin(scenario: Scenario, bounds: Bounds, step: float) -> float:
+    """Return the skin (m) the run will have, given the step (s).
 
     Raises SkinTooSmallError. Only for a skin given by hand: in a step by the rules two blocks come nearer by about a
     tenth of their overlap in the impact that follows, and the usual limit of overlap keeps that below the default.
     """
     given = scenario.contact.skin
     if given is None:
-        return smallest * (SKIN_SHARE if scenario.contact.model == "surface" else SKIN_SHARE_OF_PARTICLES)
-    speed = expected_load(scenario, bodies).speed
+        share = SKIN_SHARE if scenario.contact.model == "surface" else SKIN_SHARE_OF_PARTICLES
+        return bounds.smallest * share
+    speed = expected_load(scenario, bounds).speed
     # a list holds for one step at least, even where it is made anew at every one
     if given < nearer_in_a_step(speed, step):
         raise SkinTooSmallError(given, speed, step)

@@ -6,9 +6,10 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.kernels.arrays import ALL, Records
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Explicit
+from blocksim.world.bounds import Bounds, Kind
+from blocksim.world.interactions import Interactions
 from blocksim.world.stable_step import ContactBody, ContactStiffness, Load, stable_step, steepest
 
 MOST_STEPS = 2**53  # beyond that a step number is no exact float
@@ -30,19 +31,18 @@ class StepTooLargeError(StepError):
         )
 
 
-def admissible_step(bodies: Records, table: Records, safety: float, law: str, load: Load) -> float:
-    """Return the largest safe step (s) of these bodies with these contact parameters."""
-    is_block = bodies["faces"][:-1] == ALL
-    kinds = _kinds(bodies[:-1][is_block])
-    grounds = sorted({0, *np.unique(bodies["contact_class"][:-1][~is_block]).tolist()})
+def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: str, load: Load) -> float:
+    """Return the largest safe step (s) of blocks within these bounds with these contact parameters."""
+    kinds = [(_contact_body(kind), kind.contact_class) for kind in bounds.kinds]
 
     def stiffness(i: int, j: int, inverse_mass: float) -> ContactStiffness:
-        row = table[i, j]
-        ratio = max(row.normal_damping, row.shear_damping)
-        normal = steepest(law, float(row.normal_stiffness), inverse_mass, load)
-        return ContactStiffness(normal, normal * float(row.shear_ratio), float(ratio))
+        row = table[i][j]
+        normal = steepest(law, row.normal_stiffness, inverse_mass, load)
+        return ContactStiffness(normal, normal * row.shear_ratio, max(row.normal_damping, row.shear_damping))
 
-    grounded = [(body, None, stiffness(c, ground, body.inverse_mass)) for body, c in kinds for ground in grounds]
+    grounded = [
+        (body, None, stiffness(c, ground, body.inverse_mass)) for body, c in kinds for ground in {0, *bounds.grounds}
+    ]
     paired = [
         (a, b, stiffness(ca, cb, a.inverse_mass + b.inverse_mass))
         for (a, ca), (b, cb) in combinations_with_replacement(kinds, 2)
@@ -50,39 +50,22 @@ def admissible_step(bodies: Records, table: Records, safety: float, law: str, lo
     return stable_step([*grounded, *paired], safety)
 
 
-def _kinds(blocks: Records) -> list[tuple[ContactBody, int]]:
-    """Return every kind of block once: its sides and inverse masses, and its contact class."""
-    columns = (2.0 * blocks["half_x"], 2.0 * blocks["half_y"], blocks["inverse_mass"], blocks["inverse_inertia"])
-    rows = np.unique(np.column_stack([*columns, blocks["contact_class"]]), axis=0)
-    return [(ContactBody(*row[:-1]), int(row[-1])) for row in rows.tolist()]
+def _contact_body(kind: Kind) -> ContactBody:
+    return ContactBody(2.0 * kind.half_x, 2.0 * kind.half_y, kind.inverse_mass, kind.inverse_inertia)
 
 
-def expected_load(scenario: Scenario, bodies: Records) -> Load:
+def expected_load(scenario: Scenario, bounds: Bounds) -> Load:
     """Return the speed that the fastest point may reach by falling, or by sliding all the time, and the weight."""
     along = scenario.gravity * abs(math.sin(scenario.ground.tilt))
-    speed = fastest_start(bodies) + fastest_fall(scenario, bodies) + along * scenario.time.end
-    blocks = _blocks(bodies)
-    return Load(speed, scenario.gravity * float(np.sum(blocks.mass[blocks.inverse_mass > 0.0])))
+    speed = bounds.speed + fastest_fall(scenario, bounds) + along * scenario.time.end
+    return Load(speed, scenario.gravity * bounds.mass)
 
 
-def fastest_start(bodies: Records) -> float:
-    """Return an upper bound (m/s) of the speed of any point of a block at the start."""
-    blocks = _blocks(bodies)
-    return float(np.max(np.hypot(blocks.vx, blocks.vy) + blocks.radius * np.abs(blocks.spin)))
-
-
-def fastest_fall(scenario: Scenario, bodies: Records) -> float:
+def fastest_fall(scenario: Scenario, bounds: Bounds) -> float:
     """Return the speed (m/s) at which the highest corner would reach the lowest ground, from rest."""
-    blocks = _blocks(bodies)
     lowest = min((y for _, y in scenario.ground.profile or ()), default=0.0)
-    height = max(0.0, float(np.max(blocks.y + blocks.radius)) - lowest)
+    height = max(0.0, bounds.top - lowest)
     return math.sqrt(2.0 * scenario.gravity * math.cos(scenario.ground.tilt) * height)
-
-
-def _blocks(bodies: Records) -> Records:
-    """Return all bodies but the ground and its pieces."""
-    blocks: Records = bodies[bodies.faces == ALL][:-1].view(np.recarray)
-    return blocks
 
 
 class UncountableStepsError(StepError):
@@ -93,14 +76,14 @@ class UncountableStepsError(StepError):
         super().__init__(f"{end:.4g} s cannot be divided into steps of {step:.4g} s")
 
 
-def choose_step(scenario: Scenario, bodies: Records, table: Records) -> float:
+def choose_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
     """Return the step (s) the run will take; raises StepTooLargeError."""
     if not isinstance(scenario.time, Explicit):
         message = f"scenario {scenario.name} is not one of the explicit scheme"
         raise ValueError(message)  # noqa: TRY004 - the scenario is of the right type
     with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused below
-        load = expected_load(scenario, bodies)
-        limit = admissible_step(bodies, table, scenario.time.safety, scenario.contact.law, load)
+        load = expected_load(scenario, bounds)
+        limit = admissible_step(bounds, table, scenario.time.safety, scenario.contact.law, load)
     limit = min(limit, scenario.time.end)
     asked = scenario.time.step
     step = limit if asked == "auto" else asked

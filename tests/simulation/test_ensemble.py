@@ -6,16 +6,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from blocksim.bench.scenes import pushed_wall
+from blocksim.errors import ExitCode
 from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import ensemble, simulate
-from blocksim.simulation.ensemble import Ensemble, MemberEnd, run_ensemble
-from blocksim.simulation.stacking import stack
-from blocksim.world.build import build_world, empty_lists
+from blocksim.simulation.ending import MemberEnd, MemberFailure
+from blocksim.simulation.ensemble import Ended, Ensemble, run_ensemble, run_in_batches
+from blocksim.simulation.schemes import build_stacks
+from blocksim.world import build, memory, stacks
+from blocksim.world.memory import SceneSize, SceneTooLargeError
+from blocksim.world.rigid_step import StepTooLongError
+from blocksim.world.skin import SkinTooSmallError
+from blocksim.world.stacks import Stack
+from blocksim.world.step import StepTooLargeError
 
 if TYPE_CHECKING:
-    from blocksim.kernels.arrays import World
+    from collections.abc import Iterator
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
+WALL = {"stiffness_scale": 1e-3}
 SOFT = {"contact.stiffness_scale": 1e-3, "contact.restitution": 0.2, "time.end": 0.3}
 
 
@@ -27,7 +36,11 @@ def assert_same(end: MemberEnd, scenario: Scenario) -> None:
     alone = simulate(scenario)
     assert alone.final.equals(end.final)
     assert alone.summary.energy_J == end.ledger
+    assert alone.columns == end.columns
     assert (alone.summary.status, alone.summary.reason) == (end.outcome.status, end.outcome.reason)
+    assert alone.summary.simulated_time_s == end.seconds == end.frames.time[-1]
+    assert np.array_equal(alone.frames.x[-1:], end.frames.x)
+    assert all(np.array_equal(alone.frames.energy[name][-1:], end.frames.energy[name]) for name in end.frames.energy)
 
 
 DIFFERENT: tuple[dict[str, Any], ...] = (
@@ -66,33 +79,122 @@ def test_scenes_of_different_shapes_come_back_in_order() -> None:
         assert_same(end, scenario)
 
 
+def test_a_batch_of_everything_has_the_bits_of_runs_of_their_own() -> None:
+    """Both schemes, all laws, walls, profiles, supports that move, fixed and large blocks, one member or several."""
+    brick = {"block": "brick", "x": 0.3, "y": 0.1}
+    kinds: tuple[dict[str, Any], ...] = (
+        {},
+        {"time.scheme": "nonsmooth"},
+        {"time.scheme": "nonsmooth", "time.step": 5e-4, "contact.restitution": 0.6},
+        {"contact.law": "hertz-mindlin", "contact.stiffness_scale": 0.01},
+        {"bodies": [{**brick, "fixed": True}]},
+        {"bodies": [{**brick, "velocity": [0.3, -0.2], "spin": 2.0}]},
+        {"walls": [{"from": [0.15, 0.2], "to": [0.15, 0.0]}]},
+        {"ground": {"profile": [[0.0, 0.0], [0.1, 0.0], [0.3, -0.1]]}, "time.scheme": "nonsmooth"},
+        {"ground": {"profile": [[0.0, 0.0], [0.1, 0.0], [0.3, -0.1]]}},
+        {"motion": {"kind": "harmonic", "amplitude": 0.002, "frequency": 5.0}},
+        {"motion": {"kind": "harmonic", "amplitude": 0.002, "frequency": 5.0}, "time.scheme": "nonsmooth"},
+    )
+    scenarios = [
+        one
+        for number in range(2)
+        for kind in kinds
+        for one in collapses({"time.end": 0.03, "friction.block_block": 0.25 + 0.1 * number, **kind})
+    ]
+    for end, scenario in zip(run_ensemble(scenarios), scenarios, strict=True):
+        assert_same(end, scenario)
+
+
 @pytest.mark.long  # a minute of compiling
 def test_models_with_particles_go_together_too() -> None:
     change = {"contact.model": "kernel", "contact.particle_spacing": 0.004, "time.end": 0.002}
-    scenarios = collapses(change, {**change, "friction.block_block": 0.1})
+    others = [{**change, **more} for more in ({"contact.model": "particles"}, {"contact.particle_spacing": 0.003}, {})]
+    scenarios = collapses(change, {**change, "friction.block_block": 0.1}, *others)
     for end, scenario in zip(run_ensemble(scenarios, threads=2), scenarios, strict=True):
         assert_same(end, scenario)
 
 
 def test_a_member_whose_pair_list_is_full_gets_more_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenario = collapses({"time.end": 0.02})[0]
-
-    def cramped(given: Scenario) -> World:
-        world = build_world(given)
-        return world._replace(**empty_lists(1, world.candidates.shape[1], world.before))
-
-    monkeypatch.setattr(ensemble, "build_scene", cramped)
+    scenarios = collapses({"time.end": 0.02}, {"time.end": 0.03})
+    monkeypatch.setattr(build, "LEAST_PAIRS", 1)
+    monkeypatch.setattr(build, "PAIRS_PER_BODY", 0)
     calls: list[int] = []
     alone = Ensemble._run_alone
 
-    def counted(self: Ensemble[World], scene: World, last_step: int, start: float) -> tuple[World, int, float]:
-        calls.append(last_step)
-        return alone(self, scene, last_step, start)
+    def counted(self: Ensemble, m: int, start: float) -> Ended:
+        calls.append(m)
+        return alone(self, m, start)
 
     monkeypatch.setattr(Ensemble, "_run_alone", counted)
-    (end,) = run_ensemble([scenario])
-    assert len(calls) == 1
-    assert_same(end, scenario)
+    ends = run_ensemble(scenarios)
+    assert calls == [0, 1]
+    monkeypatch.undo()
+    for end, scenario in zip(ends, scenarios, strict=True):
+        assert_same(end, scenario)
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
+def test_a_pair_list_that_fills_up_on_the_way_changes_no_bit(scheme: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scenarios = [pushed_wall(4, 5, contact=WALL, time={"scheme": scheme, "end": end}) for end in (0.05, 0.06)]
+    alone = [simulate(scenario) for scenario in scenarios]
+    monkeypatch.setattr(build, "PAIRS_PER_BODY", 2)
+    for end, single in zip(run_ensemble(scenarios), alone, strict=True):
+        assert end.columns == single.columns
+        assert end.ledger == single.summary.energy_J
+
+
+def test_members_that_cannot_be_built_fail_in_their_place_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    quick = {"time.end": 0.01}
+    scenarios = collapses(
+        quick,
+        {**quick, "time.step": 1e-2},
+        {**quick, "contact.skin": 4e-6},
+        {**quick, "time.scheme": "nonsmooth"},
+        {"time.end": 1.0, "time.scheme": "nonsmooth", "time.step": 1.0},
+        {**quick, "contact.restitution": 0.1},
+    )
+    ends = [end for batch in run_in_batches(scenarios) for end in batch]
+    errors = [type(end.error) if isinstance(end, MemberFailure) else None for end in ends]
+    assert errors == [None, StepTooLargeError, SkinTooSmallError, None, StepTooLongError, None]
+    assert [end.outcome.status for end in ends] == ["failed" if error else "finished" for error in errors]
+    assert "largest safe step" in ends[1].outcome.reason
+    assert ends[1].outcome.exit_code == ExitCode.INVALID_INPUT
+    for end, scenario in zip(ends, scenarios, strict=True):
+        if isinstance(end, MemberEnd):
+            assert_same(end, scenario)
+    with pytest.raises(StepTooLargeError):
+        run_ensemble(scenarios)
+    monkeypatch.setattr(memory, "available_bytes", lambda: 1000)
+    (end,) = next(run_in_batches(scenarios[:1]))
+    assert isinstance(end, MemberFailure)
+    assert isinstance(end.error, SceneTooLargeError)
+
+
+def test_batches_take_no_more_scenarios_than_they_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken: list[int] = []
+
+    def endless() -> Iterator[Scenario]:
+        scenario = collapses({"time.end": 1e-3})[0]
+        while True:
+            taken.append(len(taken))
+            yield scenario
+
+    batches = run_in_batches(endless(), most=3)
+    assert taken == []
+    assert [len(next(batches)), len(next(batches))] == [3, 3]
+    assert len(taken) <= 7
+    monkeypatch.setattr(ensemble, "MOST_BODIES", 6)  # three a member
+    assert len(next(run_in_batches(endless()))) == 2
+
+
+def test_a_stack_takes_no_more_memory_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenarios = collapses(*({"friction.block_block": 0.3, "time.end": 1e-3 * k} for k in range(1, 6)))
+    whole = [end.columns for end in run_ensemble(scenarios)]
+    one = next(iter(build_stacks(scenarios[:1])))
+    assert isinstance(one, Stack)
+    monkeypatch.setattr(stacks, "MOST_BYTES", 2 * SceneSize(4, 16, 8).world_bytes)
+    assert [len(stack.placed) for stack in build_stacks(scenarios) if isinstance(stack, Stack)] == [2, 2, 1]
+    assert [end.columns for end in run_ensemble(scenarios)] == whole
 
 
 def test_a_member_that_fails_says_so_and_the_others_go_on() -> None:
@@ -124,9 +226,6 @@ def test_less_than_one_thread_is_refused(threads: int) -> None:
         run_ensemble([], threads=threads)
 
 
-def test_stacked_arrays_start_on_a_cache_line() -> None:
-    worlds = [build_world(scenario) for scenario in collapses({}, {})]
-    stacked = stack(worlds)
-    arrays = [array for array in stacked if array is not None and array.size]
-    assert all(array.ctypes.data % 64 == 0 for array in arrays)
-    assert np.array_equal(stacked.bodies[1], worlds[1].bodies)
+def test_batches_without_members_are_refused() -> None:
+    with pytest.raises(ValueError, match="members must be at least 1, not 0"):
+        run_in_batches([], most=0)

@@ -23,19 +23,19 @@ from blocksim.kernels.arrays import (
 )
 from blocksim.kernels.arrays import BODY as BODY_RECORD
 from blocksim.kernels.energy import booked
-from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.world import memory
+from blocksim.world.bounds import bounds_of
 from blocksim.world.build import (
     GROWTH,
-    LARGE_RATIO,
-    MOST_LARGE,
     build_world,
-    cell_radius,
     empty_lists,
     with_more_room,
     with_threads,
 )
+from blocksim.world.interactions import contact_classes, interactions_of
 from blocksim.world.memory import SceneTooLargeError
+from blocksim.world.parts import LARGE_RATIO, MOST_LARGE, cell_radius
 from blocksim.world.restitution import damping_ratio
 from blocksim.world.stable_step import Load
 from blocksim.world.step import StepTooLargeError, admissible_step
@@ -127,7 +127,9 @@ def test_rest_is_looked_for_only_where_it_may_stop_the_run() -> None:
 def test_automatic_step_is_the_admissible_one_and_follows_safety_and_stiffness() -> None:
     world = build_world(scenario())
     step = float(world.controls[0].step)
-    assert step == admissible_step(world.bodies, world.interactions, 0.05, "linear", Load(0.0, 0.0))
+    (bounds,) = bounds_of(world.bodies[np.newaxis], 1)
+    table = interactions_of(scenario(), contact_classes(scenario(), place_bodies(scenario())))
+    assert step == admissible_step(bounds, table, 0.05, "linear", Load(0.0, 0.0))
     assert build_world(scenario(time={"safety": 0.025})).controls[0].step == pytest.approx(step / 2)
     assert build_world(scenario(contact={"stiffness_scale": 0.01})).controls[0].step == pytest.approx(10 * step)
     strong = damping_ratio(0.0)

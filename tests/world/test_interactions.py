@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from blocksim.kernels.arrays import INTERACTION, zeros
+from blocksim.kernels.arrays import INTERACTION
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.world.interactions import (
     ContactClass,
+    Interaction,
     contact_classes,
-    fill_interaction,
-    interaction_table,
+    interaction,
+    interaction_tables,
+    interactions_of,
     normal_stiffness,
     shear_stiffness_ratio,
 )
@@ -20,6 +22,8 @@ from blocksim.world.restitution import damping_ratio
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from blocksim.kernels.arrays import Records
 
 ALUMINIUM = {"unit_weight": 26.7e3, "young_modulus": 69e9, "poisson_ratio": 0.3}
 OAK = {"density": 700.0, "young_modulus": 11e9, "poisson_ratio": 0.4}
@@ -49,6 +53,11 @@ def scenario(ground: Mapping[str, object] | None = None, **tables: Any) -> Scena
 
 def classes(of: Scenario) -> tuple[ContactClass, ...]:
     return contact_classes(of, place_bodies(of))
+
+
+def table_of(of: Scenario) -> Records:
+    table: Records = interaction_tables([interactions_of(of, classes(of))])[0]
+    return table
 
 
 def modulus(one: Mapping[str, float], two: Mapping[str, float]) -> float:
@@ -98,23 +107,28 @@ def test_named_ground_material_counts_for_every_block() -> None:
 
 def test_given_stiffness_replaces_that_of_the_materials_and_is_scaled() -> None:
     of = scenario(contact={"normal_stiffness": 1e6, "shear_stiffness_ratio": 0.5, "stiffness_scale": 3.0})
-    table = interaction_table(of, classes(of))
+    table = table_of(of)
     assert set(table.normal_stiffness[1:].ravel().tolist()) == {3e6}
     assert set(table.shear_ratio[1:].ravel().tolist()) == {0.5}
 
 
 def test_stiffness_scale_multiplies_every_stiffness() -> None:
-    usual, scaled = (
-        interaction_table(of, classes(of)) for of in (scenario(), scenario(contact={"stiffness_scale": 0.01}))
-    )
+    usual, scaled = (table_of(of) for of in (scenario(), scenario(contact={"stiffness_scale": 0.01})))
     assert scaled.normal_stiffness == pytest.approx(0.01 * usual.normal_stiffness, rel=1e-12)
     assert (scaled.shear_ratio == usual.shear_ratio).all()
     assert (scaled.normal_damping == usual.normal_damping).all()
 
 
+def test_parameters_have_the_names_and_the_order_of_the_fields_of_the_table() -> None:
+    assert Interaction._fields == INTERACTION.names
+    of = scenario()
+    for row, values in zip(table_of(of), interactions_of(of, classes(of)), strict=True):
+        assert row.tolist() == [tuple(value) for value in values]
+
+
 def test_table_is_symmetric_and_empty_for_the_ground_alone() -> None:
     of = scenario()
-    table = interaction_table(of, classes(of))
+    table = table_of(of)
     assert (table == table.T).all()
     assert not table[0, 0].normal_stiffness
 
@@ -127,7 +141,7 @@ def test_ground_and_blocks_have_their_own_friction_and_restitution() -> None:
         },
         contact={"restitution": {"block_block": 0.3, "block_ground": 0.6}},
     )
-    table = interaction_table(of, classes(of))
+    table = table_of(of)
     blocks, ground = table[1, 2], table[1, 0]
     assert (blocks.static_friction, blocks.kinetic_friction, blocks.transition_speed) == (0.31, 0.19, 0.004)
     assert (ground.static_friction, ground.kinetic_friction) == (0.38, 0.38)
@@ -137,10 +151,9 @@ def test_ground_and_blocks_have_their_own_friction_and_restitution() -> None:
 
 def test_given_shear_damping_replaces_the_normal_one_in_shear_only() -> None:
     of = scenario(contact={"shear_damping_ratio": 0.05, "restitution": 0.2})
-    record = zeros(1, INTERACTION)[0]
     ground, paper, *_ = classes(of)
-    fill_interaction(record, of, paper, ground)
-    assert (record.normal_damping, record.shear_damping) == (damping_ratio(0.2), 0.05)
+    found = interaction(of, paper, ground)
+    assert (found.normal_damping, found.shear_damping) == (damping_ratio(0.2), 0.05)
 
 
 def test_ground_cannot_touch_itself() -> None:
@@ -153,7 +166,7 @@ def test_ground_cannot_touch_itself() -> None:
 def row(of: Scenario, one: str, two: str | None) -> Any:
     """Return the parameters between a block type and another one, or the ground."""
     order = ["ground", "paper", "flat", "wooden"]
-    return interaction_table(of, classes(of))[order.index(one), order.index(two or "ground")]
+    return table_of(of)[order.index(one), order.index(two or "ground")]
 
 
 def test_pair_of_its_own_counts_for_its_two_materials_only() -> None:
@@ -183,7 +196,7 @@ def test_walls_are_ground_unless_they_have_a_material_of_their_own() -> None:
     *usual, wall = classes(of)
     assert tuple(usual) == classes(scenario())
     assert wall == ContactClass("oak", float("inf"), is_wall=True)
-    table = interaction_table(of, classes(of))
+    table = table_of(of)
     assert table[1, -1].normal_stiffness == pytest.approx(modulus(ALUMINIUM, OAK) * 0.025, rel=1e-12)
     assert table[1, -1].static_friction == 0.5
     assert not table[0, -1].normal_stiffness

@@ -5,10 +5,12 @@ from __future__ import annotations
 from math import hypot, sqrt
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 from blocksim.kernels.laws import HERTZ_MINDLIN, tangent_stiffness
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
+from blocksim.world.bounds import bounds_of
 from blocksim.world.build import build_world
 from blocksim.world.stable_step import Load, steepest
 from blocksim.world.step import MOST_STEPS, StepTooLargeError, UncountableStepsError, expected_load
@@ -29,7 +31,8 @@ def world_of(body: Mapping[str, object], *more: Mapping[str, object], **tables: 
 
 def load_of(*bodies: Mapping[str, object], **tables: Any) -> Load:
     scenario = scenario_of(bodies, **tables)
-    return expected_load(scenario, build_world(scenario).bodies)
+    (bounds,) = bounds_of(build_world(scenario).bodies[np.newaxis], len(bodies))
+    return expected_load(scenario, bounds)
 
 
 def test_expected_speed_is_that_of_a_fall_from_the_highest_point() -> None:

@@ -1,5 +1,7 @@
 """The stepping schemes; a new one is one file beside this one and one entry in `SCHEMES`."""
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,6 +9,8 @@ from blocksim.scenario import Scenario
 from blocksim.simulation.schemes.explicit import EXPLICIT
 from blocksim.simulation.schemes.nonsmooth import NONSMOOTH
 from blocksim.simulation.schemes.scheme import AnyScene, Scene, Scheme
+from blocksim.world.parts import alike
+from blocksim.world.stacks import Refusal, Stack, member, only
 
 SCHEMES = {scheme.name: scheme for scheme in (EXPLICIT, NONSMOOTH)}
 """Scheme as written in a scenario, and what it does."""
@@ -24,8 +28,15 @@ def scheme_of(scene: AnyScene) -> Scheme:
 
 def build_scene(scenario: Scenario) -> AnyScene:
     """Return the scene of a scenario at time zero. Raises what the scheme raises for a scenario that it cannot run."""
-    scene: AnyScene = scheme_named(scenario).build(scenario)
+    scene: AnyScene = member(only(build_stacks([scenario])).scenes, 0)
     return scene
+
+
+def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
+    """Build the scenes of scenarios at time zero, those of one scheme and shape together."""
+    for places in alike([scenario.time.scheme for scenario in scenarios]):
+        scheme = scheme_named(scenarios[places[0]])
+        yield from (one.numbered(places) for one in scheme.build([scenarios[i] for i in places]))
 
 
 def measured_row(scene: AnyScene) -> NDArray[np.float64]:
@@ -42,6 +53,7 @@ __all__ = [
     "Scene",
     "Scheme",
     "build_scene",
+    "build_stacks",
     "measured_row",
     "scheme_named",
     "scheme_of",

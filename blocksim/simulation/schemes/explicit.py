@@ -5,7 +5,7 @@ from blocksim.kernels.arrays import World
 from blocksim.kernels.energy import LEDGER_ROW, measure
 from blocksim.kernels.ensemble import advance_members
 from blocksim.simulation.schemes.scheme import Scheme
-from blocksim.world.build import build_world, with_more_room, with_threads
+from blocksim.world.build import build_worlds, with_more_room, with_threads
 
 WORK_SPACE = ("points", "matrices", "before", "action")
 
@@ -20,7 +20,7 @@ EXPLICIT = Scheme(
     scene_type=World,
     ledger=LEDGER_ROW,
     least_bodies=100,
-    build=build_world,
+    build=build_worlds,
     advance=advance,
     advance_in_team=advance_in_team,
     advance_members=advance_members,

@@ -14,9 +14,9 @@ from blocksim.kernels.arrays import AT_REST, REACHED, TEAM_SIZE
 from blocksim.kernels.nonsmooth.advance import advance_nonsmooth_in_team
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
 from blocksim.kernels.nonsmooth.solve import solve_two
-from blocksim.simulation.stacking import stack
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
-from blocksim.world.nonsmooth import build_nonsmooth, with_more_threads
+from blocksim.world.nonsmooth import build_nonsmooth, build_nonsmooths, with_more_threads
+from blocksim.world.stacks import only
 from tests.kernels.nonsmooth.scenes import rigid
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ def test_same_bits_for_any_number_of_threads_and_calls(begin: Callable[..., Any]
 def test_members_of_an_ensemble_have_the_same_bits(begin: Callable[..., Any]) -> None:
     scenarios = [three_blocks({"restitution": e}) for e in (0.0, 0.1)]
     alone = [begin(scenario).to_step(400) for scenario in scenarios]
-    scenes = stack([build_nonsmooth(rigid(scenario)) for scenario in scenarios])
+    scenes = only(build_nonsmooths([rigid(scenario) for scenario in scenarios])).scenes
     codes, starts = np.zeros(2, dtype=np.int64), np.zeros((2, 8))
     advance_nonsmooth_members(scenes, np.arange(2), np.full(2, 400), starts, codes)
     for m in range(2):

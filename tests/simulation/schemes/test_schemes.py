@@ -12,11 +12,12 @@ from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario.models import stepping
 from blocksim.simulation import read_result, run_ensemble, simulate, simulate_into
 from blocksim.simulation.provenance import run_hash
-from blocksim.simulation.schemes import SCHEMES, build_scene, measured_row, scheme_of
-from blocksim.simulation.stacking import arrays_of, member, shape_of, stack
+from blocksim.simulation.schemes import SCHEMES, build_scene, build_stacks, measured_row, scheme_of
+from blocksim.simulation.stacking import arrays_of
 from blocksim.simulation.team import ALONE, Team
 from blocksim.world import build
 from blocksim.world.nonsmooth import build_nonsmooth
+from blocksim.world.stacks import Stack, member, only
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -128,12 +129,20 @@ def test_ensemble_of_both_schemes_ends_as_single_runs_do() -> None:
         assert single.summary.energy_J == end.ledger
 
 
-def test_members_of_a_stack_are_the_scenes_that_went_in() -> None:
-    scenes = [build_nonsmooth(collapse()) for _ in range(3)]
-    stacked = stack(scenes)
-    assert all(array.ctypes.data % 64 == 0 for array in arrays_of(stacked) if array.size)
-    one = member(stacked, 1)
-    assert isinstance(one, Nonsmooth)
-    assert shape_of(one) == shape_of(scenes[1])
-    assert all(np.array_equal(a, b) for a, b in zip(arrays_of(one), arrays_of(scenes[1]), strict=True))
-    assert shape_of(scenes[0]) != shape_of(build_nonsmooth(wall()))
+def test_members_of_a_stack_are_the_scenes_that_would_be_built_alone() -> None:
+    scenarios = [collapse(step=step) for step in (1e-3, 5e-4, 2e-4)]
+    stack = only(build_stacks(scenarios))
+    assert all(array.ctypes.data % 64 == 0 for array in arrays_of(stack.scenes) if array.size)
+    for m, scenario in enumerate(scenarios):
+        one, alone = member(stack.scenes, m), build_nonsmooth(scenario)
+        assert isinstance(one, Nonsmooth)
+        for a, b in zip(arrays_of(one), arrays_of(alone), strict=True):
+            assert (type(a), a.dtype, a.shape) == (type(b), b.dtype, b.shape)
+            assert np.array_equal(a, b)
+
+
+def test_scenes_of_other_schemes_and_shapes_come_in_stacks_of_their_own() -> None:
+    scenarios = [collapse(), wall(), three_blocks(), collapse(step=5e-4)]
+    stacks = [one for one in build_stacks(scenarios) if isinstance(one, Stack)]
+    assert [stack.numbers for stack in stacks] == [[0, 3], [1], [2]]
+    assert [len(stack.placed) for stack in stacks] == [2, 1, 1]

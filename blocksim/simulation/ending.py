@@ -1,0 +1,99 @@
+"""Where the members of an ensemble ended: all numbers of a stack at once, objects one by one."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.errors import BlocksimError
+from blocksim.scenario import PlacedBody
+from blocksim.simulation.frames import Frames
+from blocksim.simulation.ledger import EnergyLedger, InPlay, ledger_of
+from blocksim.simulation.loop import outcome_of
+from blocksim.simulation.outcome import Outcome
+from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
+from blocksim.simulation.schemes import AnyScene, scheme_of
+from blocksim.simulation.table import COLUMNS, Columns, as_frame, final_values
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Placed = tuple[PlacedBody, ...]
+
+
+@dataclass(frozen=True)
+class MemberEnd:
+    """Where one member ended and how."""
+
+    outcome: Outcome
+    ledger: EnergyLedger
+    seconds: float  # simulated
+    columns: Columns  # the final table, as `final.csv` has it
+    placed: Placed = field(repr=False)
+    time_step: float  # s
+    rows: Rows = field(repr=False)  # one: the last
+
+    @cached_property
+    def frames(self) -> Frames:
+        """One: the last."""
+        return frames_from_rows(self.placed, self.time_step, self.rows)
+
+    @property
+    def final(self) -> "pd.DataFrame":
+        """The final table for people who know pandas."""
+        return as_frame(self.columns)
+
+
+@dataclass(frozen=True)
+class MemberFailure:
+    """A member that could not be built, or for whose contacts there was no room."""
+
+    error: BlocksimError
+
+    @property
+    def outcome(self) -> Outcome:
+        """The same words and code as where it had been run by itself."""
+        return Outcome("failed", str(self.error), self.error.exit_code)
+
+
+class Closing:
+    """The last states of a stack of scenes."""
+
+    def __init__(self, scenes: AnyScene, placed: list[Placed], measured: NDArray[np.float64]) -> None:
+        """Take what is measured (m, e + 2) in the scenes as they are now, as the scheme's `measured`."""
+        world, blocks = scenes.world, len(placed[0])
+        self.names = scheme_of(scenes).ledger
+        self.placed = placed
+        self.measured = measured
+        self.motion = np.stack([world.bodies[name][:, :blocks] for name in MOTION], axis=1)  # (m, 6, b)
+        self.steps: NDArray[np.int64] = world.clock["steps"].copy()  # (m, 1)
+        self.time_steps: list[float] = world.controls["step"][:, 0].tolist()
+        book = world.ledger[:, 0]
+        moved = (book["largest_kinetic"] + book["travel_work"]).tolist()
+        masses = [float(np.sum(mass)) for mass in world.bodies["mass"]]  # one by one: the order decides on a digit
+        self.in_play = [*map(InPlay, masses, moved)]
+        self.columns = final_values(self.motion, _shapes(placed)).tolist()
+
+    def end(self, m: int, start: float, code: int) -> MemberEnd:
+        """Return the end of one member, given its energy (J) at the start and the status code that it came to."""
+        ledger = ledger_of(self.names, self.measured[m], start, self.in_play[m])
+        names = [body.name for body in self.placed[m]]
+        some = slice(m, m + 1)
+        return MemberEnd(
+            outcome=outcome_of(code, ledger),
+            ledger=ledger,
+            seconds=int(self.steps[m, 0]) * self.time_steps[m],
+            columns=dict(zip(COLUMNS, (names, *self.columns[m]), strict=True)),
+            placed=self.placed[m],
+            time_step=self.time_steps[m],
+            rows=Rows(self.steps[m], self.motion[some], self.measured[some], self.names),
+        )
+
+
+def _shapes(placed: list[Placed]) -> NDArray[np.float64]:
+    """Return sides and angles (m, 3, b) as placed."""
+    bodies = ((one.size_x, one.size_y, one.angle) for member in placed for one in member)
+    values = np.array([*bodies]).reshape(len(placed), -1, 3)
+    return values.swapaxes(1, 2)
