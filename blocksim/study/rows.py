@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 
 from blocksim.errors import BlocksimError
-from blocksim.simulation.ensemble import MemberEnd
-from blocksim.simulation.table import Columns, final_columns
+from blocksim.simulation.ending import MemberEnd, MemberFailure
+from blocksim.simulation.table import Columns
 
 Row = dict[str, object]
 X = ".x_mm"
@@ -23,10 +23,11 @@ def row_of(status: str, reason: str, seconds: float, final: Columns) -> Row:
     return row
 
 
-def row_of_end(end: MemberEnd) -> Row:
+def row_of_end(end: MemberEnd | MemberFailure) -> Row:
     """Return the row of a member of an ensemble."""
-    frames = end.frames
-    return row_of(end.outcome.status, end.outcome.reason, float(frames.time[-1]), final_columns(frames))
+    if isinstance(end, MemberFailure):
+        return row_of_error(end.error)
+    return row_of(end.outcome.status, end.outcome.reason, end.seconds, end.columns)
 
 
 def row_of_error(error: Exception) -> Row:

@@ -10,7 +10,7 @@ import time
 from collections.abc import Generator, Iterator, Sequence
 
 from blocksim.scenario import Scenario
-from blocksim.simulation.ensemble import run_ensemble
+from blocksim.simulation.ensemble import run_in_batches
 from blocksim.study.executors.batches import BatchSize, take
 from blocksim.study.executors.task import Batch, Setting, Task, needs_nothing
 from blocksim.study.rows import Row, row_of_end, row_of_error
@@ -72,11 +72,12 @@ def is_still_running() -> bool:
 
 
 def rows_of(scenarios: Sequence[Scenario], threads: int) -> list[Row]:
-    """Return the row of every scenario; those that cannot be built fail alone, found by halving."""
+    """Return the row of every scenario; those that break something unforeseen fail alone, found by halving."""
     if not scenarios:
         return []
     try:
-        return [row_of_end(end) for end in run_ensemble(scenarios, threads=threads)]
+        batches = run_in_batches(scenarios, threads=threads)
+        return [row_of_end(end) for batch in batches for end in batch]
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         if len(scenarios) == 1:
             return [row_of_error(error)]
