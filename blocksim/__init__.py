@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from blocksim.scenario import load_scenario as load
+    from blocksim.study.judge import compare
     from blocksim.study.many import sweep
-    from blocksim.study.single import compare, run
+    from blocksim.study.single import run
 
 __version__ = "0.1.0"
 __all__ = ["compare", "load", "run", "sweep"]
@@ -20,7 +21,7 @@ __all__ = ["compare", "load", "run", "sweep"]
 _HOMES = {
     "load": ("blocksim.scenario", "load_scenario"),
     "run": ("blocksim.study.single", "run"),
-    "compare": ("blocksim.study.single", "compare"),
+    "compare": ("blocksim.study.judge", "compare"),
     "sweep": ("blocksim.study.many", "sweep"),
 }
 

@@ -79,14 +79,15 @@ class Table:
 def read_table(path: Path, columns: Sequence[str]) -> Table:
     """Read a table that has exactly these columns, in any order.
 
-    Rows of the wrong shape are left out and noted in `problems`. Raises InputMissingError when the file
-    cannot be read and InvalidInputError when it is no text or its header is wrong.
+    Rows of the wrong shape are left out and noted in `problems`, and so are columns that are only misspelt. Raises
+    InputMissingError when the file cannot be read and InvalidInputError when it is no text or its header is wrong.
     """
     notes, content = _content(_lines(path))
     if not content:
         raise_problems([Problem(where=str(path), message=f"the table is empty, {_expected(columns)}")])
-    names = _header(content[0], columns)
-    return _filled(Table(where=str(path), notes=notes, header=content[0]), names, content[1:])
+    names, problems = _header(content[0], columns)
+    table = Table(where=str(path), notes=notes, header=content[0], problems=problems)
+    return _filled(table, names, content[1:])
 
 
 def read_open_table(path: Path, limit: int) -> tuple[tuple[Cell, ...], Table]:
@@ -217,8 +218,11 @@ def _shape_complaint(line: Line, cells: list[tuple[str, Line, int, int]] | None,
     return ""
 
 
-def _header(line: Line, columns: Sequence[str]) -> list[str]:
-    """Return the column names in the file's order; raises InvalidInputError for any but the expected ones."""
+def _header(line: Line, columns: Sequence[str]) -> tuple[list[str], list[Problem]]:
+    """Return the column names that are meant, in the file's order, and the mistakes in them.
+
+    Raises InvalidInputError where they do not come to the expected columns.
+    """
     cells = _cells(line)
     if cells is None:
         raise_problems([line.problem(_shape_complaint(line, cells, 0))])
@@ -232,9 +236,15 @@ def _header(line: Line, columns: Sequence[str]) -> list[str]:
     if missing:
         plural = "s" if len(missing) > 1 else ""
         problems.append(line.problem(f"missing column{plural} {', '.join(missing)}; {_expected(columns)}"))
-    if problems:
+    meant = [name if name in columns else _meant(name, missing) for name in names]
+    if sorted(meant) != sorted(columns):
         raise_problems(problems)
-    return names
+    return meant, problems
+
+
+def _meant(name: str, missing: Sequence[str]) -> str:
+    """Return the missing column of which a name is a misspelling, or the name."""
+    return next(iter(difflib.get_close_matches(name.lower(), missing, n=1)), name)
 
 
 def _column_complaint(name: str, before: Sequence[str], columns: Sequence[str]) -> str:

@@ -20,7 +20,7 @@ from enum import StrEnum
 from math import inf, isfinite, nan, sqrt
 from typing import TYPE_CHECKING, Any
 
-from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, Statistics
+from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, Statistics, quoted
 from blocksim.analysis.student import quantile
 from blocksim.errors import InvalidInputError
 
@@ -116,7 +116,7 @@ def compare_final(final: "pd.DataFrame | Mapping[str, Sequence[Any]]", table: Ex
     ]
     unmeasured = [block for block in simulated if block not in table.blocks]
     messages = [f"block '{block}' is not in {table.source}, it is not compared" for block in unmeasured]
-    return Comparison(rows=tuple(rows), source=table.source, messages=tuple(messages))
+    return Comparison(rows=tuple(rows), source=table.source, messages=(*table.messages, *messages))
 
 
 def limits(quantity: str, mean: float, minimum: float, maximum: float) -> tuple[float, float]:
@@ -152,12 +152,9 @@ def _simulated(
     names = [str(name) for name in final["block"]]
     twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
-        message = f"the final table has more than one row for block {_quoted(twice)}"
+        message = f"the final table has more than one row for block {quoted(twice)}"
         raise InvalidInputError(message)
-    absent = [block for block in table.blocks if block not in names]
-    if absent:
-        message = f"{table.source} measures block {_quoted(absent)}, but the run has only {_quoted(names)}"
-        raise InvalidInputError(message)
+    table.refuse_unknown(names, "the run")
     values = {quantity: [float(value) for value in final[column]] for quantity, column in columns.items()}
     return {name: {quantity: values[quantity][i] for quantity in columns} for i, name in enumerate(names)}
 
@@ -204,10 +201,3 @@ def _plain(value: object) -> object:
     if isinstance(value, Verdict):
         return value.value
     return None if isinstance(value, float) and not isfinite(value) else value
-
-
-def _quoted(names: list[str]) -> str:
-    """List names for a message, a long list cut short."""
-    most = 8
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(f"'{name}'" for name in names[:most]) + more

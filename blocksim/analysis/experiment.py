@@ -1,13 +1,14 @@
 """Measured tables: the repeats of a laboratory experiment, as a tidy table and as statistics."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from math import fsum, nan, sqrt
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import fsum, isfinite, nan, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from blocksim.analysis.cells import Cell, Table, raise_problems, read_table, suggestion
 from blocksim.analysis.units import unit_factor
+from blocksim.errors import InvalidInputError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -16,6 +17,8 @@ COLUMNS = ("block", "quantity", "unit", "replicate", "value")
 LONGEST_NAME = 100  # characters in a block name
 LARGEST_VALUE = 1e9  # mm or degrees: squares and sums stay far from overflow
 LARGEST_REPLICATE = 1_000_000
+MISSING = ("", "nan", "na")  # what a cell says, in small letters, where a repeat has no value
+MOST_NAMES = 8  # that a message lists
 
 
 @dataclass(frozen=True)
@@ -63,12 +66,15 @@ class Statistics(NamedTuple):
 class ExperimentTable:
     """The measured repeats of one experiment.
 
-    `measurements` stand in the file's order. `source` is the path as it was given, `notes` the comment lines.
+    `measurements` stand in the file's order; rows without a value are in `missing` (value NaN) and nowhere else.
+    `source` is the path as it was given, `notes` the comment lines, `places` where each block is first named.
     """
 
     measurements: tuple[Measurement, ...]
     source: str
     notes: tuple[str, ...] = ()
+    missing: tuple[Measurement, ...] = ()
+    places: Mapping[str, Cell] = field(default_factory=dict, repr=False)
 
     @property
     def data(self) -> "pd.DataFrame":
@@ -90,6 +96,30 @@ class ExperimentTable:
         """The numbers of the repeats, ascending; a block need not appear in all of them."""
         return tuple(sorted({one.replicate for one in self.measurements}))
 
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What a reader of a comparison has to know: which values are missing."""
+        if not self.missing:
+            return ()
+        first, more = self.missing[0], len(self.missing) - 1
+        told = f"{self.source}: replicate {first.replicate} has no {first.quantity} of block '{first.block}'"
+        return (told + (f" (and {more} more such rows)" if more else ""),)
+
+    def refuse_unknown(self, blocks: Sequence[str], whose: str) -> None:
+        """Raise InvalidInputError, with every place in the file, for measured blocks that are not among `blocks`."""
+        unknown = [block for block in self.blocks if block not in blocks]
+        known = f"but {whose} has only {quoted(blocks)}"
+        located = [
+            self.places[block].problem(f"the table measures block '{block}', {known}")
+            for block in unknown
+            if block in self.places
+        ]
+        if located:
+            raise_problems(located)
+        if unknown:
+            message = f"{self.source} measures block {quoted(unknown)}, {known}"
+            raise InvalidInputError(message)
+
     def values(self, block: str, quantity: str) -> "pd.Series":
         """Return the repeats (mm or deg) of one quantity of one block by replicate; empty if unmeasured."""
         data = self.data
@@ -108,6 +138,12 @@ class ExperimentTable:
         return tuple(_statistics(*pair, values) for pair, values in repeats.items())
 
 
+def quoted(names: Sequence[str]) -> str:
+    """List names for a message, a long list cut short."""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(f"'{name}'" for name in names[:MOST_NAMES]) + more
+
+
 def _frame(rows: Iterable[Any]) -> "pd.DataFrame":
     """Return rows with names as a table of pandas."""
     import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
@@ -124,22 +160,39 @@ def _statistics(block: str, quantity: str, unit: str, values: list[float]) -> St
 def load_table(path: Path | str) -> ExperimentTable:
     """Read a measured table (`block,quantity,unit,replicate,value`, `#` starts a comment line).
 
-    Lengths are converted to mm and angles to degrees. Raises InputMissingError when the file cannot be read
-    and InvalidInputError with every mistake, located by line and column.
+    Lengths are converted to mm and angles to degrees. A row whose value is empty or NaN says that this repeat has none.
+    Raises InputMissingError when the file cannot be read and InvalidInputError with every mistake, located by line and
+    column.
     """
     table = read_table(Path(path), COLUMNS)
-    measurements = []
+    rows = []
     first_lines: dict[tuple[str, str, int], int] = {}
     for row in table.rows:
         measurement = _measurement(row, table)
         if measurement is not None:
             _note_repetition(measurement, row["replicate"], first_lines, table)
-            measurements.append(measurement)
-    if not table.rows and not table.problems:
-        table.problems.append(table.header.problem("the table has a header and no rows"))
+            rows.append((measurement, row))
+    measured = tuple(one for one, _ in rows if isfinite(one.value))
+    _note_emptiness(rows, measured, table)
     if table.problems:
         raise_problems(table.problems)
-    return ExperimentTable(measurements=tuple(measurements), source=str(path), notes=table.notes)
+    missing = tuple(one for one, _ in rows if not isfinite(one.value))
+    places = {row["block"].text: row["block"] for row in reversed(table.rows)}
+    return ExperimentTable(measured, str(path), table.notes, missing, places)
+
+
+def _note_emptiness(
+    rows: Sequence[tuple[Measurement, dict[str, Cell]]], measured: Sequence[Measurement], table: Table
+) -> None:
+    """Note a problem where there is no row, and for every quantity of a block that has no value in any repeat."""
+    if not table.rows and not table.problems:
+        table.problems.append(table.header.problem("the table has a header and no rows"))
+    known = {(one.block, one.quantity) for one in measured}
+    for one, row in rows:
+        if (one.block, one.quantity) not in known:
+            known.add((one.block, one.quantity))
+            message = f"block '{one.block}', {one.quantity} has no value in any replicate"
+            table.problems.append(row["value"].problem(message))
 
 
 def _measurement(row: dict[str, Cell], table: Table) -> Measurement | None:
@@ -198,7 +251,9 @@ def _factor(cell: Cell, quantity: Quantity, table: Table) -> float:
 
 
 def _value(cell: Cell, factor: float, table: Table) -> float:
-    """Return the value in mm or deg; 0 after noting a problem."""
+    """Return the value in mm or deg; NaN where the cell says that there is none, 0 after noting a problem."""
+    if cell.text.lower() in MISSING:
+        return nan
     try:
         value = cell.number() * factor
     except ValueError as error:

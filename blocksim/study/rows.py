@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from blocksim.errors import BlocksimError
-from blocksim.simulation.ending import MemberEnd, MemberFailure
+from blocksim.simulation import MemberEnd, MemberFailure
 from blocksim.simulation.table import Columns
 
 Row = dict[str, object]
@@ -23,11 +23,11 @@ def row_of(status: str, reason: str, seconds: float, final: Columns) -> Row:
     return row
 
 
-def row_of_end(end: MemberEnd | MemberFailure) -> Row:
+def row_of_member(member: MemberEnd | MemberFailure) -> Row:
     """Return the row of a member of an ensemble."""
-    if isinstance(end, MemberFailure):
-        return row_of_error(end.error)
-    return row_of(end.outcome.status, end.outcome.reason, end.seconds, end.columns)
+    if isinstance(member, MemberFailure):
+        return row_of_error(member.error)
+    return row_of(member.outcome.status, member.outcome.reason, member.seconds, member.columns)
 
 
 def row_of_error(error: Exception) -> Row:

@@ -45,6 +45,38 @@ BROKEN = {
             "      |                ^^^^^"
         ),
     ),
+    "two mistyped columns": (
+        "block,quantities,unit,repeat,value\n" + GOOD,
+        (
+            "table.csv:1: missing columns quantity, replicate; "
+            "its first line must be block,quantity,unit,replicate,value\n"
+            "    1 | block,quantities,unit,repeat,value\n"
+            "      | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^\n"
+            "table.csv:1: quantities: unknown column, did you mean 'quantity'?\n"
+            "    1 | block,quantities,unit,repeat,value\n"
+            "      |       ^^^^^^^^^^\n"
+            "table.csv:1: repeat: unknown column, did you mean 'replicate'?\n"
+            "    1 | block,quantities,unit,repeat,value\n"
+            "      |                       ^^^^^^"
+        ),
+    ),
+    "mistyped column beside mistakes in its rows": (
+        "block,quantity,units,replicate,value\n1,x,kg,1,16\n1,x,mm,2,wide\n",
+        (
+            "table.csv:1: missing column unit; its first line must be block,quantity,unit,replicate,value\n"
+            "    1 | block,quantity,units,replicate,value\n"
+            "      | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^\n"
+            "table.csv:1: units: unknown column, did you mean 'unit'?\n"
+            "    1 | block,quantity,units,replicate,value\n"
+            "      |                ^^^^^\n"
+            "table.csv:2: unit: 'kg' is not the unit of a length, write mm, cm or m\n"
+            "    2 | 1,x,kg,1,16\n"
+            "      |     ^^\n"
+            "table.csv:3: value: 'wide' is not a number, write it as 71.69 or 7.169e1\n"
+            "    3 | 1,x,mm,2,wide\n"
+            "      |          ^^^^"
+        ),
+    ),
     "column twice": (
         "block,quantity,unit,replicate,value,block\n" + GOOD,
         (

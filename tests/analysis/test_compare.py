@@ -111,7 +111,17 @@ def test_an_unmeasured_block_is_named_and_not_judged() -> None:
 def test_a_block_that_the_run_lacks_is_an_error() -> None:
     with pytest.raises(InvalidInputError) as caught:
         compare_final(final_table(x=(16.0, 74.0), rotation=(0.0, -90.0)), TABLE)
-    assert str(caught.value) == f"{TABLE.source} measures block '3', but the run has only '1', '2'"
+    line = next(n for n, text in enumerate(Path(TABLE.source).read_text().splitlines(), 1) if text.startswith("3,"))
+    told = f"{TABLE.source}:{line}: block: the table measures block '3', but the run has only '1', '2'"
+    assert str(caught.value).splitlines()[0] == told
+
+
+def test_a_missing_repeat_is_told_beside_the_verdict(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text("block,quantity,unit,replicate,value\n1,x,mm,1,5\n1,x,mm,2,\n1,x,mm,3,6\n")
+    comparison = compare_final(final_table(x=(5.5,), rotation=(0.0,)), load_table(path))
+    assert (comparison.inside, comparison.rows[0].n) == (True, 2)
+    assert comparison.messages == (f"{path}: replicate 2 has no x of block '1'",)
 
 
 def test_a_quantity_that_the_run_lacks_is_an_error() -> None:

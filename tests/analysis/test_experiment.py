@@ -127,6 +127,42 @@ def test_a_single_repeat_has_no_scatter(tmp_path: Path) -> None:
     assert list(statistics["n"]) == [1]
 
 
+@pytest.mark.parametrize("cell", ["", " ", "NaN", "nan", "NA"])
+def test_a_repeat_without_a_value_is_left_out_and_told(tmp_path: Path, cell: str) -> None:
+    rows = f"1,x,mm,1,3\n1,x,mm,2,{cell}\n1,x,mm,3,5\n"
+    path = write(tmp_path, HEADER + rows)
+    table = load_table(path)
+    assert (list(table.values("1", "x").items()), table.summaries()[0].n) == ([(1, 3.0), (3, 5.0)], 2)
+    assert table.messages == (f"{path}: replicate 2 has no x of block '1'",)
+
+
+def test_many_missing_values_are_counted(tmp_path: Path) -> None:
+    table = load_table(write(tmp_path, HEADER + "1,x,mm,1,3\n1,x,mm,2,\n1,x,mm,3,\n1,x,mm,4,NaN\n"))
+    assert table.messages[0].endswith("replicate 2 has no x of block '1' (and 2 more such rows)")
+
+
+def test_a_repeat_whose_row_is_absent_is_no_mistake(tmp_path: Path) -> None:
+    table = load_table(write(tmp_path, HEADER + "1,x,mm,1,3\n2,x,mm,1,4\n2,x,mm,2,5\n"))
+    assert [row.n for row in table.summaries()] == [1, 2]
+    assert table.messages == ()
+
+
+def test_blocks_that_a_run_lacks_are_shown_where_they_are_first_named(tmp_path: Path) -> None:
+    rows = "# source\n1,x,mm,1,3\nleft,x,mm,1,4\n9,x,mm,1,4\n9,x,mm,2,4\n"
+    table = load_table(write(tmp_path, HEADER + rows))
+    with pytest.raises(InvalidInputError) as caught:
+        table.refuse_unknown(("1", "2"), "the run")
+    path = tmp_path / "table.csv"
+    assert str(caught.value) == (
+        f"{path}:4: block: the table measures block 'left', but the run has only '1', '2'\n"
+        "    4 | left,x,mm,1,4\n"
+        "      | ^^^^\n"
+        f"{path}:5: block: the table measures block '9', but the run has only '1', '2'\n"
+        "    5 | 9,x,mm,1,4\n"
+        "      | ^"
+    )
+
+
 def write(folder: Path, text: str) -> Path:
     path = folder / "table.csv"
     path.write_bytes(text.encode())
@@ -175,12 +211,24 @@ BROKEN = {
             "      |          ^^^^^^^^"
         ),
     ),
-    "nan": (
-        HEADER + "1,x,mm,1,nan\n",
+    "no value in any repeat": (
+        HEADER + "1,x,mm,1,nan\n1,x,mm,2,\n2,x,mm,1,3\n",
+        ("table.csv:2: value: block '1', x has no value in any replicate\n    2 | 1,x,mm,1,nan\n      |          ^^^"),
+    ),
+    "dash for a missing value": (
+        HEADER + "1,x,mm,1,-\n",
         (
-            "table.csv:2: value: 'nan' is not a number, write it as 71.69 or 7.169e1\n"
-            "    2 | 1,x,mm,1,nan\n"
-            "      |          ^^^"
+            "table.csv:2: value: '-' is not a number, write it as 71.69 or 7.169e1\n"
+            "    2 | 1,x,mm,1,-\n"
+            "      |          ^"
+        ),
+    ),
+    "missing value given twice": (
+        HEADER + "1,x,mm,1,3\n1,x,mm,1,\n",
+        (
+            "table.csv:3: replicate: block '1', x, replicate 1 is already given in line 2\n"
+            "    3 | 1,x,mm,1,\n"
+            "      |        ^"
         ),
     ),
     "infinite after reading": (

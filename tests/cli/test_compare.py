@@ -1,10 +1,18 @@
 """blocksim compare: what it takes, what it says, and its exit code."""
 
 import json
+import sys
+from math import sqrt
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
+from scipy import stats
 
+from blocksim.analysis.metrics import METRICS
+from blocksim.analysis.metrics.metric import BLOCK
 from tests.cli.conftest import SOFT, Command
 
 TABLE = "scenarios/experiments/three_blocks.csv"
@@ -106,9 +114,114 @@ def test_sweep_is_judged_by_its_share_inside(blocksim: Command) -> None:
     assert blocksim("compare", "out").code == 0
     answer = blocksim("compare", "out", "--threshold", 0.6)
     assert answer.code == 1
-    assert "50% of 2 cases are inside all measured ranges (asked for: 60%)" in answer.out
+    last = answer.out.splitlines()[-1]
+    assert last == "1 of 2 members (50.0 %) are inside in everything; asked for: 60.0 %"
+    assert ": failed: " in answer.out
     assert json.loads(blocksim("compare", "out", "--json").out)[0]["share_inside"] == 0.5
-    assert "50% of 2 cases" in blocksim("compare", "out", "--experiment", TABLE).out
+    assert "1 of 2 members" in blocksim("compare", "out", "--experiment", TABLE).out
+
+
+@pytest.fixture
+def made_up(tmp_path: Path) -> Path:
+    """Give the folder of a sweep of 5000 members with large numbers, long names and failures."""
+    count = 5000
+    data: dict[str, list[object]] = {
+        "case": [f"{number:012x}" for number in range(count)],
+        "status": [*["finished"] * 7, *["failed"] * 13, *["finished"] * (count - 20)],
+        "reason": ["x" * 200] * count,
+    }
+    for block in ("a_block_with_quite_a_long_name", "b"):
+        data[f"{block}.x_mm"] = [-1234.5 + number / 10 for number in range(count)]
+        data[f"{block}.rotation_deg"] = [-90.0 * (number % 60) for number in range(count)]
+    folder = tmp_path / "made_up"
+    folder.mkdir()
+    pd.DataFrame(data).to_csv(folder / "sweep.csv", index=False)
+    rows = [
+        f"{block},{quantity},{unit},{replicate},{value}"
+        for block in ("a_block_with_quite_a_long_name", "b")
+        for quantity, unit, values in (("x", "mm", (-1200, -1100.5, -999)), ("rotation", "deg", (-90, -90, -180)))
+        for replicate, value in enumerate(values, 1)
+    ]
+    (tmp_path / "own.csv").write_text("\n".join(["block,quantity,unit,replicate,value", *rows]))
+    return folder
+
+
+def test_judgement_is_not_wider_than_80_columns(blocksim: Command, made_up: Path) -> None:
+    assert made_up.is_dir()
+    answer = blocksim("compare", "made_up", "--experiment", "own.csv")
+    assert answer.code == 1
+    lines = answer.out.splitlines()
+    assert [line for line in lines if len(line) > 80] == []
+    assert "... and 10 more did not finish (--json names all)" in lines
+    assert "... and 21 more rows (--json has all)" in lines
+
+
+def test_judgement_as_json_has_every_row_and_the_meaning_of_every_number(blocksim: Command, made_up: Path) -> None:
+    answer = blocksim("compare", made_up, "--experiment", "own.csv", "--json", "--u-num", 0.25)
+    told = json.loads(answer.out)[0]
+    assert (told["members"], len(told["failed"])) == (5000, 13)
+    assert len(told["metrics"]["outcome"]["rows"]) == 61
+    assert told["metrics"]["validation"]["rows"][0]["u_num"] == 0.25
+    assert set(told["metrics"]["area"]["rows"][0]) == set(told["metrics"]["area"]["columns"])
+
+
+def test_known_statistics_come_back(blocksim: Command, tmp_path: Path) -> None:
+    second, third = [72.0, 74.0, 76.0, 78.0, 80.0], [128.0, 131.0, 131.0, 136.0, 137.0]
+    columns = {"1.x_mm": [16.0] * 5, "2.x_mm": second, "3.x_mm": third, "1.rotation_deg": [0.1] * 5}
+    turned = {"2.rotation_deg": [-90.0] * 5, "3.rotation_deg": [-90.0, -90.0, -90.0, -180.0, -90.0]}
+    table = pd.DataFrame({"case": list("abcde"), "status": "finished", "reason": "", **columns, **turned})
+    table.to_csv(tmp_path / "sweep.csv", index=False)
+    metrics = json.loads(blocksim("compare", ".", "--experiment", TABLE, "--json").out)[0]["metrics"]
+
+    def numbers(metric: str, column: str) -> list[Any]:
+        return [row[column] for row in metrics[metric]["rows"]]
+
+    repeats = [[71.69, 76.57, 72.70, 73.22, 73.73, 78.53], [132.86, 136.05, 128.89, 128.55, 131.70, 129.92]]
+    # second: 72 to 78 are inside; third: 131, 131, 136; both: 74 and 76, as the member with 78 has turned too far
+    assert numbers("inside", "inside") == [5, 4, 3, 5, 5, 4, 2]
+    assert numbers("validation", "S") == pytest.approx([16.0, 76.0, 132.6], abs=1e-6)
+    assert numbers("validation", "u_input") == pytest.approx([0.0, sqrt(10.0), np.std(third, ddof=1)], abs=1e-6)
+    expected = [0.5, *(sqrt(np.var(values, ddof=1) / 6 + 0.25) for values in repeats)]
+    assert numbers("validation", "u_D") == pytest.approx(expected, abs=1e-6)
+    halves = [2.570581836 * np.std(values, ddof=1) * sqrt(7 / 6) for values in repeats]  # t_(5, 0.975) from tables
+    ends = [
+        end for mean, half in zip(np.mean(repeats, axis=1), halves, strict=True) for end in (mean - half, mean + half)
+    ]
+    assert np.ravel(numbers("prediction", "prediction")) == pytest.approx(ends, abs=1e-6)
+    areas = [stats.wasserstein_distance(*pair) for pair in zip((second, third), repeats, strict=True)]
+    assert numbers("area", "area") == pytest.approx([0.0, *areas], abs=1e-6)
+    difference = np.mean(repeats, axis=1) - [76.0, 132.6]
+    both = np.cov(repeats) / 6 + np.cov([second, third]) / 5
+    assert numbers("joint", "T2") == pytest.approx([difference @ np.linalg.inv(both) @ difference], abs=1e-6)
+    assert numbers("outcome", "share") == [0.8, 0.2]
+
+
+def test_help_explains_every_number_in_a_line(blocksim: Command) -> None:
+    lines = blocksim("compare", "--help").out.splitlines()
+    assert max(map(len, lines)) <= 80
+    for metric in METRICS.values():
+        assert f"  {metric.name}: {metric.meaning}" in lines
+        for column in set(metric.columns) - set(BLOCK):
+            assert f"    {column.name:<13} {column.meaning}" in lines
+
+
+def test_missing_scipy_stops_sweeps_and_not_runs(
+    blocksim: Command, made_up: Path, finished: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "scipy.special", None)
+    answer = blocksim("compare", made_up, "--experiment", "own.csv")
+    assert (answer.code, answer.out) == (69, "")
+    assert "pip install 'blocksim[study]'" in answer.err
+    assert blocksim("compare", finished).code == 1
+
+
+@pytest.mark.parametrize("option", ["--threshold", "--u-num"])
+@pytest.mark.parametrize("value", ["nan", "-1", "inf"])
+def test_wrong_numbers_for_a_sweep_are_refused(blocksim: Command, made_up: Path, option: str, value: str) -> None:
+    answer = blocksim("compare", made_up, "--experiment", "own.csv", option, value)
+    assert answer.code in {2, 65}
+    assert answer.out == ""
+    assert option in answer.err
 
 
 def test_sweep_without_experiment_asks_for_a_table(blocksim: Command) -> None:

@@ -15,7 +15,9 @@ from blocksim.kernels.lanes.functions import (
     fields_0,
     fields_4,
     fields_8,
+    fields_12,
     fields_16,
+    four,
     greater,
     is_all,
     lesser,
@@ -137,6 +139,19 @@ def _split(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     return context.make_tuple(builder, signature.return_type, numbers)
 
 
+def _repeat(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    return context.make_tuple(builder, signature.return_type, WIDTH * list(arguments))
+
+
+def _four(_: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    if signature.args[0] != types.none:
+        return arguments[1]
+    lanes = ir.Constant(VECTOR, ir.Undefined)
+    for k, number in enumerate(arguments[1:]):
+        lanes = builder.insert_element(lanes, number, INDEX(k))
+    return lanes
+
+
 def _field_pointer(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     """Return a pointer to a field of four, or to one of its numbers."""
     start = context.make_array(signature.args[1])(context, builder, arguments[1]).data
@@ -218,10 +233,10 @@ def _define_memory() -> None:
         _declare(function, answer)
         return lower_builtin(function, *kinds)
 
-    four, single = types.UniTuple(LANES, WIDTH), types.UniTuple(types.float64, WIDTH)
-    for function, part in ((fields_0, 0), (fields_4, 1), (fields_8, 2), (fields_16, 4)):
-        typed(function, four, types.NoneType, types.Array, types.NestedArray)(_read_fields(part))
-        typed(function, four, types.NoneType, types.Array, types.UniTuple)(_read_fields(part))
+    columns, single = types.UniTuple(LANES, WIDTH), types.UniTuple(types.float64, WIDTH)
+    for function, part in ((fields_0, 0), (fields_4, 1), (fields_8, 2), (fields_12, 3), (fields_16, 4)):
+        typed(function, columns, types.NoneType, types.Array, types.NestedArray)(_read_fields(part))
+        typed(function, columns, types.NoneType, types.Array, types.UniTuple)(_read_fields(part))
         typed(function, single, types.Integer, types.Array, types.NestedArray)(_read_fields(part))
     end = (MaskType, types.UniTuple)
     for writer, part in ((write_fields_0, 0), (write_fields_4, 1), (write_fields_8, 2)):
@@ -230,6 +245,9 @@ def _define_memory() -> None:
     single_end = (types.Boolean, types.UniTuple)
     typed(write_fields_0, types.none, types.Integer, types.Array, types.NestedArray, *single_end)(_write_fields(0))
     typed(split, single, LanesType)(_split)
+    typed(split, single, types.Float)(_repeat)
+    typed(four, LANES, types.NoneType, *[types.Float] * WIDTH)(_four)
+    typed(four, types.float64, types.Integer, *[types.Float] * WIDTH)(_four)
     typed(load, LANES, types.NoneType, types.NestedArray)(_load)
     typed(load, types.float64, types.Integer, types.NestedArray)(_load)
     typed(store, types.none, types.NoneType, types.NestedArray, LanesType)(_store)

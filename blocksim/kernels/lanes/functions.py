@@ -44,8 +44,13 @@ def is_all(mask: Mask) -> bool:
 
 
 def split(x: Lanes) -> tuple[float, float, float, float]:
-    """Return the numbers in the lanes."""
-    return tuple(x)
+    """Return the numbers in the lanes, or a single one four times."""
+    return tuple(np.broadcast_to(x, WIDTH))
+
+
+def four(lane: Lane, one: float, two: float, three: float, last: float) -> Lanes:
+    """Return four numbers as lanes, or the first of them where a single lane is meant."""
+    return np.array([one, two, three, last]) if lane is None else one
 
 
 def load(lane: Lane, field: Any) -> Lanes:
@@ -77,6 +82,11 @@ def fields_4(lane: Lane, records: Records, places: Places) -> tuple[Lanes, Lanes
 def fields_8(lane: Lane, records: Records, places: Places) -> tuple[Lanes, Lanes, Lanes, Lanes]:
     """Return the four fields after those of the records at four places."""
     return _fields(lane, records, places, 8)
+
+
+def fields_12(lane: Lane, records: Records, places: Places) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Return the four fields after those of the records at four places; what is no double there makes no sense."""
+    return _fields(lane, records, places, 12)
 
 
 def fields_16(lane: Lane, records: Records, places: Places) -> tuple[Lanes, Lanes, Lanes, Lanes]:

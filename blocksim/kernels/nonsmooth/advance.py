@@ -11,7 +11,7 @@ from blocksim.kernels.lanes import WIDTH
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.energy import has_excessive_overlap
 from blocksim.kernels.nonsmooth.groups import gather, pack_groups, unpack_groups
-from blocksim.kernels.nonsmooth.manifold import are_four_of_blocks, collide, collide_four
+from blocksim.kernels.nonsmooth.manifold import Place, are_four_of_blocks, collide, collide_four
 from blocksim.kernels.nonsmooth.motion import place_all
 from blocksim.kernels.nonsmooth.neighbours import look
 from blocksim.kernels.nonsmooth.substep import bodies_of, kick_share, substep
@@ -87,18 +87,22 @@ def supervise(scene: Nonsmooth, k: int, task: int) -> int:
 @kernel
 def collide_rows(scene: Nonsmooth, begin: int, end: int) -> None:
     """Find the manifolds of some rows."""
+    contacts = scene.contacts
     bodies = scene.world.bodies
+    rows = contacts.rows
     ground = bodies.size - 1
-    margin = scene.contacts.stepping[0].margin
-    rows = scene.contacts.rows
+    h = contacts.stepping[0].substep
+    ahead = 0.5 * (scene.world.controls[0].step - h)
     r = begin
     while r < end:
         if r + WIDTH <= end and are_four_of_blocks(rows, r, bodies):
-            collide_four(rows, r, bodies, margin)
+            collide_four(contacts, bodies, r, ahead)
             r += WIDTH
         else:
             row = rows[r]
-            row.is_on = collide(row, bodies[row.a], bodies[row.b], row.b == ground, margin)
+            lines = contacts.lines
+            place = Place(contacts.stepping[0].margin, ahead, 0.5 * h, row.b == ground)
+            collide(row, bodies[row.a], bodies[row.b], lines[row.a], lines[row.b], place)
             r += 1
 
 

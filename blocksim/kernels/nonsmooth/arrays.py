@@ -25,23 +25,28 @@ ROW = record_type(
     "width "  # m: from point one to point two along the tangent
     "shear_arm_a shear_arm_b "  # m: r x t, the same for both points, as they lie on one face
     "gap_one gap_two "  # m: when the step began; FAR where there is no such point
-    "normal_one normal_two shear",  # N s: impulses of the last substep: pushing apart, on body a along the tangent
+    "normal_one normal_two shear "  # N s: impulses of the last substep: pushing apart, on body a along the tangent
+    "bend shear_bend",  # m/s: what the velocities at the points gain within half a substep, as the bodies turn
     indices="a b touch",  # bodies; place in the table of interactions
-    flags="is_on",  # flag: one point or two are within the margin
+    flags="reach",  # of the manifold in the step under way: AWAY, OPEN or TOUCHING
 )
 # four active rows of one colour, field by field; see groups.py
 LANE_FLOATS = (
     "nx ny arm_a arm_b width shear_arm_a shear_arm_b gap_one gap_two normal_one normal_two shear "  # as in ROW
-    "target_one target_two "  # m/s: least approach that the velocity pass leaves; -FAR where a point does not count
-    "restitution friction "  # -: friction is kinetic
-    "pressed needed mass"  # N s, N s, 1/kg: work space for static friction
+    "bend shear_bend "  # as in ROW
+    "target_one target_two"  # m/s: least approach that the velocity pass leaves; -FAR where a point does not count
 )
 LANE_INDICES = "a b row"  # bodies; number of the row
 GROUP = on_own_lines(
     np.dtype(
         [(name, np.float64, (WIDTH,)) for name in LANE_FLOATS.split()]
         + [(name, np.uint32, (WIDTH,)) for name in LANE_INDICES.split()]
-        + [("count", np.uint8), ("is_simple", np.uint8)],  # rows, the others are copies; flag: static is kinetic
+        + [
+            ("touch", np.uint32),  # place in the table of interactions: of all rows, if they are alike, or of one
+            ("count", np.uint8),  # of rows, the others are copies
+            ("are_alike", np.uint8),  # flag: one touch for all
+            ("are_simple", np.uint8),  # flag: static friction is the kinetic one
+        ],
         align=True,
     )
 )
@@ -75,6 +80,7 @@ STEPPING = record_type(
 BOOK = record_type("impacts friction to_support")  # J: what normal and shear impulses have taken, and given, so far
 
 FAR = 1e9  # m or m/s: of points that are not there, or do not count
+AWAY, OPEN, TOUCHING = range(3)  # no point within the margin; a gap at all points; a point that touches or pressed
 COLOURS = 64  # the last one is for pairs that found no other; one thread goes through it
 PART = 4  # groups that share a book; threads take whole ones
 

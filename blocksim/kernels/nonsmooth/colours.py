@@ -7,7 +7,7 @@ not depend on who takes which part. Greedy in the order of the list: the same li
 from blocksim.kernels.arrays import Record
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.lanes import WIDTH
-from blocksim.kernels.nonsmooth.arrays import COLOURS, Nonsmooth
+from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, Nonsmooth
 
 ONE = 1
 
@@ -49,7 +49,7 @@ def keep_impulses(scene: Nonsmooth, count: int) -> None:
     for i in range(scene.firsts.size):
         scene.firsts[i] = 0
     for r in range(scene.contacts.stepping[0].row_count):
-        if rows[r].is_on:
+        if rows[r].reach != AWAY:
             kept[r].next = scene.firsts[rows[r].a]
             scene.firsts[rows[r].a] = r + 1
     for p in range(count):
@@ -115,6 +115,6 @@ def place_rows(scene: Nonsmooth, count: int) -> None:
         row.a = pair.a
         row.b = pair.b
         row.touch = bodies[pair.a].contact_class * classes + bodies[pair.b].contact_class
-        row.is_on = 0
+        row.reach = AWAY
         copy_impulses(pair, row)
     scene.contacts.stepping[0].row_count = count

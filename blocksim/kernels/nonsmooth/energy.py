@@ -11,7 +11,7 @@ from blocksim.kernels.arrays import Floats, Records
 from blocksim.kernels.energy import potential_energy, smallest_side
 from blocksim.kernels.integrate import kinetic_energy
 from blocksim.kernels.jit import entry_kernel, rare_kernel
-from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.kernels.nonsmooth.arrays import AWAY, TOUCHING, Nonsmooth
 
 DEEPEST = (
     0.5  # of the smallest side of a pair: what goes deeper comes out on the other side. Impacts of fast blocks that
@@ -63,7 +63,7 @@ def contact_points(scene: Nonsmooth) -> tuple[int, float]:
     largest = 0.0
     for r in range(scene.contacts.stepping[0].row_count):
         row = scene.contacts.rows[r]
-        if row.is_on:
+        if row.reach != AWAY:
             count += (1 if row.normal_one > 0.0 else 0) + (1 if row.normal_two > 0.0 else 0)
             largest = max(largest, -row.gap_one, -row.gap_two)
     return count, largest
@@ -77,7 +77,7 @@ def has_excessive_overlap(scene: Nonsmooth) -> bool:
     for r in range(scene.contacts.stepping[0].row_count):
         row = scene.contacts.rows[r]
         overlap = max(-row.gap_one, -row.gap_two)
-        if row.is_on and overlap > 0.0:
+        if row.reach == TOUCHING and overlap > 0.0:
             side = min(smallest_side(bodies[row.a]), smallest_side(bodies[row.b]))
             if overlap > (given if given > 0.0 else DEEPEST * side):
                 return True

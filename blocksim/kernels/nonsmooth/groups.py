@@ -15,23 +15,14 @@ from blocksim.kernels.lanes import (
     fields_0,
     fields_4,
     fields_8,
+    fields_12,
+    four,
     load,
     split,
     store,
 )
-from blocksim.kernels.nonsmooth.arrays import COLOURS, Contacts
-
-
-class Rows(NamedTuple):
-    """What four rows are, the same for all substeps of a step; fields as in ROW."""
-
-    nx: Lanes
-    ny: Lanes
-    arm_a: Lanes
-    arm_b: Lanes
-    width: Lanes
-    shear_arm_a: Lanes
-    shear_arm_b: Lanes
+from blocksim.kernels.nonsmooth.arrays import COLOURS, OPEN, TOUCHING, Contacts
+from blocksim.kernels.nonsmooth.slip import Rows
 
 
 class Bodies(NamedTuple):
@@ -70,8 +61,47 @@ def bodies_at(contacts: Contacts, places: Integers, lane: Lane) -> Bodies:
 
 
 @kernel
+def touch_of(contacts: Contacts, group: Record, k: int) -> Record:
+    """Return how the bodies of one row of a group interact."""
+    return contacts.touches[contacts.rows[group.row[k]].touch]
+
+
+@kernel
+def restitutions(contacts: Contacts, group: Record, lane: Lane) -> Lanes:
+    """Return the restitutions of the rows of a group."""
+    if group.are_alike:
+        one = contacts.touches[group.touch].restitution
+        return four(lane, one, one, one, one)
+    return four(
+        lane,
+        touch_of(contacts, group, 0).restitution,
+        touch_of(contacts, group, 1).restitution,
+        touch_of(contacts, group, 2).restitution,
+        touch_of(contacts, group, 3).restitution,
+    )
+
+
+@kernel
+def kinetic_frictions(contacts: Contacts, group: Record, lane: Lane) -> Lanes:
+    """Return the coefficients of kinetic friction of the rows of a group."""
+    if group.are_alike:
+        one = contacts.touches[group.touch].kinetic_friction
+        return four(lane, one, one, one, one)
+    return four(
+        lane,
+        touch_of(contacts, group, 0).kinetic_friction,
+        touch_of(contacts, group, 1).kinetic_friction,
+        touch_of(contacts, group, 2).kinetic_friction,
+        touch_of(contacts, group, 3).kinetic_friction,
+    )
+
+
+@kernel
 def gather(contacts: Contacts, begins: Integers) -> None:
-    """Make groups of the rows that are on, colour after colour."""
+    """Make groups of the rows within the margin, colour after colour.
+
+    Those that touch come first, so that groups of which none does can be passed by.
+    """
     stepping = contacts.stepping[0]
     rows = contacts.rows
     count = 0
@@ -80,15 +110,16 @@ def gather(contacts: Contacts, begins: Integers) -> None:
         contacts.ends[colour] = number
         most = 1 if colour == COLOURS - 1 else WIDTH
         lane = 0
-        for r in range(begins[colour], begins[colour + 1]):
-            if rows[r].is_on:
-                contacts.groups[number].row[lane] = r
-                lane += 1
-                count += 1
-                if lane == most:
-                    close(contacts.groups[number], lane)
-                    number += 1
-                    lane = 0
+        for reach in (TOUCHING, OPEN):
+            for r in range(begins[colour], begins[colour + 1]):
+                if rows[r].reach == reach:
+                    contacts.groups[number].row[lane] = r
+                    lane += 1
+                    count += 1
+                    if lane == most:
+                        close(contacts.groups[number], lane)
+                        number += 1
+                        lane = 0
         if lane > 0:
             close(contacts.groups[number], lane)
             number += 1
@@ -114,16 +145,18 @@ def pack_groups(contacts: Contacts, begin: int, end: int) -> None:
             pack(contacts, group, 0)
         else:
             pack(contacts, group, None)
-        group.is_simple = 1
+        group.touch = contacts.rows[group.row[0]].touch
+        group.are_alike = 1
+        group.are_simple = 1
         for lane in range(1 if group.count == 1 else WIDTH):
             row = contacts.rows[group.row[lane]]
-            touch = contacts.touches[row.touch]
             group.a[lane] = row.a
             group.b[lane] = row.b
-            group.restitution[lane] = touch.restitution
-            group.friction[lane] = touch.kinetic_friction
+            if row.touch != group.touch:
+                group.are_alike = 0
+            touch = contacts.touches[row.touch]
             if touch.static_friction != touch.kinetic_friction:
-                group.is_simple = 0
+                group.are_simple = 0
 
 
 @kernel
@@ -132,6 +165,9 @@ def pack(contacts: Contacts, group: Record, lane: Lane) -> None:
     nx, ny, arm_a, arm_b = fields_0(lane, contacts.rows, group.row)
     width, shear_arm_a, shear_arm_b, gap_one = fields_4(lane, contacts.rows, group.row)
     gap_two, normal_one, normal_two, shear = fields_8(lane, contacts.rows, group.row)
+    bend, shear_bend, _, _ = fields_12(lane, contacts.rows, group.row)
+    store(lane, group.bend, bend)
+    store(lane, group.shear_bend, shear_bend)
     store(lane, group.nx, nx)
     store(lane, group.ny, ny)
     store(lane, group.arm_a, arm_a)

@@ -1,7 +1,11 @@
 """Where two bodies touch or will: the ends of the overlap of two faces, with their gaps.
 
-One face is the reference: its line carries both points, and its normal is theirs. Of all faces it is the one beyond
-which the other body reaches least (separating axes). The opposite face of the other body is clipped to its length.
+Of all faces the reference is the one beyond which the other body reaches least (separating axes).
+
+Contacts that press are looked for where the bodies will be half a step ahead: normals and arms are then those of the
+middle of the step for which they are kept, so that turning about an edge and sliding along a slope are right to second
+order in the step. Their gaps are those at the start, along the same normal and arms. Contacts to come are taken as they
+are: bodies that meet half a step too deep would be taken for neighbours side by side.
 """
 
 from typing import NamedTuple
@@ -24,192 +28,55 @@ from blocksim.kernels.lanes import (
     write_fields_4,
     write_fields_8,
 )
-from blocksim.kernels.nonsmooth.arrays import FAR
+from blocksim.kernels.nonsmooth.arrays import AWAY, OPEN, TOUCHING, Contacts
+from blocksim.kernels.nonsmooth.faces import (
+    Block,
+    Points,
+    at_start,
+    block_ahead,
+    block_of,
+    clip,
+    face_towards,
+    has_point,
+    opposite_edge,
+    points_of,
+)
+from blocksim.kernels.nonsmooth.pieces import points_on_ground, points_on_piece
+from blocksim.kernels.nonsmooth.slip import Motion, bend_of
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller half side: two faces that face each other over less are passed by
 LEVEL = 0.1  # sine of the angle between two blocks up to which that is so
 TURNED = 0.906307787036650  # cosine of 25 degrees
-SLIVER = 1e-5  # of the smaller half side: with less between them two points are one
-FACING = -0.01  # cosine: faces of a block that look more away than that from a piece of ground do not touch its edge
-
-UPPER_RIGHT, UPPER_LEFT = 2, 3  # corners
 
 
-class Face(NamedTuple):
-    """A reference face: unit normal, centre of its body, distance of the face from there and half of its length (m)."""
+class Place(NamedTuple):
+    """Where and when contacts of a pair are looked for."""
 
-    nx: Lanes
-    ny: Lanes
-    x: Lanes
-    y: Lanes
-    distance: Lanes
-    half: Lanes
-
-
-class Edge(NamedTuple):
-    """The two ends of the other body's face in the frame of a reference face: along it to the right, and above it (m).
-
-    The first is the left one. `is_left`, `is_right` tell whether the ends themselves can touch.
-    """
-
-    left: Lanes
-    left_gap: Lanes
-    right: Lanes
-    right_gap: Lanes
-    is_left: Mask
-    is_right: Mask
-
-
-class Block(NamedTuple):
-    """What of bodies decides where they touch; fields as in BODY."""
-
-    x: Lanes
-    y: Lanes
-    cos: Lanes
-    sin: Lanes
-    half_x: Lanes
-    half_y: Lanes
-
-
-class Points(NamedTuple):
-    """A manifold, fields as in ROW."""
-
-    nx: Lanes
-    ny: Lanes
-    arm_a: Lanes
-    arm_b: Lanes
-    width: Lanes
-    shear_arm_a: Lanes
-    shear_arm_b: Lanes
-    gap_one: Lanes
-    gap_two: Lanes
+    margin: float  # m
+    ahead: float  # s: those that press
+    half: float  # s: half a substep
+    is_ground: bool
 
 
 @kernel
-def block_of(body: Record) -> Block:
-    """Return what of a body decides where it touches."""
-    return Block(body.x, body.y, body.cos, body.sin, body.half_x, body.half_y)
-
-
-@kernel
-def face_of(body: Block, mx: Lanes, my: Lanes, along_x: Mask) -> Face:
-    """Return the face of a body with the outward normal (mx, my), on its own x axis or y axis."""
-    distance = select(along_x, body.half_x, body.half_y)
-    half = select(along_x, body.half_y, body.half_x)
-    return Face(mx, my, body.x, body.y, distance, half)
-
-
-@kernel
-def face_towards(body: Block, x: Lanes, y: Lanes, along_x: Mask) -> Face:
-    """Return the face on one of a body's axes that is on the side of a place (m), given in the body's own frame."""
-    sign = select(select(along_x, x, y) >= 0.0, 1.0, -1.0)
-    mx = sign * select(along_x, body.cos, -body.sin)
-    my = sign * select(along_x, body.sin, body.cos)
-    return face_of(body, mx, my, along_x)
-
-
-@kernel
-def in_frame(face: Face, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes]:
-    """Return a place (m) in the frame of a face: to the right along it, and above it."""
-    dx = x - face.x
-    dy = y - face.y
-    return dx * face.ny - dy * face.nx, dx * face.nx + dy * face.ny - face.distance
-
-
-@kernel
-def opposite_edge(face: Face, body: Block) -> Edge:
-    """Return the face of a body that looks most towards a reference face."""
-    x, y = in_frame(face, body.x, body.y)
-    # the body's own x axis in the frame of the face; its y axis is (-s, c)
-    c = body.cos * face.ny - body.sin * face.nx
-    s = body.cos * face.nx + body.sin * face.ny
-    is_side = abs(s) > abs(c)
-    sign = select(select(is_side, s, c) > 0.0, -1.0, 1.0)
-    away = sign * select(is_side, body.half_x, body.half_y)
-    along = select(is_side, body.half_y, body.half_x)
-    x = x + away * select(is_side, c, -s)
-    y = y + away * select(is_side, s, c)
-    ex = along * select(is_side, -s, c)
-    ey = along * select(is_side, c, s)
-    turned = select(ex < 0.0, -1.0, 1.0)
-    ex = turned * ex
-    ey = turned * ey
-    are_all = abs(ex) >= 0.0
-    return Edge(x - ex, y - ey, x + ex, y + ey, are_all, are_all)
-
-
-@kernel
-def clip(edge: Edge, half: Lanes) -> Edge:
-    """Cut an edge at both ends of the reference face; empty (left > right) where it lies beyond."""
-    left, left_gap, right, right_gap, is_left, is_right = edge
-    slope = select(right > left, (right_gap - left_gap) / (right - left), 0.0)
-    is_cut_left = left < -half
-    is_cut_right = right > half
-    return Edge(
-        select(is_cut_left, -half, left),
-        select(is_cut_left, left_gap + slope * (-half - left), left_gap),
-        select(is_cut_right, half, right),
-        select(is_cut_right, right_gap - slope * (right - half), right_gap),
-        is_left | is_cut_left,
-        is_right | is_cut_right,
-    )
-
-
-@kernel
-def points_of(face: Face, edge: Edge, a: Block, b: Block, is_of_b: Mask, margin: float) -> Points:
-    """Return normal, arms and gaps of a manifold.
-
-    Seen along the tangent, point one is the first: the right one of a face of b, the left one of a face of a.
-    """
-    sign = select(is_of_b, 1.0, -1.0)
-    nx = sign * face.nx
-    ny = sign * face.ny
-    left_gap = select(edge.is_left & (edge.left_gap <= margin), edge.left_gap, FAR)
-    right_gap = select(edge.is_right & (edge.right_gap <= margin), edge.right_gap, FAR)
-    width = edge.right - edge.left
-    is_sliver = width < SLIVER * lesser(a.half_x + a.half_y, b.half_x + b.half_y)
-    is_left_less = left_gap <= right_gap
-    right_gap = select(is_sliver & is_left_less, FAR, right_gap)
-    left_gap = select(is_sliver & (is_left_less ^ is_sliver), FAR, left_gap)
-    one = select(is_of_b, edge.right, edge.left)
-    # point one in world axes, on the face
-    x = face.x + face.nx * face.distance + face.ny * one
-    y = face.y + face.ny * face.distance - face.nx * one
-    return Points(
-        nx,
-        ny,
-        (x - a.x) * ny - (y - a.y) * nx,
-        (x - b.x) * ny - (y - b.y) * nx,
-        width,
-        (x - a.x) * nx + (y - a.y) * ny,
-        (x - b.x) * nx + (y - b.y) * ny,
-        select(is_of_b, right_gap, left_gap),
-        select(is_of_b, left_gap, right_gap),
-    )
-
-
-@kernel
-def has_point(points: Points) -> Mask:
-    """Tell whether a manifold has a point."""
-    return lesser(points.gap_one, points.gap_two) < FAR
-
-
-@kernel
-def write_points(row: Record, points: Points) -> bool:
-    """Write a manifold into a row; tell whether it has a point. Impulses along another normal are forgotten."""
-    if points.nx * row.nx + points.ny * row.ny < TURNED:
+def write_points(row: Record, points: Points, motion: Motion) -> None:
+    """Write a manifold into a row. Impulses along another normal are forgotten."""
+    found = points.row
+    if found.nx * row.nx + found.ny * row.ny < TURNED:
         row.normal_one = row.normal_two = row.shear = 0.0
-    row.nx = points.nx
-    row.ny = points.ny
-    row.arm_a = points.arm_a
-    row.arm_b = points.arm_b
-    row.width = points.width
-    row.shear_arm_a = points.shear_arm_a
-    row.shear_arm_b = points.shear_arm_b
+    row.nx = found.nx
+    row.ny = found.ny
+    row.arm_a = found.arm_a
+    row.arm_b = found.arm_b
+    row.width = found.width
+    row.shear_arm_a = found.shear_arm_a
+    row.shear_arm_b = found.shear_arm_b
     row.gap_one = points.gap_one
     row.gap_two = points.gap_two
-    return has_point(points)
+    bend = bend_of(found, motion, points.is_of_b, row.normal_two > row.normal_one)
+    row.bend = bend.normal
+    row.shear_bend = bend.shear
 
 
 @kernel
@@ -268,103 +135,64 @@ def points_of_blocks(a: Block, b: Block, margin: float) -> tuple[Points, Mask]:
     return points, is_near & has_point(points)
 
 
-@rare_kernel
-def collide_blocks(row: Record, a: Record, b: Record, margin: float) -> bool:
-    """Find the contact manifold of two blocks; tell whether there is one within the margin (m)."""
-    points, is_on = points_of_blocks(block_of(a), block_of(b), margin)
-    write_points(row, points)
-    return is_on
+@kernel
+def reach_of(row: Record) -> int:
+    """Tell whether a row within the margin has a point that touches or pressed in the last substep."""
+    is_touching = min(row.gap_one, row.gap_two) <= 0.0 or row.normal_one > 0.0 or row.normal_two > 0.0
+    return TOUCHING if is_touching else OPEN
 
 
 @kernel
-def blocks_at(bodies: Records, places: tuple[int, int, int, int]) -> Block:
-    """Return four blocks."""
+def blocks_at(
+    bodies: Records, lines: Records, places: tuple[int, int, int, int], ahead: Lanes
+) -> tuple[Block, Lanes, Lanes, Lanes]:
+    """Return four blocks as they will be a time `ahead` (s), and their velocities (m/s, m/s, rad/s)."""
     x, y, _, cos = fields_0(None, bodies, places)
     sin, _, _, _ = fields_4(None, bodies, places)
     _, _, half_x, half_y = fields_16(None, bodies, places)
-    return Block(x, y, cos, sin, half_x, half_y)
+    vx, vy, spin, _ = fields_0(None, lines, places)
+    return block_ahead(Block(x, y, cos, sin, half_x, half_y), vx, vy, spin, ahead), vx, vy, spin
 
 
 @kernel
-def collide_four(rows: Records, first: int, bodies: Records, margin: float) -> None:
-    """Find the contact manifolds of four pairs of blocks, from row `first` on, within the margin (m)."""
+def collide_four(contacts: Contacts, bodies: Records, first: int, ahead: float) -> None:
+    """Find the contact manifolds of four pairs of blocks, from row `first` on, those that press a time `ahead` (s)."""
+    rows = contacts.rows
     places = (first, first + 1, first + 2, first + 3)
     one, two, three, four = rows[first], rows[first + 1], rows[first + 2], rows[first + 3]
-    a = blocks_at(bodies, (one.a, two.a, three.a, four.a))
-    b = blocks_at(bodies, (one.b, two.b, three.b, four.b))
-    points, is_on = points_of_blocks(a, b, margin)
+    _, normal_one, normal_two, _ = fields_8(None, rows, places)
+    are_pressed = normal_one + normal_two > 0.0
+    times = select(are_pressed, ahead, 0.0)
+    half = select(are_pressed, 0.5 * contacts.stepping[0].substep, 0.0)
+    a, vx_a, vy_a, spin_a = blocks_at(bodies, contacts.lines, (one.a, two.a, three.a, four.a), times)
+    b, vx_b, vy_b, spin_b = blocks_at(bodies, contacts.lines, (one.b, two.b, three.b, four.b), times)
+    points, is_near = points_of_blocks(a, b, contacts.stepping[0].margin)
+    motion = Motion(vx_a - vx_b, vy_a - vy_b, spin_a, spin_b, times, half)
+    write_four(rows, places, at_start(points, motion), motion, is_near)
+
+
+@kernel
+def write_four(rows: Records, places: tuple[int, int, int, int], points: Points, motion: Motion, is_near: Mask) -> None:
+    """Write the manifolds of four rows; without one the impulses are forgotten."""
+    found = points.row
     nx, ny, _, _ = fields_0(None, rows, places)
     _, normal_one, normal_two, shear = fields_8(None, rows, places)
-    are_kept = is_on & (points.nx * nx + points.ny * ny >= TURNED)
+    are_kept = is_near & (found.nx * nx + found.ny * ny >= TURNED)
     normal_one = select(are_kept, normal_one, 0.0)
     normal_two = select(are_kept, normal_two, 0.0)
     shear = select(are_kept, shear, 0.0)
-    are_all = points.width <= FAR
-    write_fields_0(None, rows, places, are_all, (points.nx, points.ny, points.arm_a, points.arm_b))
-    columns = (points.width, points.shear_arm_a, points.shear_arm_b, points.gap_one)
+    are_all = abs(found.width) >= 0.0
+    write_fields_0(None, rows, places, are_all, (found.nx, found.ny, found.arm_a, found.arm_b))
+    columns = (found.width, found.shear_arm_a, found.shear_arm_b, points.gap_one)
     write_fields_4(None, rows, places, are_all, columns)
     write_fields_8(None, rows, places, are_all, (points.gap_two, normal_one, normal_two, shear))
-    is_one, is_two, is_three, is_four = split(select(is_on, 1.0, 0.0))
-    one.is_on = is_one > 0.0
-    two.is_on = is_two > 0.0
-    three.is_on = is_three > 0.0
-    four.is_on = is_four > 0.0
-
-
-@rare_kernel
-def collide_ground(row: Record, a: Record, b: Record, margin: float) -> bool:
-    """Find the contact manifold of a block and the half-plane."""
-    face = Face(0.0, 1.0, a.x, b.y, 0.0, FAR)
-    edge = opposite_edge(face, block_of(a))
-    if min(edge.left_gap, edge.right_gap) > margin:
-        return False
-    return write_points(row, points_of(face, edge, block_of(a), block_of(b), True, margin))
-
-
-@kernel
-def upper_edge(face: Face, slab: Record) -> Edge:
-    """Return the upper face of a piece of ground in the frame of a reference face that looks down on it."""
-    x, y = in_frame(face, slab.x - slab.sin * slab.half_y, slab.y + slab.cos * slab.half_y)
-    c = (slab.cos * face.ny - slab.sin * face.nx) * slab.half_x
-    s = (slab.cos * face.nx + slab.sin * face.ny) * slab.half_x
-    is_left = (slab.corners >> UPPER_RIGHT) & 1 == 1  # seen from above a piece, right is left in its own frame
-    is_right = (slab.corners >> UPPER_LEFT) & 1 == 1
-    return Edge(x + c, y + s, x - c, y - s, is_left, is_right)
-
-
-@rare_kernel
-def collide_slab(row: Record, block: Record, slab: Record, is_first: bool, margin: float) -> bool:
-    """Find the contact manifold of a block and a piece of ground, of which only the upper face counts.
-
-    `is_first` tells whether the block is body a. Where an end of the piece is an edge that blocks can touch, a face of
-    the block that looks down on it may be the reference.
-    """
-    face = face_of(block_of(slab), -slab.sin, slab.cos, False)
-    edge = opposite_edge(face, block_of(block))
-    best = min(edge.left_gap, edge.right_gap)
-    if best > margin:
-        return False
-    edge = clip(edge, face.half)
-    is_above = edge.right > edge.left and min(edge.left_gap, edge.right_gap) >= -2.0 * slab.half_y
-    is_of_block = False
-    if slab.corners != 0:
-        for k in range(4):
-            sign = 1.0 if k < 2 else -1.0
-            along_x = k % 2 == 0
-            mx = sign * (block.cos if along_x else -block.sin)
-            my = sign * (block.sin if along_x else block.cos)
-            if my * slab.cos - mx * slab.sin < FACING:
-                other = face_of(block_of(block), mx, my, along_x)
-                up = upper_edge(other, slab)
-                if min(up.left_gap, up.right_gap) > best + TIE:
-                    best = min(up.left_gap, up.right_gap)
-                    face = other
-                    edge = clip(up, other.half)
-                    is_of_block = True
-    if best > margin or edge.right <= edge.left or not (is_above or is_of_block):
-        return False
-    a, b = (block, slab) if is_first else (slab, block)
-    return write_points(row, points_of(face, edge, block_of(a), block_of(b), is_of_block != is_first, margin))
+    bend = bend_of(found, motion, points.is_of_b, normal_two > normal_one)
+    is_touching = (lesser(points.gap_one, points.gap_two) <= 0.0) | (greater(normal_one, normal_two) > 0.0)
+    reach = select(is_near, select(is_touching, 1.0 * TOUCHING, 1.0 * OPEN), 1.0 * AWAY)
+    one, two, three, four = rows[places[0]], rows[places[1]], rows[places[2]], rows[places[3]]
+    one.bend, two.bend, three.bend, four.bend = split(bend.normal)
+    one.shear_bend, two.shear_bend, three.shear_bend, four.shear_bend = split(bend.shear)
+    one.reach, two.reach, three.reach, four.reach = split(reach)
 
 
 @kernel
@@ -378,16 +206,25 @@ def are_four_of_blocks(rows: Records, first: int, bodies: Records) -> bool:
 
 
 @rare_kernel
-def collide(row: Record, a: Record, b: Record, is_ground: bool, margin: float) -> bool:
+def collide(row: Record, a: Record, b: Record, line_a: Record, line_b: Record, place: Place) -> None:
     """Find the contact manifold of a pair; without one its impulses are forgotten."""
-    if is_ground:
-        is_on = collide_ground(row, a, b, margin)
+    is_pressed = row.normal_one + row.normal_two > 0.0
+    ahead = place.ahead if is_pressed else 0.0
+    one = block_ahead(block_of(a), line_a.vx, line_a.vy, line_a.spin, ahead)
+    two = block_ahead(block_of(b), line_b.vx, line_b.vy, line_b.spin, ahead)
+    if place.is_ground:
+        points, is_near = points_on_ground(one, two, place.margin)
     elif a.faces != ALL:
-        is_on = collide_slab(row, b, a, False, margin)
+        points, is_near = points_on_piece(two, one, a.corners, False, place.margin)
     elif b.faces != ALL:
-        is_on = collide_slab(row, a, b, True, margin)
+        points, is_near = points_on_piece(one, two, b.corners, True, place.margin)
     else:
-        is_on = collide_blocks(row, a, b, margin)
-    if not is_on:
+        points, is_near = points_of_blocks(one, two, place.margin)
+    if is_near:
+        half = place.half if is_pressed else 0.0
+        motion = Motion(line_a.vx - line_b.vx, line_a.vy - line_b.vy, line_a.spin, line_b.spin, ahead, half)
+        write_points(row, at_start(points, motion), motion)
+        row.reach = reach_of(row)
+    else:
         row.normal_one = row.normal_two = row.shear = 0.0
-    return is_on
+        row.reach = AWAY

@@ -12,8 +12,8 @@ which are at rest or move together.
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import Record, World
-from blocksim.kernels.broad_phase import bucket, cell_of
+from blocksim.kernels.arrays import Record
+from blocksim.kernels.broad_phase import bucket, cell_of, fill_grid
 from blocksim.kernels.geometry import ground_gap, separation
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
@@ -110,20 +110,6 @@ def note_places(scene: Nonsmooth, frame: Frame) -> None:
         body.list_angle = body.angle
 
 
-@rare_kernel
-def link_cells(world: World) -> None:
-    """Link the bodies of every bucket of the grid, in the order of their numbers; large ones stay out."""
-    controls = world.controls[0]
-    for k in range(world.heads.size):
-        world.heads[k] = 0
-    for i in range(world.bodies.size - 2, -1, -1):
-        body = world.bodies[i]
-        if body.radius <= controls.cell_radius:
-            k = bucket(cell_of(body.x, controls.cell_width), cell_of(body.y, controls.cell_width), world.heads.size)
-            world.links[i] = world.heads[k]
-            world.heads[k] = i + 1
-
-
 @kernel
 def add(scene: Nonsmooth, count: int, i: int, j: int) -> int:
     """List a pair, if there is room; return the count needed."""
@@ -184,7 +170,7 @@ def list_pairs(scene: Nonsmooth) -> int:
     width = world.controls[0].cell_width
     ground = world.bodies.size - 1
     level = world.bodies[ground].y
-    link_cells(world)
+    fill_grid(world)
     count = 0
     for i in range(ground):
         body = world.bodies[i]

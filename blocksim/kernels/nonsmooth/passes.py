@@ -5,43 +5,27 @@ computed anew each time, which is cheaper than to load them. Bodies that are fix
 one colour share nothing that changes.
 """
 
-from typing import NamedTuple
-
 from blocksim.kernels.arrays import Record
 from blocksim.kernels.friction import friction_coefficient
 from blocksim.kernels.jit import kernel
 from blocksim.kernels.lanes import (
-    WIDTH,
     Lane,
     Lanes,
     fields_0,
+    four,
     greater,
     is_all,
     lesser,
     load,
     select,
+    split,
     store,
     write_fields_0,
 )
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
-from blocksim.kernels.nonsmooth.groups import Bodies, Rows, bodies_at, rows_of
+from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, kinetic_frictions, restitutions, rows_of, touch_of
+from blocksim.kernels.nonsmooth.slip import Rows, slip_of
 from blocksim.kernels.nonsmooth.solve import solve_two
-
-
-class Slip(NamedTuple):
-    """Velocity of body a against body b at the contact points: along the normal, twice, and along the tangent (m/s)."""
-
-    one: Lanes
-    two: Lanes
-    shear: Lanes
-
-
-@kernel
-def slip_of(row: Rows, vx: Lanes, vy: Lanes, spin_a: Lanes, spin_b: Lanes) -> Slip:
-    """Return the velocities at the points, given that of centre a against centre b and both spins."""
-    one = row.nx * vx + row.ny * vy + row.arm_a * spin_a - row.arm_b * spin_b
-    shear = row.nx * vy - row.ny * vx + row.shear_arm_a * spin_a - row.shear_arm_b * spin_b
-    return Slip(one, one - row.width * (spin_a - spin_b), shear)
 
 
 @kernel
@@ -116,10 +100,13 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     old_two = load(lane, group.normal_two)
     k_one = one + select(gap_one > 0.0, 0.0, stepping.softness) * one
     k_two = two + select(gap_two > 0.0, 0.0, stepping.softness) * two
-    free_one = slip.one + select(gap_one > 0.0, stepping.open_bias, stepping.closed_bias) * gap_one
-    free_two = slip.two + select(gap_two > 0.0, stepping.open_bias, stepping.closed_bias) * gap_two
+    bend = load(lane, group.bend)
+    free_one = slip.one + bend + select(gap_one > 0.0, stepping.open_bias, stepping.closed_bias) * gap_one
+    free_two = slip.two + bend + select(gap_two > 0.0, stepping.open_bias, stepping.closed_bias) * gap_two
     q_one = free_one - (one * old_one + mixed * old_two)
     q_two = free_two - (mixed * old_one + two * old_two)
+    if is_all((lesser(q_one, q_two) >= 0.0) & (greater(old_one, old_two) <= 0.0)):
+        return  # gaps that stay open
     new_one, new_two = solve_two(k_one, mixed, k_two, q_one, q_two)
     store(lane, group.normal_one, new_one)
     store(lane, group.normal_two, new_two)
@@ -144,12 +131,19 @@ def aim(contacts: Contacts, group: Record, lane: Lane, row: Rows, a: Bodies, b: 
     """Fix what the velocity pass has to reach at the points of rows."""
     stepping = contacts.stepping[0]
     gap_one, gap_two = gaps(group, lane, row, a, b)
-    restitution = load(lane, group.restitution)
+    normal_one = load(lane, group.normal_one)
+    normal_two = load(lane, group.normal_two)
+    if is_all((lesser(gap_one, gap_two) > 0.0) & (greater(normal_one, normal_two) <= 0.0)):
+        none = 0.0 * gap_one - FAR
+        store(lane, group.target_one, none)
+        store(lane, group.target_two, none)
+        return none, none
+    restitution = restitutions(contacts, group, lane)
     vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
     vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
     u = slip_of(row, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
-    t_one = target(load(lane, group.normal_one), gap_one, u.one, restitution, stepping)
-    t_two = target(load(lane, group.normal_two), gap_two, u.two, restitution, stepping)
+    t_one = target(normal_one, gap_one, u.one, restitution, stepping)
+    t_two = target(normal_two, gap_two, u.two, restitution, stepping)
     store(lane, group.target_one, t_one)
     store(lane, group.target_two, t_two)
     return t_one, t_two
@@ -174,17 +168,18 @@ def shear_limit(touch: Record, normal: float, needed: float, mass: float) -> flo
 @kernel
 def shear_limits(contacts: Contacts, group: Record, lane: Lane, normal: Lanes, needed: Lanes, mass: Lanes) -> Lanes:
     """Return the largest shear impulses (N s) of rows; see shear_limit."""
-    if group.is_simple:
-        return load(lane, group.friction) * normal
-    store(lane, group.pressed, normal)
-    store(lane, group.needed, needed)
-    store(lane, group.mass, mass)
-    for k in range(group.count):
-        touch = contacts.touches[contacts.rows[group.row[k]].touch]
-        group.pressed[k] = shear_limit(touch, group.pressed[k], group.needed[k], group.mass[k])
-    for k in range(group.count, WIDTH):
-        group.pressed[k] = group.pressed[group.count - 1]
-    return load(lane, group.pressed)
+    if group.are_simple:
+        return kinetic_frictions(contacts, group, lane) * normal
+    n_0, n_1, n_2, n_3 = split(normal)
+    s_0, s_1, s_2, s_3 = split(needed)
+    m_0, m_1, m_2, m_3 = split(mass)
+    return four(
+        lane,
+        shear_limit(touch_of(contacts, group, 0), n_0, s_0, m_0),
+        shear_limit(touch_of(contacts, group, 1), n_1, s_1, m_1),
+        shear_limit(touch_of(contacts, group, 2), n_2, s_2, m_2),
+        shear_limit(touch_of(contacts, group, 3), n_3, s_3, m_3),
+    )
 
 
 @kernel
@@ -218,8 +213,9 @@ def reach(
     old_one = load(lane, group.normal_one)
     old_two = load(lane, group.normal_two)
     old_shear = load(lane, group.shear)
-    q_one = slip.one - t_one - one * old_one - mixed * old_two
-    q_two = slip.two - t_two - mixed * old_one - two * old_two
+    bend = load(lane, group.bend)
+    q_one = slip.one + bend - t_one - one * old_one - mixed * old_two
+    q_two = slip.two + bend - t_two - mixed * old_one - two * old_two
     new_one, new_two = solve_two(one, mixed, two, q_one, q_two)
     store(lane, group.normal_one, new_one)
     store(lane, group.normal_two, new_two)
@@ -230,7 +226,12 @@ def reach(
     coupled_a = a.inverse_inertia * row.shear_arm_a
     coupled_b = b.inverse_inertia * row.shear_arm_b
     turn = row.width * d_two
-    rate = slip.shear + coupled_a * (row.arm_a * normal - turn) + coupled_b * (row.arm_b * normal - turn)
+    rate = (
+        slip.shear
+        + load(lane, group.shear_bend)
+        + coupled_a * (row.arm_a * normal - turn)
+        + coupled_b * (row.arm_b * normal - turn)
+    )
     mass = a.inverse_mass + b.inverse_mass + coupled_a * row.shear_arm_a + coupled_b * row.shear_arm_b
     needed = old_shear - rate * (1.0 / mass)
     limit = shear_limits(contacts, group, lane, new_one + new_two, abs(needed), mass)

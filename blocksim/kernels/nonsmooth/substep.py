@@ -22,7 +22,7 @@ WARM, POSITION, FIRST_VELOCITY, VELOCITY = range(4)
 
 
 @kernel
-def rows_of(contacts: Contacts, task: int, begin: int, end: int) -> float:
+def go_through(contacts: Contacts, task: int, begin: int, end: int) -> float:
     """Do one task for some groups; return the largest change of velocity (m/s) where it is of interest."""
     if task == WARM:
         warm_rows(contacts, begin, end)
@@ -45,12 +45,12 @@ def sweep(contacts: Contacts, task: int, team: Integers, k: int) -> float:
         if begin < end:
             first, last = part_of(begin, end, k, 1 if colour == COLOURS - 1 else size)
             if colour < COLOURS - 1 or k == 0:
-                largest = max(largest, rows_of(contacts, task, first, last))
+                largest = max(largest, go_through(contacts, task, first, last))
             meet(team)
     return largest
 
 
-@rare_kernel
+@kernel
 def velocity_pass(contacts: Contacts, team: Integers, k: int, task: int) -> None:
     """Sweep until no impulse changes a velocity by more than the tolerance, or as often as allowed."""
     stepping = contacts.stepping[0]

@@ -9,10 +9,10 @@ import time
 from collections import deque
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from typing import Any, NoReturn
 
 from blocksim.errors import InvalidInputError, UnavailableError
+from blocksim.extras import CLUSTER, loaded
 from blocksim.simulation.provenance import code_hash
 from blocksim.study.executors.batch_run import run_batch
 from blocksim.study.executors.batches import BatchSize, take
@@ -41,11 +41,7 @@ def check(setting: Setting) -> None:
 @contextmanager
 def connected(address: str) -> Iterator[Any]:
     """Give a client of a scheduler. Raises UnavailableError where there is no package, or no answer."""
-    try:
-        distributed: Any = import_module("distributed")  # here: a second that other executors do not pay
-    except ImportError as error:
-        message = f"--scheduler needs distributed ({error}); install the extra: pip install 'blocksim[cluster]'"
-        raise UnavailableError(message) from None
+    distributed = loaded("distributed", "--scheduler", CLUSTER)  # here: a second that other executors do not pay
     try:
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except Exception as error:  # noqa: BLE001 - whatever answers there, or does not, is no scheduler

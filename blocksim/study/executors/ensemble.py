@@ -10,10 +10,10 @@ import time
 from collections.abc import Generator, Iterator, Sequence
 
 from blocksim.scenario import Scenario
-from blocksim.simulation.ensemble import run_in_batches
+from blocksim.simulation import run_in_batches
 from blocksim.study.executors.batches import BatchSize, take
 from blocksim.study.executors.task import Batch, Setting, Task, needs_nothing
-from blocksim.study.rows import Row, row_of_end, row_of_error
+from blocksim.study.rows import Row, row_of_error, row_of_member
 
 PATIENCE = 0.7  # s that a batch has to end once the user wants to stop
 POLL = 0.05  # s
@@ -72,12 +72,11 @@ def is_still_running() -> bool:
 
 
 def rows_of(scenarios: Sequence[Scenario], threads: int) -> list[Row]:
-    """Return the row of every scenario; those that break something unforeseen fail alone, found by halving."""
+    """Return the row of every scenario; one that ends in an error of ours fails alone, found by halving."""
     if not scenarios:
         return []
     try:
-        batches = run_in_batches(scenarios, threads=threads)
-        return [row_of_end(end) for batch in batches for end in batch]
+        return [row_of_member(one) for batch in run_in_batches(scenarios, threads=threads) for one in batch]
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         if len(scenarios) == 1:
             return [row_of_error(error)]

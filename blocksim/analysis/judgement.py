@@ -1,0 +1,135 @@
+"""Judgement of an ensemble, the members of a sweep, against the repeats of an experiment by all metrics."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import TYPE_CHECKING
+
+from blocksim.analysis.experiment import ExperimentTable, Statistics
+from blocksim.analysis.members import Failure, Members
+from blocksim.analysis.metrics import METRICS
+from blocksim.analysis.metrics.metric import Evidence, Findings, Metric, Value
+from blocksim.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+U_NUM = 0.5  # mm: what step and stiffness may move a block by in an ensemble that is fast enough to be run
+THRESHOLD = 0.5
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a user may choose: the share of members that must be inside, and u_num (mm)."""
+
+    threshold: float = THRESHOLD
+    u_num: float = U_NUM
+
+    def __post_init__(self) -> None:
+        """Raise InvalidInputError for what is no share or no uncertainty."""
+        if not 0.0 <= self.threshold <= 1.0:
+            message = f"threshold {self.threshold} is no share from 0 to 1"
+            raise InvalidInputError(message)
+        if not 0.0 <= self.u_num < inf:
+            message = f"u_num {self.u_num} is no uncertainty in mm: a number from 0 up"
+            raise InvalidInputError(message)
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What all metrics find, by their names; `sweep` and `source` say what was compared with what."""
+
+    sweep: str
+    source: str
+    members: int
+    inside_all: int
+    failures: tuple[Failure, ...]
+    settings: Settings
+    findings: Mapping[str, Findings]
+    messages: tuple[str, ...] = ()
+
+    @property
+    def share_inside(self) -> float:
+        """Share of all members, failed ones included, that are inside in everything measured."""
+        return self.inside_all / self.members
+
+    @property
+    def inside(self) -> bool:
+        """Whether that share reaches the threshold."""
+        return self.share_inside >= self.settings.threshold
+
+    def to_frame(self, metric: str = "inside") -> "pd.DataFrame":
+        """Return the rows of one metric; its columns are explained in METRICS."""
+        import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+
+        names = [column.name for column in METRICS[metric].columns]
+        return pd.DataFrame(self.findings[metric].rows, columns=names)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return plain values for JSON, with the meaning of each; a missing number is None."""
+        return {
+            "sweep": self.sweep,
+            "experiment": self.source,
+            "members": self.members,
+            "finished": self.members - len(self.failures),
+            "failed": [failure._asdict() for failure in self.failures],
+            "inside_all": self.inside_all,
+            "share_inside": self.share_inside,
+            "threshold": self.settings.threshold,
+            "inside": self.inside,
+            "messages": list(self.messages),
+            "metrics": {name: _told(METRICS[name], found) for name, found in self.findings.items()},
+        }
+
+
+def judge(
+    members: Members, table: ExperimentTable, settings: Settings | None = None, messages: tuple[str, ...] = ()
+) -> Judgement:
+    """Judge the members of a sweep by all metrics.
+
+    Raises InvalidInputError where members lack a measured block or quantity, UnavailableError without scipy.
+    """
+    settings = settings or Settings()
+    table.refuse_unknown(members.blocks, "the sweep")
+    evidence = Evidence(members, table, settings.u_num)
+    unmeasured = [block for block in members.blocks if block not in table.blocks]
+    told = [f"block '{block}' is not in {table.source}, it is not compared" for block in unmeasured]
+    return Judgement(
+        sweep=members.source,
+        source=table.source,
+        members=members.count,
+        inside_all=int(evidence.inside.sum()),
+        failures=members.failures,
+        settings=settings,
+        findings={name: metric.find(evidence) for name, metric in METRICS.items()},
+        messages=(*messages, *table.messages, *told, *_incomplete(evidence)),
+    )
+
+
+def _incomplete(evidence: Evidence) -> list[str]:
+    """Say of which measured quantities finished members have no value."""
+    finished = int(evidence.members.finished.sum())
+    return [
+        f"{finished - pair.known.size} finished members have no {_named(pair.measured)}: they count as outside"
+        for pair in evidence.pairs
+        if pair.known.size < finished
+    ]
+
+
+def _named(measured: Statistics) -> str:
+    return f"{measured.quantity} of block {measured.block}"
+
+
+def _told(metric: Metric, found: Findings) -> dict[str, object]:
+    return {
+        "meaning": metric.meaning,
+        "columns": {column.name: column.meaning for column in metric.columns},
+        "rows": [{name: _plain(value) for name, value in row.items()} for row in found.rows],
+        "messages": list(found.messages),
+    }
+
+
+def _plain(value: Value) -> object:
+    if isinstance(value, tuple):
+        return [_plain(end) for end in value]
+    return None if isinstance(value, float) and not isfinite(value) else value

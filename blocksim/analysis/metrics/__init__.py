@@ -1,0 +1,21 @@
+"""The metrics by which an ensemble is judged against repeats: one file a metric, one line here."""
+
+from blocksim.analysis.metrics.area import AREA
+from blocksim.analysis.metrics.inside import INSIDE
+from blocksim.analysis.metrics.joint import JOINT
+from blocksim.analysis.metrics.metric import Metric
+from blocksim.analysis.metrics.outcome import OUTCOME
+from blocksim.analysis.metrics.prediction import PREDICTION
+from blocksim.analysis.metrics.validation import VALIDATION
+
+METRICS: dict[str, Metric] = {
+    metric.name: metric
+    for metric in (
+        INSIDE,
+        OUTCOME,
+        VALIDATION,
+        PREDICTION,
+        AREA,
+        JOINT,
+    )
+}

@@ -1,0 +1,68 @@
+"""The test of the paper, [minimum, maximum] of the repeats, for every member; and what passing it is worth.
+
+One more repeat of the experiment is, in rank, equally likely to fall into each of the n + 1 gaps that n repeats leave,
+so it lies between the smallest and the largest with probability (n - 1)/(n + 1), whatever the distribution (at least
+that, where equal values are possible). Of several such tests at once only bounds are known without their dependence:
+at most the smallest of the probabilities, at least 1 - the sum of the complements (Bonferroni).
+"""
+
+from blocksim.analysis.metrics.metric import BLOCK, Column, Evidence, Findings, Form, Interval, Metric, Pair, Row
+from blocksim.analysis.proportion import interval
+
+ALL = "all"
+
+
+def repeat_passes(n: int) -> float:
+    """Return the probability that one more repeat lies within [minimum, maximum] of `n` repeats."""
+    return (n - 1) / (n + 1)
+
+
+def repeat_passes_all(counts: list[int]) -> Interval | float | None:
+    """Return the bounds of the probability that one more repeat passes all tests, with n repeats in each."""
+    if not counts:
+        return None
+    chances = [repeat_passes(n) for n in counts]
+    least = max(0.0, 1.0 - sum(1.0 - chance for chance in chances))
+    return chances[0] if len(chances) == 1 else (least, min(chances))
+
+
+def _find(evidence: Evidence) -> Findings:
+    total = evidence.members.count
+    ranged = [pair.measured.n for pair in evidence.pairs if _has_range(pair)]
+    rows = [_row(pair, total) for pair in evidence.pairs]
+    everything: Row = {"block": ALL, "quantity": "", "unit": "", "limits": None}
+    passes = {"repeat_passes": repeat_passes_all(ranged)}
+    last: Row = {**everything, **_share(int(evidence.inside.sum()), total), **passes}
+    failed = total - int(evidence.members.finished.sum())
+    told = f"shares are of all {total} members" + (f"; {failed} did not finish and count as outside" if failed else "")
+    return Findings((*rows, last), (told,))
+
+
+def _row(pair: Pair, total: int) -> Row:
+    passes = repeat_passes(pair.measured.n) if _has_range(pair) else None
+    return {**pair.head, "limits": pair.limits, **_share(int(pair.inside.sum()), total), "repeat_passes": passes}
+
+
+def _share(count: int, total: int) -> Row:
+    return {"inside": count, "of": total, "share": count / total, "interval": interval(count, total)}
+
+
+def _has_range(pair: Pair) -> bool:
+    """Tell whether the limits are those of the repeats, and no tolerance about them."""
+    return pair.limits == (pair.measured.minimum, pair.measured.maximum)
+
+
+INSIDE = Metric(
+    "inside",
+    "members inside the measured limits, as single runs are judged",
+    (
+        *BLOCK,
+        Column("limits", "limits", Form.NUMBER, "ends of what counts as inside, as for a single run"),
+        Column("inside", "inside", Form.COUNT, "members inside; failed ones are not"),
+        Column("of", "", Form.COUNT, "all members, failed ones included"),
+        Column("share", "share", Form.SHARE, "inside / of", 1),
+        Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability behind it", 1),
+        Column("repeat_passes", "repeat", Form.SHARE, "chance that one more repeat is inside: (n-1)/(n+1)", 0),
+    ),
+    _find,
+)

@@ -1,0 +1,153 @@
+"""What a metric is: evidence in, a table of numbers out, and every number with its meaning."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from blocksim.analysis.compare import limits
+from blocksim.analysis.experiment import MOST_NAMES, ExperimentTable, Statistics
+from blocksim.analysis.members import Members
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Interval = tuple[float, float]
+Value = str | int | float | bool | Interval | None
+Row = dict[str, Value]  # by the names of the metric's columns; None where there is no such number
+
+
+class Form(StrEnum):
+    """How the values of a column are written."""
+
+    TEXT = "text"
+    COUNT = "count"
+    NUMBER = "number"
+    SHARE = "share"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One number of a metric: its name for programs, its head in a table (none: not shown), its meaning."""
+
+    name: str
+    head: str
+    form: Form
+    meaning: str
+    digits: int = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """One measured quantity of one block: m repeats, and the value of each of n members (NaN: none)."""
+
+    measured: Statistics
+    repeats: dict[int, float]  # by replicate, ascending
+    values: "NDArray[np.float64]" = field(repr=False)
+
+    @property
+    def is_length(self) -> bool:
+        """Whether it is a position in mm, and no angle."""
+        return self.measured.unit == "mm"
+
+    @property
+    def scatters(self) -> bool:
+        """Whether the repeats differ; equal ones only say that the scatter is below the reading."""
+        return self.measured.minimum < self.measured.maximum
+
+    @property
+    def known(self) -> "NDArray[np.float64]":
+        """The values of the members that have one."""
+        return self.values[np.isfinite(self.values)]
+
+    @property
+    def limits(self) -> Interval:
+        """The lowest and the highest value that count as inside, as for a single run."""
+        return limits(self.measured.quantity, self.measured.mean, self.measured.minimum, self.measured.maximum)
+
+    @property
+    def inside(self) -> "NDArray[np.bool_]":
+        """Whether each member is inside the limits, ends included; a member without a value is not."""
+        return self.between(self.limits)
+
+    def between(self, ends: Interval) -> "NDArray[np.bool_]":
+        """Tell of each member whether it lies between two ends, ends included."""
+        return (self.values >= ends[0]) & (self.values <= ends[1])
+
+    @property
+    def head(self) -> Row:
+        """The first cells of its row in a table."""
+        return {"block": self.measured.block, "quantity": self.measured.quantity, "unit": self.measured.unit}
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What metrics are computed from; `u_num` is the standard uncertainty (mm) of the numerical solution."""
+
+    members: Members
+    table: ExperimentTable
+    u_num: float
+
+    @cached_property
+    def pairs(self) -> tuple[Pair, ...]:
+        """All measured pairs of block and quantity, in the order of the experiment's table."""
+        repeats: dict[tuple[str, str], dict[int, float]] = {}
+        for one in sorted(self.table.measurements, key=lambda one: one.replicate):
+            repeats.setdefault((one.block, one.quantity), {})[one.replicate] = one.value
+        return tuple(self._pair(row, repeats[row.block, row.quantity]) for row in self.table.summaries())
+
+    def _pair(self, measured: Statistics, repeats: dict[int, float]) -> Pair:
+        return Pair(measured, repeats, self.members.values(measured.block, measured.quantity))
+
+    @property
+    def inside(self) -> "NDArray[np.bool_]":
+        """Whether each member is inside in everything that was measured."""
+        inside: NDArray[np.bool_] = np.all([pair.inside for pair in self.pairs], axis=0)
+        return inside
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The rows of a metric, and messages about what could not be computed."""
+
+    rows: tuple[Row, ...]
+    messages: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One way of judging an ensemble: `meaning` is one line, `find` computes the rows."""
+
+    name: str
+    meaning: str
+    columns: tuple[Column, ...]
+    find: Callable[[Evidence], Findings]
+
+
+BLOCK = (
+    Column("block", "block", Form.TEXT, "name of the block"),
+    Column("quantity", "quantity", Form.TEXT, "what was measured of it"),
+    Column("unit", "", Form.TEXT, "unit of the numbers: mm or deg"),
+)
+
+
+def shown_name(pair: Pair) -> str:
+    """Return the name of a pair for a message."""
+    return f"{pair.measured.quantity} of block {pair.measured.block}"
+
+
+def complete_repeats(pairs: Sequence[Pair]) -> "tuple[NDArray[np.float64], list[int]]":
+    """Return the replicates in which all p pairs were measured, shape (n, p), and the numbers of the others."""
+    every = sorted({replicate for pair in pairs for replicate in pair.repeats})
+    complete = [replicate for replicate in every if all(replicate in pair.repeats for pair in pairs)]
+    rows = [[pair.repeats[replicate] for pair in pairs] for replicate in complete]
+    return np.array(rows, dtype=float).reshape(len(rows), len(pairs)), sorted(set(every) - set(complete))
+
+
+def listed(replicates: Sequence[int]) -> str:
+    """Return numbers of replicates for a message, a long list cut short."""
+    more = f" and {len(replicates) - MOST_NAMES} more" if len(replicates) > MOST_NAMES else ""
+    return ", ".join(map(str, replicates[:MOST_NAMES])) + more

@@ -1,0 +1,86 @@
+"""The probability of each outcome: the rotations of all blocks, rounded to quarter turns.
+
+A class is written as its angles in degrees, "0, -90, -90". It is that of the blocks whose rotation was measured, or of
+all blocks where none was. Members that failed are in the total, as a class of their own.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from blocksim.analysis.metrics.metric import Column, Evidence, Findings, Form, Metric, Row, complete_repeats, listed
+from blocksim.analysis.proportion import interval, lower_bound
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+QUARTER = 90.0  # deg
+ROTATION = "rotation"
+UNKNOWN = "?"
+FAILED = "did not finish"
+
+
+def outcome(rotations: Sequence[float]) -> str:
+    """Return the class of rotations (deg); halves between two quarter turns go to the even one."""
+    return ", ".join(_turned(angle) for angle in rotations)
+
+
+def _turned(angle: float) -> str:
+    return f"{QUARTER * round(angle / QUARTER):.0f}" if np.isfinite(angle) else UNKNOWN
+
+
+def _find(evidence: Evidence) -> Findings:
+    measured = [pair for pair in evidence.pairs if pair.measured.quantity == ROTATION]
+    members = evidence.members
+    blocks = [pair.measured.block for pair in measured] or [
+        block for block in members.blocks if members.has(block, ROTATION)
+    ]
+    if not blocks:
+        return Findings((), ("not computed: the sweep has no rotations",))
+    rotations = np.column_stack([members.values(block, ROTATION) for block in blocks])
+    repeats, incomplete = complete_repeats(measured)
+    found, seen = Counter(_classes(rotations, members.finished)), Counter(map(outcome, repeats.tolist()))
+    order = sorted({*found, *seen}, key=lambda name: (-found[name], -seen[name], name))
+    messages = ["blocks: " + ", ".join(blocks)]
+    if incomplete:
+        messages.append(f"left out, as not all rotations were measured: replicate {listed(incomplete)}")
+    if seen:
+        messages.append("at least: one-sided 95 % limit of the measured share")
+    return Findings(tuple(_row(name, found, seen) for name in order), tuple(messages))
+
+
+def _classes(rotations: "NDArray[np.float64]", finished: "NDArray[np.bool_]") -> list[str]:
+    rows = zip(rotations.tolist(), finished, strict=True)
+    return [outcome(row) if ended else FAILED for row, ended in rows]
+
+
+def _row(name: str, found: Counter[str], seen: Counter[str]) -> Row:
+    count, total, repeats = found[name], found.total(), seen.total()
+    measured: Row = {"measured": seen[name], "repeats": repeats, "lower_bound": lower_bound(seen[name], repeats)}
+    return {
+        "outcome": name,
+        "members": count,
+        "of": total,
+        "share": count / total,
+        "interval": interval(count, total),
+        **(measured if seen[name] else dict.fromkeys(measured, None)),
+    }
+
+
+OUTCOME = Metric(
+    "outcome",
+    "rotations of the blocks, to quarter turns (deg)",
+    (
+        Column("outcome", "outcome", Form.TEXT, "rotation of each block, rounded to 90 degrees"),
+        Column("members", "members", Form.COUNT, "members that end so"),
+        Column("of", "of", Form.COUNT, "all members, failed ones included"),
+        Column("share", "share", Form.SHARE, "members / of", 1),
+        Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability behind it", 1),
+        Column("measured", "measured", Form.COUNT, "repeats that ended so"),
+        Column("repeats", "of", Form.COUNT, "all repeats"),
+        Column("lower_bound", "at least", Form.SHARE, "one-sided 95 % limit: 0.05^(1/n) where all n agree", 1),
+    ),
+    _find,
+)

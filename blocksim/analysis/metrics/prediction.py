@@ -1,0 +1,39 @@
+"""Where one more test would fall, and how many members fall there.
+
+For normal scatter the interval is mean +- t_(n-1, 0.975) s sqrt(1 + 1/n). Repeats that are all equal give none: their
+scatter is not zero, only smaller than what was read.
+"""
+
+from blocksim.analysis.compare import prediction_half_width
+from blocksim.analysis.metrics.metric import BLOCK, Column, Evidence, Findings, Form, Metric, Pair, Row, shown_name
+from blocksim.analysis.proportion import interval
+
+
+def _find(evidence: Evidence) -> Findings:
+    lengths = [pair for pair in evidence.pairs if pair.is_length]
+    rows = tuple(_row(pair, evidence.members.count) for pair in lengths if pair.scatters)
+    without = [f"{shown_name(pair)}: repeats without scatter predict nothing" for pair in lengths if not pair.scatters]
+    return Findings(rows, tuple(without))
+
+
+def _row(pair: Pair, total: int) -> Row:
+    half = prediction_half_width(pair.measured.s, pair.measured.n)
+    ends = (pair.measured.mean - half, pair.measured.mean + half)
+    count = int(pair.between(ends).sum())
+    shares: Row = {"inside": count, "of": total, "share": count / total, "interval": interval(count, total)}
+    return {**pair.head, "prediction": ends, **shares}
+
+
+PREDICTION = Metric(
+    "prediction",
+    "members inside the 95 % prediction interval for one more test (mm)",
+    (
+        *BLOCK,
+        Column("prediction", "one more test", Form.NUMBER, "mean +- t s sqrt(1 + 1/n) of the n repeats"),
+        Column("inside", "inside", Form.COUNT, "members in it; failed ones are not"),
+        Column("of", "of", Form.COUNT, "all members, failed ones included"),
+        Column("share", "share", Form.SHARE, "inside / of", 1),
+        Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability behind it", 1),
+    ),
+    _find,
+)

@@ -1,0 +1,186 @@
+"""Faces of rectangles: which one looks at a body, what of the other body's face lies over it, and the points there.
+
+One face is the reference: its line carries both points, and its normal is theirs. The opposite face of the other body
+is clipped to its length.
+"""
+
+from typing import NamedTuple
+
+from blocksim.kernels.arrays import Record
+from blocksim.kernels.jit import kernel
+from blocksim.kernels.lanes import Lanes, Mask, lesser, select
+from blocksim.kernels.nonsmooth.arrays import FAR
+from blocksim.kernels.nonsmooth.slip import Motion, Rows, slip_of
+
+SLIVER = 1e-5  # of the smaller half side: with less between them two points are one
+
+
+class Face(NamedTuple):
+    """A reference face: unit normal, centre of its body, distance of the face from there and half of its length (m)."""
+
+    nx: Lanes
+    ny: Lanes
+    x: Lanes
+    y: Lanes
+    distance: Lanes
+    half: Lanes
+
+
+class Edge(NamedTuple):
+    """The two ends of the other body's face in the frame of a reference face: along it to the right, and above it (m).
+
+    The first is the left one. `is_left`, `is_right` tell whether the ends themselves can touch.
+    """
+
+    left: Lanes
+    left_gap: Lanes
+    right: Lanes
+    right_gap: Lanes
+    is_left: Mask
+    is_right: Mask
+
+
+class Block(NamedTuple):
+    """What of bodies decides where they touch; fields as in BODY."""
+
+    x: Lanes
+    y: Lanes
+    cos: Lanes
+    sin: Lanes
+    half_x: Lanes
+    half_y: Lanes
+
+
+class Points(NamedTuple):
+    """A manifold: its row, and its gaps (m), FAR where there is no such point."""
+
+    row: Rows
+    gap_one: Lanes
+    gap_two: Lanes
+    is_of_b: Mask  # the reference face is one of body b
+
+
+@kernel
+def block_of(body: Record) -> Block:
+    """Return what of a body decides where it touches."""
+    return Block(body.x, body.y, body.cos, body.sin, body.half_x, body.half_y)
+
+
+@kernel
+def face_of(body: Block, mx: Lanes, my: Lanes, along_x: Mask) -> Face:
+    """Return the face of a body with the outward normal (mx, my), on its own x axis or y axis."""
+    distance = select(along_x, body.half_x, body.half_y)
+    half = select(along_x, body.half_y, body.half_x)
+    return Face(mx, my, body.x, body.y, distance, half)
+
+
+@kernel
+def face_towards(body: Block, x: Lanes, y: Lanes, along_x: Mask) -> Face:
+    """Return the face on one of a body's axes that is on the side of a place (m), given in the body's own frame."""
+    sign = select(select(along_x, x, y) >= 0.0, 1.0, -1.0)
+    mx = sign * select(along_x, body.cos, -body.sin)
+    my = sign * select(along_x, body.sin, body.cos)
+    return face_of(body, mx, my, along_x)
+
+
+@kernel
+def in_frame(face: Face, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes]:
+    """Return a place (m) in the frame of a face: to the right along it, and above it."""
+    dx = x - face.x
+    dy = y - face.y
+    return dx * face.ny - dy * face.nx, dx * face.nx + dy * face.ny - face.distance
+
+
+@kernel
+def opposite_edge(face: Face, body: Block) -> Edge:
+    """Return the face of a body that looks most towards a reference face."""
+    x, y = in_frame(face, body.x, body.y)
+    # the body's own x axis in the frame of the face; its y axis is (-s, c)
+    c = body.cos * face.ny - body.sin * face.nx
+    s = body.cos * face.nx + body.sin * face.ny
+    is_side = abs(s) > abs(c)
+    sign = select(select(is_side, s, c) > 0.0, -1.0, 1.0)
+    away = sign * select(is_side, body.half_x, body.half_y)
+    along = select(is_side, body.half_y, body.half_x)
+    x = x + away * select(is_side, c, -s)
+    y = y + away * select(is_side, s, c)
+    ex = along * select(is_side, -s, c)
+    ey = along * select(is_side, c, s)
+    turned = select(ex < 0.0, -1.0, 1.0)
+    ex = turned * ex
+    ey = turned * ey
+    are_all = abs(ex) >= 0.0
+    return Edge(x - ex, y - ey, x + ex, y + ey, are_all, are_all)
+
+
+@kernel
+def clip(edge: Edge, half: Lanes) -> Edge:
+    """Cut an edge at both ends of the reference face; empty (left > right) where it lies beyond."""
+    left, left_gap, right, right_gap, is_left, is_right = edge
+    slope = select(right > left, (right_gap - left_gap) / (right - left), 0.0)
+    is_cut_left = left < -half
+    is_cut_right = right > half
+    return Edge(
+        select(is_cut_left, -half, left),
+        select(is_cut_left, left_gap + slope * (-half - left), left_gap),
+        select(is_cut_right, half, right),
+        select(is_cut_right, right_gap - slope * (right - half), right_gap),
+        is_left | is_cut_left,
+        is_right | is_cut_right,
+    )
+
+
+@kernel
+def points_of(face: Face, edge: Edge, a: Block, b: Block, is_of_b: Mask, margin: float) -> Points:
+    """Return normal, arms and gaps of a manifold.
+
+    Seen along the tangent, point one is the first: the right one of a face of b, the left one of a face of a.
+    """
+    sign = select(is_of_b, 1.0, -1.0)
+    nx = sign * face.nx
+    ny = sign * face.ny
+    left_gap = select(edge.is_left & (edge.left_gap <= margin), edge.left_gap, FAR)
+    right_gap = select(edge.is_right & (edge.right_gap <= margin), edge.right_gap, FAR)
+    width = edge.right - edge.left
+    is_sliver = width < SLIVER * lesser(a.half_x + a.half_y, b.half_x + b.half_y)
+    is_left_less = left_gap <= right_gap
+    right_gap = select(is_sliver & is_left_less, FAR, right_gap)
+    left_gap = select(is_sliver & (is_left_less ^ is_sliver), FAR, left_gap)
+    one = select(is_of_b, edge.right, edge.left)
+    # point one in world axes, on the face
+    x = face.x + face.nx * face.distance + face.ny * one
+    y = face.y + face.ny * face.distance - face.nx * one
+    row = Rows(
+        nx,
+        ny,
+        (x - a.x) * ny - (y - a.y) * nx,
+        (x - b.x) * ny - (y - b.y) * nx,
+        width,
+        (x - a.x) * nx + (y - a.y) * ny,
+        (x - b.x) * nx + (y - b.y) * ny,
+    )
+    return Points(row, select(is_of_b, right_gap, left_gap), select(is_of_b, left_gap, right_gap), is_of_b)
+
+
+@kernel
+def has_point(points: Points) -> Mask:
+    """Tell whether a manifold has a point."""
+    return lesser(points.gap_one, points.gap_two) < FAR
+
+
+@kernel
+def block_ahead(body: Block, vx: Lanes, vy: Lanes, spin: Lanes, ahead: Lanes) -> Block:
+    """Return a body as it will be a short time `ahead` (s); its turn to second order."""
+    turn = ahead * spin
+    lost = 0.5 * turn * turn
+    cos = body.cos - turn * body.sin - lost * body.cos
+    sin = body.sin + turn * body.cos - lost * body.sin
+    return Block(body.x + ahead * vx, body.y + ahead * vy, cos, sin, body.half_x, body.half_y)
+
+
+@kernel
+def at_start(points: Points, motion: Motion) -> Points:
+    """Return a manifold found ahead of time with the gaps it has now, along its own normal and arms."""
+    slip = slip_of(points.row, motion.vx, motion.vy, motion.spin_a, motion.spin_b)
+    gap_one = points.gap_one - motion.ahead * slip.one
+    return Points(points.row, gap_one, points.gap_two - motion.ahead * slip.two, points.is_of_b)

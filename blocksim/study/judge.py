@@ -1,0 +1,83 @@
+"""Comparison of whatever was simulated, one run or a sweep, with measured repeats."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, overload
+
+from blocksim.analysis.compare import Comparison
+from blocksim.analysis.experiment import load_table
+from blocksim.analysis.judgement import Judgement, Settings, judge
+from blocksim.analysis.members import Members
+from blocksim.errors import InputMissingError
+from blocksim.scenario import Scenario, load_scenario
+from blocksim.study.many import PLAN, TABLE, SweepResult, read_sweep
+from blocksim.study.single import compare as compare_run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from blocksim.simulation import Result
+
+
+@overload
+def compare(run: SweepResult, experiment: Path | str | None = None, settings: Settings | None = None) -> Judgement: ...
+@overload
+def compare(run: "Result | pd.DataFrame", experiment: Path | str | None = None) -> Comparison: ...
+@overload
+def compare(
+    run: Path | str, experiment: Path | str | None = None, settings: Settings | None = None
+) -> Comparison | Judgement: ...
+def compare(
+    run: "SweepResult | Result | pd.DataFrame | Path | str",
+    experiment: Path | str | None = None,
+    settings: Settings | None = None,
+) -> Comparison | Judgement:
+    """Compare a run, or a sweep or its folder, with an experiment table.
+
+    A run is what `blocksim.study.single.compare` takes; `settings` are for sweeps. Raises what `compare` and
+    `compare_sweep` raise.
+    """
+    if isinstance(run, SweepResult):
+        return compare_sweep(run, experiment, settings)
+    if isinstance(run, Path | str) and is_sweep(run):
+        return compare_sweep(run, experiment, settings)
+    return compare_run(run, experiment)
+
+
+def is_sweep(place: Path | str) -> bool:
+    """Tell whether a place is the folder of a sweep."""
+    return (Path(place) / TABLE).is_file()
+
+
+def compare_sweep(
+    sweep: SweepResult | Path | str, experiment: Path | str | None = None, settings: Settings | None = None
+) -> Judgement:
+    """Judge the members of a sweep by its table and an experiment's; by default that of the scenario.
+
+    Raises InputMissingError without any experiment, InvalidInputError for tables that cannot be used or do not go with
+    each other, UnavailableError without scipy.
+    """
+    result = sweep if isinstance(sweep, SweepResult) else read_sweep(Path(sweep))
+    scenario = _scenario(result.folder)
+    table = experiment or (scenario.experiment.table if scenario is not None and scenario.experiment else None)
+    if table is None:
+        message = f"{result.folder}: the sweep's scenario names no experiment; give a table with --experiment"
+        raise InputMissingError(message)
+    members = Members(result.table, str(result.folder / TABLE))
+    return judge(members, load_table(table), settings, _remarks(scenario))
+
+
+def _scenario(folder: Path) -> Scenario | None:
+    """Return the scenario of a sweep, None where its folder does not have it."""
+    plan = folder / PLAN
+    return load_scenario(plan) if plan.is_file() else None
+
+
+def _remarks(scenario: Scenario | None) -> tuple[str, ...]:
+    """Say where shares of members are no probabilities."""
+    plan = None if scenario is None else scenario.sweep
+    if plan is None or plan.is_sampled:
+        return ()
+    return (
+        f"mode {plan.mode!r} chooses its members: shares count them, and are no probabilities",
+        "of the outcome; the 95 % limits hold for samples (modes lhs, sobol, normal)",
+    )

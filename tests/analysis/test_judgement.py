@@ -1,0 +1,90 @@
+"""All metrics together."""
+
+import json
+import sys
+from math import nan
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.analysis.experiment import load_table
+from blocksim.analysis.judgement import Judgement, Settings, judge
+from blocksim.analysis.metrics import METRICS
+from blocksim.errors import InvalidInputError, UnavailableError
+from tests.analysis.metrics.conftest import members_of, table_of
+
+PAPER = load_table(Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks.csv")
+BLOCKS = ("1", "2", "3")
+
+
+def judged(settings: Settings | None = None) -> Judgement:
+    random = np.random.default_rng(1)
+    values = {(block, "x"): random.normal(mean, 1.0, 40) for block, mean in zip(BLOCKS, (16, 74, 131), strict=True)}
+    values |= {(block, "rotation"): np.full(40, turn) for block, turn in zip(BLOCKS, (0.0, -90.0, -90.0), strict=True)}
+    statuses = ["finished"] * 39 + ["failed"]
+    return judge(members_of({key: value.tolist() for key, value in values.items()}, statuses), PAPER, settings)
+
+
+def test_every_number_has_a_meaning_and_json_carries_it() -> None:
+    plain = json.loads(json.dumps(judged().to_dict(), allow_nan=False))
+    assert set(plain["metrics"]) == set(METRICS)
+    for told in plain["metrics"].values():
+        assert told["meaning"]
+        for row in told["rows"]:
+            assert set(row) <= set(told["columns"])
+    assert all(meaning for told in plain["metrics"].values() for meaning in told["columns"].values())
+
+
+def test_failed_members_are_counted_and_named() -> None:
+    plain = judged().to_dict()
+    assert (plain["members"], plain["finished"]) == (40, 39)
+    assert plain["failed"] == [{"row": 40, "case": "c40", "status": "failed", "reason": "as it is"}]
+    assert judged().share_inside == judged().inside_all / 40
+
+
+def test_threshold_that_is_just_met_is_met() -> None:
+    share = judged().share_inside
+    assert 0.0 < share < 1.0
+    assert judged(Settings(threshold=share)).inside
+    assert not judged(Settings(threshold=np.nextafter(share, 1.0))).inside
+
+
+@pytest.mark.parametrize("metric", METRICS)
+def test_findings_as_frames_have_the_columns_of_the_metric(metric: str) -> None:
+    frame = judged().to_frame(metric)
+    assert list(frame.columns) == [column.name for column in METRICS[metric].columns]
+    assert len(frame) == len(judged().findings[metric].rows)
+
+
+def test_u_num_goes_into_the_validation() -> None:
+    assert {row["u_num"] for row in judged(Settings(u_num=3.0)).findings["validation"].rows} == {3.0}
+
+
+@pytest.mark.parametrize("wrong", [{"threshold": 1.1}, {"threshold": nan}, {"u_num": -1.0}, {"u_num": nan}])
+def test_settings_that_mean_nothing_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(InvalidInputError, match=next(iter(wrong))):
+        Settings(**wrong)
+
+
+def test_blocks_that_are_not_measured_or_not_there_are_told() -> None:
+    members = members_of({("1", "x"): [1.0, nan], ("2", "x"): [1.0, 1.0]})
+    found = judge(members, table_of({("1", "x"): [1, 2]}))
+    assert found.messages == (
+        "block '2' is not in repeats.csv, it is not compared",
+        "1 finished members have no x of block 1: they count as outside",
+    )
+    with pytest.raises(InvalidInputError, match=r"repeats\.csv measures block '3', but the sweep has only '1', '2'"):
+        judge(members, table_of({("3", "x"): [1, 2]}))
+
+
+def test_one_member_and_one_repeat_are_enough_for_an_answer() -> None:
+    found = judge(members_of({("1", "x"): [1.0], ("1", "rotation"): [0.0]}), table_of({("1", "x"): [1.2]}))
+    assert found.inside
+    assert found.findings["joint"].rows == ()
+
+
+def test_missing_scipy_is_told_with_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "scipy.special", None)
+    with pytest.raises(UnavailableError, match=r"blocksim\[study\]"):
+        judged()

@@ -1,0 +1,71 @@
+"""Sweeps judged from Python, from their folders and tables."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import blocksim
+from blocksim.analysis.compare import Comparison
+from blocksim.analysis.judgement import Judgement, Settings
+from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.scenario import Document
+from blocksim.study.judge import compare, compare_sweep
+from blocksim.study.many import SweepResult, sweep
+from blocksim.study.single import run
+from tests.study.conftest import SCENARIOS
+
+PAPER = SCENARIOS / "experiments" / "three_blocks.csv"
+
+
+@pytest.fixture(scope="module")
+def swept(nominal: Document, tmp_path_factory: pytest.TempPathFactory) -> SweepResult:
+    """Give two members, of which the second fails."""
+    vary = {"contact.max_overlap": [1e-3, 1e-9]}
+    return sweep(nominal, vary, out=tmp_path_factory.mktemp("sweep") / "out", jobs=1)
+
+
+def test_sweep_and_its_folder_are_judged_alike(swept: SweepResult) -> None:
+    found = [compare(swept), compare(swept.folder), compare(str(swept.folder), PAPER)]
+    assert all(isinstance(one, Judgement) and one.members == 2 for one in found)
+    first, second, third = (one.to_dict() for one in found)
+    assert first == second
+    assert first["metrics"] == third["metrics"]
+
+
+def test_member_of_a_sweep_is_judged_as_a_run_of_its_own(swept: SweepResult, nominal: Document) -> None:
+    alone = compare(run(nominal.build()))
+    rows = compare_sweep(swept).findings["inside"].rows[:-1]
+    verdicts = {(row.block, row.quantity): int(row.verdict == "inside") for row in alone.rows}
+    assert {(row["block"], row["quantity"]): row["inside"] for row in rows} == verdicts
+    assert isinstance(alone, Comparison)
+
+
+def test_verdict_agrees_with_the_column_of_the_sweep(swept: SweepResult) -> None:
+    assert compare_sweep(swept).share_inside == swept.share_inside
+
+
+def test_settings_reach_the_verdict(swept: SweepResult) -> None:
+    assert compare_sweep(swept, settings=Settings(threshold=0.0)).inside
+
+
+def test_chosen_members_are_no_sample_and_this_is_said(swept: SweepResult) -> None:
+    assert any("are no probabilities" in message for message in compare_sweep(swept).messages)
+
+
+def test_table_alone_needs_an_experiment(swept: SweepResult, tmp_path: Path) -> None:
+    swept.table.to_csv(tmp_path / "sweep.csv", index=False)
+    with pytest.raises(InputMissingError, match="--experiment"):
+        compare_sweep(tmp_path)
+    assert compare_sweep(tmp_path, PAPER).members == 2
+
+
+def test_damaged_table_is_told(tmp_path: Path) -> None:
+    pd.DataFrame({"case": ["a"], "status": ["finished"], "1.x_mm": ["wide"]}).to_csv(tmp_path / "sweep.csv")
+    (tmp_path / "one.csv").write_text("block,quantity,unit,replicate,value\n1,x,mm,1,3\n")
+    with pytest.raises(InvalidInputError, match=r"sweep\.csv: 1\.x_mm: 'wide' in row 1 is not a number"):
+        compare_sweep(tmp_path, tmp_path / "one.csv")
+
+
+def test_python_users_compare_sweeps_by_the_same_name(swept: SweepResult) -> None:
+    assert set(blocksim.compare(swept).to_frame("outcome")["outcome"]) == {"0, -90, -90", "did not finish"}
