@@ -114,7 +114,7 @@ def sweep_command(
         seed=seed,
     )
     if dry_run:
-        show_estimate(document, jobs, as_json=as_json)
+        show_estimate(document, jobs, keep_cases=keep_cases, as_json=as_json)
         return
     for kernels in kernels_for(document):
         tell_compilation(kernels, quiet=silent)
