@@ -22,7 +22,9 @@ COMMANDS = {  # name: module in this folder, function in it, first line of its h
     "converge": ("converge", "converge_command", "Refine step, stiffness and spacing until the run-out stays."),
     "verify": ("verify", "verify_command", "Run the verification cases and show the table."),
     "bench": ("bench", "bench_command", "Measure speed and memory, and show the table."),
-    "plot": ("plot", "plot_command", "Draw a run as a strip of pictures."),
+    "plot": ("plot", "plot_command", "Draw a run: a strip of frames, its end, or its histories."),
+    "animate": ("animate", "animate_command", "Show a run as a film, GIF or MP4."),
+    "export": ("export", "export_command", "Write all frames of a run as CSV or VTKHDF."),
     "new": ("new", "new_command", "Write a commented scenario, sweep or table from a template."),
     "schema": ("schema", "schema_command", "Print the JSON Schema of scenario files, for editors."),
 }

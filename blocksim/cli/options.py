@@ -6,6 +6,9 @@ from typing import Annotated
 import typer
 
 ScenarioPath = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (TOML).")]
+StoredRunPath = Annotated[
+    Path, typer.Argument(metavar="RUN", help="Run folder, results/NAME (its newest finished run) or scenario file.")
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option(

@@ -9,13 +9,10 @@ from blocksim.analysis.experiment import load_table
 from blocksim.cli import options
 from blocksim.cli.output import note
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import load_scenario
-from blocksim.simulation import folder as files
-from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.study.many import TABLE
 from blocksim.study.picture import draw_sweep
-from blocksim.study.single import find_run
-from blocksim.view.strip import draw_strip
+from blocksim.study.stored import stored_run
+from blocksim.view.kinds import STRIP, kind_named
 from blocksim.view.support import support_of
 
 
@@ -29,42 +26,53 @@ def plot_command(
     times: Annotated[
         str | None, typer.Option(metavar="T,T,...", help="Times of the frames in s (default: chosen by motion).")
     ] = None,
+    kind: Annotated[
+        str | None, typer.Option(metavar="KIND", help="Of a run: strip (default), final or history.")
+    ] = None,
     experiment: options.ExperimentPath = None,
     quiet: options.Quiet = False,
 ) -> None:
-    """Draw a run as a strip of pictures.
+    """Draw a run: a strip of frames, its end, or its histories.
 
-    Below the final state of a run stand the measured ranges. A run that was stopped or killed is drawn as far as it
-    came. For a sweep over one key the picture shows final x against its values, with the measured range as a band; a
-    second key gets a column for each of its values.
+    Below the final state of a run stand the measured ranges. --kind final shows where the blocks end, with rotation and
+    measured range below each of them; --kind history shows x, y, rotation, energies and contacts over time. A run that
+    was stopped or killed is drawn as far as it came. For a sweep over one key the picture shows final x against its
+    values, with the measured range as a band; a second key gets a column for each of its values.
 
     Example: blocksim plot scenarios/three_blocks.toml --out strip.png
     """
     moments = _times(times)
     if (run / TABLE).is_file():
-        _refuse_times(run, times)
+        _refuse_for_sweeps(run, times, kind)
         picture = draw_sweep(run, out, experiment)
     else:
-        picture = _draw_run(run, out, moments, experiment)
+        picture = _draw_run(run, out, moments, experiment, kind or STRIP)
     if not quiet:
         note(f"picture: {picture}")
 
 
-def _draw_run(run: Path, out: Path | None, moments: list[float] | None, experiment: Path | None) -> Path:
-    folder = find_run(run, needed=(files.SCENARIO, files.FRAMES))
-    scenario = load_scenario(folder / files.SCENARIO)
-    frames = read_frames(folder / files.FRAMES, scenario)
+def _draw_run(run: Path, out: Path | None, moments: list[float] | None, experiment: Path | None, kind: str) -> Path:
+    draw = kind_named(kind)
+    chosen = {} if moments is None else {"times": moments}
+    if chosen and kind != STRIP:
+        message = f"--times picks frames of the strip; --kind {kind} has none to pick"
+        raise InvalidInputError(message)
+    stored = stored_run(run)
+    scenario = stored.scenario
     table = experiment or (scenario.experiment.table if scenario.experiment is not None else None)
     measured = None if table is None else load_table(table)
-    picture = out or Path(f"{scenario.name}.png")
-    draw_strip(frames, picture, times=moments, title=scenario.name, measured=measured, support=support_of(scenario))
+    picture = out or Path(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
+    draw(stored.frames, picture, title=scenario.name, measured=measured, support=support_of(scenario), **chosen)
+    if stored.remark:
+        note(stored.remark)
     return picture
 
 
-def _refuse_times(run: Path, times: str | None) -> None:
-    if times is not None:
-        message = f"--times picks frames of a run, but {run} is a sweep"
-        raise InvalidInputError(message)
+def _refuse_for_sweeps(run: Path, times: str | None, kind: str | None) -> None:
+    for option, value, picked in (("--times", times, "frames"), ("--kind", kind, "the picture")):
+        if value is not None:
+            message = f"{option} picks {picked} of a run, but {run} is a sweep"
+            raise InvalidInputError(message)
 
 
 def _times(text: str | None) -> list[float] | None:

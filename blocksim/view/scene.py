@@ -16,6 +16,7 @@ Flags = NDArray[np.bool_]
 UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # counter-clockwise from lower left
 EDGE_INSET = 0.86  # where the mark of the upper side runs, as a part of half the height
 NAME_ROOM = 0.85, 0.7  # width and height for a block's name, as parts of its smaller side
+LETTERS = 100  # of a name; longer ones have no room anywhere
 FIXED_HATCH = "////"
 LEAST_HATCHED = 12.0  # points; on smaller blocks hatching is a few stray lines
 
@@ -47,14 +48,28 @@ def readable_scale(frames: FramesLike) -> float:
 
 def draw_scene(canvas: Canvas, frames: FramesLike, frame: int, support: Support) -> None:
     """Draw the support and the blocks of one frame, with the blocks' names where there is room for all."""
+    draw_standing(canvas, frames, frame, support)
+    draw_blocks(canvas, frames, frame, support)
+
+
+def draw_standing(canvas: Canvas, frames: FramesLike, frame: int, support: Support) -> None:
+    """Draw ground and walls at the time of one frame, and where they were at the start."""
     offset = MILLIMETRES * support.offset(frames.time[frame : frame + 1])[0]
-    outlines = corners(frames, frame)
-    fixed = np.array(support.fixed or (False,) * len(frames.names))
     draw_support(canvas, support, offset)
-    draw_start(canvas, support, offset, outlines[fixed])
+    draw_start(canvas, support, offset, corners(frames, frame)[_fixed(frames, support)])
     draw_shift(canvas, support, offset, MILLIMETRES * float(frames.x[0].mean()))
-    _draw_blocks(canvas, frames, frame, outlines, fixed)
+
+
+def draw_blocks(canvas: Canvas, frames: FramesLike, frame: int, support: Support) -> None:
+    """Draw the blocks of one frame, free and fixed ones, with their names where there is room for all."""
+    outlines, fixed = corners(frames, frame), _fixed(frames, support)
+    _draw_outlines(canvas, frames, frame, outlines, fixed)
     _draw_names(canvas, frames, outlines.mean(axis=1), fixed)
+
+
+def _fixed(frames: FramesLike, support: Support) -> Flags:
+    """Tell of every block whether it moves with the support, (b,)."""
+    return np.array(support.fixed or (False,) * len(frames.names))
 
 
 def draw_centres(canvas: Canvas, frames: FramesLike, frame: int) -> None:
@@ -79,7 +94,7 @@ def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: flo
             canvas.axes.text(
                 item.maximum + 3.0 / canvas.points_per_mm,
                 y,
-                item.block,
+                style.shortened(item.block, LETTERS),
                 fontsize=font,
                 rotation=float(np.degrees(canvas.extent.tilt)),
                 rotation_mode="anchor",
@@ -88,7 +103,7 @@ def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: flo
             )
 
 
-def _draw_blocks(canvas: Canvas, frames: FramesLike, frame: int, outlines: Floats, fixed: Flags) -> None:
+def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, outlines: Floats, fixed: Flags) -> None:
     """Draw free blocks each in its colour, fixed ones hatched in that of the ground, and all upper sides."""
     from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415 - see style
 
@@ -117,7 +132,7 @@ def _draw_names(canvas: Canvas, frames: FramesLike, places: Floats, fixed: Flags
             canvas.axes.text(
                 float(places[index, 0]),
                 float(places[index, 1]),
-                frames.names[index],
+                style.shortened(frames.names[index], LETTERS),
                 fontsize=fonts[index],
                 color=style.text_colour(fill),
                 ha="center",

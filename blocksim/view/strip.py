@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from blocksim.view import style
-from blocksim.view.ground import GROUND_THICKNESS, RULER_HEIGHT, Canvas, draw_ruler
+from blocksim.view.ground import Canvas, draw_ruler
 from blocksim.view.moments import FramesLike, Indices, drawable_frames, moments_at, moments_by_motion
+from blocksim.view.panel import ROW_HEIGHT, depth_of, finish_panel, room_below
 from blocksim.view.scene import MeasuredRange, draw_centres, draw_measured, draw_scene, readable_scale
 from blocksim.view.support import Support
 from blocksim.view.window import MILLIMETRES, Extent, extent_of
@@ -23,11 +24,9 @@ WIDTH = 10.0  # inches, of the whole strip
 SIDE, GAP = 0.25, 0.25  # inches, at the left and right end and between columns
 HEAD, TITLE, FOOT = 0.22, 0.30, 0.52  # inches: time above a panel, title of the strip, axis and legend below
 LINE = 0.155  # inches, of each further line of text above a panel or below the strip
-LETTERS = 150  # in a line below the strip
+LETTERS, TITLE_LETTERS = 150, 100  # in a line below the strip, in its title
 TICKS = 0.26  # inches, for the numbers under a row of panels
-TICK_ROOM = 0.4  # inches along the axis for one number
 TALLEST_PANEL = 4.0  # inches
-ROW_HEIGHT = 9.0  # points, of one row of measured ranges
 WIDEST_IN_FOURS, WIDEST_IN_PAIRS = 2.5, 6.0  # width over height, so that a panel stays about an inch tall
 LOW_ENOUGH = 1.6  # width over height from which four rows of pairs fit on a page
 NARROWEST = 0.35  # width over height
@@ -130,7 +129,7 @@ def plan(extent: Extent, columns: int, panels: int, measured_rows: int, captions
     columns = min(columns, panels)
     rows = -(-panels // columns)
     scale = min(_panel_width(columns) / extent.width, TALLEST_PANEL / extent.height)  # inches per mm
-    below = max((extent.lowest - extent.bottom) * scale, _room_below(extent, measured_rows) / style.POINTS_PER_INCH)
+    below = max((extent.lowest - extent.bottom) * scale, room_below(extent, measured_rows) / style.POINTS_PER_INCH)
     panel_height = (extent.top - extent.lowest) * scale + below
     ticks = 0.0 if extent.tilt else TICKS
     head, foot = HEAD + (captions - 1) * LINE, FOOT - TICKS + ticks + (notes - 1) * LINE
@@ -142,17 +141,6 @@ def plan(extent: Extent, columns: int, panels: int, measured_rows: int, captions
 def _panel_width(columns: int) -> float:
     """Return the width that a panel may have (inches)."""
     return (WIDTH - 2.0 * SIDE - (columns - 1) * GAP) / columns
-
-
-def _depth_of(rows: int) -> float:
-    """Return how far rows of measured ranges reach below the lowest ground (points)."""
-    return GROUND_THICKNESS + (rows + 0.4) * ROW_HEIGHT
-
-
-def _room_below(extent: Extent, rows: int) -> float:
-    """Return how far the picture goes on below the lowest ground (points)."""
-    depth = _depth_of(rows)
-    return (depth + RULER_HEIGHT) / float(np.cos(extent.tilt)) if extent.tilt else depth
 
 
 def measured_ranges(measured: MeasuredTable, names: Sequence[str], width: float) -> list[MeasuredRange]:
@@ -199,9 +187,9 @@ def _draw_panels(
         if ranges and index == last:
             draw_centres(canvas, frames, frame)
             draw_measured(canvas, ranges, ROW_HEIGHT)
-        _finish_panel(canvas, layout, labelled=index + layout.columns > last)
+        finish_panel(canvas, (layout.panel_width, layout.panel_height), labelled=index + layout.columns > last)
         if layout.extent.tilt:
-            draw_ruler(canvas, _depth_of(rows_of(ranges)))
+            draw_ruler(canvas, depth_of(rows_of(ranges)))
         canvas.axes.set_title(_caption(frames, frame, support), loc="left", pad=3.0)
 
 
@@ -209,27 +197,10 @@ def _draw_texts(figure: "Figure", layout: Layout, title: str | None, notes: Sequ
     side = SIDE / WIDTH
     if title:
         top = 1.0 - 0.06 / layout.height
-        figure.suptitle(title, x=side, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE)
+        figure.suptitle(
+            style.shortened(title, TITLE_LETTERS), x=side, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE
+        )
     figure.text(side, 0.05 / layout.height, "\n".join(notes), color=style.FAINT_INK, va="bottom")
-
-
-def _finish_panel(canvas: Canvas, layout: Layout, *, labelled: bool) -> None:
-    """Fix the scale of a panel and leave only its x axis; tilted ground has a ruler of its own."""
-    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - see style
-
-    axes, extent = canvas.axes, canvas.extent
-    axes.set_xlim(extent.left, extent.right)
-    points_high = layout.panel_height * style.POINTS_PER_INCH
-    axes.set_ylim(extent.top - points_high / layout.points_per_mm, extent.top)
-    axes.spines[["left", "right", "top"]].set_visible(False)
-    axes.yaxis.set_visible(False)
-    ticks = max(2, int(layout.panel_width / TICK_ROOM))
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=ticks, steps=[1, 2, 5, 10]))
-    axes.tick_params(axis="x", length=2.5, pad=1.5)
-    axes.xaxis.set_visible(not extent.tilt)
-    axes.spines["bottom"].set_visible(not extent.tilt)
-    if labelled:
-        axes.set_xlabel("x (mm)", labelpad=1.0)
 
 
 def _caption(frames: FramesLike, frame: int, support: Support) -> str:

@@ -1,10 +1,14 @@
 """The one place for colours, fonts and sizes, and for making a picture file."""
 
+import warnings
+from bisect import bisect_right
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
+from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from unicodedata import east_asian_width
 
 from blocksim.errors import InvalidInputError, OutputError
 
@@ -74,28 +78,54 @@ def picture_suffix(path: Path) -> str:
 @contextmanager
 def styled_figure(width: float, height: float) -> Iterator["Figure"]:
     """Give an empty figure of `width` x `height` inches, in this style; needs no display."""
-    from matplotlib import rc_context, rcParamsDefault  # noqa: PLC0415 - half a second, only for pictures
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415 - see in_style
     from matplotlib.figure import Figure  # noqa: PLC0415
+
+    with in_style():
+        figure = Figure(figsize=(width, height))
+        FigureCanvasAgg(figure)
+        yield figure
+
+
+@contextmanager
+def in_style() -> Iterator[None]:
+    """Let whatever is drawn be drawn in this style."""
+    from matplotlib import rc_context, rcParamsDefault  # noqa: PLC0415 - half a second, only for pictures
 
     # A user's own matplotlibrc must not change the file, but the backend is none of our business.
     settings: dict[Any, Any] = {key: value for key, value in rcParamsDefault.items() if not key.startswith("backend")}
     with rc_context(settings | SETTINGS):
-        figure = Figure(figsize=(width, height))
-        FigureCanvasAgg(figure)
-        yield figure
+        yield
 
 
 def save_figure(figure: "Figure", path: Path) -> None:
     """Write the figure as PNG, SVG or PDF after its suffix; raises OutputError when it cannot be written."""
     suffix = picture_suffix(path)
     buffer = BytesIO()
-    figure.savefig(buffer, format=suffix[1:], metadata=METADATA[suffix])
+    with no_word_of_missing_letters():
+        figure.savefig(buffer, format=suffix[1:], metadata=METADATA[suffix])
     try:
         path.write_bytes(buffer.getvalue())
     except OSError as error:
         message = f"{path}: cannot be written: {error.strerror}"
         raise OutputError(message) from None
+
+
+@contextmanager
+def no_word_of_missing_letters() -> Iterator[None]:
+    """Draw letters that the font lacks as boxes and do not warn: whoever looks sees it."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font", category=UserWarning)
+        yield
+
+
+def shortened(text: str, letters: int) -> str:
+    """Return a name in one line, no wider than this many letters; signs that are no letters become boxes."""
+    line = "".join(sign if sign.isprintable() else "\N{WHITE SQUARE}" for sign in text)
+    ends = list(accumulate(1 + (east_asian_width(sign) in "WF") for sign in line))
+    if not ends or ends[-1] <= letters:
+        return line
+    return f"{line[: bisect_right(ends, letters - 1)]}…"
 
 
 def fitting_font(text: str, room: tuple[float, float], largest: float = FONT_SIZE) -> float:

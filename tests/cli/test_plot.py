@@ -18,6 +18,21 @@ def test_picture_has_the_name_of_the_scenario(blocksim: Command, finished: Path)
     assert Path("three_blocks_nominal.png").is_file()
 
 
+@pytest.mark.parametrize(("kind", "told"), [("final", "measured 74.41 [71.69, 78.53]"), ("history", "energy (mJ)")])
+def test_other_kinds_are_drawn(blocksim: Command, finished: Path, kind: str, told: str) -> None:
+    assert blocksim("plot", finished, "--kind", kind).err == f"picture: three_blocks_nominal_{kind}.png\n"
+    assert blocksim("plot", finished, "--kind", kind, "--out", "picture.svg").code == 0
+    assert f"<!-- {told} -->" in Path("picture.svg").read_text(encoding="utf-8")
+
+
+def test_killed_run_is_drawn_and_told(blocksim: Command, copied: Path) -> None:
+    for name in ("run.json", "done.json", "final.csv"):
+        (copied / name).unlink()
+    answer = blocksim("plot", copied, "--kind", "final")
+    assert answer.code == 0
+    assert f"{copied}: this run was killed or is still going on; its " in answer.err
+
+
 def test_failed_run_can_be_drawn(blocksim: Command) -> None:
     failing = ("--set", "contact.max_overlap=1e-9", "--out", "out")
     assert blocksim("run", "scenarios/three_blocks_nominal.toml", *SOFT, *failing).code == 76
@@ -41,6 +56,8 @@ def test_the_folder_alone_tells_what_the_blocks_stand_on(blocksim: Command) -> N
         (["--out", "strip.bmp"], 65, "'.bmp' is no picture format"),
         (["--out", "nix/strip.png"], 74, "nix/strip.png: cannot be written"),
         (["--times", "0,x"], 65, "--times 0,x: give times in seconds"),
+        (["--kind", "finel"], 65, "--kind finel: no such picture of a run, did you mean 'final'?"),
+        (["--kind", "final", "--times", "0"], 65, "--kind final has none to pick"),
         (["--times", "0,99"], 65, "outside the recorded span"),
         (["--experiment", "nix.csv"], 66, "nix.csv: no such file"),
     ],
@@ -82,3 +99,4 @@ def test_sweep_that_cannot_be_drawn_is_told(blocksim: Command) -> None:
     assert answer.code == 65
     assert "swept: 3 keys are varied; a picture can show one or two" in answer.err
     assert "--times picks frames of a run" in blocksim("plot", "swept", "--times", "0,0.01").err
+    assert "--kind picks" in blocksim("plot", "swept", "--kind", "final").err

@@ -10,6 +10,7 @@ from blocksim.view.style import (
     SMALLEST_FONT,
     block_colour,
     fitting_font,
+    shortened,
     text_colour,
 )
 
@@ -37,3 +38,16 @@ def test_text_shrinks_to_its_room_and_vanishes_when_unreadable() -> None:
     assert SMALLEST_FONT <= fitting_font("block_12", (30.0, 100.0)) < 8.0
     assert fitting_font("block_12", (10.0, 100.0)) == 0.0
     assert fitting_font("", (10.0, 100.0)) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [("block", "block"), ("exactly 12 l", "exactly 12 l"), ("more than 12 letters", "more than 1…"), ("", "")],
+)
+def test_long_names_are_cut(name: str, shown: str) -> None:
+    assert shortened(name, 12) == shown
+
+
+def test_signs_that_are_no_letters_become_boxes_and_wide_ones_count_twice() -> None:
+    assert shortened("a\nb\u202e", 12) == "a□b□"
+    assert shortened("\N{GRINNING FACE}" * 9, 12) == "\N{GRINNING FACE}" * 5 + "…"

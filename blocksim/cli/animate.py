@@ -1,0 +1,45 @@
+"""blocksim animate: a run as a film."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from blocksim.cli import options
+from blocksim.cli.output import note
+from blocksim.study.stored import stored_run
+from blocksim.view.animation import Look, Pace, draw_film, writer_of
+from blocksim.view.support import support_of
+
+
+def animate_command(
+    run: options.StoredRunPath,
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Film to write: .gif or .mp4.")] = None,
+    speed: Annotated[
+        float, typer.Option(min=1e-6, max=1e6, metavar="FACTOR", help="Seconds of the run in a second of film.")
+    ] = 0.25,
+    fps: Annotated[float, typer.Option(min=0.1, max=240.0, metavar="N", help="Pictures a second, 50 in a GIF.")] = 30.0,
+    trails: Annotated[
+        bool | None, typer.Option("--trails/--no-trails", help="Ways of the centres (default: up to 30 blocks).")
+    ] = None,
+    width: Annotated[int, typer.Option(min=200, max=4000, metavar="PX", help="Width in pixels.")] = 800,
+    quiet: options.Quiet = False,
+) -> None:
+    """Show a run as a film, GIF or MP4.
+
+    The default is a GIF, NAME.gif, at a quarter of the real speed; the last picture is held for a while. A run that was
+    stopped or killed is shown as far as it came. MP4 needs the extra `video`.
+
+    Example: blocksim animate scenarios/three_blocks.toml --speed 0.1
+    """
+    if out is not None:
+        writer_of(out)
+    stored = stored_run(run)
+    film = out or Path(f"{stored.scenario.name}.gif")
+    support = support_of(stored.scenario)
+    look = Look(width, trails, stored.scenario.name)
+    count = draw_film(stored.frames, film, Pace(speed, fps), look, support)
+    if stored.remark:
+        note(stored.remark)
+    if not quiet:
+        note(f"film: {film} ({count} pictures)")

@@ -1,0 +1,48 @@
+"""blocksim export: all frames of a run for other programs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from blocksim.cli import options
+from blocksim.cli.output import note
+from blocksim.errors import OutputExistsError
+from blocksim.simulation import folder as files
+from blocksim.simulation.stores.formats import format_named
+from blocksim.study.stored import stored_run
+
+
+def export_command(
+    run: options.StoredRunPath,
+    kind: Annotated[
+        str, typer.Option("--format", metavar="FORMAT", help="csv for spreadsheets, vtkhdf for ParaView.")
+    ] = "csv",
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="File to write (default: NAME.csv, NAME.vtkhdf).")
+    ] = None,
+    quiet: options.Quiet = False,
+) -> None:
+    """Write all frames of a run as CSV or VTKHDF.
+
+    CSV: one row a frame and block, with units in the heads. VTKHDF: one file with all times, blocks as rectangles with
+    number, velocity and rotation; ParaView opens it. A run that was stopped or killed is written as far as it came.
+
+    Example: blocksim export scenarios/three_blocks.toml --format vtkhdf
+    """
+    write = format_named(kind)
+    stored = stored_run(run)
+    file = out or Path(f"{stored.scenario.name}.{kind}")
+    _refuse_own_files(file, stored.folder)
+    count = write(file, stored.frames)
+    if stored.remark:
+        note(stored.remark)
+    if not quiet:
+        note(f"file: {file} ({count} frames)")
+
+
+def _refuse_own_files(file: Path, folder: Path) -> None:
+    """Raise OutputExistsError for a file of the run itself."""
+    if file.name in files.OURS and file.resolve().parent == folder.resolve():
+        message = f"{file}: belongs to the run; choose another name with --out"
+        raise OutputExistsError(message)

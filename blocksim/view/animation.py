@@ -1,0 +1,182 @@
+"""A run as a film: which frames to show when, and one picture after the other."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.errors import InvalidInputError
+from blocksim.view import style
+from blocksim.view.gif import write_gif
+from blocksim.view.ground import Canvas, draw_ruler
+from blocksim.view.moments import Floats, FramesLike, Indices, drawable_frames
+from blocksim.view.mp4 import write_mp4
+from blocksim.view.panel import Page, depth_of, finish_panel, page_for
+from blocksim.view.scene import draw_blocks, draw_standing
+from blocksim.view.support import Support
+from blocksim.view.window import MILLIMETRES, extent_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Pixels = NDArray[np.uint8]  # (height, width, 3), red, green, blue
+Writer = Callable[[Path, Iterator[Pixels], Floats], None]
+
+WRITERS: dict[str, Writer] = {".gif": write_gif, ".mp4": write_mp4}  # by suffix; a format is one file and a line here
+DOTS_PER_INCH = 100.0  # letters of 11 pixels
+MARGINS = 0.15, 0.50, 0.42  # inches: at the sides, above and below the panel
+HIGHEST = 1.0  # height of the panel over its width
+HELD = 1.5  # s that the last picture stays
+MOST_PICTURES = 10_000
+FEW_BLOCKS = 30  # up to which trails are drawn unless somebody decides
+TRAIL: dict[str, Any] = {"linewidths": 1.0, "alpha": 0.5, "zorder": 2.5}  # below names
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast a film runs: seconds of the run in a second of film, and pictures a second."""
+
+    speed: float = 0.25
+    rate: float = 30.0
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a film looks: its width in pixels, and whether the ways of the centres are drawn (default: few blocks)."""
+
+    width: int = 800
+    trails: bool | None = None
+    title: str = ""
+
+
+def draw_film(
+    frames: FramesLike,
+    path: Path | str,
+    pace: Pace | None = None,
+    look: Look | None = None,
+    support: Support | None = None,
+) -> int:
+    """Write a run as GIF or MP4 and return the number of pictures; the last one is held for a while.
+
+    `support` is what the blocks stand on: level ground at rest if it is not given. Raises InvalidInputError for an
+    unknown format, nothing to draw or too many pictures, OutputError when the file cannot be written and
+    UnavailableError when the package for MP4 is missing.
+    """
+    path = Path(path)
+    write = writer_of(path)
+    chosen, seconds = timed(frames, drawable_frames(frames), pace or Pace())
+    film = Film(frames, support or Support(), look or Look())
+    write(path, (film.picture(int(frame)) for frame in chosen), seconds)
+    return len(chosen)
+
+
+def writer_of(path: Path) -> Writer:
+    """Return what writes a file of this name; raises InvalidInputError for a format that is not written."""
+    try:
+        return WRITERS[path.suffix.lower()]
+    except KeyError:
+        message = f"{path}: '{path.suffix}' is no film format, write {' or '.join(WRITERS)}"
+        raise InvalidInputError(message) from None
+
+
+def timed(frames: FramesLike, drawable: Indices, pace: Pace) -> tuple[Indices, Floats]:
+    """Return which frame each picture shows and how long (s of film): even in time, the last one held.
+
+    Every picture shows the frame nearest to its time. Raises InvalidInputError for more pictures than anybody wants.
+    """
+    recorded = frames.time[drawable]
+    length = float(recorded[-1] - recorded[0]) / pace.speed
+    count = length * pace.rate
+    if count > MOST_PICTURES:
+        message = f"the film would have {count:.3g} pictures, at most {MOST_PICTURES}: raise --speed or lower --fps"
+        raise InvalidInputError(message)
+    wanted = recorded[0] + pace.speed / pace.rate * np.arange(int(count + 1e-9) + 1)
+    after = np.searchsorted(recorded, wanted).clip(max=len(recorded) - 1)
+    before = (after - 1).clip(min=0)
+    nearest = np.where(wanted - recorded[before] <= recorded[after] - wanted, before, after)
+    nearest[-1] = len(recorded) - 1
+    seconds = np.full(len(nearest), 1.0 / pace.rate)
+    seconds[-1] = HELD
+    return drawable[nearest], seconds
+
+
+class Film:
+    """Draws one frame after the other on the same page; what never moves is drawn once."""
+
+    def __init__(self, frames: FramesLike, support: Support, look: Look) -> None:
+        """Prepare the page, as high as the run needs."""
+        self.frames, self.support = frames, support
+        self.drawable = drawable_frames(frames)
+        self.has_trails = len(frames.names) <= FEW_BLOCKS if look.trails is None else look.trails
+        across = look.width / DOTS_PER_INCH
+        tallest = HIGHEST * (across - 2.0 * MARGINS[0])
+        self.page = page_for(extent_of(frames, self.drawable, support), across, tallest, MARGINS)
+        self._prepare(look.title)
+
+    def _prepare(self, title: str) -> None:
+        """Draw what stays: title, axis, and the support unless it moves."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415 - see style
+
+        with style.styled_figure(*_even(self.page)) as figure, style.no_word_of_missing_letters():
+            figure.set_dpi(DOTS_PER_INCH)
+            self.canvas = Canvas(figure.add_axes(self.page.place), self.page.extent, self.page.points_per_mm)
+            self._draw_still(figure, title)
+            paper: Any = FigureCanvasAgg
+            self.paper = paper(figure)
+            self.paper.draw()
+            self.still = self.paper.copy_from_bbox(figure.bbox)
+
+    def _draw_still(self, figure: "Figure", title: str) -> None:
+        finish_panel(self.canvas, (self.page.panel_width, self.page.panel_height), labelled=True)
+        if self.page.extent.tilt:
+            draw_ruler(self.canvas, depth_of(0))
+        letters = int(self.page.width * style.POINTS_PER_INCH / (style.LETTER[0] * style.TITLE_SIZE))
+        place = MARGINS[0] / self.page.width, 1.0 - 0.06 / self.page.height
+        figure.text(*place, style.shortened(title, letters), va="top", fontsize=style.TITLE_SIZE)
+        if self.support.motion is None:
+            draw_standing(self.canvas, self.frames, int(self.drawable[0]), self.support)
+
+    def picture(self, frame: int) -> Pixels:
+        """Return the picture of one frame."""
+        axes = self.canvas.axes
+        there = set(axes.get_children())
+        with style.in_style(), style.no_word_of_missing_letters():
+            self._draw(frame)
+            moving = sorted((one for one in axes.get_children() if one not in there), key=lambda one: one.get_zorder())
+            self.paper.restore_region(self.still)
+            for artist in moving:
+                axes.draw_artist(artist)
+        for artist in moving:
+            artist.remove()
+        return np.array(self.paper.buffer_rgba())[..., :3]
+
+    def _draw(self, frame: int) -> None:
+        """Add to the panel what has moved since the last picture."""
+        if self.support.motion is not None:
+            draw_standing(self.canvas, self.frames, frame, self.support)
+        draw_blocks(self.canvas, self.frames, frame, self.support)
+        if self.has_trails:
+            self._draw_trails(frame)
+        top = self.page.extent.top + 4.0 / self.page.points_per_mm
+        time = f"{float(self.frames.time[frame]):.3f} s"
+        self.canvas.axes.text(self.page.extent.left, top, time, va="bottom")
+
+    def _draw_trails(self, frame: int) -> None:
+        """Draw the way of every free centre up to a frame."""
+        from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
+
+        past = self.drawable[self.drawable <= frame]
+        free = ~np.array(self.support.fixed or (False,) * len(self.frames.names))
+        ways = MILLIMETRES * np.stack([self.frames.x[past], self.frames.y[past]], axis=-1)[:, free]
+        lines = LineCollection(list(ways.swapaxes(0, 1)), colors=style.INK, **TRAIL, transform=self.canvas.scene)
+        self.canvas.axes.add_collection(lines)
+
+
+def _even(page: Page) -> tuple[float, float]:
+    """Return width and height (inches) of a page in whole pairs of pixels, as MP4 wants them; half a pixel spare."""
+    pairs = (round(0.5 * side * DOTS_PER_INCH) for side in (page.width, page.height))
+    width, height = ((2 * pair + 0.5) / DOTS_PER_INCH for pair in pairs)
+    return width, height

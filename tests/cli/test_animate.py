@@ -1,0 +1,60 @@
+"""blocksim animate: films of finished and killed runs."""
+
+import sys
+from pathlib import Path
+
+import pytest
+from PIL.GifImagePlugin import GifImageFile
+
+from tests.cli.conftest import Command
+
+QUICK = ("--speed", "1", "--fps", "10", "--width", "240")
+
+
+def test_film_has_the_name_of_the_scenario_and_is_told(blocksim: Command, finished: Path) -> None:
+    answer = blocksim("animate", finished, *QUICK)
+    assert (answer.code, answer.out) == (0, "")
+    assert answer.err.startswith("film: three_blocks_nominal.gif (")
+    with GifImageFile("three_blocks_nominal.gif") as film:
+        assert film.width == 240
+        assert film.n_frames >= 3
+    assert blocksim("animate", finished, *QUICK, "--out", "other.gif", "--no-trails", "--quiet").err == ""
+    assert Path("other.gif").read_bytes() != Path("three_blocks_nominal.gif").read_bytes()
+
+
+def test_killed_run_is_shown_and_told(blocksim: Command, copied: Path) -> None:
+    (copied / "run.json").unlink()
+    answer = blocksim("animate", copied, *QUICK, "--out", "film.gif")
+    assert answer.code == 0
+    assert "this run was killed or is still going on" in answer.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["--out", "film.avi"], 65, "'.avi' is no film format, write .gif or .mp4"),
+        (["--out", "nix/film.gif", *QUICK], 74, "nix/film.gif: cannot be written"),
+        (["--speed", "0.00001"], 65, "raise --speed or lower --fps"),
+        (["--fps", "60"], 65, "a GIF shows at most 50 pictures a second"),
+        (["--speed", "0"], 2, "--speed"),
+        (["--width", "3"], 2, "--width"),
+    ],
+)
+def test_mistakes_are_told(blocksim: Command, finished: Path, arguments: list[str], code: int, told: str) -> None:
+    answer = blocksim("animate", finished, *arguments)
+    assert answer.code == code
+    assert told in answer.err
+    assert {path.name for path in Path().iterdir()} == {"scenarios"}
+
+
+def test_missing_package_for_mp4_is_told(blocksim: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    answer = blocksim("animate", finished, "--out", "film.mp4")
+    assert answer.code == 69
+    assert "pip install 'blocksim[video]'" in answer.err
+
+
+def test_mp4_is_written(blocksim: Command, finished: Path) -> None:
+    pytest.importorskip("imageio_ffmpeg", reason="MP4 needs the extra video")
+    assert blocksim("animate", finished, *QUICK, "--out", "film.MP4").code == 0
+    assert Path("film.MP4").read_bytes()[4:8] == b"ftyp"

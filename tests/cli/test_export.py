@@ -1,0 +1,66 @@
+"""blocksim export: frames for other programs."""
+
+import csv
+from pathlib import Path
+
+import h5py
+import pytest
+
+from tests.cli.conftest import Command
+
+
+def test_csv_ends_where_the_final_table_does(blocksim: Command, finished: Path) -> None:
+    answer = blocksim("export", finished)
+    assert (answer.code, answer.out) == (0, "")
+    assert answer.err.startswith("file: three_blocks_nominal.csv (")
+    with Path("three_blocks_nominal.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    with (finished / "final.csv").open(encoding="utf-8", newline="") as file:
+        final = list(csv.DictReader(file))
+    keys = ("block", "x_mm", "y_mm", "rotation_deg", "vx_mm_s", "vy_mm_s", "spin_deg_s")
+    assert [[row[key] for key in keys] for row in rows[-3:]] == [[row[key] for key in keys] for row in final]
+
+
+def test_vtkhdf_has_the_times_of_the_run(blocksim: Command, finished: Path) -> None:
+    assert blocksim("export", finished, "--format", "vtkhdf", "--out", "run.vtkhdf", "--quiet").err == ""
+    with h5py.File("run.vtkhdf") as file, h5py.File(finished / "run.h5") as run:
+        assert file["VTKHDF/Steps/Values"][:].tolist() == run["particles/blocks/time"][:].tolist()
+
+
+def test_killed_run_is_exported_and_told(blocksim: Command, copied: Path) -> None:
+    (copied / "run.json").unlink()
+    answer = blocksim("export", copied, "--out", "frames.csv")
+    assert answer.code == 0
+    assert "this run was killed or is still going on" in answer.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["--format", "xlsx"], 65, "--format xlsx: no such format, choose csv or vtkhdf"),
+        (["--out", "nix/frames.csv"], 74, "nix/frames.csv: cannot be written"),
+    ],
+)
+def test_mistakes_are_told(blocksim: Command, finished: Path, arguments: list[str], code: int, told: str) -> None:
+    answer = blocksim("export", finished, *arguments)
+    assert answer.code == code
+    assert told in answer.err
+    assert {path.name for path in Path().iterdir()} == {"scenarios"}
+
+
+def test_files_of_the_run_are_not_replaced(blocksim: Command, copied: Path) -> None:
+    before = (copied / "final.csv").read_bytes()
+    answer = blocksim("export", copied, "--out", copied / "final.csv")
+    assert answer.code == 73
+    assert "final.csv: belongs to the run" in answer.err
+    assert (copied / "final.csv").read_bytes() == before
+
+
+@pytest.mark.parametrize("content", [None, b"", b"rubbish" * 100])
+def test_damaged_frames_are_told(blocksim: Command, copied: Path, content: bytes | None) -> None:
+    (copied / "run.h5").unlink()
+    if content is not None:
+        (copied / "run.h5").write_bytes(content)
+    answer = blocksim("export", copied)
+    assert answer.code == (66 if content is None else 65)
+    assert "run.h5" in answer.err

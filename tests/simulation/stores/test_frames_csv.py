@@ -1,0 +1,63 @@
+"""CSV of all frames: tidy, with units, every number to the last bit."""
+
+import csv
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.errors import OutputError
+from blocksim.simulation.frames import Frames
+from blocksim.simulation.stores.frames_csv import COLUMNS, write_csv
+from tests.view.made_up import HOSTILE, toppling
+
+
+def rows_of(path: Path, frames: Frames) -> list[dict[str, str]]:
+    assert write_csv(path, frames) == len(frames)
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_every_frame_has_a_row_for_every_block_in_the_units_of_its_heads(tmp_path: Path) -> None:
+    frames = toppling(3, steps=5)
+    rows = rows_of(tmp_path / "frames.csv", frames)
+    assert tuple(rows[0]) == COLUMNS
+    assert len(rows) == 15
+    assert [row["block"] for row in rows[:4]] == ["1", "2", "3", "1"]
+    for key, values in {
+        "x_mm": 1000.0 * frames.x,
+        "y_mm": 1000.0 * frames.y,
+        "rotation_deg": np.degrees(frames.rotation),
+        "vx_mm_s": 1000.0 * frames.vx,
+        "vy_mm_s": 1000.0 * frames.vy,
+        "spin_deg_s": np.degrees(frames.spin),
+        "time_s": np.repeat(frames.time, 3),
+    }.items():
+        assert [float(row[key]) for row in rows] == values.ravel().tolist()
+
+
+def test_rotation_counts_from_the_placed_angle(tmp_path: Path) -> None:
+    frames = replace(toppling(1, steps=2), start_angle=np.array([0.5]))
+    assert float(rows_of(tmp_path / "frames.csv", frames)[0]["rotation_deg"]) == -math.degrees(0.5)
+
+
+def test_what_is_not_finite_is_an_empty_cell(tmp_path: Path) -> None:
+    frames = toppling(1, steps=2)
+    frames.x[1] = np.nan
+    assert [row["x_mm"] for row in rows_of(tmp_path / "frames.csv", frames)] == ["0.0", ""]
+
+
+def test_hostile_names_come_back_as_they_are(tmp_path: Path) -> None:
+    frames = replace(toppling(len(HOSTILE), steps=1), names=HOSTILE)
+    assert tuple(row["block"] for row in rows_of(tmp_path / "frames.csv", frames)) == HOSTILE
+
+
+def test_trouble_is_told_and_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="cannot be written: No such file"):
+        write_csv(tmp_path / "none" / "frames.csv", toppling(1))
+    (tmp_path / "folder.csv").mkdir()
+    with pytest.raises(OutputError, match=r"folder\.csv: cannot be written"):
+        write_csv(tmp_path / "folder.csv", toppling(1))
+    assert [path.name for path in tmp_path.iterdir()] == ["folder.csv"]

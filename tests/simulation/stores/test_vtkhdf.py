@@ -1,0 +1,130 @@
+"""VTKHDF: every time and every block where they were, by the rules of the format and by VTK's own reader."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from blocksim.errors import InvalidInputError, OutputError
+from blocksim.simulation.frames import Frames
+from blocksim.simulation.stores import vtkhdf
+from blocksim.simulation.stores.vtkhdf import write_vtkhdf
+from blocksim.view.scene import corners
+from tests.view.made_up import HOSTILE, toppling
+
+
+@pytest.fixture(params=[1, 7, 1 << 16], ids=lambda size: f"batch {size}")
+def written(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Frames, Path]:
+    """Give frames of three blocks and their file, written some blocks at once."""
+    monkeypatch.setattr(vtkhdf, "BATCH", request.param)
+    frames = toppling(3, steps=11)
+    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames) == 11
+    return frames, tmp_path / "run.vtkhdf"
+
+
+def test_parts_of_every_time_are_found_where_the_steps_say(written: tuple[Frames, Path]) -> None:
+    frames, path = written
+    with h5py.File(path) as file:
+        group = file["VTKHDF"]
+        assert bytes(group.attrs["Type"]) == b"UnstructuredGrid"
+        assert group.attrs["Version"].tolist() == [2, 0]
+        steps = group["Steps"]
+        assert int(steps.attrs["NSteps"]) == 11
+        assert steps["Values"][:].tolist() == frames.time.tolist()
+        for frame in range(11):
+            assert steps["NumberOfParts"][frame] == 1
+            start = int(steps["PointOffsets"][frame])
+            points = group["Points"][start : start + int(group["NumberOfPoints"][0])]
+            np.testing.assert_allclose(points[:, :2], 1e-3 * corners(frames, frame).reshape(-1, 2), atol=1e-15)
+            first = int(steps["CellDataOffsets/rotation_deg"][frame])
+            rotation = group["CellData/rotation_deg"][first : first + 3]
+            assert rotation.tolist() == np.degrees(frames.rotation[frame]).tolist()
+
+
+def test_cells_are_rectangles_of_consecutive_points(written: tuple[Frames, Path]) -> None:
+    with h5py.File(written[1]) as file:
+        group = file["VTKHDF"]
+        assert group["Types"][:].tolist() == [9, 9, 9]
+        assert group["Offsets"][:].tolist() == [0, 4, 8, 12]
+        assert group["Connectivity"][:].tolist() == list(range(12))
+        assert [int(group[name][0]) for name in ("NumberOfCells", "NumberOfPoints", "NumberOfConnectivityIds")] == [
+            3,
+            12,
+            12,
+        ]
+
+
+def test_vtk_reads_back_every_time(written: tuple[Frames, Path]) -> None:
+    hdf = pytest.importorskip("vtkmodules.vtkIOHDF", reason="reading back needs the extra paraview-check (vtk)")
+    frames, path = written
+    reader = hdf.vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    assert reader.GetNumberOfSteps() == 11
+    assert times_of(reader) == frames.time.tolist()
+    for frame in (0, 5, 10, 2):
+        reader.SetStep(frame)
+        reader.Update()
+        grid = reader.GetOutputDataObject(0)
+        assert [grid.GetCellType(cell) for cell in range(grid.GetNumberOfCells())] == [9, 9, 9]
+        np.testing.assert_allclose(points_of(grid), 1e-3 * corners(frames, frame), atol=1e-15)
+        data = grid.GetCellData()
+        assert values(data, "block").tolist() == [1, 2, 3]
+        assert values(data, "rotation_deg").tolist() == np.degrees(frames.rotation[frame]).tolist()
+        assert values(data, "spin_deg_s").tolist() == np.degrees(frames.spin[frame]).tolist()
+        assert values(data, "velocity_m_s").tolist() == [[0.25, -0.5, 0.0]] * 3
+
+
+def times_of(reader: Any) -> list[float]:
+    """Return the times that a reader offers ParaView's time slider."""
+    model = pytest.importorskip("vtkmodules.vtkCommonExecutionModel")
+    steps = model.vtkStreamingDemandDrivenPipeline.TIME_STEPS()
+    information = reader.GetOutputInformation(0)
+    return [information.Get(steps, index) for index in range(information.Length(steps))]
+
+
+def points_of(grid: Any) -> NDArray[np.float64]:
+    """Return the corners (m) of every cell, (b, 4, 2)."""
+    cells = []
+    for number in range(grid.GetNumberOfCells()):
+        cell = grid.GetCell(number).GetPoints()  # the grid lends the same object for every cell
+        cells.append([cell.GetPoint(corner)[:2] for corner in range(4)])
+    return np.array(cells)
+
+
+def values(data: Any, name: str) -> NDArray[Any]:
+    numpy_support = pytest.importorskip("vtkmodules.util.numpy_support")
+    found: NDArray[Any] = numpy_support.vtk_to_numpy(data.GetArray(name))
+    return found
+
+
+def test_names_are_kept_as_they_are(tmp_path: Path) -> None:
+    names = (*HOSTILE, "plain")
+    write_vtkhdf(tmp_path / "run.vtkhdf", replace(toppling(len(names), steps=1), names=names))
+    with h5py.File(tmp_path / "run.vtkhdf") as file:
+        assert tuple(name.decode() for name in file["blocksim/block_names"][:]) == names
+
+
+def test_frames_that_are_not_finite_are_left_out(tmp_path: Path) -> None:
+    frames = toppling(2, steps=4)
+    frames.vx[3, 1] = np.inf
+    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames) == 3
+    frames.x[:] = np.nan
+    with pytest.raises(InvalidInputError, match="no frame to export"):
+        write_vtkhdf(tmp_path / "other.vtkhdf", frames)
+
+
+def test_full_disk_is_told_and_leaves_the_older_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_room(*_: object) -> None:
+        raise RuntimeError("Unable to write: no space left")
+
+    (tmp_path / "run.vtkhdf").write_text("older")
+    monkeypatch.setattr(vtkhdf, "_write_times", no_room)
+    with pytest.raises(OutputError, match=r"run\.vtkhdf: cannot be written: Unable to write"):
+        write_vtkhdf(tmp_path / "run.vtkhdf", toppling(1))
+    assert (tmp_path / "run.vtkhdf").read_text() == "older"
+    assert len(list(tmp_path.iterdir())) == 1

@@ -1,0 +1,92 @@
+"""Frames that no run has made: blocks in rows of ten that topple to the right."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from numpy.typing import NDArray
+
+from blocksim.simulation.frames import Frames
+
+HOSTILE = (
+    "<script>alert(1)</script>",
+    "$x^2$ \\frac",
+    "\u202eright to left \u05e9\u05dc\u05d5\u05dd",
+    "\N{GRINNING FACE}" * 40,
+    "two\nlines\x07",
+    "_hidden",
+    "-->",
+)
+
+
+def toppling(blocks: int, steps: int = 40, end: float = 0.6) -> Frames:
+    """Return blocks in rows of ten that turn to the right, the later the further up; 32 x 50 mm each."""
+    time = np.linspace(0.0, end, steps)
+    row, column = np.divmod(np.arange(blocks), 10)
+    share = (time[:, None] / end) ** 2
+    zeros = np.zeros((steps, blocks))
+    return Frames(
+        step=np.arange(steps),
+        time=time,
+        x=0.040 * column + 0.06 * share * (row + 1),
+        y=0.025 + 0.05 * row * (1.0 - share),
+        angle=-0.5 * np.pi * share * np.ones(blocks),
+        vx=zeros + 0.25,
+        vy=zeros - 0.5,
+        spin=zeros - 0.125,
+        energy={"kinetic": time, "potential": 3.0 - time, "friction": 0.0 * time, "dashpot": 0.5 * time, "elf": time},
+        contact_count=np.full(steps, 2.0),
+        largest_overlap=np.zeros(steps),
+        names=tuple(str(number + 1) for number in range(blocks)),
+        size_x=np.full(blocks, 0.032),
+        size_y=np.full(blocks, 0.050),
+        start_angle=np.zeros(blocks),
+    )
+
+
+def stacked(blocks: int) -> Frames:
+    """Return a tower at rest."""
+    frames = toppling(blocks)
+    frames.x[:], frames.angle[:] = 0.016, 0.0
+    frames.y[:] = 0.025 + 0.05 * np.arange(blocks)
+    return frames
+
+
+def texts_of(figure: Figure) -> list[Text]:
+    """Return the texts of a figure that can be seen, numbers of axes and legends included."""
+    texts = list(figure.texts)
+    for axes in figure.axes:
+        legend = axes.get_legend()
+        texts += [*axes.texts, *(legend.get_texts() if legend else [])]
+        if axes.axison:
+            texts += [*_of_axis(axes, "x"), *_of_axis(axes, "y")]
+    return [text for text in texts if text.get_text() and text.get_visible()]
+
+
+def _of_axis(axes: Axes, name: str) -> list[Text]:
+    axis = axes.xaxis if name == "x" else axes.yaxis
+    if not axis.get_visible():
+        return []
+    low, high = sorted(axes.get_xlim() if name == "x" else axes.get_ylim())
+    ticks = [tick.label1 for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+    return [axis.label, *(tick for tick in ticks if tick.get_visible())]
+
+
+def boxes_of(figure: Figure) -> list[tuple[str, NDArray[np.float64]]]:
+    """Return what is written and the box (pixels, left, bottom, right, top) of every text."""
+    return [(text.get_text(), np.array(text.get_window_extent().extents)) for text in texts_of(figure)]
+
+
+def overlapping(figure: Figure) -> list[tuple[str, str]]:
+    """Return the pairs of texts that cover each other, and the texts that are cut at the edge beside nothing."""
+    boxes = boxes_of(figure)
+    found = []
+    for index, (one, box) in enumerate(boxes):
+        if min(box[0], box[1], figure.bbox.width - box[2], figure.bbox.height - box[3]) < 0.0:
+            found.append((one, ""))
+        for other, other_box in boxes[index + 1 :]:
+            width = min(box[2], other_box[2]) - max(box[0], other_box[0])
+            height = min(box[3], other_box[3]) - max(box[1], other_box[1])
+            if min(width, height) > 0.0:
+                found.append((one, other))
+    return found

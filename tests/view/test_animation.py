@@ -1,0 +1,188 @@
+"""Films: frames chosen by time, the last one held, blocks where they were recorded, and clear refusals."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from PIL.GifImagePlugin import GifImageFile
+
+from blocksim.errors import InvalidInputError, OutputError, UnavailableError
+from blocksim.scenario.motion import MotionPieces
+from blocksim.simulation.frames import Frames
+from blocksim.view.animation import Film, Look, Pace, Pixels, draw_film, timed
+from blocksim.view.gif import ticks
+from blocksim.view.style import BLOCK_COLOURS
+from blocksim.view.support import Support
+from tests.view.made_up import HOSTILE, toppling
+
+FAST = Pace(speed=1.0, rate=10.0)
+SMALL = Look(width=240)
+MOVING = Support(motion=MotionPieces(np.array([0.0, 1.0]), np.array([[0.0, 0.02, 0.0, 0.0]]), 0.02))
+
+
+def colour(index: int) -> list[int]:
+    return [round(255 * part) for part in to_rgb(BLOCK_COLOURS[index])]
+
+
+def pixel_of(film: Film, picture: Pixels, x: float, y: float) -> list[int]:
+    """Return the colour at a place (mm) of the scene."""
+    column, row = film.canvas.scene.transform((x, y))
+    return [int(part) for part in picture[len(picture) - 1 - int(row), int(column)]]
+
+
+def near_the_centre(frames: Frames, frame: int, block: int) -> tuple[float, float]:
+    """Return a place (mm) beside the name of a block."""
+    return 1000.0 * float(frames.x[frame, block]) + 9.0, 1000.0 * float(frames.y[frame, block]) - 9.0
+
+
+@pytest.mark.parametrize("trails", [True, False])
+@pytest.mark.parametrize("support", [Support(), MOVING, Support(tilt=0.2)], ids=["level", "moving", "tilted"])
+def test_blocks_are_where_they_were_recorded(support: Support, trails: bool) -> None:
+    frames = toppling(2)
+    film = Film(frames, support, Look(width=400, trails=trails))
+    for frame in (0, 20, 39, 0):  # any order
+        picture = film.picture(frame)
+        for block in range(2):
+            assert pixel_of(film, picture, *near_the_centre(frames, frame, block)) == colour(block)
+
+
+def test_a_picture_does_not_depend_on_those_before() -> None:
+    film = Film(toppling(3), MOVING, SMALL)
+    first = film.picture(0)
+    film.picture(30)
+    assert np.array_equal(film.picture(0), first)
+
+
+def test_trails_are_drawn_for_few_blocks_unless_somebody_decides() -> None:
+    assert Film(toppling(3), Support(), SMALL).has_trails
+    assert not Film(toppling(31), Support(), SMALL).has_trails
+    without, with_trails = (Film(toppling(1), Support(), Look(240, trails=one)).picture(39) for one in (False, True))
+    assert not np.array_equal(without, with_trails)
+
+
+def test_a_moving_support_moves() -> None:
+    frames = toppling(1)
+    frames.x[:], frames.y[:], frames.angle[:] = 0.0, 0.025, 0.0
+    still, moving = (Film(frames, support, Look(240, trails=False)) for support in (Support(), MOVING))
+    assert np.array_equal(still.picture(10)[60:], still.picture(39)[60:])  # but for the time
+    assert not np.array_equal(moving.picture(10)[60:], moving.picture(39)[60:])
+
+
+@pytest.mark.parametrize("width", [200, 401, 1234])
+def test_sides_are_even_and_the_width_is_the_one_asked_for(width: int) -> None:
+    height, across, _ = Film(toppling(60), Support(), Look(width)).picture(0).shape
+    assert height % 2 == across % 2 == 0
+    assert abs(across - width) <= 1
+
+
+def test_a_tower_stays_within_the_page() -> None:
+    frames = toppling(1)
+    frames.y[:, 0] = np.linspace(3.0, 0.0, len(frames))
+    height, width, _ = Film(frames, Support(), SMALL).picture(0).shape
+    assert height < 1.6 * width
+
+
+def test_pictures_are_even_in_time_and_the_last_frame_is_shown_and_held() -> None:
+    frames = toppling(1, steps=601)  # a millisecond apart
+    chosen, seconds = timed(frames, np.arange(601), Pace(speed=0.25, rate=30.0))
+    assert chosen[:4].tolist() == [0, 8, 17, 25]  # 8.33 ms apart
+    assert chosen[-1] == 600
+    assert len(chosen) == 73
+    assert seconds[0] == pytest.approx(1.0 / 30.0)
+    assert seconds[-1] > 1.0
+
+
+def test_uneven_frames_are_shown_at_their_times() -> None:
+    frames = replace(toppling(1, steps=4), time=np.array([0.0, 0.1, 0.11, 0.5]))
+    chosen, _ = timed(frames, np.arange(4), Pace(1.0, 10.0))
+    assert chosen.tolist() == [0, 1, 2, 2, 3, 3]
+
+
+def test_a_single_frame_is_a_film() -> None:
+    frames = toppling(1)
+    chosen, seconds = timed(frames, np.array([3]), FAST)
+    assert chosen.tolist() == [3]
+    assert len(seconds) == 1
+
+
+def test_gif_plays_as_long_as_it_should(tmp_path: Path) -> None:
+    path = tmp_path / "film.gif"
+    assert draw_film(toppling(3), path, Pace(0.5, 30.0), SMALL) == 37
+    with GifImageFile(path) as film:
+        length = 0
+        for index in range(film.n_frames):
+            film.seek(index)
+            length += film.info["duration"]
+        assert film.info["loop"] == 0
+        assert film.width == 240
+    assert length == pytest.approx(1000 * (36 / 30 + 1.5), abs=10)
+
+
+def test_gif_shows_the_blocks_in_their_own_colours(tmp_path: Path) -> None:
+    frames = toppling(6)
+    draw_film(frames, tmp_path / "film.gif", FAST, Look(400))
+    drawn = Film(frames, Support(), Look(400))
+    with GifImageFile(tmp_path / "film.gif") as film:
+        film.seek(film.n_frames - 1)
+        last = np.asarray(film.convert("RGB"))
+    for block in range(6):
+        assert pixel_of(drawn, last, *near_the_centre(frames, -1, block)) == colour(block)
+    assert last[0, 0].tolist() == [255, 255, 255]
+
+
+def test_the_same_run_gives_the_same_gif(tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        draw_film(toppling(3), tmp_path / f"{name}.gif", FAST, SMALL)
+    assert (tmp_path / "first.gif").read_bytes() == (tmp_path / "second.gif").read_bytes()
+
+
+def test_ticks_add_up_where_a_picture_is_no_whole_number_of_them() -> None:
+    durations = ticks(np.full(30, 1.0 / 30.0))
+    assert set(durations.tolist()) == {3, 4}
+    assert durations.sum() == 100
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # the reader leaves its pipes open
+def test_mp4_can_be_read_back(tmp_path: Path) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="MP4 needs the extra video")
+    path = tmp_path / "film.mp4"
+    frames = toppling(2)
+    draw_film(frames, path, FAST, Look(301, title="film"))
+    reader = ffmpeg.read_frames(str(path))
+    told = next(reader)
+    pictures = list(reader)
+    film = Film(frames, Support(), Look(301))
+    assert told["size"] == film.picture(0).shape[1::-1]
+    assert len(pictures) == 6 + 15  # seven, the last one of them for 1.5 s
+    last = np.frombuffer(pictures[-1], np.uint8).reshape(film.picture(0).shape)
+    found = pixel_of(film, last, *near_the_centre(frames, -1, 1))
+    assert np.abs(np.subtract(found, colour(1))).max() < 16  # as lossy as MP4 is
+    assert [one.name for one in tmp_path.iterdir()] == ["film.mp4"]
+
+
+def test_missing_package_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[video\]'"):
+        draw_film(toppling(1), tmp_path / "film.mp4", FAST, SMALL)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_trouble_is_told(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"'.avi' is no film format, write .gif or .mp4"):
+        draw_film(toppling(1), tmp_path / "film.avi")
+    with pytest.raises(InvalidInputError, match="at most 10000: raise --speed or lower --fps"):
+        draw_film(toppling(1), tmp_path / "film.gif", Pace(1e-6, 30.0))
+    with pytest.raises(InvalidInputError, match="at most 50 pictures a second"):
+        draw_film(toppling(1), tmp_path / "film.gif", Pace(1.0, 60.0), SMALL)
+    with pytest.raises(OutputError, match="cannot be written: No such file"):
+        draw_film(toppling(1), tmp_path / "none" / "film.gif", FAST, SMALL)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_hostile_names_are_text() -> None:
+    frames = replace(toppling(len(HOSTILE)), names=HOSTILE)
+    for title in HOSTILE:
+        assert Film(frames, Support(), Look(800, title=title)).picture(0).shape[1] == 800
