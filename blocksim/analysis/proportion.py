@@ -4,7 +4,7 @@ They hold at least the stated confidence whatever the probability is. Each is th
 (fewer), of n has just the remaining chance; a quantile of a beta distribution solves that equation.
 """
 
-from blocksim.analysis.packages import scipy_special
+from blocksim.extras import loaded
 
 CONFIDENCE = 0.95
 
@@ -24,4 +24,4 @@ def _lower(count: int, total: int, tail: float) -> float:
     """Return p with P(at least `count` of `total`; p) = `tail`."""
     if count == 0:
         return 0.0
-    return float(scipy_special().betaincinv(count, total - count + 1, tail))
+    return float(loaded("scipy.special", "judging a sweep").betaincinv(count, total - count + 1, tail))

@@ -74,7 +74,7 @@ def rates(members: Sequence[Scenario], threads: int, repeats: int) -> tuple[Numb
         ensemble = Ensemble(members, only(build_stacks(members)))
         with ThreadPoolExecutor(threads) as pool:
             cpu, began = time.process_time(), time.perf_counter()
-            ensemble.advance(pool)
+            ensemble.advance(pool, threads)
             clock.append(len(members) / (time.perf_counter() - began))
             return len(members) / (time.process_time() - cpu)
 

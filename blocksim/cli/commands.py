@@ -17,6 +17,8 @@ COMMANDS = {  # name: module in this folder, function in it, first line of its h
     "compare": ("compare", "compare_command", "Compare runs with measured repeats."),
     "check": ("check", "check_command", "Validate a scenario and show what it comes to."),
     "sweep": ("sweep", "sweep_command", "Run a scenario many times with some keys varied."),
+    "calibrate": ("calibrate", "calibrate_command", "Fit inputs to measured repeats, within priors."),
+    "sensitivity": ("sensitivity", "sensitivity_command", "Show which inputs decide where the blocks end."),
     "converge": ("converge", "converge_command", "Refine step, stiffness and spacing until the run-out stays."),
     "verify": ("verify", "verify_command", "Run the verification cases and show the table."),
     "bench": ("bench", "bench_command", "Measure speed and memory, and show the table."),

@@ -20,8 +20,8 @@ from blocksim.simulation.folder import RESULTS
 from blocksim.study.converge import FEWEST_LEVELS, LEVELS, TOLERANCE_MM, converge
 from blocksim.study.convergence import Convergence, Joint, Level, Study, Verdict
 from blocksim.study.picture import draw_convergence
-from blocksim.study.pool import Row
 from blocksim.study.refinement import SPACING, STEP, STIFFNESS, TOLERANCE
+from blocksim.study.rows import Row
 from blocksim.view.style import picture_suffix
 
 MOST_BLOCKS = 3

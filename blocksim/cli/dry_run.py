@@ -9,9 +9,9 @@ from blocksim.study.estimate import Estimate, estimate
 from blocksim.world.memory import readable
 
 
-def show_estimate(document: Document, jobs: int | None, *, as_json: bool) -> None:
+def show_estimate(document: Document, jobs: int | None, *, keep_cases: bool, as_json: bool) -> None:
     """Print count, cost and size of the sweep of a document. Raises what `estimate` raises."""
-    found = estimate(document)
+    found = estimate(document, keep_cases=keep_cases)
     cores = jobs or os.cpu_count() or 1
     if as_json:
         print_json({**asdict(found), "jobs": cores})

@@ -1,9 +1,10 @@
 """blocksim sweep: many runs of one scenario."""
 
-import math
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Sequence
 from enum import StrEnum
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -11,15 +12,28 @@ from blocksim.cli import options
 from blocksim.cli.dry_run import show_estimate
 from blocksim.cli.output import GAP, answer, note, print_json, table_lines, width_of_screen
 from blocksim.cli.progress import tell_compilation
+from blocksim.cli.reporter import Reporter, shown
 from blocksim.cli.vary import with_vary
-from blocksim.errors import ExitCode
+from blocksim.errors import ExitCode, StoppedEarlyError
 from blocksim.scenario import Document
-from blocksim.study.many import TABLE, SweepResult, kernels_for, sweep
-from blocksim.study.pool import Row
+from blocksim.study.executors.ensemble import is_still_running
+from blocksim.study.many import SweepResult, kernels_for, sweep
+from blocksim.study.merge import merge as merge_shards
+from blocksim.study.shard import WHOLE, Shard
 from blocksim.study.single import FINISHED
 
 MOST_ROWS = 40
+MOST_FAILURES = 5
 NOT_SHOWN = {"case", "reason", "seconds"}
+NOT_SHOWN_ENDS = ("rotation_deg", "y_mm", "left_mm", "right_mm")
+
+
+class Executor(StrEnum):
+    """What runs the cases."""
+
+    ENSEMBLE = "ensemble"
+    PROCESSES = "processes"
+    DASK = "dask"
 
 
 class Mode(StrEnum):
@@ -34,7 +48,7 @@ class Mode(StrEnum):
 
 
 def sweep_command(
-    scenario: options.ScenarioPath,
+    scenario: Annotated[Path | None, typer.Argument(metavar="SCENARIO", help="Scenario file (TOML).")] = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -50,7 +64,28 @@ def sweep_command(
     samples: Annotated[int | None, typer.Option(metavar="N", help="How many cases are drawn (default: 128).")] = None,
     seed: Annotated[int | None, typer.Option(metavar="S", help="The same seed draws the same (default: 0).")] = None,
     settings: options.Settings = None,
-    jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes (default: one a core).")] = None,
+    executor: Annotated[
+        Executor | None,
+        typer.Option(help="ensemble: in this process (default); processes: one case cannot take others with it."),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Threads or processes (default: one a core).")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster, such as tcp://host:8786.")
+    ] = None,
+    shard: Annotated[
+        str | None, typer.Option(metavar="I/N", help="Run only cases I, I + N, ... (job arrays); then --merge.")
+    ] = None,
+    merge: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Run nothing; make sweep.csv from the shards in a folder.")
+    ] = None,
+    allow_missing: Annotated[bool, typer.Option("--allow-missing", help="Merge what there is by now.")] = False,
+    keep_cases: Annotated[
+        bool, typer.Option("--keep-cases", help="Keep a run folder with all frames for every case.")
+    ] = False,
+    fail_fast: Annotated[bool, typer.Option("--fail-fast", help="Stop at the first case that fails.")] = False,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run failed cases again.")] = False,
     out: options.SweepFolder = None,
     overwrite: options.Overwrite = False,
     dry_run: Annotated[
@@ -61,10 +96,15 @@ def sweep_command(
 ) -> None:
     """Run a scenario many times with some keys varied.
 
-    Every case gives a row in sweep.csv. Called again, the same sweep runs only the cases that are missing.
+    Every case gives a row in sweep.csv. Called again, also after a kill, the same sweep runs only the cases that are
+    missing.
 
     Example: blocksim sweep scenarios/slide.toml --vary gravity=1.62,9.81
     """
+    if merge is not None:
+        _tell(_merged(merge, scenario, allow_missing=allow_missing), as_json=as_json, quiet=quiet)
+    if scenario is None:
+        raise typer.BadParameter("a scenario file is needed, or --merge DIR", param_hint="SCENARIO")
     silent = quiet or as_json
     document = with_vary(
         Document.read(scenario).with_settings(settings or []),
@@ -74,18 +114,46 @@ def sweep_command(
         seed=seed,
     )
     if dry_run:
-        show_estimate(document, jobs, as_json=as_json)
+        show_estimate(document, jobs, keep_cases=keep_cases, as_json=as_json)
         return
-    short = short_keys(document)
     for kernels in kernels_for(document):
         tell_compilation(kernels, quiet=silent)
+    result = _sweep(
+        document,
+        out=out,
+        executor=None if executor is None else executor.value,
+        jobs=jobs,
+        scheduler=scheduler,
+        shard=WHOLE if shard is None else Shard.parse(shard),
+        keep_cases=keep_cases,
+        fail_fast=fail_fast,
+        retry_failed=retry_failed,
+        overwrite=overwrite,
+        on_row=(lambda *_: None) if silent else Reporter(short_keys(document)).tell,
+    )
+    _tell(result, as_json=as_json, quiet=quiet)
 
-    def on_row(done: int, total: int, row: Row) -> None:
-        if not silent:
-            values = ", ".join(f"{name} = {shown(row[key])}" for key, name in short.items())
-            note(f"{done}/{total} {row['status']}: {values}")
 
-    result = sweep(document, out=out, jobs=jobs, overwrite=overwrite, on_row=on_row)
+def _sweep(document: Document, **wanted: Any) -> SweepResult:
+    """Run a sweep; stopped early, leave without waiting for a case that takes minutes."""
+    try:
+        return sweep(document, **wanted)
+    except StoppedEarlyError as error:
+        if is_still_running():
+            note(str(error))
+            os._exit(error.exit_code)
+        raise
+
+
+def _merged(folder: Path, scenario: Path | None, *, allow_missing: bool) -> SweepResult:
+    if scenario is not None:
+        raise typer.BadParameter("--merge takes the plan from the folder; leave the scenario out", param_hint="--merge")
+    return merge_shards(folder, allow_missing=allow_missing)
+
+
+def _tell(result: SweepResult, *, as_json: bool, quiet: bool) -> NoReturn:
+    """Show the table and leave with the exit code."""
+    short = short_names(result.keys)
     if as_json:
         print_json({"folder": str(result.folder), "rows": result.table.to_dict(orient="records")})
     else:
@@ -96,7 +164,11 @@ def sweep_command(
 def short_keys(document: Document) -> dict[str, str]:
     """Return the varied keys with the shortest ends that tell them apart."""
     plan = document.build().sweep
-    keys = [] if plan is None else list(plan.vary)
+    return short_names(() if plan is None else tuple(plan.vary))
+
+
+def short_names(keys: Sequence[str]) -> dict[str, str]:
+    """Return keys with the shortest ends that tell them apart."""
     return {
         key: next(end for end in _ends(key) if sum(f".{other}".endswith(f".{end}") for other in keys) == 1)
         for key in keys
@@ -108,20 +180,9 @@ def _ends(key: str) -> list[str]:
     return [".".join(parts[start:]) for start in reversed(range(len(parts)))]
 
 
-def shown(value: object) -> str:
-    """Return a cell of the table for people."""
-    match value:
-        case bool():
-            return "yes" if value else "no"
-        case float():
-            return f"{value:.6g}" if math.isfinite(value) else "–"
-        case _:
-            return str(value)
-
-
 def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
     table = result.table
-    told = [name for name in table.columns if name not in NOT_SHOWN and not name.endswith("rotation_deg")]
+    told = [name for name in table.columns if name not in NOT_SHOWN and not name.endswith(NOT_SHOWN_ENDS)]
     names = [name for name in told if name in short or name == "inside" or _varies(table[name])]
     rows = [[shown(value) for value in row] for row in table[names].head(MOST_ROWS).itertuples(index=False)]
     fitting = _fitting([short.get(name, name) for name in names], rows)
@@ -135,13 +196,27 @@ def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
         "columns that do not vary": len(told) - len(names),
     }
     if any(left_out.values()):
-        note(f"{TABLE} has " + ", ".join(f"{count} {what}" for what, count in left_out.items() if count))
+        note(f"{result.name} has " + ", ".join(f"{count} {what}" for what, count in left_out.items() if count))
     if result.share_inside is not None:
         note(f"{result.share_inside:.0%} of {len(table)} cases are inside all measured ranges")
-    if result.failed:
-        first = table[table["status"] != FINISHED]["reason"].iloc[0]
-        note(f"{result.failed} of {len(table)} cases did not finish; the first: {first}")
-    note(f"table: {result.folder / TABLE}")
+    _tell_failures(result, short)
+    if result.left:
+        note(f"{result.left} cases have not been run; the same command runs them")
+    note(f"table: {result.folder / result.name}")
+
+
+def _tell_failures(result: SweepResult, short: dict[str, str]) -> None:
+    """Name the first cases that failed, with their reasons."""
+    if not result.failed:
+        return
+    failed = result.table[result.table["status"] != FINISHED]
+    first = failed.iloc[0]["reason"]
+    note(f"{result.failed} of {len(result.table)} cases did not finish; the first: {first}")
+    for _, row in failed.head(MOST_FAILURES).iterrows():
+        values = ", ".join(f"{name} = {shown(row[key])}" for key, name in short.items())
+        note(f"  {row['status']}: {values}: {str(row['reason']).splitlines()[0]}")
+    if len(failed) > MOST_FAILURES:
+        note(f"  and {len(failed) - MOST_FAILURES} more; --retry-failed runs them again")
 
 
 def _varies(values: Iterable[object]) -> bool:

@@ -6,6 +6,7 @@ from blocksim.errors import Problem, ScenarioError
 from blocksim.scenario import Document
 from blocksim.scenario.overrides import UnfitOverrideError, parse_value
 from blocksim.study.plan import Values, with_sweep
+from blocksim.study.variation import Variations
 
 ENDS = ("from", "to", "count")
 LEAST_ENDS = 2
@@ -25,17 +26,24 @@ def with_vary(
 
     Raises ScenarioError where a text is none of them; wrong keys and values show when the document is built.
     """
-    problems = [Problem(f"--vary {text}", f"write {FORMS}") for text in texts if not _parts(text)]
+    given = read_variations(texts, "--vary")
+    return with_sweep(document, given.tables, mode, given.texts, samples=samples, seed=seed)
+
+
+def read_variations(texts: Sequence[str], option: str) -> Variations:
+    """Return what such texts, given to an option, say of each key; raises ScenarioError where one is none of them."""
+    problems = [Problem(f"{option} {text}", f"write {FORMS}") for text in texts if not _parts(text)]
     keys = [key for text in texts for key, _ in _parts(text)]
     problems += [
-        Problem(f"--vary {key}", "given twice; list all its values once") for key in keys if keys.count(key) > 1
+        Problem(f"{option} {key}", "given twice; list all its values once") for key in keys if keys.count(key) > 1
     ]
     if problems:
         raise ScenarioError(list(dict.fromkeys(problems)))
     split = {key: (text, values) for text in texts for key, values in _parts(text)}
-    vary = {key: _values(values) for key, (_, values) in split.items()}
-    labels = {key: text for key, (text, _) in split.items()}
-    return with_sweep(document, vary, mode, labels, samples=samples, seed=seed)
+    return Variations(
+        tables={key: _values(values) for key, (_, values) in split.items()},
+        texts={key: text for key, (text, _) in split.items()},
+    )
 
 
 def _parts(text: str) -> list[tuple[str, str]]:

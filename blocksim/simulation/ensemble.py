@@ -24,7 +24,7 @@ from blocksim.world.stacks import Refusal, Stack, member, stack_of_one
 
 BATCH = 256  # members in memory at the same time
 MOST_BODIES = 16_384  # of all members of a batch
-CHUNK = 4  # members that a thread takes at a time: few enough that all threads end together
+CHUNK = 4  # members at most that a thread takes at a time: few enough that all threads end together
 
 Ended = MemberEnd | MemberFailure
 
@@ -67,7 +67,7 @@ def _run_all(scenarios: Iterable[Scenario], threads: int, most: int) -> Iterator
         for batch in _batches(scenarios, most):
             for kernels in dict.fromkeys(map(kernels_of, batch)):
                 compile_kernels(kernels)
-            yield _run_batch(batch, pool)
+            yield _run_batch(batch, pool, threads)
 
 
 def _batches(scenarios: Iterable[Scenario], most: int) -> Iterator[list[Scenario]]:
@@ -84,14 +84,14 @@ def _batches(scenarios: Iterable[Scenario], most: int) -> Iterator[list[Scenario
         yield batch
 
 
-def _run_batch(scenarios: Sequence[Scenario], pool: ThreadPoolExecutor) -> list[Ended]:
+def _run_batch(scenarios: Sequence[Scenario], pool: ThreadPoolExecutor, threads: int) -> list[Ended]:
     ends: dict[int, Ended] = {}
     for one in build_stacks(scenarios):
         if isinstance(one, Refusal):
             ends[one.number] = MemberFailure(one.error)
         else:
             ensemble = Ensemble(scenarios, one)
-            ensemble.advance(pool)
+            ensemble.advance(pool, threads)
             ends.update(zip(one.numbers, ensemble.ends(), strict=True))
     return [ends[i] for i in range(len(scenarios))]
 
@@ -110,11 +110,12 @@ class Ensemble:
         self.starts = np.zeros((len(ends), len(self.scheme.measured)))
         self.codes = np.zeros(len(ends), dtype=np.int64)
 
-    def advance(self, pool: ThreadPoolExecutor) -> None:
+    def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
         self._advance(np.zeros(0, dtype=np.int64))  # compiles, before there are threads
         count = len(self.codes)
-        list(pool.map(self._advance, (np.arange(i, min(i + CHUNK, count)) for i in range(0, count, CHUNK))))
+        chunk = min(CHUNK, -(-count // threads))
+        list(pool.map(self._advance, (np.arange(i, min(i + chunk, count)) for i in range(0, count, chunk))))
 
     def _advance(self, members: NDArray[np.int64]) -> None:
         self.scheme.advance_members(self.scenes, members, self.last_steps, self.starts, self.codes)

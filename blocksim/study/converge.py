@@ -18,8 +18,9 @@ from blocksim.simulation.schemes import build_scene
 from blocksim.simulation.stopping import interruptible
 from blocksim.simulation.summary import read_summary
 from blocksim.study.convergence import Convergence, Coordinates, Joint, Study, Verdict, distance, judge
-from blocksim.study.pool import Row, run_all
+from blocksim.study.folders import run_all
 from blocksim.study.refinement import Refinement, effects_note, has_particles, refinements_of, with_setting
+from blocksim.study.rows import Row
 from blocksim.study.single import FINISHED, check_experiment
 
 FOLDER = "converge"

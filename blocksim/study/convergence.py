@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import Scenario, place_bodies
-from blocksim.study.pool import Row
 from blocksim.study.refinement import Refinement
+from blocksim.study.rows import Row
 from blocksim.study.single import FINISHED
 
 ROUND_OFF_MM = 1e-6  # a smaller change says nothing about the order

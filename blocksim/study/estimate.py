@@ -10,12 +10,14 @@ from blocksim.scenario import Document
 from blocksim.study.plan import cases_of
 from blocksim.study.sampling.modes import remarks
 from blocksim.study.single import check_experiment
-from blocksim.world.describe import describe
+from blocksim.world.describe import Description, describe
 
 LOOKED_AT = 32
 """Cases that are built to estimate all of them."""
 SMALL_FILES = 12_000
 """Bytes of the files beside run.h5 in the folder of a case."""
+ROW, ROW_OF_BLOCK = 300, 230
+"""Bytes of a case in manifest and table, and more for each block; three blocks and two keys take 1 kB."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +29,12 @@ class Estimate:
     impossible: int  # of those looked at
     reason: str  # why the first impossible one is
     seconds: float  # of solving all cases on one core, at most: as if none came to rest before its end
-    bytes: int  # of all folders of cases, at most
+    bytes: int  # of all that the sweep writes, at most
     remarks: tuple[str, ...]
 
 
-def estimate(document: Document) -> Estimate:
-    """Return what the sweep of a document comes to; nothing is run or written.
+def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
+    """Return what the sweep of a document comes to, with all frames of every case or without; nothing is written.
 
     Raises what building the document, its plan or a scene raises, InvalidInputError where nothing is varied.
     """
@@ -52,9 +54,14 @@ def estimate(document: Document) -> Estimate:
         impossible=len(problems),
         reason=problems[0] if problems else "",
         seconds=share * len(cases) * fmean([one.seconds for one in described] or [0.0]),
-        bytes=round(share * len(cases) * fmean([one.bytes + SMALL_FILES for one in described] or [0.0])),
+        bytes=round(share * len(cases) * fmean([_bytes(one, keep_cases=keep_cases) for one in described] or [0.0])),
         remarks=tuple(remarks(base.sweep)),
     )
+
+
+def _bytes(one: Description, *, keep_cases: bool) -> int:
+    row = ROW + ROW_OF_BLOCK * len(one.bodies)
+    return row + one.bytes + SMALL_FILES if keep_cases else row
 
 
 def _spread_out(count: int) -> list[int]:

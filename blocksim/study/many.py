@@ -1,72 +1,42 @@
 """Many runs of one scenario with some keys varied, with one row a case in sweep.csv.
 
-Every case lies in a folder named by the hash of its run, so a sweep that is called again does only what is missing.
+What has ended is in the manifest, so a sweep that is called again, after a kill too, does only what is missing. The
+table is written from the manifest: it depends neither on the executor nor on the order in which the cases ended.
 """
 
 import hashlib
 import json
 import os
-import shutil
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import dataclass, field
 from multiprocessing import current_process
 from pathlib import Path
-from typing import Any
 
-import pandas as pd
-
-from blocksim.analysis.compare import compare_final
-from blocksim.analysis.experiment import load_table
-from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError
+from blocksim.errors import InvalidInputError
 from blocksim.scenario import Document, Scenario, scenario_hash
 from blocksim.scenario.models.study import Sweep
 from blocksim.simulation import folder as files
-from blocksim.simulation.atomic import write_text
 from blocksim.simulation.compilation import compile_kernels, kernel_set
-from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
-from blocksim.simulation.stopping import interruptible
-from blocksim.simulation.table import read_table
-from blocksim.study.plan import Case, Values, cases_of, with_sweep
-from blocksim.study.pool import Row, run_all
+from blocksim.study import manifest
+from blocksim.study.done import Done
+from blocksim.study.executors import DEFAULT, WITH_FOLDERS, WITH_SCHEDULER, executor_named
+from blocksim.study.executors.task import Setting
+from blocksim.study.manifest import Manifest
+from blocksim.study.plan import Cases, Values, cases_of, with_sweep
+from blocksim.study.ranges import Ranges
 from blocksim.study.sampling.design import levels_of
-from blocksim.study.single import FINISHED, check_experiment
+from blocksim.study.shard import WHOLE, Shard
+from blocksim.study.single import check_experiment
+from blocksim.study.sweep_folder import CASES, PLAN, prepare
+from blocksim.study.sweeping import OnRow, Sweeping
+from blocksim.study.table import TABLE, SweepResult, SweepTable, read_sweep
+from blocksim.study.timings import Timings
 
-TABLE = "sweep.csv"
-PLAN = "sweep.toml"
-CASES = "cases"
-WRITE_SECONDS = 1.0
-TEXT_COLUMNS = {"case": str, "status": str, "reason": str}
-OnRow = Callable[[int, int, Row], None]
+__all__ = ["PLAN", "TABLE", "OnRow", "SweepResult", "kernels_for", "read_sweep", "sweep", "sweep_hash"]
 
-
-@dataclass(frozen=True)
-class SweepResult:
-    """The folder of a sweep and its table, a row a case."""
-
-    folder: Path
-    table: pd.DataFrame = field(repr=False)
-
-    @property
-    def failed(self) -> int:
-        """How many cases did not finish."""
-        return int((self.table["status"] != FINISHED).sum())
-
-    @property
-    def share_inside(self) -> float | None:
-        """Share of all cases that lie inside all measured ranges; None without an experiment."""
-        if "inside" not in self.table or self.table["inside"].isna().all():
-            return None
-        return float((self.table["inside"] == True).mean())  # noqa: E712 - the column has True, False and missing values
-
-    def share_inside_of(self, experiment: Path | str) -> float:
-        """Share of all cases that lie inside all ranges of another table. Raises what reading it raises."""
-        measured = load_table(experiment)
-        names = self.table["case"][self.table["status"] == FINISHED]
-        finals = (read_table(self.folder / CASES / name / files.FINAL) for name in names)
-        return sum(compare_final(final, measured).inside for final in finals) / len(self.table)
+TIMINGS = "timings.csv"
+MEASURED = "experiment.table"
 
 
 def sweep(  # noqa: PLR0913 - one argument for each option of the command
@@ -75,33 +45,68 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     *,
     mode: str | None = None,
     out: Path | str | None = None,
+    executor: str | None = None,
     jobs: int | None = None,
+    scheduler: str | None = None,
+    shard: Shard = WHOLE,
+    keep_cases: bool = False,
+    fail_fast: bool = False,
+    retry_failed: bool = False,
     overwrite: bool = False,
     on_row: OnRow = lambda *_: None,
 ) -> SweepResult:
-    """Run every case of a sweep on `jobs` processes (default: one a core).
+    """Run every case of a sweep that has no row yet, on `jobs` threads or processes (default: one a core).
 
     `vary` (dotted key: values, or from, to, count) and `mode` (grid, list) replace what the scenario's [sweep] table
-    says. Cases that fail get a row with their status; the others go on. Raises ScenarioError for a bad scenario,
-    InvalidInputError where nothing is varied, OutputExistsError where the folder is not free, StoppedEarlyError on
-    Ctrl-C.
+    says. `executor` is ensemble (default), processes (default with `keep_cases`, which writes a folder of frames for
+    every case) or dask (default with a `scheduler`, such as tcp://host:8786); the rows are the same. With a `shard`,
+    only its cases are run, and `merge` makes one table of all shards.
 
-    A script that calls it needs the guard `if __name__ == "__main__":`, as the processes import the script.
+    Cases that fail get a row with their status; the others go on, unless `fail_fast`. `retry_failed` runs them again.
+    Raises ScenarioError for a bad scenario, InvalidInputError where nothing is varied, OutputExistsError where the
+    folder is not free, UnavailableError for a scheduler that does not answer, StoppedEarlyError on Ctrl-C.
+
+    A script that has processes started needs the guard `if __name__ == "__main__":`, as they import the script.
     """
-    _refuse_in_worker()
+    executor = _chosen(executor, scheduler, keep_cases=keep_cases)
+    _refuse_loss(shard, overwrite=overwrite)
+    runner = executor_named(executor)
     document = with_sweep(scenario if isinstance(scenario, Document) else Document.read(scenario), vary, mode)
     base = document.build()
-    if base.sweep is None:
-        message = "nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario"
-        raise InvalidInputError(message)
-    check_experiment(base)
-    cases = cases_of(document, base.sweep)
-    name = sweep_hash(base, base.sweep)
+    plan = _plan_of(base)
+    cases = cases_of(document, plan)
+    name = sweep_hash(base, plan)
     folder = Path(out) if out is not None else files.RESULTS / base.name / f"sweep-{name}"
-    _prepare(folder, base, name, overwrite=overwrite)
+    setting = Setting(jobs or os.cpu_count() or 1, scheduler=scheduler, folder=folder / CASES if keep_cases else None)
+    runner.check(setting)
+    prepare(folder, base, name, overwrite=overwrite)
     for kernels in kernels_for(document):
         compile_kernels(kernels)
-    return _run_cases(folder, cases, jobs or os.cpu_count() or 1, on_row)
+    with closing(Manifest(folder / shard.file(manifest.NAME))) as kept:
+        done = Done(folder, len(cases))
+        if retry_failed:
+            done.forget_failed(shard)
+        table = SweepTable(folder / shard.file(TABLE), cases, done, ranges_of(base), shard)
+        timings = Timings(folder / shard.file(TIMINGS), executor)
+        Sweeping(cases, shard, kept, done, table, timings, on_row).run(runner.run, setting, fail_fast=fail_fast)
+    return SweepResult(folder, shard.file(TABLE), len(done.state[shard.slice]))
+
+
+def _chosen(executor: str | None, scheduler: str | None, *, keep_cases: bool) -> str:
+    """Return the executor that the other options ask for. Raises InvalidInputError where they contradict it."""
+    needed = WITH_SCHEDULER if scheduler is not None else WITH_FOLDERS if keep_cases else executor or DEFAULT
+    if keep_cases and WITH_SCHEDULER in {needed, executor}:
+        raise InvalidInputError("folders of cases are kept on this machine only: not with a scheduler")
+    if executor is not None and executor != needed:
+        why = "a scheduler" if scheduler is not None else "keeping the folders of cases"
+        message = f"{why} goes with the executor {needed}, not {executor}"
+        executor_named(executor)
+        raise InvalidInputError(message)
+    if needed == WITH_SCHEDULER and scheduler is None:
+        raise InvalidInputError("the executor dask needs the address of a scheduler: --scheduler tcp://HOST:PORT")
+    if needed == WITH_FOLDERS:
+        _refuse_in_worker()
+    return needed
 
 
 def _refuse_in_worker() -> None:
@@ -109,6 +114,34 @@ def _refuse_in_worker() -> None:
     if getattr(current_process(), "_inheriting", False):
         message = 'sweep() starts processes that import this script: call it below if __name__ == "__main__":'
         raise InvalidInputError(message)
+
+
+def _refuse_loss(shard: Shard, *, overwrite: bool) -> None:
+    """Refuse that every job of an array removes what the others have done."""
+    if overwrite and shard != WHOLE:
+        raise InvalidInputError("a shard cannot overwrite what other shards have done; remove the folder first")
+
+
+def _plan_of(base: Scenario) -> Sweep:
+    """Return what is varied. Raises InvalidInputError where that is nothing, and for a table that does not fit."""
+    if base.sweep is None:
+        message = "nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario"
+        raise InvalidInputError(message)
+    if MEASURED in base.sweep.vary:
+        message = f"{MEASURED} cannot be varied: compare --experiment judges by another table"
+        raise InvalidInputError(message)
+    check_experiment(base)
+    return base.sweep
+
+
+def cases_in(document: Document) -> Cases:
+    """Return the cases of a document that has a sweep. Raises InvalidInputError where it has none."""
+    return cases_of(document, _plan_of(document.build()))
+
+
+def ranges_of(base: Scenario) -> Ranges | None:
+    """Return the measured ranges that a scenario is compared with, if it names any."""
+    return None if base.experiment is None else Ranges.read(base.experiment.table)
 
 
 def sweep_hash(base: Scenario, plan: Sweep) -> str:
@@ -124,98 +157,3 @@ def kernels_for(document: Document) -> tuple[str, ...]:
     schemes = (base.time.scheme, *map(str, levels_of(vary.get("time.scheme", ()))))
     models = (base.contact.model, *map(str, levels_of(vary.get("contact.model", ()))))
     return tuple(dict.fromkeys(kernel_set(scheme, model) for scheme in schemes for model in models))
-
-
-def _prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool) -> None:
-    """Make the folder and write the plan into it. Raises OutputExistsError when something else is there."""
-    head = f"# Sweep {name}. To run it again: blocksim sweep FILE\n"
-    tables = read_tables(base)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        _make_free(folder, head, overwrite=overwrite)
-    except OSError as error:
-        message = f"{folder}: cannot be created: {error.strerror}"
-        raise OutputExistsError(message) from error
-    write_text(folder / PLAN, head + resolved_beside(base, tables))
-    keep_tables(tables, folder)
-
-
-def _make_free(folder: Path, head: str, *, overwrite: bool) -> None:
-    present = {path.name for path in folder.iterdir() if not path.name.startswith(f".{PLAN}.")}
-    if not present:
-        return
-    plan = (folder / PLAN).read_text(encoding="utf-8", errors="replace") if PLAN in present else ""
-    if not plan.startswith("# Sweep "):
-        message = f"{folder}: holds files that are not a sweep; choose another folder with --out"
-        raise OutputExistsError(message)
-    if overwrite:
-        (folder / TABLE).unlink(missing_ok=True)
-        shutil.rmtree(folder / CASES, ignore_errors=True)
-    elif not plan.startswith(head):
-        message = f"{folder}: another sweep is there; --overwrite replaces it, --out DIR writes elsewhere"
-        raise OutputExistsError(message)
-
-
-def _run_cases(folder: Path, cases: Sequence[Case], jobs: int, on_row: OnRow) -> SweepResult:
-    """Run what has to be run; cases of the same name are one run."""
-    rows = _Rows(folder / TABLE, cases, on_row)
-    tasks: dict[Path, Scenario] = {}
-    numbers: dict[Path, list[int]] = {}
-    try:
-        for number, case in enumerate(cases):
-            place = folder / CASES / case.name
-            numbers.setdefault(place, []).append(number)
-            if case.scenario is None:
-                rows.add(number, {"status": "invalid", "reason": case.problem, "seconds": 0.0})
-            else:
-                tasks[place] = case.scenario
-        # closed here and now: left to the garbage collector, a Ctrl-C in this loop would wait for the workers
-        with interruptible(), closing(run_all(tasks, jobs)) as ended:
-            for place, row in ended:
-                for number in numbers[place]:
-                    rows.add(number, row)
-    except KeyboardInterrupt:
-        rows.write()
-        message = f"stopped with {len(rows.rows)} of {len(cases)} cases done; the same command does the others"
-        raise StoppedEarlyError(message) from None
-    return SweepResult(folder, rows.write())
-
-
-class _Rows:
-    """The rows so far, written to sweep.csv every now and then and at the end."""
-
-    def __init__(self, path: Path, cases: Sequence[Case], on_row: OnRow) -> None:
-        self.path = path
-        self.heads: list[dict[str, Any]] = [{"case": case.name, **case.settings} for case in cases]
-        self.rows: dict[int, Row] = {}
-        self.on_row = on_row
-        self.written_at = time.monotonic()
-
-    def add(self, number: int, row: Row) -> None:
-        self.rows[number] = row
-        self.on_row(len(self.rows), len(self.heads), {**self.heads[number], **row})
-        if time.monotonic() - self.written_at > WRITE_SECONDS:
-            self.write()
-
-    def write(self) -> pd.DataFrame:
-        table = pd.DataFrame([{**self.heads[number], **self.rows[number]} for number in sorted(self.rows)])
-        write_text(self.path, table.to_csv(index=False, lineterminator="\n"))
-        self.written_at = time.monotonic()
-        return table
-
-
-def read_sweep(folder: Path) -> SweepResult:
-    """Return the sweep that a folder holds. Raises InputMissingError or InvalidInputError."""
-    path = folder / TABLE
-    try:
-        table = pd.read_csv(path, dtype=TEXT_COLUMNS)
-    except FileNotFoundError:
-        message = f"{path}: no such file"
-        raise InputMissingError(message) from None
-    except (OSError, ValueError) as error:
-        message = f"{path}: not the table of a sweep: {str(error).strip()}"
-        raise InvalidInputError(message) from error
-    if not {"case", "status"} <= set(table.columns):
-        message = f"{path}: not the table of a sweep: no columns case and status"
-        raise InvalidInputError(message)
-    return SweepResult(folder, table)

@@ -128,7 +128,16 @@ def test_terminal_without_the_signs_gets_an_answer(process: Process) -> None:
 
 def test_stopped_sweep_is_75_and_ends_its_workers(process: Process, tmp_path: Path) -> None:
     vary = ("--vary", "time.end=0.001,1e4,2e4", "--set", "time.stop_at_rest=false", "--jobs", 2)
-    arguments = ("sweep", "scenarios/three_blocks_nominal.toml", *SOFT, *vary, "--out", "out")
+    arguments = (
+        "sweep",
+        "scenarios/three_blocks_nominal.toml",
+        *SOFT,
+        *vary,
+        "--executor",
+        "processes",
+        "--out",
+        "out",
+    )
     running = process(*arguments, start_new_session=True)
     assert running.stderr is not None
     line = running.stderr.readline()

@@ -12,6 +12,7 @@ from blocksim.study.plan import with_sweep
 from tests.cli.conftest import SCENARIOS, SOFT, Command
 
 SHORT = ("sweep", "scenarios/three_blocks_nominal.toml", *SOFT, "--set", "time.end=0.01", "--jobs", 1, "--out", "out")
+RIGID = ("sweep", "scenarios/three_blocks_nonsmooth.toml", "--set", "time.end=0.01", "--out", "out")
 KINETIC = "friction.block_block.kinetic"
 
 
@@ -133,6 +134,62 @@ def test_key_given_twice_is_told(blocksim: Command) -> None:
     answer = blocksim(*SHORT, "--vary", "gravity=1,2", "--vary", "gravity=3,4")
     assert answer.code == 65
     assert answer.err == "--vary gravity: given twice; list all its values once\n"
+
+
+def test_failures_are_listed_up_to_a_few(blocksim: Command) -> None:
+    answer = blocksim(*SHORT, "--vary", "contact.max_overlap=1e-3," + ",".join(f"{k}e-9" for k in range(1, 9)))
+    assert answer.code == 77
+    assert answer.err.count("  failed: max_overlap = ") == 5
+    assert "8 of 9 cases did not finish" in answer.err
+    assert "  and 3 more; --retry-failed runs them again" in answer.err
+
+
+def test_many_cases_are_told_in_few_lines(blocksim: Command) -> None:
+    answer = blocksim(*RIGID, "--vary", f"{KINETIC}=0.1:0.3:60")
+    assert answer.code == 0
+    assert "60/60 cases, " in answer.err
+    assert answer.err.count("cases, ") < 10
+
+
+def test_shards_are_merged_and_missing_ones_named(blocksim: Command) -> None:
+    vary = ("--vary", f"{KINETIC}=0.1:0.3:5")
+    assert blocksim(*RIGID, *vary, "--shard", "0/2").code == 0
+    early = blocksim("sweep", "--merge", "out")
+    assert (early.code, early.out) == (65, "")
+    assert "2 of 5 cases are missing" in early.err
+    assert "--shard 1/2: 2 of 2 missing" in early.err
+    assert blocksim("sweep", "--merge", "out", "--allow-missing").code == 0
+    assert len(rows()) == 3
+    assert blocksim(*RIGID, *vary, "--shard", "1/2").code == 0
+    assert blocksim("sweep", "--merge", "out").code == 0
+    assert len(rows()) == 5
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "told"),
+    [
+        (("--shard", "2/2"), 65, "--shard 2/2: write I/N"),
+        (("--shard", "0/2", "--overwrite"), 65, "a shard cannot overwrite"),
+        (("--executor", "dask"), 65, "--scheduler tcp://HOST:PORT"),
+        (("--executor", "thread"), 2, "Invalid value for '--executor'"),
+        (("--merge", "out"), 2, "leave the scenario out"),
+        (("--jobs", "0"), 2, "--jobs"),
+    ],
+)
+def test_options_that_do_not_go_together_are_told(
+    blocksim: Command, tmp_path: Path, options: tuple[str, ...], code: int, told: str
+) -> None:
+    before = sorted(tmp_path.rglob("*"))
+    answer = blocksim(*RIGID, "--vary", f"{KINETIC}=0.1,0.2", *options)
+    assert answer.code == code
+    assert told in answer.err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_scenario_is_needed_unless_shards_are_merged(blocksim: Command) -> None:
+    answer = blocksim("sweep")
+    assert answer.code == 2
+    assert "a scenario file is needed, or --merge DIR" in answer.err
 
 
 SAMPLED = ("--vary", f"{KINETIC}=0.1:0.3", "--vary", "structures.0.overlap=10 mm+-0.1 mm", "--mode", "lhs")

@@ -19,3 +19,9 @@ def nominal() -> Document:
 def scenario(nominal: Document) -> Scenario:
     """Give the same, checked."""
     return nominal.build()
+
+
+@pytest.fixture(scope="session")
+def quick() -> Document:
+    """Give rigid blocks that have hardly begun to fall: a case takes less than a millisecond."""
+    return Document.read(SCENARIOS / "three_blocks_nonsmooth.toml").with_values({"time.end": 0.01})

@@ -7,11 +7,11 @@ import pytest
 
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Document, Scenario
-from blocksim.study import pool
+from blocksim.study import folders
 from blocksim.study.converge import converge
 from blocksim.study.convergence import Coordinates, Study, Verdict, judge
-from blocksim.study.pool import Row
 from blocksim.study.refinement import Refinement, refinements_of, with_setting
+from blocksim.study.rows import Row
 from tests.study.conftest import SCENARIOS
 
 HALVED = Refinement("step", "time step", "time.safety", 0.05, 0.5, 1)
@@ -161,7 +161,7 @@ def test_all_recommended_values_are_tried_together(slide: Scenario, tmp_path: Pa
 
 def test_more_levels_run_only_what_is_missing(slide: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = converge(slide, studies=["step"], out=tmp_path)
-    monkeypatch.setattr(pool, "run", None)
+    monkeypatch.setattr(folders, "run", None)
     assert converge(slide, studies=["step"], out=tmp_path, levels=9) == before
 
 

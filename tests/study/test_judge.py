@@ -61,7 +61,9 @@ def test_table_alone_needs_an_experiment(swept: SweepResult, tmp_path: Path) -> 
 
 
 def test_damaged_table_is_told(tmp_path: Path) -> None:
-    pd.DataFrame({"case": ["a"], "status": ["finished"], "1.x_mm": ["wide"]}).to_csv(tmp_path / "sweep.csv")
+    pd.DataFrame({"case": ["a"], "status": ["finished"], "1.x_mm": ["wide"]}).to_csv(
+        tmp_path / "sweep.csv", index=False
+    )
     (tmp_path / "one.csv").write_text("block,quantity,unit,replicate,value\n1,x,mm,1,3\n")
     with pytest.raises(InvalidInputError, match=r"sweep\.csv: 1\.x_mm: 'wide' in row 1 is not a number"):
         compare_sweep(tmp_path, tmp_path / "one.csv")

@@ -1,18 +1,19 @@
 """A sweep keeps one row a case, repeats nothing, and goes on where a case fails."""
 
+import json
 import os
 import signal
 from multiprocessing import active_children
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.scenario import Document, load_scenario
-from blocksim.study import pool
+from blocksim.study.manifest import Manifest
 from blocksim.study.many import read_sweep, sweep
+from blocksim.study.shard import Shard
 from blocksim.study.single import run
 from tests.study.conftest import SCENARIOS
 
@@ -22,183 +23,206 @@ OVERLAP = "contact.max_overlap"
 TWO = {KINETIC: [0.2, 0.25]}
 
 
-@pytest.fixture
-def runs(monkeypatch: pytest.MonkeyPatch) -> list[object]:
-    """Give the scenarios that are run from now on."""
-    made: list[object] = []
-
-    def counted(scenario: object, **options: object) -> object:
-        made.append(scenario)
-        return run(scenario, **options)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(pool, "run", counted)
-    return made
-
-
-def test_pool_of_two_gives_the_rows_of_one_process(nominal: Document, tmp_path: Path) -> None:
-    vary = {KINETIC: [0.2, 0.25, 0.3]}
-    two = sweep(nominal, vary, jobs=2, out=tmp_path / "two").table
-    one = sweep(nominal, vary, jobs=1, out=tmp_path / "one").table
-    pd.testing.assert_frame_equal(two.drop(columns="seconds"), one.drop(columns="seconds"), check_exact=True)
-    assert two[KINETIC].tolist() == [0.2, 0.25, 0.3]
-    assert two["status"].tolist() == ["finished"] * 3
+def lines(folder: Path) -> list[str]:
+    """Return the lines of the manifest: one for every case that was run."""
+    return (folder / "manifest.jsonl").read_text().splitlines()
 
 
 def test_row_is_what_a_single_run_gives(nominal: Document, tmp_path: Path) -> None:
-    row = sweep(nominal, {KINETIC: [0.25]}, jobs=1, out=tmp_path).table.iloc[0]
+    row = sweep(nominal, {KINETIC: [0.25]}, out=tmp_path).table.iloc[0]
     single = run(nominal.with_values({KINETIC: 0.25}).build())
-    assert row["3.x_mm"] == single.final["x_mm"][2]
-    assert row["2.rotation_deg"] == single.final["rotation_deg"][1]
+    for column in ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm"):
+        assert row[f"3.{column}"] == single.final[column][2]
+    assert row["seconds"] == single.summary.simulated_time_s
+    assert row["reason"] == single.reason
     assert not row["inside"]
 
 
-def test_folder_holds_plan_table_and_cases(nominal: Document, tmp_path: Path) -> None:
-    result = sweep(nominal, TWO, jobs=1, out=tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {"sweep.toml", "sweep.csv", "cases", "experiment.csv"}
+def test_columns_are_values_outcome_verdict_and_ends(quick: Document, tmp_path: Path) -> None:
+    table = sweep(quick, TWO, out=tmp_path).table
+    ends = [f"{block}.{name}" for block in "123" for name in ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")]
+    assert list(table.columns) == ["case", KINETIC, "status", "reason", "seconds", "inside", *ends]
+
+
+def test_folder_holds_plan_table_and_manifest(quick: Document, tmp_path: Path) -> None:
+    result = sweep(quick, TWO, out=tmp_path)
+    files = {"sweep.toml", "sweep.csv", "manifest.jsonl", "timings.csv", "experiment.csv"}
+    assert {path.name for path in tmp_path.iterdir()} == files
+    pd.testing.assert_frame_equal(read_sweep(tmp_path).table, result.table, check_exact=True)
+    timings = pd.read_csv(tmp_path / "timings.csv")
+    assert timings["case"].tolist() == result.table["case"].tolist()
+    assert (timings["seconds"] > 0.0).all()
+
+
+def test_kept_cases_are_runs(nominal: Document, tmp_path: Path) -> None:
+    short = nominal.with_values({END: 0.01})
+    result = sweep(short, TWO, out=tmp_path, jobs=1, keep_cases=True)
     assert sorted(result.table["case"]) == sorted(path.name for path in (tmp_path / "cases").iterdir())
-    back = read_sweep(tmp_path)
-    assert back.table["case"].tolist() == result.table["case"].tolist()
-    np.testing.assert_allclose(back.table["3.x_mm"], result.table["3.x_mm"], rtol=1e-12)
-    case = load_scenario(tmp_path / "cases" / result.table["case"][1] / "scenario.toml")
-    assert case.friction.block_block.kinetic == 0.25
-    assert case.sweep is None
+    case = tmp_path / "cases" / result.table["case"][1]
+    assert (case / "run.h5").is_file()
+    scenario = load_scenario(case / "scenario.toml")
+    assert scenario.friction.block_block.kinetic == 0.25
+    assert scenario.sweep is None
 
 
-def test_plan_is_a_scenario_that_repeats_the_sweep(nominal: Document, tmp_path: Path, runs: list[object]) -> None:
-    first = sweep(nominal, TWO, jobs=1, out=tmp_path)
-    assert len(runs) == 2
-    again = sweep(tmp_path / "sweep.toml", jobs=1, out=tmp_path)
+def test_equal_cases_are_kept_in_one_folder(quick: Document, tmp_path: Path) -> None:
+    table = sweep(quick, {END: [0.01, "10 ms", "0.01 s"]}, jobs=2, out=tmp_path, keep_cases=True).table
+    assert len(list((tmp_path / "cases").iterdir())) == 1
+    assert table["status"].tolist() == ["finished"] * 3
+    assert len(set(table["case"])) == 1
+
+
+def test_plan_is_a_scenario_that_repeats_the_sweep(quick: Document, tmp_path: Path) -> None:
+    first = sweep(quick, TWO, out=tmp_path)
+    again = sweep(tmp_path / "sweep.toml", out=tmp_path)
     assert again.table["case"].tolist() == first.table["case"].tolist()
-    assert len(runs) == 2
+    assert len(lines(tmp_path)) == 2
 
 
 def test_default_folder_is_named_by_what_is_varied(
-    nominal: Document, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    quick: Document, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    short = nominal.with_values({END: 0.01})
-    folders = {sweep(short, vary, jobs=1).folder for vary in (TWO, TWO, {KINETIC: [0.2]})}
+    folders = {sweep(quick, vary).folder for vary in (TWO, TWO, {KINETIC: [0.2]})}
     assert len(folders) == 2
-    assert {folder.parent for folder in folders} == {Path("results/three_blocks_nominal")}
+    assert {folder.parent for folder in folders} == {Path("results/three_blocks_nonsmooth")}
 
 
-def test_called_again_it_runs_only_what_is_missing(nominal: Document, tmp_path: Path, runs: list[object]) -> None:
-    first = sweep(nominal, TWO, jobs=1, out=tmp_path)
-    (tmp_path / "cases" / first.table["case"][0] / "done.json").unlink()
-    again = sweep(nominal, TWO, jobs=1, out=tmp_path)
-    assert len(runs) == 3
-    pd.testing.assert_frame_equal(first.table.drop(columns="seconds"), again.table.drop(columns="seconds"))
-    assert again.table["seconds"][1] == first.table["seconds"][1]
+def test_called_again_it_runs_only_what_is_missing(quick: Document, tmp_path: Path) -> None:
+    vary = {KINETIC: [0.2, 0.22, 0.25]}
+    sweep(quick, vary, out=tmp_path)
+    whole, table = lines(tmp_path), (tmp_path / "sweep.csv").read_bytes()
+    (tmp_path / "manifest.jsonl").write_text(whole[2] + "\n" + whole[0][:-20])  # the last one torn
+    (tmp_path / "sweep.csv").unlink()
+    sweep(quick, vary, out=tmp_path)
+    assert sorted(json.loads(line)["number"] for line in lines(tmp_path) if line in whole) == [0, 1, 2]
+    assert len(lines(tmp_path)) == 4
+    assert (tmp_path / "sweep.csv").read_bytes() == table
 
 
-def test_failed_case_is_not_run_again_either(nominal: Document, tmp_path: Path, runs: list[object]) -> None:
-    for _ in range(2):
-        result = sweep(nominal, {OVERLAP: [1e-9, 1e-3]}, jobs=1, out=tmp_path)
-        assert result.table["status"].tolist() == ["failed", "finished"]
-        assert result.failed == 1
-    assert len(runs) == 2
+def test_failed_case_is_run_again_only_when_asked(quick: Document, tmp_path: Path) -> None:
+    vary = {OVERLAP: [1e-12, 1e-2, 1e-11]}
+    for retry, count in ((False, 3), (False, 3), (True, 5)):
+        result = sweep(quick, vary, out=tmp_path, retry_failed=retry)
+        assert result.table["status"].tolist() == ["failed", "finished", "failed"]
+        assert result.failed == 2
+        assert len(lines(tmp_path)) == count
 
 
-def test_damaged_case_is_run_again(nominal: Document, tmp_path: Path, runs: list[object]) -> None:
-    first = sweep(nominal, TWO, jobs=1, out=tmp_path)
-    (tmp_path / "cases" / first.table["case"][0] / "final.csv").write_text("")
-    again = sweep(nominal, TWO, jobs=1, out=tmp_path)
-    assert len(runs) == 3
-    assert again.failed == 0
-
-
-def test_equal_cases_are_one_run(nominal: Document, tmp_path: Path, runs: list[object]) -> None:
-    table = sweep(nominal, {END: [0.01, "10 ms"]}, jobs=1, out=tmp_path).table
-    assert len(runs) == 1
-    assert len(table) == 2
-    assert table["case"][0] == table["case"][1]
-
-
-def test_overwrite_runs_everything_again(nominal: Document, tmp_path: Path, runs: list[object]) -> None:
-    sweep(nominal, TWO, jobs=1, out=tmp_path)
-    sweep(nominal, TWO, jobs=1, out=tmp_path, overwrite=True)
-    assert len(runs) == 4
-
-
-def test_impossible_case_has_a_row_with_the_reason(nominal: Document, tmp_path: Path) -> None:
-    result = sweep(nominal, {KINETIC: [0.2, 0.9]}, jobs=1, out=tmp_path)
-    assert result.table["status"].tolist() == ["finished", "invalid"]
-    assert "above static friction" in result.table["reason"][1]
+def test_first_failure_ends_a_sweep_that_is_to_fail_fast(quick: Document, tmp_path: Path) -> None:
+    vary = {KINETIC: [0.1], OVERLAP: [1e-2] * 3 + [1e-12] + [1e-2] * 60}
+    result = sweep(quick, vary, jobs=1, out=tmp_path, fail_fast=True)
     assert result.failed == 1
+    assert result.left == 64 - len(result.table) > 0
+    whole = sweep(quick, vary, jobs=1, out=tmp_path)
+    assert (whole.failed, whole.left, len(whole.table)) == (1, 0, 64)
+    assert len(lines(tmp_path)) == 64
 
 
-def test_broken_case_does_not_end_the_others(
-    nominal: Document, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def broken(scenario: object, **options: object) -> object:
-        if not list((tmp_path / "cases").glob("*")):
-            Path(str(options["out"])).mkdir(parents=True)
-            raise ZeroDivisionError("oh")
-        return run(scenario, **options)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(pool, "run", broken)
-    table = sweep(nominal, TWO, jobs=1, out=tmp_path).table
-    assert table["status"].tolist() == ["failed", "finished"]
-    assert table["reason"][0] == "internal error: ZeroDivisionError: oh"
+def test_overwrite_runs_everything_again(quick: Document, tmp_path: Path) -> None:
+    sweep(quick, TWO, out=tmp_path)
+    before = (tmp_path / "timings.csv").read_text()
+    sweep(quick, TWO, out=tmp_path, overwrite=True)
+    assert len(lines(tmp_path)) == 2
+    assert (tmp_path / "timings.csv").read_text() != before
 
 
-def test_other_sweep_in_the_folder_is_not_mixed_in(nominal: Document, tmp_path: Path) -> None:
-    sweep(nominal, TWO, jobs=1, out=tmp_path)
+def test_impossible_case_has_a_row_with_the_reason(quick: Document, tmp_path: Path) -> None:
+    result = sweep(quick, {KINETIC: [0.9, 0.2, 0.8]}, out=tmp_path)
+    assert result.table["status"].tolist() == ["invalid", "finished", "invalid"]
+    assert "above static friction" in result.table["reason"][0]
+    assert result.failed == 2
+    assert len(lines(tmp_path)) == 3
+
+
+def test_case_that_cannot_be_built_does_not_end_the_others(nominal: Document, tmp_path: Path) -> None:
+    short = nominal.with_values({END: 0.01})
+    result = sweep(short, {"time.step": ["auto", 1e-2, 1e-6]}, out=tmp_path)
+    assert result.table["status"].tolist() == ["finished", "failed", "finished"]
+    assert "step" in result.table["reason"][1]
+
+
+def test_other_sweep_in_the_folder_is_not_mixed_in(quick: Document, tmp_path: Path) -> None:
+    sweep(quick, TWO, out=tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     with pytest.raises(OutputExistsError, match="another sweep is there; --overwrite"):
-        sweep(nominal, {KINETIC: [0.1]}, jobs=1, out=tmp_path)
-    result = sweep(nominal, {KINETIC: [0.1]}, jobs=1, out=tmp_path, overwrite=True)
-    assert [path.name for path in (tmp_path / "cases").iterdir()] == result.table["case"].tolist()
+        sweep(quick, {KINETIC: [0.1]}, out=tmp_path)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+    result = sweep(quick, {KINETIC: [0.1]}, out=tmp_path, overwrite=True)
+    assert result.table[KINETIC].tolist() == [0.1]
 
 
 @pytest.mark.parametrize("overwrite", [False, True])
-def test_foreign_folder_is_left_alone(nominal: Document, tmp_path: Path, overwrite: bool) -> None:
+def test_sweep_that_is_running_is_left_alone(quick: Document, tmp_path: Path, overwrite: bool) -> None:
+    sweep(quick, TWO, out=tmp_path)
+    running = Manifest(tmp_path / "manifest.jsonl")
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    with pytest.raises(OutputExistsError, match="running"):
+        sweep(quick, TWO, out=tmp_path, overwrite=overwrite)
+    running.close()
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_foreign_folder_is_left_alone(quick: Document, tmp_path: Path, overwrite: bool) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(OutputExistsError, match="not a sweep"):
-        sweep(nominal, TWO, out=tmp_path, overwrite=overwrite)
+        sweep(quick, TWO, out=tmp_path, overwrite=overwrite)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
-def test_mistake_leaves_no_folder(nominal: Document, tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError):
-        sweep(nominal, {"friction.block_blok": [1]}, out=tmp_path / "sweep")
-    with pytest.raises(InvalidInputError, match="nothing to vary"):
-        sweep(nominal, out=tmp_path / "sweep")
+def test_mistake_leaves_no_folder(quick: Document, tmp_path: Path) -> None:
+    wrong = [
+        ({"friction.block_blok": [1]}, {}, "unknown key"),
+        (None, {}, "nothing to vary"),
+        ({"experiment.table": ["a.csv"]}, {}, "experiment.table"),
+        (TWO, {"executor": "ensembel"}, "did you mean 'ensemble'"),
+        (TWO, {"executor": "dask"}, "address of a scheduler"),
+        (TWO, {"executor": "ensemble", "keep_cases": True}, "goes with the executor processes"),
+        (TWO, {"scheduler": "tcp://localhost:1", "executor": "processes"}, "goes with the executor dask"),
+        (TWO, {"scheduler": "tcp://localhost:1", "keep_cases": True}, "not with a scheduler"),
+        (TWO, {"shard": Shard(0, 2), "overwrite": True}, "cannot overwrite"),
+    ]
+    for vary, options, told in wrong:
+        with pytest.raises(InvalidInputError, match=told):
+            sweep(quick, vary, out=tmp_path / "sweep", **options)  # type: ignore[arg-type]
     assert list(tmp_path.iterdir()) == []
 
 
-def test_ctrl_c_keeps_the_rows_so_far_and_the_next_call_does_the_rest(
-    nominal: Document, tmp_path: Path, runs: list[object]
-) -> None:
-    slow = nominal.with_values({END: 1000.0, "time.stop_at_rest": False})
-    vary = {END: [0.01, 1000.0, 0.02]}
+def test_ctrl_c_keeps_the_rows_so_far_and_the_next_call_does_the_rest(quick: Document, tmp_path: Path) -> None:
+    vary = {KINETIC: [0.1 + 0.001 * k for k in range(120)]}
+    whole = sweep(quick, vary, out=tmp_path / "whole")
 
-    def press_ctrl_c(*_: object) -> None:
-        signal.setitimer(signal.ITIMER_REAL, 0.2)
+    def press_ctrl_c(done: int, *_: object) -> None:
+        if done == 2:
+            os.kill(os.getpid(), signal.SIGINT)
 
-    before = signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGINT))
-    try:
-        with pytest.raises(StoppedEarlyError, match="1 of 3 cases done; the same command does the others"):
-            sweep(slow, vary, jobs=1, out=tmp_path, on_row=press_ctrl_c)
-    finally:
-        signal.signal(signal.SIGALRM, before)
-    assert len(read_sweep(tmp_path).table) == 1
-    assert len(runs) == 2
+    with pytest.raises(StoppedEarlyError, match="of 120 cases done; the same command does the others"):
+        sweep(quick, vary, jobs=1, out=tmp_path / "cut", on_row=press_ctrl_c)
+    some = len(read_sweep(tmp_path / "cut").table)
+    assert 2 <= some < 120
+    told: list[int] = []
+    sweep(quick, vary, out=tmp_path / "cut", on_row=lambda done, *_: told.append(done))
+    assert told == list(range(some + 1, 121))
+    assert (tmp_path / "cut" / "sweep.csv").read_bytes() == (tmp_path / "whole" / "sweep.csv").read_bytes()
+    assert len(whole.table) == 120
 
 
-def test_share_inside_counts_failed_cases_as_outside(nominal: Document, tmp_path: Path) -> None:
+def test_share_inside_counts_failed_cases_as_outside(tmp_path: Path) -> None:
     calibrated = Document.read(SCENARIOS / "three_blocks.toml")
-    result = sweep(calibrated, {OVERLAP: [1e-3, 1e-12]}, jobs=1, out=tmp_path)
+    result = sweep(calibrated, {OVERLAP: [1e-3, 1e-12]}, out=tmp_path)
     assert result.table["inside"].tolist()[0] is True
     assert result.share_inside == 0.5
     assert read_sweep(tmp_path).share_inside == 0.5
     assert result.share_inside_of(SCENARIOS / "experiments" / "three_blocks.csv") == 0.5
-    assert nominal.build().sweep is None
 
 
 def test_sweep_without_experiment_has_no_share(tmp_path: Path) -> None:
-    vary = {"contact.stiffness_scale": [0.001, 0.002]}
-    result = sweep(Document.read(SCENARIOS / "slide.toml"), vary, jobs=1, out=tmp_path)
+    slide = Document.read(SCENARIOS / "slide.toml").with_values({END: 0.001})
+    result = sweep(slide, {"contact.stiffness_scale": [0.001, 0.002]}, out=tmp_path)
     assert result.share_inside is None
+    with pytest.raises(InvalidInputError, match="the sweep has no such column"):
+        result.share_inside_of(SCENARIOS / "experiments" / "three_blocks.csv")
 
 
 @pytest.mark.parametrize("text", ["", "a,b\n1,2\n", "case,status\n1,2\n1,2,3,4\n"])
@@ -217,8 +241,9 @@ def test_interrupt_between_two_rows_ends_the_workers_at_once(tmp_path: Path) -> 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    shipped = Path(__file__).parents[2] / "scenarios" / "three_blocks_nominal.toml"
+    shipped = SCENARIOS / "three_blocks_nominal.toml"
     endless = Document.read(shipped).with_settings(["contact.stiffness_scale=0.001", "time.stop_at_rest=false"])
+    vary = {END: [0.001, 1e4, 2e4]}
     with pytest.raises(StoppedEarlyError, match="1 of 3 cases done"):
-        sweep(endless, {"time.end": [0.001, 1e4, 2e4]}, out=tmp_path / "out", jobs=2, on_row=interrupt)
+        sweep(endless, vary, out=tmp_path / "out", executor="processes", jobs=2, on_row=interrupt)
     assert active_children() == []

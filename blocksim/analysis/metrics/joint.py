@@ -30,7 +30,7 @@ from blocksim.analysis.metrics.metric import (
     listed,
     shown_name,
 )
-from blocksim.analysis.packages import scipy_special
+from blocksim.extras import loaded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -66,7 +66,7 @@ def hotelling(repeats: "Floats", members: "Floats") -> Hotelling | None:
     if rest <= 0.0:
         return None
     scale = degrees * p / rest
-    special = scipy_special()
+    special = loaded("scipy.special", "judging a sweep")
     critical = scale * float(special.fdtri(p, rest, CONFIDENCE))
     return Hotelling(squared, squared / scale, float(p), rest, critical, float(special.fdtrc(p, rest, squared / scale)))
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.extras import loaded
 from blocksim.scenario.models.variation import Normal, Uniform, Variation, rounded, written
-from blocksim.study.sampling.extra import scipy_stats
 
 Places = NDArray[np.float64]
 """Numbers u with 0 < u < 1, shape (samples,)."""
@@ -40,7 +40,7 @@ def uniform(values: Uniform, places: Places) -> Places:
 
 def normal(values: Normal, places: Places) -> Places:
     """Invert the normal distribution, cut at its bounds (scipy.stats.truncnorm)."""
-    stats = scipy_stats()
+    stats = loaded("scipy.stats", "sampled sweeps")
     low, high = ((bound - values.mean) / values.sd for bound in (values.low, values.high))
     if np.isinf(low) and np.isinf(high):
         return np.asarray(stats.norm.ppf(places, values.mean, values.sd))

@@ -7,10 +7,10 @@ removed or reordered and the values of the others stay. Another number of sample
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.extras import loaded
 from blocksim.scenario import Sweep
 from blocksim.study.sampling.design import Design
 from blocksim.study.sampling.draws import each_by_itself
-from blocksim.study.sampling.extra import scipy_qmc
 
 
 def lhs(sweep: Sweep) -> Design:
@@ -20,5 +20,7 @@ def lhs(sweep: Sweep) -> Design:
 
 def _strata(stream: np.random.Generator, samples: int) -> NDArray[np.float64]:
     """Return a place in each interval, in random order."""
-    column: NDArray[np.float64] = scipy_qmc().LatinHypercube(1, seed=stream).random(samples)[:, 0]
+    column: NDArray[np.float64] = (
+        loaded("scipy.stats.qmc", "sampled sweeps").LatinHypercube(1, seed=stream).random(samples)[:, 0]
+    )
     return column

@@ -8,10 +8,10 @@ next dimension. The points are balanced where their number is a power of two.
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.extras import loaded
 from blocksim.scenario import Sweep
 from blocksim.study.sampling.design import Design
 from blocksim.study.sampling.draws import from_places, generator
-from blocksim.study.sampling.extra import scipy_qmc
 
 DIMENSIONS = 128
 """Dimensions that are scrambled, however few are used: so those in use do not depend on how many they are."""
@@ -28,7 +28,9 @@ def sobol(sweep: Sweep) -> Design:
 
 def _points(seed: int, samples: int, dimensions: int) -> NDArray[np.float64]:
     """Return points in the middles of the finest cells of the net, shape (samples, dimensions)."""
-    sequence = scipy_qmc().Sobol(DIMENSIONS, scramble=True, bits=BITS, seed=generator(seed, "sobol"))
+    sequence = loaded("scipy.stats.qmc", "sampled sweeps").Sobol(
+        DIMENSIONS, scramble=True, bits=BITS, seed=generator(seed, "sobol")
+    )
     size = min(CHUNK, 1 << (samples - 1).bit_length())
     chunks = [sequence.random(size)[:, :dimensions].copy() for _ in range(0, samples, size)]
     return np.concatenate(chunks)[:samples] + 0.5 ** (BITS + 1)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from blocksim import extras
 from blocksim.errors import UnavailableError
 from blocksim.scenario import Document, Sweep
-from blocksim.study.sampling import extra
 from blocksim.study.sampling.modes import design_of, remarks
 from tests.study.sampling.plans import OVERLAP, RATIO, SCALE, TILT, sweep_of
 
@@ -132,7 +132,7 @@ def test_a_missing_scipy_names_the_extra(nominal: Document, monkeypatch: pytest.
         raise ImportError(name)
 
     sweep = sweep_of(nominal, "lhs", {SCALE: UNIT})
-    monkeypatch.setattr(extra, "import_module", gone)
+    monkeypatch.setattr(extras, "import_module", gone)
     with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[study\]'") as caught:
         design_of(sweep)
     assert caught.value.exit_code == 69

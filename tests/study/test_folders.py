@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import Document
-from blocksim.study.pool import Row, _outcome, run_all
+from blocksim.study.folders import _outcome, run_all
 
 
 def test_dead_worker_fails_its_case_and_says_what_to_do() -> None:
-    future: Future[Row] = Future()
+    future: Future[dict[str, object]] = Future()
     future.set_exception(BrokenProcessPool())
     row = _outcome(future)
     assert row["status"] == "failed"

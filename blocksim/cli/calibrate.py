@@ -1,0 +1,162 @@
+"""blocksim calibrate: fit inputs to measured repeats, so that agreement is probable under the scatter of the others."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from blocksim.cli import options
+from blocksim.cli.output import answer, note, print_json, table_lines
+from blocksim.cli.progress import tell_compilation
+from blocksim.cli.vary import read_variations
+from blocksim.scenario import Document
+from blocksim.simulation.compilation import kernels_of
+from blocksim.study.calibrate.calibrate import FRESH_MEMBERS, MEMBERS, TRIALS, Fit, calibrate
+from blocksim.study.calibrate.plan import FIT, SCATTER, read_plan
+from blocksim.study.calibrate.search import Trial
+
+COLUMNS = ("key", "prior", "fitted")
+TOLD_SECONDS = 2.0
+
+
+def calibrate_command(
+    scenario: options.ScenarioPath,
+    fit: Annotated[
+        list[str] | None, typer.Option(FIT, metavar="KEY=FROM:TO", help="A key to fit, and its prior. Repeatable.")
+    ] = None,
+    scatter: Annotated[
+        list[str] | None,
+        typer.Option(
+            SCATTER,
+            metavar="KEY=MEAN+-SD",
+            help="Scatter of an input (KEY=FROM:TO: uniform); of a fitted key, about its fitted value. Repeatable. "
+            "Default: the distributions of [sweep].",
+        ),
+    ] = None,
+    trials: Annotated[int, typer.Option(min=1, metavar="N", help="Sets of values that are tried.")] = TRIALS,
+    members: Annotated[int, typer.Option(min=1, metavar="M", help="Runs over the scatter, a trial.")] = MEMBERS,
+    fresh: Annotated[
+        int, typer.Option(min=1, metavar="M", help="Fresh runs that the probability is measured with in the end.")
+    ] = FRESH_MEMBERS,
+    seed: Annotated[int, typer.Option(min=0, metavar="S", help="The same seed finds the same.")] = 0,
+    experiment: options.ExperimentPath = None,
+    settings: options.Settings = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE", help="Scenario file to write (default: results/NAME/calibrate-HASH/scenario.toml)."
+        ),
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the trials that are there.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file and the trials there.")] = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Fit inputs to measured repeats, within priors.
+
+    What is maximised is the probability that a run is inside all measured ranges (as in compare) while the other inputs
+    scatter as stated, not the agreement of one run. Writes the scenario with the fitted values and where they come from
+    in [provenance]. Every trial is kept as it ends; a search that was stopped goes on with --resume. Needs the extra
+    blocksim[study]. The example takes the scatter from [sweep], as in "structures.0.overlap" = { mean = "10 mm", sd =
+    "0.3 mm" }; --scatter "structures.0.overlap=10 mm+-0.3 mm" says the same.
+
+    Example: blocksim calibrate mine.toml --fit contact.restitution=0.2:0.35
+    """
+    silent = quiet or as_json
+    plan = read_plan(
+        Document.read(scenario).with_settings(settings or []),
+        read_variations(fit or [], FIT),
+        read_variations(scatter or [], SCATTER),
+        experiment=experiment,
+        members=members,
+        seed=seed,
+    )
+    tell_compilation(kernels_of(plan.base), quiet=silent)
+    found = calibrate(
+        plan,
+        trials=trials,
+        fresh_members=fresh,
+        out=out,
+        resume=resume,
+        overwrite=overwrite,
+        on_trial=(lambda *_: None) if silent else _telling(),
+    )
+    if as_json:
+        print_json(_data(found))
+    else:
+        answer("\n".join(_lines(found)))
+    if not silent:
+        _tell_end(found)
+
+
+def _telling() -> Callable[[Trial, Trial, int], None]:
+    """Return a function that tells every trial that is the best so far, and another now and then."""
+    told_at = 0.0
+
+    def tell(trial: Trial, best: Trial, trials: int) -> None:
+        nonlocal told_at
+        now = time.monotonic()
+        if trial is best or now - told_at > TOLD_SECONDS or trial.number == trials:
+            told_at = now
+            values = ", ".join(f"{'.'.join(key.split('.')[-2:])} {value}" for key, value in trial.values.items())
+            share, most = trial.score.share_inside, best.score.share_inside
+            note(f"{trial.number}/{trials}: {share:.0%} inside (best {most:.0%}): {values}")
+
+    return tell
+
+
+def _lines(found: Fit) -> list[str]:
+    rows = [[prior.key, str(prior), str(found.best.values[prior.key])] for prior in found.plan.priors]
+    return [*table_lines(COLUMNS, rows, left=1), "", *_probability(found)]
+
+
+def _probability(found: Fit) -> list[str]:
+    score, tried = found.score, found.best.score
+    if found.plan.scatter.plan is None:
+        verdict = "inside all ranges" if score.inside else f"not inside all ranges ({score.miss:.3g} off)"
+        return [f"one run, without input scatter: {verdict}"]
+    low, high = score.interval
+    return [
+        f"P(inside all ranges) = {score.share_inside:.3f}, 95 % interval {low:.3f} to {high:.3f} (Wilson)",
+        f"of {score.members} fresh random members; the search had {tried.share_inside:.3f} of its {tried.members}",
+    ]
+
+
+def _tell_end(found: Fit) -> None:
+    for prior in found.at_bounds:
+        value = found.best.values[prior.key]
+        note(f"warning: {prior.key} = {value} lies at a bound of its prior; a wider one might fit better")
+    failed = found.score.failed
+    if failed:
+        note(f"{failed} of {found.score.members} fresh members failed or cannot be simulated; they count as outside")
+    note(f"written: {found.path}")
+
+
+def _data(found: Fit) -> dict[str, object]:
+    low, high = found.score.interval
+    return {
+        "scenario": str(found.path),
+        "fitted": [
+            {
+                "key": prior.key,
+                "prior": [prior.low, prior.high],
+                "unit": prior.unit,
+                "value": found.best.values[prior.key],
+                "at_bound": prior in found.at_bounds,
+            }
+            for prior in found.plan.priors
+        ],
+        "scatter": found.plan.scatter.described(),
+        "experiment": found.plan.table.source,
+        "trials": found.trials,
+        "members": found.plan.members,
+        "seed": found.plan.seed,
+        "best_trial": found.best.number,
+        "search_share_inside": found.best.score.share_inside,
+        "share_inside": found.score.share_inside,
+        "interval": [low, high],
+        "fresh_members": found.score.members,
+        "failed": found.score.failed,
+    }

@@ -1,0 +1,52 @@
+"""How a sweep is going: a line a case where they are few, else a line every now and then."""
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from blocksim.cli.output import note
+from blocksim.study.rows import Row
+from blocksim.study.single import FINISHED
+
+FEW = 40
+EVERY = 2.0  # s
+
+
+@dataclass
+class Reporter:
+    """Tells of rows as they come; `short` has the varied keys and their names for people."""
+
+    short: Mapping[str, str]
+    began: float = field(default_factory=time.monotonic)
+    told_at: float = field(default_factory=time.monotonic)
+    new: int = 0
+    failed: int = 0
+
+    def tell(self, done: int, total: int, row: Row) -> None:
+        """Tell of a row, one of `done` so far."""
+        self.new += 1
+        self.failed += row["status"] != FINISHED
+        if total <= FEW:
+            values = ", ".join(f"{name} = {shown(row[key])}" for key, name in self.short.items())
+            note(f"{done}/{total} {row['status']}: {values}")
+        elif done == total or time.monotonic() - self.told_at > EVERY:
+            self._tell_pace(done, total)
+
+    def _tell_pace(self, done: int, total: int) -> None:
+        self.told_at = time.monotonic()
+        pace = self.new / max(self.told_at - self.began, 1e-9)
+        left = f", {(total - done) / pace:.0f} s left" if done < total else ""
+        failed = f", {self.failed} failed" if self.failed else ""
+        note(f"{done}/{total} cases{failed}, {pace:.3g} a second{left}")
+
+
+def shown(value: object) -> str:
+    """Return a cell of the table for people."""
+    match value:
+        case bool():
+            return "yes" if value else "no"
+        case float():
+            return f"{value:.6g}" if math.isfinite(value) else "–"
+        case _:
+            return str(value)

@@ -1,0 +1,197 @@
+"""blocksim sensitivity: which inputs decide where the blocks end."""
+
+import csv
+import io
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from blocksim.cli import options
+from blocksim.cli.output import answer, note, number, print_json, table_lines
+from blocksim.cli.progress import tell_compilation
+from blocksim.cli.vary import read_variations
+from blocksim.errors import InvalidInputError, OutputExistsError
+from blocksim.scenario import Document, Sweep
+from blocksim.simulation.atomic import write_text
+from blocksim.simulation.compilation import kernels_of
+from blocksim.study.sensitivity.methods import METHODS
+from blocksim.study.sensitivity.outputs import INDICATOR
+from blocksim.study.sensitivity.sensitivity import Indices, Sensitivity, sensitivity
+from blocksim.study.variation import varied
+
+VARY = "--vary"
+MODE = "sobol"
+DIGITS = 3
+TOLD_SECONDS = 2.0
+SIGNS = {"deg": "°", INDICATOR: ""}
+NOTHING = "nothing to vary: give --vary KEY=FROM:TO, or a [sweep] table with distributions"
+
+
+class MethodName(StrEnum):
+    """Methods by their names."""
+
+    MORRIS = "morris"
+    SOBOL = "sobol"
+
+
+def sensitivity_command(
+    scenario: options.ScenarioPath,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            VARY,
+            metavar="KEY=FROM:TO",
+            help="An input and its distribution: KEY=FROM:TO, KEY=MEAN+-SD or KEY=a,b,c. Repeatable. "
+            "Default: the distributions of [sweep].",
+        ),
+    ] = None,
+    method: Annotated[MethodName, typer.Option(help="Elementary effects, or shares of the variance.")] = (
+        MethodName.MORRIS
+    ),
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            help="Morris: trajectories of k + 1 runs for k keys (default: 16); Sobol: base samples of k + 2 runs "
+            "(default: 128).",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, metavar="S", help="The same seed gives the same runs.")] = 0,
+    settings: options.Settings = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="CSV", help="Write all numbers to a table.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table.")] = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Show which inputs decide where the blocks end.
+
+    The results looked at are all measured quantities (without an experiment, x of the blocks) and the class of the
+    outcome: rotations rounded to quarters of a turn. Blocks of a design with a failed run are left out and counted.
+    Needs the extra blocksim[study].
+
+    Example: blocksim sensitivity scenarios/slide.toml --vary gravity=9.7:9.9
+    """
+    silent = quiet or as_json
+    _refuse_present(out, overwrite=overwrite)
+    document = Document.read(scenario).with_settings(settings or [])
+    plan = _plan(document, vary or [])
+    bare = replace(document, data={key: value for key, value in document.data.items() if key != "sweep"})
+    tell_compilation(kernels_of(bare.build()), quiet=silent)
+    telling: Callable[[int, int], None] = (lambda *_: None) if silent else _telling()
+    found = sensitivity(bare, plan, METHODS[method.value], samples=samples, seed=seed, on_member=telling)
+    if out is not None:
+        write_text(out, _csv(found))
+    if as_json:
+        print_json(_data(found))
+    else:
+        answer("\n".join(_lines(found)))
+    if not silent:
+        _tell_end(found, out)
+
+
+def _plan(document: Document, texts: list[str]) -> Sweep:
+    given = read_variations(texts, VARY)
+    plan = varied(document, given, VARY, MODE) if given.tables else document.build().sweep
+    if plan is None or not plan.is_sampled:
+        raise InvalidInputError(NOTHING)
+    return plan
+
+
+def _refuse_present(out: Path | None, *, overwrite: bool) -> None:
+    """Notice before minutes of running that the table cannot be written."""
+    if out is None:
+        return
+    if out.is_dir() or not out.absolute().parent.is_dir():
+        reason = "it is a folder" if out.is_dir() else "there is no such folder"
+        raise OutputExistsError(f"{out}: cannot be created: {reason}")
+    if out.exists() and not overwrite:
+        raise OutputExistsError(f"{out}: is there already; --overwrite replaces it")
+
+
+def _telling() -> Callable[[int, int], None]:
+    told_at = time.monotonic()
+
+    def tell(done: int, total: int) -> None:
+        nonlocal told_at
+        now = time.monotonic()
+        if now - told_at > TOLD_SECONDS:
+            told_at = now
+            note(f"{done}/{total} runs")
+
+    return tell
+
+
+def _lines(found: Sensitivity) -> list[str]:
+    """Return a table for every output that varies."""
+    lines: list[str] = []
+    for output in found.outputs:
+        if output.varies:
+            lines += [*([""] if lines else []), _title(output), *_table(found, output)]
+    return lines or ["no result varies: none of these inputs matters here"]
+
+
+def _title(output: Indices) -> str:
+    if output.unit == INDICATOR:
+        return f"{output.name}: in {output.mean:.0%} of the runs"
+    return f"{output.name}: {number(output.mean)} {SIGNS.get(output.unit, output.unit)} ± {number(output.sd)} (s)"
+
+
+def _table(found: Sensitivity, output: Indices) -> list[str]:
+    """Return the keys of an output, those that matter most first."""
+    columns = tuple(found.method.columns)
+    first = output.numbers[columns[0]]
+    order = sorted(range(len(found.keys)), key=lambda i: -abs(first[i]))
+    rows = [[found.keys[i], *(number(output.numbers[column][i], DIGITS) for column in columns)] for i in order]
+    return table_lines(("key", *(column.split(" ")[0] for column in columns)), rows)
+
+
+def _tell_end(found: Sensitivity, out: Path | None) -> None:
+    for column, meaning in found.method.columns.items():
+        note(f"{column}: {meaning}")
+    still = [output.name for output in found.outputs if not output.varies]
+    if still:
+        note(f"does not vary: {', '.join(still)}")
+    if found.failed:
+        note(
+            f"{found.failed} of {found.runs} runs failed; {found.left_out} of {found.blocks} "
+            f"{found.method.sample_word} are left out for that. The first: {found.first_problem}"
+        )
+    note(f"{found.runs} runs" + (f"; table: {out}" if out is not None else ""))
+
+
+def _records(found: Sensitivity) -> Iterator[dict[str, object]]:
+    """Yield one row an output that varies and key."""
+    for output in found.outputs:
+        for index, key in enumerate(found.keys if output.varies else ()):
+            numbers = {column: values[index] for column, values in output.numbers.items()}
+            yield {"output": output.name, "unit": output.unit, "key": key, **numbers}
+
+
+def _csv(found: Sensitivity) -> str:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, ["output", "unit", "key", *found.method.columns], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(_records(found))
+    return text.getvalue()
+
+
+def _data(found: Sensitivity) -> dict[str, object]:
+    return {
+        "method": found.method.name,
+        "meaning": dict(found.method.columns),
+        "keys": list(found.keys),
+        "runs": found.runs,
+        "failed": found.failed,
+        found.method.sample_word.replace(" ", "_"): found.blocks,
+        "left_out": found.left_out,
+        "outputs": [
+            {"output": one.name, "unit": one.unit, "mean": one.mean, "sd": one.sd, "varies": one.varies}
+            for one in found.outputs
+        ],
+        "indices": list(_records(found)),
+    }

@@ -1,0 +1,1 @@
+"""Fitting inputs of a scenario to measured repeats, so that agreement is probable and not lucky."""

@@ -1,0 +1,132 @@
+"""Calibration: values within their priors for which agreement with the repeats is most probable under input scatter."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from blocksim.errors import InvalidInputError, OutputExistsError, StoppedEarlyError
+from blocksim.simulation import folder as files
+from blocksim.simulation.atomic import write_text
+from blocksim.simulation.stopping import interruptible
+from blocksim.study.calibrate.objective import Score, score_of
+from blocksim.study.calibrate.plan import Plan
+from blocksim.study.calibrate.prior import Prior
+from blocksim.study.calibrate.search import Trial, finished_trials, opened, search
+from blocksim.study.calibrate.written import with_fitted
+from blocksim.study.members import Values, run_members
+
+TRIALS = 100
+MEMBERS = 64
+FRESH_MEMBERS = 512
+WRITTEN = "scenario.toml"
+JOURNAL = ".trials.jsonl"
+OnTrial = Callable[[Trial, Trial, int], None]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What a calibration found; `score` is of fresh members, drawn independently, that no trial has seen."""
+
+    plan: Plan
+    best: Trial
+    score: Score
+    trials: int
+    path: Path
+
+    @property
+    def at_bounds(self) -> tuple[Prior, ...]:
+        """Priors at an end of which the fitted value lies: a wider one might give a better fit."""
+        return tuple(prior for prior in self.plan.priors if prior.lies_at_bound(self.best.values[prior.key]))
+
+
+def calibrate(  # noqa: PLR0913 - one argument for each option of the command
+    plan: Plan,
+    *,
+    trials: int = TRIALS,
+    fresh_members: int = FRESH_MEMBERS,
+    out: Path | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    on_trial: OnTrial = lambda *_: None,
+) -> Fit:
+    """Look for the best values in `trials` trials, measure how probable agreement is with them, write a scenario file.
+
+    The file is `out` (default: results/NAME/calibrate-HASH/scenario.toml); beside it every trial is kept as it ends, in
+    FILE.trials.jsonl. `resume` goes on with trials that are there, `overwrite` replaces them and the file. `on_trial`
+    is told every new trial, the best so far, and how many are to be made. Raises OutputExistsError, OutputError,
+    UnavailableError without the extra `study`, and StoppedEarlyError on Ctrl-C.
+    """
+    path = out or files.RESULTS / plan.base.name / f"calibrate-{plan.name()}" / WRITTEN
+    journal = path.parent / (path.stem + JOURNAL)
+    prepare(path, journal, resume=resume, overwrite=overwrite)
+    best = _searched(plan, journal, trials, on_trial)
+    fresh = plan.scatter.fresh_members(best.values, fresh_members if plan.scatter.plan else 1, plan.seed)
+    score = _score(plan, fresh)
+    text = with_fitted(plan.document, best.values, _provenance(plan, score, trials), path.parent, _head(plan, best))
+    write_text(path, text)
+    return Fit(plan, best, score, trials, path)
+
+
+def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None:
+    """Make the folder, and room in it. Raises OutputExistsError for files that must not go."""
+    if path.is_dir():
+        raise OutputExistsError(f"{path}: this is a folder; name a file")
+    if path.exists() and not overwrite:
+        raise OutputExistsError(f"{path}: is there already; --overwrite replaces it, --out FILE writes elsewhere")
+    if journal.exists() and journal.stat().st_size and not (resume or overwrite):
+        message = f"{journal}: trials of a calibration are there; --resume goes on with them, --overwrite starts again"
+        raise OutputExistsError(message)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if overwrite and not resume:
+            journal.unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputExistsError(f"{path.parent}: cannot be created: {error.strerror}") from error
+
+
+def _searched(plan: Plan, journal: Path, trials: int, on_trial: OnTrial) -> Trial:
+    """Return the best trial, the first of equally good ones."""
+    best: Trial | None = None
+
+    def evaluate(values: Mapping[str, object]) -> Score:
+        return _score(plan, plan.scatter.members(values, plan.members, plan.seed))
+
+    with opened(journal, plan.fingerprint()) as study, interruptible():
+        done = len(finished_trials(study))
+        try:
+            for trial in search(plan.priors, evaluate, study, trials=trials, seed=plan.seed):
+                best = trial if best is None or trial.score.value > best.score.value else best
+                if trial.number > done:
+                    on_trial(trial, best, trials)
+        except KeyboardInterrupt:
+            message = f"stopped after {len(finished_trials(study))} of {trials} trials; --resume does the others"
+            raise StoppedEarlyError(message) from None
+    if best is None:
+        raise InvalidInputError("at least one trial is needed")
+    return best
+
+
+def _score(plan: Plan, members: Iterable[Values]) -> Score:
+    return score_of(run_members(plan.bare, members), plan.ranges)
+
+
+def _provenance(plan: Plan, score: Score, trials: int) -> dict[str, str]:
+    """Say of every fitted value where it comes from."""
+    table = Path(plan.table.source).name
+    if plan.scatter.plan is None:
+        inside = "inside" if score.inside else "not inside"
+        found = f"seed {plan.seed}, {trials} trials of one run, {inside} all ranges of {table}"
+    else:
+        low, high = score.interval
+        scatter = ", ".join(f"{key} {words}" for key, words in plan.scatter.described().items())
+        found = (
+            f"seed {plan.seed}, {trials} trials of {plan.members} members, P(inside all ranges) "
+            f"{score.share_inside:.3f} [{low:.3f}, {high:.3f}] of {score.members} fresh members, {table}, "
+            f"scatter (SI): {scatter}"
+        )
+    return {prior.key: f"calibrated, prior {prior}, {found}" for prior in plan.priors}
+
+
+def _head(plan: Plan, best: Trial) -> str:
+    name = Path(plan.document.source.where).name
+    return f"{name} calibrated by blocksim: {', '.join(f'{key} = {value}' for key, value in best.values.items())}"

@@ -1,0 +1,133 @@
+"""A scenario file with some of its values replaced, and everything else as its author wrote it.
+
+The text is edited where every value stands, so comments and order are kept. The result is then read again: where it
+does not say exactly what it should (a value that goes over several lines, for instance), the whole scenario is written
+out instead, resolved and without comments.
+"""
+
+import os
+import re
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import tomli_w
+
+from blocksim.errors import BlocksimError
+from blocksim.scenario import Document, Scenario, scenario_hash, scenario_to_toml
+from blocksim.scenario.keys import KeyPath, follow, format_key
+from blocksim.scenario.locate import Place, Span, locate
+from blocksim.scenario.overrides import with_value
+
+TABLES: tuple[KeyPath, ...] = (("experiment", "table"), ("motion", "table"), ("sweep", "table"))
+"""Keys whose values are paths, relative to the scenario's folder."""
+NOTE = "calibrated, see [provenance]"
+GAP = "  "
+_COMMENT = re.compile(r"""([^#"']*?)(\s*)(?:#\s*(.*?)\s*)?""")
+"""What stands behind a value: the end of its list or table, blanks, and a comment."""
+
+
+def with_fitted(
+    document: Document, values: Mapping[str, object], provenance: Mapping[str, str], folder: Path, head: str
+) -> str:
+    """Return the text of a scenario file to stand in `folder`: values set, their notes in [provenance], `head` on top.
+
+    Values that were set over the document before are written too; paths of tables are those seen from the folder.
+    Raises what building the scenario raises.
+    """
+    changed = document.with_values(values)
+    changed = changed.with_values({format_key(("provenance", key)): text for key, text in provenance.items()})
+    scenario = changed.build()
+    moved = _moved(changed, folder)
+    with suppress(BlocksimError):  # no scenario any more, half-way through
+        text = f"# {head}\n{_with_values(document.source.text, moved, len(document.overrides))}"
+        if _says(text, scenario, folder):
+            return text
+    return f"# {head}\n{_resolved(scenario, moved)}"
+
+
+def _with_values(text: str, wanted: Document, settings: int) -> str:
+    """Return the text with all values that were set over it; the first so many are settings, the others are fitted."""
+    fitted = {override.path for override in wanted.overrides[settings:] if override.path[0] != "provenance"}
+    for path in dict.fromkeys([*(override.path for override in wanted.overrides), *TABLES]):
+        if follow(wanted.data, path) != follow(Document.parse(text).data if text else {}, path):
+            text = _edited(text, path, wanted, is_fitted=path in fitted)
+    return text
+
+
+def _moved(document: Document, folder: Path) -> Document:
+    """Return the document with its paths as seen from another folder."""
+    data = document.data
+    for path in TABLES:
+        named = follow(data, path)
+        if isinstance(named, str):
+            target = (document.folder / named).resolve()
+            data, _ = with_value(data, path, Path(os.path.relpath(target, folder.resolve())).as_posix())
+    return replace(document, data=data, folder=folder)
+
+
+def _edited(text: str, path: KeyPath, wanted: Document, *, is_fitted: bool) -> str:
+    """Return the text with the value at a path set, as the wanted document has it."""
+    places = locate(text)
+    known = next((path[:size] for size in range(len(path), 0, -1) if path[:size] in places), ())
+    lines = text.split("\n")
+    if not known:
+        return _appended(text, path, wanted)
+    place = places[known]
+    if not _is_header(lines, place):
+        note = (NOTE if known == path else f"{path[-1]} {NOTE}") if is_fitted else ""
+        return _replaced(lines, place.value, toml_value(follow(wanted.data, known)), note)
+    line = f"{format_key(path[len(known) :])} = {toml_value(follow(wanted.data, path))}"
+    return "\n".join([*lines[: place.key.line], line, *lines[place.key.line :]])
+
+
+def _is_header(lines: list[str], place: Place) -> bool:
+    return lines[place.key.line - 1].lstrip().startswith("[") and place.key == place.value
+
+
+def _replaced(lines: list[str], span: Span, value: str, note: str) -> str:
+    """Put a value where one stood; a comment behind it was about that one, which is said."""
+    line = lines[span.line - 1]
+    rest = line[span.column + span.length :]
+    comment = _COMMENT.fullmatch(rest)
+    if note and comment is not None:
+        before = f"; before: {comment[3]}" if comment[3] else ""
+        gap = " " * max(len(GAP), span.length + len(comment[2]) - len(value))  # the comment stays in its column
+        rest = f"{comment[1]}{gap}# {note}{before}"
+    return "\n".join([*lines[: span.line - 1], line[: span.column] + value + rest, *lines[span.line :]])
+
+
+def _appended(text: str, path: KeyPath, wanted: Document) -> str:
+    """Put a key into a table of its own at the end, or before all tables where it stands in none."""
+    if len(path) == 1:
+        return f"{format_key(path)} = {toml_value(follow(wanted.data, path))}\n{text}"
+    entry = f"[{format_key(path[:1])}]\n{format_key(path[1:])} = {toml_value(follow(wanted.data, path))}\n"
+    return f"{text.rstrip()}\n\n{entry}"
+
+
+def toml_value(value: object) -> str:
+    """Write a value as it stands in a TOML file, on one line."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{format_key((str(key),))} = {toml_value(one)}" for key, one in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(toml_value, value)) + "]"
+    return tomli_w.dumps({"v": value}).removeprefix("v = ").rstrip("\n")
+
+
+def _says(text: str, scenario: Scenario, folder: Path) -> bool:
+    """Tell whether a text, read in a folder, gives exactly this scenario."""
+    with suppress(BlocksimError):
+        found = Document.parse(text, folder=folder).build()
+        beside = [one.model_copy(update={"motion": None}) for one in (found, scenario)]  # the hash has its content
+        return scenario_hash(found) == scenario_hash(scenario) and beside[0] == beside[1]
+    return False
+
+
+def _resolved(scenario: Scenario, moved: Document) -> str:
+    experiment, motion = (follow(moved.data, path) for path in TABLES[:2])
+    return scenario_to_toml(
+        scenario,
+        experiment_table=experiment if isinstance(experiment, str) else None,
+        motion_table=motion if isinstance(motion, str) else None,
+    )

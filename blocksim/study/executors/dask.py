@@ -1,0 +1,128 @@
+"""Tasks on the workers of a Dask cluster that is there already, by the address of its scheduler.
+
+A worker runs a batch on one thread; how many batches it runs at a time is its own number of threads. What a worker had
+that dies is run by another one: Dask sees to that.
+"""
+
+import queue
+import time
+from collections import deque
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from typing import Any, NoReturn
+
+from blocksim.errors import InvalidInputError, UnavailableError
+from blocksim.extras import CLUSTER, loaded
+from blocksim.simulation.provenance import code_hash
+from blocksim.study.executors.batch_run import run_batch
+from blocksim.study.executors.batches import BatchSize, take
+from blocksim.study.executors.task import Batch, Setting, Task
+from blocksim.study.rows import Row, row_of_error
+
+PATIENCE = 3.0  # s until a scheduler has answered
+GATHERING = 1.0  # s until the rows of a batch that has ended are here
+AHEAD = 2  # batches a thread of a worker
+POLL = 0.1  # s
+COUNT_EVERY = 2.0  # s between two looks at how many workers there are
+
+
+def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
+    """Run batches on the workers of `setting.scheduler`; on leaving, what is under way is called off."""
+    with connected(setting.scheduler or "") as client:
+        yield from Submission(client, tasks, setting).batches()
+
+
+def check(setting: Setting) -> None:
+    """Look whether the scheduler answers, before anything is written. Raises what `connected` raises."""
+    with connected(setting.scheduler or ""):
+        pass
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Any]:
+    """Give a client of a scheduler. Raises UnavailableError where there is no package, or no answer."""
+    distributed = loaded("distributed", "--scheduler", CLUSTER)  # here: a second that other executors do not pay
+    try:
+        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+    except Exception as error:  # noqa: BLE001 - whatever answers there, or does not, is no scheduler
+        message = f"no Dask scheduler answers at {address} ({type(error).__name__}); start one, or mend --scheduler"
+        raise UnavailableError(message) from None
+    try:
+        yield client
+    finally:
+        client.close(timeout=PATIENCE)
+
+
+class Submission:
+    """Batches that are with the cluster, as many as keep its workers busy."""
+
+    def __init__(self, client: Any, tasks: Iterator[Task], setting: Setting) -> None:
+        """Submit nothing yet."""
+        self.client, self.tasks, self.setting = client, tasks, setting
+        self.size = BatchSize()
+        self.pending: dict[str, tuple[Any, tuple[Task, ...]]] = {}
+        self.ended: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self.again: deque[tuple[Task, ...]] = deque()
+        self.room = AHEAD
+        self.counted_at = -COUNT_EVERY
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield batches as they end, until there are no more or the user wants to stop."""
+        while not self.setting.is_stopped():
+            self._fill()
+            if not self.pending and not self.again:
+                return
+            try:
+                key = self.ended.get(timeout=POLL)
+            except queue.Empty:
+                self._look_for_the_scheduler()
+            else:
+                yield from self._gathered(*self.pending.pop(key))
+
+    def _fill(self) -> None:
+        if time.monotonic() - self.counted_at > COUNT_EVERY:
+            self.room = AHEAD * max(1, sum(self.client.nthreads().values()))
+            self.counted_at = time.monotonic()
+        while len(self.pending) < self.room:
+            tasks = self.again.popleft() if self.again else take(self.tasks, self.size.count, self.setting.is_stopped)
+            if not tasks:
+                return
+            payload = [(task.scenario, None) for task in tasks]
+            self._await(self.client.submit(run_batch, payload, code_hash(), pure=False), tasks)
+
+    def _await(self, future: Any, tasks: tuple[Task, ...]) -> None:
+        self.pending[future.key] = (future, tasks)
+        future.add_done_callback(lambda ended: self.ended.put(ended.key))
+
+    def _gathered(self, future: Any, tasks: tuple[Task, ...]) -> Iterator[Batch]:
+        """Yield a batch that has ended, unless it has to be run again."""
+        if future.status == "cancelled":
+            self._scheduler_has_gone()
+        try:
+            rows, seconds, host = future.result(timeout=GATHERING)
+        except InvalidInputError:
+            raise
+        except TimeoutError:  # the worker that had the rows has died: another one is at it
+            self._await(future, tasks)
+        except Exception as error:  # noqa: BLE001 - workers that died of a batch, one after the other
+            if len(tasks) > 1:
+                self.again.extend((task,) for task in tasks)
+            else:
+                yield Batch(tasks, (_dead(error),), 0.0, "")
+        else:
+            self.size.measured(len(tasks), seconds)
+            yield Batch(tasks, rows, seconds, host)
+
+    def _look_for_the_scheduler(self) -> None:
+        if self.client.status not in {"running", "connecting"}:
+            self._scheduler_has_gone()
+
+    def _scheduler_has_gone(self) -> NoReturn:
+        message = f"the Dask scheduler at {self.setting.scheduler} has gone; the same command does the other cases"
+        raise UnavailableError(message)
+
+
+def _dead(error: Exception) -> Row:
+    """Return the row of a case whose workers have died again and again."""
+    row = row_of_error(error)
+    return {**row, "reason": f"no worker came to its end ({type(error).__name__}); --retry-failed runs it again"}

@@ -1,0 +1,142 @@
+"""Tasks on spawned processes of this machine: a case that takes the memory of all others ends its process only.
+
+The only executor that can keep whole runs, in folders of their own.
+"""
+
+from collections import deque
+from collections.abc import Generator, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from typing import NamedTuple
+
+from blocksim.simulation.provenance import code_hash
+from blocksim.study.executors.batch_run import Outcome, run_batch
+from blocksim.study.executors.batches import BatchSize, take
+from blocksim.study.executors.pool import pool_of
+from blocksim.study.executors.task import Batch, Setting, Task, needs_nothing
+from blocksim.study.rows import Row
+
+AHEAD = 2  # batches a process: it need not wait for the next one
+POLL = 0.05  # s
+DEAD: Row = {
+    "status": "failed",
+    "reason": "its worker process has died twice (out of memory?); --retry-failed runs it again",
+    "seconds": 0.0,
+}
+
+
+check = needs_nothing
+
+
+class Job(NamedTuple):
+    """Tasks that go to a process together; `is_suspect` where a process has died that had them."""
+
+    tasks: tuple[Task, ...]
+    is_suspect: bool = False
+
+
+class StoppedError(Exception):
+    """The user wants to stop: the pool has to end at once."""
+
+
+def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
+    """Run batches on `setting.jobs` processes, each on one thread; a pool that has died is replaced by a new one."""
+    twins = Twins()
+    work = Work(tasks if setting.folder is None else twins.without(tasks), setting)
+    with suppress(StoppedError):
+        while not work.is_done:
+            with suppress(BrokenProcessPool), pool_of(setting.jobs) as pool:
+                for batch in work.run_on(pool):
+                    twins.note(batch)
+                    yield batch
+            yield from work.after_death()
+        yield from twins.batches()
+
+
+class Work:
+    """Tasks that are still to be run, and those that are under way."""
+
+    def __init__(self, tasks: Iterator[Task], setting: Setting) -> None:
+        """Begin nothing yet."""
+        self.tasks, self.setting = tasks, setting
+        self.size = BatchSize()
+        self.pending: dict[Future[Outcome], Job] = {}
+        self.suspects: deque[Job] = deque()
+        self.is_done = False
+
+    def run_on(self, pool: ProcessPoolExecutor) -> Iterator[Batch]:
+        """Run until nothing is left. Raises BrokenProcessPool where a process dies, and StoppedError."""
+        while True:
+            while (job := self._next()) is not None:
+                self._submit(pool, job)
+            if self.setting.is_stopped():
+                raise StoppedError
+            if not self.pending:
+                self.is_done = True
+                return
+            for future in wait(self.pending, POLL, FIRST_COMPLETED).done:
+                yield self._ended(future)
+
+    def _next(self) -> Job | None:
+        """Return what to begin now; suspects run alone, so that it shows which of them it is."""
+        if self.suspects:
+            return None if self.pending else self.suspects.popleft()
+        alone = any(job.is_suspect for job in self.pending.values())
+        if alone or len(self.pending) >= AHEAD * self.setting.jobs:
+            return None
+        tasks = take(self.tasks, self.size.count, self.setting.is_stopped)
+        return Job(tasks) if tasks else None
+
+    def _submit(self, pool: ProcessPoolExecutor, job: Job) -> None:
+        payload = [(task.scenario, self.setting.folder_of(task)) for task in job.tasks]
+        try:
+            self.pending[pool.submit(run_batch, payload, code_hash())] = job
+        except BrokenProcessPool:  # it died before it got the job
+            self.suspects.append(job)
+            raise
+
+    def _ended(self, future: Future[Outcome]) -> Batch:
+        rows, seconds, host = future.result()
+        tasks = self.pending.pop(future).tasks
+        self.size.measured(len(tasks), seconds)
+        return Batch(tasks, rows, seconds, host)
+
+    def after_death(self) -> Iterator[Batch]:
+        """Yield what ended beside the dead, and what has now died twice; put the rest back, one by one."""
+        for future, job in list(self.pending.items()):
+            if future.done() and not future.cancelled() and future.exception() is None:
+                yield self._ended(future)
+            elif job.is_suspect:
+                yield Batch(job.tasks, (DEAD,) * len(job.tasks), 0.0, "")
+            else:
+                self.suspects.extend(Job((task,), is_suspect=True) for task in job.tasks)
+        self.pending.clear()
+
+
+class Twins:
+    """Cases that come to the same run, such as "10 mm" and 0.01: one folder cannot be written by two processes."""
+
+    def __init__(self) -> None:
+        """Know of none yet."""
+        self.rows: dict[str, Row] = {}
+        self.names: set[str] = set()
+        self.later: list[Task] = []
+
+    def without(self, tasks: Iterator[Task]) -> Iterator[Task]:
+        """Yield the first of every run."""
+        for task in tasks:
+            if task.name in self.names:
+                self.later.append(task)
+            else:
+                self.names.add(task.name)
+                yield task
+
+    def note(self, batch: Batch) -> None:
+        """Remember rows."""
+        self.rows |= {task.name: row for task, row in zip(batch.tasks, batch.rows, strict=True)}
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the others, once all have ended."""
+        if self.later:
+            yield Batch(tuple(self.later), tuple(self.rows.get(task.name, DEAD) for task in self.later), 0.0, "")

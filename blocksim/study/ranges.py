@@ -1,0 +1,49 @@
+"""Which cases of a sweep lie inside all measured ranges, told from its rows alone."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from blocksim.analysis.compare import limits
+from blocksim.analysis.experiment import QUANTITIES, load_table
+from blocksim.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """The limits (mm, degrees) of every measured quantity, by the name of its column in sweep.csv."""
+
+    source: str
+    limits: Mapping[str, tuple[float, float]]
+
+    @classmethod
+    def read(cls, table: Path | str) -> "Ranges":
+        """Take the limits of an experiment table by the rules of `compare`. Raises what reading it raises."""
+        measured = load_table(table)
+        return cls(
+            measured.source,
+            {
+                f"{row.block}.{QUANTITIES[row.quantity].final_column}": limits(
+                    row.quantity, row.mean, row.minimum, row.maximum
+                )
+                for row in measured.summaries()
+            },
+        )
+
+    def hold(self, row: Mapping[str, object]) -> bool:
+        """Tell whether everything measured is inside; a block that a case does not have is not."""
+        values = ((row.get(name), lower, upper) for name, (lower, upper) in self.limits.items())
+        return all(isinstance(value, float) and lower <= value <= upper for value, lower, upper in values)
+
+    def count(self, table: "pd.DataFrame") -> int:
+        """Return how many rows of a table are inside. Raises InvalidInputError where it has no such block."""
+        missing = [name for name in self.limits if name not in table]
+        if missing:
+            message = f"{self.source} measures {missing[0]}, but the sweep has no such column"
+            raise InvalidInputError(message)
+        inside = [table[name].between(lower, upper) for name, (lower, upper) in self.limits.items()]
+        return sum(map(all, zip(*inside, strict=True)))

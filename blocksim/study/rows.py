@@ -1,0 +1,47 @@
+"""What a sweep keeps of a case: one row, the same from whatever ran it."""
+
+from collections.abc import Iterable
+
+from blocksim.errors import BlocksimError
+from blocksim.simulation import MemberEnd, MemberFailure
+from blocksim.simulation.table import Columns
+
+Row = dict[str, object]
+X = ".x_mm"
+KEPT = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")  # of the final table, for every block
+
+
+def row_of(status: str, reason: str, seconds: float, final: Columns) -> Row:
+    """Return the row of a case that was run.
+
+    `seconds` is the time (s) that was simulated until it ended: it is the same on every machine, other than the time
+    that the simulation took.
+    """
+    row: Row = {"status": status, "reason": reason, "seconds": seconds}
+    for block, *values in zip(final["block"], *(final[name] for name in KEPT), strict=True):
+        row |= {f"{block}.{name}": value for name, value in zip(KEPT, values, strict=True)}
+    return row
+
+
+def row_of_member(member: MemberEnd | MemberFailure) -> Row:
+    """Return the row of a member of an ensemble."""
+    if isinstance(member, MemberFailure):
+        return row_of_error(member.error)
+    return row_of(member.outcome.status, member.outcome.reason, member.seconds, member.columns)
+
+
+def row_of_error(error: Exception) -> Row:
+    """Return the row of a case that could not be run."""
+    told = isinstance(error, BlocksimError)
+    reason = str(error) if told else f"internal error: {type(error).__name__}: {error}"
+    return {"status": "failed", "reason": reason, "seconds": 0.0}
+
+
+def invalid_row(problem: str) -> Row:
+    """Return the row of a case whose values do not go together."""
+    return {"status": "invalid", "reason": problem, "seconds": 0.0}
+
+
+def blocks_in(names: Iterable[str]) -> tuple[str, ...]:
+    """Return the blocks that a row, or a table of rows, tells of."""
+    return tuple(name.removesuffix(X) for name in names if name.endswith(X))

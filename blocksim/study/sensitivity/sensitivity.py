@@ -1,0 +1,139 @@
+"""Sensitivity of run-outs and outcomes to inputs that are distributed as stated."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
+from blocksim.scenario import Document, Sweep
+from blocksim.scenario.models.variation import Normal, Variation
+from blocksim.study.members import Member, run_members
+from blocksim.study.sampling.distributions import drawn
+from blocksim.study.sampling.draws import open_interval
+from blocksim.study.sensitivity.methods.method import Floats, Method
+from blocksim.study.sensitivity.outputs import INDICATOR, Output, outputs_of
+
+TAIL = 0.005  # of a normal distribution is left out at either end, for methods that go to the ends of the unit cube
+LEAST_VARIATION = {"mm": 0.01, "deg": 0.01, INDICATOR: 0.0}  # standard deviations below are no answer to anything
+LEAST_BLOCKS = 2
+LEAST_SHARE = 0.5  # of the blocks of a design have to be whole
+OnMember = Callable[[int, int], None]
+
+
+class TooManyFailuresError(BlocksimError):
+    """So many runs failed that the indices of the others would mean little."""
+
+    exit_code = ExitCode.NUMERICAL_FAILURE
+
+
+@dataclass(frozen=True)
+class Indices:
+    """The numbers of one output, by column of the method and in the order of the keys; none where it hardly varies."""
+
+    name: str
+    unit: str
+    mean: float
+    sd: float
+    numbers: Mapping[str, tuple[float, ...]]
+
+    @property
+    def varies(self) -> bool:
+        """Tell whether there is a variation to be explained."""
+        return bool(self.numbers)
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Indices of all outputs; `left_out` of `blocks` blocks of the design had failed runs in them."""
+
+    method: Method
+    keys: tuple[str, ...]
+    outputs: tuple[Indices, ...]
+    runs: int
+    failed: int
+    first_problem: str
+    blocks: int
+    left_out: int
+
+
+def sensitivity(
+    document: Document,
+    plan: Sweep,
+    method: Method,
+    *,
+    samples: int | None = None,
+    seed: int = 0,
+    on_member: OnMember = lambda *_: None,
+) -> Sensitivity:
+    """Run a design of `samples` blocks over the distributions of a plan, and return the indices of every output.
+
+    Designs need whole blocks (trajectories, base samples): one with a failed run is left out and counted, so the
+    indices are those of inputs that can be simulated. Raises TooManyFailuresError where more than half are left out,
+    UnavailableError without the extra `study`, InvalidInputError for too few samples, and what reading the experiment
+    table raises.
+    """
+    base = document.build()
+    table = None if base.experiment is None else load_table(base.experiment.table)
+    count = method.samples if samples is None else samples
+    if count < LEAST_BLOCKS:
+        raise InvalidInputError(f"{count} {method.sample_word} are too few; at least {LEAST_BLOCKS} are needed")
+    points = method.points(len(plan.vary), count, seed)
+    members = []
+    for member in run_members(document, settings_at(points, plan.vary)):
+        members.append(member)
+        on_member(len(members), len(points))
+    return _analysed(members, points, plan, method, table, seed)
+
+
+def settings_at(points: Floats, vary: Mapping[str, Variation]) -> Iterator[dict[str, object]]:
+    """Yield the values of the keys at points of the unit cube, shape (runs, keys)."""
+    columns = [drawn(values, _places(values, points[:, index])) for index, values in enumerate(vary.values())]
+    return (dict(zip(vary, row, strict=True)) for row in zip(*columns, strict=True))
+
+
+def _places(values: Variation, places: Floats) -> Floats:
+    """Return where in the unit interval a design's places lie: not at the infinite ends of a normal distribution."""
+    return TAIL + (1.0 - 2.0 * TAIL) * places if isinstance(values, Normal) else open_interval(places)
+
+
+def _analysed(
+    members: list[Member], points: Floats, plan: Sweep, method: Method, table: ExperimentTable | None, seed: int
+) -> Sensitivity:
+    rows = method.rows_of_block(len(plan.vary))
+    has_final = np.array([member.final is not None for member in members])
+    whole = np.asarray(np.all(has_final.reshape(-1, rows), axis=1))
+    problems = [member.problem for member in members if member.final is None]
+    if whole.sum() < max(LEAST_BLOCKS, LEAST_SHARE * len(whole)):
+        raise TooManyFailuresError(
+            f"{len(problems)} of {len(members)} runs failed, in {np.sum(~whole)} of {len(whole)} {method.sample_word}; "
+            f"no indices can be given. The first: {problems[0]}"
+        )
+    kept = np.repeat(whole, rows)
+    finals = [member.final for member, is_kept in zip(members, kept, strict=True) if is_kept and member.final]
+    found = tuple(indices_of(output, points[kept], method, seed) for output in outputs_of(finals, table))
+    return Sensitivity(
+        method=method,
+        keys=tuple(plan.vary),
+        outputs=found,
+        runs=len(members),
+        failed=len(problems),
+        first_problem=problems[0] if problems else "",
+        blocks=len(whole),
+        left_out=int(np.sum(~whole)),
+    )
+
+
+def indices_of(output: Output, points: Floats, method: Method, seed: int) -> Indices:
+    """Return the indices of one output of a design's runs."""
+    sd = float(np.std(output.values))
+    varies = sd > LEAST_VARIATION[output.unit]
+    numbers = method.numbers(points, output.values, seed) if varies else {}
+    return Indices(
+        name=output.name,
+        unit=output.unit,
+        mean=float(np.mean(output.values)),
+        sd=sd,
+        numbers={column: tuple(values.tolist()) for column, values in numbers.items()},
+    )

@@ -1,0 +1,146 @@
+"""sweep.csv: a row a case, in the order of the plan, whatever the order in which the cases ended."""
+
+import csv
+import io
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.simulation.atomic import writing
+from blocksim.study.done import Done
+from blocksim.study.plan import Cases
+from blocksim.study.ranges import Ranges
+from blocksim.study.rows import KEPT
+from blocksim.study.shard import WHOLE, Shard
+from blocksim.study.single import FINISHED
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TABLE = "sweep.csv"
+TEXT_COLUMNS = {"case": str, "status": str, "reason": str}
+OUTCOME = ("status", "reason", "seconds")
+SOONEST = 2.0  # s between two tables while the sweep runs
+SHARE = 0.02  # of the time, at most, goes into tables that are soon replaced
+
+
+@dataclass
+class SweepTable:
+    """The table of a sweep, to be written whenever it is worth it."""
+
+    path: Path
+    cases: Cases
+    done: Done
+    ranges: Ranges | None
+    shard: Shard = WHOLE
+    next_at: float = field(default_factory=lambda: time.monotonic() + SOONEST)
+
+    def write_now_and_then(self) -> None:
+        """Write the table unless it was written a short while ago; the more rows, the longer the while."""
+        if time.monotonic() >= self.next_at:
+            self.write()
+
+    def write(self) -> None:
+        """Write all rows so far, one after the other: none is kept. Raises OutputError."""
+        began = time.monotonic()
+        with writing(self.path) as file:
+            text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+            writer = csv.writer(text, lineterminator="\n")
+            writer.writerow(self._columns())
+            writer.writerows(self._rows())
+            text.detach()
+        ended = time.monotonic()
+        self.next_at = ended + max(SOONEST, (ended - began) / SHARE)
+
+    def _columns(self) -> list[str]:
+        verdict = [] if self.ranges is None else ["inside"]
+        ends = [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
+        return ["case", *self.cases.design.columns, *OUTCOME, *verdict, *ends]
+
+    def _rows(self) -> Iterator[list[object]]:
+        ends = [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
+        with closing(self.done.reader()) as reader:
+            for number in self.shard.numbers(len(self.cases)):
+                settings = self.cases.design[number]
+                entry = reader.entry(number) if self.done.holds(number, settings) else None
+                if entry is not None:
+                    row = entry.row
+                    outcome = [row[name] for name in OUTCOME]
+                    yield [entry.case, *settings.values(), *outcome, *self._verdict(row), *map(row.get, ends)]
+
+    def _verdict(self, row: dict[str, object]) -> list[object]:
+        """Judge here and not when the case ended: the measured table may be mended between two calls."""
+        if self.ranges is None:
+            return []
+        return [self.ranges.hold(row) if row["status"] == FINISHED else None]
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """The folder of a sweep and its table, a row a case."""
+
+    folder: Path
+    name: str = TABLE
+    planned: int | None = None  # how many rows there are to be; None where only the table is known
+
+    @cached_property
+    def table(self) -> "pd.DataFrame":
+        """The rows of the table (pandas 3 reads every bit). Raises InputMissingError or InvalidInputError."""
+        return _read(self.folder / self.name)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The dotted keys that vary."""
+        names = [str(name) for name in self.table.columns]
+        return tuple(names[names.index("case") + 1 : names.index("status")])
+
+    @property
+    def failed(self) -> int:
+        """How many cases did not finish."""
+        return int((self.table["status"] != FINISHED).sum())
+
+    @property
+    def left(self) -> int:
+        """How many cases were not run, where the first failure was to end the sweep."""
+        return 0 if self.planned is None else self.planned - len(self.table)
+
+    @property
+    def share_inside(self) -> float | None:
+        """Share of all cases that lie inside all measured ranges; None without an experiment."""
+        if "inside" not in self.table or self.table["inside"].isna().all():
+            return None
+        return float((self.table["inside"] == True).mean())  # noqa: E712 - the column has True, False and missing values
+
+    def share_inside_of(self, experiment: Path | str) -> float:
+        """Share of all cases that lie inside all ranges of another table. Raises what reading it raises."""
+        finished = self.table[self.table["status"] == FINISHED]
+        return Ranges.read(experiment).count(finished) / len(self.table)
+
+
+def read_sweep(folder: Path) -> SweepResult:
+    """Return the sweep that a folder holds. Raises InputMissingError or InvalidInputError."""
+    result = SweepResult(folder)
+    _ = result.table
+    return result
+
+
+def _read(path: Path) -> "pd.DataFrame":
+    import pandas as pd  # noqa: PLC0415 - a third of a second that a sweep need not wait for before it begins
+
+    try:
+        table = pd.read_csv(path, dtype=TEXT_COLUMNS)
+    except FileNotFoundError:
+        message = f"{path}: no such file"
+        raise InputMissingError(message) from None
+    except (OSError, ValueError) as error:
+        message = f"{path}: not the table of a sweep: {str(error).strip()}"
+        raise InvalidInputError(message) from error
+    if not {"case", "status"} <= set(table.columns) or table.columns[0] != "case":
+        message = f"{path}: not the table of a sweep: no columns case and status"
+        raise InvalidInputError(message)
+    return table

@@ -1,0 +1,181 @@
+"""blocksim calibrate: what it writes, tells and refuses; killed, it goes on."""
+
+import json
+import signal
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from blocksim.scenario import Document
+from tests.cli.conftest import SCENARIOS, SOFT, Answer, Command, Process
+
+FRICTION, SPEED = "friction.block_ground", "bodies.0.velocity.0"
+TABLE = "block,quantity,unit,replicate,value\nblock,x,mm,1,41\nblock,x,mm,2,43\n"
+FIT = ("--fit", f"{FRICTION}=0.2:0.5")
+SCATTER = ("--scatter", f"{SPEED}=0.5 m/s+-0.01 m/s")
+SHORT = ("--trials", 20, "--members", 8, "--fresh", 128)
+Slide = Callable[..., Answer]
+
+
+@pytest.fixture
+def slide(blocksim: Command, tmp_path: Path) -> Slide:
+    """Calibrate the friction of the slide to a table in which the block stops after 41 and 43 mm."""
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "slide.toml").write_text((SCENARIOS / "slide.toml").read_text())
+    (tmp_path / "measured.csv").write_text(TABLE)
+
+    def call(*arguments: object, scenario: str = "mine/slide.toml") -> Answer:
+        return blocksim("calibrate", scenario, *SOFT, "--experiment", "measured.csv", *arguments)
+
+    return call
+
+
+def test_friction_of_the_slide_is_found(slide: Slide, blocksim: Command) -> None:
+    answer = slide(*FIT, *SCATTER, *SHORT, "--out", "fitted.toml", "--json")
+    assert (answer.code, answer.err) == (0, "")
+    data = json.loads(answer.out)
+    value = data["fitted"][0]["value"]
+    assert value == pytest.approx(0.5**2 / (2 * 9.81 * 0.042), rel=0.02)  # x = v^2 / (2 mu g), 42 mm
+    assert data["interval"][0] < data["share_inside"] < data["interval"][1]
+    # v within 42 mm +- 1 mm is v +- 1.19 %, that is 0.595 standard deviations: P = 0.448
+    assert data["share_inside"] == pytest.approx(0.448, abs=0.13)
+    assert blocksim("check", "fitted.toml").code == 0
+    fitted = Document.read("fitted.toml")
+    told = fitted.build().provenance[FRICTION]
+    assert "prior 0.2 to 0.5, seed 0, 20 trials of 8 members" in told
+    assert "of 128 fresh members, measured.csv" in told
+    assert "# one block sliding" not in fitted.source.text
+    assert "as in Table 1" in fitted.source.text  # the user's comments stay
+
+
+def test_table_fits_the_screen_and_bounds_are_warned_of(slide: Slide) -> None:
+    answer = slide("--fit", f"{FRICTION}=0.4:0.5", *SCATTER, *SHORT, "--out", "fitted.toml")
+    assert answer.code == 0
+    lines = answer.out.splitlines()
+    assert lines[0].split() == ["key", "prior", "fitted"]
+    assert max(map(len, lines)) <= 80
+    assert "P(inside all ranges) = 0.0" in answer.out
+    assert "lies at a bound of its prior" in answer.err
+    assert "20/20: " in answer.err
+    assert answer.err.splitlines()[-1] == "written: fitted.toml"
+
+
+def test_nothing_is_overwritten_unless_asked(slide: Slide, tmp_path: Path) -> None:
+    few = (*FIT, *SCATTER, "--trials", 2, "--members", 2, "--fresh", 2, "--out", "fitted.toml", "--quiet")
+    assert slide(*few).code == 0
+    before = (tmp_path / "fitted.toml").read_text()
+    again = slide(*few)
+    assert (again.code, again.out) == (73, "")
+    assert "fitted.toml: is there already; --overwrite replaces it" in again.err
+    (tmp_path / "fitted.toml").unlink()
+    journal = slide(*few)
+    assert journal.code == 73
+    assert "--resume goes on with them, --overwrite starts again" in journal.err
+    other = slide(*few, "--seed", 1, "--resume")
+    assert other.code == 73
+    assert "another calibration (seed differ)" in other.err
+    assert slide(*few, "--overwrite").code == 0
+    assert (tmp_path / "fitted.toml").read_text() == before
+
+
+def test_more_trials_go_on_where_fewer_ended(slide: Slide) -> None:
+    many = (*FIT, *SCATTER, "--members", 2, "--fresh", 2)
+    assert slide(*many, "--trials", 18, "--out", "one.toml").code == 0
+    assert slide(*many, "--trials", 20, "--out", "other.toml").code == 0
+    told = slide(*many, "--trials", 20, "--out", "one.toml", "--resume", "--overwrite")
+    assert told.code == 0
+    assert Path("one.toml").read_text() == Path("other.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        ((*SCATTER,), 65, "nothing to fit: give --fit KEY=FROM:TO"),
+        ((*FIT,), 65, "no input scatter: give --scatter"),
+        (("--fit", "friction.block_gruond=0.2:0.5"), 65, "did you mean 'block_ground'?"),
+        (("--fit", f"{FRICTION}=0.2 mm:0.5 mm"), 65, f"--fit {FRICTION}=0.2 mm:0.5 mm"),
+        (("--fit", f"{FRICTION}=0.5:0.2"), 65, "from 0.5 is not below to 0.2"),
+        (("--fit", f"{FRICTION}=0.2"), 65, "a prior is a range: write KEY=FROM:TO"),
+        (("--fit", f"{FRICTION}=0.2+-0.1"), 65, "a prior is a range: write KEY=FROM:TO"),
+        (("--fit", FRICTION), 65, f"--fit {FRICTION}: write KEY="),
+        ((*FIT, *FIT), 65, f"--fit {FRICTION}: given twice"),
+        ((*FIT, "--fit", f"{FRICTION}.kinetic=0.1:0.2"), 65, "which is fitted too"),
+        (
+            (*FIT, "--scatter", f"{FRICTION}.static=0.3:0.4"),
+            65,
+            "which is fitted; scatter friction.block_ground itself",
+        ),
+        ((*FIT, "--scatter", f"{FRICTION}=0.3,0.4"), 65, "has to be a distribution, not a list"),
+        ((*FIT, "--scatter", f"{SPEED}=0.5 mm+-0.1 mm"), 65, "is a length"),
+        ((*FIT, *SCATTER, "--experiment", "missing.csv"), 66, "missing.csv: no such file"),
+        ((*FIT, *SCATTER, "--out", "."), 73, "this is a folder"),
+        ((*FIT, *SCATTER, "--trials", 0), 2, "Invalid value"),
+    ],
+)
+def test_wrong_wishes_are_told_and_leave_nothing_behind(
+    slide: Slide, tmp_path: Path, arguments: tuple[object, ...], code: int, told: str
+) -> None:
+    before = sorted(tmp_path.rglob("*"))
+    answer = slide(*arguments)
+    assert (answer.code, answer.out) == (code, "")
+    assert told in answer.err
+    assert "Traceback" not in answer.err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_scenario_without_an_experiment_is_told(blocksim: Command) -> None:
+    answer = blocksim("calibrate", "scenarios/slide.toml", *FIT, *SCATTER)
+    assert answer.code == 66
+    assert "names no experiment; give a table with --experiment" in answer.err
+
+
+@pytest.mark.parametrize("package", ["optuna", "scipy.stats"])
+def test_missing_package_names_the_extra(slide: Slide, monkeypatch: pytest.MonkeyPatch, package: str) -> None:
+    for name in [name for name in sys.modules if f"{name}.".startswith(f"{package}.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, package, None)
+    answer = slide(*FIT, *SCATTER, *SHORT)
+    assert (answer.code, answer.out) == (69, "")
+    assert "pip install 'blocksim[study]'" in answer.err
+
+
+def test_scatter_of_the_scenario_is_the_default_and_stays_in_the_file(slide: Slide, tmp_path: Path) -> None:
+    scenario = tmp_path / "mine" / "slide.toml"
+    own = f'\n[sweep]  # my scatter\nmode = "normal"\n"{SPEED}" = {{ mean = "0.5 m/s", sd = "0.01 m/s" }}\n'
+    scenario.write_text(scenario.read_text() + own)
+    few = (*FIT, "--trials", 4, "--members", 4, "--fresh", 4)
+    assert slide(*few, "--out", "own.toml").code == 0
+    assert slide(*few, *SCATTER, "--out", "given.toml").code == 0
+    assert own in Path("own.toml").read_text()
+    assert Path("own.toml").read_text() == Path("given.toml").read_text()
+
+
+def test_single_run_without_scatter_says_that_it_is_one(slide: Slide) -> None:
+    answer = slide(*FIT, "--trials", 20, "--members", 1, "--out", "fitted.toml")
+    assert answer.code == 0
+    assert "one run, without input scatter: inside all ranges" in answer.out
+
+
+def test_stopped_killed_and_resumed_it_finds_the_same(slide: Slide, process: Process, tmp_path: Path) -> None:
+    many = (*FIT, *SCATTER, "--trials", 22, "--members", 4, "--fresh", 4)
+    assert slide(*many, "--out", "whole.toml", "--quiet").code == 0
+    given = ("mine/slide.toml", *SOFT, "--experiment", "measured.csv", *many, "--out", "cut.toml", "--resume")
+    journal = tmp_path / "cut.trials.jsonl"
+    for number, lines in ((signal.SIGTERM, 5), (signal.SIGKILL, 20)):
+        running = process("calibrate", *given)
+        until = time.monotonic() + 120
+        while not journal.exists() or journal.read_text().count("\n") < lines:
+            assert time.monotonic() < until
+            assert running.poll() is None
+            time.sleep(0.01)
+        running.send_signal(number)
+        _, told = running.communicate()
+        assert not (tmp_path / "cut.toml").exists()
+        if number == signal.SIGTERM:
+            assert running.returncode == 75
+            assert "of 22 trials; --resume does the others" in told
+    assert slide(*many, "--out", "cut.toml", "--resume", "--quiet").code == 0
+    assert (tmp_path / "cut.toml").read_text() == (tmp_path / "whole.toml").read_text()

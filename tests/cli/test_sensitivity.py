@@ -1,0 +1,94 @@
+"""blocksim sensitivity: tables, files and what it refuses."""
+
+import csv
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import SCENARIOS, SOFT, Command
+
+SLIDE = ("sensitivity", "scenarios/slide.toml", *SOFT)
+VARY = ("--vary", "friction.block_ground=0.3:0.4", "--vary", "bodies.0.velocity.0=0.5 m/s+-0.02 m/s")
+
+
+@pytest.mark.parametrize(
+    ("method", "heads", "runs"), [("morris", ["mu*", "±", "mu", "sigma"], 12), ("sobol", ["S1", "±", "ST", "±"], 16)]
+)
+def test_tables_tell_what_matters_most_first(blocksim: Command, method: str, heads: list[str], runs: int) -> None:
+    answer = blocksim(*SLIDE, *VARY, "--method", method, "--samples", 4, "--out", "indices.csv")
+    assert answer.code == 0
+    lines = answer.out.splitlines()
+    assert lines[0].startswith("x of block block: 3")
+    assert lines[1].split() == ["key", *heads]
+    assert max(map(len, lines)) <= 80
+    assert f"{runs} runs; table: indices.csv" in answer.err
+    assert "does not vary: most frequent outcome 0" in answer.err
+    first = [abs(float(line.split()[1])) for line in lines[3:]]
+    assert len(first) == 2
+    assert first == sorted(first, reverse=True)
+    with Path("indices.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["key"] for row in rows] == ["friction.block_ground", "bodies.0.velocity.0"]
+
+
+def test_json_tells_everything_and_nothing_else(blocksim: Command) -> None:
+    answer = blocksim(*SLIDE, *VARY, "--samples", 4, "--json")
+    data = json.loads(answer.out)
+    assert (answer.code, answer.err) == (0, "")
+    assert (data["method"], data["runs"], data["failed"], data["trajectories"]) == ("morris", 12, 0, 4)
+    assert len(data["indices"]) == 2
+    assert data["indices"][0]["mu"] < 0.0  # friction shortens the way
+
+
+def test_distributions_of_the_scenario_are_the_default(blocksim: Command, tmp_path: Path) -> None:
+    text = (SCENARIOS / "slide.toml").read_text()
+    (tmp_path / "mine.toml").write_text(
+        f'{text}\n[sweep]\nmode = "lhs"\n"friction.block_ground" = {{ from = 0.3, to = 0.4 }}\n'
+    )
+    answer = blocksim("sensitivity", "mine.toml", *SOFT, "--samples", 4)
+    assert answer.code == 0
+    assert "friction.block_ground" in answer.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        ((), 65, "nothing to vary: give --vary KEY=FROM:TO"),
+        (("--vary", "friction.block_gruond=0.3:0.4"), 65, "did you mean 'block_ground'?"),
+        (("--vary", "friction.block_ground=0.4:0.3"), 65, "from 0.4 is not below to 0.3"),
+        (("--vary", "bodies.0.velocity.0=1 mm:2 mm"), 65, "--vary bodies.0.velocity.0=1 mm:2 mm"),
+        (("--vary", "friction.block_ground=0.3:0.4:5"), 65, "count belongs to the modes"),
+        ((*VARY, "--samples", 1), 65, "1 trajectories are too few"),
+        ((*VARY, "--out", "scenarios"), 73, "it is a folder"),
+        ((*VARY, "--out", "nowhere/indices.csv"), 73, "there is no such folder"),
+        ((*VARY, "--method", "fast"), 2, "Invalid value"),
+    ],
+)
+def test_wrong_wishes_are_told_and_leave_nothing_behind(
+    blocksim: Command, tmp_path: Path, arguments: tuple[object, ...], code: int, told: str
+) -> None:
+    before = sorted(tmp_path.rglob("*"))
+    answer = blocksim(*SLIDE, *arguments)
+    assert (answer.code, answer.out) == (code, "")
+    assert told in answer.err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_table_is_not_overwritten_unless_asked(blocksim: Command) -> None:
+    Path("indices.csv").write_text("mine")
+    assert blocksim(*SLIDE, *VARY, "--samples", 2, "--out", "indices.csv").code == 73
+    assert Path("indices.csv").read_text() == "mine"
+    assert blocksim(*SLIDE, *VARY, "--samples", 2, "--out", "indices.csv", "--overwrite").code == 0
+
+
+@pytest.mark.parametrize("method", ["morris", "sobol"])
+def test_missing_package_names_the_extra(blocksim: Command, monkeypatch: pytest.MonkeyPatch, method: str) -> None:
+    for name in [name for name in sys.modules if f"{name}.".startswith("SALib.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "SALib", None)
+    answer = blocksim(*SLIDE, *VARY, "--method", method)
+    assert (answer.code, answer.out) == (69, "")
+    assert "sensitivity needs the package SALib" in answer.err
+    assert "pip install 'blocksim[study]'" in answer.err

@@ -1,0 +1,108 @@
+"""A sweep that is killed goes on where it was; a sweep that is stopped stops at once."""
+
+import json
+import random
+import shutil
+import signal
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import pytest
+
+from blocksim.study.manifest import read_entries
+from tests.cli.conftest import Process, Running
+from tests.cli.test_process import PATIENCE, wait_for
+
+Sweep = Callable[..., Running]
+
+
+@pytest.fixture
+def start(process: Process) -> Sweep:
+    """Start a sweep of rigid blocks, of some milliseconds a case."""
+
+    def begin(out: str, count: int, *options: object) -> Running:
+        vary = ("--vary", f"friction.block_block.static=0.25:0.4:{count}")
+        return process("sweep", "scenarios/three_blocks_nonsmooth.toml", *vary, "--out", out, "--quiet", *options)
+
+    return begin
+
+
+def finish(running: Running) -> None:
+    _, err = running.communicate(timeout=10 * PATIENCE)
+    assert running.returncode == 0, err
+
+
+def check_kills(start: Sweep, folder: Path, count: int, shares: Iterable[float], *options: object) -> None:
+    """Kill a sweep at moments given as shares of its duration; go on, and compare with the one that was left alone."""
+    began = time.monotonic()
+    finish(start("whole", count))
+    duration = time.monotonic() - began
+    for number, share in enumerate(shares):
+        place = folder / f"killed-{number}"
+        running = start(place.name, count, *options)
+        time.sleep(share * duration)
+        running.kill()
+        running.communicate()
+        kept = list(read_entries(place / "manifest.jsonl")) if (place / "manifest.jsonl").exists() else []
+        finish(start(place.name, count, *options))
+        after = list(read_entries(place / "manifest.jsonl"))
+        assert after[: len(kept)] == kept
+        assert sorted(entry.number for _, entry in after) == list(range(count))  # none twice, none lost
+        assert (place / "sweep.csv").read_bytes() == (folder / "whole" / "sweep.csv").read_bytes()
+        shutil.rmtree(place)
+
+
+def test_killed_sweep_goes_on_to_the_same_table(start: Sweep, tmp_path: Path) -> None:
+    check_kills(start, tmp_path, 150, (0.6, 0.9))
+
+
+@pytest.mark.long
+def test_sweep_killed_at_20_moments_goes_on_to_the_same_table(start: Sweep, tmp_path: Path) -> None:
+    moments = random.Random(6)  # noqa: S311 - no secret
+    check_kills(start, tmp_path, 500, [moments.random() for _ in range(20)])
+
+
+@pytest.mark.long
+def test_killed_processes_leave_the_same_table(start: Sweep, tmp_path: Path) -> None:
+    check_kills(start, tmp_path, 500, (0.5, 0.8, 1.1), "--executor", "processes")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_endless_case_is_given_up_at_once(process: Process, tmp_path: Path, number: signal.Signals) -> None:
+    endless = ("--vary", "time.end=1e4,2e4", "--set", "time.stop_at_rest=false")
+    running = process("sweep", "scenarios/three_blocks_nonsmooth.toml", *endless, "--out", "out")
+    wait_for(tmp_path / "out" / "manifest.jsonl", running)
+    time.sleep(0.5)
+    began = time.monotonic()
+    running.send_signal(number)
+    _, err = running.communicate(timeout=PATIENCE)
+    assert time.monotonic() - began < 5.0  # most of it is waiting for a busy machine
+    assert running.returncode == 75
+    assert err == "stopped with 0 of 2 cases done; the same command does the others\n"
+    assert (tmp_path / "out" / "sweep.csv").read_text().count("\n") == 1
+
+
+def test_same_sweep_twice_at_a_time_is_refused(process: Process, tmp_path: Path) -> None:
+    vary = ("--vary", "time.end=1e4,2e4", "--set", "time.stop_at_rest=false", "--out", "out", "--jobs", 1)
+    arguments = ("sweep", "scenarios/three_blocks_nonsmooth.toml", *vary)
+    first = process(*arguments)
+    wait_for(tmp_path / "out" / "manifest.jsonl", first)
+    time.sleep(0.2)
+    second = process(*arguments, "--overwrite")
+    _, err = second.communicate(timeout=PATIENCE)
+    assert second.returncode == 73
+    assert "a sweep is running here" in err
+    first.kill()
+    first.communicate()
+
+
+def test_shards_at_a_time_share_a_folder(start: Sweep, process: Process, tmp_path: Path) -> None:
+    finish(start("whole", 20))
+    for running in [start("parts", 20, "--shard", f"{index}/2", "--jobs", 1) for index in range(2)]:
+        finish(running)
+    merged = process("sweep", "--merge", "parts", "--json")
+    out, _ = merged.communicate(timeout=PATIENCE)
+    assert merged.returncode == 0
+    assert len(json.loads(out)["rows"]) == 20
+    assert (tmp_path / "parts" / "sweep.csv").read_bytes() == (tmp_path / "whole" / "sweep.csv").read_bytes()

@@ -1,0 +1,71 @@
+"""The members of a trial: the same points for all trials, about the values that are fitted."""
+
+import numpy as np
+import pytest
+
+from blocksim.scenario import Sweep
+from blocksim.scenario.models.variation import Normal, Uniform
+from blocksim.study.calibrate.scatter import Scatter, about
+
+OVERLAP, KINETIC = "structures.0.overlap", "friction.block_block.kinetic"
+
+
+def scatter(**tables: object) -> Scatter:
+    keys = {"overlap": OVERLAP, "kinetic": KINETIC}
+    return Scatter(Sweep.model_validate({"mode": "sobol", **{keys[name]: table for name, table in tables.items()}}))
+
+
+NORMAL = scatter(overlap={"mean": "10 mm", "sd": "0.3 mm"}, kinetic={"from": 0.18, "to": 0.2})
+
+
+def test_every_trial_has_the_same_points() -> None:
+    one, other = (list(NORMAL.members({"contact.restitution": e}, 16, 5)) for e in (0.2, 0.3))
+    assert [row[OVERLAP] for row in one] == [row[OVERLAP] for row in other]
+    assert len({row[OVERLAP] for row in one}) == 16
+    assert {row["contact.restitution"] for row in other} == {0.3}
+
+
+def test_fitted_key_scatters_about_its_fitted_value() -> None:
+    rows = list(NORMAL.members({KINETIC: 0.25}, 256, 5))
+    values = np.array([float(str(row[KINETIC])) for row in rows])
+    assert values.mean() == pytest.approx(0.25, abs=1e-4)
+    assert 0.24 <= values.min() < 0.241
+    assert 0.259 < values.max() <= 0.26
+    assert len(rows[0]) == 2
+
+
+def test_fitted_key_written_with_other_quotes_is_the_same_key() -> None:
+    rows = list(NORMAL.members({'friction."block_block".kinetic': 0.25}, 4, 5))
+    assert all(len(row) == 2 for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("distribution", "drawn", "fitted", "expected"),
+    [
+        (Normal(0.01, 0.0003), 0.0103, "11 mm", 0.0113),
+        (Uniform(0.2, 0.4), 0.25, 0.5, 0.45),
+        (Uniform(0.01, 1.0, "log"), 1.0, 0.5, 5.0),
+        (Normal(0.1, 0.02, angle=True), "0.12 rad", "0.3 rad", "0.32 rad"),
+    ],
+)
+def test_scatter_is_moved_to_the_fitted_value(
+    distribution: Normal | Uniform, drawn: object, fitted: object, expected: object
+) -> None:
+    moved = about(distribution, drawn, fitted)
+    if isinstance(expected, str):
+        assert isinstance(moved, str)
+        assert float(moved.removesuffix(" rad")) == pytest.approx(0.32)
+    else:
+        assert moved == pytest.approx(expected)
+
+
+def test_fresh_members_are_others_of_the_same_distribution() -> None:
+    tried = [float(str(row[OVERLAP])) for row in NORMAL.members({}, 64, 5)]
+    fresh = [float(str(row[OVERLAP])) for row in NORMAL.fresh_members({}, 4096, 5)]
+    assert not set(tried) & set(fresh)
+    assert np.mean(fresh) == pytest.approx(0.01, abs=3 * 0.0003 / 64)
+    assert np.std(fresh) == pytest.approx(0.0003, rel=0.05)
+
+
+def test_without_scatter_all_members_are_the_fitted_values() -> None:
+    assert list(Scatter(None).members({KINETIC: 0.2}, 2, 0)) == [{KINETIC: 0.2}, {KINETIC: 0.2}]

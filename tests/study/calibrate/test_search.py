@@ -1,0 +1,122 @@
+"""The search: the same for the same seed, also when it is stopped, killed or continued."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from blocksim.errors import InvalidInputError, OutputExistsError
+from blocksim.study.calibrate.objective import Score
+from blocksim.study.calibrate.prior import Prior
+from blocksim.study.calibrate.search import FIRST, Trial, opened, search
+
+PRIORS = (Prior("a", 0.0, 1.0), Prior("b", 10.0, 20.0, "mm"))
+PLAN = {"scenario": "one", "seed": 3}
+
+
+def hill(values: Mapping[str, object]) -> Score:
+    """Return a probability of 1 near (0.3, 17 mm), 0 elsewhere; the miss grows with the distance."""
+    a, b = (prior.number(values[prior.key]) for prior in PRIORS)
+    off = max(abs(a - 0.3), abs(b - 17.0) / 10.0)
+    inside = 8 if off < 0.05 else 0
+    return Score(8, inside, 0, off)
+
+
+def made(
+    journal: Path, trials: int, seed: int = 3, evaluate: Callable[[Mapping[str, object]], Score] = hill
+) -> list[Trial]:
+    with opened(journal, PLAN) as study:
+        return list(search(PRIORS, evaluate, study, trials=trials, seed=seed))
+
+
+class KilledError(Exception):
+    pass
+
+
+def dies_after(count: int) -> Callable[[Mapping[str, object]], Score]:
+    calls: Iterator[int] = iter(range(count))
+
+    def evaluate(values: Mapping[str, object]) -> Score:
+        if next(calls, None) is None:
+            raise KilledError
+        return hill(values)
+
+    return evaluate
+
+
+def test_finds_a_small_region_and_never_leaves_the_priors(tmp_path: Path) -> None:
+    trials = made(tmp_path / "journal", 60)
+    assert [trial.number for trial in trials] == list(range(1, 61))
+    assert max(trial.score.share_inside for trial in trials) == 1.0
+    for trial in trials:
+        for prior in PRIORS:
+            assert prior.low <= prior.number(trial.values[prior.key]) <= prior.high
+    late = [trial.score.inside for trial in trials[-20:]]
+    assert sum(late) > 3 * sum(trial.score.inside for trial in trials[:20])  # it learns
+
+
+def test_same_seed_finds_the_same_and_another_seed_something_else(tmp_path: Path) -> None:
+    first = made(tmp_path / "1", FIRST + 4)
+    assert made(tmp_path / "2", FIRST + 4) == first
+    assert made(tmp_path / "3", FIRST + 4, seed=4)[0] != first[0]
+
+
+@pytest.mark.parametrize("killed_after", [0, 3, FIRST, FIRST + 1, FIRST + 6])
+def test_search_that_died_goes_on_as_if_it_had_not(tmp_path: Path, killed_after: int) -> None:
+    expected = made(tmp_path / "whole", FIRST + 8)
+    with pytest.raises(KilledError):
+        made(tmp_path / "cut", FIRST + 8, evaluate=dies_after(killed_after))
+    counted: list[object] = []
+
+    def evaluate(values: Mapping[str, object]) -> Score:
+        counted.append(values)
+        return hill(values)
+
+    assert made(tmp_path / "cut", FIRST + 8, evaluate=evaluate) == expected
+    assert len(counted) == FIRST + 8 - killed_after
+
+
+def test_longer_search_begins_as_a_shorter_one(tmp_path: Path) -> None:
+    short = made(tmp_path / "short", FIRST + 2)
+    assert made(tmp_path / "long", FIRST + 6)[: FIRST + 2] == short
+    assert made(tmp_path / "short", FIRST + 6) == made(tmp_path / "long", FIRST + 6)
+
+
+def test_torn_last_line_is_forgotten(tmp_path: Path) -> None:
+    journal = tmp_path / "journal"
+    expected = made(journal, 4)
+    with journal.open("ab") as file:
+        file.write(b'{"op_code":4,"wor')
+    assert made(journal, 6)[:4] == expected
+
+
+def test_journal_of_another_plan_is_refused_and_kept(tmp_path: Path) -> None:
+    journal = tmp_path / "journal"
+    made(journal, 2)
+    before = journal.read_bytes()
+    with (
+        pytest.raises(OutputExistsError, match=r"another calibration \(scenario differ"),
+        opened(journal, {**PLAN, "scenario": "two"}),
+    ):
+        pass
+    assert journal.read_bytes() == before
+
+
+def test_two_at_once_are_refused(tmp_path: Path) -> None:
+    @contextmanager
+    def second() -> Iterator[None]:
+        with opened(tmp_path / "journal", PLAN):
+            yield
+
+    with second(), pytest.raises(OutputExistsError, match="another calibration is writing here"), second():
+        pass
+
+
+@pytest.mark.parametrize("content", [b"not a journal\n", b"[1, 2]\n", b'{"op_code": 4}\n', b"\xff\xfe\n"])
+def test_file_that_is_no_journal_is_refused_and_kept(tmp_path: Path, content: bytes) -> None:
+    journal = tmp_path / "journal"
+    journal.write_bytes(content)
+    with pytest.raises(InvalidInputError, match="not the journal of a calibration"), opened(journal, PLAN):
+        pass
+    assert journal.read_bytes() == content

@@ -1,0 +1,119 @@
+"""Every executor gives the same rows, in batches of any size, and the table does not tell them apart."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from blocksim.errors import UnavailableError
+from blocksim.scenario import Document
+from blocksim.study.executors import EXECUTORS, batches, executor_named
+from blocksim.study.executors.batches import GROWTH, MOST, BatchSize, take
+from blocksim.study.executors.task import Setting, Task
+from blocksim.study.many import sweep
+from blocksim.study.merge import merge
+from blocksim.study.plan import Values
+from blocksim.study.shard import Shard
+
+KINETIC = "friction.block_block.kinetic"
+# values that finish, fail in the run, fail before it, and do not go together; other shapes and schemes beside them
+VARY: dict[str, Values] = {
+    KINETIC: [0.1, 0.2, 0.9],
+    "contact.max_overlap": [1e-2, 1e-12],
+    "structures.0.count": [2, 3],
+    "time.end": [0.004, 0.008],
+}
+
+
+@pytest.fixture(scope="module")
+def whole(quick: Document, tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Give the table of the default executor on one thread."""
+    folder = tmp_path_factory.mktemp("whole")
+    table = sweep(without_experiment(quick), VARY, out=folder, jobs=1).table
+    assert table["status"].value_counts().to_dict() == {"failed": 8, "finished": 8, "invalid": 8}
+    return (folder / "sweep.csv").read_bytes()
+
+
+def without_experiment(document: Document) -> Document:
+    """Leave the measured table out: it measures three blocks, and some cases have two."""
+    data = {key: value for key, value in document.data.items() if key != "experiment"}
+    return Document(data, document.source, document.folder, document.overrides)
+
+
+@pytest.mark.parametrize(
+    "options", [{"jobs": 3}, {"executor": "processes", "jobs": 2}, {"keep_cases": True, "jobs": 2}]
+)
+def test_table_is_the_same_from_every_executor(
+    quick: Document, whole: bytes, tmp_path: Path, options: dict[str, object]
+) -> None:
+    sweep(without_experiment(quick), VARY, out=tmp_path, **options)  # type: ignore[arg-type]
+    assert (tmp_path / "sweep.csv").read_bytes() == whole
+
+
+@pytest.mark.parametrize("most", [1, 7])
+def test_table_does_not_depend_on_batches(
+    quick: Document, whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most: int
+) -> None:
+    monkeypatch.setattr(batches, "MOST", most)
+    sweep(without_experiment(quick), VARY, out=tmp_path, jobs=2)
+    assert (tmp_path / "sweep.csv").read_bytes() == whole
+
+
+def test_shards_merged_in_any_order_are_the_same_table(quick: Document, whole: bytes, tmp_path: Path) -> None:
+    for index in (2, 0, 1):
+        result = sweep(without_experiment(quick), VARY, out=tmp_path, shard=Shard(index, 3))
+        assert result.name == f"sweep-{index}-of-3.csv"
+        assert len(result.table) == 8
+    assert not (tmp_path / "sweep.csv").exists()
+    merge(tmp_path)
+    assert (tmp_path / "sweep.csv").read_bytes() == whole
+
+
+@pytest.mark.parametrize("name", ["ensemble", "processes"])
+def test_stopped_executor_begins_no_batch(quick: Document, name: str) -> None:
+    made: list[int] = []
+
+    def tasks() -> Iterator[Task]:
+        for number in range(10):
+            made.append(number)
+            yield Task(number, str(number), {}, quick.build())
+
+    assert list(executor_named(name).run(tasks(), Setting(2, is_stopped=lambda: True))) == []
+    assert len(made) <= 1
+
+
+def test_unreachable_scheduler_is_told_before_anything_is_written(quick: Document, tmp_path: Path) -> None:
+    with pytest.raises(UnavailableError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1 "):
+        sweep(quick, {KINETIC: [0.1]}, out=tmp_path / "out", scheduler="tcp://127.0.0.1:1")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_package_names_the_extra(quick: Document, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[cluster\]'"):
+        sweep(quick, {KINETIC: [0.1]}, out=tmp_path / "out", scheduler="tcp://127.0.0.1:1")
+
+
+def test_every_executor_can_be_loaded() -> None:
+    for name in EXECUTORS:
+        assert callable(executor_named(name).run)
+
+
+def test_batch_grows_with_the_speed_and_never_without_bounds() -> None:
+    size = BatchSize(2, least=2)
+    size.measured(2, 0.25)
+    assert size.count == 4
+    size.measured(4, 1e-9)
+    assert size.count == 4 * GROWTH
+    for _ in range(20):
+        size.measured(size.count, 1e-9)
+    assert size.count == MOST
+    size.measured(MOST, 1e9)
+    assert size.count == 2
+
+
+def test_tasks_are_taken_as_they_are_needed() -> None:
+    tasks = iter([Task(number, "", {}, None) for number in range(5)])  # type: ignore[arg-type]
+    assert [task.number for task in take(tasks, 2, lambda: False)] == [0, 1]
+    assert take(tasks, 2, lambda: True) == ()
+    assert [task.number for task in take(tasks, 9, lambda: False)] == [2, 3, 4]

@@ -1,0 +1,44 @@
+"""Members of an ensemble: in order, each by itself, failures beside results."""
+
+from pathlib import Path
+
+import pytest
+
+from blocksim.scenario import Document
+from blocksim.simulation import simulate
+from blocksim.study.members import BATCH, run_members
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+FRICTION = "friction.block_ground"
+
+
+@pytest.fixture(scope="module")
+def slide() -> Document:
+    return Document.read(SCENARIOS / "slide.toml").with_values({"contact.stiffness_scale": 0.001, "time.end": 0.05})
+
+
+def test_member_ends_as_a_run_of_its_own(slide: Document) -> None:
+    (member,) = run_members(slide, [{FRICTION: 0.3}])
+    assert member.final == simulate(slide.with_values({FRICTION: 0.3}).build()).columns
+
+
+def test_members_that_fail_do_not_touch_the_others(slide: Document) -> None:
+    values: list[dict[str, object]] = [
+        {FRICTION: 0.3},
+        {"bodies.0.y": "11 mm"},  # inside the ground
+        {"contact.max_overlap": "1e-12 m"},  # fails on the way
+        {"time.step": "1 s"},  # cannot be started
+        {FRICTION: 0.4},
+    ]
+    members = list(run_members(slide, values))
+    assert [member.final is None for member in members] == [False, True, True, True, False]
+    assert [bool(member.problem) for member in members] == [False, True, True, True, False]
+    assert [members[0], members[4]] == list(run_members(slide, [values[0], values[4]]))
+
+
+def test_members_keep_their_order_beyond_a_batch(slide: Document) -> None:
+    ends = [0.001 + 1e-5 * number for number in range(BATCH + 3)]
+    finals = [member.final for member in run_members(slide, ({"time.end": end} for end in ends))]
+    places = [final["x_mm"][0] for final in finals if final is not None]
+    assert len(places) == len(ends)
+    assert places == sorted(places)
