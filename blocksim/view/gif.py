@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 TICK = 0.01  # s, of a GIF's clock
 SHORTEST = 2  # ticks; browsers slow down what is shorter
 COLOURS = 128
+FILLS, SHARES = 16, np.array([[0.2], [0.4], [0.6], [0.8]])  # so many colours get so many shades
 UNKNOWN = 255
 Pixels = NDArray[np.uint8]  # (height, width, 3)
 MOST_BYTES = 1 << 30  # of all pictures together, which Pillow keeps in memory
@@ -55,13 +56,16 @@ def ticks(seconds: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 class Palette:
-    """The colours of a film: the most frequent ones of its first picture, unchanged; all others become the nearest."""
+    """The colours of a film: the most frequent ones of its first picture, unchanged, and shades of these.
+
+    All others become the nearest.
+    """
 
     def __init__(self, picture: Pixels) -> None:
         """Choose the colours."""
         colours, counts = np.unique(_packed(picture), return_counts=True)
         frequent = colours[np.argsort(-counts, kind="stable")[:COLOURS]]
-        self.colours = _unpacked(frequent)
+        self.colours = np.concatenate([_unpacked(frequent), _mixed(_unpacked(frequent))])
         self.numbers = np.full(1 << 24, UNKNOWN, dtype=np.uint8)  # of every colour, found when first met
         self.numbers[frequent] = np.arange(len(frequent))
 
@@ -76,6 +80,14 @@ class Palette:
         image = Image.fromarray(self.numbers[packed])
         image.putpalette(self.colours.astype(np.uint8).tobytes())
         return image
+
+
+def _mixed(colours: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return shades between the first colours and the darkest: the edges of lines that come later."""
+    darkest = colours[colours.sum(axis=1).argmin()]
+    shades = darkest + (colours[:FILLS, None] - darkest) * SHARES
+    mixed: NDArray[np.int32] = np.round(shades).astype(np.int32).reshape(-1, 3)
+    return mixed
 
 
 def _packed(picture: Pixels) -> NDArray[np.int32]:
