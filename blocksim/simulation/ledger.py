@@ -1,12 +1,13 @@
 """The energy ledger of a run: where the energy went, and how much of it is unaccounted for."""
 
 import math
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, computed_field
 
-from blocksim.simulation.schemes import AnyScene, measured_row, scheme_of
+if TYPE_CHECKING:
+    from blocksim.simulation.schemes import AnyScene
 
 SMALLEST_HEIGHT = 1e-3  # m; the energy in play is at least that of lifting everything by this much
 STANDARD_GRAVITY = 9.81
@@ -50,17 +51,21 @@ class EnergyLedger(BaseModel, frozen=True):
         return abs(self.residual) / self.in_play if self.in_play else abs(self.residual)
 
 
-def start_energy(scene: AnyScene) -> float:
+def start_energy(scene: "AnyScene") -> float:
     """Return all energy (J) that a scene holds and has lost: constant, if the ledger is complete."""
+    from blocksim.simulation.schemes import measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
+
     return float(measured_row(scene)[: len(scheme_of(scene).ledger)].sum())
 
 
-def energy_ledger(scene: AnyScene, start: float) -> EnergyLedger:
+def energy_ledger(scene: "AnyScene", start: float) -> EnergyLedger:
     """Return the ledger of the present state; `start` is the energy (J) at the start.
 
     Energy in play: largest kinetic energy + sum of the weights' travel |m g v| dt + |work of the support|, at least
     m_total g 1 mm.
     """
+    from blocksim.simulation.schemes import measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
+
     ledger = scene.world.ledger[0]
     row = measured_row(scene)
     entries = {name: float(value) for name, value in zip(scheme_of(scene).ledger, row, strict=False)}
