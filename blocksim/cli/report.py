@@ -95,11 +95,17 @@ def _compared(run: StoredRun, experiment: Path | None) -> tuple[dict[str, object
             return None, ()
         if run.status != FINISHED:
             return None, ("only a finished run is compared with the measurement",)
-        return compare_final(run.final, table).to_dict(), ()
+        found = compare_final(run.final, table)
+        return {**found.to_dict(), "experiment": _near(found.source)}, ()
     except BlocksimError as error:
         if experiment is not None:
             raise
         return None, (str(error),)
+
+
+def _near(path: str) -> str:
+    here = Path.cwd()
+    return str(Path(path).relative_to(here)) if Path(path).is_relative_to(here) else path
 
 
 def _measured(scenario: Scenario | None, experiment: Path | None) -> ExperimentTable | None:

@@ -82,7 +82,10 @@ def _moving(run: StoredRun, most_bytes: int) -> tuple[dict[str, Any] | None, lis
     except InvalidInputError as error:
         return None, [], [str(error)]
     scene = scene_data(run.frames, run.scenario, frame_indices(run.frames, most_bytes))
-    return {**packed.data, "scene": scene}, [*packed.notes, "Contact forces are not stored with a run."], []
+    found = packed.data["energy"]
+    energy = {told: found[name] for name, told in LEDGER.items() if name in found}
+    notes = [*packed.notes, "Contact forces are not stored with a run."]
+    return {**packed.data, "energy": energy, "scene": scene}, notes, []
 
 
 def _reason(run: StoredRun) -> str:

@@ -168,7 +168,7 @@ class Drawing {
 
   drawScale(scale) {
     const { context, colours } = this;
-    const length = ticks(0, 160 / scale, 1).at(-1) || 100 / scale;
+    const length = roundBelow(160 / scale);
     const y = this.canvas.height / this.ratio - 6;
     context.fillStyle = colours.ink;
     context.fillRect(10, y - 2, length * scale, 2);

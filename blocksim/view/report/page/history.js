@@ -41,7 +41,7 @@ class Chart {
   draw(lines) {
     this.width = this.svg.clientWidth;
     this.height = this.svg.clientHeight;
-    if (!this.width) return;
+    if (!this.width || matchMedia("print").matches) return;
     const { frames } = this.player;
     const values = lines.map(({ value }) => Array.from({ length: frames.count }, (_, frame) => value(frame)));
     const finite = values.flat().filter(Number.isFinite);
@@ -49,6 +49,7 @@ class Chart {
     const least = Math.max(1e-12, 1e-6 * Math.max(Math.abs(low), Math.abs(high)));
     if (high - low < least) { low -= 0.5; high += 0.5; }
     const up = (value) => this.height - PLACE.bottom - (this.height - PLACE.bottom - PLACE.top) * (value - low) / (high - low);
+    this.svg.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
     this.svg.replaceChildren(...this.axes(low, high, up));
     values.forEach((row, line) => {
       const path = row.map((value, frame) => (Number.isFinite(value) ? `${this.across(frames.time[frame]).toFixed(1)},${up(value).toFixed(1)}` : "")).filter(Boolean);
@@ -67,7 +68,7 @@ class Chart {
       nodes.push(draw("text", { x: PLACE.left - 6, y: up(tick) + 4, "text-anchor": "end" }, brief(tick)));
     }
     const [first, last] = this.span();
-    for (const tick of ticks(first, last, Math.max(2, Math.floor(this.width / 90)))) {
+    for (const tick of ticks(first, last, Math.max(2, Math.floor(this.width / 75)))) {
       nodes.push(draw("text", { x: this.across(tick), y: this.height - PLACE.bottom + 15, "text-anchor": "middle" }, brief(tick)));
     }
     nodes.push(draw("text", { x: right, y: this.height - 3, "text-anchor": "end" }, "time (s)"));
@@ -151,7 +152,7 @@ class Histories {
     const seen = found.filter(([, values]) => largest(values) > 2e-3 * top);
     const styles = seen.map((_, place) => ({ colour: LINES[place % LINES.length], dash: DASHES[Math.floor(place / LINES.length) % DASHES.length] }));
     this.energy.draw(seen.map(([, values], place) => ({ ...styles[place], value: (frame) => values[frame] })));
-    this.legend.replaceChildren(...seen.map(([name], place) => make("small", {}, this.swatch(styles[place]), ` ${name.replaceAll("_", " ")}`)));
+    this.legend.replaceChildren(...seen.map(([name], place) => make("small", {}, this.swatch(styles[place]),  ` ${name}`)));
   }
 
   swatch({ colour: stroke, dash }) {

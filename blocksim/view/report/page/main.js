@@ -41,5 +41,18 @@ addEventListener("keydown", (event) => {
   built.get(sections.find((section) => !section.hidden).id)?.player?.key(event);
 });
 
+// On paper nothing can be opened.
+const opened = new Set();
+addEventListener("beforeprint", () => {
+  for (const details of document.querySelectorAll("details:not([open]):not(.keys)")) {
+    details.open = true;
+    opened.add(details);
+  }
+});
+addEventListener("afterprint", () => {
+  for (const details of opened) details.open = false;
+  opened.clear();
+});
+
 show();
 window.blocksim = { built, decode };

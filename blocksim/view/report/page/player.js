@@ -48,8 +48,13 @@ class Player {
   }
 
   wireView() {
-    new ResizeObserver(() => { this.drawing.resize(); this.redraw(); }).observe(this.canvas.parentElement);
-    onTheme(() => { this.drawing.takeColours(); this.drawing.resize(); this.redraw(); });
+    new ResizeObserver(() => { this.fitAnew(); }).observe(this.canvas.parentElement);
+    onTheme(() => { this.drawing.takeColours(); this.fitAnew(); });
+  }
+
+  fitAnew() {
+    if (!matchMedia("print").matches) this.drawing.resize();
+    this.redraw();
   }
 
   wirePointer() {

@@ -24,7 +24,7 @@ class CaseTable {
 
   drawHead() {
     this.heads = this.columns.map((column) => {
-      const button = make("button", { type: "button" }, isolated(column.name));
+      const button = make("button", { type: "button" }, breakable(column.name));
       const head = make("th", { scope: "col", "aria-sort": "none", ...(this.isNumber(column) && { class: "n" }) }, button);
       button.addEventListener("click", () => this.sort(column));
       return head;
