@@ -69,14 +69,15 @@ def pack(values: Floats, *, exact: bool = False) -> tuple[dict[str, Any], float]
     """Return values as base64 text with the range they are rounded in, and the largest error of that.
 
     Few values, or all with `exact`, become 32-bit floats; many become 16-bit steps between smallest and largest.
-    Values that are not finite become NaN, or the smallest in steps.
+    Values that are not finite stay what they are, or become 0 in steps.
     """
     if exact or values.size <= EXACT_VALUES:
         floats = values.astype("<f4")
         return {"type": "f4", "data": _text(floats)}, _largest(floats.astype(float) - values)
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    finite = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+    low, high = float(finite.min()), float(finite.max())
     step = (high - low) / LEVELS or 1.0
-    steps = np.rint((np.nan_to_num(values, nan=low) - low) / step).astype("<u2")
+    steps = np.rint((finite - low) / step).astype("<u2")
     return {"type": "u2", "low": low, "step": step, "data": _text(steps)}, _largest(low + step * steps - values)
 
 

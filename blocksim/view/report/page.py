@@ -55,6 +55,7 @@ def _environment() -> "Environment":
     environment = Environment(
         loader=DictLoader(texts), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
+    environment.policies["json.dumps_kwargs"] = {"sort_keys": False, "allow_nan": False}
     environment.filters["fixed"] = _fixed
     environment.filters["own"] = Markup  # for our own style and scripts, never for what comes from a scenario
     return environment
