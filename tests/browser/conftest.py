@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, Dialog, Page
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 SCREENSHOTS = "BLOCKSIM_SCREENSHOTS"
@@ -27,6 +27,11 @@ class Opened:
     page: "Page"
     complaints: list[str] = field(default_factory=list)
     requests: list[str] = field(default_factory=list)
+
+    def dismiss(self, dialog: "Dialog") -> None:
+        """Close a dialog: there should be none."""
+        self.complaints.append(f"dialog: {dialog.message}")
+        dialog.dismiss()
 
     def state(self) -> dict[str, Any]:
         """Return the state of the player that is shown."""
@@ -72,7 +77,7 @@ def open_page(browser: "Browser") -> Iterator[Open]:
         opened.append(one)
         page.on("console", lambda message: one.complaints.append(f"{message.type}: {message.text}"))
         page.on("pageerror", lambda error: one.complaints.append(str(error)))
-        page.on("dialog", lambda dialog: (one.complaints.append(f"dialog: {dialog.message}"), dialog.dismiss()))
+        page.on("dialog", one.dismiss)
         page.on("request", lambda request: one.requests.append(request.url))
         page.goto(path.resolve().as_uri() + part)
         return one

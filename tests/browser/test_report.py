@@ -78,6 +78,7 @@ def test_blocks_are_where_the_run_says_to_a_pixel(three: tuple[Path, Frames], op
     path, frames = three
     one = open_page(path)
     one.page.evaluate(f"{PLAYER}.toggle('names')")
+    scale = one.state()["scale"]
     drawn = []
     for frame in (0, 12, 20):
         one.page.evaluate(f"{PLAYER}.show({frame})")
@@ -85,7 +86,7 @@ def test_blocks_are_where_the_run_says_to_a_pixel(three: tuple[Path, Frames], op
         drawn.append([middle_of(pixels(one), colour) for colour in COLOURS])
         assert np.abs(np.array(state["centres"]) - drawn[-1]).max() < 1.0
     places = np.stack([frames.x, -frames.y], axis=-1)[[0, 12, 20]]  # m; y goes down on a screen
-    ways = 1e3 * state["scale"] * (places - places[0, 0])
+    ways = 1e3 * scale * (places - places[0, 0])
     assert np.abs(np.array(drawn) - drawn[0][0] - ways).max() < 1.0
     one.keep("three-blocks")
 

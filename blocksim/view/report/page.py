@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 MARK = '<meta name="generator" content="blocksim report">'
 MARK_WITHIN = 2000  # bytes from the start of a file
 SCRIPTS = ("decode", "frames", "view", "drawing", "player", "history", "table", "map", "main")  # in this order
-PAGE = resources.files("blocksim.view.report") / "page"
+PARTS = resources.files("blocksim.view.report") / "parts"
 
 
 def write_report(subjects: Sequence[Subject], path: Path, *, title: str, version: str) -> int:
@@ -68,7 +68,7 @@ def _fixed(value: float, digits: int) -> str:
 
 
 def _part(name: str) -> str:
-    return (PAGE / name).read_text(encoding="utf-8")
+    return (PARTS / name).read_text(encoding="utf-8")
 
 
 def _refuse_foreign(path: Path) -> None:

@@ -6,6 +6,7 @@ class CaseTable {
     this.root = root;
     this.columns = data.columns;
     this.members = data.members;
+    this.numeric = new Set(data.columns.filter((column) => this.isNumber(column)));
     this.open = open;
     this.count = data.columns[0].values.length;
     this.order = Array.from({ length: this.count }, (_, row) => row);
@@ -25,7 +26,7 @@ class CaseTable {
   drawHead() {
     this.heads = this.columns.map((column) => {
       const button = make("button", { type: "button" }, breakable(column.name));
-      const head = make("th", { scope: "col", "aria-sort": "none", ...(this.isNumber(column) && { class: "n" }) }, button);
+      const head = make("th", { scope: "col", "aria-sort": "none", ...(this.numeric.has(column) && { class: "n" }) }, button);
       button.addEventListener("click", () => this.sort(column));
       return head;
     });
@@ -74,7 +75,7 @@ class CaseTable {
       const name = key ? make("a", { href: `#${key}` }, isolated(value)) : isolated(value);
       return make("th", { scope: "row" }, name);
     }
-    const kind = typeof value === "number" ? "n" : "text";
+    const kind = this.numeric.has(column) ? "n" : "text";
     if (column.name === "inside") return make("td", { class: value === "True" ? "inside" : value === "False" ? "outside" : "" }, { True: "✓ inside", False: "✗ outside" }[value] ?? "–");
     const text = column.role === "block" && typeof value === "number" ? shown(value) : brief(value);
     return make("td", { class: kind }, isolated(text));
