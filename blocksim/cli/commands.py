@@ -25,6 +25,7 @@ COMMANDS = {  # name: module in this folder, function in it, first line of its h
     "plot": ("plot", "plot_command", "Draw a run: a strip of frames, its end, or its histories."),
     "animate": ("animate", "animate_command", "Show a run as a film, GIF or MP4."),
     "export": ("export", "export_command", "Write all frames of a run as CSV or VTKHDF."),
+    "report": ("report", "report_command", "Write runs and sweeps into one HTML file."),
     "new": ("new", "new_command", "Write a commented scenario, sweep or table from a template."),
     "schema": ("schema", "schema_command", "Print the JSON Schema of scenario files, for editors."),
 }

@@ -1,12 +1,16 @@
 """The time loop and what it leaves behind: frames, final table, summary, and the folder that keeps them."""
 
-from blocksim.simulation.ending import MemberEnd, MemberFailure
-from blocksim.simulation.ensemble import run_ensemble, run_in_batches
-from blocksim.simulation.frames import Frames
-from blocksim.simulation.loop import Progress, Watcher
-from blocksim.simulation.result import Result, read_result
-from blocksim.simulation.simulate import renew_copies, simulate, simulate_into
-from blocksim.simulation.summary import Summary
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from blocksim.simulation.ending import MemberEnd, MemberFailure
+    from blocksim.simulation.ensemble import run_ensemble, run_in_batches
+    from blocksim.simulation.frames import Frames
+    from blocksim.simulation.loop import Progress, Watcher
+    from blocksim.simulation.result import Result, read_result
+    from blocksim.simulation.running import renew_copies, simulate, simulate_into
+    from blocksim.simulation.summary import Summary
 
 __all__ = [
     "Frames",
@@ -23,3 +27,27 @@ __all__ = [
     "simulate",
     "simulate_into",
 ]
+
+# found when first asked for, so that stored results can be read without waiting for numba and the kernels
+_HOMES = {
+    "Frames": "frames",
+    "MemberEnd": "ending",
+    "MemberFailure": "ending",
+    "Progress": "loop",
+    "Result": "result",
+    "Summary": "summary",
+    "Watcher": "loop",
+    "read_result": "result",
+    "renew_copies": "running",
+    "run_ensemble": "ensemble",
+    "run_in_batches": "ensemble",
+    "simulate": "running",
+    "simulate_into": "running",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        message = f"module 'blocksim.simulation' has no attribute '{name}'"
+        raise AttributeError(message)
+    return getattr(import_module(f"blocksim.simulation.{_HOMES[name]}"), name)

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, computed_field
 
-from blocksim.simulation.schemes import AnyScene, measured_row, scheme_of
+if TYPE_CHECKING:
+    from blocksim.simulation.schemes import AnyScene
 
 SMALLEST_HEIGHT = 1e-3  # m; the energy in play is at least that of lifting everything by this much
 STANDARD_GRAVITY = 9.81
@@ -52,8 +53,10 @@ class EnergyLedger(BaseModel, frozen=True):
         return abs(self.residual) / self.in_play if self.in_play else abs(self.residual)
 
 
-def start_energy(scene: AnyScene) -> float:
+def start_energy(scene: "AnyScene") -> float:
     """Return all energy (J) that a scene holds and has lost: constant, if the ledger is complete."""
+    from blocksim.simulation.schemes import measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
+
     return float(measured_row(scene)[: len(scheme_of(scene).ledger)].sum())
 
 
@@ -64,8 +67,10 @@ class InPlay(NamedTuple):
     moved: float  # J: largest kinetic energy + sum of the weights' travel |m g v| dt
 
 
-def energy_ledger(scene: AnyScene, start: float) -> EnergyLedger:
+def energy_ledger(scene: "AnyScene", start: float) -> EnergyLedger:
     """Return the ledger of the present state; `start` is the energy (J) at the start."""
+    from blocksim.simulation.schemes import measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
+
     book = scene.world.ledger[0]
     in_play = InPlay(float(np.sum(scene.world.bodies.mass)), float(book.largest_kinetic + book.travel_work))
     return ledger_of(scheme_of(scene).ledger, measured_row(scene), start, in_play)

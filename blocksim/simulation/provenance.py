@@ -8,10 +8,12 @@ import shlex
 import sys
 from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from blocksim.kernels.arrays import World
-from blocksim.kernels.jit import source_hash
 from blocksim.scenario import Scenario, scenario_hash
+
+if TYPE_CHECKING:
+    from blocksim.kernels.arrays import World
 
 ROOMS = ("kernels", "scenario", "simulation", "world")  # their code decides the bits of a run
 PACKAGES = ("numpy", "numba", "pydantic", "h5py", "pandas")
@@ -27,6 +29,8 @@ def code_version() -> str:
 @functools.cache
 def code_hash() -> str:
     """Return a hash of all code that decides the bits of a run, and of the versions it is compiled with."""
+    from blocksim.kernels.jit import source_hash  # noqa: PLC0415 - numba, which reading a folder does not need
+
     package = Path(__file__).resolve().parents[1]
     text = " ".join([code_version(), *(source_hash(package / room) for room in ROOMS)])
     return hashlib.sha256(text.encode()).hexdigest()
@@ -38,7 +42,7 @@ def run_hash(scenario: Scenario) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
 
 
-def state_hash(world: World) -> str:
+def state_hash(world: "World") -> str:
     """Return a hash of the bits of all positions and velocities."""
     digest = hashlib.sha256()
     for name in ("x", "y", "angle", "vx", "vy", "spin"):

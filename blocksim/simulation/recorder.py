@@ -1,14 +1,16 @@
 """Samples the world at the output times. It names the next step it wants and never changes the motion."""
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody
 from blocksim.simulation.frames import Frames
-from blocksim.simulation.schemes import AnyScene, measured_row, scheme_of
+
+if TYPE_CHECKING:
+    from blocksim.simulation.schemes import AnyScene
 
 MOTION = ("x", "y", "angle", "vx", "vy", "spin")
 
@@ -49,8 +51,10 @@ class Recorder:
             number += 1
         return round(number * self.steps_per_frame)
 
-    def sample(self, scene: AnyScene) -> None:
+    def sample(self, scene: "AnyScene") -> None:
         """Add a frame of the present state, unless this step has one already."""
+        from blocksim.simulation.schemes import measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
+
         step = int(scene.world.clock[0].steps)
         if self.steps and self.steps[-1] == step:
             return

@@ -1,6 +1,5 @@
 """One run, and its comparison with an experiment."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ from blocksim.simulation import Progress, Result, Watcher, read_result, renew_co
 from blocksim.simulation import folder as files
 from blocksim.simulation.summary import read_summary
 from blocksim.simulation.table import COLUMNS, read_table
+from blocksim.study.places import find_run as find_run  # noqa: PLC0414 - its old home, for those who look there
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -90,35 +90,3 @@ def _refuse_unfinished(name: str, status: str, reason: str) -> None:
         verb = "was" if status == "interrupted" else "has"
         message = f"{name}: this run {verb} {status} ({reason}); only a finished run can be compared"
         raise InvalidInputError(message)
-
-
-def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Path:
-    """Return the run folder meant by a run folder, by `results/<name>` (newest finished run) or by a scenario file.
-
-    A folder counts as a run when it has all `needed` files. Raises InputMissingError with the command that helps.
-    """
-    place = Path(place)
-    if not place.exists():
-        message = f"{place}: no such run folder or scenario file"
-        raise InputMissingError(message)
-    if place.is_dir():
-        return _run_in(place, needed)
-    folder = files.default_folder(load_scenario(place))
-    if not files.is_finished(folder):
-        message = f"{place}: no finished run of exactly this scenario in {folder}; first: blocksim run {place}"
-        raise InputMissingError(message)
-    return folder
-
-
-def _run_in(place: Path, needed: Sequence[str]) -> Path:
-    missing = [name for name in needed if not (place / name).is_file()]
-    if not missing:
-        return place
-    if (place / files.SCENARIO).is_file():
-        message = f"{place}: this run is not complete (there is no {missing[0]}); blocksim run --overwrite repeats it"
-        raise InputMissingError(message)
-    newest = files.newest_finished(place)
-    if newest is None:
-        message = f"{place}: no finished run in this folder; blocksim run SCENARIO makes one"
-        raise InputMissingError(message)
-    return newest

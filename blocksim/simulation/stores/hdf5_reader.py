@@ -14,7 +14,6 @@ from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
-from blocksim.simulation.schemes import scheme_named
 from blocksim.simulation.stores import hdf5_layout as layout
 
 SUPERBLOCK = struct.Struct("<8sBxxB16xQ")  # signature, version, consistency flags, end of file
@@ -61,14 +60,16 @@ def read_frames(path: Path, scenario: Scenario) -> Frames:
 
     Raises InputMissingError, or InvalidInputError when the file is not one of ours, damaged or still empty.
     """
-    placed, scheme = place_bodies(scenario), scheme_named(scenario)
+    placed = place_bodies(scenario)
     with _opened(path) as file:
         try:
             count = int(file[layout.COMMITTED][()])
             steps = file[layout.STEP][:count]
             time_step = float(file[layout.STEP].attrs["time_step"])
             motion = np.stack([file[f"{layout.BLOCKS}/{name}"][:count] for name in MOTION], axis=1)
-            measured = np.stack([file[f"{layout.OBSERVABLES}/{name}"][:count] for name in scheme.measured], axis=1)
+            ledger = tuple(name for name in file[layout.OBSERVABLES] if name not in layout.COUNTED_UNITS)
+            names = (*ledger, *layout.COUNTED_UNITS)
+            measured = np.stack([file[f"{layout.OBSERVABLES}/{name}"][:count] for name in names], axis=1)
         except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
             message = f"{path}: not a complete run file: {error}"
             raise InvalidInputError(message) from error
@@ -77,4 +78,4 @@ def read_frames(path: Path, scenario: Scenario) -> Frames:
             f"{path}: holds {len(motion)} frames, {count} announced, of {motion.shape[-1]} bodies, not {len(placed)}"
         )
         raise InvalidInputError(message)
-    return frames_from_rows(placed, time_step, Rows(steps, motion, measured, scheme.ledger))
+    return frames_from_rows(placed, time_step, Rows(steps, motion, measured, ledger))

@@ -1,0 +1,110 @@
+"""Frames as text that a page can carry: thinned where there are too many, rounded where they are large."""
+
+import base64
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.simulation.frames import Frames
+from blocksim.view.moments import Indices, drawable_frames
+
+Floats = NDArray[np.float64]
+
+MILLI = 1e3
+EXACT_VALUES = 200_000  # up to so many values are kept as 32-bit floats
+MOST_BYTES = 12_000_000  # of the frames of one run, before they become text, which takes a third more
+LEVELS = 65_535  # steps of a rounded value
+SHORT_BYTES = 2
+CHANNELS = {"x": "mm", "y": "mm", "rotation": "deg", "vx": "mm/s", "vy": "mm/s", "spin": "deg/s"}
+
+
+@dataclass(frozen=True)
+class Packed:
+    """Frames for the page: `data` is plain values for JSON; the errors are the largest of rounding, by channel."""
+
+    data: dict[str, Any]
+    kept: int
+    recorded: int
+    errors: dict[str, float]
+
+    @property
+    def notes(self) -> list[str]:
+        """What was lost, in sentences."""
+        told = [f"{name} {error:.1g} {CHANNELS[name]}" for name, error in self.errors.items()]
+        thinned = "all" if self.kept == self.recorded else "evenly thinned"
+        return [
+            f"{self.kept} of {self.recorded} recorded frames are in this page ({thinned}).",
+            f"Largest rounding error of a value: {', '.join(told)}.",
+        ]
+
+
+def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
+    """Return the drawable frames in mm and degrees. Raises InvalidInputError when there is none."""
+    drawable = drawable_frames(frames)
+    kept = _thinned(drawable, len(frames.names), most_bytes)
+    channels = _channels(frames, kept)
+    packed = {name: pack(values) for name, values in channels.items()}
+    data = {
+        "time": pack(frames.time[kept], exact=True)[0],
+        "names": list(frames.names),
+        "size_x": _listed(MILLI * frames.size_x),
+        "size_y": _listed(MILLI * frames.size_y),
+        "start_angle": _listed(np.degrees(frames.start_angle)),
+        "channels": {name: part for name, (part, _) in packed.items()},
+        "energy": {name: pack(values[kept], exact=True)[0] for name, values in frames.energy.items()},
+        "contact_count": pack(frames.contact_count[kept], exact=True)[0],
+        "largest_overlap": pack(MILLI * frames.largest_overlap[kept], exact=True)[0],
+    }
+    return Packed(data, len(kept), len(frames), {name: error for name, (_, error) in packed.items()})
+
+
+def frame_indices(frames: Frames, most_bytes: int = MOST_BYTES) -> Indices:
+    """Return the frames that `pack_frames` keeps."""
+    return _thinned(drawable_frames(frames), len(frames.names), most_bytes)
+
+
+def pack(values: Floats, *, exact: bool = False) -> tuple[dict[str, Any], float]:
+    """Return values as base64 text with the range they are rounded in, and the largest error of that.
+
+    Few values, or all with `exact`, become 32-bit floats; many become 16-bit steps between smallest and largest.
+    Values that are not finite stay what they are, or become 0 in steps.
+    """
+    if exact or values.size <= EXACT_VALUES:
+        floats = values.astype("<f4")
+        return {"type": "f4", "data": _text(floats)}, _largest(floats.astype(float) - values)
+    finite = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+    low, high = float(finite.min()), float(finite.max())
+    step = (high - low) / LEVELS or 1.0
+    steps = np.rint((finite - low) / step).astype("<u2")
+    return {"type": "u2", "low": low, "step": step, "data": _text(steps)}, _largest(low + step * steps - values)
+
+
+def _thinned(drawable: Indices, blocks: int, most_bytes: int) -> Indices:
+    """Return evenly chosen frames, first and last included, that fit."""
+    values = len(drawable) * blocks * len(CHANNELS)
+    bytes_each = (4 if len(drawable) * blocks <= EXACT_VALUES else SHORT_BYTES) * blocks * len(CHANNELS)
+    most = max(2, most_bytes // bytes_each)
+    if len(drawable) <= most or values == 0:
+        return drawable
+    return drawable[np.unique(np.rint(np.linspace(0.0, len(drawable) - 1.0, most)).astype(np.intp))]
+
+
+def _channels(frames: Frames, kept: Indices) -> dict[str, Floats]:
+    lengths = {name: MILLI * getattr(frames, name)[kept] for name in ("x", "y", "vx", "vy")}
+    turns = {"rotation": np.degrees(frames.rotation[kept]), "spin": np.degrees(frames.spin[kept])}
+    return {name: {**lengths, **turns}[name] for name in CHANNELS}
+
+
+def _largest(errors: Floats) -> float:
+    finite = np.abs(errors[np.isfinite(errors)])
+    return float(finite.max()) if finite.size else 0.0
+
+
+def _listed(values: Floats) -> list[float]:
+    return [float(f"{value:.7g}") for value in values]
+
+
+def _text(values: NDArray[Any]) -> str:
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")

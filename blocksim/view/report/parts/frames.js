@@ -1,0 +1,57 @@
+// The frames of one run: n moments of b blocks, in mm and degrees.
+class Frames {
+  constructor(data) {
+    this.names = data.names;
+    this.scene = data.scene;
+    this.sizeX = data.size_x;
+    this.sizeY = data.size_y;
+    this.startAngle = data.start_angle;
+    this.time = decode(data.time);
+    this.energy = Object.entries(data.energy).map(([name, part]) => [name, decode(part)]);
+    this.contactCount = decode(data.contact_count);
+    for (const [name, part] of Object.entries(data.channels)) this[name] = decode(part);
+  }
+
+  get count() { return this.time.length; }
+
+  get blocks() { return this.names.length; }
+
+  // Angle of a block's own axes in rad.
+  angle(frame, block) {
+    return (this.rotation[frame * this.blocks + block] + this.startAngle[block]) * Math.PI / 180;
+  }
+
+  offset(frame) { return this.scene.offset ? this.scene.offset[frame] : [0, 0]; }
+
+  // The last frame that is not later than a time (s).
+  at(time) {
+    let low = 0;
+    let high = this.count - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.time[middle] <= time) low = middle;
+      else high = middle - 1;
+    }
+    return low;
+  }
+
+  // The blocks in the order of the ways of their centres from start to end, the longest first.
+  byWay() {
+    const last = (this.count - 1) * this.blocks;
+    const way = (block) => Math.hypot(this.x[last + block] - this.x[block], this.y[last + block] - this.y[block]);
+    return this.names.map((_, block) => block).sort((one, other) => way(other) - way(one) || one - other);
+  }
+
+  // The block at a place (mm), the one drawn last where there are several; -1 where there is none.
+  blockAt(frame, x, y) {
+    for (let block = this.blocks - 1; block >= 0; block -= 1) {
+      const dx = x - this.x[frame * this.blocks + block];
+      const dy = y - this.y[frame * this.blocks + block];
+      const angle = this.angle(frame, block);
+      const along = Math.cos(angle) * dx + Math.sin(angle) * dy;
+      const across = Math.cos(angle) * dy - Math.sin(angle) * dx;
+      if (Math.abs(along) <= 0.5 * this.sizeX[block] && Math.abs(across) <= 0.5 * this.sizeY[block]) return block;
+    }
+    return -1;
+  }
+}

@@ -1,0 +1,58 @@
+// Shows one part of the report at a time, and builds a part when it is first shown.
+const built = new Map();
+const sections = [...document.querySelectorAll("section.subject")];
+
+const open = (key) => { location.hash = key; };
+
+const build = (section) => {
+  const data = JSON.parse(document.getElementById(`${section.id}-data`).textContent);
+  if (data.kind === "run") {
+    if (!data.frames) return null;
+    const player = new Player(section, data.frames);
+    return { player, histories: new Histories(section.querySelector(".histories"), player) };
+  }
+  const table = new CaseTable(section, data, open);
+  return { table, map: new OutcomeMap(section, data, table, open) };
+};
+
+const show = () => {
+  const wanted = sections.find((section) => `#${section.id}` === location.hash) ?? sections[0];
+  for (const section of sections) {
+    section.hidden = section !== wanted;
+    if (section !== wanted) built.get(section.id)?.player?.pause();
+  }
+  for (const link of document.querySelectorAll("nav a")) {
+    if (link.getAttribute("href") === `#${wanted.id}`) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  if (!built.has(wanted.id)) built.set(wanted.id, build(wanted));
+  return wanted;
+};
+
+addEventListener("hashchange", () => {
+  const section = show();
+  scrollTo(0, 0);
+  section.querySelector("h2").focus({ preventScroll: true });
+});
+
+// Keys work before anything has the focus.
+addEventListener("keydown", (event) => {
+  if (event.target !== document.body) return;
+  built.get(sections.find((section) => !section.hidden).id)?.player?.key(event);
+});
+
+// On paper nothing can be opened.
+const opened = new Set();
+addEventListener("beforeprint", () => {
+  for (const details of document.querySelectorAll("details:not([open]):not(.keys)")) {
+    details.open = true;
+    opened.add(details);
+  }
+});
+addEventListener("afterprint", () => {
+  for (const details of opened) details.open = false;
+  opened.clear();
+});
+
+show();
+window.blocksim = { built, decode };

@@ -1,0 +1,136 @@
+"""What a report is about, as plain values that templates and scripts can use: runs here, sweeps in `sweeps`."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from blocksim.errors import InvalidInputError
+from blocksim.simulation.table import rows_of
+from blocksim.view.report.packing import MOST_BYTES, frame_indices, pack_frames
+from blocksim.view.report.scene import scene_data
+from blocksim.view.report.stored import StoredRun
+
+LEDGER = {  # name in run.json: what a person reads
+    "kinetic": "kinetic",
+    "potential": "potential",
+    "stored_normal": "stored, normal",
+    "stored_shear": "stored, shear",
+    "dashpot": "lost in dashpots",
+    "friction": "lost in friction",
+    "broken": "lost as contacts broke",
+    "impacts": "lost in impacts",
+    "correction": "correction of positions",
+    "to_support": "given to the support",
+    "start": "at the start",
+    "in_play": "in play",
+    "residual": "residual",
+}
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One part of a report: `page` is for the template, `data` for the scripts; `key` ties the two together."""
+
+    key: str
+    kind: str
+    name: str
+    page: Mapping[str, Any]
+    data: Mapping[str, Any] = field(repr=False)
+
+
+def run_subject(
+    key: str,
+    run: StoredRun,
+    comparison: Mapping[str, Any] | None = None,
+    remarks: tuple[str, ...] = (),
+    *,
+    most_bytes: int = MOST_BYTES,
+    parent: str | None = None,
+) -> Subject:
+    """Return a run for a report; `comparison` is what `Comparison.to_dict` gives, `remarks` more that is to be told.
+
+    `parent` is the key of the sweep that it is a member of.
+    """
+    data, notes, problems = _moving(run, most_bytes)
+    page = {
+        "parent": parent,
+        "place": str(run.folder),
+        "status": run.status,
+        "reason": _reason(run),
+        "summary": _summary(run),
+        "problems": [*run.problems, *problems, *remarks],
+        "scenario": run.scenario_text,
+        "description": None if run.scenario is None else run.scenario.description,
+        "notes": notes,
+        "final": [] if run.final is None else rows_of(run.final),
+        "comparison": comparison,
+        "ledger": _ledger(run),
+        "provenance": _provenance(run),
+        "has_player": data is not None,
+        "has_particles": bool(data and data["scene"]["particles"]),
+    }
+    return Subject(key, "run", run.name, page, {"kind": "run", "name": run.name, "frames": data})
+
+
+def _moving(run: StoredRun, most_bytes: int) -> tuple[dict[str, Any] | None, list[str], list[str]]:
+    """Return frames and scene for the player, what is to be said of them, and what is wrong with them."""
+    if run.frames is None or run.scenario is None:
+        return None, [], []
+    try:
+        packed = pack_frames(run.frames, most_bytes)
+    except InvalidInputError as error:
+        return None, [], [str(error)]
+    scene = scene_data(run.frames, run.scenario, frame_indices(run.frames, most_bytes))
+    found = packed.data["energy"]
+    energy = {told: found[name] for name, told in LEDGER.items() if name in found}
+    notes = [*packed.notes, "Contact forces are not stored with a run."]
+    return {**packed.data, "energy": energy, "scene": scene}, notes, []
+
+
+def _reason(run: StoredRun) -> str:
+    if run.summary is not None:
+        return run.summary.reason
+    return "no summary: the run was stopped, is still going on, or its run.json cannot be read"
+
+
+def _summary(run: StoredRun) -> list[tuple[str, str]]:
+    """Return names and values for people."""
+    blocks = [] if run.frames is None else [("blocks", str(len(run.frames.names)))]
+    if run.summary is None:
+        last = [] if run.frames is None else [("recorded until", f"{run.frames.time[-1]:.4g} s")]
+        return [*blocks, *last]
+    told = run.summary
+    return [
+        *blocks,
+        ("simulated time", f"{told.simulated_time_s:.4g} s"),
+        ("steps", f"{told.steps} of {told.time_step_s:.3g} s"),
+        ("solver time", f"{told.solver_seconds:.2f} s on {told.threads} thread{'s' if told.threads > 1 else ''}"),
+        ("energy unaccounted for", _share(told.energy_J.relative_residual)),
+        *(("warning", warning) for warning in told.warnings),
+    ]
+
+
+def _share(value: float) -> str:
+    return f"{value:.1e} of what was in play" if math.isfinite(value) else "not known"
+
+
+def _ledger(run: StoredRun) -> list[tuple[str, str]]:
+    if run.summary is None:
+        return []
+    values = run.summary.energy_J.model_dump()
+    # what a scheme does not know is zero, and no news
+    shown = {name: values[name] for name in LEDGER if values.get(name) != 0.0 or name in ("kinetic", "potential")}
+    return [(LEDGER[name], _joule(value)) for name, value in shown.items()]
+
+
+def _joule(value: float) -> str:
+    return f"{value:.6g}".replace("-", "−") if math.isfinite(value) else "–"
+
+
+def _provenance(run: StoredRun) -> list[tuple[str, str]]:
+    if run.summary is None:
+        return []
+    told = run.summary
+    hashes = [("run", told.run), ("scenario", told.scenario_hash), ("final state", told.final_state_sha256)]
+    return [("ended at", told.ended_at), *hashes, *told.environment.items(), *told.sha256.items()]

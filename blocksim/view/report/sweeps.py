@@ -1,0 +1,140 @@
+"""Sweeps in a report: the table as it lies in sweep.csv, and the members whose frames were kept."""
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.scenario import Scenario
+from blocksim.view.report.subjects import Subject
+
+TABLE = "sweep.csv"
+HEAD, TAIL = ("case",), ("status", "reason", "seconds", "inside")
+NEEDED = {"case", "status"}
+OF_BLOCKS = (".x_mm", ".y_mm", ".rotation_deg", ".left_mm", ".right_mm")
+MOST_VALUES = 400_000  # of blocks in the page; a sweep of 10 000 cases shows 13 blocks
+
+
+@dataclass(frozen=True)
+class SweepTable:
+    """The rows of sweep.csv as texts, by column."""
+
+    folder: Path
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Columns that are neither of all sweeps nor of a block."""
+        known = {*HEAD, *TAIL}
+        return tuple(name for name in self.columns if name not in known and not name.endswith(OF_BLOCKS))
+
+    @property
+    def blocks(self) -> tuple[str, ...]:
+        """Names of the blocks."""
+        return tuple(name.removesuffix(".x_mm") for name in self.columns if name.endswith(".x_mm"))
+
+    def column(self, name: str) -> list[str]:
+        """Return one column; empty texts where there is none."""
+        if name not in self.columns:
+            return [""] * len(self.rows)
+        place = self.columns.index(name)
+        return [row[place] for row in self.rows]
+
+
+def read_sweep_table(folder: Path) -> SweepTable:
+    """Return the table of a sweep's folder; rows that are cut off are left out. Raises InvalidInputError."""
+    path = folder / TABLE
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            lines = [tuple(line) for line in csv.reader(file) if line]
+    except OSError as error:
+        message = f"{path}: cannot be read: {error.strerror}"
+        raise InputMissingError(message) from error
+    except (ValueError, csv.Error) as error:
+        message = f"{path}: not the table of a sweep: {error}"
+        raise InvalidInputError(message) from error
+    if not lines or not set(lines[0]) >= NEEDED:
+        message = f"{path}: not the table of a sweep: no columns case and status"
+        raise InvalidInputError(message)
+    return SweepTable(folder, lines[0], tuple(line for line in lines[1:] if len(line) == len(lines[0])))
+
+
+def sweep_subject(
+    key: str,
+    table: SweepTable,
+    scenario: Scenario | None,
+    members: Mapping[str, str],
+    problems: Sequence[str] = (),
+    left_out: Sequence[str] = (),
+) -> Subject:
+    """Return a sweep for a report; `members` are the keys of the subjects of its cases.
+
+    `left_out` are cases that have frames, for which there was no room.
+    """
+    name = table.folder.name if scenario is None else scenario.name
+    shown = table.blocks[: max(1, MOST_VALUES // (2 * max(1, len(table.rows))))]
+    page = {
+        "place": str(table.folder),
+        "description": None if scenario is None else scenario.description,
+        "summary": _summary(table, len(members)),
+        "problems": list(problems),
+        "hidden_blocks": len(table.blocks) - len(shown),
+        "has_members": bool(members),
+    }
+    data = {
+        "kind": "sweep",
+        "name": name,
+        "place": str(table.folder),
+        "columns": _columns(table, shown),
+        "left_out": list(left_out),
+        "members": dict(members),
+    }
+    return Subject(key, "sweep", name, page, data)
+
+
+def _columns(table: SweepTable, blocks: Sequence[str]) -> list[dict[str, Any]]:
+    """Return names, roles and values; a column whose values are all numbers has numbers, an empty cell is null."""
+    ends = [f"{block}{suffix}" for block in blocks for suffix in (".x_mm", ".rotation_deg")]
+    roles = {"varied": table.varied, "case": HEAD, "outcome": TAIL, "block": ends}
+    order = [*HEAD, *table.varied, *TAIL, *ends]
+    role = {name: kind for kind, names in roles.items() for name in names}
+    return [
+        {"name": name, "role": role[name], "values": _values(table.column(name), is_text=name in HEAD)}
+        for name in order
+        if name in table.columns
+    ]
+
+
+def _values(texts: Sequence[str], *, is_text: bool) -> list[Any]:
+    if is_text:
+        return list(texts)
+    numbers = [_number(text) for text in texts]
+    if all(number is not None or not text for number, text in zip(numbers, texts, strict=True)):
+        return numbers
+    return [text or None for text in texts]
+
+
+def _number(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _summary(table: SweepTable, members: int) -> list[tuple[str, str]]:
+    cases = len(table.rows)
+    finished = table.column("status").count("finished")
+    judged = [value for value in table.column("inside") if value]
+    inside = [] if not judged else [("inside all measured ranges", f"{judged.count('True')} of {len(judged)}")]
+    return [
+        ("cases", str(cases)),
+        ("finished", f"{finished} of {cases}"),
+        *inside,
+        ("varied", ", ".join(table.varied) or "nothing"),
+        ("members in this page", str(members)),
+    ]

@@ -1,0 +1,273 @@
+"""Reports in a real browser: no complaints, no network, blocks where run.h5 says, keys, sizes, themes."""
+
+import base64
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+from typer.testing import CliRunner
+
+from blocksim.cli.app import app
+from blocksim.simulation.frames import Frames
+from blocksim.view.report.page import write_report
+from blocksim.view.report.stored import read_stored
+from blocksim.view.report.subjects import run_subject
+from tests.browser.conftest import PLAYER, Open, Opened
+from tests.view.report.folders import write_run, write_sweep
+
+pytestmark = pytest.mark.long
+FRAMES_A_SECOND = 30.0
+COLOURS = ((86, 180, 233), (230, 159, 0), (0, 158, 115))  # of the first blocks, in the order of the palette
+HOSTILE = (
+    "<script>alert(1)</script>",
+    "</script><img src=x onerror=alert(2)>",
+    "x" * 400,
+    "قالب \u202e evil",
+    "🧱 {{ 7*7 }} $x^2$ &amp;",
+    "-->'\"`${alert(3)}",
+)
+
+
+def report(*arguments: object) -> None:
+    result = CliRunner().invoke(app, ["report", *map(str, arguments), "--quiet"])
+    assert result.exit_code == 0, result.output
+
+
+@pytest.fixture(scope="session")
+def three(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Frames]:
+    folder = tmp_path_factory.mktemp("three")
+    frames = write_run(folder / "run", count=21)
+    report(folder / "run", "--out", folder / "report.html")
+    return folder / "report.html", frames
+
+
+@pytest.fixture(scope="session")
+def wall(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Frames]:
+    folder = tmp_path_factory.mktemp("wall")
+    frames = write_run(folder / "run", "wall", count=12)
+    report(folder / "run", "--out", folder / "report.html")
+    return folder / "report.html", frames
+
+
+@pytest.fixture(scope="session")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("swept")
+    write_sweep(folder / "sweep")
+    report(folder / "sweep", "--out", folder / "report.html")
+    return folder / "report.html"
+
+
+def pixels(one: Opened) -> NDArray[np.int64]:
+    """Return the canvas as RGB, a CSS pixel each."""
+    url = one.page.evaluate(f"{PLAYER}.canvas.toDataURL()")
+    picture = Image.open(io.BytesIO(base64.b64decode(url.split(",")[1])))
+    return np.asarray(picture.convert("RGB"), dtype=np.int64)
+
+
+def middle_of(picture: NDArray[np.int64], colour: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return the middle of all pixels of one colour: that of a rectangle, however it is turned."""
+    rows, columns = np.nonzero((np.abs(picture - colour) <= 2).all(axis=-1))
+    return 0.5 * np.array([columns.min() + columns.max() + 1, rows.min() + rows.max() + 1])
+
+
+def test_blocks_are_where_the_run_says_to_a_pixel(three: tuple[Path, Frames], open_page: Open) -> None:
+    path, frames = three
+    one = open_page(path)
+    one.page.evaluate(f"{PLAYER}.toggle('names')")
+    scale = one.state()["scale"]
+    drawn = []
+    for frame in (0, 12, 20):
+        one.page.evaluate(f"{PLAYER}.show({frame})")
+        state = one.state()
+        drawn.append([middle_of(pixels(one), colour) for colour in COLOURS])
+        assert np.abs(np.array(state["centres"]) - drawn[-1]).max() < 1.0
+    places = np.stack([frames.x, -frames.y], axis=-1)[[0, 12, 20]]  # m; y goes down on a screen
+    ways = 1e3 * scale * (places - places[0, 0])
+    assert np.abs(np.array(drawn) - drawn[0][0] - ways).max() < 1.0
+    one.keep("three-blocks")
+
+
+def test_thousand_blocks_open_and_play_at_thirty_frames_a_second(wall: tuple[Path, Frames], open_page: Open) -> None:
+    path, frames = wall
+    one = open_page(path)
+    one.page.evaluate(f"{PLAYER}.show(11)")
+    state = one.state()
+    way = np.diff(np.array(state["centres"])[[0, 999]], axis=0)[0]
+    expected = 1e3 * state["scale"] * np.array([np.ptp(frames.x[11, [0, 999]]), -np.ptp(frames.y[11, [0, 999]])])
+    assert np.abs(way - expected).max() < 1.0
+    rate = one.page.evaluate(
+        f"""() => new Promise((done) => {{
+            const player = {PLAYER};
+            const start = performance.now();
+            let drawn = 0;
+            const draw = (now) => {{
+                player.show(drawn % player.frames.count);
+                drawn += 1;
+                if (now - start < 2000) requestAnimationFrame(draw);
+                else done(drawn / ((now - start) / 1000));
+            }};
+            requestAnimationFrame(draw);
+        }})"""
+    )
+    print(f"1000 blocks: {rate:.0f} frames a second")  # noqa: T201 - shown with -s
+    assert rate >= FRAMES_A_SECOND
+    one.keep("thousand-blocks")
+
+
+def test_keys_move_the_player(three: tuple[Path, Frames], open_page: Open) -> None:
+    one = open_page(three[0])
+    press = one.page.keyboard.press
+    press("ArrowRight")
+    press("ArrowRight")
+    assert one.state()["frame"] == 2
+    press("Shift+ArrowRight")
+    assert one.state()["frame"] == 12
+    press("End")
+    assert one.state()["frame"] == 20
+    press("Home")
+    press("Space")
+    one.page.get_by_role("button", name="Pause").wait_for()
+    one.page.wait_for_timeout(700)  # ms; the page forbids eval, by which Playwright waits for anything else
+    assert 0 < one.state()["frame"] < 20
+    press("Space")
+    assert not one.state()["playing"]
+    scale = one.state()["scale"]
+    press("+")
+    assert one.state()["scale"] == pytest.approx(1.25 * scale)
+    press("0")
+    assert one.state()["scale"] == pytest.approx(scale)
+    press("b")
+    assert "block 1" in one.page.locator(".player .state").inner_text()
+    press("?")
+    assert one.page.locator("details.keys").get_attribute("open") is not None
+
+
+def test_everything_that_acts_is_reached_by_tab_and_has_a_name(three: tuple[Path, Frames], open_page: Open) -> None:
+    one = open_page(three[0])
+    nameless = one.page.evaluate(
+        """() => [...document.querySelectorAll("section:not([hidden]) :is(button, select, input, canvas, svg[role])")]
+            .filter((node) => !node.getAttribute("aria-label") && !node.closest("label") && !node.textContent.trim())
+            .map((node) => node.outerHTML)"""
+    )
+    assert nameless == []
+    one.page.keyboard.press("Tab")
+    assert one.page.evaluate("document.activeElement.tagName") == "CANVAS"
+    one.page.keyboard.press("Tab")
+    assert one.page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+
+
+def test_block_under_the_mouse_tells_its_state(three: tuple[Path, Frames], open_page: Open) -> None:
+    path, frames = three
+    one = open_page(path)
+    canvas = one.page.locator(".stage canvas").bounding_box()
+    assert canvas is not None
+    x, y = one.state()["centres"][2]
+    one.page.mouse.move(canvas["x"] + x + 1, canvas["y"] + y + 1)
+    told = one.page.locator(".player .state").inner_text()
+    assert "block 3" in told
+    assert f"x {1e3 * frames.x[0, 2]:.2f} mm" in told
+    before = one.state()["centres"][2]
+    one.page.mouse.down()
+    one.page.mouse.move(canvas["x"] + x + 31, canvas["y"] + y + 1)
+    one.page.mouse.up()
+    assert one.state()["centres"][2][0] - before[0] == pytest.approx(30.0, abs=1.0)
+
+
+def test_cursor_of_the_histories_follows_and_leads(three: tuple[Path, Frames], open_page: Open) -> None:
+    one = open_page(three[0])
+    one.page.locator(".chart .cursor").first.wait_for(state="attached")
+    first = one.page.locator(".chart .cursor").first.get_attribute("x1")
+    one.page.keyboard.press("End")
+    assert float(one.page.locator(".chart .cursor").first.get_attribute("x1") or 0) > float(first or 0)
+    chart = one.page.locator(".chart svg").first
+    box = chart.bounding_box()
+    assert box is not None
+    chart.click(position={"x": 52 + 0.5 * (box["width"] - 62), "y": 40})
+    assert one.state()["frame"] == pytest.approx(10, abs=1)
+
+
+def test_sweep_is_sorted_filtered_and_its_members_open(swept: Path, open_page: Open) -> None:
+    one = open_page(swept)
+    rows = one.page.locator("table.cases tbody tr")
+    assert rows.count() == 6
+    head = one.page.get_by_role("button", name="1.x_mm")
+    head.click()
+    assert "66.00" in rows.first.inner_text()
+    head.click()
+    assert "70.00" in rows.first.inner_text()
+    assert "failed" in rows.last.inner_text()  # without a number, last both ways
+    one.keep("sweep")
+    one.page.get_by_label("Filter").fill("overlap")
+    assert rows.count() == 1
+    one.page.get_by_label("Filter").fill("")
+    one.page.locator("table.cases a").first.click()
+    assert one.page.locator("section.subject:not([hidden])").get_attribute("data-kind") == "run"
+    one.page.keyboard.press("End")
+    assert one.state()["frame"] == 4
+    one.page.get_by_role("link", name="Back to the sweep").click()
+    assert one.page.locator(".map canvas").is_visible()
+
+
+def test_case_without_frames_says_how_to_get_them(swept: Path, open_page: Open) -> None:
+    one = open_page(swept)
+    one.page.locator(".map canvas").focus()
+    for _ in range(6):
+        one.page.keyboard.press("ArrowRight")
+    told = one.page.locator(".map .state").inner_text()
+    assert "case 000000000005" in told
+    assert "--keep-cases" in told
+
+
+def test_hostile_names_stay_text(tmp_path: Path, open_page: Open) -> None:
+    write_run(tmp_path / "run", count=5)
+    stored = read_stored(tmp_path / "run")
+    assert stored.frames is not None
+    assert stored.final is not None
+    for number, name in enumerate(HOSTILE):
+        frames = replace(stored.frames, names=(name, "2", "3"))
+        run = replace(stored, frames=frames, final={**stored.final, "block": [name, "2", "3"]}, problems=(name,))
+        subject = replace(run_subject("part-1", replace(run, scenario_text=name)), name=name)
+        path = tmp_path / f"{number}.html"
+        write_report([subject, replace(subject, key="part-2")], path, title=name, version="0")
+        one = open_page(path)
+        assert one.page.title().split() == name.split()
+        assert one.page.locator("section:not([hidden]) h2").text_content() == name
+        one.page.evaluate(f"{PLAYER}.mark(0)")
+        assert name in (one.page.locator("section:not([hidden]) .player .state").text_content() or "")
+        assert one.page.locator("section:not([hidden]) .chip bdi").all_text_contents().count(name) <= 1
+        assert one.page.evaluate("document.images.length") == 0
+        assert one.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        one.keep(f"hostile-{number}")
+
+
+@pytest.mark.parametrize("kind", ["three", "swept"])
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("phone", {"viewport": {"width": 360, "height": 740}, "is_mobile": True, "has_touch": True}),
+        ("dark", {"color_scheme": "dark"}),
+    ],
+)
+def test_page_fits_phones_and_has_dark_colours(
+    kind: str, name: str, options: dict[str, object], request: pytest.FixtureRequest, open_page: Open
+) -> None:
+    found = request.getfixturevalue(kind)
+    one = open_page(found if isinstance(found, Path) else found[0], **options)
+    assert one.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    back = one.page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert (back == "rgb(255, 255, 255)") == (name != "dark")
+    one.keep(f"{kind}-{name}")
+
+
+def test_paper_is_white_and_has_no_controls(three: tuple[Path, Frames], open_page: Open) -> None:
+    one = open_page(three[0], color_scheme="dark")
+    one.page.emulate_media(media="print")
+    assert one.page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert not one.page.get_by_role("button", name="Play").is_visible()
+    corner = pixels(one)[3, 3]
+    assert corner.tolist() == [255, 255, 255]
+    one.keep("three-print")

@@ -1,0 +1,117 @@
+"""blocksim report: what is written, what is refused, and what is left of damaged runs."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.conftest import Command
+from tests.view.report.folders import write_run, write_sweep
+
+REPORT = Path("report.html")
+
+
+def data_of(path: Path, key: str = "part-1") -> dict[str, Any]:
+    """Return the data of one part of a report."""
+    text = path.read_text(encoding="utf-8")
+    found = re.search(rf'<script type="application/json" id="{key}-data">(.*?)</script>', text, re.DOTALL)
+    assert found
+    data: dict[str, Any] = json.loads(found[1])
+    return data
+
+
+def test_report_of_a_run_is_written_and_told(blocksim: Command, tmp_path: Path) -> None:
+    write_run(tmp_path / "run")
+    answer = blocksim("report", "run")
+    assert (answer.code, answer.out) == (0, "")
+    assert answer.err.startswith("report: report.html (")
+    text = REPORT.read_text(encoding="utf-8")
+    for part in ("Comparison with the measurement", "Energy ledger (J)", "Resolved scenario", "Provenance", "Keys"):
+        assert part in text
+    assert not re.search(r"""(src|href)=["'](?!#|data:,)|url\(|https?://(?!www\.w3\.org/2000/svg)""", text)
+
+
+def test_several_places_are_parts_of_one_file(blocksim: Command, tmp_path: Path) -> None:
+    write_run(tmp_path / "run")
+    write_sweep(tmp_path / "sweep", cases=4, kept=2)
+    assert blocksim("report", "run", "sweep", "--out", "all.html").code == 0
+    sweep = data_of(Path("all.html"), "part-2")
+    assert sweep["kind"] == "sweep"
+    assert list(sweep["members"].values()) == ["part-2-member-1", "part-2-member-2"]
+    assert data_of(Path("all.html"), "part-2-member-2")["frames"]["names"] == ["1", "2", "3"]
+
+
+def test_members_beyond_the_limit_are_named(blocksim: Command, tmp_path: Path) -> None:
+    write_sweep(tmp_path / "sweep", cases=4, kept=3)
+    assert blocksim("report", "sweep", "--members", 1).code == 0
+    sweep = data_of(REPORT)
+    assert list(sweep["members"]) == ["000000000000"]
+    assert sweep["left_out"] == ["000000000001", "000000000002"]
+
+
+def test_run_needs_no_solver(tmp_path: Path) -> None:
+    write_run(tmp_path / "run")
+    code = (
+        "import sys; from typer.testing import CliRunner; from blocksim.cli.app import app;"
+        "result = CliRunner().invoke(app, ['report', 'run']);"
+        "print(result.exit_code, sorted({'numba', 'pandas', 'matplotlib', 'scipy'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout == "0 []\n"
+
+
+def test_older_report_is_replaced_but_no_other_file(blocksim: Command, tmp_path: Path) -> None:
+    write_run(tmp_path / "run")
+    assert blocksim("report", "run").code == 0
+    assert blocksim("report", "run").code == 0
+    Path("mine.html").write_text("<!doctype html><p>mine", encoding="utf-8")
+    answer = blocksim("report", "run", "--out", "mine.html")
+    assert answer.code == 73
+    assert "mine.html" in answer.err
+    assert Path("mine.html").read_text(encoding="utf-8") == "<!doctype html><p>mine"
+
+
+@pytest.mark.parametrize("damaged", ["run.h5", "run.json", "final.csv", "scenario.toml", "experiment.csv"])
+def test_damaged_run_is_shown_as_far_as_it_can_be_read(blocksim: Command, tmp_path: Path, damaged: str) -> None:
+    write_run(tmp_path / "run")
+    (tmp_path / "run" / damaged).write_bytes(b"\xff\x00rubbish")
+    answer = blocksim("report", "run")
+    assert answer.code == (0 if damaged == "experiment.csv" else 65)
+    text = REPORT.read_text(encoding="utf-8")
+    assert damaged in text.split("Not everything could be read or judged")[1]
+    assert (data_of(REPORT)["frames"] is None) == (damaged in ("run.h5", "scenario.toml"))
+
+
+def test_run_that_was_killed_is_played_as_far_as_it_came(blocksim: Command, tmp_path: Path) -> None:
+    write_run(tmp_path / "run")
+    for name in ("run.json", "final.csv", "done.json"):
+        (tmp_path / "run" / name).unlink()
+    assert blocksim("report", "run").code == 0
+    assert "unfinished" in REPORT.read_text(encoding="utf-8")
+    assert data_of(REPORT)["frames"] is not None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["nix"], 66, "nix: no such run folder"),
+        (["run", "--experiment", "nix.csv"], 66, "nix.csv: no such file"),
+        (["run", "--out", "nix/report.html"], 74, "cannot be written"),
+        (["empty"], 65, "nothing of this run can be read"),
+        (["broken"], 65, "no columns case and status"),
+    ],
+)
+def test_mistakes_are_told(blocksim: Command, tmp_path: Path, arguments: list[str], code: int, told: str) -> None:
+    write_run(tmp_path / "run", count=3)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "empty" / "run.h5").write_bytes(b"")
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "sweep.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    answer = blocksim("report", *arguments)
+    assert answer.code == code
+    assert told in answer.err
+    assert not REPORT.exists()

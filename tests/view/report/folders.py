@@ -1,0 +1,89 @@
+"""Folders of runs with made-up motion, written by the parts that write real ones; the solver is not needed."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from blocksim.scenario import Scenario, load_scenario, place_bodies
+from blocksim.simulation import folder as files
+from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
+from blocksim.simulation.frames import Frames
+from blocksim.simulation.ledger import EnergyLedger
+from blocksim.simulation.recorder import Frame
+from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.stores.hdf5_writer import FrameFile
+from blocksim.simulation.summary import Summary
+from blocksim.simulation.table import csv_text, final_columns
+
+SCENARIOS = Path(__file__).parents[3] / "scenarios"
+LEDGER = ("kinetic", "potential", "friction")
+TIME_STEP = 1e-3
+
+
+def write_run(
+    folder: Path, name: str = "three_blocks", count: int = 21, overrides: Mapping[str, object] | None = None
+) -> Frames:
+    """Write a finished run of a shipped scenario with `count` frames and return them."""
+    scenario = load_scenario(SCENARIOS / f"{name}.toml", dict(overrides or {}))
+    folder.mkdir(parents=True)
+    tables = read_tables(scenario)
+    keep_tables(tables, folder)
+    (folder / files.SCENARIO).write_text(resolved_beside(scenario, tables), encoding="utf-8")
+    write_frames(folder / files.FRAMES, scenario, count)
+    frames = read_frames(folder / files.FRAMES, scenario)
+    (folder / files.FINAL).write_text(csv_text(final_columns(frames)), encoding="utf-8")
+    (folder / files.SUMMARY).write_text(summary_of(scenario.name, count).to_json(), encoding="utf-8")
+    (folder / files.DONE).write_text('{"run": "made-up"}', encoding="utf-8")
+    return frames
+
+
+def write_frames(path: Path, scenario: Scenario, count: int) -> None:
+    """Write frames in which every block but the first goes its own way and turns."""
+    placed = place_bodies(scenario)
+    start = np.array([[body.x, body.y, body.angle, 0.0, 0.0, 0.0] for body in placed]).T
+    numbers = np.arange(len(placed)) / len(placed)
+    speed = np.array([0.5 * numbers, 0.2 * numbers, -4.0 * numbers])
+    with FrameFile(path, placed, TIME_STEP, "", ledger=LEDGER) as file:
+        for step in range(count):
+            motion = start.copy()
+            motion[:3] += speed * step * TIME_STEP * 10.0
+            motion[3:] = 10.0 * speed
+            file.append(Frame(10 * step, motion, np.array([0.1 * step, 5.0 - 0.1 * step, 0.0, 4.0, 1e-5])))
+
+
+def summary_of(name: str, count: int) -> Summary:
+    """Return a summary with made-up numbers."""
+    return Summary(
+        name=name,
+        status="finished",
+        reason="at rest",
+        exit_code=0,
+        run="0123456789ab",
+        scenario_hash="5c" * 32,
+        final_state_sha256="f1" * 32,
+        steps=10 * count,
+        time_step_s=TIME_STEP,
+        simulated_time_s=10 * count * TIME_STEP,
+        ended_at="2020-02-20T20:20:20+00:00",
+        compile_seconds=0.0,
+        solver_seconds=0.5,
+        total_seconds=0.6,
+        energy_J=EnergyLedger(kinetic=0.1, potential=4.9, friction=0.0, start=5.0, in_play=1.0),
+        warnings=(),
+        environment={"blocksim": "0.1.0"},
+    )
+
+
+def write_sweep(folder: Path, cases: int = 6, kept: int = 2) -> None:
+    """Write a sweep over two keys; the first `kept` members have folders with frames."""
+    folder.mkdir(parents=True)
+    lines = ["case,friction.block_block.kinetic,contact.restitution,status,reason,seconds,inside,1.x_mm,1.rotation_deg"]
+    for number in range(cases):
+        case, x = f"{number:012x}", 70.0 - number
+        failed = number == cases - 1
+        outcome = "failed,overlap,0.5,,," if failed else f"finished,at rest,0.5,{number % 2 == 0},{x},-90.0"
+        lines.append(f"{case},{0.1 * (number % 3) + 0.1:.1f},{0.2 * (number // 3) + 0.1:.1f},{outcome}")
+        if number < kept:
+            write_run(folder / "cases" / case, count=5)
+    (folder / "sweep.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -1,0 +1,68 @@
+"""Frames as text: what comes back, how far it is off, and what is left out."""
+
+import base64
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.errors import InvalidInputError
+from blocksim.view.report import packing
+from blocksim.view.report.packing import pack, pack_frames
+from tests.view.report.folders import write_run
+
+
+def unpacked(part: dict[str, object]) -> np.ndarray:
+    data = base64.b64decode(str(part["data"]))
+    if part["type"] == "f4":
+        return np.frombuffer(data, "<f4").astype(float)
+    return float(str(part["low"])) + float(str(part["step"])) * np.frombuffer(data, "<u2")
+
+
+@pytest.mark.parametrize(("most", "kind"), [(1000, "f4"), (10, "u2")])
+def test_told_error_is_the_largest_one(monkeypatch: pytest.MonkeyPatch, most: int, kind: str) -> None:
+    values = np.random.default_rng(1).normal(0.0, 100.0, (50, 7))
+    monkeypatch.setattr(packing, "EXACT_VALUES", most)
+    part, error = pack(values)
+    assert part["type"] == kind
+    assert np.abs(unpacked(part) - values.ravel()).max() == pytest.approx(error)
+    assert error <= 0.5 * np.ptp(values) / 65_535 * (1.0 + 1e-9)
+
+
+def test_equal_values_can_be_rounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(packing, "EXACT_VALUES", 0)
+    part, error = pack(np.full((3, 2), 4.5))
+    assert unpacked(part).tolist() == [4.5] * 6
+    assert error == 0.0
+
+
+def test_too_many_frames_are_thinned_and_that_is_told(tmp_path: Path) -> None:
+    frames = write_run(tmp_path / "run", count=41)
+    packed = pack_frames(frames, most_bytes=5 * 3 * 6 * 4)
+    assert (packed.kept, packed.recorded) == (5, 41)
+    assert unpacked(packed.data["time"]) == pytest.approx(frames.time[[0, 10, 20, 30, 40]])
+    assert "5 of 41 recorded frames are in this page (evenly thinned)." in packed.notes
+
+
+def test_frames_that_are_not_finite_are_left_out(tmp_path: Path) -> None:
+    frames = write_run(tmp_path / "run", count=4)
+    x = frames.x.copy()
+    x[3, 1] = np.nan
+    assert pack_frames(replace(frames, x=x)).kept == 3
+    with pytest.raises(InvalidInputError, match="no frame to draw"):
+        pack_frames(replace(frames, x=np.full_like(x, np.nan)))
+
+
+def test_thousand_blocks_and_many_frames_stay_below_the_limit(tmp_path: Path) -> None:
+    frames = write_run(tmp_path / "run", "wall", count=2)
+    rows = np.arange(600) % 2
+    many = {
+        name: getattr(frames, name)[rows]
+        for name in ("step", "x", "y", "angle", "vx", "vy", "spin", "contact_count", "largest_overlap")
+    }
+    energy = {name: values[rows] for name, values in frames.energy.items()}
+    packed = pack_frames(replace(frames, time=np.arange(600.0), energy=energy, **many))
+    size = sum(len(part["data"]) for part in packed.data["channels"].values())
+    assert 300 < packed.kept < 1700
+    assert size < 17_000_000
