@@ -1,4 +1,4 @@
-"""blocksim plot: a strip of frames, or where the blocks of a sweep end."""
+"""blocksim plot: a strip of frames, where the blocks of a sweep end, or which inputs matter."""
 
 from pathlib import Path
 from typing import Annotated
@@ -13,7 +13,7 @@ from blocksim.scenario import load_scenario
 from blocksim.simulation import folder as files
 from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.study.many import TABLE
-from blocksim.study.picture import draw_sweep
+from blocksim.study.picture import draw_indices, draw_sweep
 from blocksim.study.single import find_run
 from blocksim.view.strip import draw_strip
 from blocksim.view.support import support_of
@@ -21,7 +21,10 @@ from blocksim.view.support import support_of
 
 def plot_command(
     run: Annotated[
-        Path, typer.Argument(metavar="RUN", help="Run folder, results/NAME, scenario file, or sweep folder.")
+        Path,
+        typer.Argument(
+            metavar="RUN", help="Run folder, results/NAME, scenario file, sweep folder, table of sensitivities."
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Picture to write: .png, .svg or .pdf.")
@@ -29,22 +32,34 @@ def plot_command(
     times: Annotated[
         str | None, typer.Option(metavar="T,T,...", help="Times of the frames in s (default: chosen by motion).")
     ] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help="Of a sweep: lines, map (two inputs), matrix (every two inputs), histogram; tornado for sensitivities "
+            "(default: what suits).",
+        ),
+    ] = None,
     experiment: options.ExperimentPath = None,
     quiet: options.Quiet = False,
 ) -> None:
-    """Draw a run as a strip of pictures.
+    """Draw a run, a sweep or a table of sensitivities.
 
     Below the final state of a run stand the measured ranges. A run that was stopped or killed is drawn as far as it
-    came. For a sweep over one key the picture shows final x against its values, with the measured range as a band; a
-    second key gets a column for each of its values.
+    came. A sweep over one key, or a second one with few values, shows final x as lines; one over two keys a map of
+    run-outs and outcomes; a sampled one every two of its inputs. The measured range is marked in all of them.
 
     Example: blocksim plot scenarios/three_blocks.toml --out strip.png
     """
     moments = _times(times)
     if (run / TABLE).is_file():
-        _refuse_times(run, times)
-        picture = draw_sweep(run, out, experiment)
+        _refuse_times(run, times, "a sweep")
+        picture = draw_sweep(run, out, experiment, kind)
+    elif run.suffix.lower() == ".csv":
+        _refuse_times(run, times, "a table")
+        picture = draw_indices(run, out, kind)
     else:
+        _refuse_kind(run, kind)
         picture = _draw_run(run, out, moments, experiment)
     if not quiet:
         note(f"picture: {picture}")
@@ -61,9 +76,15 @@ def _draw_run(run: Path, out: Path | None, moments: list[float] | None, experime
     return picture
 
 
-def _refuse_times(run: Path, times: str | None) -> None:
+def _refuse_times(run: Path, times: str | None, what: str) -> None:
     if times is not None:
-        message = f"--times picks frames of a run, but {run} is a sweep"
+        message = f"--times picks frames of a run, but {run} is {what}"
+        raise InvalidInputError(message)
+
+
+def _refuse_kind(run: Path, kind: str | None) -> None:
+    if kind is not None:
+        message = f"--kind chooses a picture of a sweep, but {run} is none"
         raise InvalidInputError(message)
 
 
