@@ -100,6 +100,15 @@ pictures: $(RUN_STAMP) ## Draw the pictures of the README anew
 	$(BLOCKSIM) plot $(PICTURES)/jitter --out results/start_jitter.png
 	$(BLOCKSIM) sweep scenarios/impact_laws.toml --out $(PICTURES)/laws --overwrite --quiet
 	$(BLOCKSIM) plot $(PICTURES)/laws --out results/impact_laws.png
+	$(BLOCKSIM) sweep scenarios/sweep_readings.toml --out $(PICTURES)/readings --overwrite --quiet
+	$(BLOCKSIM) plot $(PICTURES)/readings --out results/readings.png
+	$(BLOCKSIM) sweep scenarios/sweep_friction_stiffness.toml --out $(PICTURES)/friction --overwrite --quiet
+	$(BLOCKSIM) plot $(PICTURES)/friction --out results/friction_stiffness.png
+	$(BLOCKSIM) sweep scenarios/ensemble_three_blocks.toml --out $(PICTURES)/ensemble --overwrite --quiet
+	$(BLOCKSIM) plot $(PICTURES)/ensemble --out results/ensemble_matrix.png
+	$(BLOCKSIM) plot $(PICTURES)/ensemble --kind histogram --out results/ensemble.png
+	$(BLOCKSIM) sensitivity scenarios/ensemble_three_blocks.toml --samples 24 --out $(PICTURES)/morris.csv --overwrite --quiet
+	$(BLOCKSIM) plot $(PICTURES)/morris.csv --out results/sensitivity.png
 
 .PHONY: setup
 setup: $(DEV_STAMP) ## Create or update .venv, with the tools for developers

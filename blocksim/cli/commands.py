@@ -22,7 +22,7 @@ COMMANDS = {  # name: module in this folder, function in it, first line of its h
     "converge": ("converge", "converge_command", "Refine step, stiffness and spacing until the run-out stays."),
     "verify": ("verify", "verify_command", "Run the verification cases and show the table."),
     "bench": ("bench", "bench_command", "Measure speed and memory, and show the table."),
-    "plot": ("plot", "plot_command", "Draw a run: a strip of frames, its end, or its histories."),
+    "plot": ("plot", "plot_command", "Draw a run, a sweep or a table of sensitivities."),
     "animate": ("animate", "animate_command", "Show a run as a film, GIF or MP4."),
     "export": ("export", "export_command", "Write all frames of a run as CSV or VTKHDF."),
     "report": ("report", "report_command", "Write runs and sweeps into one HTML file."),

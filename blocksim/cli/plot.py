@@ -1,4 +1,4 @@
-"""blocksim plot: a strip of frames, or where the blocks of a sweep end."""
+"""blocksim plot: a strip of frames, where the blocks of a sweep end, or which inputs matter."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +10,7 @@ from blocksim.cli import options
 from blocksim.cli.output import note
 from blocksim.errors import InvalidInputError
 from blocksim.study.many import TABLE
-from blocksim.study.picture import draw_sweep
+from blocksim.study.picture import draw_indices, draw_sweep
 from blocksim.study.stored import stored_run
 from blocksim.view.kinds import STRIP, kind_named
 from blocksim.view.support import support_of
@@ -18,7 +18,10 @@ from blocksim.view.support import support_of
 
 def plot_command(
     run: Annotated[
-        Path, typer.Argument(metavar="RUN", help="Run folder, results/NAME, scenario file, or sweep folder.")
+        Path,
+        typer.Argument(
+            metavar="RUN", help="Run folder, results/NAME, scenario file, sweep folder, table of sensitivities."
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Picture to write: .png, .svg or .pdf.")
@@ -27,24 +30,34 @@ def plot_command(
         str | None, typer.Option(metavar="T,T,...", help="Times of the frames in s (default: chosen by motion).")
     ] = None,
     kind: Annotated[
-        str | None, typer.Option(metavar="KIND", help="Of a run: strip (default), final or history.")
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help="Of a run: strip (default), final or history. Of a sweep: lines, map (two inputs), matrix (every two "
+            "inputs) or histogram; tornado for sensitivities (default: what suits).",
+        ),
     ] = None,
     experiment: options.ExperimentPath = None,
     quiet: options.Quiet = False,
 ) -> None:
-    """Draw a run: a strip of frames, its end, or its histories.
+    """Draw a run, a sweep or a table of sensitivities.
 
     Below the final state of a run stand the measured ranges. --kind final shows where the blocks end, with rotation and
     measured range below each of them; --kind history shows x, y, rotation, energies and contacts over time. A run that
-    was stopped or killed is drawn as far as it came. For a sweep over one key the picture shows final x against its
-    values, with the measured range as a band; a second key gets a column for each of its values.
+    was stopped or killed is drawn as far as it came.
+
+    A sweep over one key, or a second one with few values, shows final x as lines; one over two keys a map of
+    run-outs and outcomes; a sampled one every two of its inputs. The measured range is marked in all of them.
 
     Example: blocksim plot scenarios/three_blocks.toml --out strip.png
     """
     moments = _times(times)
     if (run / TABLE).is_file():
-        _refuse_for_sweeps(run, times, kind)
-        picture = draw_sweep(run, out, experiment)
+        _refuse_times(run, times, "a sweep")
+        picture = draw_sweep(run, out, experiment, kind)
+    elif run.suffix.lower() == ".csv":
+        _refuse_times(run, times, "a table")
+        picture = draw_indices(run, out, kind)
     else:
         picture = _draw_run(run, out, moments, experiment, kind or STRIP)
     if not quiet:
@@ -68,11 +81,10 @@ def _draw_run(run: Path, out: Path | None, moments: list[float] | None, experime
     return picture
 
 
-def _refuse_for_sweeps(run: Path, times: str | None, kind: str | None) -> None:
-    for option, value, picked in (("--times", times, "frames"), ("--kind", kind, "the picture")):
-        if value is not None:
-            message = f"{option} picks {picked} of a run, but {run} is a sweep"
-            raise InvalidInputError(message)
+def _refuse_times(run: Path, times: str | None, what: str) -> None:
+    if times is not None:
+        message = f"--times picks frames of a run, but {run} is {what}"
+        raise InvalidInputError(message)
 
 
 def _times(text: str | None) -> list[float] | None:

@@ -5,13 +5,21 @@ from pathlib import Path
 import numpy as np
 
 from blocksim.analysis.experiment import load_table
-from blocksim.scenario import Scenario
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import Scenario, load_scenario
+from blocksim.scenario.findings import did_you_mean_or_list
 from blocksim.study.convergence import Convergence, Study
-from blocksim.study.series import read_series
+from blocksim.study.found import read_found
+from blocksim.study.indices import read_indices
+from blocksim.study.sweep_folder import PLAN
 from blocksim.view.levels import Panel, draw_levels
-from blocksim.view.series import draw_series
+from blocksim.view.style import picture_suffix
+from blocksim.view.sweeps.kind import Kind
+from blocksim.view.sweeps.kinds import KINDS, kind_for
+from blocksim.view.tornado import draw_tornado
 
 FEWEST_LEVELS = 2  # to show a distance
+TORNADO = "tornado"
 
 
 def draw_convergence(result: Convergence, scenario: Scenario, path: Path) -> bool:
@@ -25,23 +33,51 @@ def draw_convergence(result: Convergence, scenario: Scenario, path: Path) -> boo
         if sum(level.is_finished for level in study.levels) >= FEWEST_LEVELS
     ]
     if panels:
-        widths = {block: high - low for block, (low, high) in _measured_ranges(scenario, None).items()}
+        widths = {block: high - low for block, (low, high) in _measured_ranges(scenario).items()}
         draw_levels(panels, path, title=f"{result.name}: distance from the finest level", measured=widths)
     return bool(panels)
 
 
-def draw_sweep(folder: Path, path: Path | None = None, experiment: Path | None = None) -> Path:
-    """Draw where the blocks of a sweep end over its key; return the picture's path (default: NAME.png).
+def draw_sweep(folder: Path, path: Path | None = None, experiment: Path | None = None, kind: str | None = None) -> Path:
+    """Draw a sweep, by default as the kind that suits it; return the picture's path (default: NAME.png).
 
-    Raises what `read_series` raises, InvalidInputError for an unknown picture format, OutputError.
+    Raises what `read_found` raises, InvalidInputError for an unknown picture format or kind and for one that cannot
+    show this sweep, OutputError.
     """
-    found = read_series(folder)
-    scenario = found.scenario
-    path = path or Path(f"{scenario.name}.png")
-    title = scenario.description or scenario.name
-    ranges = _measured_ranges(scenario, experiment)
-    draw_series(found.series, found.blocks, (found.key, found.unit), path, title=title, measured=ranges)
+    chosen = None if kind is None else _kind_named(kind)
+    found = read_found(folder, experiment)
+    reason = "" if chosen is None else chosen.refusal(found)
+    if reason:
+        message = f"{folder}: {reason}"
+        raise InvalidInputError(message)
+    path = path or Path(f"{load_scenario(folder / PLAN).name}.png")
+    picture_suffix(path)
+    (chosen or kind_for(found)).draw(found, path)
     return path
+
+
+def draw_indices(table: Path, path: Path | None = None, kind: str | None = None) -> Path:
+    """Draw the table of a sensitivity study; return the picture's path (default: that of the table, as PNG).
+
+    Raises what `read_indices` raises, InvalidInputError for an unknown picture format or another kind, OutputError.
+    """
+    if kind not in {None, TORNADO}:
+        message = f"{table}: a table of indices is drawn as {TORNADO!r}, not as {kind!r}"
+        raise InvalidInputError(message)
+    panels, labels = read_indices(table)
+    path = path or Path(f"{table.stem}.png")
+    draw_tornado(panels, labels, path, title="Which inputs matter")
+    return path
+
+
+def _kind_named(name: str) -> Kind:
+    if name == TORNADO:
+        message = f"a {TORNADO} is drawn from a table of indices: blocksim sensitivity SCENARIO --out TABLE.csv"
+        raise InvalidInputError(message)
+    if name not in KINDS:
+        message = f"--kind {name}: unknown kind, {did_you_mean_or_list(name, [*KINDS, TORNADO])}"
+        raise InvalidInputError(message)
+    return KINDS[name]
 
 
 def _panel(result: Convergence, study: Study) -> Panel:
@@ -61,9 +97,9 @@ def _panel(result: Convergence, study: Study) -> Panel:
     )
 
 
-def _measured_ranges(scenario: Scenario, experiment: Path | None) -> dict[str, tuple[float, float]]:
-    """Return smallest and largest measured x (mm) by block, from another table than the scenario's if one is given."""
-    table = experiment or (None if scenario.experiment is None else scenario.experiment.table)
+def _measured_ranges(scenario: Scenario) -> dict[str, tuple[float, float]]:
+    """Return smallest and largest measured x (mm) by block."""
+    table = None if scenario.experiment is None else scenario.experiment.table
     if table is None:
         return {}
     statistics = load_table(table).statistics()

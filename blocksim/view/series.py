@@ -119,16 +119,20 @@ def _draw_panels(
 
 def moving_blocks(series: Sequence[SeriesLike]) -> list[int]:
     """Return the blocks to draw, in their order: those whose final x varies most; all are candidates if none does."""
-    spread = np.max([np.ptp(one.x_mm, axis=0) for one in series], axis=0)
+    return most_moving(np.max([np.ptp(one.x_mm, axis=0) for one in series], axis=0))
+
+
+def most_moving(spread: Floats) -> list[int]:
+    """Return the blocks to draw by how much their final x varies (mm, (b,))."""
     candidates = [int(block) for block in np.argsort(-spread, kind="stable")]
     moving = [block for block in candidates if spread[block] >= STAYS_MM]
     return sorted((moving or candidates)[:MOST_ROWS])
 
 
-def value_axis(values: Floats, key: str, unit: str) -> ValueAxis:
-    """Return how to show values of a key: over decades, as distances from their middle, or as they are."""
+def value_axis(values: Floats, key: str, unit: str, *, is_even: bool = False) -> ValueAxis:
+    """Return how to show values of a key: over decades (not if spread evenly), around their middle, or as they are."""
     low, high = float(values.min()), float(values.max())
-    if low > 0.0 and high >= DECADES * low:
+    if low > 0.0 and high >= DECADES * low and not is_even:
         return ValueAxis(f"{key} ({unit})" if unit else key, 0.0, 1.0, is_log=True)
     middle = float(np.median(np.unique(values)))
     if 0.0 < high - low < NARROW * abs(middle):

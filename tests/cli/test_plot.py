@@ -92,11 +92,47 @@ def test_sweep_over_one_key_is_drawn(blocksim: Command) -> None:
     assert "Band: smallest to largest of the measured repeats." in text
 
 
-def test_sweep_that_cannot_be_drawn_is_told(blocksim: Command) -> None:
+def test_sweep_gets_the_picture_that_is_asked_for(blocksim: Command) -> None:
+    vary = ("--vary", "structures.0.overlap=9 mm:11 mm:3", "--vary", "gravity=5:10:3")
+    assert blocksim(*SWEEP, *vary).code == 0
+    marks = {
+        "map": "turns of the blocks",
+        "matrix": "overlap (mm)",
+        "histogram": "all 9 cases",
+        "lines": "gravity = 5.0",
+    }
+    for kind, mark in marks.items():
+        assert blocksim("plot", "swept", "--kind", kind, "--out", f"{kind}.svg").code == 0
+        assert mark.replace(".0", "") in Path(f"{kind}.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--kind", "lines"], "swept: 3 keys are varied; lines can show one or two"),
+        (["--kind", "mapp"], "--kind mapp: unknown kind, did you mean 'map'?"),
+        (["--kind", "tornado"], "a tornado is drawn from a table of indices"),
+        (["--out", "swept.bmp"], "'.bmp' is no picture format"),
+        (["--times", "0,0.01"], "--times picks frames of a run, but swept is a sweep"),
+    ],
+)
+def test_sweep_that_cannot_be_drawn_is_told(blocksim: Command, arguments: list[str], told: str) -> None:
     vary = [part for key in ("gravity", "time.rest_speed", "time.rest_hold") for part in ("--vary", f"{key}=1,2")]
     assert blocksim(*SWEEP, *vary).code == 0
-    answer = blocksim("plot", "swept")
+    answer = blocksim("plot", "swept", *arguments)
     assert answer.code == 65
-    assert "swept: 3 keys are varied; a picture can show one or two" in answer.err
-    assert "--times picks frames of a run" in blocksim("plot", "swept", "--times", "0,0.01").err
-    assert "--kind picks" in blocksim("plot", "swept", "--kind", "final").err
+    assert told in answer.err
+
+
+def test_kind_of_a_sweep_is_refused_for_a_run(blocksim: Command, finished: Path) -> None:
+    answer = blocksim("plot", finished, "--kind", "map")
+    assert answer.code == 65
+    assert "map" in answer.err
+
+
+def test_table_of_sensitivities_is_drawn(blocksim: Command) -> None:
+    text = "output,unit,key,mu*,±,mu,sigma\nx of block 2,mm,gravity,5,1,-5,0\n"
+    Path("indices.csv").write_text(text, encoding="utf-8")
+    answer = blocksim("plot", "indices.csv")
+    assert (answer.code, answer.err) == (0, "picture: indices.png\n")
+    assert "drawn as 'tornado', not as 'map'" in blocksim("plot", "indices.csv", "--kind", "map").err

@@ -5,12 +5,14 @@ import pytest
 
 from blocksim.analysis import Verdict, closed_forms
 from blocksim.analysis.compare import Comparison
-from blocksim.scenario import load_scenario
+from blocksim.scenario import Document, load_scenario
 from blocksim.simulation import Frames, Result
+from blocksim.study.plan import cases_of
 from blocksim.study.single import compare, run
 from tests.study.conftest import SCENARIOS
 
 HALF_HEIGHT = 0.0125  # m
+STUDIES = {"sweep_friction_stiffness": 10_000, "sweep_readings": 4875, "ensemble_three_blocks": 1024}
 
 
 def run_shipped(name: str, **overrides: object) -> Result:
@@ -37,6 +39,42 @@ def test_literal_reading_is_far_outside() -> None:
     found = {(row.block, row.quantity): row.distance for row in compare(run_shipped("three_blocks_literal")).rows}
     assert found[("2", "x")] > 10.0
     assert found[("3", "x")] > 10.0
+
+
+@pytest.mark.parametrize(("name", "count"), STUDIES.items())
+def test_shipped_studies_have_cases_that_can_be_run(name: str, count: int) -> None:
+    document = Document.read(SCENARIOS / f"{name}.toml")
+    plan = document.build().sweep
+    assert plan is not None
+    cases = cases_of(document, plan)
+    assert len(cases) == count
+    assert not [case.problem for case in cases[:: count // 50] if case.scenario is None]
+
+
+def reading(upright: str, overlap: str, restitution: float) -> Comparison:
+    values = {"blocks.brick.upright": upright, "structures.0.overlap": overlap, "contact.restitution": restitution}
+    return compare(run_shipped("sweep_readings", **values))
+
+
+@pytest.mark.parametrize("restitution", [0.3, 0.4, 0.5])
+def test_only_one_reading_of_the_printed_sizes_explains_the_data(restitution: float) -> None:
+    assert not reading("height", "10 mm", restitution).inside
+    assert not reading("width", "10 mm", restitution).inside
+    assert reading("length", "10 mm", restitution).inside
+
+
+def test_blocks_stand_where_the_overlap_is_read_as_the_offset() -> None:
+    final = run_shipped("sweep_readings", **{"structures.0.overlap": "22 mm"}).final
+    np.testing.assert_allclose(final["rotation_deg"], 0.0, atol=0.01)
+    np.testing.assert_allclose(final["x_mm"], [16.0, 26.0, 36.0], atol=0.01)
+
+
+def test_ensemble_has_both_impact_laws_equally_often() -> None:
+    document = Document.read(SCENARIOS / "ensemble_three_blocks.toml")
+    plan = document.build().sweep
+    assert plan is not None
+    schemes = [settings["time.scheme"] for settings in cases_of(document, plan).design]
+    assert schemes.count("explicit") == schemes.count("nonsmooth") == 512
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,125 @@
+"""A sweep, read back from its folder as pictures need it."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from blocksim.analysis.compare import limits, prediction_half_width
+from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import Scenario, load_scenario
+from blocksim.scenario import quantities as q
+from blocksim.scenario.keys import KeyPath, field_at, follow, parse_key
+from blocksim.scenario.models.variation import Normal, Uniform
+from blocksim.study.ranges import Ranges
+from blocksim.study.rows import blocks_in
+from blocksim.study.single import FINISHED
+from blocksim.study.sweep_folder import PLAN
+from blocksim.study.table import read_sweep
+from blocksim.view.sweeps.found import QUARTER, FoundSweep, Input, Measured
+
+Floats = NDArray[np.float64]
+
+
+def read_found(folder: Path, experiment: Path | None = None) -> FoundSweep:
+    """Return what a sweep's folder holds, beside the scenario's experiment or another table.
+
+    Raises InputMissingError or InvalidInputError: where files are missing or damaged, no case has finished, or the
+    table measures what the sweep does not have.
+    """
+    table = read_sweep(folder).table
+    scenario = load_scenario(folder / PLAN)
+    blocks = blocks_in(map(str, table.columns))
+    finished = (table["status"] == FINISHED).to_numpy(dtype=bool)
+    if not blocks or not finished.any():
+        message = f"{folder}: no case of this sweep has finished, there is nothing to draw"
+        raise InvalidInputError(message)
+    path = experiment or (None if scenario.experiment is None else scenario.experiment.table)
+    return FoundSweep(
+        title=scenario.description or scenario.name,
+        mode="" if scenario.sweep is None else scenario.sweep.mode,
+        inputs=_inputs(scenario, table),
+        blocks=blocks,
+        x_mm=_columns(table, blocks, "x_mm", finished),
+        rotation_deg=_columns(table, blocks, "rotation_deg", finished),
+        finished=finished,
+        inside=None if path is None else _inside(table, Ranges.read(path)) & finished,
+        measured=Measured() if path is None else measured_of(load_table(path), blocks),
+    )
+
+
+def measured_of(table: ExperimentTable, blocks: tuple[str, ...]) -> Measured:
+    """Return repeats and prediction intervals of x (mm), and the measured class where all rotations are measured."""
+    means = {row.block: row.mean for row in table.summaries() if row.quantity == "rotation"}
+    turned = [round(means[block] / QUARTER) * int(QUARTER) for block in blocks if block in means]
+    rows = [row for row in table.summaries() if row.quantity == "x" and row.block in blocks]
+    return Measured(
+        x_mm={row.block: table.values(row.block, "x").to_numpy(dtype=float) for row in rows},
+        limits_mm={row.block: limits("x", row.mean, row.minimum, row.maximum) for row in rows},
+        prediction_mm={
+            row.block: (row.mean - half, row.mean + half)
+            for row in rows
+            if (half := prediction_half_width(row.s, row.n)) > 0.0
+        },
+        outcome=tuple(turned) if len(turned) == len(blocks) else None,
+    )
+
+
+def _columns(table: pd.DataFrame, blocks: tuple[str, ...], name: str, finished: NDArray[np.bool_]) -> Floats:
+    values = table[[f"{block}.{name}" for block in blocks]].to_numpy(dtype=float, na_value=np.nan)
+    return np.where(finished[:, None], values, np.nan)
+
+
+def _inside(table: pd.DataFrame, ranges: Ranges) -> NDArray[np.bool_]:
+    ranges.count(table)  # refuses a table of other blocks
+    inside = [table[name].between(*ends) for name, ends in ranges.limits.items()]
+    return np.array([all(row) for row in zip(*inside, strict=True)], dtype=np.bool_)
+
+
+def _inputs(scenario: Scenario, table: pd.DataFrame) -> tuple[Input, ...]:
+    """Return the keys that take more than one value, or the first where none does."""
+    vary = {} if scenario.sweep is None else scenario.sweep.vary
+    keys = [str(key) for key in table.columns if key in vary]
+    inputs = [_input(scenario, key, table[key]) for key in keys]
+    varied = [one for one in inputs if one.count > 1]
+    return tuple(varied or inputs[:1])
+
+
+def _input(scenario: Scenario, key: str, column: pd.Series) -> Input:
+    numbers = [_number(value) for value in column]
+    if all(number is not None for number in numbers):
+        return Input(key, _unit(scenario, key), np.array(numbers, dtype=np.float64), is_even=_is_even(scenario, key))
+    words = [q.shown(value).strip('"') for value in column]
+    levels = tuple(dict.fromkeys(words))
+    return Input(key, "", np.array([levels.index(word) for word in words], dtype=np.float64), levels)
+
+
+def _is_even(scenario: Scenario, key: str) -> bool:
+    """Tell whether values are drawn from a distribution that is not over decades."""
+    values = None if scenario.sweep is None else scenario.sweep.vary[key]
+    return isinstance(values, Normal) or (isinstance(values, Uniform) and values.scale == "linear")
+
+
+def _number(value: object) -> float | None:
+    """Return a value in SI, None for a word; in the table of a sweep it stands as it was given."""
+    try:
+        return float(str(value))
+    except ValueError:
+        pass
+    try:
+        return q.parse_quantity(str(value), q.NUMBER)[0]
+    except ValueError:
+        return None
+
+
+def _unit(scenario: Scenario, key: str) -> str:
+    """Return the unit that a key's values have inside, empty for plain numbers."""
+    data = scenario.model_dump(by_alias=True, exclude={"sweep"})
+    path: KeyPath = ()
+    for part in parse_key(key):
+        path = (*path, int(part) if isinstance(follow(data, path), list | tuple) else part)
+    field = field_at(path, data)
+    marks = () if field is None else field.metadata
+    return next((mark.kind.unit for mark in marks if isinstance(mark, q.Quantity)), "")

@@ -1,0 +1,92 @@
+"""One panel of a map: cells of a grid or dots of samples, coloured by a number, with what agrees outlined."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from blocksim.view import style
+from blocksim.view.series import ValueAxis
+from blocksim.view.sweeps.found import Flags, Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+DOTS: dict[str, Any] = {"s": 9.0, "linewidth": 0.5, "zorder": 2}
+OUTLINE: dict[str, Any] = {"colors": style.MEASURED_COLOUR, "linewidths": 0.9, "zorder": 3}
+FAILED: dict[str, Any] = {"marker": "x", "s": 10.0, "linewidth": 0.7, "color": style.INK, "zorder": 4}
+MARGIN = 0.03  # of an axis around dots
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """Two inputs of n cases, as shown on their axes."""
+
+    x: Floats  # (n,)
+    y: Floats  # (n,)
+    axes: tuple[ValueAxis, ValueAxis]
+    is_grid: bool
+
+
+def draw_panel(axes: "Axes", plane: Plane, numbers: Floats, look: dict[str, Any], agrees: Flags | None) -> None:
+    """Colour the cases by their numbers (NaN: none), with the map and norm of `look`; outline those that agree."""
+    for side, shown in zip((axes.set_xscale, axes.set_yscale), plane.axes, strict=True):
+        side("log" if shown.is_log else "linear")
+    if plane.is_grid:
+        _draw_cells(axes, plane, numbers, look, agrees)
+    else:
+        _draw_dots(axes, plane, numbers, look, agrees)
+
+
+def mark_failed(axes: "Axes", plane: Plane, failed: Flags) -> None:
+    """Cross out the cases that did not finish."""
+    axes.scatter(plane.x[failed], plane.y[failed], **FAILED)
+
+
+def edges_of(centres: Floats, *, is_log: bool) -> Floats:
+    """Return the edges between ascending centres, (n,) to (n + 1,), midway on the axis; the outer cells are whole."""
+    places = np.log(centres) if is_log else centres
+    if len(places) == 1:
+        half = 0.5 * abs(places[0]) or 0.5
+        edges = np.array([places[0] - half, places[0] + half])
+    else:
+        middles = 0.5 * (places[1:] + places[:-1])
+        edges = np.array([2.0 * places[0] - middles[0], *middles, 2.0 * places[-1] - middles[-1]])
+    return np.exp(edges) if is_log else edges
+
+
+def outline_of(agrees: Flags, x: Floats, y: Floats) -> list[list[tuple[float, float]]]:
+    """Return the sides between cells that agree and others; `agrees` is (rows, columns), x and y are cell edges."""
+    framed = np.pad(agrees, 1)
+    rows, columns = np.nonzero(framed[1:-1, 1:] != framed[1:-1, :-1])
+    upright = [[(x[i], y[j]), (x[i], y[j + 1])] for j, i in zip(rows, columns, strict=True)]
+    rows, columns = np.nonzero(framed[1:, 1:-1] != framed[:-1, 1:-1])
+    return [*upright, *([(x[i], y[j]), (x[i + 1], y[j])] for j, i in zip(rows, columns, strict=True))]
+
+
+def on_grid(plane: Plane, numbers: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the ascending centres along x and y, and the numbers on them, (rows, columns); NaN where there is none."""
+    x, columns = np.unique(plane.x, return_inverse=True)
+    y, rows = np.unique(plane.y, return_inverse=True)
+    table = np.full((len(y), len(x)), np.nan)
+    table[rows, columns] = numbers
+    return x, y, table
+
+
+def _draw_cells(axes: "Axes", plane: Plane, numbers: Floats, look: dict[str, Any], agrees: Flags | None) -> None:
+    from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
+
+    x, y, table = on_grid(plane, numbers)
+    edges = (edges_of(x, is_log=plane.axes[0].is_log), edges_of(y, is_log=plane.axes[1].is_log))
+    axes.pcolormesh(*edges, np.ma.masked_invalid(table), **look, rasterized=True, zorder=1)
+    if agrees is not None:
+        mask = on_grid(plane, agrees.astype(np.float64))[2] == 1.0
+        axes.add_collection(LineCollection(outline_of(mask, *edges), **OUTLINE))
+
+
+def _draw_dots(axes: "Axes", plane: Plane, numbers: Floats, look: dict[str, Any], agrees: Flags | None) -> None:
+    known = np.isfinite(numbers)
+    around = np.full(len(numbers), style.MEASURED_COLOUR if agrees is not None else "none", dtype=object)
+    around[~agrees if agrees is not None else known] = "none"
+    axes.scatter(plane.x[known], plane.y[known], c=numbers[known], edgecolors=list(around[known]), **look, **DOTS)
+    axes.margins(MARGIN)

@@ -1,0 +1,153 @@
+"""Histogram: where the members of a sweep end, beside the repeats of the experiment and their intervals."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from blocksim.view import style
+from blocksim.view.sweeps import layout
+from blocksim.view.sweeps.colours import percent
+from blocksim.view.sweeps.found import Flags, Floats, FoundSweep
+from blocksim.view.sweeps.kind import Kind
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+LEFT, RIGHT, FOOT = 0.55, 0.2, 0.42  # inches
+PANEL_HEIGHT, GAP, ROOM = 1.15, 0.62, 0.26  # inches; ROOM is above the bars, for the repeats
+CAPTION = 0.2  # inches, of the text above a panel
+LINE = 0.145  # inches, of a row of text
+MOST_BLOCKS = 4
+BINS = 40
+RARE = 1.0  # percent at either end that may lie beyond the axis
+LEAST_BIN_MM = 0.01
+ALL_COLOUR, INSIDE_COLOUR = "#B5D6EA", "#0072B2"
+
+
+def refusal(_sweep: FoundSweep) -> str:
+    """Tell why a sweep cannot be shown: never."""
+    return ""
+
+
+def suits(_sweep: FoundSweep) -> bool:
+    """Tell that any sweep may be shown."""
+    return True
+
+
+def draw(sweep: FoundSweep, path: Path) -> None:
+    """Draw a panel for each block that moves."""
+    blocks = sweep.moving[-MOST_BLOCKS:]
+    legend = _entries(sweep)
+    foot = FOOT + LINE * -(-len(legend) // 2) + 2.0 * layout.EDGE
+    head = layout.title_height(sweep.title, layout.COLUMN_WIDTH) + CAPTION
+    height = head + len(blocks) * PANEL_HEIGHT + (len(blocks) - 1) * GAP + foot
+    with style.styled_figure(layout.COLUMN_WIDTH, height) as figure:
+        layout.write_title(figure, sweep.title)
+        for row, block in enumerate(blocks):
+            bottom = foot + (len(blocks) - 1 - row) * (PANEL_HEIGHT + GAP)
+            place = (LEFT, bottom, layout.COLUMN_WIDTH - LEFT - RIGHT, PANEL_HEIGHT)
+            _draw_block(layout.add_axes(figure, *place), sweep, block)
+        figure.legend(
+            handles=legend,
+            loc="lower left",
+            bbox_to_anchor=(layout.EDGE / layout.COLUMN_WIDTH, layout.EDGE / height),
+            ncols=2,
+            frameon=False,
+            borderpad=0.0,
+            borderaxespad=0.0,
+            labelspacing=0.25,
+            columnspacing=1.0,
+        )
+        style.save_figure(figure, path)
+
+
+def limits_of(x_mm: Floats, others: Floats) -> tuple[float, float]:
+    """Return the ends of an axis (mm) around all but the rarest run-outs and everything measured."""
+    ends = np.concatenate([np.percentile(x_mm, [RARE, 100.0 - RARE]), others])
+    low, high = float(ends.min()), float(ends.max())
+    margin = max(0.04 * (high - low), 0.5 * BINS * LEAST_BIN_MM)
+    return low - margin, high + margin
+
+
+def _draw_block(axes: "Axes", sweep: FoundSweep, block: int) -> None:
+    name = sweep.blocks[block]
+    x = sweep.x_mm[sweep.finished, block]
+    inside = None if sweep.inside is None else sweep.inside[sweep.finished]
+    repeats = sweep.measured.x_mm.get(name, np.empty(0))
+    interval = np.array(sweep.measured.prediction_mm.get(name, ()))
+    limits = limits_of(x, np.concatenate([repeats, interval]))
+    top = _draw_bars(axes, x, inside, len(sweep.finished), limits)
+    _draw_measured(axes, repeats, interval, top)
+    axes.set_xlim(*limits)
+    axes.set_ylim(0.0, top * (1.0 + ROOM / (PANEL_HEIGHT - ROOM)))
+    axes.spines[["right", "top"]].set_visible(False)
+    for side in (axes.xaxis, axes.yaxis):
+        layout.number_axis(side)
+    axes.set_yticks([tick for tick in axes.get_yticks() if tick <= top])
+    axes.set_ylabel("cases (%)")
+    axes.set_xlabel(f"final x of block {name} (mm)", labelpad=2.0)
+    axes.set_title(_caption(x, limits), loc="left", pad=4.0)
+
+
+def _draw_bars(axes: "Axes", x: Floats, inside: Flags | None, count: int, limits: tuple[float, float]) -> float:
+    """Draw shares of all cases (%) and return the largest."""
+    edges = np.linspace(*limits, BINS + 1)
+    shares, _ = np.histogram(x, edges)
+    axes.stairs(100.0 * shares / count, edges, fill=True, color=ALL_COLOUR)
+    if inside is not None:
+        hits, _ = np.histogram(x[inside], edges)
+        axes.stairs(100.0 * hits / count, edges, fill=True, color=INSIDE_COLOUR)
+    return float(100.0 * shares.max() / count)
+
+
+def _draw_measured(axes: "Axes", repeats: Floats, interval: Floats, top: float) -> None:
+    """Draw the range as a band, and above the bars the repeats and the interval of one more test."""
+    if repeats.size:
+        axes.axvspan(repeats.min(), repeats.max(), color=style.MEASURED_COLOUR, alpha=0.15, linewidth=0, zorder=0)
+        axes.plot(repeats, np.full(len(repeats), 1.2 * top), **_REPEATS)
+    if interval.size:
+        axes.plot(interval, [1.08 * top] * 2, **_INTERVAL)
+
+
+_REPEATS: dict[str, Any] = {
+    "linestyle": "",
+    "marker": "|",
+    "markersize": 7.0,
+    "markeredgewidth": 1.1,
+    "color": style.MEASURED_COLOUR,
+    "zorder": 4,
+}
+_INTERVAL: dict[str, Any] = {
+    "marker": "|",
+    "markersize": 4.0,
+    "color": style.MEASURED_COLOUR,
+    "linewidth": 1.0,
+    "zorder": 4,
+}
+
+
+def _entries(sweep: FoundSweep) -> list[Any]:
+    """Return what the legend names."""
+    from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
+    from matplotlib.patches import Patch  # noqa: PLC0415
+
+    entries: list[Any] = [Patch(color=ALL_COLOUR, label=f"all {len(sweep.finished)} cases")]
+    if sweep.inside is not None:
+        share = percent(float(sweep.inside.mean()))
+        entries.append(Patch(color=INSIDE_COLOUR, label=f"all inside ({share})"))
+    if sweep.measured.x_mm:
+        count = max(len(repeats) for repeats in sweep.measured.x_mm.values())
+        entries.append(Line2D([], [], **_REPEATS, label=f"{count} repeats and their range"))
+    if sweep.measured.prediction_mm:
+        entries.append(Line2D([], [], **_INTERVAL, label="95 %: one more test"))
+    return entries
+
+
+def _caption(x: Floats, limits: tuple[float, float]) -> str:
+    beyond = int(((x < limits[0]) | (x > limits[1])).sum())
+    told = f", {beyond} beyond the axis" if beyond else ""
+    return f"median {np.median(x):.1f} mm{told}"
+
+
+HISTOGRAM = Kind("final x of the blocks, beside the repeats and their intervals", refusal, suits, draw)

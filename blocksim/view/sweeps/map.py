@@ -1,0 +1,250 @@
+"""Outcome map: over two inputs, how far the blocks get and which class the outcome is of; a column a third input."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from blocksim.view import style
+from blocksim.view.series import MOST_COLUMNS, ValueAxis, value_axis
+from blocksim.view.sweeps import layout
+from blocksim.view.sweeps.cells import Plane, draw_panel, mark_failed
+from blocksim.view.sweeps.colours import Classes, classes_of, run_out_scale
+from blocksim.view.sweeps.found import Flags, Floats, FoundSweep, Input
+from blocksim.view.sweeps.kind import Kind
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LEFT, RIGHT, FOOT = 0.80, 0.62, 0.42  # inches; the bars of colour are to the right
+ROW_HEIGHT, ROW_GAP, COLUMN_GAP = 1.25, 0.30, 0.12  # inches
+NARROWEST, WIDEST = 1.55, 2.1  # inches, of a panel
+HEADING = 0.18  # inches, of a heading above panels
+LINE = 0.145  # inches, of a row of text
+MOST_BLOCKS = 3
+AXES = 2
+FEWEST = 3  # values of an input that is an axis
+
+
+@dataclass(frozen=True, eq=False)
+class _Map:
+    """What is drawn where."""
+
+    sweep: FoundSweep
+    x: Input
+    y: Input
+    columns: tuple[tuple[str, Flags], ...]  # heading, and the cases (n,)
+    blocks: list[int]
+    axes: tuple[ValueAxis, ValueAxis]
+
+    def plane(self, cases: Flags) -> Plane:
+        """Return the inputs of some cases."""
+        x, y = (axis.shown(one.values[cases]) for axis, one in zip(self.axes, (self.x, self.y), strict=True))
+        return Plane(x, y, self.axes, self.sweep.is_grid)
+
+    @property
+    def panel_width(self) -> float:
+        """Inches."""
+        if len(self.columns) == 1:
+            return layout.COLUMN_WIDTH - LEFT - RIGHT
+        room = layout.PAGE_WIDTH - LEFT - RIGHT - (len(self.columns) - 1) * COLUMN_GAP
+        return min(WIDEST, room / len(self.columns))
+
+    @property
+    def legend_columns(self) -> int:
+        """How many classes stand beside each other in the legend."""
+        return 1 if len(self.columns) == 1 else 2
+
+    @property
+    def head(self) -> float:
+        """Inches between the title and the panels."""
+        return HEADING if len(self.columns) == 1 else 2.0 * HEADING
+
+    @property
+    def width(self) -> float:
+        """Inches."""
+        return LEFT + RIGHT + len(self.columns) * self.panel_width + (len(self.columns) - 1) * COLUMN_GAP
+
+
+def suits(sweep: FoundSweep) -> bool:
+    """Tell whether two inputs can be axes and the others, at most one, columns."""
+    axes = _axes_of(sweep)
+    if refusal(sweep):
+        return False
+    others = [one for one in sweep.inputs if one not in axes]
+    spread = all(one.count >= FEWEST for one in axes)
+    return spread and len(others) <= 1 and all(one.count <= MOST_COLUMNS for one in others)
+
+
+def refusal(sweep: FoundSweep) -> str:
+    """Tell why a sweep cannot be shown."""
+    return "a map needs two inputs that are numbers" if len(_axes_of(sweep)) < AXES else ""
+
+
+def draw(sweep: FoundSweep, path: Path) -> None:
+    """Draw the map. Samples over more than two inputs are seen along all others."""
+    found = _map_of(sweep)
+    classes = classes_of(sweep)
+    notes = layout.wrapped(_notes(found), found.width - 2.0 * layout.EDGE)
+    labels = -(-len(_shown_classes(classes)) // found.legend_columns)
+    foot = FOOT + LINE * (len(notes) + labels) + 2.0 * layout.EDGE
+    rows = len(found.blocks) + 1
+    height = (
+        layout.title_height(sweep.title, found.width) + found.head + rows * ROW_HEIGHT + (rows - 1) * ROW_GAP + foot
+    )
+    with style.styled_figure(found.width, height) as figure:
+        layout.write_title(figure, sweep.title)
+        for row, block in enumerate(found.blocks):
+            _draw_block(figure, found, block, foot + (rows - 1 - row) * (ROW_HEIGHT + ROW_GAP))
+        _draw_classes(figure, found, classes, foot)
+        _name_axes(figure, found, foot, rows)
+        _draw_legend(figure, found, classes, layout.EDGE + LINE * (len(notes) + labels))
+        for number, line in enumerate(reversed(notes)):
+            place = (layout.EDGE, layout.EDGE + LINE * number)
+            layout.write_text(figure, *place, line, color=style.FAINT_INK, va="bottom")
+        style.save_figure(figure, path)
+
+
+def _axes_of(sweep: FoundSweep) -> tuple[Input, ...]:
+    """Return the two inputs with the most values; of equal ones the first."""
+    return tuple(sorted((one for one in sweep.inputs if one.is_number), key=lambda one: -one.count)[:AXES])
+
+
+def _map_of(sweep: FoundSweep) -> _Map:
+    x, y = axes = _axes_of(sweep)
+    others = [one for one in sweep.inputs if one not in axes and one.count <= MOST_COLUMNS]
+    everything = np.ones(len(sweep.finished), dtype=bool)
+    columns: list[tuple[str, Flags]] = [("", everything)]
+    if others:
+        name = others[0].key.rpartition(".")[2]
+        values = np.unique(others[0].values)
+        columns = [(f"{name} = {others[0].told(value)}", others[0].values == value) for value in values]
+    shown = tuple(value_axis(one.values, one.key, one.unit, is_even=one.is_even) for one in axes)
+    return _Map(sweep, x, y, tuple(columns), sweep.moving[-MOST_BLOCKS:], (shown[0], shown[1]))
+
+
+def _panels(figure: "Figure", found: _Map, bottom: float) -> "list[Axes]":
+    """Return a row of empty panels."""
+    step = found.panel_width + COLUMN_GAP
+    return [
+        layout.add_axes(figure, LEFT + column * step, bottom, found.panel_width, ROW_HEIGHT)
+        for column in range(len(found.columns))
+    ]
+
+
+def _draw_row(
+    figure: "Figure", found: _Map, bottom: float, numbers: Floats, look: dict[str, Any], agrees: Flags | None
+) -> None:
+    for axes, (_, cases) in zip(_panels(figure, found, bottom), found.columns, strict=True):
+        plane = found.plane(cases)
+        draw_panel(axes, plane, numbers[cases], look, None if agrees is None else agrees[cases])
+        mark_failed(axes, plane, ~found.sweep.finished[cases])
+        layout.number_axis(axes.xaxis, found.axes[0], most=4)
+        layout.number_axis(axes.yaxis, found.axes[1], most=4)
+        axes.tick_params(axis="y", labelleft=cases is found.columns[0][1])
+
+
+def _draw_block(figure: "Figure", found: _Map, block: int, bottom: float) -> None:
+    """Draw the run-out of a block, with the measured range outlined and beside the bar of colours."""
+    x = found.sweep.x_mm[:, block]
+    colours, norm = run_out_scale(x)
+    band = found.sweep.measured.limits_mm.get(found.sweep.blocks[block])
+    with np.errstate(invalid="ignore"):
+        agrees = None if band is None else (x >= band[0]) & (x <= band[1])
+    _draw_row(figure, found, bottom, x, {"cmap": colours, "norm": norm}, agrees)
+    left = found.width - RIGHT + 0.1
+    bar = layout.add_axes(figure, left, bottom, 0.1, ROW_HEIGHT)
+    _draw_bar(bar, colours, norm, band)
+    layout.write_text(figure, LEFT, bottom + ROW_HEIGHT + 0.05, f"final x of block {found.sweep.blocks[block]} (mm)")
+
+
+def _draw_bar(axes: "Axes", colours: Any, norm: Any, band: tuple[float, float] | None) -> None:
+    from matplotlib.cm import ScalarMappable  # noqa: PLC0415 - see style
+    from matplotlib.colorbar import Colorbar  # noqa: PLC0415
+
+    bar = Colorbar(axes, ScalarMappable(norm, colours), spacing="proportional", extendfrac=0.06)
+    bar.ax.minorticks_off()
+    layout.number_axis(bar.ax.yaxis, most=5)
+    low, high = np.clip(band or (0.0, 0.0), norm.vmin, norm.vmax)
+    if low < high:
+        axes.fill_between([0.55, 1.0], low, high, color=style.MEASURED_COLOUR, linewidth=0.0)
+
+
+def _draw_classes(figure: "Figure", found: _Map, classes: Classes, bottom: float) -> None:
+    from matplotlib.colors import BoundaryNorm, ListedColormap  # noqa: PLC0415 - see style
+
+    look = {
+        "cmap": ListedColormap(list(classes.colours)),
+        "norm": BoundaryNorm(np.arange(len(classes.colours) + 1) - 0.5, len(classes.colours)),
+    }
+    _draw_row(figure, found, bottom, classes.numbers, look, found.sweep.inside)
+    layout.write_text(figure, LEFT, bottom + ROW_HEIGHT + 0.05, "turns of the blocks")
+
+
+def _name_axes(figure: "Figure", found: _Map, foot: float, rows: int) -> None:
+    """Write the keys once below and beside all panels, numbers only at the outer ones, and headings at the top."""
+    columns = len(found.columns)
+    for axes in figure.axes:
+        if axes.get_label() != "<colorbar>":
+            axes.tick_params(axis="x", labelbottom=_bottom_of(axes, figure) < foot + 0.01)
+    middle = 0.5 * (LEFT + found.width - RIGHT)
+    layout.write_text(figure, middle, foot - FOOT + 0.04, found.axes[0].label, ha="center", va="bottom")
+    upright = foot + 0.5 * (rows * ROW_HEIGHT + (rows - 1) * ROW_GAP)
+    layout.write_text(figure, layout.EDGE, upright, found.axes[1].label, ha="left", va="center", rotation=90.0)
+    top = foot + rows * ROW_HEIGHT + (rows - 1) * ROW_GAP + 0.22
+    for column, (heading, _) in enumerate(found.columns if columns > 1 else ()):
+        left = LEFT + column * (found.panel_width + COLUMN_GAP)
+        layout.write_text(figure, left, top, heading, weight="bold")
+
+
+def _bottom_of(axes: "Axes", figure: "Figure") -> float:
+    return float(axes.get_position().y0 * figure.get_figheight())
+
+
+def _shown_classes(classes: Classes) -> list[tuple[str, str]]:
+    """Return label and colour of the classes that occur."""
+    pairs = zip(classes.labels, classes.colours, strict=True)
+    return [pair for number, pair in enumerate(pairs) if (classes.numbers == number).any()]
+
+
+def _draw_legend(figure: "Figure", found: _Map, classes: Classes, top: float) -> None:
+    from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
+    from matplotlib.patches import Patch  # noqa: PLC0415
+
+    handles: list[Any] = []
+    for label, colour in _shown_classes(classes):
+        if label.startswith("failed"):
+            handles.append(Line2D([], [], linestyle="", marker="x", markersize=4.0, color=style.INK, label=label))
+        else:
+            handles.append(Patch(facecolor=colour, label=label))
+    width, height = (float(size) for size in figure.get_size_inches())
+    place = (layout.EDGE / width, top / height)
+    figure.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=place,
+        ncols=found.legend_columns,
+        frameon=False,
+        borderpad=0.0,
+        borderaxespad=0.0,
+        labelspacing=0.25,
+        handlelength=1.2,
+    )
+
+
+def _notes(found: _Map) -> list[str]:
+    texts = []
+    if found.sweep.measured.x_mm:
+        texts.append("Outlined: inside the measured range; at the bottom: inside all of them.")
+    if not found.sweep.is_grid:
+        texts.append("One dot: one run.")
+    drawn = {found.x.key, found.y.key}
+    hidden = [one for one in found.sweep.inputs if one.key not in drawn and len(found.columns) == 1]
+    if hidden:
+        texts.append(f"{len(hidden)} more inputs vary.")
+    return texts
+
+
+MAP = Kind("run-outs and outcomes over two inputs", refusal, suits, draw)

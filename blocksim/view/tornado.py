@@ -1,0 +1,118 @@
+"""Tornado: how much each input matters, the most important at the top, a panel for each result."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.view import style
+from blocksim.view.sweeps import layout
+from blocksim.view.sweeps.found import short_names
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+BAR, GAP, FOOT = 0.15, 0.46, 0.34  # inches: height of a bar, between panels, below them
+LETTER = 0.062  # inches, of a key's name
+MOST_KEYS, MOST_PANELS = 10, 8
+MOST_INTERVAL = 0.6  # of the longest bar, that an axis makes room for
+FEWEST_LETTERS, MOST_LETTERS = 8, 28
+MAIN_COLOUR, FIRST_COLOUR = "#B5D6EA", "#0072B2"
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """Indices of k keys for one result; `low` and `high` are the ends of their intervals, `part` a share of them."""
+
+    title: str
+    keys: tuple[str, ...]
+    values: Floats  # (k,)
+    half_widths: Floats  # (k,) of the intervals of `values`
+    part: Floats | None = None  # (k,)
+
+
+def draw_tornado(panels: Sequence[Bars], labels: tuple[str, str], path: Path | str, title: str) -> None:
+    """Draw bars of the indices and write PNG, SVG or PDF; `labels` name the whole bars and their dark parts.
+
+    Raises InvalidInputError for an unknown picture format and OutputError when the file cannot be written.
+    """
+    path = Path(path)
+    style.picture_suffix(path)
+    told = [panel for panel in panels if np.any(panel.values)] or list(panels)
+    panels = [_with_short_keys(panel) for panel in told[:MOST_PANELS]]
+    left = _room_for_keys(panels)
+    heights = [BAR * (min(len(panel.keys), MOST_KEYS) + 0.6) for panel in panels]
+    rows = 2 if labels[1] else 1
+    foot = FOOT + 0.145 * rows + layout.EDGE
+    head = layout.title_height(title, layout.COLUMN_WIDTH) + 0.2
+    height = head + sum(heights) + GAP * (len(panels) - 1) + foot
+    with style.styled_figure(layout.COLUMN_WIDTH, height) as figure:
+        layout.write_title(figure, title)
+        bottom = height - head
+        for panel, size in zip(panels, heights, strict=True):
+            bottom -= size
+            width = layout.COLUMN_WIDTH - left - 2.0 * layout.EDGE
+            _draw_bars(layout.add_axes(figure, left, bottom, width, size), panel)
+            layout.write_text(figure, layout.EDGE, bottom + size + 0.05, panel.title)
+            bottom -= GAP
+        place = (layout.EDGE / layout.COLUMN_WIDTH, layout.EDGE / height)
+        look: dict[str, Any] = {"frameon": False, "borderpad": 0.0, "borderaxespad": 0.0, "labelspacing": 0.25}
+        figure.legend(handles=_entries(labels), loc="lower left", bbox_to_anchor=place, **look)
+        style.save_figure(figure, path)
+
+
+def order_of(values: Floats) -> list[int]:
+    """Return the numbers of the keys to draw, the largest index first."""
+    return [int(key) for key in np.argsort(-np.abs(values), kind="stable")[:MOST_KEYS]]
+
+
+def shortened(name: str) -> str:
+    """Return the end of a long name."""
+    return name if len(name) <= MOST_LETTERS else f"…{name[1 - MOST_LETTERS :]}"
+
+
+def _with_short_keys(panel: Bars) -> Bars:
+    return replace(panel, keys=tuple(shortened(key) for key in short_names(panel.keys)))
+
+
+def _room_for_keys(panels: Sequence[Bars]) -> float:
+    letters = max(len(key) for panel in panels for key in panel.keys)
+    return LETTER * max(letters, FEWEST_LETTERS) + 0.15
+
+
+def _draw_bars(axes: "Axes", panel: Bars) -> None:
+    order = order_of(panel.values)
+    places = np.arange(len(order))[::-1]
+    intervals = np.nan_to_num(panel.half_widths[order])
+    whisker = {"ecolor": style.INK, "elinewidth": style.LINE_WIDTH, "capsize": 1.5}
+    axes.barh(places, panel.values[order], 0.72, color=MAIN_COLOUR, xerr=intervals, error_kw=whisker)
+    if panel.part is not None:
+        axes.barh(places, panel.part[order], 0.36, color=FIRST_COLOUR)
+    axes.axvline(0.0, color=style.FAINT_INK, linewidth=style.LINE_WIDTH)
+    axes.set_yticks(places, [panel.keys[key] for key in order])
+    axes.set_ylim(-0.8, len(order) - 0.2)
+    axes.tick_params(axis="y", length=0.0)
+    axes.spines[["right", "top", "left"]].set_visible(False)
+    axes.set_xlim(*limits_of(panel))
+    layout.number_axis(axes.xaxis)
+
+
+def limits_of(panel: Bars) -> tuple[float, float]:
+    """Return the ends of an axis around the bars; intervals of indices that are hardly known may lie beyond."""
+    ends = np.concatenate([panel.values, np.zeros(1) if panel.part is None else panel.part])
+    largest = float(np.abs(ends).max()) or 1.0
+    reach = np.minimum(np.nan_to_num(panel.half_widths), largest * MOST_INTERVAL)
+    low = float(min(ends.min(), 0.0, np.min(panel.values - reach)))
+    high = float(max(ends.max(), 0.0, np.max(panel.values + reach)))
+    return low - 0.02 * largest, high + 0.02 * largest
+
+
+def _entries(labels: tuple[str, str]) -> list[Any]:
+    from matplotlib.patches import Patch  # noqa: PLC0415 - see style
+
+    pairs = zip((MAIN_COLOUR, FIRST_COLOUR), labels, strict=True)
+    return [Patch(color=colour, label=label) for colour, label in pairs if label]

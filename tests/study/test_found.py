@@ -1,0 +1,90 @@
+"""A sweep read back from its stored table, as pictures need it: no case is run here."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.scenario import Document
+from blocksim.study.found import read_found
+from blocksim.study.plan import Values, with_sweep
+from blocksim.study.sweep_folder import prepare
+from blocksim.view.sweeps.found import FoundSweep
+from tests.study.conftest import SCENARIOS
+
+ENDS = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")
+
+
+def stored(nominal: Document, folder: Path, vary: dict[str, Values], rows: list[str], mode: str = "grid") -> FoundSweep:
+    """Write what a sweep writes, with rows of key values and status, and read it back."""
+    base = with_sweep(nominal, vary, mode).build()
+    prepare(folder, base, "made-up", overwrite=False)
+    heads = ["case", *vary, "status", "reason", "seconds", *(f"{block}.{end}" for block in "123" for end in ENDS)]
+    lines = [f"case{number},{row}" for number, row in enumerate(rows)]
+    (folder / "sweep.csv").write_text("\n".join([",".join(heads), *lines, ""]), encoding="utf-8")
+    return read_found(folder)
+
+
+def ended(x2: float, x3: float) -> str:
+    blocks = ((16.0, 0.0), (x2, -90.0), (x3, -90.0))
+    return ",".join(["finished,at rest,0.5", *(f"{x},16,{turn},{x - 25},{x + 25}" for x, turn in blocks)])
+
+
+def test_values_are_in_si_with_the_unit_of_their_key(nominal: Document, tmp_path: Path) -> None:
+    vary: dict[str, Values] = {"structures.0.overlap": ["11 mm", "9 mm", 0.01]}
+    found = stored(nominal, tmp_path, vary, [f"{value},{ended(74.0, 130.0)}" for value in ("11 mm", "9 mm", "0.01")])
+    (overlap,) = found.inputs
+    assert (overlap.key, overlap.unit) == ("structures.0.overlap", "m")
+    assert overlap.values.tolist() == [0.011, 0.009, 0.01]
+
+
+def test_words_become_levels_and_keys_keep_the_order_of_the_table(nominal: Document, tmp_path: Path) -> None:
+    vary: dict[str, Values] = {"time.scheme": ["explicit", "nonsmooth"], "gravity": [1.0, 2.0]}
+    rows = [f"{word},{g},{ended(74.0, 130.0)}" for word in ("explicit", "nonsmooth") for g in (1.0, 2.0)]
+    scheme, gravity = stored(nominal, tmp_path, vary, rows).inputs
+    assert (scheme.levels, scheme.values.tolist()) == (("explicit", "nonsmooth"), [0.0, 0.0, 1.0, 1.0])
+    assert (gravity.levels, gravity.unit) == ((), "m/s^2")
+
+
+def test_keys_with_one_value_are_no_inputs(nominal: Document, tmp_path: Path) -> None:
+    vary: dict[str, Values] = {"contact.restitution": [0.1], "gravity": [1.0, 2.0]}
+    found = stored(nominal, tmp_path, vary, [f"0.1,{g},{ended(74.0, 130.0)}" for g in (1.0, 2.0)])
+    assert [one.key for one in found.inputs] == ["gravity"]
+
+
+def test_cases_are_inside_by_the_rules_of_compare_and_failed_ones_never(nominal: Document, tmp_path: Path) -> None:
+    rows = [f"1.0,{ended(74.0, 130.0)}", f"2.0,{ended(67.0, 130.0)}", "3.0,failed,too large,0.1" + "," * 15]
+    found = stored(nominal, tmp_path, {"gravity": [1.0, 2.0, 3.0]}, rows)
+    assert found.inside is not None
+    assert found.inside.tolist() == [True, False, False]
+    assert found.finished.tolist() == [True, True, False]
+    assert np.isnan(found.x_mm[2]).all()
+    assert found.outcomes == [(0, -90, -90), (0, -90, -90), None]
+
+
+def test_repeats_come_with_their_range_and_prediction_interval(nominal: Document, tmp_path: Path) -> None:
+    known = stored(nominal, tmp_path, {"gravity": [1.0]}, [f"1.0,{ended(74.0, 130.0)}"]).measured
+    assert known.x_mm["2"].tolist() == [71.69, 76.57, 72.70, 73.22, 73.73, 78.53]
+    assert known.range_of("2") == (71.69, 78.53)
+    assert known.prediction_mm["2"] == pytest.approx((67.18, 81.63), abs=0.01)
+    assert "1" not in known.prediction_mm  # repeats that are all equal predict nothing
+    assert known.outcome == (0, -90, -90)
+
+
+def test_sweep_without_experiment_measures_nothing(tmp_path: Path) -> None:
+    slide = Document.read(SCENARIOS / "slide.toml")
+    base = with_sweep(slide, {"gravity": [1.0]}).build()
+    prepare(tmp_path, base, "made-up", overwrite=False)
+    text = "case,gravity,status,reason,seconds,block.x_mm,block.rotation_deg\nc,1.0,finished,at rest,1,16,0\n"
+    (tmp_path / "sweep.csv").write_text(text, encoding="utf-8")
+    found = read_found(tmp_path)
+    assert found.inside is None
+    assert not found.measured.x_mm
+
+
+def test_what_cannot_be_drawn_is_refused(nominal: Document, tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="no case of this sweep has finished"):
+        stored(nominal, tmp_path / "failed", {"gravity": [1.0]}, ["1.0,failed,too large,0.1" + "," * 15])
+    with pytest.raises(InputMissingError, match="no such file"):
+        read_found(tmp_path / "nix")

@@ -1,0 +1,67 @@
+"""Which picture a sweep gets, and that every kind draws every sweep that it does not refuse."""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.errors import InvalidInputError, OutputError
+from blocksim.view.sweeps.found import FoundSweep, Input
+from blocksim.view.sweeps.kinds import KINDS, kind_for
+from tests.view.sweeps.made_up import grid, made_up, samples
+
+ONE = (Input("gravity", "m/s^2", np.linspace(1.0, 10.0, 8)),)
+MEMBER = tuple(Input(one.key, one.unit, one.values[:1]) for one in samples()[:1])
+SWEEPS = {
+    "one key": (made_up(ONE), "lines"),
+    "a word alone": (made_up(samples()[3:], "list"), "histogram"),
+    "one key, drawn": (made_up(samples(1)[:1], "lhs"), "lines"),
+    "grid": (made_up(grid()), "map"),
+    "grid, some failed": (made_up(grid(), failed=5), "map"),
+    "grid without measurements": (made_up(grid(), measured=False), "map"),
+    "grid in columns": (made_up(grid(3)), "map"),
+    "grid with too many columns": (made_up(grid(6)), "matrix"),
+    "two keys, drawn": (made_up(samples(2)[:2], "sobol"), "map"),
+    "drawn": (made_up(samples(4), "sobol", failed=3), "matrix"),
+    "one member": (made_up(MEMBER, "sobol"), "lines"),
+    "two keys of one member": (made_up(tuple(Input(str(i), "", np.ones(1)) for i in range(2)), "grid"), "lines"),
+}
+DRAWN = [(name, kind) for name, (sweep, _) in SWEEPS.items() for kind in KINDS if not KINDS[kind].refusal(sweep)]
+
+
+@pytest.mark.parametrize(("sweep", "kind"), SWEEPS.values(), ids=SWEEPS)
+def test_a_sweep_gets_the_picture_that_suits_it(sweep: FoundSweep, kind: str) -> None:
+    assert kind_for(sweep) is KINDS[kind]
+
+
+@pytest.mark.parametrize(("name", "kind"), DRAWN)
+def test_every_kind_draws_what_it_does_not_refuse(tmp_path: Path, name: str, kind: str) -> None:
+    sweep, _ = SWEEPS[name]
+    path = tmp_path / "picture.svg"
+    KINDS[kind].draw(sweep, path)
+    assert ET.parse(path).getroot().tag.endswith("svg")  # noqa: S314 - our own file
+    assert "<!-- made up -->" in path.read_text(encoding="utf-8")
+
+
+def test_refusals_say_what_is_missing() -> None:
+    assert "two inputs that are numbers" in KINDS["map"].refusal(made_up(ONE))
+    assert "3 keys are varied" in KINDS["lines"].refusal(made_up(grid(3)))
+    assert "(one is 'explicit')" in KINDS["lines"].refusal(made_up(samples()[3:], "list"))
+
+
+@pytest.mark.parametrize("kind", ["map", "matrix", "histogram"])
+def test_same_sweep_gives_the_same_bytes(tmp_path: Path, kind: str) -> None:
+    paths = [tmp_path / f"{name}.png" for name in ("first", "second")]
+    for path in paths:
+        KINDS[kind].draw(made_up(samples(2), "sobol"), path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_wrong_files_are_refused(tmp_path: Path, kind: str) -> None:
+    sweep = made_up(grid())
+    with pytest.raises(InvalidInputError, match="no picture format"):
+        KINDS[kind].draw(sweep, tmp_path / "picture.bmp")
+    with pytest.raises(OutputError, match="cannot be written"):
+        KINDS[kind].draw(sweep, tmp_path / "nix" / "picture.png")

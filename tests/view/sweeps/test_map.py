@@ -1,0 +1,110 @@
+"""Maps: cells where they belong, what agrees outlined, everything named."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.view.sweeps.cells import edges_of, on_grid, outline_of
+from blocksim.view.sweeps.colours import CLASS_COLOURS, OTHER_COLOUR, classes_of, percent, run_out_scale
+from blocksim.view.sweeps.found import FoundSweep, Input
+from blocksim.view.sweeps.map import MAP, _map_of
+from tests.view.sweeps.made_up import grid, made_up, samples
+
+
+def texts_of(sweep: FoundSweep, folder: Path) -> str:
+    MAP.draw(sweep, folder / "map.svg")
+    return (folder / "map.svg").read_text(encoding="utf-8")
+
+
+def test_map_names_axes_blocks_classes_and_columns(tmp_path: Path) -> None:
+    text = texts_of(made_up(grid(3), failed=5), tmp_path)
+    for told in (
+        "friction.block_block.static",
+        "contact.stiffness_scale",
+        "final x of block 2 (mm)",
+        "turns of the blocks",
+        "upright = level2",
+        "failed: 5 %",
+    ):
+        assert f"<!-- {told} -->" in text
+    assert "0°/−90° (measured): " in text
+    assert "final x of block 1" not in text  # it stays
+    assert "Outlined: inside the measured range" in text
+
+
+def test_map_without_measurements_outlines_nothing(tmp_path: Path) -> None:
+    text = texts_of(made_up(grid(), measured=False), tmp_path)
+    assert "Outlined" not in text
+    assert "(measured)" not in text
+
+
+def test_map_of_samples_says_that_other_inputs_vary_too(tmp_path: Path) -> None:
+    text = texts_of(made_up(samples(4)[:4], "sobol"), tmp_path)
+    assert "One dot: one run." in text
+    assert "2 more" in text
+
+
+def test_numbers_stand_in_the_cells_of_their_inputs() -> None:
+    sweep = made_up(grid())
+    found = _map_of(sweep)
+    x, y, table = on_grid(found.plane(np.ones(35, dtype=bool)), sweep.x_mm[:, 1])
+    assert x.tolist() == pytest.approx(np.linspace(0.2, 0.4, 7).tolist())
+    assert y.tolist() == pytest.approx(np.geomspace(1e-3, 1e-1, 5).tolist())
+    assert table[2, 4] == sweep.x_mm[4 * 5 + 2, 1]
+    assert [axis.is_log for axis in found.axes] == [False, True]
+
+
+def test_cells_that_were_not_run_stay_empty() -> None:
+    friction, scale = grid()
+    cut = tuple(Input(one.key, one.unit, one.values[:-1]) for one in (friction, scale))
+    found = _map_of(made_up(cut))
+    _, _, table = on_grid(found.plane(np.ones(34, dtype=bool)), np.ones(34))
+    assert np.argwhere(np.isnan(table)).tolist() == [[4, 6]]
+
+
+def test_edges_lie_midway_between_cells() -> None:
+    assert edges_of(np.array([1.0, 2.0, 4.0]), is_log=False).tolist() == [0.5, 1.5, 3.0, 5.0]
+    assert edges_of(np.array([1.0, 100.0]), is_log=True).tolist() == pytest.approx([0.1, 10.0, 1000.0])
+    assert edges_of(np.array([3.0]), is_log=False).tolist() == [1.5, 4.5]
+    low, high = edges_of(np.zeros(1), is_log=False)
+    assert low < 0.0 < high
+
+
+def test_outline_goes_once_around_cells_that_agree() -> None:
+    edges = np.arange(4.0)
+    middle = np.zeros((3, 3), dtype=bool)
+    middle[1, 1] = True
+    sides = {tuple(side) for side in outline_of(middle, edges, edges)}
+    corners = [(1.0, 1.0), (2.0, 1.0), (1.0, 2.0), (2.0, 2.0)]
+    a, b, c, d = corners
+    assert sides == {(a, b), (a, c), (b, d), (c, d)}
+    assert len(outline_of(np.ones((3, 3), dtype=bool), edges, edges)) == 12  # the border alone
+    assert outline_of(np.zeros((3, 3), dtype=bool), edges, edges) == []
+
+
+def test_measured_class_comes_first_and_rare_ones_are_taken_together() -> None:
+    count = 8
+    turns = np.column_stack([np.zeros(count), -90.0 * np.array([2, 2, 2, 1, 3, 4, 5, 6])])
+    made = made_up((Input("gravity", "", np.arange(1.0, count + 1.0)),), failed=0)
+    classes = classes_of(
+        FoundSweep(made.title, "grid", made.inputs, made.blocks, made.x_mm, turns, made.finished, None, made.measured)
+    )
+    assert classes.labels[0] == "0°/−90° (measured): 12 %"
+    assert classes.labels[1] == "0°/−180°: 38 %"
+    assert classes.labels[-2] == "others: 12 %"
+    assert classes.numbers.tolist()[:4] == [1.0, 1.0, 1.0, 0.0]
+    assert classes.colours[: len(CLASS_COLOURS)] == CLASS_COLOURS
+    assert classes.colours[-2] == OTHER_COLOUR
+
+
+def test_shares_are_never_rounded_to_nothing_or_everything() -> None:
+    assert [percent(share) for share in (0.0, 0.0004, 0.03, 0.9999, 1.0)] == ["0 %", "0.04 %", "3 %", "99 %", "100 %"]
+
+
+def test_colours_change_at_round_run_outs_and_span_nearly_all() -> None:
+    _, norm = run_out_scale(np.linspace(61.0, 79.0, 200))
+    assert norm.boundaries.tolist() == [60.0, 62.5, 65.0, 67.5, 70.0, 72.5, 75.0, 77.5, 80.0]
+    _, norm = run_out_scale(np.full(5, 70.0))
+    assert norm.boundaries[0] <= 69.5
+    assert norm.boundaries[-1] >= 70.5
