@@ -3,6 +3,14 @@ const EDGE = { left: 74, right: 16, top: 12, bottom: 46 };
 const SIGNS = { inside: "#009E73", outside: "#D55E00", finished: "#56B4E9", other: "#777777" };
 const DECADES = 30;
 
+// Whether the median is nearer to the middle of a logarithmic axis than to that of a linear one.
+function isMiddleInLogs(values) {
+  const sorted = [...values].sort((a, b) => a - b);
+  const [low, middle, high] = [0, Math.floor(sorted.length / 2), sorted.length - 1].map((place) => sorted[place]);
+  const offMiddle = (a, b, c) => Math.abs((b - a) / (c - a) - 0.5);
+  return offMiddle(Math.log(low), Math.log(middle), Math.log(high)) < offMiddle(low, middle, high);
+}
+
 class Axis {
   constructor(column, count) {
     this.name = column ? column.name : "row in the table";
@@ -13,7 +21,7 @@ class Axis {
     const finite = this.values.filter((value) => value !== null);
     this.low = finite.reduce((a, b) => Math.min(a, b), Infinity);
     this.high = finite.reduce((a, b) => Math.max(a, b), -Infinity);
-    this.isLog = this.isNumber && this.low > 0 && this.high >= DECADES * this.low;
+    this.isLog = this.isNumber && this.low > 0 && this.high >= DECADES * this.low && isMiddleInLogs(finite);
   }
 
   scaled(value) { return this.isLog ? Math.log10(value) : value; }
