@@ -17,6 +17,7 @@ PANEL_WIDTH, PANEL_HEIGHT = 3.6, 2.9  # inches
 LEFT, RIGHT, HEAD, FOOT, GAP = 0.62, 0.15, 0.62, 0.48, 0.72  # inches
 LEGEND_ROW = 0.17  # inches
 MARKERS = "os^D"
+DASHES = ("-", (0, (4, 2)), (0, (1, 1.5)))
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")  # as in style, the well visible ones
 MANY_DECADES = 100.0  # ratio of the ends of an axis
 SMALLEST_SHARE = 1e-4  # of the largest error: what is less is drawn there
@@ -125,7 +126,10 @@ def _number_axes(axes: "Axes") -> None:
 
 
 def _look(group: int, number: int) -> dict[str, Any]:
-    """Return the look of the curve with this number (from 0) in its group: later ones are dashed and hollow."""
+    """Return the look of the curve with this number (from 0) in its group.
+
+    Later ones are dashed and hollow, the third and those after it dotted.
+    """
     colour = COLOURS[group % len(COLOURS)]
     return {
         "color": colour,
@@ -133,7 +137,7 @@ def _look(group: int, number: int) -> dict[str, Any]:
         "markersize": 4.0,
         "markerfacecolor": "#FFFFFF" if number else colour,
         "linewidth": 1.2,
-        "linestyle": (0, (4, 2)) if number else "-",
+        "linestyle": DASHES[min(number, len(DASHES) - 1)],
     }
 
 
