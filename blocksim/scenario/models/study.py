@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
+    AfterValidator,
     BeforeValidator,
     Field,
     GetJsonSchemaHandler,
@@ -92,6 +93,11 @@ def _of_the_mode(value: object, info: ValidationInfo) -> object:
 Values = Annotated[Variation, PlainValidator(_variation), WithJsonSchema(VALUES_SCHEMA)]
 
 
+def _lists_first(vary: dict[str, Any]) -> dict[str, Any]:
+    """Put lists before distributions, as they stand in a resolved file: Sobol's dimensions follow the order of keys."""
+    return dict(sorted(vary.items(), key=lambda entry: not isinstance(entry[1], tuple)))
+
+
 class Sweep(Table):
     """Which scenario keys to vary; in the file every dotted key stands in quotes beside `mode`."""
 
@@ -118,7 +124,7 @@ class Sweep(Table):
         default=None,
         description="CSV table of cases, relative to the scenario file: a column a key, units as in `overlap [mm]`",
     )
-    vary: dict[str, Values] = Field(
+    vary: Annotated[dict[str, Values], AfterValidator(_lists_first)] = Field(
         description="dotted key of the scenario, and a list, { from, to, count }, { from, to }, { mean, sd } or "
         '{ mean, sd, from, to }; scale = "log" beside from and to'
     )

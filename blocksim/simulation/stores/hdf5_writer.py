@@ -77,6 +77,7 @@ class FrameFile:
         self._growing(layout.TIME, np.float64, "s")
         for name, unit in layout.MOTION_UNITS.items():
             self._growing(f"{layout.BLOCKS}/{name}", np.float64, unit, len(placed))
+        self.file.create_group(layout.OBSERVABLES, track_order=True)  # readers list the energies as the scheme does
         for name, unit in self.units.items():
             self._growing(f"{layout.OBSERVABLES}/{name}", np.float64, unit)
         for name, unit in layout.BODY_UNITS.items():
