@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.analysis.compare import limits
-from blocksim.analysis.experiment import QUANTITIES, load_table
+from blocksim.analysis.experiment import load_table
 from blocksim.errors import InvalidInputError
+from blocksim.study.targets import ranges_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,15 +24,8 @@ class Ranges:
     def read(cls, table: Path | str) -> "Ranges":
         """Take the limits of an experiment table by the rules of `compare`. Raises what reading it raises."""
         measured = load_table(table)
-        return cls(
-            measured.source,
-            {
-                f"{row.block}.{QUANTITIES[row.quantity].final_column}": limits(
-                    row.quantity, row.mean, row.minimum, row.maximum
-                )
-                for row in measured.summaries()
-            },
-        )
+        limits = {f"{one.block}.{one.column}": (one.lower, one.upper) for one in ranges_of(measured)}
+        return cls(measured.source, limits)
 
     def hold(self, row: Mapping[str, object]) -> bool:
         """Tell whether everything measured is inside; a block that a case does not have is not."""
