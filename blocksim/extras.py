@@ -5,14 +5,17 @@ from typing import Any
 
 from blocksim.errors import UnavailableError
 
-STUDY, CLUSTER = "study", "cluster"
+STUDY, CLUSTER, BENCH = "study", "cluster", "bench"
 
 
-def loaded(module: str, purpose: str, extra: str = STUDY) -> Any:
-    """Return a module; `purpose` says in the message what needs it. Raises UnavailableError."""
+def loaded(module: str, purpose: str, extra: str = STUDY, package: str = "") -> Any:
+    """Return a module; the message says what needs it, and its `package` if that has another name.
+
+    Raises UnavailableError.
+    """
     try:
         return import_module(module)
     except ImportError as error:
-        package = module.partition(".")[0]
-        message = f"{purpose} needs the package {package} ({error}); install the extra: pip install 'blocksim[{extra}]'"
+        name = package or module.partition(".")[0]
+        message = f"{purpose} needs the package {name} ({error}); install the extra: pip install 'blocksim[{extra}]'"
         raise UnavailableError(message) from None

@@ -1,31 +1,18 @@
 """The optional packages of the other engines."""
 
-from importlib import import_module
 from typing import Any
 
-from blocksim.errors import BlocksimError, ExitCode
+from blocksim import extras
 
 PACKAGES = {"pymunk": "pymunk", "Box2D": "box2d"}  # module: name of its package
 
 
-class MissingPackageError(BlocksimError):
-    """An optional package is not installed."""
-
-    exit_code = ExitCode.UNAVAILABLE
-
-
 def loaded(module: str) -> Any:
-    """Return the module of an engine; raises MissingPackageError."""
-    try:
-        return import_module(module)
-    except ImportError as error:
-        raise MissingPackageError(
-            f"bench --peers needs the package {PACKAGES[module]} ({error}); "
-            "install the extra: pip install 'blocksim[bench]'"
-        ) from None
+    """Return the module of an engine; raises UnavailableError."""
+    return extras.loaded(module, "bench --peers", extras.BENCH, PACKAGES[module])
 
 
 def require_all() -> None:
-    """Raise MissingPackageError before anything is measured."""
+    """Raise UnavailableError before anything is measured."""
     for module in PACKAGES:
         loaded(module)
