@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody
+from blocksim.simulation.contacts import Contacts, joined
+from blocksim.simulation.contacts import Rows as ContactRows
 from blocksim.simulation.frames import Frames
 
 if TYPE_CHECKING:
@@ -21,6 +23,7 @@ class Frame(NamedTuple):
     step: int
     motion: NDArray[np.float64]  # (6, b) as MOTION
     measured: NDArray[np.float64]  # as the scheme's `measured`
+    contacts: ContactRows | None = None  # where they are recorded
 
 
 class FrameSink(Protocol):
@@ -33,8 +36,19 @@ class FrameSink(Protocol):
 class Recorder:
     """Frames, growing as the run goes on."""
 
-    def __init__(self, placed: Sequence[PlacedBody], every: float, step: float, sink: FrameSink | None = None) -> None:
-        """Record every `every` seconds, at the nearest step of length `step` (s); `sink` gets all frames too."""
+    def __init__(
+        self,
+        placed: Sequence[PlacedBody],
+        every: float,
+        step: float,
+        sink: FrameSink | None = None,
+        *,
+        contacts: bool = False,
+    ) -> None:
+        """Record every `every` seconds, at the nearest step of length `step` (s); `sink` gets all frames too.
+
+        With `contacts` the contacts of every frame are recorded as well.
+        """
         self.placed = tuple(placed)
         self.time_step = step
         self.sink = sink
@@ -43,6 +57,7 @@ class Recorder:
         self.motion: list[NDArray[np.float64]] = []
         self.measured: list[NDArray[np.float64]] = []
         self.ledger: tuple[str, ...] = ()
+        self.contacts: list[ContactRows] | None = [] if contacts else None
 
     def next_step(self, done: int) -> int:
         """Return the next step to record after `done` steps."""
@@ -60,17 +75,22 @@ class Recorder:
             return
         row = measured_row(scene)
         motion = np.stack([scene.world.bodies[name][: len(self.placed)] for name in MOTION])
-        self.ledger = scheme_of(scene).ledger
+        scheme = scheme_of(scene)
+        self.ledger = scheme.ledger
+        touching = None if self.contacts is None else scheme.contacts(scene, len(self.placed))
         self.steps.append(step)
         self.motion.append(motion)
         self.measured.append(row)
+        if self.contacts is not None and touching is not None:
+            self.contacts.append(touching)
         if self.sink is not None:
-            self.sink.append(Frame(step, motion, row))
+            self.sink.append(Frame(step, motion, row, touching))
 
     def frames(self) -> Frames:
         """Return all frames so far."""
         steps = np.array(self.steps, dtype=np.int64)
-        rows = Rows(steps, np.stack(self.motion), np.stack(self.measured), self.ledger)
+        contacts = None if self.contacts is None else joined(self.contacts)
+        rows = Rows(steps, np.stack(self.motion), np.stack(self.measured), self.ledger, contacts)
         return frames_from_rows(self.placed, self.time_step, rows)
 
 
@@ -81,6 +101,7 @@ class Rows(NamedTuple):
     motion: NDArray[np.float64]  # (n, 6, b) as MOTION
     measured: NDArray[np.float64]  # (n, e + 2): energies, number of contacts, largest overlap
     ledger: tuple[str, ...]  # names of the e energies
+    contacts: Contacts | None = None  # of all frames
 
 
 def frames_from_rows(placed: Sequence[PlacedBody], time_step: float, rows: Rows) -> Frames:
@@ -103,4 +124,5 @@ def frames_from_rows(placed: Sequence[PlacedBody], time_step: float, rows: Rows)
         size_x=np.array([body.size_x for body in placed]),
         size_y=np.array([body.size_y for body in placed]),
         start_angle=np.array([body.angle for body in placed]),
+        contacts=rows.contacts,
     )

@@ -38,7 +38,8 @@ def simulate(scenario: Scenario, *, threads: int = 1, on_progress: Watcher = _ig
     compile_kernels(kernels_of(scenario))
     began = time.perf_counter()
     scene = build_scene(scenario)
-    recorder = Recorder(place_bodies(scenario), scenario.output.every, float(scene.world.controls[0].step))
+    step, output = float(scene.world.controls[0].step), scenario.output
+    recorder = Recorder(place_bodies(scenario), output.every, step, contacts=output.contacts)
     with stop_requests() as is_stopped, team_for(scene, threads) as team:
         ended = run_loop(scene, recorder, scenario.time.end, team=team, on_progress=on_progress, is_stopped=is_stopped)
     return _result(scenario, recorder, ended, began)
@@ -60,10 +61,10 @@ def simulate_into(
     toml = _keep_scenario(scenario, tables, folder)
     placed = place_bodies(scenario)
     step = float(scene.world.controls[0].step)
-    end, ledger = scenario.time.end, scheme_named(scenario).ledger
+    end, output, ledger = scenario.time.end, scenario.output, scheme_named(scenario).ledger
     with stop_requests() as is_stopped, team_for(scene, threads) as team:
-        with FrameFile(folder / files.FRAMES, placed, step, toml, ledger=ledger) as sink:
-            recorder = Recorder(placed, scenario.output.every, step, sink)
+        with FrameFile(folder / files.FRAMES, placed, step, toml, ledger=ledger, contacts=output.contacts) as sink:
+            recorder = Recorder(placed, output.every, step, sink, contacts=output.contacts)
             ended = run_loop(scene, recorder, end, team=team, on_progress=on_progress, is_stopped=is_stopped)
         return _keep_result(_result(scenario, recorder, ended, began), folder)
 

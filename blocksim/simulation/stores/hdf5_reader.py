@@ -15,6 +15,7 @@ from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
 from blocksim.simulation.stores import hdf5_layout as layout
+from blocksim.simulation.stores.hdf5_contacts import read_contacts
 
 SUPERBLOCK = struct.Struct("<8sBxxB16xQ")  # signature, version, consistency flags, end of file
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -70,6 +71,7 @@ def read_frames(path: Path, scenario: Scenario) -> Frames:
             ledger = tuple(name for name in file[layout.OBSERVABLES] if name not in layout.COUNTED_UNITS)
             names = (*ledger, *layout.COUNTED_UNITS)
             measured = np.stack([file[f"{layout.OBSERVABLES}/{name}"][:count] for name in names], axis=1)
+            contacts = read_contacts(file, count)
         except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
             message = f"{path}: not a complete run file: {error}"
             raise InvalidInputError(message) from error
@@ -78,4 +80,4 @@ def read_frames(path: Path, scenario: Scenario) -> Frames:
             f"{path}: holds {len(motion)} frames, {count} announced, of {motion.shape[-1]} bodies, not {len(placed)}"
         )
         raise InvalidInputError(message)
-    return frames_from_rows(placed, time_step, Rows(steps, motion, measured, ledger))
+    return frames_from_rows(placed, time_step, Rows(steps, motion, measured, ledger, contacts))
