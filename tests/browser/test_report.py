@@ -271,3 +271,29 @@ def test_paper_is_white_and_has_no_controls(three: tuple[Path, Frames], open_pag
     corner = pixels(one)[3, 3]
     assert corner.tolist() == [255, 255, 255]
     one.keep("three-print")
+
+
+def test_forces_are_shown_on_request_and_where_the_contacts_are(tmp_path: Path, open_page: Open) -> None:
+    write_run(tmp_path / "run", count=5, overrides={"output.contacts": True})
+    report(tmp_path / "run", "--out", tmp_path / "report.html")
+    one = open_page(tmp_path / "report.html")
+    one.page.evaluate(f"{PLAYER}.toggle('names')")
+    one.page.evaluate(f"{PLAYER}.show(4)")
+    before = pixels(one)
+    one.page.keyboard.press("f")
+    assert one.page.get_by_label("contact forces").is_checked()
+    changed = (pixels(one) != before).any(axis=-1)
+    scale, centres = one.state()["scale"], np.array(one.state()["centres"])
+    columns = np.nonzero(changed.any(axis=0))[0]
+    for x, _ in centres:  # made-up contacts are below the centres
+        assert np.abs(columns - x).min() <= 1.0
+    assert all(np.abs(centres[:, 0] - column).min() < 8.0 for column in columns)
+    assert np.nonzero(changed.any(axis=1))[0].size == pytest.approx(0.6 * 41.0 * scale, abs=6.0)
+    assert "Arrows: contact forces" in one.page.locator(".player .notes").inner_text()
+    one.keep("three-blocks-forces")
+
+
+def test_run_without_contacts_says_how_to_store_them(three: tuple[Path, Frames], open_page: Open) -> None:
+    one = open_page(three[0])
+    assert one.page.get_by_label("contact forces").count() == 0
+    assert "--set output.contacts=true" in one.page.locator(".player .notes").inner_text()
