@@ -17,7 +17,7 @@ from blocksim.view.report.page import write_report
 from blocksim.view.report.stored import read_stored
 from blocksim.view.report.subjects import run_subject
 from tests.browser.conftest import PLAYER, Open, Opened
-from tests.view.report.folders import write_run, write_sweep
+from tests.view.report.folders import write_experiment, write_run, write_sweep
 
 pytestmark = pytest.mark.long
 FRAMES_A_SECOND = 30.0
@@ -210,6 +210,24 @@ def test_sweep_is_sorted_filtered_and_its_members_open(swept: Path, open_page: O
     assert one.state()["frame"] == 4
     one.page.get_by_role("link", name="Back to the sweep").click()
     assert one.page.locator(".map canvas").is_visible()
+
+
+def test_measured_range_is_marked_in_the_map_and_the_table(tmp_path: Path, open_page: Open) -> None:
+    write_sweep(tmp_path / "sweep", kept=0)
+    write_experiment(tmp_path / "repeats.csv")
+    report(tmp_path / "sweep", "--experiment", tmp_path / "repeats.csv", "--out", tmp_path / "report.html")
+    one = open_page(tmp_path / "report.html")
+    assert one.page.locator("table.cases td.inside", has_text="69.00").count() == 1
+    assert one.page.locator("table.cases td.outside", has_text="70.00").count() == 1
+    one.page.locator("[data-option=up]").select_option("1.x_mm")
+    assert "counts as inside" in one.page.locator(".map .legend").inner_text()
+    one.keep("sweep-judged")
+    band = (246, 217, 196)
+    url = one.page.evaluate("document.querySelector('.map canvas').toDataURL()")
+    picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(url.split(",")[1]))).convert("RGB"), dtype=np.int64)
+    rows = np.nonzero((picture == band).all(axis=-1).any(axis=1))[0]
+    height = one.page.evaluate("document.querySelector('.map canvas').clientHeight") - 12 - 46
+    assert np.ptp(rows) + 1 == pytest.approx(0.9 * height * 2.0 / 4.0, abs=2.0)  # 67 to 69 on an axis from 66 to 70
 
 
 def test_case_without_frames_says_how_to_get_them(swept: Path, open_page: Open) -> None:

@@ -99,3 +99,9 @@ def write_sweep(folder: Path, cases: int = 6, kept: int = 2) -> None:
         if number < kept:
             write_run(folder / "cases" / case, count=5)
     (folder / "sweep.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_experiment(path: Path) -> None:
+    """Write repeats of the block that `write_sweep` tells of: three of its five finished members are inside."""
+    rows = [f"1,{name},{value}" for name, value in (("x,mm,1", 67.0), ("x,mm,2", 69.0), ("rotation,deg,1", -90.0))]
+    path.write_text("\n".join(["block,quantity,unit,replicate,value", *rows]) + "\n", encoding="utf-8")
