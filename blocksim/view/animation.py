@@ -136,9 +136,9 @@ class Film:
         finish_panel(self.canvas, (self.page.panel_width, self.page.panel_height), labelled=True)
         if self.page.extent.tilt:
             draw_ruler(self.canvas, depth_of(0))
-        letters = int(self.page.width * style.POINTS_PER_INCH / (style.LETTER[0] * style.TITLE_SIZE))
+        shown = style.cut_to(title, self.page.panel_width * style.POINTS_PER_INCH, style.TITLE_SIZE)
         place = MARGINS[0] / self.page.width, 1.0 - 0.06 / self.page.height
-        figure.text(*place, style.shortened(title, letters), va="top", fontsize=style.TITLE_SIZE)
+        figure.text(*place, shown, va="top", fontsize=style.TITLE_SIZE)
         if self.support.motion is None:
             draw_standing(self.canvas, self.frames, int(self.drawable[0]), self.support)
 

@@ -28,7 +28,7 @@ LINE = 9.5  # points, of a line of text
 FONT = 7.0  # points
 BAR = 9.0  # points, of a measured range
 SPACE = 10.0, 7.0  # points between labels, across and down
-LETTERS, TITLE_LETTERS = 14, 48  # of a name, of the title
+LETTERS = 14  # of a name
 MOST_ROWS = 4  # of labels below their blocks
 MOST_LINES = 36  # below the panel; more labels than that fit nobody's page
 COLOUR_BAR = 0.5  # inches
@@ -262,7 +262,8 @@ def _draw_texts(figure: "Figure", title: str | None, caption: str, legend: str) 
     left, top = SIDE / WIDTH, 1.0 - 0.08 / height
     figure.text(1.0 - left, top, caption, ha="right", va="top")
     if title:
-        figure.text(left, top, style.shortened(title, TITLE_LETTERS), va="top", fontsize=style.TITLE_SIZE)
+        room = (WIDTH - 2.0 * SIDE) * style.POINTS_PER_INCH - style.width_of(caption, style.FONT_SIZE) - SPACE[0]
+        figure.text(left, top, style.cut_to(title, room, style.TITLE_SIZE), va="top", fontsize=style.TITLE_SIZE)
     figure.text(left, 0.06 / height, legend, color=style.FAINT_INK, va="bottom")
 
 

@@ -26,7 +26,8 @@ PANEL, GAP = 1.25, 0.14  # inches
 MOST_BLOCKS = len(style.BLOCK_COLOURS)  # that get a line of their own
 MOST_POINTS = 2000  # of a line
 MOST_PATHS = 50  # grey lines in an SVG or PDF; more of them are stored as an image
-LETTERS, TITLE_LETTERS, NOTE_LETTERS = 16, 60, 105  # of a name, of the title, of a line below the panels
+LETTERS, NOTE_LETTERS = 16, 105  # of a name, of a line below the panels
+NAME_ROOM = 1.2  # inches, for a name beside the panels
 LINE = 0.155  # inches, of each further line below the panels
 MOST_WEIGHTS = 3.0  # of all blocks: forces of supports beyond that are cut, those of impacts are far beyond
 SMALL_SHARE = 1e-3  # of the largest energy; what stays below is not drawn
@@ -262,8 +263,9 @@ def _draw_legends(panels: Sequence["Axes"], frames: FramesLike, shown: Sequence[
     from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
 
     if shown:
+        room = NAME_ROOM * style.POINTS_PER_INCH
         handles = [Line2D([], [], color=_colour(shown, block)) for block in shown]
-        names = [style.shortened(frames.names[block], LETTERS) for block in shown]
+        names = [style.cut_to(style.shortened(frames.names[block], LETTERS), room, style.FONT_SIZE) for block in shown]
         panels[0].legend(handles, names, **BESIDE, title="block", alignment="left")
     start, end = float(frames.time[0]), float(frames.time[-1])
     for axes in panels:
@@ -278,7 +280,8 @@ def _colour(shown: Sequence[int], block: int) -> str:
 def _draw_texts(figure: "Figure", height: float, title: str | None, legend: str) -> None:
     if title:
         place = 0.12 / WIDTH, 1.0 - 0.08 / height
-        figure.text(*place, style.shortened(title, TITLE_LETTERS), va="top", fontsize=style.TITLE_SIZE)
+        room = (WIDTH - 0.24) * style.POINTS_PER_INCH
+        figure.text(*place, style.cut_to(title, room, style.TITLE_SIZE), va="top", fontsize=style.TITLE_SIZE)
     figure.text(0.12 / WIDTH, 0.06 / height, legend, color=style.FAINT_INK, va="bottom")
 
 

@@ -25,7 +25,7 @@ WIDTH = 10.0  # inches, of the whole strip
 SIDE, GAP = 0.25, 0.25  # inches, at the left and right end and between columns
 HEAD, TITLE, FOOT = 0.22, 0.30, 0.52  # inches: time above a panel, title of the strip, axis and legend below
 LINE = 0.155  # inches, of each further line of text above a panel or below the strip
-LETTERS, TITLE_LETTERS = 150, 100  # in a line below the strip, in its title
+LETTERS = 150  # in a line below the strip
 TICKS = 0.26  # inches, for the numbers under a row of panels
 TALLEST_PANEL = 4.0  # inches
 WIDEST_IN_FOURS, WIDEST_IN_PAIRS = 2.5, 6.0  # width over height, so that a panel stays about an inch tall
@@ -210,9 +210,8 @@ def _draw_texts(figure: "Figure", layout: Layout, title: str | None, notes: Sequ
     side = SIDE / WIDTH
     if title:
         top = 1.0 - 0.06 / layout.height
-        figure.suptitle(
-            style.shortened(title, TITLE_LETTERS), x=side, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE
-        )
+        shown = style.cut_to(title, (WIDTH - 2.0 * SIDE) * style.POINTS_PER_INCH, style.TITLE_SIZE)
+        figure.suptitle(shown, x=side, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE)
     figure.text(side, 0.05 / layout.height, "\n".join(notes), color=style.FAINT_INK, va="bottom")
 
 

@@ -71,7 +71,8 @@ def texts_of(figure: Figure) -> list[Text]:
     texts = list(figure.texts)
     for axes in figure.axes:
         legend = axes.get_legend()
-        texts += [*axes.texts, *(legend.get_texts() if legend else [])]
+        titles = [child for child in axes.get_children() if isinstance(child, Text)]  # and what else is written there
+        texts += [*titles, *(legend.get_texts() if legend else [])]
         if axes.axison:
             texts += [*_of_axis(axes, "x"), *_of_axis(axes, "y")]
     return [text for text in texts if text.get_text() and text.get_visible()]
