@@ -28,6 +28,7 @@ INSTALL_DECIDES := pyproject.toml $(CONSTRAINTS) blocksim/__init__.py
 VOID := $(if $(realpath $(VENV_PYTHON)),,void)
 
 SCENARIO := scenarios/three_blocks.toml
+DEMO := results/demo
 SMOKE := results/make-smoke
 PICTURES := results/make-pictures
 
@@ -109,6 +110,13 @@ pictures: $(RUN_STAMP) ## Draw the pictures of the README anew
 	$(BLOCKSIM) plot $(PICTURES)/ensemble --kind histogram --out results/ensemble.png
 	$(BLOCKSIM) sensitivity scenarios/ensemble_three_blocks.toml --samples 24 --out $(PICTURES)/morris.csv --overwrite --quiet
 	$(BLOCKSIM) plot $(PICTURES)/morris.csv --out results/sensitivity.png
+
+.PHONY: demo
+demo: $(RUN_STAMP) ## Run the three blocks with contact forces; strip, film and report in results/demo
+	$(BLOCKSIM) run $(SCENARIO) --set output.contacts=true --out $(DEMO)/run --overwrite --quiet
+	$(BLOCKSIM) plot $(DEMO)/run --forces --out $(DEMO)/strip.png
+	$(BLOCKSIM) animate $(DEMO)/run --forces --speed 0.1 --fps 20 --width 640 --out $(DEMO)/film.gif
+	$(BLOCKSIM) report $(DEMO)/run --out $(DEMO)/report.html
 
 .PHONY: setup
 setup: $(DEV_STAMP) ## Create or update .venv, with the tools for developers

@@ -32,6 +32,7 @@ MARGINS = 0.15, 0.50, 0.42  # inches: at the sides, above and below the panel
 HIGHEST = 1.0  # height of the panel over its width
 HELD = 1.5  # s that the last picture stays
 MOST_PICTURES = 10_000
+TIME_ROOM = 60.0  # points
 FEW_BLOCKS = 30  # up to which trails are drawn unless somebody decides
 TRAIL: dict[str, Any] = {"linewidths": 1.0, "alpha": 0.5, "zorder": 2.5}  # below names
 
@@ -139,8 +140,17 @@ class Film:
         shown = style.cut_to(title, self.page.panel_width * style.POINTS_PER_INCH, style.TITLE_SIZE)
         place = MARGINS[0] / self.page.width, 1.0 - 0.06 / self.page.height
         figure.text(*place, shown, va="top", fontsize=style.TITLE_SIZE)
+        if self.forces is not None:
+            self._tell_scale(self.forces.example)
         if self.support.motion is None:
             draw_standing(self.canvas, self.frames, int(self.drawable[0]), self.support)
+
+    def _tell_scale(self, example: str) -> None:
+        """Write how long forces are at the right, in the line of the time and as far as there is room beside it."""
+        room = self.page.panel_width * style.POINTS_PER_INCH - TIME_ROOM
+        top = self.page.extent.top + 4.0 / self.page.points_per_mm
+        text = style.cut_to(f"forces: {example}", room, style.FONT_SIZE)
+        self.canvas.axes.text(self.page.extent.right, top, text, ha="right", va="bottom", color=style.FAINT_INK)
 
     def picture(self, frame: int) -> Pixels:
         """Return the picture of one frame."""

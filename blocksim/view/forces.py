@@ -51,12 +51,17 @@ class ForceScale:
     @property
     def told(self) -> str:
         """What a person has to know to read the arrows."""
-        force = rounded(0.5 * self.longest / self.mm_per_newton)
-        length, most = force * self.mm_per_newton, self.longest / self.mm_per_newton
+        most = self.longest / self.mm_per_newton
         return (
-            f"Arrows: contact forces, each on the block that it pushes up; {force:g} N is {length:.3g} mm long, "
+            f"Arrows: contact forces, each on the block that it pushes up; {self.example} long, "
             f"from {most:.3g} N on they are cut."
         )
+
+    @property
+    def example(self) -> str:
+        """How long the arrow of a round force is."""
+        force = rounded(0.5 * self.longest / self.mm_per_newton)
+        return f"{force:g} N is {force * self.mm_per_newton:.3g} mm"
 
 
 def contacts_of(frames: WithContacts) -> Contacts:

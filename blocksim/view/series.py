@@ -19,7 +19,7 @@ LEFT, RIGHT, HEAD, FOOT = 0.62, 0.15, 0.62, 0.68  # inches
 COLUMN_GAP, ROW_GAP = 0.25, 0.36  # inches
 ROW_HEIGHT = 1.35  # inches
 SHORT_NAME = "1000"  # for which there is room in any caption
-LABEL_DEPTH = 0.22  # inches from the panels down to a label that is below all of them
+LABEL_DEPTH = 0.25  # inches from the panels down to a label that is below all of them
 MOST_ROWS, MOST_COLUMNS = 4, 4
 STAYS_MM = 0.01  # a block whose final x varies less than this is not drawn beside others
 LEAST_SPAN_MM = 1.0  # of an axis, so that round-off does not look like scatter
@@ -86,8 +86,7 @@ def draw_series(
         _draw_panels(figure, drawn, [(block, blocks[block]) for block in rows], key, measured or {})
         for axes, one in zip(figure.axes, drawn, strict=False):
             place = axes.get_position().x0, 1.0 - 0.29 / height
-            label = style.cut_to(one.label, panel_width(len(drawn)), style.FONT_SIZE, bold=True)
-            figure.text(*place, label, va="top", weight="bold")
+            figure.text(*place, _heading(one.label, panel_width(len(drawn))), va="top", weight="bold")
         if title:
             shown = style.cut_to(title, (WIDTH - 0.2) * style.POINTS_PER_INCH, style.TITLE_SIZE)
             figure.suptitle(shown, x=0.1 / WIDTH, y=1.0 - 0.06 / height, ha="left", va="top", fontsize=style.TITLE_SIZE)
@@ -122,6 +121,11 @@ def _draw_panels(
             _finish(axes, is_log=axis.is_log, is_first=column == 0, is_last=row == len(rows) - 1)
             axes.set_title(captions[row][column], loc="left", pad=3.0)
     _name_axis(figure, axis.label, len(series), room)
+
+
+def _heading(label: str, room: float) -> str:
+    """Return what is told above a column (points wide); of `key = value` the end is what tells columns apart."""
+    return style.cut_to(label[::-1], room, style.FONT_SIZE, bold=True)[::-1]
 
 
 def panel_width(columns: int) -> float:

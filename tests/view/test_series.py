@@ -111,3 +111,10 @@ def test_short_names_are_whole(caught: list[Figure]) -> None:
     assert "a short title" in texts
     assert any(text.startswith("block brick: 68.00 to 72.00 mm, 4.00 mm apart") for text in texts)
     assert not any("…" in text for text in texts)
+
+
+def test_headings_of_narrow_columns_keep_their_values(caught: list[Figure]) -> None:
+    series = [made_up(3, f"friction.block_block.kinetic = 0.{number}") for number in range(4)]
+    draw_series(series, ("1", "2", "3"), ("gravity", ""), "series.png")
+    texts = [text for text, _ in boxes_of(caught[0])]
+    assert [sum(text.endswith(f" = 0.{number}") for text in texts) for number in range(4)] == [1, 1, 1, 1]
