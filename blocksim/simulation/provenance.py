@@ -65,6 +65,12 @@ def environment() -> dict[str, str]:
     }
 
 
+def machine() -> str:
+    """Return processor, system and its C library, whose sines may differ in the last digit, in one line."""
+    parts = (_processor(), platform.system(), platform.machine(), *platform.libc_ver())
+    return " ".join(part for part in parts if part)
+
+
 def _processor() -> str:
     try:
         lines = CPU_INFO.read_text(encoding="utf-8", errors="replace").splitlines()

@@ -8,7 +8,7 @@ is followed by a new value of `n_committed`. HDF5 cannot recover from a write th
 import contextlib
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -48,8 +48,13 @@ class FrameFile:
         scenario_toml: str,
         *,
         ledger: Sequence[str],
+        kept: Iterable[Frame] = (),
     ) -> None:
-        """Create the file with all its data sets, `ledger` names the energies; raises OutputError when that fails."""
+        """Create the file with all its data sets, `ledger` names the energies; raises OutputError when that fails.
+
+        It begins with the frames that are `kept` from an earlier part of the run. Only with those on the disk it takes
+        the place of an older file.
+        """
         self.path = path
         self.units = layout.measured_units(ledger)
         self.time_step = time_step
@@ -63,10 +68,27 @@ class FrameFile:
         with self._telling_trouble():
             _try_room(unnamed)
             self.file = h5py.File(unnamed, "w", libver="latest")
-            self._reserve(len(scenario_toml))
-            self._create(placed, scenario_toml)
-            self.file.swmr_mode = True
-            unnamed.replace(path)
+            try:
+                self._reserve(len(scenario_toml))
+                self._create(placed, scenario_toml)
+                self.file.swmr_mode = True
+                self._begin_with(kept)
+                unnamed.replace(path)
+            except BaseException:
+                self._abandon(unnamed)
+                raise
+
+    def _begin_with(self, kept: Iterable[Frame]) -> None:
+        self.waiting.extend(kept)
+        if self.waiting:
+            self.commit()
+            self.sync()
+
+    def _abandon(self, unnamed: Path) -> None:
+        """Leave nothing where there is no room, or no time."""
+        with contextlib.suppress(OSError, RuntimeError):
+            self.file.close()
+        unnamed.unlink(missing_ok=True)
 
     def _create(self, placed: Sequence[PlacedBody], scenario_toml: str) -> None:
         h5md = self.file.create_group("h5md")
@@ -114,6 +136,12 @@ class FrameFile:
             self.file.flush()
         self.flushed_at = time.monotonic()
 
+    def sync(self) -> None:
+        """Commit, and wait until it is on the disk, where it outlives a power failure. Raises OutputError."""
+        self.commit()
+        with self._telling_trouble():
+            os.fsync(self.file.id.get_vfd_handle())
+
     def _write_waiting(self) -> None:
         steps, motions, rows = zip(*self.waiting, strict=True)
         self._put(layout.STEP, np.array(steps))
@@ -159,5 +187,6 @@ class FrameFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the file, whatever happened."""
+        """Close the file, whatever happened; who asks for the second time to stop at once does not wait for frames."""
+        self.is_broken |= kind is not None and not issubclass(kind, Exception)
         self.close()
