@@ -27,12 +27,18 @@ def code_version() -> str:
 
 
 @functools.cache
-def code_hash() -> str:
-    """Return a hash of all code that decides the bits of a run, and of the versions it is compiled with."""
+def code_hashes() -> dict[str, str]:
+    """Return a hash of the code of each room that decides the bits of a run, with the versions it is compiled with."""
     from blocksim.kernels.jit import source_hash  # noqa: PLC0415 - numba, which reading a folder does not need
 
     package = Path(__file__).resolve().parents[1]
-    text = " ".join([code_version(), *(source_hash(package / room) for room in ROOMS)])
+    return {room: source_hash(package / room) for room in ROOMS}
+
+
+@functools.cache
+def code_hash() -> str:
+    """Return one hash of all code that decides the bits of a run, and of the versions it is compiled with."""
+    text = " ".join([code_version(), *code_hashes().values()])
     return hashlib.sha256(text.encode()).hexdigest()
 
 
