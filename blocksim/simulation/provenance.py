@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from blocksim.kernels.arrays import World
 
 ROOMS = ("kernels", "scenario", "simulation", "world")  # their code decides the bits of a run
-PACKAGES = ("numpy", "numba", "pydantic", "h5py", "pandas")
+PACKAGES = ("numpy", "numba", "llvmlite", "pydantic", "h5py", "pandas")  # the first three compile or compute the bits
 HASH_DIGITS = 12
+ROOM_PREFIX = "code_"  # and a room: the hash of its code
 CPU_INFO = Path("/proc/cpuinfo")
 
 
@@ -57,18 +58,31 @@ def state_hash(world: "World") -> str:
 
 
 def environment() -> dict[str, str]:
-    """Return versions and machine."""
+    """Return versions, machine and command; `cpu` and `cpu_features` are what machine code is compiled for."""
     versions = {name: metadata.version(name) for name in PACKAGES}
+    cpu, features = _compiled_for()
     return {
         "blocksim": code_version(),
         "code": code_hash()[:HASH_DIGITS],
+        **{f"{ROOM_PREFIX}{room}": digest for room, digest in code_hashes().items()},
         "python": platform.python_version(),
         **versions,
         "platform": platform.platform(),
         "processor": _processor(),
+        "cpu": cpu,
+        "cpu_features": features,
         "cores": str(os.cpu_count()),
         "command": shlex.join(sys.argv),
     }
+
+
+def _compiled_for() -> tuple[str, str]:
+    """Return the name of the processor, and its features, that numba has compiled for: by these it names its files."""
+    from numba.core.registry import cpu_target  # noqa: PLC0415 - as in `code_hashes`
+
+    _, name, features = cpu_target.target_context.codegen().magic_tuple()
+    present = sorted(one[1:] for one in features.split(",") if one.startswith("+"))
+    return name, " ".join(present)
 
 
 def _processor() -> str:
