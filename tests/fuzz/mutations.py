@@ -64,6 +64,11 @@ def _pieces(pattern: re.Pattern[bytes], words: Sequence[str]) -> Callable[[st.Dr
     return replaced
 
 
+def _place(draw: st.DrawFn, last: int) -> int:
+    """Draw where to change something; more often where a large file says what it holds."""
+    return draw(st.one_of(st.integers(0, last), st.integers(0, min(last, 4096))))
+
+
 def _line_deleted(draw: st.DrawFn, text: bytes) -> bytes:
     lines = text.split(b"\n")
     del lines[draw(st.integers(0, len(lines) - 1))]
@@ -80,7 +85,7 @@ def _line_repeated(draw: st.DrawFn, text: bytes) -> bytes:
 def _bytes_changed(draw: st.DrawFn, text: bytes) -> bytes:
     changed = bytearray(text)
     for _ in range(draw(st.integers(1, 8)) if text else 0):
-        changed[draw(st.integers(0, len(text) - 1))] ^= 1 << draw(st.integers(0, 7))
+        changed[_place(draw, len(text) - 1)] ^= 1 << draw(st.integers(0, 7))
     return bytes(changed)
 
 
@@ -99,21 +104,21 @@ def _encoded(text: str) -> bytes:
 
 
 def _zeroed(draw: st.DrawFn, text: bytes) -> bytes:
-    place = draw(st.integers(0, len(text)))
+    place = _place(draw, len(text))
     size = min(draw(st.sampled_from((8, 64, 512, 4096))), len(text) - place)
     return text[:place] + bytes(size) + text[place + size :]
 
 
 def _filled(draw: st.DrawFn, text: bytes) -> bytes:
     """Set eight bytes to one: sizes and addresses become enormous."""
-    place = draw(st.integers(0, max(0, len(text) - 8)))
+    place = _place(draw, max(0, len(text) - 8))
     return text[:place] + draw(st.sampled_from((b"\xff", b"\x7f"))) * 8 + text[place + 8 :]
 
 
 def _moved(draw: st.DrawFn, text: bytes) -> bytes:
     """Put a block over another one."""
     size = min(draw(st.sampled_from((8, 64, 512))), len(text))
-    source, target = (draw(st.integers(0, len(text) - size)) for _ in range(2))
+    source, target = (_place(draw, len(text) - size) for _ in range(2))
     return text[:target] + text[source : source + size] + text[target + size :]
 
 

@@ -107,7 +107,9 @@ def test_a_document_keeps_what_was_allowed_when_it_was_read(naming: Callable[[st
 
 def test_data_from_python_are_held_to_the_same(place: Path) -> None:
     data = {
-        "schema": 1, "name": "case", "bodies": [{"block": "brick", "x": 0, "y": 0.01}],
+        "schema": 1,
+        "name": "case",
+        "bodies": [{"block": "brick", "x": 0, "y": 0.01}],
         "materials": {"steel": {"density": 7850, "young_modulus": 210e9, "poisson_ratio": 0.3}},
         "blocks": {"brick": {"width": 0.04, "height": 0.02, "length": 0.06, "material": "steel"}},
         "experiment": {"table": str(place / "theirs" / "measured.csv")},
