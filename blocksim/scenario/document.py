@@ -2,6 +2,7 @@
 
 import difflib
 import functools
+import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,6 +12,7 @@ from typing import Self, cast
 from blocksim.errors import InputMissingError, Problem, ScenarioError
 from blocksim.scenario.check import examine
 from blocksim.scenario.findings import Finding
+from blocksim.scenario.keys import MAX_PARTS
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overrides import (
     Data,
@@ -29,6 +31,9 @@ MAX_BYTES = 1_000_000
 MAX_PROBLEMS = 50
 Pair = tuple[str | Sequence[str | int], object]
 TOO_DEEP = "tables or lists are nested too deeply for a scenario"
+_PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
+ENDLESS_KEY = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MAX_PARTS}}}")
+"""A dotted key (or a text like one) that would keep tomllib busy for minutes; it takes the square of the parts."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,9 @@ class Document:
         Raises ScenarioError where it is no TOML.
         """
         source = Source(where, text.replace("\r\n", "\n"))
+        endless = ENDLESS_KEY.search(source.text)
+        if endless is not None:
+            raise ScenarioError([source.shown(TOO_DEEP, "", source.span_at(endless.start()))])
         try:
             data = cast("Data", frozen(tomllib.loads(source.text)))
         except tomllib.TOMLDecodeError as error:

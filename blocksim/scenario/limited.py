@@ -16,7 +16,7 @@ def read_limited(path: Path, limit: int) -> bytes:
     no file but a folder, a pipe or a device, which may never end.
     """
     try:
-        with path.open("rb", opener=_at_once) as file:
+        with open(path, "rb", opener=_at_once) as file:
             if not path.is_file():
                 message = f"{path}: not a file"
                 raise InvalidInputError(message)

@@ -4,8 +4,9 @@ import contextlib
 import json
 from pathlib import Path
 
-from blocksim.errors import OutputExistsError
+from blocksim.errors import BlocksimError, OutputExistsError
 from blocksim.scenario import Scenario
+from blocksim.scenario.limited import MEGABYTE, read_limited
 from blocksim.scenario.resolved import HEADER
 from blocksim.simulation.provenance import run_hash
 
@@ -18,6 +19,8 @@ FRAMES = "run.h5"
 SUMMARY = "run.json"
 DONE = "done.json"  # written last: a folder without it is not finished
 OURS = (SCENARIO, EXPERIMENT, MOTION, FINAL, FRAMES, SUMMARY, DONE)
+
+MOST_BYTES = MEGABYTE  # of done.json
 
 
 def default_folder(scenario: Scenario) -> Path:
@@ -32,8 +35,8 @@ def is_finished(folder: Path) -> bool:
 
 def holds_run(folder: Path, scenario: Scenario) -> bool:
     """Tell whether the folder holds a finished run of exactly this scenario and code."""
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
-        done = json.loads((folder / DONE).read_text(encoding="utf-8"))
+    with contextlib.suppress(BlocksimError, ValueError, KeyError, TypeError, RecursionError):
+        done = json.loads(read_limited(folder / DONE, MOST_BYTES))
         return bool(done["run"] == run_hash(scenario))
     return False
 

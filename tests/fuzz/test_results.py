@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -72,9 +72,14 @@ def _left_open(folder: Path) -> bytes:
 def _rewritten(folder: Path) -> bytes:
     """Return the frames in HDF5's oldest format, whose structures have no checksums to catch the damage."""
     path = folder / "old.h5"
-    with h5py.File(folder / "run.h5") as source, h5py.File(path, "w", libver=("earliest", "v108")) as target:
-        for name in source:
-            source.copy(name, target)
+    with h5py.File(folder / "run.h5") as source, h5py.File(path, "w", libver="earliest") as target:
+
+        def copy(name: str, found: Any) -> None:
+            if isinstance(found, h5py.Dataset):
+                made = target.create_dataset(name, data=found[()], chunks=True if found.chunks else None)
+                made.attrs.update(found.attrs)
+
+        source.visititems(copy)
     content = path.read_bytes()
     path.unlink()
     return content
