@@ -11,6 +11,7 @@ from typer.core import TyperGroup
 
 from blocksim.cli.collector import loading
 from blocksim.cli.failures import told
+from blocksim.cli.outside import add_outside
 
 COMMANDS = {  # name: module in this folder, function in it, first line of its help
     "run": ("run", "run_command", "Simulate a scenario and show where the blocks end."),
@@ -53,7 +54,7 @@ def loaded(name: str) -> Any:
         command = getattr(import_module(f"blocksim.cli.{module}"), function)
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
     alone.command(name, short_help=summary)(command)
-    return typer.main.get_command(alone)
+    return add_outside(name, typer.main.get_command(alone))
 
 
 def _listed() -> None:
