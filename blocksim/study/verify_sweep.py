@@ -2,6 +2,7 @@
 
 import csv
 import io
+import os
 import random
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -9,12 +10,12 @@ from functools import cached_property
 from pathlib import Path
 
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.simulation import run_in_batches
 from blocksim.study.done import Done
+from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.many import cases_in, ranges_of
 from blocksim.study.plan import Case, Cases
 from blocksim.study.ranges import Ranges
-from blocksim.study.rows import Row, invalid_row, row_of_member
+from blocksim.study.rows import Row, invalid_row
 from blocksim.study.single import FINISHED
 from blocksim.study.sweep_folder import CASES, read_origin, read_plan
 from blocksim.study.table import OUTCOME, TABLE
@@ -128,10 +129,10 @@ def _numbers(folder: Path, cases: Cases, count: int) -> Sequence[int]:
 
 def _ends(cases: Sequence[Case]) -> Iterator[tuple[Case, Row]]:
     """Run cases and yield each with its row."""
-    batches = run_in_batches([case.scenario for case in cases if case.scenario is not None])
-    members = (row_of_member(one) for batch in batches for one in batch)
+    scenarios = [case.scenario for case in cases if case.scenario is not None]
+    rows = iter(rows_of(scenarios, os.cpu_count() or 1))
     for case in cases:
-        yield case, invalid_row(case.problem) if case.scenario is None else next(members)
+        yield case, invalid_row(case.problem) if case.scenario is None else next(rows)
 
 
 def _cells(columns: Sequence[str], case: Case, row: Row, ranges: Ranges | None) -> dict[str, str]:

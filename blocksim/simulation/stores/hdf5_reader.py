@@ -18,6 +18,7 @@ from blocksim.simulation.frames import Frames
 from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
 from blocksim.simulation.stores import hdf5_layout as layout
 from blocksim.simulation.stores import hdf5_safety as safety
+from blocksim.simulation.stores.hdf5_contacts import read_contacts
 
 SUPERBLOCK = struct.Struct("<8sBxxB16xQ")  # signature, version, consistency flags, end of file
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -93,6 +94,7 @@ def _read(path: Path, file: Any, bodies: int) -> tuple[float, Rows]:
         np.stack([one[:count] for one in moving.values()], axis=1, dtype=np.float64),
         np.stack([one[:count] for one in measured.values()], axis=1, dtype=np.float64),
         ledger,
+        read_contacts(path, file, count, bodies),
     )
     return _time_step(steps, rows.steps), rows
 
