@@ -33,6 +33,9 @@ INSTALL_DECIDES := pyproject.toml $(CONSTRAINTS) $(DEV_CONSTRAINTS) $(BENCH_CONS
 # Without a Python (none yet, or it was upgraded away) the stamps are void.
 VOID := $(if $(realpath $(VENV_PYTHON)),,void)
 
+# Every process compiles or loads the kernels by itself, so more of them gain less and less.
+ON_ALL_CORES := --numprocesses auto --maxprocesses 4 --dist worksteal
+
 SCENARIO := scenarios/three_blocks.toml
 SMOKE := results/make-smoke
 PICTURES := results/make-pictures
@@ -48,7 +51,7 @@ run: $(RUN_STAMP) ## Let the three blocks collapse and compare with the measurem
 
 .PHONY: test
 test: $(DEV_STAMP) ## Run the tests (sets up .venv first)
-	$(VENV_PYTHON) -m pytest
+	$(VENV_PYTHON) -m pytest $(ON_ALL_CORES)
 
 .PHONY: test-long
 test-long: $(DEV_STAMP) ## Run the full sizes of the verification cases, some minutes
@@ -56,7 +59,7 @@ test-long: $(DEV_STAMP) ## Run the full sizes of the verification cases, some mi
 
 .PHONY: test-nojit
 test-nojit: $(DEV_STAMP) ## Run the tests of the kernels as plain Python, without the compiler
-	NUMBA_DISABLE_JIT=1 $(VENV_PYTHON) -m pytest tests/kernels
+	NUMBA_DISABLE_JIT=1 $(VENV_PYTHON) -m pytest $(ON_ALL_CORES) tests/kernels
 
 .PHONY: verify-table
 verify-table: $(DEV_STAMP) ## Measure all verification cases anew and write their table into the README
