@@ -1,5 +1,6 @@
 """Samples the world at the output times. It names the next step it wants and never changes the motion."""
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -60,18 +61,38 @@ class Recorder:
         self.contacts: list[ContactRows] | None = [] if contacts else None
 
     def next_step(self, done: int) -> int:
-        """Return the next step to record after `done` steps."""
-        number = int(done / self.steps_per_frame + 0.5) + 1
+        """Return the next step to record after `done` steps, wherever those end."""
+        number = int(done / self.steps_per_frame)
         while round(number * self.steps_per_frame) <= done:
             number += 1
         return round(number * self.steps_per_frame)
+
+    def is_output_time(self, step: int) -> bool:
+        """Tell whether a step is recorded wherever the run ends."""
+        return step == 0 or self.next_step(step - 1) == step
+
+    def count_until(self, step: int) -> int:
+        """Return the number of frames up to a step."""
+        return bisect_right(self.steps, step)
+
+    def take_over(self, rows: "Rows") -> None:
+        """Begin with the frames of an earlier part of the run; what it recorded is not recorded again."""
+        self.ledger = rows.ledger
+        self.steps = rows.steps.tolist()
+        self.motion, self.measured = [*rows.motion], [*rows.measured]
+        self.contacts = None if rows.contacts is None else rows.contacts.tables()
+
+    def recorded(self) -> list[Frame]:
+        """Return the frames so far, one by one."""
+        contacts = [None] * len(self.steps) if self.contacts is None else self.contacts
+        return [Frame(*one) for one in zip(self.steps, self.motion, self.measured, contacts, strict=True)]
 
     def sample(self, scene: "AnyScene") -> None:
         """Add a frame of the present state, unless this step has one already."""
         from blocksim.simulation.schemes import measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
 
         step = int(scene.world.clock[0].steps)
-        if self.steps and self.steps[-1] == step:
+        if self.steps and self.steps[-1] >= step:
             return
         row = measured_row(scene)
         motion = np.stack([scene.world.bodies[name][: len(self.placed)] for name in MOTION])
@@ -102,6 +123,18 @@ class Rows(NamedTuple):
     measured: NDArray[np.float64]  # (n, e + 2): energies, number of contacts, largest overlap
     ledger: tuple[str, ...]  # names of the e energies
     contacts: Contacts | None = None  # of all frames
+
+    def chosen(self, which: NDArray[np.bool_]) -> "Rows":
+        """Return some of the frames."""
+        contacts = None if self.contacts is None else self.contacts.chosen(which)
+        return Rows(self.steps[which], self.motion[which], self.measured[which], self.ledger, contacts)
+
+
+def rows_of_frames(frames: Frames) -> Rows:
+    """Return what frames consist of: the other way round than `frames_from_rows`."""
+    motion = np.stack([getattr(frames, name) for name in MOTION], axis=1)
+    measured = np.stack([*frames.energy.values(), frames.contact_count, frames.largest_overlap], axis=1)
+    return Rows(frames.step, motion, measured, tuple(frames.energy), frames.contacts)
 
 
 def frames_from_rows(placed: Sequence[PlacedBody], time_step: float, rows: Rows) -> Frames:

@@ -36,7 +36,7 @@ class Done:
             return
         if path not in self.paths:
             self.paths.append(path)
-        self.state[number] = ENDED_WELL if entry.row["status"] == FINISHED else ENDED_BADLY
+        self.state[number] = ENDED_WELL if entry.row.get("status") == FINISHED else ENDED_BADLY
         self.starts[number], self.sources[number] = start, self.paths.index(path)
         self.values[number] = int(entry.values, 16)
         blocks = blocks_in(entry.row)

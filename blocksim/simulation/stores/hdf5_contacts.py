@@ -4,11 +4,13 @@ They are written and flushed with the frames they belong to, before `n_committed
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from blocksim.simulation.contacts import BODIES, CONTACT_ROW, UNITS, Contacts, Rows, empty_rows
+from blocksim.simulation.contacts import BODIES, CONTACT_ROW, SUPPORT, UNITS, Contacts, Rows, empty_rows
+from blocksim.simulation.stores import hdf5_safety as safety
 
 GROUP = "contacts"
 ENDS = f"{GROUP}/end"
@@ -48,21 +50,23 @@ def _append(data_set: Any, values: Any) -> None:
     data_set[count:] = values
 
 
-def read_contacts(file: Any, frames: int) -> Contacts | None:
-    """Return the contacts of the first `frames` frames, None where none were stored.
+def read_contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts | None:
+    """Return the contacts of the first `frames` frames of a file, None where none were stored.
 
-    Raises KeyError or ValueError where columns are missing or do not go together.
+    Raises KeyError or ValueError where columns are missing, do not go together or name no body.
     """
     if GROUP not in file:
         return None
-    ends = file[ENDS][:frames].astype(np.int64)
+    ends = safety.data_set(file, ENDS, 1)[:frames].astype(np.int64)
     if len(ends) != frames or (np.diff(ends, prepend=0) < 0).any():
         raise ValueError(f"{ENDS} does not count the contacts of {frames} frames")
     count = int(ends[-1]) if frames else 0
+    columns = {name: safety.data_set(file, f"{GROUP}/{name}", 1) for name in COLUMN_UNITS}
+    safety.refuse_too_many(path, columns, count, "contacts")
     rows = empty_rows(count)
-    for name in COLUMN_UNITS:
-        column = file[f"{GROUP}/{name}"]
-        if column.shape[0] < count:
-            raise ValueError(f"{GROUP}/{name} has {column.shape[0]} of {count} contacts")
+    for name, column in columns.items():
         rows[name] = column[:count]
+    for name, least in zip(BODIES, (0, SUPPORT), strict=True):
+        if count and not (least <= rows[name].min() and rows[name].max() < bodies):
+            raise ValueError(f"{GROUP}/{name} names bodies that are none of {bodies}")
     return Contacts(ends, rows)

@@ -8,7 +8,7 @@ is followed by a new value of `n_committed`. HDF5 cannot recover from a write th
 import contextlib
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -42,7 +42,7 @@ def _try_room(path: Path) -> None:
 class FrameFile:
     """Writes frames as they come; use as a context manager."""
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - what a file begins with
         self,
         path: Path,
         placed: Sequence[PlacedBody],
@@ -50,11 +50,13 @@ class FrameFile:
         scenario_toml: str,
         *,
         ledger: Sequence[str],
+        kept: Iterable[Frame] = (),
         contacts: bool = False,
     ) -> None:
         """Create the file with all its data sets, `ledger` names the energies; raises OutputError when that fails.
 
-        With `contacts` every frame has to bring its contacts.
+        It begins with the frames that are `kept` from an earlier part of the run. Only with those on the disk it takes
+        the place of an older file. With `contacts` every frame has to bring its contacts.
         """
         self.path = path
         self.units = layout.measured_units(ledger)
@@ -70,10 +72,27 @@ class FrameFile:
         with self._telling_trouble():
             _try_room(unnamed)
             self.file = h5py.File(unnamed, "w", libver="latest")
-            self._reserve(len(scenario_toml))
-            self._create(placed, scenario_toml)
-            self.file.swmr_mode = True
-            unnamed.replace(path)
+            try:
+                self._reserve(len(scenario_toml))
+                self._create(placed, scenario_toml)
+                self.file.swmr_mode = True
+                self._begin_with(kept)
+                unnamed.replace(path)
+            except BaseException:
+                self._abandon(unnamed)
+                raise
+
+    def _begin_with(self, kept: Iterable[Frame]) -> None:
+        self.waiting.extend(kept)
+        if self.waiting:
+            self.commit()
+            self.sync()
+
+    def _abandon(self, unnamed: Path) -> None:
+        """Leave nothing where there is no room, or no time."""
+        with contextlib.suppress(OSError, RuntimeError):
+            self.file.close()
+        unnamed.unlink(missing_ok=True)
 
     def _create(self, placed: Sequence[PlacedBody], scenario_toml: str) -> None:
         h5md = self.file.create_group("h5md")
@@ -122,6 +141,12 @@ class FrameFile:
             self.file[layout.COMMITTED][()] = self.count
             self.file.flush()
         self.flushed_at = time.monotonic()
+
+    def sync(self) -> None:
+        """Commit, and wait until it is on the disk, where it outlives a power failure. Raises OutputError."""
+        self.commit()
+        with self._telling_trouble():
+            os.fsync(self.file.id.get_vfd_handle())
 
     def _write_waiting(self) -> None:
         steps, motions, rows, _ = zip(*self.waiting, strict=True)
@@ -176,5 +201,6 @@ class FrameFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the file, whatever happened."""
+        """Close the file, whatever happened; who asks for the second time to stop at once does not wait for frames."""
+        self.is_broken |= kind is not None and not issubclass(kind, Exception)
         self.close()
