@@ -11,6 +11,7 @@ from typer.core import TyperGroup
 
 from blocksim.cli.collector import loading
 from blocksim.cli.failures import told
+from blocksim.cli.outside import add_outside
 
 COMMANDS = {  # name: module in this folder, function in it, first line of its help
     "run": ("run", "run_command", "Simulate a scenario and show where the blocks end."),
@@ -21,6 +22,7 @@ COMMANDS = {  # name: module in this folder, function in it, first line of its h
     "sensitivity": ("sensitivity", "sensitivity_command", "Show which inputs decide where the blocks end."),
     "converge": ("converge", "converge_command", "Refine step, stiffness and spacing until the run-out stays."),
     "verify": ("verify", "verify_command", "Run the verification cases and show the table."),
+    "verify-run": ("verify_run", "verify_run_command", "Run stored results again and compare the bits."),
     "bench": ("bench", "bench_command", "Measure speed and memory, and show the table."),
     "plot": ("plot", "plot_command", "Draw a run, a sweep or a table of sensitivities."),
     "animate": ("animate", "animate_command", "Show a run as a film, GIF or MP4."),
@@ -52,7 +54,7 @@ def loaded(name: str) -> Any:
         command = getattr(import_module(f"blocksim.cli.{module}"), function)
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
     alone.command(name, short_help=summary)(command)
-    return typer.main.get_command(alone)
+    return add_outside(name, typer.main.get_command(alone))
 
 
 def _listed() -> None:

@@ -22,6 +22,7 @@ ScenarioPath = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario
 StoredRunPath = Annotated[
     Path, typer.Argument(metavar="RUN", help="Run folder, results/NAME (its newest finished run) or scenario file.")
 ]
+Forces = Annotated[bool, typer.Option("--forces", help="Draw contact forces, where the run has stored them.")]
 Settings = Annotated[
     list[str] | None,
     typer.Option(

@@ -2,15 +2,17 @@
 
 import difflib
 import functools
+import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self, cast
 
 from blocksim.errors import InputMissingError, Problem, ScenarioError
 from blocksim.scenario.check import examine
 from blocksim.scenario.findings import Finding
+from blocksim.scenario.keys import MAX_PARTS
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overrides import (
     Data,
@@ -22,25 +24,30 @@ from blocksim.scenario.overrides import (
     with_value,
 )
 from blocksim.scenario.quantities import shown
+from blocksim.scenario.reach import is_anywhere, reaching, said_by_hand
 from blocksim.scenario.source import Source, clipped, override_problem
 
 MAX_BYTES = 1_000_000
 MAX_PROBLEMS = 50
 Pair = tuple[str | Sequence[str | int], object]
 TOO_DEEP = "tables or lists are nested too deeply for a scenario"
+_PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
+ENDLESS_KEY = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MAX_PARTS}}}")
+"""A dotted key (or a text like one) that would keep tomllib busy for minutes; it takes the square of the parts."""
 
 
 @dataclass(frozen=True)
 class Document:
     """Raw data of one scenario with its text, so that mistakes can be shown where they stand.
 
-    Relative paths inside are resolved against `folder`.
+    Relative paths inside are resolved against `folder`; with `allow_outside` they may lead anywhere.
     """
 
     data: Data
     source: Source
     folder: Path = Path()
     overrides: tuple[Override, ...] = ()
+    allow_outside: bool = field(default_factory=is_anywhere)
 
     @classmethod
     def read(cls, path: Path | str) -> Self:
@@ -58,6 +65,9 @@ class Document:
         Raises ScenarioError where it is no TOML.
         """
         source = Source(where, text.replace("\r\n", "\n"))
+        endless = ENDLESS_KEY.search(source.text)
+        if endless is not None:
+            raise ScenarioError([source.shown(TOO_DEEP, "", source.span_at(endless.start()))])
         try:
             data = cast("Data", frozen(tomllib.loads(source.text)))
         except tomllib.TOMLDecodeError as error:
@@ -86,7 +96,7 @@ class Document:
     def with_settings(self, settings: Sequence[str]) -> Self:
         """Set values as --set takes them ("contact.stiffness_scale=0.1"); raises ScenarioError."""
         texts = [(f"--set {clipped(text, 0)[0]}", text) for text in settings]
-        return self._with(texts, [functools.partial(parse_override, text) for text in settings])
+        return self._with(texts, [functools.partial(_setting, text) for text in settings])
 
     def _with(self, texts: Sequence[tuple[str, str]], pairs: Sequence[Callable[[], Pair]]) -> Self:
         """Set one value after the other, and tell all that cannot be set together."""
@@ -104,7 +114,8 @@ class Document:
 
     def build(self) -> Scenario:
         """Validate; raises ScenarioError with every mistake, those in the file first and by line."""
-        scenario, findings = examine(self.data, self.folder)
+        with reaching(anywhere=self.allow_outside):
+            scenario, findings = examine(self.data, self.folder)
         if scenario is None:
             raise ScenarioError(self._problems(findings))
         return scenario
@@ -134,6 +145,11 @@ class Document:
 
 def _pair(key: str, value: object) -> Pair:
     return key, value
+
+
+def _setting(text: str) -> Pair:
+    key, value = parse_override(text)
+    return key, said_by_hand(key, value)
 
 
 def _unusable(where: str, message: str) -> ScenarioError:

@@ -24,6 +24,9 @@ TAGS = ("kind", "scheme")
 MISSING = object()
 """What `follow` returns where there is nothing."""
 
+MAX_PARTS = 64
+"""Of a dotted key; tomllib takes the time of their square."""
+
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _BASIC = re.compile(r'"(?:[^"\\\n]|\\[^\n])*"')
 _LITERAL = re.compile(r"'[^'\n]*'")
@@ -33,10 +36,10 @@ _BLANK = re.compile(r"[ \t]*")
 def read_key(text: str, start: int = 0) -> tuple[tuple[str, ...], int]:
     """Read a TOML key, dotted and quoted or not, from `start`: its parts, and where it ends.
 
-    Raises ValueError.
+    Raises ValueError, also for more than MAX_PARTS parts.
     """
     parts: list[str] = []
-    while True:
+    while len(parts) < MAX_PARTS:
         start = skip_blank(text, start)
         found = next((m for p in (_BASIC, _LITERAL, _BARE) if (m := p.match(text, start))), None)
         if found is None:
@@ -47,6 +50,8 @@ def read_key(text: str, start: int = 0) -> tuple[tuple[str, ...], int]:
         if not text.startswith(".", after):
             return tuple(parts), found.end()
         start = after + 1
+    message = "too many parts"
+    raise ValueError(message)
 
 
 def _unquoted(part: str) -> str:

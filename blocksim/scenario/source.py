@@ -54,6 +54,11 @@ class Source:
         place = self.places[prefix]
         return self.shown(message, key, place.key if at == "key" else place.value)
 
+    def span_at(self, index: int) -> Span:
+        """Return the place of one character of the text."""
+        before = self.text[:index]
+        return Span(before.count("\n") + 1, index - (before.rfind("\n") + 1), 1)
+
     def shown(self, message: str, key: str, span: Span | None) -> Problem:
         """Make the problem with its line."""
         if span is None:

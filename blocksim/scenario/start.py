@@ -19,6 +19,9 @@ from blocksim.scenario.structures import MAX_BLOCKS, UnfitError
 MAX_SEGMENTS = 1000
 MAX_OVERLAPS = 20
 MAX_PIECES = 1_000_000
+MAX_INTERVALS = 65_000
+"""Of particles along one side; the solver counts them in 16 bits."""
+MAX_PARTICLES = 1_000_000
 SHORTEST_SHARE = 0.01
 """Least length of a piece of boundary, in smallest sides of the blocks."""
 LEAST_SKIN = 1e-4
@@ -50,6 +53,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
         return
     smallest = min(min(body.size_x, body.size_y) for body in bodies)
     yield from _coarse_particles(scenario, smallest)
+    yield from _fine_particles(scenario)
     farthest = max(max(abs(body.x), abs(body.y)) for body in bodies)
     yield from _unfit_skin(scenario, smallest, farthest)
     yield from _short_segments(scenario, SHORTEST_SHARE * smallest)
@@ -133,6 +137,18 @@ def _coarse_particles(scenario: Scenario, smallest: float) -> Iterator[Finding]:
         length = _mm(contact.resolved_smoothing_length)
         message = f"a {contact.kernel} of smoothing length {length} reaches {_mm(contact.support_radius)} far"
         yield Finding(("contact", key), f"{message}, through {side}", relation=True)
+
+
+def _fine_particles(scenario: Scenario) -> Iterator[Finding]:
+    """Find particles so close that a side, or all kinds of blocks together, would have too many of them."""
+    spacing = scenario.contact.particle_spacing
+    if scenario.contact.model == "surface":
+        return
+    sides = [side / spacing for block in scenario.blocks.values() for side in (block.size_x, block.size_y)]
+    if max(sides) > MAX_INTERVALS or 2.0 * sum(sides) > MAX_PARTICLES:
+        message = f"{_mm(spacing)} is too small: the longest side would have {max(sides):.6g} particles"
+        most = f"at most {MAX_INTERVALS} on a side and {MAX_PARTICLES} around one block of each kind are possible"
+        yield Finding(("contact", "particle_spacing"), f"{message}; {most}", relation=True)
 
 
 def _unfit_skin(scenario: Scenario, smallest: float, farthest: float) -> Iterator[Finding]:

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
 from blocksim.scenario.resolved import deciding_values
-from blocksim.simulation.provenance import ROOMS, code_version, machine
+from blocksim.simulation.provenance import code_hashes, code_version, machine
 
 MOST_NAMED = 6  # differences in a message
 NONE = "none"
@@ -30,13 +30,10 @@ def origin_of(scenario: Scenario) -> Origin:
     """Return what a run of a scenario comes from, here and now."""
     import numba  # noqa: PLC0415 - a run has it anyway, who only reads results has not
 
-    from blocksim.kernels.jit import source_hash  # noqa: PLC0415 - numba
-
-    package = Path(__file__).resolve().parents[1]
     return Origin(
         scenario=deciding_values(scenario),
         versions={"blocksim": code_version(), "numba": numba.__version__, "numpy": np.__version__},
-        rooms={room: source_hash(package / room) for room in ROOMS},
+        rooms=code_hashes(),
         machine=machine(),
     )
 

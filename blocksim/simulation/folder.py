@@ -5,8 +5,9 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from blocksim.errors import OutputError, OutputExistsError
+from blocksim.errors import BlocksimError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario
+from blocksim.scenario.limited import MEGABYTE, read_limited
 from blocksim.scenario.resolved import HEADER
 from blocksim.simulation.provenance import run_hash
 
@@ -21,6 +22,8 @@ DONE = "done.json"  # written last: a folder without it is not finished
 CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run goes on, removed when it has finished
 OURS = (SCENARIO, EXPERIMENT, MOTION, FINAL, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
 
+MOST_BYTES = MEGABYTE  # of done.json
+
 
 def default_folder(scenario: Scenario) -> Path:
     """Return results/<name>/<hash of the resolved scenario and the code>."""
@@ -34,8 +37,8 @@ def is_finished(folder: Path) -> bool:
 
 def holds_run(folder: Path, scenario: Scenario) -> bool:
     """Tell whether the folder holds a finished run of exactly this scenario and code."""
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
-        done = json.loads((folder / DONE).read_text(encoding="utf-8"))
+    with contextlib.suppress(BlocksimError, ValueError, KeyError, TypeError, RecursionError):
+        done = json.loads(read_limited(folder / DONE, MOST_BYTES))
         return bool(done["run"] == run_hash(scenario))
     return False
 

@@ -30,7 +30,7 @@ class Part:
         stored = resumption.checkpoint
         self.scene = built if stored is None else restored(stored, built)
         self.step = float(self.scene.world.controls[0].step)
-        self.recorder = Recorder(self.placed, scenario.output.every, self.step)
+        self.recorder = Recorder(self.placed, scenario.output.every, self.step, contacts=scenario.output.contacts)
         self.past = NO_PAST
         if stored is not None:
             self.past = Past.of(stored.path, stored.position)
@@ -41,7 +41,8 @@ class Part:
     def run(self, toml: str, precautions: Precautions, team: Team, attendance: Attendance) -> LoopResult:
         """Run to the end or an interruption; the file of the frames says `toml`. Raises OutputError."""
         path, names, kept = self.folder / files.FRAMES, scheme_named(self.scenario).ledger, self.recorder.recorded()
-        with FrameFile(path, self.placed, self.step, toml, ledger=names, kept=kept) as sink:
+        contacts = self.scenario.output.contacts
+        with FrameFile(path, self.placed, self.step, toml, ledger=names, kept=kept, contacts=contacts) as sink:
             self.recorder.sink = sink
             files.clear_remains(self.folder, (files.FINAL, files.SUMMARY))  # they tell of the part before
             self.writer = self._writer(sink, precautions)

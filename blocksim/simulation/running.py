@@ -44,7 +44,8 @@ def simulate(
     compile_kernels(kernels_of(scenario))
     began = time.perf_counter()
     scene = build_scene(scenario)
-    recorder = Recorder(place_bodies(scenario), scenario.output.every, float(scene.world.controls[0].step))
+    step, output = float(scene.world.controls[0].step), scenario.output
+    recorder = Recorder(place_bodies(scenario), output.every, step, contacts=output.contacts)
     with stop_requests() as requests, team_for(scene, threads) as team:
         attendance = Attendance(on_progress, lambda: requests.reason() or limit.reason())
         ended = run_loop(scene, recorder, scenario.time.end, team=team, attendance=attendance)

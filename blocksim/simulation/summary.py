@@ -5,8 +5,12 @@ from typing import Literal
 
 from pydantic import BaseModel, ValidationError
 
-from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.errors import InvalidInputError
+from blocksim.scenario.limited import MEGABYTE, read_limited
 from blocksim.simulation.ledger import EnergyLedger
+
+MOST_BYTES = MEGABYTE
+"""Of run.json; a run writes two thousand."""
 
 
 class Summary(BaseModel, frozen=True):
@@ -42,15 +46,9 @@ class Summary(BaseModel, frozen=True):
 def read_summary(path: Path) -> Summary:
     """Return what a run.json holds. Raises InputMissingError or InvalidInputError."""
     try:
-        return Summary.model_validate_json(path.read_bytes())
-    except FileNotFoundError:
-        message = f"{path}: no such file"
-        raise InputMissingError(message) from None
+        return Summary.model_validate_json(read_limited(path, MOST_BYTES))
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
         message = f"{path}: not the summary of a run: {place + ': ' if place else ''}{first['msg']}"
         raise InvalidInputError(message) from None
-    except OSError as error:
-        message = f"{path}: cannot be read: {error.strerror}"
-        raise InputMissingError(message) from None

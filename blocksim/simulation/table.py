@@ -7,12 +7,14 @@ when somebody asks for a DataFrame.
 import csv
 import io
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.errors import InvalidInputError
+from blocksim.scenario.limited import MEGABYTE, read_limited
 from blocksim.simulation.frames import Floats, Frames
 
 if TYPE_CHECKING:
@@ -34,6 +36,7 @@ COLUMNS = (
     "spin_deg_s",
 )
 MILLI = 1e3
+MOST_BYTES = 400 * MEGABYTE  # of final.csv; a million blocks take half of it
 
 
 def final_columns(frames: Frames) -> Columns:
@@ -105,23 +108,24 @@ def csv_text(columns: Columns) -> str:
 def read_table(path: Path) -> Columns:
     """Return a final table from its file. Raises InputMissingError or InvalidInputError."""
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            return _columns_of([line for line in csv.reader(file) if line])
-    except FileNotFoundError:
-        message = f"{path}: no such file"
-        raise InputMissingError(message) from None
-    except (OSError, ValueError, csv.Error) as error:
+        text = read_limited(path, MOST_BYTES).decode()
+        return _columns_of(line for line in csv.reader(io.StringIO(text, newline="")) if line)
+    except (ValueError, csv.Error) as error:
         message = f"{path}: not a final table: {error}"
         raise InvalidInputError(message) from error
 
 
-def _columns_of(lines: list[list[str]]) -> Columns:
-    """Return the columns in the lines of a file. Raises ValueError."""
-    if not lines or tuple(lines[0]) != COLUMNS:
+def _columns_of(lines: Iterator[list[str]]) -> Columns:
+    """Return the columns in the lines of a file, which are not kept. Raises ValueError."""
+    if tuple(next(lines, ())) != COLUMNS:
         raise ValueError(f"the columns have to be {','.join(COLUMNS)}")
-    names, *texts = zip(*lines[1:], strict=True) if lines[1:] else [()] * len(COLUMNS)
-    numbers = ([_number(text) for text in column] for column in texts)
-    return dict(zip(COLUMNS, (list(names), *numbers), strict=True))
+    columns: Columns = {name: [] for name in COLUMNS}
+    for number, cells in enumerate(lines, start=1):
+        if len(cells) != len(COLUMNS):
+            raise ValueError(f"row {number} has {len(cells)} cells, not {len(COLUMNS)}")
+        for column, value in zip(columns.values(), (cells[0], *map(_number, cells[1:])), strict=True):
+            column.append(value)
+    return columns
 
 
 def _number(text: str) -> float:

@@ -6,9 +6,9 @@ from typing import BinaryIO
 import numpy as np
 
 from blocksim.study.manifest import PATTERN, Entry, read_entries, values_hash
+from blocksim.study.places import FINISHED
 from blocksim.study.rows import blocks_in
 from blocksim.study.shard import WHOLE, Shard
-from blocksim.study.single import FINISHED
 
 MISSING, ENDED_WELL, ENDED_BADLY = range(3)
 
@@ -36,7 +36,7 @@ class Done:
             return
         if path not in self.paths:
             self.paths.append(path)
-        self.state[number] = ENDED_WELL if entry.row["status"] == FINISHED else ENDED_BADLY
+        self.state[number] = ENDED_WELL if entry.row.get("status") == FINISHED else ENDED_BADLY
         self.starts[number], self.sources[number] = start, self.paths.index(path)
         self.values[number] = int(entry.values, 16)
         blocks = blocks_in(entry.row)

@@ -11,6 +11,7 @@ import itertools
 import json
 import math
 import os
+import re
 import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ PATTERN = "manifest*.jsonl"
 DIGITS = 12
 SUM = b',"sum":"'
 NEWLINE = b"\n"
+LONGEST = 1 << 30
+"""Bytes of a line that are read at once; a row of a million blocks has 200 million."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +52,19 @@ class Entry:
         head, _, end = line.rpartition(SUM)
         if end != b'%08x"}\n' % zlib.crc32(head):
             return None
-        data = json.loads(head + b"}")
-        return cls(data["number"], data["case"], data["values"], data["row"])
+        try:
+            data = json.loads(head + b"}")
+            entry = cls(data["number"], data["case"], data["values"], data["row"])
+        except (ValueError, KeyError, TypeError, RecursionError):  # a right sum below what no sweep writes
+            return None
+        return entry if _is_entry(entry) else None
+
+
+def _is_entry(entry: Entry) -> bool:
+    """Tell whether a line holds what a sweep writes, in its types."""
+    number, values, row = entry.number, entry.values, entry.row
+    is_hash = isinstance(values, str) and re.fullmatch("[0-9a-f]{1,15}", values) is not None
+    return type(number) is int and isinstance(entry.case, str) and is_hash and isinstance(row, dict)
 
 
 def _is_not_finite(value: object) -> bool:
@@ -123,7 +137,7 @@ def read_entries(path: Path) -> Iterator[tuple[int, Entry]]:
     """Yield where each whole line of a manifest begins, and its entry."""
     start = 0
     with path.open("rb") as file:
-        for line in file:
+        while line := file.readline(LONGEST):
             entry = Entry.from_line(line)
             if entry is not None:
                 yield start, entry

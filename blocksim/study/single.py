@@ -12,12 +12,11 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.precautions import DEFAULTS, Precautions
 from blocksim.simulation.summary import read_summary
 from blocksim.simulation.table import COLUMNS, read_table
-from blocksim.study.places import find_run as find_run  # noqa: PLC0414 - its old home, for those who look there
+from blocksim.study.places import FINISHED as FINISHED  # noqa: PLC0414 - their old home, for those who look there
+from blocksim.study.places import find_run as find_run  # noqa: PLC0414
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FINISHED = "finished"
 
 
 def _ignore(_: Progress) -> None:

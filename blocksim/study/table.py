@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.simulation.atomic import writing
 from blocksim.study.done import Done
+from blocksim.study.places import FINISHED
 from blocksim.study.plan import Cases
 from blocksim.study.ranges import Ranges
 from blocksim.study.rows import KEPT
 from blocksim.study.shard import WHOLE, Shard
-from blocksim.study.single import FINISHED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,14 +70,14 @@ class SweepTable:
                 entry = reader.entry(number) if self.done.holds(number, settings) else None
                 if entry is not None:
                     row = entry.row
-                    outcome = [row[name] for name in OUTCOME]
+                    outcome = [row.get(name) for name in OUTCOME]
                     yield [entry.case, *settings.values(), *outcome, *self._verdict(row), *map(row.get, ends)]
 
     def _verdict(self, row: dict[str, object]) -> list[object]:
         """Judge here and not when the case ended: the measured table may be mended between two calls."""
         if self.ranges is None:
             return []
-        return [self.ranges.hold(row) if row["status"] == FINISHED else None]
+        return [self.ranges.hold(row) if row.get("status") == FINISHED else None]
 
 
 @dataclass(frozen=True)

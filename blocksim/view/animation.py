@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 from blocksim.view import style
+from blocksim.view.forces import WithContacts, draw_forces, force_scale
 from blocksim.view.gif import write_gif
 from blocksim.view.ground import Canvas, draw_ruler
 from blocksim.view.moments import Floats, FramesLike, Indices, drawable_frames
@@ -45,15 +46,16 @@ class Pace:
 
 @dataclass(frozen=True)
 class Look:
-    """How a film looks: its width in pixels, and whether the ways of the centres are drawn (default: few blocks)."""
+    """How a film looks: its width in pixels, whether it has the ways of the centres (default: few blocks), forces."""
 
     width: int = 800
     trails: bool | None = None
     title: str = ""
+    forces: bool = False
 
 
 def draw_film(
-    frames: FramesLike,
+    frames: WithContacts,
     path: Path | str,
     pace: Pace | None = None,
     look: Look | None = None,
@@ -62,8 +64,8 @@ def draw_film(
     """Write a run as GIF or MP4 and return the number of pictures; the last one is held for a while.
 
     `support` is what the blocks stand on: level ground at rest if it is not given. Raises InvalidInputError for an
-    unknown format, nothing to draw or too many pictures, OutputError when the file cannot be written and
-    UnavailableError when the package for MP4 is missing.
+    unknown format, forces that were not stored, nothing to draw or too many pictures, OutputError when the file cannot
+    be written and UnavailableError when the package for MP4 is missing.
     """
     path = Path(path)
     write = writer_of(path)
@@ -106,9 +108,10 @@ def timed(frames: FramesLike, drawable: Indices, pace: Pace) -> tuple[Indices, F
 class Film:
     """Draws one frame after the other on the same page; what never moves is drawn once."""
 
-    def __init__(self, frames: FramesLike, support: Support, look: Look) -> None:
-        """Prepare the page, as high as the run needs."""
+    def __init__(self, frames: WithContacts, support: Support, look: Look) -> None:
+        """Prepare the page, as high as the run needs. Raises InvalidInputError for forces that were not stored."""
         self.frames, self.support = frames, support
+        self.forces = force_scale(frames) if look.forces else None
         self.drawable = drawable_frames(frames)
         self.has_trails = len(frames.names) <= FEW_BLOCKS if look.trails is None else look.trails
         across = look.width / DOTS_PER_INCH
@@ -160,6 +163,8 @@ class Film:
         draw_blocks(self.canvas, self.frames, frame, self.support)
         if self.has_trails:
             self._draw_trails(frame)
+        if self.forces is not None:
+            draw_forces(self.canvas, self.frames, frame, self.forces)
         top = self.page.extent.top + 4.0 / self.page.points_per_mm
         time = f"{float(self.frames.time[frame]):.3f} s"
         self.canvas.axes.text(self.page.extent.left, top, time, va="bottom")

@@ -157,3 +157,15 @@ bad.toml:22: contact.particle_spacing: 10.1 mm is more than half of the smallest
 @pytest.mark.parametrize(("new", "message"), CASES.values(), ids=CASES)
 def test_contact(refusal_of_edit: Callable[[str | None, str], tuple[int, str]], new: str, message: str) -> None:
     assert refusal_of_edit(None, new) == (65, message.strip("\n"))
+
+
+@pytest.mark.parametrize("model", ["particles", "kernel"])
+@pytest.mark.parametrize("spacing", ["1e-300 m", "1 nm", "0.5 um"])
+def test_particles_finer_than_a_side_can_have_are_refused(
+    refusal_of_edit: Callable[..., tuple[int, str]], model: str, spacing: str
+) -> None:  # they overflowed a field of 16 bits
+    text = f'\n[contact]\nmodel = "{model}"\nparticle_spacing = "{spacing}"\n'
+    code, message = refusal_of_edit(None, text)
+    assert code == 65
+    assert "contact.particle_spacing: " in message
+    assert "is too small" in message

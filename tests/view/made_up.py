@@ -1,11 +1,14 @@
 """Frames that no run has made: blocks in rows of ten that topple to the right."""
 
+from dataclasses import replace
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from blocksim.simulation.contacts import SUPPORT, Contacts, empty_rows
 from blocksim.simulation.frames import Frames
 
 HOSTILE = (
@@ -42,6 +45,17 @@ def toppling(blocks: int, steps: int = 40, end: float = 0.6) -> Frames:
         size_y=np.full(blocks, 0.050),
         start_angle=np.zeros(blocks),
     )
+
+
+def pressed(frames: Frames, force: float = 2.0) -> Frames:
+    """Return the same frames with two contacts of each block with the ground, at its middle and right of it."""
+    steps, blocks = frames.x.shape
+    rows = empty_rows(2 * steps * blocks)
+    rows["body_a"], rows["body_b"] = np.tile(np.repeat(np.arange(blocks), 2), steps), SUPPORT
+    rows["x"] = np.repeat(frames.x.ravel(), 2) + np.tile([0.0, 0.012], steps * blocks)
+    rows["normal_y"], rows["normal_force"] = 1.0, force * (1.0 + rows["body_a"])
+    rows["shear_force"] = np.tile([0.0, -0.3 * force], steps * blocks)
+    return replace(frames, contacts=Contacts(2 * blocks * np.arange(1, steps + 1), rows))
 
 
 def stacked(blocks: int) -> Frames:

@@ -72,10 +72,15 @@ def _identifier(value: object) -> object:
     if not allowed or not 1 <= len(value) <= MAX_NAME or value[0] in ".-":
         message = f"{shown(value)} is not a name; 1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
         raise invalid(message)
+    if value.endswith(".") or value.partition(".")[0].upper() in DEVICES:
+        message = f"{shown(value)} is not a name: on some systems it means a device, or another name"
+        raise invalid(message)
     return value
 
 
 MAX_NAME = 100
+DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{number}" for port in ("COM", "LPT") for number in range(1, 10))}
+"""Names that Windows keeps for itself, whatever follows after a dot."""
 Identifier = Annotated[
     str,
     BeforeValidator(_identifier),

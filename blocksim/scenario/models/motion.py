@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema, model_validator
@@ -10,6 +9,7 @@ from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, Wit
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import Table
 from blocksim.scenario.motion_table import MotionTable, MotionTableError, read_motion_table
+from blocksim.scenario.reach import OutOfReachError, table_in
 
 PIECES_PER_CYCLE = 200
 """The cubic pieces are then off by less than (2 pi/200)^4/384 = 3e-9 of the amplitude."""
@@ -63,11 +63,10 @@ def _table(value: object, info: ValidationInfo) -> MotionTable:
     if not isinstance(value, str) or not value or "\0" in value:
         message = f'{q.shown(value)} is not the path of a table, such as "shaking.csv"'
         raise q.invalid(message)
-    path = Path((info.context or {}).get("folder", ""), value).resolve()
-    if not path.is_file():
-        what = "is a folder, not a table" if path.is_dir() else "no such file"
-        message = f"{q.shown(value)}: {what} (paths are relative to the scenario file)"
-        raise q.invalid(message)
+    try:
+        path = table_in((info.context or {}).get("folder", ""), value)
+    except OutOfReachError as error:
+        raise q.invalid(str(error)) from None
     try:
         return read_motion_table(path)
     except MotionTableError as error:

@@ -21,6 +21,7 @@ from pydantic_core import CoreSchema
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import OneOf, Table, whole
 from blocksim.scenario.models.variation import VALUES_SCHEMA, Variation, read_any, read_sampled, read_spread
+from blocksim.scenario.reach import OutOfReachError, table_in
 from blocksim.scenario.spelling import nearest
 
 MAX_SAMPLES = 1_000_000
@@ -42,12 +43,10 @@ def _existing_table(value: object, info: ValidationInfo) -> object:
         raise q.invalid(message)
     if info.context is None:
         return Path(value)
-    table = Path(info.context["folder"], value).resolve()
-    if not table.is_file():
-        what = "is a folder, not a table" if table.is_dir() else "no such file"
-        message = f"{q.shown(value)}: {what} (paths are relative to the scenario file)"
-        raise q.invalid(message)
-    return table
+    try:
+        return table_in(info.context["folder"], value)
+    except OutOfReachError as error:
+        raise q.invalid(str(error)) from None
 
 
 TablePath = Annotated[Path, BeforeValidator(_existing_table), WithJsonSchema({"type": "string", "minLength": 1})]

@@ -1,5 +1,6 @@
 """Reads run.h5: of a finished run, of one that was killed, and of one that is still going on."""
 
+import math
 import os
 import struct
 from collections.abc import Iterator
@@ -9,17 +10,22 @@ from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
 from blocksim.simulation.stores import hdf5_layout as layout
+from blocksim.simulation.stores import hdf5_safety as safety
+from blocksim.simulation.stores.hdf5_contacts import read_contacts
 
 SUPERBLOCK = struct.Struct("<8sBxxB16xQ")  # signature, version, consistency flags, end of file
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 SUPERBLOCK_VERSION = 3
 SWMR_FLAG = 4
+DAMAGE = (AttributeError, KeyError, MemoryError, OSError, OverflowError, RuntimeError, TypeError, ValueError)
+"""What h5py raises for what HDF5 finds wrong."""
 
 
 @contextmanager
@@ -29,8 +35,8 @@ def _opened(path: Path) -> Iterator[Any]:
         raise InputMissingError(message)
     try:
         file = h5py.File(path, "r", **({"libver": "latest", "swmr": True} if _is_left_open(path) else {}))
-    except OSError as error:
-        message = f"{path}: not a readable HDF5 file: {error}"
+    except DAMAGE as error:
+        message = f"{path}: not a readable HDF5 file: {safety.told(error)}"
         raise InvalidInputError(message) from error
     with file:
         yield file
@@ -63,19 +69,41 @@ def read_frames(path: Path, scenario: Scenario) -> Frames:
     placed = place_bodies(scenario)
     with _opened(path) as file:
         try:
-            count = int(file[layout.COMMITTED][()])
-            steps = file[layout.STEP][:count]
-            time_step = float(file[layout.STEP].attrs["time_step"])
-            motion = np.stack([file[f"{layout.BLOCKS}/{name}"][:count] for name in MOTION], axis=1)
-            ledger = tuple(name for name in file[layout.OBSERVABLES] if name not in layout.COUNTED_UNITS)
-            names = (*ledger, *layout.COUNTED_UNITS)
-            measured = np.stack([file[f"{layout.OBSERVABLES}/{name}"][:count] for name in names], axis=1)
-        except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
-            message = f"{path}: not a complete run file: {error}"
+            time_step, rows = _read(path, file, len(placed))
+        except DAMAGE as error:
+            message = f"{path}: not a complete run file: {safety.told(error)}"
             raise InvalidInputError(message) from error
-    if count == 0 or motion.shape != (count, len(MOTION), len(placed)) or len(measured) != count:
-        message = (
-            f"{path}: holds {len(motion)} frames, {count} announced, of {motion.shape[-1]} bodies, not {len(placed)}"
-        )
-        raise InvalidInputError(message)
-    return frames_from_rows(placed, time_step, Rows(steps, motion, measured, ledger))
+    return frames_from_rows(placed, time_step, rows)
+
+
+def _read(path: Path, file: Any, bodies: int) -> tuple[float, Rows]:
+    """Return step (s) and rows of all committed frames, after looking at what would be read."""
+    count = int(safety.data_set(file, layout.COMMITTED, 0)[()])
+    steps = safety.data_set(file, layout.STEP, 1)
+    moving = {name: safety.data_set(file, f"{layout.BLOCKS}/{name}", 2) for name in MOTION}
+    ledger = tuple(name for name in safety.group(file, layout.OBSERVABLES) if name not in layout.COUNTED_UNITS)
+    names = (*ledger, *layout.COUNTED_UNITS)
+    measured = {name: safety.data_set(file, f"{layout.OBSERVABLES}/{name}", 1) for name in names}
+    found = {one.shape[1] for one in moving.values()}
+    if count <= 0 or found != {bodies}:
+        told = "/".join(map(str, sorted(found)))
+        raise ValueError(f"holds {steps.shape[0]} frames, {count} announced, of {told} bodies, not {bodies}")
+    safety.refuse_too_many(path, {layout.STEP: steps, **moving, **measured}, count)
+    rows = Rows(
+        steps[:count],
+        np.stack([one[:count] for one in moving.values()], axis=1, dtype=np.float64),
+        np.stack([one[:count] for one in measured.values()], axis=1, dtype=np.float64),
+        ledger,
+        read_contacts(path, file, count, bodies),
+    )
+    return _time_step(steps, rows.steps), rows
+
+
+def _time_step(data_set: Any, steps: NDArray[np.int64]) -> float:
+    """Return the time step (s) that goes with numbers of steps; raises ValueError where they make no times."""
+    time_step = float(data_set.attrs["time_step"])
+    if steps.dtype.kind != "i" or steps.min() < 0:
+        raise ValueError("the numbers of its steps are none")
+    if not (math.isfinite(time_step * float(steps.max())) and time_step > 0.0):
+        raise ValueError(f"a time step of {time_step:g} s is none")
+    return time_step

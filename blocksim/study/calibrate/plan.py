@@ -10,6 +10,7 @@ from blocksim.errors import InputMissingError, InvalidInputError, Problem, Scena
 from blocksim.scenario import Document, Scenario, Sweep, scenario_hash
 from blocksim.scenario.keys import parse_key
 from blocksim.scenario.models.variation import Uniform
+from blocksim.scenario.reach import said_by_hand
 from blocksim.simulation.atomic import sha256_of
 from blocksim.simulation.provenance import code_hash
 from blocksim.study.calibrate.prior import Prior, prior_of
@@ -20,6 +21,7 @@ from blocksim.study.variation import Variations, varied
 
 FIT, SCATTER = "--fit", "--scatter"
 MODE = "sobol"
+TABLE = "experiment.table"
 NO_FIT = "nothing to fit: give --fit KEY=FROM:TO"
 NO_SCATTER = (
     "no input scatter: give --scatter KEY=MEAN+-SD (or KEY=FROM:TO), or a [sweep] table with distributions; "
@@ -81,7 +83,7 @@ def read_plan(
         raise InvalidInputError(NO_FIT)
     if experiment is not None:
         load_table(experiment)  # so that its mistakes are told of the option
-        document = document.with_values({"experiment.table": str(experiment.absolute())})
+        document = document.with_values({TABLE: said_by_hand(TABLE, str(experiment.absolute()))})
     fits = varied(document, fit, FIT, MODE)
     scattered = _scattered(document, scatter)
     bare = replace(document, data={key: value for key, value in document.data.items() if key != "sweep"})

@@ -1,0 +1,80 @@
+"""Which files a scenario may name: those below its own folder or below the current one, unless somebody asks for more.
+
+A scenario may come from a stranger, and what it names is read, shown where it has mistakes, and copied into results. A
+path that a person gives by hand (`--set experiment.table=PATH`, or an override in Python) may lead anywhere.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+
+from blocksim.scenario.quantities import shown
+
+WAY_OUT = "--allow-outside (in Python allow_outside=True) reads it all the same"
+
+_is_anywhere = ContextVar("_is_anywhere", default=False)
+
+
+class ByHand(str):
+    """A path that a person gave beside the scenario; it may lead anywhere."""
+
+    __slots__ = ()
+
+
+class OutOfReachError(ValueError):
+    """A path that leads outside, or to no file; the text says why."""
+
+
+def is_anywhere() -> bool:
+    """Tell whether scenarios that are read now may name any file."""
+    return _is_anywhere.get()
+
+
+@contextmanager
+def reaching(*, anywhere: bool) -> Iterator[None]:
+    """Let scenarios that are read and checked meanwhile name any file, or only those within reach."""
+    token = _is_anywhere.set(anywhere)
+    try:
+        yield
+    finally:
+        _is_anywhere.reset(token)
+
+
+def said_by_hand(key: str | Sequence[str | int], value: object) -> object:
+    """Mark a value that a person sets, where it is the path of a table."""
+    last = key.rpartition(".")[2] if isinstance(key, str) else key[-1]
+    return ByHand(value) if last == "table" and isinstance(value, str) else value
+
+
+def table_in(folder: Path | str, text: str) -> Path:
+    """Return the file that a scenario in `folder` names, all links followed. Raises OutOfReachError."""
+    try:
+        table = Path(folder, text).resolve()
+        _refuse_outside(Path(folder), text, table)
+        is_file, is_folder = table.is_file(), table.is_dir()
+    except (OSError, RuntimeError) as error:  # a name that is too long; links in a circle
+        reason = getattr(error, "strerror", None) or str(error)
+        message = f"{shown(text)}: cannot be read: {reason}"
+        raise OutOfReachError(message) from None
+    if not is_file:
+        what = "is a folder, not a table" if is_folder else "no such file"
+        message = f"{shown(text)}: {what} (paths are relative to the scenario file)"
+        raise OutOfReachError(message)
+    return table
+
+
+def _refuse_outside(folder: Path, text: str, table: Path) -> None:
+    if _is_anywhere.get() or isinstance(text, ByHand):
+        return
+    if not any(table.is_relative_to(root) for root in _roots(folder)):
+        message = f"{shown(text)}: leads outside the scenario's folder and the current folder; {WAY_OUT}"
+        raise OutOfReachError(message)
+
+
+def _roots(folder: Path) -> Iterator[Path]:
+    """Yield the folders below which files may be read: not all that somebody has, where that is the current folder."""
+    yield folder.resolve()
+    here = Path.cwd()
+    if not Path.home().resolve().is_relative_to(here):
+        yield here

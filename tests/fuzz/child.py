@@ -1,0 +1,114 @@
+"""Commands in a process of their own: it may hang, crash or take all memory, and the tests can tell."""
+
+from __future__ import annotations
+
+import json
+import resource
+import select
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PATIENCE = 30.0  # s of wall time, after which a command counts as hanging; machines of tests are busy
+MOST_SECONDS = 2.0  # of processor time
+MOST_BYTES = 10**9
+ADDRESSES = 8 << 30  # bytes of address space, so that nothing takes the machine's memory; libraries map some of it
+START = "from tests.fuzz.child import serve; serve()"
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a command left: exit code, answer, what it told beside, and what it took (s of processor time, bytes)."""
+
+    code: int
+    out: str
+    err: str
+    seconds: float
+    memory: int
+    traceback: str
+
+
+class Child:
+    """A process that runs one command after the other; a new one takes the place of one that was lost."""
+
+    def __init__(self, root: Path) -> None:
+        """Start nothing yet; `root` is the folder that has `tests`."""
+        self.root = root
+        self.process: subprocess.Popen[str] | None = None
+
+    def call(self, folder: Path, *arguments: object) -> Left:
+        """Run a command in a folder; fails the test where it hangs, or takes the process with it."""
+        process = self.process or self._started()
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write(json.dumps({"folder": str(folder), "arguments": list(map(str, arguments))}) + "\n")
+        process.stdin.flush()
+        ready, _, _ = select.select([process.stdout], [], [], PATIENCE)
+        line = process.stdout.readline() if ready else ""
+        if line:
+            return Left(**json.loads(line))
+        self.close()
+        what = f"crashed ({process.returncode})" if ready else f"did not come back within {PATIENCE} s"
+        raise AssertionError(f"blocksim {' '.join(map(str, arguments))} {what}")
+
+    def _started(self) -> subprocess.Popen[str]:
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        self.process = subprocess.Popen([sys.executable, "-c", START], cwd=self.root, text=True, bufsize=1, **pipes)
+        return self.process
+
+    def close(self) -> None:
+        """End the process."""
+        if self.process is not None:
+            self.process.kill()
+            self.process.communicate()
+            self.process = None
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the process."""
+        self.close()
+
+
+def serve() -> None:
+    """Run the commands that come in, a line each, until there are no more."""
+    import os  # noqa: PLC0415 - all of these belong to the process that is started
+
+    resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    for line in sys.stdin:
+        answers.write(json.dumps(_left(**json.loads(line))) + "\n")
+        answers.flush()
+
+
+def _left(folder: str, arguments: list[str]) -> dict[str, Any]:
+    import os  # noqa: PLC0415
+    import traceback  # noqa: PLC0415
+
+    from typer.testing import CliRunner  # noqa: PLC0415
+
+    from blocksim.cli.app import app  # noqa: PLC0415
+
+    os.chdir(folder)
+    began = time.process_time()
+    result = CliRunner().invoke(app, arguments)
+    seconds = time.process_time() - began
+    error = result.exception
+    is_trouble = error is not None and not isinstance(error, SystemExit)
+    return {
+        "code": result.exit_code,
+        "out": result.stdout,
+        "err": result.stderr,
+        "seconds": seconds,
+        "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+        "traceback": "".join(traceback.format_exception(error)) if is_trouble else "",
+    }

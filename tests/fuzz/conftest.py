@@ -1,0 +1,46 @@
+"""Commands in a child process, and how much of what comes in is tried."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import settings
+
+from tests.fuzz.child import MOST_BYTES, MOST_SECONDS, Child, Left
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+ROOT = Path(__file__).parents[2]
+settings.register_profile("long", settings.get_profile("ci"), max_examples=5000)
+QUICK = 50
+LONG = settings.get_profile("long")
+
+
+def assert_harmless(left: Left, codes: set[int]) -> None:
+    """Check that a command ended as commands may: by no exception, soon, with little memory, and a known code."""
+    told = f"{left.code}\n{left.err}\n{left.traceback}"
+    assert not left.traceback, told
+    assert left.code in codes, told
+    assert "Traceback" not in left.err, told
+    assert bool(left.err) or left.code in {0, 1}, told
+    assert left.seconds < MOST_SECONDS, f"{left.seconds} s: {told}"
+    assert left.memory < MOST_BYTES, f"{left.memory} bytes: {told}"
+
+
+@pytest.fixture(scope="session")
+def child() -> Iterator[Child]:
+    """Give a process that runs commands, warm."""
+    with Child(ROOT) as child:
+        yield child
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Give a folder that all examples of a file use, one after the other, with the tables that scenarios name."""
+    folder = tmp_path_factory.mktemp("fuzz")
+    shutil.copytree(ROOT / "scenarios" / "experiments", folder / "experiments")
+    return folder

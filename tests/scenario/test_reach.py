@@ -1,0 +1,128 @@
+"""Files that a scenario names: found in reach, refused outside, and read from anywhere where somebody asks for it."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from blocksim.errors import ScenarioError
+from blocksim.scenario import Document, load_scenario, scenario_from_mapping
+from blocksim.scenario.reach import reaching
+
+TABLE = "block,quantity,unit,replicate,value\n1,x,mm,1,16\n"
+MOTION = "time_s,displacement_mm\n0,0\n0.1,1\n"
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Stand in one of two folders side by side, of which the other one holds tables."""
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs" / "measured.csv").write_text(TABLE, encoding="utf-8")
+    (tmp_path / "theirs" / "shaking.csv").write_text(MOTION, encoding="utf-8")
+    monkeypatch.chdir(tmp_path / "mine")
+    return tmp_path
+
+
+@pytest.fixture
+def naming(place: Path, valid_text: str) -> Callable[[str], Path]:
+    """Write a scenario that names an experiment."""
+
+    def write(table: str) -> Path:
+        path = place / "mine" / "case.toml"
+        path.write_text(f'{valid_text}\n[experiment]\ntable = "{table}"\n', encoding="utf-8")
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("way", ["../theirs/measured.csv", "{}/theirs/measured.csv", "link.csv", "linked/measured.csv"])
+def test_what_leads_outside_is_refused_with_the_line_and_the_way_out(
+    place: Path, naming: Callable[[str], Path], way: str
+) -> None:
+    (place / "mine" / "link.csv").symlink_to(place / "theirs" / "measured.csv")
+    (place / "mine" / "linked").symlink_to(place / "theirs")
+    scenario = naming(way.format(place))
+    with pytest.raises(ScenarioError, match=r"case\.toml:21: experiment\.table: .*leads outside .*--allow-outside"):
+        load_scenario(scenario)
+    assert load_scenario(scenario, allow_outside=True).experiment is not None
+
+
+def test_what_is_missing_outside_is_not_told(naming: Callable[[str], Path]) -> None:
+    with pytest.raises(ScenarioError, match="leads outside"):
+        load_scenario(naming("../theirs/nothing.csv"))
+
+
+def test_a_motion_outside_is_refused(place: Path, valid_text: str) -> None:
+    path = place / "mine" / "case.toml"
+    path.write_text(f'{valid_text}\n[motion]\nkind = "table"\ntable = "../theirs/shaking.csv"\n', encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"motion\.table: .*leads outside"):
+        load_scenario(path)
+    assert load_scenario(path, allow_outside=True).motion is not None
+
+
+def test_tables_below_the_current_folder_are_in_reach(
+    place: Path, naming: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = naming("../theirs/measured.csv")
+    monkeypatch.chdir(place)
+    assert load_scenario(scenario).experiment is not None
+
+
+def test_a_home_as_the_current_folder_puts_nothing_into_reach(
+    place: Path, naming: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = naming("../theirs/measured.csv")
+    (place / "home").mkdir()
+    monkeypatch.setenv("HOME", str(place / "home"))
+    for folder in (place, place / "home"):
+        monkeypatch.chdir(folder)
+        with pytest.raises(ScenarioError, match="leads outside"):
+            load_scenario(scenario)
+
+
+@pytest.mark.parametrize(
+    "given", [["experiment.table=../theirs/measured.csv"], {"experiment.table": "../theirs/measured.csv"}]
+)
+def test_a_path_given_by_hand_may_lead_anywhere(
+    naming: Callable[[str], Path], given: list[str] | dict[str, object]
+) -> None:
+    assert load_scenario(naming("nothing.csv"), given).experiment is not None
+
+
+def test_cases_of_a_sweep_name_no_file_outside(naming: Callable[[str], Path]) -> None:
+    document = Document.read(naming("nothing.csv"))
+    with pytest.raises(ScenarioError, match="leads outside"):  # values that come from a file, as those of a sweep
+        document.with_values({"experiment.table": "../theirs/measured.csv"}).build()
+
+
+def test_a_document_keeps_what_was_allowed_when_it_was_read(naming: Callable[[str], Path]) -> None:
+    scenario = naming("../theirs/measured.csv")
+    with reaching(anywhere=True):
+        allowed = Document.read(scenario)
+    assert allowed.build().experiment is not None
+    with pytest.raises(ScenarioError, match="leads outside"):
+        Document.read(scenario).build()
+
+
+def test_data_from_python_are_held_to_the_same(place: Path) -> None:
+    data = {
+        "schema": 1,
+        "name": "case",
+        "bodies": [{"block": "brick", "x": 0, "y": 0.01}],
+        "materials": {"steel": {"density": 7850, "young_modulus": 210e9, "poisson_ratio": 0.3}},
+        "blocks": {"brick": {"width": 0.04, "height": 0.02, "length": 0.06, "material": "steel"}},
+        "experiment": {"table": str(place / "theirs" / "measured.csv")},
+    }
+    with pytest.raises(ScenarioError, match="leads outside"):
+        scenario_from_mapping(data)
+    assert scenario_from_mapping(data, allow_outside=True).experiment is not None
+
+
+@pytest.mark.parametrize("name", ["x" * 300 + ".csv", "loop.csv"])
+def test_names_that_cannot_be_followed_are_mistakes_with_a_line(
+    place: Path, naming: Callable[[str], Path], name: str
+) -> None:
+    (place / "mine" / "loop.csv").symlink_to("loop.csv")
+    with pytest.raises(ScenarioError, match=r"case\.toml:21: experiment\.table: "):
+        load_scenario(naming(name))

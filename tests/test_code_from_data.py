@@ -1,0 +1,77 @@
+"""Nothing that is read is ever run: the source is searched for whatever turns data into code or commands."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "blocksim"
+MODULES = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "yaml", "ctypes"}
+MODULES |= {"code", "codeop", "runpy", "tarfile", "zipfile", "xml", "telnetlib", "urllib", "http", "ftplib", "socket"}
+CALLS = {"eval", "exec", "compile", "__import__", "system", "popen", "execv", "execve", "spawnl", "fromfile"}
+CALLS |= {"read_pickle", "subprocess.run", "subprocess.Popen", "subprocess.call", "subprocess.check_output"}
+FLAGS = {"shell", "allow_pickle"}
+
+EXCEPTIONS = {
+    "bench/startup.py: subprocess.run": "measures how long `blocksim --help` takes to start: its own fixed command",
+}
+"""Places that may do it, and why no data of others reach them. Not in our source, and so not found here: processes of a
+sweep, and Dask with --scheduler, pass scenarios between each other with pickle; numba keeps its compiled kernels so in
+the user's own cache folder. Neither reads what comes with scenarios, tables or results."""
+
+
+def _name(node: ast.expr) -> str:
+    return (
+        f"{_name(node.value)}.{node.attr}".lstrip(".") if isinstance(node, ast.Attribute) else getattr(node, "id", "")
+    )
+
+
+def _finds(tree: ast.AST) -> Iterator[str]:
+    """Yield what a module does of all that."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (name.name for name in node.names if name.name.partition(".")[0] in MODULES)
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] in MODULES:
+            yield str(node.module)
+        elif isinstance(node, ast.Call):
+            name = _name(node.func)
+            if name in CALLS or (name.rpartition(".")[2] in CALLS and name != "re.compile"):
+                yield name
+            flags = {word.arg for word in node.keywords if not _is_false(word.value)}
+            yield from sorted(flags & FLAGS)
+
+
+def _is_false(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and node.value is False
+
+
+def _in_package() -> set[str]:
+    return {
+        f"{path.relative_to(PACKAGE).as_posix()}: {found}"
+        for path in PACKAGE.rglob("*.py")
+        for found in _finds(ast.parse(path.read_text(encoding="utf-8")))
+    }
+
+
+def test_no_data_become_code_or_commands() -> None:
+    assert _in_package() == set(EXCEPTIONS)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import pickle",
+        "from yaml import safe_load",
+        "import xml.etree.ElementTree",
+        "eval('1')",
+        "exec(text)",
+        "numpy.load(path, allow_pickle=True)",
+        "subprocess.run(command, shell=True)",
+        "os.system(text)",
+        "pandas.read_pickle(path)",
+        "__import__(name)",
+    ],
+)
+def test_the_search_finds_what_it_looks_for(source: str) -> None:
+    assert list(_finds(ast.parse(source)))
