@@ -22,7 +22,9 @@ def scenario() -> Scenario:
     """Return one block."""
     return scenario_from_mapping(
         {
-            "schema": 1, "name": "one", "structures": [{"kind": "stack", "block": "brick", "count": 1}],
+            "schema": 1,
+            "name": "one",
+            "structures": [{"kind": "stack", "block": "brick", "count": 1}],
             "materials": {"steel": {"density": 7850, "young_modulus": 210e9, "poisson_ratio": 0.3}},
             "blocks": {"brick": {"width": 0.04, "height": 0.02, "length": 0.06, "material": "steel"}},
         }
