@@ -13,7 +13,10 @@ import typer
 from blocksim.cli.output import note
 from blocksim.errors import BlocksimError, ExitCode
 
+PATH_TROUBLE = {errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES}
 DISK_TROUBLE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
+
+LONGEST_NAME = 200  # characters of a path that a message shows
 
 
 @contextmanager
@@ -37,11 +40,20 @@ def _tell_trouble(error: OSError) -> ExitCode:
     if isinstance(error, BrokenPipeError):  # whoever read our answer has gone: nothing to tell
         _abandon_answer()
         return ExitCode.INPUT_OUTPUT
+    if error.errno in PATH_TROUBLE and error.filename is not None:
+        note(f"{_shortened(error.filename)}: cannot be reached: {error.strerror}")
+        return ExitCode.INPUT_OUTPUT
     if error.errno not in DISK_TROUBLE:
         raise error
     note(f"{error.filename or 'the answer'}: cannot be written: {error.strerror}")
     _abandon_answer()
     return ExitCode.INPUT_OUTPUT
+
+
+def _shortened(name: object) -> str:
+    """Return a name for a line of a message."""
+    text = "".join(c if c.isprintable() else "\ufffd" for c in str(name))
+    return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}…"
 
 
 def _abandon_answer() -> None:

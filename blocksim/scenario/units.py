@@ -133,6 +133,8 @@ _EXPRESSION = re.compile(rf"{_FACTOR}(?:[ ]?[*/·][ ]?{_FACTOR}|[ ]{_FACTOR})*")
 _OPERATOR = re.compile(r" ?([*/·]) ?")
 _SUPERSCRIPTS = str.maketrans({"²": "^2", "³": "^3"})
 _MAX_LENGTH = 40
+_NO_NUMBER = re.compile(r"\bnan(?![A-Za-z_])", re.IGNORECASE)
+"""What pint takes for a number, which no fraction is."""
 
 
 class UnitError(ValueError):
@@ -169,6 +171,9 @@ def unit_by_pint(text: str) -> Unit:
     import pint  # noqa: PLC0415 - a third of a second that scenarios in everyday units do not pay
 
     registry: Any = _registry()  # pint's own hints do not follow `non_int_type`
+    numbers = _NO_NUMBER.search(text)
+    if numbers is not None:
+        raise UnitError(numbers[0])
     try:
         unit = registry.parse_units(_for_pint(text))
         factor, _ = registry.get_base_units(unit)

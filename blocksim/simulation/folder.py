@@ -9,6 +9,7 @@ from blocksim.errors import BlocksimError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario
 from blocksim.scenario.limited import MEGABYTE, read_limited
 from blocksim.scenario.resolved import HEADER
+from blocksim.simulation.output_folder import make_folder
 from blocksim.simulation.provenance import run_hash
 
 RESULTS = Path("results")
@@ -49,7 +50,7 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
     Raises OutputExistsError when something is there that may not go, or the folder cannot be created.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         present = {path.name for path in folder.iterdir()}
         _refuse_foreign(folder, present)
         if present and not overwrite:

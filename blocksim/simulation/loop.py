@@ -10,6 +10,7 @@ from blocksim.simulation.checkpoint import Position
 from blocksim.simulation.checkpoint_writer import KEEPS_NOTHING, Keeper, Standing
 from blocksim.simulation.culprit import told
 from blocksim.simulation.ledger import EnergyLedger, energy_ledger, start_energy
+from blocksim.simulation.looks import adds_up, next_look
 from blocksim.simulation.outcome import Outcome
 from blocksim.simulation.pace import Pace
 from blocksim.simulation.recorder import Recorder
@@ -61,7 +62,7 @@ def last_step_of(end: float, step: float) -> int:
 def outcome_of(code: int, ledger: EnergyLedger) -> Outcome:
     """Return what a run came to that was not interrupted: its status code, and whether its energy adds up."""
     outcome = ends.BY_CODE[code]
-    if outcome.is_finished and ledger.relative_residual > ends.RESIDUAL_LIMIT:
+    if outcome.is_finished and not adds_up(ledger):
         return ends.RESIDUAL
     return outcome
 
@@ -95,8 +96,9 @@ class _Going:
         self.on_progress, self.stop, self.keeper = attendance.on_progress, attendance.stop, attendance.keeper
         self.step = float(scene.world.controls[0].step)
         self.last = last_step_of(end, self.step)
-        self.pace = Pace(scene.world.bodies.size)
-        self.status = REACHED
+        self.bodies = scene.world.bodies.size - 1
+        self.pace = Pace(self.bodies)
+        self.status, self.is_lost = REACHED, False
         self.seconds = self.start = 0.0  # in compiled code; J
 
     @property
@@ -115,7 +117,7 @@ class _Going:
 
     def go_on(self) -> str:
         """Run to the end, or until somebody wants to stop; return why, and nothing at the end."""
-        while self.status == REACHED and self.done < self.last:
+        while self.status == REACHED and self.done < self.last and not self.is_lost:
             why = self.stop()
             if why:
                 return why
@@ -124,17 +126,17 @@ class _Going:
 
     def _go_to(self, wanted: int) -> None:
         """Advance towards a step at which a frame is wanted, as far as one call goes."""
-        before = self.seconds
-        done = self.done
-        self._advance(min(wanted, done + self.pace.steps, self.keeper.next_step(done)))
+        done, before = self.done, self.seconds
+        look = next_look(done, self.bodies)
+        self._advance(min(wanted, look, done + self.pace.steps, self.keeper.next_step(done)))
         self.pace.learn(self.done - done, self.seconds - before)
         if self.done == wanted:
             self.recorder.sample(self.scene)
-        residual = energy_ledger(self.scene, self.start).relative_residual
-        is_good = self.status == REACHED and residual <= ends.RESIDUAL_LIMIT  # not so where it is not a number
-        if is_good and self.done < self.last and self.keeper.is_due(self.done):
+        ledger = energy_ledger(self.scene, self.start)
+        self.is_lost = self.done == look and not adds_up(ledger)
+        if self.status == REACHED and adds_up(ledger) and self.done < self.last and self.keeper.is_due(self.done):
             self.keep_checkpoint()
-        self.on_progress(Progress(self.done * self.step, self.end, self.done, residual))
+        self.on_progress(Progress(self.done * self.step, self.end, self.done, ledger.relative_residual))
 
     def _advance(self, last_step: int) -> None:
         self.seconds -= time.perf_counter()

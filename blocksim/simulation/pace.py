@@ -1,6 +1,6 @@
 """How many steps a compiled call may take, so that signals and limits are heard soon and progress is shown."""
 
-CALL_SECONDS = 0.1
+CALL_SECONDS = 0.05
 BODY_STEPS_AT_FIRST = 100_000  # ten milliseconds or so; particles and rigid contacts take longer
 MOST_GROWTH = 4  # from one call to the next: the first steps of a scene may be quick, as nothing touches
 

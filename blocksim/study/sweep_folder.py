@@ -10,6 +10,7 @@ from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsEr
 from blocksim.scenario import Document, Scenario
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
+from blocksim.simulation.output_folder import make_folder
 from blocksim.simulation.provenance import environment
 from blocksim.study.manifest import PATTERN, is_in_use
 
@@ -34,7 +35,7 @@ def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool) -> None
     head = f"{HEAD}{name}. To run it again: blocksim sweep FILE\n"
     tables = read_tables(base)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         _make_free(folder, head, overwrite=overwrite)
     except OSError as error:
         message = f"{folder}: cannot be created: {error.strerror}"

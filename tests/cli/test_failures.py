@@ -8,6 +8,9 @@ import typer
 
 from blocksim.cli.failures import tell_internal_error, told
 from blocksim.errors import ExitCode, InputMissingError, OutputError
+from tests.cli.conftest import Command
+
+LONG = "x" * 300
 
 
 def exit_code_of(error: BaseException) -> int:
@@ -53,3 +56,14 @@ def test_internal_error_on_a_full_disk_is_still_told(
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "nowhere"))
     tell_internal_error(ValueError("x"))
     assert "internal error: ValueError: x" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("export", LONG), ("report", LONG), ("compare", LONG), ("plot", LONG), ("animate", LONG), ("check", LONG)],
+)
+def test_names_that_are_too_long_are_told_in_a_line(blocksim: Command, arguments: tuple[str, ...]) -> None:
+    answer = blocksim(*arguments)
+    assert answer.code in {66, 74}
+    assert "File name too long" in answer.err
+    assert len(answer.err) < 2 * len(LONG)

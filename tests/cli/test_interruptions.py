@@ -183,6 +183,17 @@ def test_run_of_other_code_or_values_that_waits_is_told(blocksim: Command) -> No
     assert "a run of another scenario or version of the code waits in results/three_blocks_nominal/" in answer.err
 
 
+@pytest.mark.parametrize("executor", ["ensemble", "processes"])
+def test_sweep_around_a_case_that_blows_up_goes_on(blocksim: Command, tmp_path: Path, executor: str) -> None:
+    forced = ("--set", "time.force_step=true", "--set", "contact.max_overlap=1", "--vary", "time.step=1e-6,5e-4,2e-6")
+    shorter = ("--set", "time.end=0.01", "--jobs", "1", "--executor", executor)
+    answer = blocksim("sweep", NOMINAL, *SOFT, *forced, *shorter, "--out", "out")
+    assert answer.code == 77
+    rows = (tmp_path / "out" / "sweep.csv").read_text().splitlines()
+    assert [("finished" in row, "failed" in row) for row in rows[1:]] == [(True, False), (False, True), (True, False)]
+    assert "the fastest is block " in rows[2]
+
+
 @pytest.mark.parametrize(
     ("arguments", "what"),
     [

@@ -61,7 +61,8 @@ def test_failed_run_is_told_kept_and_76(blocksim: Command) -> None:
         assert answer.code == 76
         assert re.fullmatch(
             r"three_blocks_nominal: failed: an overlap exceeds contact\.max_overlap "
-            r"\(block \d and (block \d|the ground) by [\d.e-]+ mm, step \d+\); what there is by then is kept in out\nno checkpoint was written by then\n",
+            r"\(block \d and (block \d|the ground) by [\d.e-]+ mm, step \d+\); "
+            r"what there is by then is kept in out\nno checkpoint was written by then\n",
             answer.err,
         )
     assert json.loads(Path("out/run.json").read_text())["status"] == "failed"

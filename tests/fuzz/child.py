@@ -41,24 +41,25 @@ class Child:
         self.root = root
         self.process: subprocess.Popen[str] | None = None
 
-    def call(self, folder: Path, *arguments: object) -> Left:
-        """Run a command in a folder; fails the test where it hangs, or takes the process with it."""
+    def call(self, folder: Path, *arguments: object, patience: float = PATIENCE) -> Left:
+        """Run a command in a folder; fails the test where it hangs (s of wall time), or takes the process with it."""
         process = self.process or self._started()
         assert process.stdin is not None
         assert process.stdout is not None
         process.stdin.write(json.dumps({"folder": str(folder), "arguments": list(map(str, arguments))}) + "\n")
         process.stdin.flush()
-        ready, _, _ = select.select([process.stdout], [], [], PATIENCE)
+        ready, _, _ = select.select([process.stdout], [], [], patience)
         line = process.stdout.readline() if ready else ""
         if line:
             return Left(**json.loads(line))
         self.close()
-        what = f"crashed ({process.returncode})" if ready else f"did not come back within {PATIENCE} s"
+        what = f"crashed ({process.returncode})" if ready else f"did not come back within {patience} s"
         raise AssertionError(f"blocksim {' '.join(map(str, arguments))} {what}")
 
     def _started(self) -> subprocess.Popen[str]:
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-        self.process = subprocess.Popen([sys.executable, "-c", START], cwd=self.root, text=True, bufsize=1, **pipes)
+        pipe = subprocess.PIPE
+        command = [sys.executable, "-c", START]
+        self.process = subprocess.Popen(command, cwd=self.root, text=True, bufsize=1, stdin=pipe, stdout=pipe)
         return self.process
 
     def close(self) -> None:

@@ -57,3 +57,9 @@ def test_a_scenario_in_common_units_is_loaded_without_pint() -> None:
     code = "import sys, blocksim.scenario as s; s.load_scenario(sys.argv[1]); assert 'pint' not in sys.modules"
     path = Path(__file__).parents[2] / "scenarios" / "three_blocks.toml"
     subprocess.run([sys.executable, "-c", code, path], check=True)
+
+
+@pytest.mark.parametrize("text", ["nan", "NaN", "NAN", "nan*m", "m/nan", "inf", "Infinity", "nan^2"])
+def test_words_that_pint_takes_for_numbers_are_unknown_units(text: str) -> None:
+    with pytest.raises(units.UnitError):
+        units.parse_unit(text)

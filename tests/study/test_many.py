@@ -58,7 +58,7 @@ def test_cases_are_drawn_as_the_command_draws_them(quick: Document, tmp_path: Pa
 
 def test_folder_holds_plan_table_and_manifest(quick: Document, tmp_path: Path) -> None:
     result = sweep(quick, TWO, out=tmp_path)
-    files = {"sweep.toml", "sweep.csv", "manifest.jsonl", "timings.csv", "experiment.csv"}
+    files = {"sweep.toml", "sweep.json", "sweep.csv", "manifest.jsonl", "timings.csv", "experiment.csv"}
     assert {path.name for path in tmp_path.iterdir()} == files
     pd.testing.assert_frame_equal(read_sweep(tmp_path).table, result.table, check_exact=True)
     timings = pd.read_csv(tmp_path / "timings.csv")

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
+from blocksim.verification.case import RIGID_STEP
 from tests.symmetries.scenes import (
     BEFORE_CHAOS,
     EXPLICIT,
     GRAVITY,
     RIGID,
+    ROUND_OFF,
     Body,
     Stack,
     allowed,
@@ -26,7 +28,10 @@ from tests.symmetries.scenes import (
 MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0])  # x, y, angle, vx, vy, spin
 SCHEMES = pytest.mark.parametrize("scheme", [EXPLICIT, RIGID])
 FAR_UP = 5.0  # m above the ground
-SOLVED = 1e-9  # m
+APPROACH = 20.0  # m/s for each metre between the blocks
+# Springs: round-off. Rigid contacts: round-off may have blocks meet, or part, one step sooner or later, and by then
+# they have come nearer by the speed of the farthest (0.16 m away) times a step.
+SAME_COLLISION = {EXPLICIT: ROUND_OFF, RIGID: APPROACH * 0.16 * RIGID_STEP}  # m
 
 
 @SCHEMES
@@ -79,7 +84,7 @@ def flying(stack: Stack, seed: int) -> list[Body]:
 
 def thrown(bodies: list[Body], vx: float, vy: float) -> list[dict[str, object]]:
     """Return bodies that close in on the first one, seen from a frame that moves with -vx, -vy."""
-    return [{**body, "velocity": [vx - 20.0 * body["x"], vy]} for body in bodies]
+    return [{**body, "velocity": [vx - APPROACH * body["x"], vy]} for body in bodies]
 
 
 @SCHEMES
@@ -96,7 +101,7 @@ def test_collisions_are_the_same_in_a_moving_frame(scheme: str, examples: int) -
         kinetic = [float(end.bodies["spin"][0]) for end in ends]
         assert kinetic[0] != bodies[0]["spin"]  # they have met
         moving -= np.array([vx * ends[1].time, vy * ends[1].time, 0.0, vx, vy, 0.0])
-        assert apart(rest, moving) <= SOLVED
+        assert apart(rest, moving) <= SAME_COLLISION[scheme]
 
     for_all(st.tuples(stacks(3), st.integers(0, 1000), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), examples, check)
 

@@ -81,9 +81,10 @@ def _identifier(value: object) -> object:
 MAX_NAME = 100
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{number}" for port in ("COM", "LPT") for number in range(1, 10))}
 """Names that Windows keeps for itself, whatever follows after a dot."""
+_DEVICE = "([Cc][Oo][Nn]|[Pp][Rr][Nn]|[Aa][Uu][Xx]|[Nn][Uu][Ll]|[Cc][Oo][Mm][1-9]|[Ll][Pp][Tt][1-9])"
 Identifier = Annotated[
     str,
     BeforeValidator(_identifier),
-    Field(json_schema_extra={"pattern": r"^[A-Za-z0-9_][A-Za-z0-9._-]{0,99}$"}),
+    Field(json_schema_extra={"pattern": rf"^(?!{_DEVICE}(\.|$))[A-Za-z0-9_]([A-Za-z0-9._-]{{0,98}}[A-Za-z0-9_-])?$"}),
 ]
 """A name that can be a folder or a table cell on every system."""

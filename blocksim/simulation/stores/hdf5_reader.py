@@ -1,73 +1,45 @@
 """Reads run.h5: of a finished run, of one that was killed, and of one that is still going on."""
 
 import math
-import os
-import struct
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.scenario import Scenario, place_bodies
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
 from blocksim.simulation.stores import hdf5_layout as layout
 from blocksim.simulation.stores import hdf5_safety as safety
 from blocksim.simulation.stores.hdf5_contacts import read_contacts
+from blocksim.simulation.stores.hdf5_open import DAMAGE, is_left_open, opened
 
-SUPERBLOCK = struct.Struct("<8sBxxB16xQ")  # signature, version, consistency flags, end of file
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
-SUPERBLOCK_VERSION = 3
-SWMR_FLAG = 4
-DAMAGE = (AttributeError, KeyError, MemoryError, OSError, OverflowError, RuntimeError, TypeError, ValueError)
-"""What h5py raises for what HDF5 finds wrong."""
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    if not path.is_file():
-        message = f"{path}: no such file"
-        raise InputMissingError(message)
-    try:
-        file = h5py.File(path, "r", **({"libver": "latest", "swmr": True} if _is_left_open(path) else {}))
-    except DAMAGE as error:
-        message = f"{path}: not a readable HDF5 file: {safety.told(error)}"
-        raise InvalidInputError(message) from error
-    with file:
-        yield file
-
-
-def _is_left_open(path: Path) -> bool:
-    """Tell whether a writer has not closed the file: it was killed, or is still at work.
-
-    Looked up in the superblock (HDF5 file format specification, II.A), because HDF5 tries for ever to read a damaged
-    file in SWMR mode. Raises InvalidInputError for a file that is cut off.
-    """
-    with path.open("rb") as file:
-        head = file.read(SUPERBLOCK.size)
-        size = file.seek(0, os.SEEK_END)
-    if len(head) < SUPERBLOCK.size:
-        return False
-    signature, version, flags, end = SUPERBLOCK.unpack(head)
-    is_open = signature == SIGNATURE and version == SUPERBLOCK_VERSION and bool(flags & SWMR_FLAG)
-    if is_open and size < end:
-        message = f"{path}: not a complete run file: cut off at {size} of {end} bytes"
-        raise InvalidInputError(message)
-    return is_open
+PAUSES = (0.05, 0.2)  # s
 
 
 def read_frames(path: Path, scenario: Scenario) -> Frames:
     """Return the committed frames of a run file; `scenario` is the one that lies beside it.
 
-    Raises InputMissingError, or InvalidInputError when the file is not one of ours, damaged or still empty.
+    Raises InputMissingError, or InvalidInputError when the file is not one of ours, damaged or still empty. What a run
+    that goes on writes at this moment may look like damage, so a file without an end is tried a few times.
     """
     placed = place_bodies(scenario)
-    with _opened(path) as file:
+    for pause in PAUSES:
+        try:
+            return _frames(path, placed)
+        except InvalidInputError:
+            if not is_left_open(path):
+                raise
+            time.sleep(pause)
+    return _frames(path, placed)
+
+
+def _frames(path: Path, placed: Sequence[PlacedBody]) -> Frames:
+    with opened(path) as file:
         try:
             time_step, rows = _read(path, file, len(placed))
         except DAMAGE as error:

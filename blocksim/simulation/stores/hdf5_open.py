@@ -1,0 +1,138 @@
+"""Opens run.h5 for reading: of a finished run, of one that was killed, and of one that is still going on.
+
+A file whose writer has not closed it says so in its superblock, and HDF5 opens such a file in SWMR mode only, in which
+it tries for ever to read what is damaged. So it is shown to HDF5 as if it were closed: with the marks of the writer
+taken out, and its end where the file ends. In SWMR mode a writer keeps the rest in order at any moment.
+"""
+
+import io
+import os
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.simulation.stores.hdf5_safety import told
+
+SUPERBLOCK = struct.Struct("<8s4B3QQI")  # signature; version, sizes, flags; base, extension, end; root; checksum
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+VERSION = 3
+SIZE_OF_ADDRESS = 8
+WRITING, SWMR = 1, 4  # flags: HDF5 file format specification, II.A
+DAMAGE = (AttributeError, KeyError, MemoryError, OSError, OverflowError, RuntimeError, TypeError, ValueError)
+"""What h5py raises for what HDF5 finds wrong."""
+WORD = 0xFFFFFFFF
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """Give the file to read from. Raises InputMissingError, or InvalidInputError for no HDF5 file, or one cut off."""
+    if not path.is_file():
+        message = f"{path}: no such file"
+        raise InputMissingError(message)
+    try:
+        with path.open("rb", buffering=0) as raw:
+            head = _head_as_closed(path, raw)
+            with h5py.File(path if head is None else AsClosed(raw, head), "r") as file:
+                yield file
+    except DAMAGE as error:
+        message = f"{path}: not a readable HDF5 file: {told(error)}"
+        raise InvalidInputError(message) from error
+
+
+def is_left_open(path: Path) -> bool:
+    """Tell whether a file has a writer who has not closed it: a run that goes on, or was killed."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(SUPERBLOCK.size)
+    except OSError:
+        return False
+    return len(head) == SUPERBLOCK.size and head.startswith(SIGNATURE) and bool(head[11] & SWMR)
+
+
+def _head_as_closed(path: Path, raw: io.FileIO) -> bytes | None:
+    """Return the superblock that a file would have if it were closed, or None where it has that already.
+
+    Raises InvalidInputError for a file that is cut off, or whose superblock is damaged.
+    """
+    head = raw.read(SUPERBLOCK.size)
+    size = raw.seek(0, os.SEEK_END)
+    if len(head) < SUPERBLOCK.size:
+        return None
+    signature, version, offsets, lengths, flags, base, extension, end, root, checksum = SUPERBLOCK.unpack(head)
+    if signature != SIGNATURE or version != VERSION or not flags & SWMR:
+        return None
+    if size < end:
+        message = f"{path}: not a complete run file: cut off at {size} of {end} bytes"
+        raise InvalidInputError(message)
+    if checksum != lookup3(head[:-4]) or offsets != SIZE_OF_ADDRESS:
+        message = f"{path}: not a readable HDF5 file: its superblock is damaged"
+        raise InvalidInputError(message)
+    flags &= ~(WRITING | SWMR)
+    closed = SUPERBLOCK.pack(signature, version, offsets, lengths, flags, base, extension, size, root, 0)[:-4]
+    return closed + lookup3(closed).to_bytes(4, "little")
+
+
+class AsClosed(io.RawIOBase):
+    """A file with another beginning."""
+
+    def __init__(self, raw: io.FileIO, head: bytes) -> None:
+        """Take the file and what its first bytes are to be."""
+        self.raw, self.head = raw, head
+
+    def readable(self) -> bool:
+        """Say that it can be read."""
+        return True
+
+    def seekable(self) -> bool:
+        """Say that it has places."""
+        return True
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Go to a place."""
+        return self.raw.seek(offset, whence)
+
+    def tell(self) -> int:
+        """Return the place."""
+        return self.raw.tell()
+
+    def readinto(self, buffer: Any) -> int:
+        """Fill a buffer from the place on."""
+        view, place, count = memoryview(buffer).cast("B"), self.raw.tell(), 0
+        while count < len(view) and (part := self.raw.read(len(view) - count)):
+            view[count : count + len(part)] = part
+            count += len(part)
+        covered = max(0, min(len(self.head) - place, count))
+        view[:covered] = self.head[place : place + covered]
+        return count
+
+
+def lookup3(data: bytes) -> int:
+    """Return the checksum of HDF5's metadata: Jenkins' lookup3 with the initial value 0."""
+    a = b = c = (0xDEADBEEF + len(data)) & WORD
+    words = struct.unpack(f"<{-(-len(data) // 12) * 3}I", data.ljust(-(-len(data) // 12) * 12, b"\0"))
+    for place in range(0, len(words), 3):
+        a, b, c = ((one + two) & WORD for one, two in zip((a, b, c), words[place : place + 3], strict=True))
+        if place + 3 < len(words):
+            a, b, c = _mixed(a, b, c)
+    for turn_b, turn_c, turn_a in ((14, 11, 25), (16, 4, 14)):
+        c = ((c ^ b) - _turned(b, turn_b)) & WORD
+        a = ((a ^ c) - _turned(c, turn_c)) & WORD
+        b = ((b ^ a) - _turned(a, turn_a)) & WORD
+    return ((c ^ b) - _turned(b, 24)) & WORD
+
+
+def _mixed(a: int, b: int, c: int) -> tuple[int, int, int]:
+    for turns in ((4, 6, 8), (16, 19, 4)):
+        a, c = ((a - c) & WORD) ^ _turned(c, turns[0]), (c + b) & WORD
+        b, a = ((b - a) & WORD) ^ _turned(a, turns[1]), (a + c) & WORD
+        c, b = ((c - b) & WORD) ^ _turned(b, turns[2]), (b + a) & WORD
+    return a, b, c
+
+
+def _turned(word: int, bits: int) -> int:
+    return ((word << bits) | (word >> (32 - bits))) & WORD

@@ -1,0 +1,48 @@
+"""Names of scenarios: folders of results are made of them, on any file system, and never anywhere else."""
+
+import re
+
+import pytest
+
+from blocksim.errors import ScenarioError
+from blocksim.scenario import Scenario, json_schema, scenario_from_mapping
+from blocksim.simulation.folder import RESULTS, default_folder
+
+HOSTILE = (
+    *("../../x", "/etc/x", "..", ".", "a/b", "a\\b", "C:x", "", " ", "a b", "-rf", ".hidden", "x" * 101, "x" * 300),
+    *("CON", "con", "nul", "aux.txt", "Com1", "LPT9.toml", "prn.", "a.", "a\0", "a\n", "a\x1b[2J", "\u202egnp.exe"),
+    *("caf\u00e9", "\U0001f4a9", "a\u200b", "<b>", "$(id)", "`id`", "%s", "*", "?", "|", '"', "'", "~root", "\u2215"),
+)
+FINE = ("a", "three_blocks", "7", "a.b-c_D", "CONE", "com10", "nulled.x", "x" * 100)
+
+
+def scenario_named(name: str) -> Scenario:
+    return scenario_from_mapping(
+        {
+            "schema": 1,
+            "name": name,
+            "bodies": [{"block": "brick", "x": 0, "y": 0.01}],
+            "materials": {"steel": {"density": 7850, "young_modulus": 210e9, "poisson_ratio": 0.3}},
+            "blocks": {"brick": {"width": 0.04, "height": 0.02, "length": 0.06, "material": "steel"}},
+        }
+    )
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_name_that_is_no_folder_everywhere_is_refused(name: str) -> None:
+    with pytest.raises(ScenarioError, match="is not a name"):
+        scenario_named(name)
+
+
+@pytest.mark.parametrize("name", FINE)
+def test_results_lie_in_a_folder_of_the_name_below_results(name: str) -> None:
+    folder = default_folder(scenario_named(name))
+    assert folder.parent.name == name
+    assert folder.resolve().parent.parent == RESULTS.resolve()
+
+
+@pytest.mark.parametrize("name", [*HOSTILE, *FINE])
+def test_editors_are_told_the_same(name: str) -> None:
+    pattern = json_schema()["properties"]["name"]["pattern"]
+    found = re.search(pattern.replace("$", r"\Z"), name)  # the $ of JSON Schema allows no line feed behind it
+    assert bool(found) == (name in FINE)
