@@ -88,4 +88,5 @@ def assert_same(one: Result, other: Result) -> None:
 
 def contacts_of(frames: Frames) -> tuple[bytes, bytes] | None:
     """Return all bits of the contacts of frames, where they were recorded."""
-    return frames.contacts and (frames.contacts.ends.tobytes(), frames.contacts.rows.tobytes())
+    contacts = frames.contacts
+    return None if contacts is None else (contacts.ends.tobytes(), contacts.rows.tobytes())
