@@ -17,7 +17,7 @@ def frames(count: int = COUNT) -> Frames:
     step = np.arange(count)
     return Frames(
         step=step,
-        time=1e-3 * step,
+        time=np.multiply(step, 1e-3, dtype=np.float64),
         **{name: next(numbers) for name in ("x", "y", "angle", "vx", "vy", "spin")},
         energy={"kinetic": next(numbers)[:, 0], "friction": next(numbers)[:, 0]},
         contact_count=next(numbers)[:, 0],
