@@ -38,7 +38,7 @@ def _finds(tree: ast.AST) -> Iterator[str]:
             name = _name(node.func)
             if name in CALLS or (name.rpartition(".")[2] in CALLS and name != "re.compile"):
                 yield name
-            flags = {word.arg for word in node.keywords if not _is_false(word.value)}
+            flags = {str(word.arg) for word in node.keywords if not _is_false(word.value)}
             yield from sorted(flags & FLAGS)
 
 
