@@ -16,7 +16,7 @@ import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from blocksim.errors import OutputError, OutputExistsError
 from blocksim.study.rows import Row
@@ -54,17 +54,19 @@ class Entry:
             return None
         try:
             data = json.loads(head + b"}")
-            entry = cls(data["number"], data["case"], data["values"], data["row"])
-        except (ValueError, KeyError, TypeError, RecursionError):  # a right sum below what no sweep writes
+        except (ValueError, RecursionError):  # a right sum below what no sweep writes
             return None
-        return entry if _is_entry(entry) else None
+        return cls(data["number"], data["case"], data["values"], data["row"]) if _is_entry(data) else None
 
 
-def _is_entry(entry: Entry) -> bool:
+def _is_entry(data: Any) -> bool:
     """Tell whether a line holds what a sweep writes, in its types."""
-    number, values, row = entry.number, entry.values, entry.row
+    if not (isinstance(data, dict) and {"number", "case", "values", "row"} <= data.keys()):
+        return False
+    values = data["values"]
     is_hash = isinstance(values, str) and re.fullmatch("[0-9a-f]{1,15}", values) is not None
-    return type(number) is int and isinstance(entry.case, str) and is_hash and isinstance(row, dict)
+    is_row = isinstance(data["row"], dict) and isinstance(data["case"], str)
+    return type(data["number"]) is int and is_hash and is_row
 
 
 def _is_not_finite(value: object) -> bool:

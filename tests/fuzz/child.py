@@ -57,8 +57,14 @@ class Child:
         raise AssertionError(f"blocksim {' '.join(map(str, arguments))} {what}")
 
     def _started(self) -> subprocess.Popen[str]:
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-        self.process = subprocess.Popen([sys.executable, "-c", START], cwd=self.root, text=True, bufsize=1, **pipes)
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", START],
+            cwd=self.root,
+            text=True,
+            bufsize=1,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
         return self.process
 
     def close(self) -> None:
