@@ -10,24 +10,34 @@ MAKEFLAGS += --no-builtin-rules
 PYTHON ?= python3
 # A PYTHON that somebody names is the only one tried; otherwise newer names are, where python3 is too old.
 CANDIDATES := $(PYTHON) $(if $(filter file,$(origin PYTHON)),python3.13 python3.12 python3.11)
-LOCK_PYTHON ?= python3.11
 
+# Exact versions and the SHA-256 of every file of them, for all platforms: what blocksim, its developers' tools and the
+# engines to compare with need. The last two name only what they need beside the first, which they include.
 CONSTRAINTS := tests/constraints.txt
+DEV_CONSTRAINTS := tests/constraints-dev.txt
+BENCH_CONSTRAINTS := tests/constraints-bench.txt
 VENV := .venv
 VENV_PYTHON := $(VENV)/bin/python
 BLOCKSIM := $(VENV)/bin/blocksim
-PIP_INSTALL := $(VENV_PYTHON) -m pip install -qq --disable-pip-version-check --constraint $(CONSTRAINTS)
+PIP_INSTALL := $(VENV_PYTHON) -m pip install -qq --disable-pip-version-check
+# Only wheels, as what a package would be built with has no hash here; then blocksim, and nothing that it asks for.
+INSTALL_LOCKED := $(PIP_INSTALL) --require-hashes --only-binary :all: --requirement
+INSTALL_BLOCKSIM := $(PIP_INSTALL) --no-deps --no-build-isolation --editable .
 
 # The stamps say what is installed, and for which folder: an editable install does not survive a move of the checkout.
 FOLDER := $(shell pwd | cksum | cut -d ' ' -f 1)
 RUN_STAMP := $(VENV)/.installed-run-$(FOLDER)
 DEV_STAMP := $(VENV)/.installed-dev-$(FOLDER)
 BENCH_STAMP := $(VENV)/.installed-bench-$(FOLDER)
-INSTALL_DECIDES := pyproject.toml $(CONSTRAINTS) blocksim/__init__.py
+INSTALL_DECIDES := pyproject.toml $(CONSTRAINTS) $(DEV_CONSTRAINTS) $(BENCH_CONSTRAINTS) blocksim/__init__.py
 # Without a Python (none yet, or it was upgraded away) the stamps are void.
 VOID := $(if $(realpath $(VENV_PYTHON)),,void)
 
+# Every process compiles or loads the kernels by itself, so more of them gain less and less.
+ON_ALL_CORES := --numprocesses auto --maxprocesses 4 --dist worksteal
+
 SCENARIO := scenarios/three_blocks.toml
+DEMO := results/demo
 SMOKE := results/make-smoke
 PICTURES := results/make-pictures
 
@@ -42,7 +52,7 @@ run: $(RUN_STAMP) ## Let the three blocks collapse and compare with the measurem
 
 .PHONY: test
 test: $(DEV_STAMP) ## Run the tests (sets up .venv first)
-	$(VENV_PYTHON) -m pytest
+	$(VENV_PYTHON) -m pytest $(ON_ALL_CORES)
 
 .PHONY: test-long
 test-long: $(DEV_STAMP) ## Run the full sizes of the verification cases, some minutes
@@ -50,7 +60,7 @@ test-long: $(DEV_STAMP) ## Run the full sizes of the verification cases, some mi
 
 .PHONY: test-nojit
 test-nojit: $(DEV_STAMP) ## Run the tests of the kernels as plain Python, without the compiler
-	NUMBA_DISABLE_JIT=1 $(VENV_PYTHON) -m pytest tests/kernels
+	NUMBA_DISABLE_JIT=1 $(VENV_PYTHON) -m pytest $(ON_ALL_CORES) tests/kernels
 
 .PHONY: verify-table
 verify-table: $(DEV_STAMP) ## Measure all verification cases anew and write their table into the README
@@ -110,21 +120,40 @@ pictures: $(RUN_STAMP) ## Draw the pictures of the README anew
 	$(BLOCKSIM) sensitivity scenarios/ensemble_three_blocks.toml --samples 24 --out $(PICTURES)/morris.csv --overwrite --quiet
 	$(BLOCKSIM) plot $(PICTURES)/morris.csv --out results/sensitivity.png
 
+.PHONY: demo
+demo: $(RUN_STAMP) ## Run the three blocks with contact forces; strip, film and report in results/demo
+	$(BLOCKSIM) run $(SCENARIO) --set output.contacts=true --out $(DEMO)/run --overwrite --quiet
+	$(BLOCKSIM) plot $(DEMO)/run --forces --out $(DEMO)/strip.png
+	$(BLOCKSIM) animate $(DEMO)/run --forces --speed 0.1 --fps 20 --width 640 --out $(DEMO)/film.gif
+	$(BLOCKSIM) report $(DEMO)/run --out $(DEMO)/report.html
+
 .PHONY: setup
 setup: $(DEV_STAMP) ## Create or update .venv, with the tools for developers
 
 .PHONY: lock
-lock: ## Rewrite the constraints with the newest versions that fit pyproject.toml
+lock: ## Rewrite the locked versions and hashes: the newest that fit pyproject.toml
 	@folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
-	echo "Resolving in a fresh environment, with the oldest Python that is supported"; \
-	$(LOCK_PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11) and "lock: needs Python 3.11")'; \
-	$(LOCK_PYTHON) -m venv "$$folder/venv"; \
-	"$$folder/venv/bin/python" -m pip install -qq --disable-pip-version-check ".[bench,dev]"; \
-	{ echo "# Exact versions of everything that make installs, for Python 3.11 to 3.13. Written by: make lock"; \
-	  "$$folder/venv/bin/python" -m pip freeze --disable-pip-version-check --exclude blocksim \
-	      --exclude setuptools --exclude wheel; } >"$$folder/constraints.txt"; \
-	cp "$$folder/constraints.txt" $(CONSTRAINTS); \
-	echo "Wrote $(CONSTRAINTS); see the difference, then make test"
+	echo "Resolving for Python 3.11 and newer, with uv in a fresh environment"; \
+	$(PYTHON) -m venv "$$folder/venv"; \
+	"$$folder/venv/bin/python" -m pip install -qq --disable-pip-version-check uv; \
+	index=$${PIP_INDEX_URL:-$$("$$folder/venv/bin/python" -m pip config get global.index-url 2>/dev/null || true)}; \
+	if [ -n "$$index" ]; then export UV_DEFAULT_INDEX="$$index"; fi; \
+	sed -n 's/^requires = \["\(hatchling==[^"]*\)"\].*/\1/p' pyproject.toml >"$$folder/build.in"; \
+	echo editables >>"$$folder/build.in"; \
+	names() { sed -n 's/^\([a-z0-9][^= ]*\)==.*/\1/p' "$$1"; }; \
+	resolve() { "$$folder/venv/bin/uv" pip compile -q --universal --python-version 3.11 --generate-hashes --no-header \
+	    --no-annotate --fork-strategy fewest --no-emit-package colorama "$$@"; }; \
+	resolve pyproject.toml "$$folder/build.in" --extra study -o "$$folder/run.txt"; \
+	known=$$(names "$$folder/run.txt" | sed 's/^/--no-emit-package /'); \
+	resolve pyproject.toml --extra dev -c "$$folder/run.txt" $$known -o "$$folder/dev.txt"; \
+	resolve pyproject.toml --extra bench --extra study -c "$$folder/run.txt" $$known -o "$$folder/bench.txt"; \
+	head() { echo "# $$1. Written by: make lock"; }; \
+	{ head "Exact versions, with hashes, of what make run installs"; cat "$$folder/run.txt"; } >$(CONSTRAINTS); \
+	for extra in dev bench; do \
+	    { head "What the extra $$extra needs beside"; echo "-r constraints.txt"; cat "$$folder/$$extra.txt"; } \
+	        >tests/constraints-$$extra.txt; \
+	done; \
+	echo "Wrote tests/constraints*.txt; see the difference, then make test"
 
 .PHONY: clean
 clean: ## Remove .venv, caches and what make smoke left; your results stay
@@ -148,15 +177,18 @@ $(VENV_PYTHON):
 
 $(RUN_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
 	@echo "Installing blocksim into $(VENV), a minute or so (versions: $(CONSTRAINTS))"
-	@$(PIP_INSTALL) --editable ".[study]"
+	@$(INSTALL_LOCKED) $(CONSTRAINTS)
+	@$(INSTALL_BLOCKSIM)
 	@touch $@
 
 $(DEV_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
-	@echo "Installing blocksim and its developers' tools into $(VENV), a minute or so (versions: $(CONSTRAINTS))"
-	@$(PIP_INSTALL) --editable ".[dev]"
+	@echo "Installing blocksim and its developers' tools into $(VENV), a minute or so (versions: $(DEV_CONSTRAINTS))"
+	@$(INSTALL_LOCKED) $(DEV_CONSTRAINTS)
+	@$(INSTALL_BLOCKSIM)
 	@touch $(RUN_STAMP) $@
 
 $(BENCH_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
-	@echo "Installing the engines to compare with into $(VENV) (versions: $(CONSTRAINTS))"
-	@$(PIP_INSTALL) --editable ".[bench,study]"
+	@echo "Installing the engines to compare with into $(VENV) (versions: $(BENCH_CONSTRAINTS))"
+	@$(INSTALL_LOCKED) $(BENCH_CONSTRAINTS)
+	@$(INSTALL_BLOCKSIM)
 	@touch $(RUN_STAMP) $@

@@ -38,8 +38,9 @@ def _finds(tree: ast.AST) -> Iterator[str]:
             name = _name(node.func)
             if name in CALLS or (name.rpartition(".")[2] in CALLS and name != "re.compile"):
                 yield name
-            flags = {str(word.arg) for word in node.keywords if not _is_false(word.value)}
-            yield from sorted(flags & FLAGS)
+            yield from sorted(
+                str(word.arg) for word in node.keywords if word.arg in FLAGS and not _is_false(word.value)
+            )
 
 
 def _is_false(node: ast.expr) -> bool:

@@ -22,13 +22,15 @@ def animate_command(
     trails: Annotated[
         bool | None, typer.Option("--trails/--no-trails", help="Ways of the centres (default: up to 30 blocks).")
     ] = None,
+    forces: options.Forces = False,
     width: Annotated[int, typer.Option(min=200, max=4000, metavar="PX", help="Width in pixels.")] = 800,
     quiet: options.Quiet = False,
 ) -> None:
     """Show a run as a film, GIF or MP4.
 
     The default is a GIF, NAME.gif, at a quarter of the real speed; the last picture is held for a while. A run that was
-    stopped or killed is shown as far as it came. MP4 needs the extra `video`.
+    stopped or killed is shown as far as it came. --forces needs a run that has stored contacts (output.contacts =
+    true), MP4 the extra `video`.
 
     Example: blocksim animate scenarios/three_blocks.toml --speed 0.1
     """
@@ -38,7 +40,7 @@ def animate_command(
     film = out or Path(f"{stored.scenario.name}.gif")
     support = support_of(stored.scenario)
     older = replacement(film)
-    look = Look(width, trails, stored.scenario.name)
+    look = Look(width, trails, stored.scenario.name, forces)
     count = draw_film(stored.frames, film, Pace(speed, fps), look, support)
     if stored.remark:
         note(stored.remark)

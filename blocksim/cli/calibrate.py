@@ -119,7 +119,7 @@ def _probability(found: Fit) -> list[str]:
         return [f"one run, without input scatter: {verdict}"]
     low, high = score.interval
     return [
-        f"P(inside all ranges) = {score.share_inside:.3f}, 95 % interval {low:.3f} to {high:.3f} (Wilson)",
+        f"P(inside all ranges) = {score.share_inside:.3f}, 95 % interval {low:.3f} to {high:.3f} (Clopper-Pearson)",
         f"of {score.members} fresh random members; the search had {tried.share_inside:.3f} of its {tried.members}",
     ]
 

@@ -22,6 +22,7 @@ COMMANDS = {  # name: module in this folder, function in it, first line of its h
     "sensitivity": ("sensitivity", "sensitivity_command", "Show which inputs decide where the blocks end."),
     "converge": ("converge", "converge_command", "Refine step, stiffness and spacing until the run-out stays."),
     "verify": ("verify", "verify_command", "Run the verification cases and show the table."),
+    "verify-run": ("verify_run", "verify_run_command", "Run stored results again and compare the bits."),
     "bench": ("bench", "bench_command", "Measure speed and memory, and show the table."),
     "plot": ("plot", "plot_command", "Draw a run, a sweep or a table of sensitivities."),
     "animate": ("animate", "animate_command", "Show a run as a film, GIF or MP4."),

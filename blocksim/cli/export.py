@@ -25,21 +25,26 @@ def export_command(
 ) -> None:
     """Write all frames of a run as CSV or VTKHDF.
 
-    CSV: one row a frame and block, with units in the heads. VTKHDF: one file with all times, blocks as rectangles with
-    number, velocity and rotation; ParaView opens it. A run that was stopped or killed is written as far as it came.
+    CSV: one row a frame and block, with units in the heads; contacts, where the run has stored them, go into a second
+    file, NAME_contacts.csv. VTKHDF: one file with all times, blocks as rectangles with number, velocity and rotation,
+    ground and walls with number 0; ParaView opens it. A run that was stopped or killed is written as far as it came.
 
     Example: blocksim export scenarios/three_blocks.toml --format vtkhdf
     """
-    write = format_named(kind)
+    form = format_named(kind)
     stored = stored_run(run)
     file = out or Path(f"{stored.scenario.name}.{kind}")
+    beside = file.with_name(f"{file.stem}_contacts{file.suffix}")
     _refuse_own_files(file, stored.folder)
-    older = replacement(file)
-    count = write(file, stored.frames)
+    told = [f"file: {file} ({replacement(file)}{form.write(file, stored.frames, stored.scenario)} frames)"]
+    if form.write_contacts is not None and stored.frames.contacts is not None:
+        older = replacement(beside)
+        count = form.write_contacts(beside, stored.frames, stored.frames.contacts)
+        told.append(f"file: {beside} ({older}{count} contacts)")
     if stored.remark:
         note(stored.remark)
     if not quiet:
-        note(f"file: {file} ({older}{count} frames)")
+        note("\n".join(told))
 
 
 def _refuse_own_files(file: Path, folder: Path) -> None:

@@ -9,9 +9,9 @@ from blocksim.analysis.experiment import load_table
 from blocksim.cli import options
 from blocksim.cli.output import note
 from blocksim.errors import InvalidInputError
-from blocksim.study.many import TABLE
 from blocksim.study.picture import draw_indices, draw_sweep
 from blocksim.study.stored import stored_run
+from blocksim.study.table import TABLE
 from blocksim.view.kinds import STRIP, kind_named
 from blocksim.view.support import support_of
 
@@ -38,13 +38,15 @@ def plot_command(
         ),
     ] = None,
     experiment: options.ExperimentPath = None,
+    forces: options.Forces = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Draw a run, a sweep or a table of sensitivities.
 
     Below the final state of a run stand the measured ranges. --kind final shows where the blocks end, with rotation and
-    measured range below each of them; --kind history shows x, y, rotation, energies and contacts over time. A run that
-    was stopped or killed is drawn as far as it came.
+    measured range below each of them; --kind history shows x, y, rotation, energies and contacts over time. --forces
+    draws contact forces as arrows, of runs that have stored them (output.contacts = true). A run that was stopped or
+    killed is drawn as far as it came.
 
     A sweep over one key, or a second one with few values, shows final x as lines; one over two keys a map of
     run-outs and outcomes; a sampled one every two of its inputs. The measured range is marked in all of them.
@@ -53,18 +55,20 @@ def plot_command(
     """
     moments = _times(times)
     if (run / TABLE).is_file():
-        _refuse_times(run, times, "a sweep")
+        _refuse_times(run, times, forces, "a sweep")
         picture = draw_sweep(run, out, experiment, kind)
     elif run.suffix.lower() == ".csv":
-        _refuse_times(run, times, "a table")
+        _refuse_times(run, times, forces, "a table")
         picture = draw_indices(run, out, kind)
     else:
-        picture = _draw_run(run, out, moments, experiment, kind or STRIP)
+        picture = _draw_run(run, out, moments, experiment, kind or STRIP, forces)
     if not quiet:
         note(f"picture: {picture}")
 
 
-def _draw_run(run: Path, out: Path | None, moments: list[float] | None, experiment: Path | None, kind: str) -> Path:
+def _draw_run(
+    run: Path, out: Path | None, moments: list[float] | None, experiment: Path | None, kind: str, forces: bool
+) -> Path:
     draw = kind_named(kind)
     chosen = {} if moments is None else {"times": moments}
     if chosen and kind != STRIP:
@@ -75,15 +79,17 @@ def _draw_run(run: Path, out: Path | None, moments: list[float] | None, experime
     table = experiment or (scenario.experiment.table if scenario.experiment is not None else None)
     measured = None if table is None else load_table(table)
     picture = out or Path(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
-    draw(stored.frames, picture, title=scenario.name, measured=measured, support=support_of(scenario), **chosen)
+    look = {"title": scenario.name, "measured": measured, "support": support_of(scenario), "forces": forces}
+    draw(stored.frames, picture, **look, **chosen)
     if stored.remark:
         note(stored.remark)
     return picture
 
 
-def _refuse_times(run: Path, times: str | None, what: str) -> None:
-    if times is not None:
-        message = f"--times picks frames of a run, but {run} is {what}"
+def _refuse_times(run: Path, times: str | None, forces: bool, what: str) -> None:
+    if times is not None or forces:
+        option = "--forces shows contacts of a run" if forces else "--times picks frames of a run"
+        message = f"{option}, but {run} is {what}"
         raise InvalidInputError(message)
 
 

@@ -11,9 +11,10 @@ from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.cli import options
 from blocksim.cli.output import note
-from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
+from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
 from blocksim.scenario import Scenario, load_scenario
 from blocksim.simulation import folder as files
+from blocksim.study.judge import compare_sweep
 from blocksim.study.places import find_run
 from blocksim.view.report.packing import MOST_BYTES
 from blocksim.view.report.page import write_report
@@ -43,10 +44,10 @@ def report_command(
     """Write runs and sweeps into one HTML file.
 
     It has a player, time histories, the comparison with measured repeats, energies and where everything comes from;
-    for a sweep a table, a map and, where --keep-cases kept their frames, its members. The file loads nothing from
-    anywhere and can be opened from the disk or sent by mail. Many frames are thinned and rounded; the page says so.
-    A run that was killed or damaged is shown as far as it can be read (exit code 65 where something is damaged). An
-    older report is replaced, any other file is not.
+    for a sweep the share of its members inside, a table, a map and, where --keep-cases kept their frames, its members.
+    The file loads nothing from anywhere and can be opened from the disk or sent by mail. Many frames are thinned and
+    rounded; the page says so. A run that was killed or damaged is shown as far as it can be read (exit code 65 where
+    something is damaged). An older report is replaced, any other file is not.
 
     Example: blocksim report scenarios/three_blocks.toml --out three_blocks.html
     """
@@ -118,15 +119,31 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
     """Return a sweep and those of its members that have frames as subjects, and what is damaged in them."""
     table = read_sweep_table(place)
     scenario, problems = _plan(place)
+    judged, remarks = _judged(place, scenario, experiment)
     cases = _kept(table)
     found = [(case, read_stored(folder)) for case, folder in list(cases.items())[:most]]
     keys = {case: f"{key}-member-{number}" for number, (case, _) in enumerate(found, start=1)}
-    sweep = sweep_subject(key, table, scenario, keys, problems, list(cases)[most:])
+    sweep = sweep_subject(key, table, scenario, keys, [*problems, *remarks], list(cases)[most:], judged=judged)
     shown = [
         run_subject(keys[case], run, *_compared(run, experiment), most_bytes=MOST_BYTES // len(found), parent=key)
         for case, run in found
     ]
     return [sweep, *shown], tuple(text for _, run in found for text in run.damage)
+
+
+def _judged(
+    place: Path, scenario: Scenario | None, experiment: Path | None
+) -> tuple[dict[str, object] | None, tuple[str, ...]]:
+    """Return the judgement of a sweep's members, or why there is none though there is a measurement."""
+    if experiment is None and (scenario is None or scenario.experiment is None):
+        return None, ()
+    try:
+        found = compare_sweep(place, experiment)
+        return {**found.to_dict(), "experiment": _near(found.source)}, ()
+    except BlocksimError as error:
+        if experiment is not None and not isinstance(error, UnavailableError):
+            raise
+        return None, (str(error),)
 
 
 def _plan(place: Path) -> tuple[Scenario | None, tuple[str, ...]]:

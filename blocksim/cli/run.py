@@ -2,6 +2,7 @@
 
 import os
 from itertools import islice
+from pathlib import Path
 
 import typer
 
@@ -10,14 +11,18 @@ from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.progress import tell_compilation, watching
 from blocksim.cli.scenario import read_scenario
 from blocksim.cli.verdict import comparison_table, verdict_lines
+from blocksim.scenario import Scenario
 from blocksim.simulation import Result
 from blocksim.simulation.compilation import kernels_of
-from blocksim.simulation.folder import default_folder, holds_run
+from blocksim.simulation.folder import default_folder, holds_run, unfinished_beside
+from blocksim.simulation.precautions import CHECKPOINT_SECONDS, Precautions
+from blocksim.simulation.resumption import NEW, find_resumption
 from blocksim.simulation.table import rows_of
 from blocksim.study.single import FINISHED, check_experiment, compare, run
 
 MOST_ROWS = 40  # of the final table on the screen; of a longer one the first are shown
 FIRST_ROWS = 10
+INTERRUPTED = "interrupted"
 
 
 def run_command(
@@ -25,6 +30,11 @@ def run_command(
     settings: options.Settings = None,
     out: options.OutFolder = None,
     overwrite: options.Overwrite = False,
+    resume: options.Resume = False,
+    wall_time: options.WallTime = None,
+    checkpoint_every: options.CheckpointEvery = CHECKPOINT_SECONDS,
+    checkpoint_steps: options.CheckpointSteps = None,
+    checkpoint_time: options.CheckpointTime = None,
     threads: options.Threads = 1,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -32,20 +42,33 @@ def run_command(
     """Simulate a scenario and show where the blocks end.
 
     Where the scenario names an experiment, the measured ranges stand beside. A run that is there already is shown
-    again.
+    again. Ctrl-C, SIGTERM, SIGUSR1 and --wall-time stop a run so that --resume goes on with it, to the same bits.
 
     Example: blocksim run scenarios/three_blocks.toml --set time.end=0.1
     """
+    if resume and overwrite:
+        raise typer.BadParameter("cannot go with --overwrite, which throws away what there is", param_hint="--resume")
     silent = quiet or as_json
+    precautions = Precautions(checkpoint_every, checkpoint_steps, checkpoint_time, wall_time)
     with read_scenario(scenario, settings or []) as ready:
         folder = out or default_folder(ready)
         known = not overwrite and holds_run(folder, ready)
         if not known:
             check_experiment(ready)
             warn_of_threads(threads)
+            if resume:
+                tell_resumption(folder, ready, quiet=silent)
             tell_compilation(kernels_of(ready), quiet=silent)
         with watching(quiet=silent or known) as on_progress:
-            result = run(ready, out=folder, overwrite=overwrite, threads=threads, on_progress=on_progress)
+            result = run(
+                ready,
+                out=folder,
+                overwrite=overwrite,
+                resume=resume,
+                threads=threads,
+                precautions=precautions,
+                on_progress=on_progress,
+            )
     if known and not silent:
         note(f"already there, --overwrite repeats it: {folder}")
     show_result(result, as_json=as_json, quiet=silent)
@@ -78,8 +101,32 @@ def show_result(result: Result, *, as_json: bool, quiet: bool) -> None:
         answer("\n".join(_answer_lines(result)))
     if result.status != FINISHED:
         note(f"{result.name}: {result.status}: {result.reason}; what there is by then is kept in {result.folder}")
+        note(_way_on(result))
     elif not quiet:
         note(f"results: {result.folder}")
+
+
+def _way_on(result: Result) -> str:
+    """Return what can be done with a run that did not finish."""
+    step = result.summary.last_checkpoint
+    if result.status == INTERRUPTED:
+        return f"go on with --resume (checkpoint at step {step})"
+    return "no checkpoint was written by then" if step is None else f"last good checkpoint at step {step}"
+
+
+def tell_resumption(folder: Path, scenario: Scenario, *, quiet: bool) -> None:
+    """Tell from where a run is going on, and what is left where nothing can. Raises what `find_resumption` raises."""
+    found = find_resumption(folder, scenario)
+    for remark in found.remarks:
+        note(remark)
+    if not quiet and found.checkpoint is not None:
+        position = found.checkpoint.position
+        note(f"goes on at step {position.step}, {position.frames} frames are there: {folder}")
+    if found is NEW:
+        for other in unfinished_beside(folder):
+            note(
+                f"nothing to go on with in {folder}; a run of another scenario or version of the code waits in {other}"
+            )
 
 
 def _answer_lines(result: Result) -> list[str]:

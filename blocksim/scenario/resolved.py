@@ -56,12 +56,17 @@ def _leave_to_static(scenario: Scenario, data: dict[str, Any]) -> None:
             functools.reduce(dict.__getitem__, path, data).pop("kinetic", None)
 
 
-def scenario_hash(scenario: Scenario) -> str:
-    """Return the SHA-256 (hex) of all that decides the motion and the output, in any order of the file."""
+def deciding_values(scenario: Scenario) -> dict[str, Any]:
+    """Return all that decides the motion and the output, as JSON has it; of a table of motion its digest."""
     data = scenario.model_dump(mode="json", exclude=UNHASHED)
     if isinstance(scenario.motion, FromTable):
         data["motion"]["table"] = scenario.motion.table.digest
-    text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return data
+
+
+def scenario_hash(scenario: Scenario) -> str:
+    """Return the SHA-256 (hex) of all that decides the motion and the output, in any order of the file."""
+    text = json.dumps(deciding_values(scenario), sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
 from blocksim.scenario import PlacedBody
+from blocksim.simulation.culprit import told
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.ledger import EnergyLedger, InPlay, ledger_of
 from blocksim.simulation.loop import outcome_of
@@ -16,6 +17,7 @@ from blocksim.simulation.outcome import Outcome
 from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
 from blocksim.simulation.schemes import AnyScene, scheme_of
 from blocksim.simulation.table import COLUMNS, Columns, as_frame, final_values
+from blocksim.world.stacks import member
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,7 +67,7 @@ class Closing:
         """Take what is measured (m, e + 2) in the scenes as they are now, as the scheme's `measured`."""
         world, blocks = scenes.world, len(placed[0])
         self.names = scheme_of(scenes).ledger
-        self.placed = placed
+        self.scenes, self.placed = scenes, placed
         self.measured = measured
         self.motion = np.stack([world.bodies[name][:, :blocks] for name in MOTION], axis=1)  # (m, 6, b)
         self.steps: NDArray[np.int64] = world.clock["steps"].copy()  # (m, 1)
@@ -81,8 +83,11 @@ class Closing:
         ledger = ledger_of(self.names, self.measured[m], start, self.in_play[m])
         names = [body.name for body in self.placed[m]]
         some = slice(m, m + 1)
+        outcome = outcome_of(code, ledger)
+        if not outcome.is_finished:
+            outcome = told(outcome, code, member(self.scenes, m), self.placed[m])
         return MemberEnd(
-            outcome=outcome_of(code, ledger),
+            outcome=outcome,
             ledger=ledger,
             seconds=int(self.steps[m, 0]) * self.time_steps[m],
             columns=dict(zip(COLUMNS, (names, *self.columns[m]), strict=True)),

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
-from blocksim.kernels.arrays import PAIRS_FULL
+from blocksim.kernels.arrays import PAIRS_FULL, REACHED
 from blocksim.scenario import Scenario
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.ending import Closing, MemberEnd, MemberFailure
-from blocksim.simulation.ledger import start_energy
+from blocksim.simulation.ledger import energy_ledger, start_energy
+from blocksim.simulation.looks import adds_up, next_look
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import AnyScene, build_stacks, measured_row, scheme_of
 from blocksim.simulation.team import ALONE
@@ -104,6 +105,7 @@ class Ensemble:
         self.placed = stack.placed
         self.scenes: AnyScene = stack.scenes
         self.scheme = scheme_of(self.scenes)
+        self.bodies = int(self.scenes.world.bodies.shape[1]) - 1
         self.time_steps: list[float] = self.scenes.world.controls["step"][:, 0].tolist()
         ends = [scenarios[number].time.end for number in stack.numbers]
         self.last_steps = np.array([*map(last_step_of, ends, self.time_steps)], dtype=np.int64)
@@ -112,21 +114,37 @@ class Ensemble:
 
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
-        self._advance(np.zeros(0, dtype=np.int64))  # compiles, before there are threads
+        nobody = np.zeros(0, dtype=np.int64)  # compiles, before there are threads
+        self.scheme.advance_members(self.scenes, nobody, self.last_steps, self.starts, self.codes)
         count = len(self.codes)
         chunk = min(CHUNK, -(-count // threads))
         list(pool.map(self._advance, (np.arange(i, min(i + chunk, count)) for i in range(0, count, chunk))))
 
     def _advance(self, members: NDArray[np.int64]) -> None:
-        self.scheme.advance_members(self.scenes, members, self.last_steps, self.starts, self.codes)
+        """Advance some members from look to look, without those whose energy does not add up any more."""
+        rows, stops = self.starts, np.zeros_like(self.codes)
+        done = 0
+        while members.size:
+            done = next_look(done, self.bodies)
+            np.minimum(self.last_steps, done, out=stops)
+            self.scheme.advance_members(self.scenes, members, stops, rows, self.codes)
+            rows = np.zeros_like(self.starts)  # what is measured at the start of a later call
+            members = members[(self.codes[members] == REACHED) & (self.last_steps[members] > done)]
+            members = members[[self._adds_up(m) for m in members.tolist()]]
+
+    def _adds_up(self, m: int) -> bool:
+        return adds_up(energy_ledger(member(self.scenes, m), self._start(m)))
+
+    def _start(self, m: int) -> float:
+        """Return the energy (J) of a member at the start."""
+        return float(self.starts[m, : len(self.scheme.ledger)].sum())
 
     def ends(self) -> list[Ended]:
         """Return where the members ended, in order."""
         closing = Closing(self.scenes, self.placed, self._measured())
-        starts = [float(row.sum()) for row in self.starts[:, : len(self.scheme.ledger)]]
         return [
-            self._run_alone(m, start) if code == PAIRS_FULL else closing.end(m, start, code)
-            for m, (start, code) in enumerate(zip(starts, self.codes.tolist(), strict=True))
+            self._run_alone(m, self._start(m)) if code == PAIRS_FULL else closing.end(m, self._start(m), code)
+            for m, code in enumerate(self.codes.tolist())
         ]
 
     def _measured(self) -> NDArray[np.float64]:
@@ -142,7 +160,15 @@ class Ensemble:
             if not scene.world.clock[0].is_started:
                 scene, _ = ALONE.advance(self.scheme.with_more_room(scene), 0)
                 start = start_energy(scene)
-            scene, code = ALONE.advance(scene, int(self.last_steps[m]))
+            scene, code = self._finish(scene, start, int(self.last_steps[m]))
         except BlocksimError as error:
             return MemberFailure(error)
         return Closing(stack_of_one(scene), placed, measured_row(scene)[np.newaxis]).end(0, start, code)
+
+    def _finish(self, scene: AnyScene, start: float, last: int) -> tuple[AnyScene, int]:
+        """Advance one scene from look to look, as `_advance` does; return it and its status code."""
+        code, done = REACHED, -1
+        while code == REACHED and done < last and (done < 0 or adds_up(energy_ledger(scene, start))):
+            done = next_look(int(scene.world.clock[0].steps), self.bodies)
+            scene, code = ALONE.advance(scene, min(done, last))
+        return scene, code

@@ -2,9 +2,10 @@
 
 import contextlib
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
-from blocksim.errors import BlocksimError, OutputExistsError
+from blocksim.errors import BlocksimError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario
 from blocksim.scenario.limited import MEGABYTE, read_limited
 from blocksim.scenario.resolved import HEADER
@@ -19,7 +20,8 @@ FINAL = "final.csv"
 FRAMES = "run.h5"
 SUMMARY = "run.json"
 DONE = "done.json"  # written last: a folder without it is not finished
-OURS = (SCENARIO, EXPERIMENT, MOTION, FINAL, FRAMES, SUMMARY, DONE)
+CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run goes on, removed when it has finished
+OURS = (SCENARIO, EXPERIMENT, MOTION, FINAL, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
 
 MOST_BYTES = MEGABYTE  # of done.json
 
@@ -52,14 +54,46 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
         present = {path.name for path in folder.iterdir()}
         _refuse_foreign(folder, present)
         if present and not overwrite:
-            what = "another run" if DONE in present else "a run that did not finish (stopped, failed or still running)"
-            message = f"{folder}: {what} is there; --overwrite replaces it, --out DIR writes elsewhere"
+            _refuse_finished(folder)
+            message = (
+                f"{folder}: a run that did not finish (stopped, failed or still running) is there; --resume goes on "
+                "with it, --overwrite replaces it, --out DIR writes elsewhere"
+            )
             raise OutputExistsError(message)
         for name in sorted(present, key=DONE.__ne__):  # the mark of a finished run goes first
             (folder / name).unlink(missing_ok=True)
     except OSError as error:
         message = f"{folder}: cannot be created: {error.strerror}"
         raise OutputExistsError(message) from error
+
+
+def check_folder(folder: Path) -> None:
+    """Raise OutputExistsError unless a run in this folder may go on: nothing but an unfinished run is there."""
+    try:
+        present = {path.name for path in folder.iterdir()}
+        _refuse_foreign(folder, present)
+        _refuse_finished(folder)
+    except OSError as error:
+        message = f"{folder}: cannot be read: {error.strerror}"
+        raise OutputExistsError(message) from error
+
+
+def clear_remains(folder: Path, names: Iterable[str]) -> None:
+    """Remove files of these names, and what was half written when a run was killed. Raises OutputError."""
+    chosen = set(names)
+    try:
+        for path in folder.iterdir():
+            if path.name in chosen or (path.name not in OURS and _is_ours(path.name)):
+                path.unlink(missing_ok=True)
+    except OSError as error:
+        message = f"{folder}: cannot be written: {error.strerror}"
+        raise OutputError(message) from error
+
+
+def _refuse_finished(folder: Path) -> None:
+    if is_finished(folder):
+        message = f"{folder}: another run is there; --overwrite replaces it, --out DIR writes elsewhere"
+        raise OutputExistsError(message)
 
 
 def _refuse_foreign(folder: Path, present: set[str]) -> None:
@@ -87,3 +121,9 @@ def newest_finished(folder: Path) -> Path | None:
     """Return the newest finished run right below a folder, or None."""
     finished = [path.parent for path in folder.glob(f"*/{DONE}")]
     return max(finished, key=lambda path: (path / DONE).stat().st_mtime_ns, default=None)
+
+
+def unfinished_beside(folder: Path) -> list[Path]:
+    """Return the folders beside one in which checkpoints of runs that did not finish wait."""
+    checkpoints = (path for name in CHECKPOINTS for path in folder.parent.glob(f"*/{name}"))
+    return sorted({path.parent for path in checkpoints if path.parent != folder and not is_finished(path.parent)})

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.simulation.contacts import Contacts
+
 Floats = NDArray[np.float64]
 
 
@@ -27,6 +29,7 @@ class Frames:
     size_x: Floats  # (b,) m, along the body's own x axis
     size_y: Floats  # (b,) m
     start_angle: Floats  # (b,) rad, of the body axes as placed
+    contacts: Contacts | None = None  # where they were recorded
 
     @property
     def rotation(self) -> Floats:

@@ -1,4 +1,4 @@
-"""The one time loop: compiled code runs until the recorder wants a frame."""
+"""The one time loop: compiled code runs until the recorder wants a frame, or somebody wants to look in."""
 
 import time
 from collections.abc import Callable
@@ -6,13 +6,16 @@ from dataclasses import dataclass
 
 from blocksim.kernels.arrays import REACHED, World
 from blocksim.simulation import outcome as ends
+from blocksim.simulation.checkpoint import Position
+from blocksim.simulation.checkpoint_writer import KEEPS_NOTHING, Keeper, Standing
+from blocksim.simulation.culprit import told
 from blocksim.simulation.ledger import EnergyLedger, energy_ledger, start_energy
+from blocksim.simulation.looks import adds_up, next_look
 from blocksim.simulation.outcome import Outcome
+from blocksim.simulation.pace import Pace
 from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.team import ALONE, Team
-
-BODY_STEPS_A_CALL = 1_000_000  # a tenth of a second or so; after that Ctrl-C is heard and progress is shown
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,18 @@ class Progress:
 
 
 Watcher = Callable[[Progress], None]
+
+
+@dataclass(frozen=True)
+class Attendance:
+    """Who looks in between two compiled calls."""
+
+    on_progress: Watcher = lambda _: None
+    stop: Callable[[], str] = lambda: ""  # why to stop now; nothing as long as the run may go on
+    keeper: Keeper = KEEPS_NOTHING
+
+
+NOBODY = Attendance()
 
 
 @dataclass(frozen=True)
@@ -47,7 +62,7 @@ def last_step_of(end: float, step: float) -> int:
 def outcome_of(code: int, ledger: EnergyLedger) -> Outcome:
     """Return what a run came to that was not interrupted: its status code, and whether its energy adds up."""
     outcome = ends.BY_CODE[code]
-    if outcome.is_finished and ledger.relative_residual > ends.RESIDUAL_LIMIT:
+    if outcome.is_finished and not adds_up(ledger):
         return ends.RESIDUAL
     return outcome
 
@@ -58,29 +73,85 @@ def run_loop(
     end: float,
     *,
     team: Team = ALONE,
-    on_progress: Watcher = lambda _: None,
-    is_stopped: Callable[[], bool] = lambda: False,
+    attendance: Attendance = NOBODY,
+    since: Position | None = None,
 ) -> LoopResult:
-    """Advance a scene to `end` (s) or until it rests, fails or `is_stopped`; the recorder samples on the way."""
-    step = float(scene.world.controls[0].step)
-    last = last_step_of(end, step)
-    most = max(1, BODY_STEPS_A_CALL // scene.world.bodies.size)
-    seconds = -time.perf_counter()
-    scene, status = team.advance(scene, 0)
-    seconds += time.perf_counter()
-    start = start_energy(scene)
-    recorder.sample(scene)
-    done, wanted = 0, 0
-    while status == REACHED and done < last and not is_stopped():
-        wanted = min(recorder.next_step(done), last) if done == wanted else wanted
-        seconds -= time.perf_counter()
-        scene, status = team.advance(scene, min(wanted, done + most))
-        seconds += time.perf_counter()
-        done = int(scene.world.clock[0].steps)
-        if done == wanted:
-            recorder.sample(scene)
-        on_progress(Progress(done * step, end, done, energy_ledger(scene, start).relative_residual))
-    recorder.sample(scene)  # wherever it ended
-    ledger = energy_ledger(scene, start)
-    outcome = ends.INTERRUPTED if status == REACHED and done < last else outcome_of(status, ledger)
-    return LoopResult(scene.world, outcome, ledger, seconds, team.threads)
+    """Advance a scene to `end` (s) or until it rests, fails or is stopped; the recorder samples on the way.
+
+    `since` is where the scene of a checkpoint stood. Raises what keeping frames and checkpoints raises.
+    """
+    going = _Going(scene, recorder, end, team, attendance)
+    going.begin(since)
+    why = going.go_on()
+    if why:
+        going.keep_checkpoint()
+    return going.result(why)
+
+
+class _Going:
+    """A run under way."""
+
+    def __init__(self, scene: AnyScene, recorder: Recorder, end: float, team: Team, attendance: Attendance) -> None:
+        self.scene, self.recorder, self.end, self.team = scene, recorder, end, team
+        self.on_progress, self.stop, self.keeper = attendance.on_progress, attendance.stop, attendance.keeper
+        self.step = float(scene.world.controls[0].step)
+        self.last = last_step_of(end, self.step)
+        self.bodies = scene.world.bodies.size - 1
+        self.pace = Pace(self.bodies)
+        self.status, self.is_lost = REACHED, False
+        self.seconds = self.start = 0.0  # in compiled code; J
+
+    @property
+    def done(self) -> int:
+        """Return the number of steps done."""
+        return int(self.scene.world.clock[0].steps)
+
+    def begin(self, since: Position | None) -> None:
+        """Evaluate the contacts at the start, or take over what an earlier part of the run has left."""
+        if since is not None:
+            self.start, self.seconds = since.start_energy, since.solver_seconds
+            return
+        self._advance(0)
+        self.start = start_energy(self.scene)
+        self.recorder.sample(self.scene)
+
+    def go_on(self) -> str:
+        """Run to the end, or until somebody wants to stop; return why, and nothing at the end."""
+        while self.status == REACHED and self.done < self.last and not self.is_lost:
+            why = self.stop()
+            if why:
+                return why
+            self._go_to(min(self.recorder.next_step(self.done), self.last))
+        return ""
+
+    def _go_to(self, wanted: int) -> None:
+        """Advance towards a step at which a frame is wanted, as far as one call goes."""
+        done, before = self.done, self.seconds
+        look = next_look(done, self.bodies)
+        self._advance(min(wanted, look, done + self.pace.steps, self.keeper.next_step(done)))
+        self.pace.learn(self.done - done, self.seconds - before)
+        if self.done == wanted:
+            self.recorder.sample(self.scene)
+        ledger = energy_ledger(self.scene, self.start)
+        self.is_lost = self.done == look and not adds_up(ledger)
+        if self.status == REACHED and adds_up(ledger) and self.done < self.last and self.keeper.is_due(self.done):
+            self.keep_checkpoint()
+        self.on_progress(Progress(self.done * self.step, self.end, self.done, ledger.relative_residual))
+
+    def _advance(self, last_step: int) -> None:
+        self.seconds -= time.perf_counter()
+        self.scene, self.status = self.team.advance(self.scene, last_step)
+        self.seconds += time.perf_counter()
+
+    def keep_checkpoint(self) -> None:
+        """Have the present state kept, before the frame of a moment that is no output time is recorded."""
+        frames, threads = self.recorder.count_until(self.done), self.team.threads
+        self.keeper.keep(self.scene, Standing(self.done, frames, self.start, self.seconds, threads))
+
+    def result(self, why: str) -> LoopResult:
+        """Record where the run ended, and tell what it came to."""
+        self.recorder.sample(self.scene)  # wherever it ended
+        ledger = energy_ledger(self.scene, self.start)
+        outcome = ends.interrupted(why) if why else outcome_of(self.status, ledger)
+        outcome = told(outcome, self.status, self.scene, self.recorder.placed)
+        return LoopResult(self.scene.world, outcome, ledger, self.seconds, self.team.threads)

@@ -26,7 +26,6 @@ class Outcome:
 
 END_OF_TIME = Outcome("finished", "end of simulated time", ExitCode.SUCCESS)
 REST = Outcome("finished", "at rest", ExitCode.SUCCESS)
-INTERRUPTED = Outcome("interrupted", "stopped by the user", ExitCode.STOPPED_EARLY)
 RESIDUAL = Outcome(
     "failed", f"energy residual above {RESIDUAL_LIMIT:.0%} of the energy in play", ExitCode.NUMERICAL_FAILURE
 )
@@ -37,3 +36,8 @@ BY_CODE = {
     arrays.NOT_FINITE: Outcome("failed", "a position or velocity is no longer finite", ExitCode.NUMERICAL_FAILURE),
     arrays.OVERLAP_LIMIT: Outcome("failed", "an overlap exceeds contact.max_overlap", ExitCode.NUMERICAL_FAILURE),
 }
+
+
+def interrupted(why: str) -> Outcome:
+    """Return what a run comes to that is stopped, and can go on."""
+    return Outcome("interrupted", why, ExitCode.STOPPED_EARLY)

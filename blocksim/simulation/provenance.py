@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from blocksim.kernels.arrays import World
 
 ROOMS = ("kernels", "scenario", "simulation", "world")  # their code decides the bits of a run
-PACKAGES = ("numpy", "numba", "pydantic", "h5py", "pandas")
+PACKAGES = ("numpy", "numba", "llvmlite", "pydantic", "h5py", "pandas")  # the first three compile or compute the bits
 HASH_DIGITS = 12
+ROOM_PREFIX = "code_"  # and a room: the hash of its code
 CPU_INFO = Path("/proc/cpuinfo")
 
 
@@ -27,12 +28,18 @@ def code_version() -> str:
 
 
 @functools.cache
-def code_hash() -> str:
-    """Return a hash of all code that decides the bits of a run, and of the versions it is compiled with."""
+def code_hashes() -> dict[str, str]:
+    """Return a hash of the code of each room that decides the bits of a run, with the versions it is compiled with."""
     from blocksim.kernels.jit import source_hash  # noqa: PLC0415 - numba, which reading a folder does not need
 
     package = Path(__file__).resolve().parents[1]
-    text = " ".join([code_version(), *(source_hash(package / room) for room in ROOMS)])
+    return {room: source_hash(package / room) for room in ROOMS}
+
+
+@functools.cache
+def code_hash() -> str:
+    """Return one hash of all code that decides the bits of a run, and of the versions it is compiled with."""
+    text = " ".join([code_version(), *code_hashes().values()])
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -51,18 +58,37 @@ def state_hash(world: "World") -> str:
 
 
 def environment() -> dict[str, str]:
-    """Return versions and machine."""
+    """Return versions, machine and command; `cpu` and `cpu_features` are what machine code is compiled for."""
     versions = {name: metadata.version(name) for name in PACKAGES}
+    cpu, features = _compiled_for()
     return {
         "blocksim": code_version(),
         "code": code_hash()[:HASH_DIGITS],
+        **{f"{ROOM_PREFIX}{room}": digest for room, digest in code_hashes().items()},
         "python": platform.python_version(),
         **versions,
         "platform": platform.platform(),
         "processor": _processor(),
+        "cpu": cpu,
+        "cpu_features": features,
         "cores": str(os.cpu_count()),
         "command": shlex.join(sys.argv),
     }
+
+
+def machine() -> str:
+    """Return processor, system and its C library, whose sines may differ in the last digit, in one line."""
+    parts = (_processor(), platform.system(), platform.machine(), *platform.libc_ver())
+    return " ".join(part for part in parts if part)
+
+
+def _compiled_for() -> tuple[str, str]:
+    """Return the name of the processor, and its features, that numba has compiled for: by these it names its files."""
+    from numba.core.registry import cpu_target  # noqa: PLC0415 - as in `code_hashes`
+
+    _, name, features = cpu_target.target_context.codegen().magic_tuple()
+    present = sorted(one[1:] for one in features.split(",") if one.startswith("+"))
+    return name, " ".join(present)
 
 
 def _processor() -> str:

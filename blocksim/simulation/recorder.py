@@ -1,5 +1,6 @@
 """Samples the world at the output times. It names the next step it wants and never changes the motion."""
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -7,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody
+from blocksim.simulation.contacts import Contacts, joined
+from blocksim.simulation.contacts import Rows as ContactRows
 from blocksim.simulation.frames import Frames
 
 if TYPE_CHECKING:
@@ -21,6 +24,7 @@ class Frame(NamedTuple):
     step: int
     motion: NDArray[np.float64]  # (6, b) as MOTION
     measured: NDArray[np.float64]  # as the scheme's `measured`
+    contacts: ContactRows | None = None  # where they are recorded
 
 
 class FrameSink(Protocol):
@@ -33,8 +37,19 @@ class FrameSink(Protocol):
 class Recorder:
     """Frames, growing as the run goes on."""
 
-    def __init__(self, placed: Sequence[PlacedBody], every: float, step: float, sink: FrameSink | None = None) -> None:
-        """Record every `every` seconds, at the nearest step of length `step` (s); `sink` gets all frames too."""
+    def __init__(
+        self,
+        placed: Sequence[PlacedBody],
+        every: float,
+        step: float,
+        sink: FrameSink | None = None,
+        *,
+        contacts: bool = False,
+    ) -> None:
+        """Record every `every` seconds, at the nearest step of length `step` (s); `sink` gets all frames too.
+
+        With `contacts` the contacts of every frame are recorded as well.
+        """
         self.placed = tuple(placed)
         self.time_step = step
         self.sink = sink
@@ -43,34 +58,60 @@ class Recorder:
         self.motion: list[NDArray[np.float64]] = []
         self.measured: list[NDArray[np.float64]] = []
         self.ledger: tuple[str, ...] = ()
+        self.contacts: list[ContactRows] | None = [] if contacts else None
 
     def next_step(self, done: int) -> int:
-        """Return the next step to record after `done` steps."""
-        number = int(done / self.steps_per_frame + 0.5) + 1
+        """Return the next step to record after `done` steps, wherever those end."""
+        number = int(done / self.steps_per_frame)
         while round(number * self.steps_per_frame) <= done:
             number += 1
         return round(number * self.steps_per_frame)
+
+    def is_output_time(self, step: int) -> bool:
+        """Tell whether a step is recorded wherever the run ends."""
+        return step == 0 or self.next_step(step - 1) == step
+
+    def count_until(self, step: int) -> int:
+        """Return the number of frames up to a step."""
+        return bisect_right(self.steps, step)
+
+    def take_over(self, rows: "Rows") -> None:
+        """Begin with the frames of an earlier part of the run; what it recorded is not recorded again."""
+        self.ledger = rows.ledger
+        self.steps = rows.steps.tolist()
+        self.motion, self.measured = [*rows.motion], [*rows.measured]
+        self.contacts = None if rows.contacts is None else rows.contacts.tables()
+
+    def recorded(self) -> list[Frame]:
+        """Return the frames so far, one by one."""
+        contacts = [None] * len(self.steps) if self.contacts is None else self.contacts
+        return [Frame(*one) for one in zip(self.steps, self.motion, self.measured, contacts, strict=True)]
 
     def sample(self, scene: "AnyScene") -> None:
         """Add a frame of the present state, unless this step has one already."""
         from blocksim.simulation.schemes import measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
 
         step = int(scene.world.clock[0].steps)
-        if self.steps and self.steps[-1] == step:
+        if self.steps and self.steps[-1] >= step:
             return
         row = measured_row(scene)
         motion = np.stack([scene.world.bodies[name][: len(self.placed)] for name in MOTION])
-        self.ledger = scheme_of(scene).ledger
+        scheme = scheme_of(scene)
+        self.ledger = scheme.ledger
+        touching = None if self.contacts is None else scheme.contacts(scene, len(self.placed))
         self.steps.append(step)
         self.motion.append(motion)
         self.measured.append(row)
+        if self.contacts is not None and touching is not None:
+            self.contacts.append(touching)
         if self.sink is not None:
-            self.sink.append(Frame(step, motion, row))
+            self.sink.append(Frame(step, motion, row, touching))
 
     def frames(self) -> Frames:
         """Return all frames so far."""
         steps = np.array(self.steps, dtype=np.int64)
-        rows = Rows(steps, np.stack(self.motion), np.stack(self.measured), self.ledger)
+        contacts = None if self.contacts is None else joined(self.contacts)
+        rows = Rows(steps, np.stack(self.motion), np.stack(self.measured), self.ledger, contacts)
         return frames_from_rows(self.placed, self.time_step, rows)
 
 
@@ -81,6 +122,19 @@ class Rows(NamedTuple):
     motion: NDArray[np.float64]  # (n, 6, b) as MOTION
     measured: NDArray[np.float64]  # (n, e + 2): energies, number of contacts, largest overlap
     ledger: tuple[str, ...]  # names of the e energies
+    contacts: Contacts | None = None  # of all frames
+
+    def chosen(self, which: NDArray[np.bool_]) -> "Rows":
+        """Return some of the frames."""
+        contacts = None if self.contacts is None else self.contacts.chosen(which)
+        return Rows(self.steps[which], self.motion[which], self.measured[which], self.ledger, contacts)
+
+
+def rows_of_frames(frames: Frames) -> Rows:
+    """Return what frames consist of: the other way round than `frames_from_rows`."""
+    motion = np.stack([getattr(frames, name) for name in MOTION], axis=1)
+    measured = np.stack([*frames.energy.values(), frames.contact_count, frames.largest_overlap], axis=1)
+    return Rows(frames.step, motion, measured, tuple(frames.energy), frames.contacts)
 
 
 def frames_from_rows(placed: Sequence[PlacedBody], time_step: float, rows: Rows) -> Frames:
@@ -103,4 +157,5 @@ def frames_from_rows(placed: Sequence[PlacedBody], time_step: float, rows: Rows)
         size_x=np.array([body.size_x for body in placed]),
         size_y=np.array([body.size_y for body in placed]),
         start_angle=np.array([body.angle for body in placed]),
+        contacts=rows.contacts,
     )

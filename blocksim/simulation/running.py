@@ -11,14 +11,17 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import sha256_of, write_text
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
-from blocksim.simulation.loop import LoopResult, Progress, Watcher, run_loop
+from blocksim.simulation.disk import refuse_full_disk
+from blocksim.simulation.loop import Attendance, LoopResult, Progress, Watcher, run_loop
 from blocksim.simulation.outcome import RESIDUAL_PROMISE
+from blocksim.simulation.part import Part
+from blocksim.simulation.precautions import DEFAULTS, Precautions
 from blocksim.simulation.provenance import environment, run_hash, state_hash
 from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.result import Result
-from blocksim.simulation.schemes import build_scene, scheme_named
-from blocksim.simulation.stopping import stop_requests
-from blocksim.simulation.stores.hdf5_writer import FrameFile
+from blocksim.simulation.resumption import NEW, find_resumption
+from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.stopping import WallTime, stop_requests
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import csv_text, final_columns
 from blocksim.simulation.team import team_for
@@ -30,42 +33,57 @@ def _ignore(_: Progress) -> None:
     pass
 
 
-def simulate(scenario: Scenario, *, threads: int = 1, on_progress: Watcher = _ignore) -> Result:
-    """Run a scenario in memory, without writing anything. Ctrl-C ends it with the status `interrupted`.
+def simulate(
+    scenario: Scenario, *, threads: int = 1, on_progress: Watcher = _ignore, wall_time: float | None = None
+) -> Result:
+    """Run a scenario in memory, without writing anything. A signal or the limit of wall time (s) interrupts it.
 
     The result does not depend on the number of threads; small scenes do not use them all.
     """
+    limit = WallTime(wall_time)
     compile_kernels(kernels_of(scenario))
     began = time.perf_counter()
     scene = build_scene(scenario)
-    recorder = Recorder(place_bodies(scenario), scenario.output.every, float(scene.world.controls[0].step))
-    with stop_requests() as is_stopped, team_for(scene, threads) as team:
-        ended = run_loop(scene, recorder, scenario.time.end, team=team, on_progress=on_progress, is_stopped=is_stopped)
-    return _result(scenario, recorder, ended, began)
+    step, output = float(scene.world.controls[0].step), scenario.output
+    recorder = Recorder(place_bodies(scenario), output.every, step, contacts=output.contacts)
+    with stop_requests() as requests, team_for(scene, threads) as team:
+        attendance = Attendance(on_progress, lambda: requests.reason() or limit.reason())
+        ended = run_loop(scene, recorder, scenario.time.end, team=team, attendance=attendance)
+    return _result(scenario, recorder, ended, time.perf_counter() - began)
 
 
-def simulate_into(
-    scenario: Scenario, folder: Path, *, overwrite: bool = False, threads: int = 1, on_progress: Watcher = _ignore
+def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
+    scenario: Scenario,
+    folder: Path,
+    *,
+    overwrite: bool = False,
+    resume: bool = False,
+    threads: int = 1,
+    precautions: Precautions = DEFAULTS,
+    on_progress: Watcher = _ignore,
 ) -> Result:
     """Run a scenario and keep everything in a folder, frames while it runs, the mark of a finished run last.
 
-    Raises OutputExistsError where the folder is not free and OutputError where writing fails. Ctrl-C ends it with the
-    status `interrupted`, and what there is by then is kept.
+    With `resume` it goes on from the newest whole checkpoint there, to the same bits as without the interruption;
+    without any it starts anew. Raises InvalidInputError for checkpoints of another scenario or version of the code,
+    OutputExistsError where the folder is not free and OutputError where writing fails. A signal (SIGINT, SIGTERM,
+    SIGUSR1) or the limit of wall time ends it with the status `interrupted`, and what there is by then is kept.
     """
+    limit = WallTime(precautions.wall_time)
     compile_kernels(kernels_of(scenario))
     began = time.perf_counter()
-    scene = build_scene(scenario)
+    built = build_scene(scenario)
+    refuse_full_disk(folder, scenario, built)
+    part = Part(scenario, folder, built, find_resumption(folder, scenario) if resume else NEW)
     tables = read_tables(scenario)
-    files.prepare_folder(folder, overwrite=overwrite)
+    if not part.goes_on:
+        files.prepare_folder(folder, overwrite=overwrite or resume)
     toml = _keep_scenario(scenario, tables, folder)
-    placed = place_bodies(scenario)
-    step = float(scene.world.controls[0].step)
-    end, ledger = scenario.time.end, scheme_named(scenario).ledger
-    with stop_requests() as is_stopped, team_for(scene, threads) as team:
-        with FrameFile(folder / files.FRAMES, placed, step, toml, ledger=ledger) as sink:
-            recorder = Recorder(placed, scenario.output.every, step, sink)
-            ended = run_loop(scene, recorder, end, team=team, on_progress=on_progress, is_stopped=is_stopped)
-        return _keep_result(_result(scenario, recorder, ended, began), folder)
+    with stop_requests() as requests, team_for(part.scene, threads) as team:
+        attendance = Attendance(on_progress, lambda: requests.reason() or limit.reason())
+        ended = part.run(toml, precautions, team, attendance)
+        result = _result(scenario, part.recorder, ended, time.perf_counter() - began)
+        return _keep_result(result, part.account(result.summary), folder)
 
 
 def renew_copies(scenario: Scenario, folder: Path) -> None:
@@ -93,9 +111,9 @@ def _keep_scenario(scenario: Scenario, tables: Mapping[str, bytes], folder: Path
     return toml
 
 
-def _result(scenario: Scenario, recorder: Recorder, ended: LoopResult, began: float) -> Result:
+def _result(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Result:
     frames = recorder.frames()
-    summary = _summary(scenario, ended, time.perf_counter() - began)
+    summary = _summary(scenario, ended, seconds)
     return Result(scenario.name, final_columns(frames), frames, summary, scenario)
 
 
@@ -136,10 +154,11 @@ def _with_checksums(summary: Summary, folder: Path) -> Summary:
     return summary.model_copy(update={"sha256": {name: sha256_of(folder / name) for name in kept}})
 
 
-def _keep_result(result: Result, folder: Path) -> Result:
+def _keep_result(result: Result, summary: Summary, folder: Path) -> Result:
     write_text(folder / files.FINAL, csv_text(result.columns))
-    summary = _with_checksums(result.summary, folder)
+    summary = _with_checksums(summary, folder)
     write_text(folder / files.SUMMARY, summary.to_json())
     if result.status == "finished":
         write_text(folder / files.DONE, json.dumps({"run": summary.run, "status": summary.status}) + "\n")
+        files.clear_remains(folder, files.CHECKPOINTS)
     return Result(result.name, result.columns, result.frames, summary, result.scenario, folder)

@@ -1,21 +1,62 @@
-"""Ctrl-C, and being terminated: when a run or a sweep takes notice of them."""
+"""Ctrl-C, being terminated, and limits of time: when a run or a sweep takes notice of them."""
 
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+NAMES = ("SIGINT", "SIGTERM", "SIGUSR1")  # the last one is what batch systems send ahead of their time limit
+SIGNALS = tuple(signal.Signals[name] for name in NAMES if hasattr(signal, name))
 DEFAULT = (signal.default_int_handler, signal.SIG_DFL)
 
 
+class StopRequests:
+    """The signals that have come: looked at between steps, so that none is torn."""
+
+    def __init__(self) -> None:
+        """Know of none yet."""
+        self.names: list[str] = []
+        self.is_heard = False
+
+    def __call__(self) -> bool:
+        """Tell whether the user has asked to stop."""
+        return bool(self.names)
+
+    def reason(self) -> str:
+        """Return why to stop, in words, and nothing where nobody has asked; a further signal then stops at once."""
+        self.is_heard = bool(self.names)
+        return f"stopped by {self.names[0]}" if self.names else ""
+
+    def hear(self, number: int, _: Any) -> None:
+        """Note a signal. Raises KeyboardInterrupt for one that comes after an earlier one was heard."""
+        self.names.append(signal.Signals(number).name)
+        if self.is_heard:
+            raise KeyboardInterrupt
+
+
 @contextmanager
-def stop_requests() -> Iterator[Callable[[], bool]]:
-    """Give a function that tells whether the user has asked to stop: looked at between frames, so that none is torn."""
-    asked: list[int] = []
-    with _handling(SIGNALS, lambda number, _: asked.append(number)):
-        yield lambda: bool(asked)
+def stop_requests() -> Iterator[StopRequests]:
+    """Give what tells whether the user has asked to stop."""
+    requests = StopRequests()
+    with _handling(SIGNALS, requests.hear):
+        yield requests
+
+
+class WallTime:
+    """A limit of wall time (s), None for no limit, that begins to run now."""
+
+    def __init__(self, limit: float | None) -> None:
+        """Begin."""
+        self.limit = limit
+        self.began = time.monotonic()
+
+    def reason(self) -> str:
+        """Return why to stop, in words, and nothing before the limit."""
+        if self.limit is None or time.monotonic() - self.began < self.limit:
+            return ""
+        return f"wall-time limit of {self.limit:g} s reached"
 
 
 @contextmanager

@@ -31,6 +31,8 @@ class Summary(BaseModel, frozen=True):
     solver_seconds: float
     total_seconds: float
     threads: int = 1
+    resumed_from: tuple[int, ...] = ()  # steps at which parts of the run after the first one began
+    last_checkpoint: int | None = None  # step of the last good one, where the run did not finish
     energy_J: EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
     warnings: tuple[str, ...]
     environment: dict[str, str]

@@ -6,9 +6,9 @@ from typing import BinaryIO
 import numpy as np
 
 from blocksim.study.manifest import PATTERN, Entry, read_entries, values_hash
+from blocksim.study.places import FINISHED
 from blocksim.study.rows import blocks_in
 from blocksim.study.shard import WHOLE, Shard
-from blocksim.study.single import FINISHED
 
 MISSING, ENDED_WELL, ENDED_BADLY = range(3)
 

@@ -14,9 +14,9 @@ from blocksim.scenario import Scenario, load_scenario
 from blocksim.scenario import quantities as q
 from blocksim.scenario.keys import KeyPath, field_at, follow, parse_key
 from blocksim.scenario.models.variation import Normal, Uniform
+from blocksim.study.places import FINISHED
 from blocksim.study.ranges import Ranges
 from blocksim.study.rows import blocks_in
-from blocksim.study.single import FINISHED
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.table import TABLE, read_sweep
 from blocksim.view.sweeps.found import QUARTER, FoundSweep, Input, Measured

@@ -9,8 +9,8 @@ from blocksim.analysis.judgement import Judgement, Settings, judge
 from blocksim.analysis.members import Members
 from blocksim.errors import InputMissingError
 from blocksim.scenario import Scenario, load_scenario
-from blocksim.study.many import PLAN, TABLE, SweepResult, read_sweep
-from blocksim.study.single import compare as compare_run
+from blocksim.study.sweep_folder import PLAN
+from blocksim.study.table import TABLE, SweepResult, read_sweep
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,6 +40,8 @@ def compare(
         return compare_sweep(run, experiment, settings)
     if isinstance(run, Path | str) and is_sweep(run):
         return compare_sweep(run, experiment, settings)
+    from blocksim.study.single import compare as compare_run  # noqa: PLC0415 - the solver, which no table needs
+
     return compare_run(run, experiment)
 
 

@@ -54,19 +54,16 @@ class Entry:
             return None
         try:
             data = json.loads(head + b"}")
-        except (ValueError, RecursionError):  # a right sum below what no sweep writes
+            parts = (data["number"], data["case"], data["values"], data["row"])
+        except (ValueError, KeyError, TypeError, RecursionError):  # a right sum below what no sweep writes
             return None
-        return cls(data["number"], data["case"], data["values"], data["row"]) if _is_entry(data) else None
+        return cls(*parts) if _are_parts(*parts) else None
 
 
-def _is_entry(data: Any) -> bool:
+def _are_parts(number: Any, case: Any, values: Any, row: Any) -> bool:
     """Tell whether a line holds what a sweep writes, in its types."""
-    if not (isinstance(data, dict) and {"number", "case", "values", "row"} <= data.keys()):
-        return False
-    values = data["values"]
     is_hash = isinstance(values, str) and re.fullmatch("[0-9a-f]{1,15}", values) is not None
-    is_row = isinstance(data["row"], dict) and isinstance(data["case"], str)
-    return type(data["number"]) is int and is_hash and is_row
+    return type(number) is int and isinstance(case, str) and is_hash and isinstance(row, dict)
 
 
 def _is_not_finite(value: object) -> bool:

@@ -44,6 +44,8 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     vary: Mapping[str, Values] | None = None,
     *,
     mode: str | None = None,
+    samples: int | None = None,
+    seed: int | None = None,
     out: Path | str | None = None,
     executor: str | None = None,
     jobs: int | None = None,
@@ -57,10 +59,11 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
 ) -> SweepResult:
     """Run every case of a sweep that has no row yet, on `jobs` threads or processes (default: one a core).
 
-    `vary` (dotted key: values, or from, to, count) and `mode` (grid, list) replace what the scenario's [sweep] table
-    says. `executor` is ensemble (default), processes (default with `keep_cases`, which writes a folder of frames for
-    every case) or dask (default with a `scheduler`, such as tcp://host:8786); the rows are the same. With a `shard`,
-    only its cases are run, and `merge` makes one table of all shards.
+    `vary` (dotted key: values; from, to, count; from, to; or mean, sd), `mode` (grid, list, table, lhs, sobol, normal)
+    and, for drawn cases, `samples` and `seed` replace what the scenario's [sweep] table says. `executor` is ensemble
+    (default), processes (default with `keep_cases`, which writes a folder of frames for every case) or dask (default
+    with a `scheduler`, such as tcp://host:8786); the rows are the same. With a `shard`, only its cases are run, and
+    `merge` makes one table of all shards.
 
     Cases that fail get a row with their status; the others go on, unless `fail_fast`. `retry_failed` runs them again.
     Raises ScenarioError for a bad scenario, InvalidInputError where nothing is varied, OutputExistsError where the
@@ -71,7 +74,9 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     executor = _chosen(executor, scheduler, keep_cases=keep_cases)
     _refuse_loss(shard, overwrite=overwrite)
     runner = executor_named(executor)
-    document = with_sweep(scenario if isinstance(scenario, Document) else Document.read(scenario), vary, mode)
+    document = with_sweep(
+        scenario if isinstance(scenario, Document) else Document.read(scenario), vary, mode, samples=samples, seed=seed
+    )
     base = document.build()
     plan = _plan_of(base)
     cases = cases_of(document, plan)

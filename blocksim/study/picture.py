@@ -1,6 +1,7 @@
 """Pictures of studies: what was found, brought into the form that the view draws."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,7 +9,6 @@ from blocksim.analysis.experiment import load_table
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, load_scenario
 from blocksim.scenario.findings import did_you_mean_or_list
-from blocksim.study.convergence import Convergence, Study
 from blocksim.study.found import read_found
 from blocksim.study.indices import read_indices
 from blocksim.study.sweep_folder import PLAN
@@ -18,11 +18,14 @@ from blocksim.view.sweeps.kind import Kind
 from blocksim.view.sweeps.kinds import KINDS, kind_for
 from blocksim.view.tornado import draw_tornado
 
+if TYPE_CHECKING:
+    from blocksim.study.convergence import Convergence, Study
+
 FEWEST_LEVELS = 2  # to show a distance
 TORNADO = "tornado"
 
 
-def draw_convergence(result: Convergence, scenario: Scenario, path: Path) -> bool:
+def draw_convergence(result: "Convergence", scenario: Scenario, path: Path) -> bool:
     """Draw a panel for each study with enough levels; tell whether there was one.
 
     Raises InvalidInputError for an unknown picture format and OutputError when the file cannot be written.
@@ -80,7 +83,7 @@ def _kind_named(name: str) -> Kind:
     return KINDS[name]
 
 
-def _panel(result: Convergence, study: Study) -> Panel:
+def _panel(result: "Convergence", study: "Study") -> Panel:
     levels = [level for level in study.levels if level.is_finished]
     x = np.array([level.x_mm for level in levels])
     return Panel(

@@ -7,6 +7,9 @@ from blocksim.errors import InputMissingError
 from blocksim.scenario import load_scenario
 from blocksim.simulation import folder as files
 
+FINISHED = "finished"
+"""Status of a run that has come to its end."""
+
 
 def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Path:
     """Return the run folder meant by a run folder, by `results/<name>` (newest finished run) or by a scenario file.

@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 
 from blocksim.errors import BlocksimError
-from blocksim.simulation import MemberEnd, MemberFailure
 from blocksim.simulation.table import Columns
 
 Row = dict[str, object]
@@ -21,13 +20,6 @@ def row_of(status: str, reason: str, seconds: float, final: Columns) -> Row:
     for block, *values in zip(final["block"], *(final[name] for name in KEPT), strict=True):
         row |= {f"{block}.{name}": value for name, value in zip(KEPT, values, strict=True)}
     return row
-
-
-def row_of_member(member: MemberEnd | MemberFailure) -> Row:
-    """Return the row of a member of an ensemble."""
-    if isinstance(member, MemberFailure):
-        return row_of_error(member.error)
-    return row_of(member.outcome.status, member.outcome.reason, member.seconds, member.columns)
 
 
 def row_of_error(error: Exception) -> Row:

@@ -9,45 +9,60 @@ from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, place_bodies
 from blocksim.simulation import Progress, Result, Watcher, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation import folder as files
+from blocksim.simulation.precautions import DEFAULTS, Precautions
 from blocksim.simulation.summary import read_summary
 from blocksim.simulation.table import COLUMNS, read_table
-from blocksim.study.places import find_run as find_run  # noqa: PLC0414 - its old home, for those who look there
+from blocksim.study.places import FINISHED as FINISHED  # noqa: PLC0414 - their old home, for those who look there
+from blocksim.study.places import find_run as find_run  # noqa: PLC0414
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FINISHED = "finished"
 
 
 def _ignore(_: Progress) -> None:
     pass
 
 
-def run(
+def run(  # noqa: PLR0913 - what a user can choose for a run
     scenario: Scenario | Path | str,
     *,
     out: Path | str | None = None,
     overwrite: bool = False,
+    resume: bool = False,
     threads: int = 1,
+    precautions: Precautions = DEFAULTS,
     on_progress: Watcher = _ignore,
 ) -> Result:
     """Simulate a scenario and return the result; with `out` it is kept in that folder as well.
 
     A folder that holds the finished run of exactly this scenario and code is read instead, unless `overwrite` is
-    given. The result does not depend on the number of threads. Ctrl-C returns what there is by then, with the status
-    `interrupted`. Raises ScenarioError, InvalidInputError for an experiment table that does not go with the blocks or
-    for more threads than the system has, OutputExistsError, OutputError.
+    given. With `resume` a run that was interrupted there goes on, to the same bits as without the interruption. The
+    result does not depend on the number of threads, nor on `precautions`, which say when checkpoints are written and
+    after which wall time to stop. Ctrl-C returns what there is by then, with the status `interrupted`. Raises
+    ScenarioError, InvalidInputError for an experiment table that does not go with the blocks, for more threads than the
+    system has or a checkpoint of another scenario or version of the code, OutputExistsError, OutputError; ValueError
+    for `resume` with `overwrite` or without `out`.
     """
+    if resume and (overwrite or out is None):
+        raise ValueError("a run is resumed where it was kept: resume needs out, and cannot go with overwrite")
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
     check_experiment(scenario)
     if out is None:
-        return simulate(scenario, threads=threads, on_progress=on_progress)
+        return simulate(scenario, threads=threads, on_progress=on_progress, wall_time=precautions.wall_time)
     folder = Path(out)
     if not overwrite and files.holds_run(folder, scenario):
         renew_copies(scenario, folder)
         return read_result(folder)
-    return simulate_into(scenario, folder, overwrite=overwrite, threads=threads, on_progress=on_progress)
+    return simulate_into(
+        scenario,
+        folder,
+        overwrite=overwrite,
+        resume=resume,
+        threads=threads,
+        precautions=precautions,
+        on_progress=on_progress,
+    )
 
 
 def check_experiment(scenario: Scenario) -> None:

@@ -10,7 +10,7 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import read_summary
-from blocksim.study.single import FINISHED, find_run
+from blocksim.study.places import FINISHED, find_run
 
 
 @dataclass(frozen=True)

@@ -1,19 +1,33 @@
-"""The folder of a sweep: whose it is, and that nothing in it is lost by mistake."""
+"""The folder of a sweep: whose it is, what it came from, and that nothing in it is lost by mistake."""
 
 import shutil
+from datetime import UTC, datetime
 from pathlib import Path
 
-from blocksim.errors import InputMissingError, OutputExistsError
+from pydantic import BaseModel, ValidationError
+
+from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
 from blocksim.simulation.output_folder import make_folder
+from blocksim.simulation.provenance import environment
 from blocksim.study.manifest import PATTERN, is_in_use
 
 PLAN = "sweep.toml"
+ORIGIN = "sweep.json"
 CASES = "cases"
 HEAD = "# Sweep "
-RESULTS = (PATTERN, "timings*.csv", "sweep*.csv")
+RESULTS = (PATTERN, "timings*.csv", "sweep*.csv", ORIGIN)
+
+
+class Origin(BaseModel, frozen=True):
+    """The entries of sweep.json: versions, machine and command of whoever began the sweep, and how cases were drawn."""
+
+    began_at: str
+    mode: str | None = None
+    seed: int | None = None
+    environment: dict[str, str]
 
 
 def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool) -> None:
@@ -28,6 +42,31 @@ def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool) -> None
         raise OutputExistsError(message) from error
     write_text(folder / PLAN, head + resolved_beside(base, tables))
     keep_tables(tables, folder)
+    if not (folder / ORIGIN).is_file():  # whoever goes on with a sweep did not begin it
+        write_text(folder / ORIGIN, _origin_of(base).model_dump_json(indent=2) + "\n")
+
+
+def _origin_of(base: Scenario) -> Origin:
+    plan = base.sweep
+    seed = plan.seed if plan is not None and plan.is_sampled else None
+    return Origin(
+        began_at=datetime.now(UTC).isoformat(timespec="seconds"),
+        mode=None if plan is None else plan.mode,
+        seed=seed,
+        environment=environment(),
+    )
+
+
+def read_origin(folder: Path) -> Origin | None:
+    """Return what a sweep came from, None where it is older than this file. Raises InvalidInputError."""
+    path = folder / ORIGIN
+    try:
+        return Origin.model_validate_json(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    except (OSError, ValidationError) as error:
+        message = f"{path}: not what a sweep came from: {str(error).splitlines()[0]}"
+        raise InvalidInputError(message) from None
 
 
 def _make_free(folder: Path, head: str, *, overwrite: bool) -> None:

@@ -14,11 +14,11 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario.limited import MEGABYTE, refuse_large
 from blocksim.simulation.atomic import writing
 from blocksim.study.done import Done
+from blocksim.study.places import FINISHED
 from blocksim.study.plan import Cases
 from blocksim.study.ranges import Ranges
 from blocksim.study.rows import KEPT
 from blocksim.study.shard import WHOLE, Shard
-from blocksim.study.single import FINISHED
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 from blocksim.view import style
+from blocksim.view.forces import WithContacts, draw_forces, force_scale
 from blocksim.view.gif import write_gif
 from blocksim.view.ground import Canvas, draw_ruler
 from blocksim.view.moments import Floats, FramesLike, Indices, drawable_frames
@@ -31,6 +32,7 @@ MARGINS = 0.15, 0.50, 0.42  # inches: at the sides, above and below the panel
 HIGHEST = 1.0  # height of the panel over its width
 HELD = 1.5  # s that the last picture stays
 MOST_PICTURES = 10_000
+TIME_ROOM = 60.0  # points
 FEW_BLOCKS = 30  # up to which trails are drawn unless somebody decides
 TRAIL: dict[str, Any] = {"linewidths": 1.0, "alpha": 0.5, "zorder": 2.5}  # below names
 
@@ -45,15 +47,16 @@ class Pace:
 
 @dataclass(frozen=True)
 class Look:
-    """How a film looks: its width in pixels, and whether the ways of the centres are drawn (default: few blocks)."""
+    """How a film looks: its width in pixels, whether it has the ways of the centres (default: few blocks), forces."""
 
     width: int = 800
     trails: bool | None = None
     title: str = ""
+    forces: bool = False
 
 
 def draw_film(
-    frames: FramesLike,
+    frames: WithContacts,
     path: Path | str,
     pace: Pace | None = None,
     look: Look | None = None,
@@ -62,8 +65,8 @@ def draw_film(
     """Write a run as GIF or MP4 and return the number of pictures; the last one is held for a while.
 
     `support` is what the blocks stand on: level ground at rest if it is not given. Raises InvalidInputError for an
-    unknown format, nothing to draw or too many pictures, OutputError when the file cannot be written and
-    UnavailableError when the package for MP4 is missing.
+    unknown format, forces that were not stored, nothing to draw or too many pictures, OutputError when the file cannot
+    be written and UnavailableError when the package for MP4 is missing.
     """
     path = Path(path)
     write = writer_of(path)
@@ -106,9 +109,10 @@ def timed(frames: FramesLike, drawable: Indices, pace: Pace) -> tuple[Indices, F
 class Film:
     """Draws one frame after the other on the same page; what never moves is drawn once."""
 
-    def __init__(self, frames: FramesLike, support: Support, look: Look) -> None:
-        """Prepare the page, as high as the run needs."""
+    def __init__(self, frames: WithContacts, support: Support, look: Look) -> None:
+        """Prepare the page, as high as the run needs. Raises InvalidInputError for forces that were not stored."""
         self.frames, self.support = frames, support
+        self.forces = force_scale(frames) if look.forces else None
         self.drawable = drawable_frames(frames)
         self.has_trails = len(frames.names) <= FEW_BLOCKS if look.trails is None else look.trails
         across = look.width / DOTS_PER_INCH
@@ -133,11 +137,20 @@ class Film:
         finish_panel(self.canvas, (self.page.panel_width, self.page.panel_height), labelled=True)
         if self.page.extent.tilt:
             draw_ruler(self.canvas, depth_of(0))
-        letters = int(self.page.width * style.POINTS_PER_INCH / (style.LETTER[0] * style.TITLE_SIZE))
+        shown = style.cut_to(title, self.page.panel_width * style.POINTS_PER_INCH, style.TITLE_SIZE)
         place = MARGINS[0] / self.page.width, 1.0 - 0.06 / self.page.height
-        figure.text(*place, style.shortened(title, letters), va="top", fontsize=style.TITLE_SIZE)
+        figure.text(*place, shown, va="top", fontsize=style.TITLE_SIZE)
+        if self.forces is not None:
+            self._tell_scale(self.forces.example)
         if self.support.motion is None:
             draw_standing(self.canvas, self.frames, int(self.drawable[0]), self.support)
+
+    def _tell_scale(self, example: str) -> None:
+        """Write how long forces are at the right, in the line of the time and as far as there is room beside it."""
+        room = self.page.panel_width * style.POINTS_PER_INCH - TIME_ROOM
+        top = self.page.extent.top + 4.0 / self.page.points_per_mm
+        text = style.cut_to(f"forces: {example}", room, style.FONT_SIZE)
+        self.canvas.axes.text(self.page.extent.right, top, text, ha="right", va="bottom", color=style.FAINT_INK)
 
     def picture(self, frame: int) -> Pixels:
         """Return the picture of one frame."""
@@ -160,6 +173,8 @@ class Film:
         draw_blocks(self.canvas, self.frames, frame, self.support)
         if self.has_trails:
             self._draw_trails(frame)
+        if self.forces is not None:
+            draw_forces(self.canvas, self.frames, frame, self.forces)
         top = self.page.extent.top + 4.0 / self.page.points_per_mm
         time = f"{float(self.frames.time[frame]):.3f} s"
         self.canvas.axes.text(self.page.extent.left, top, time, va="bottom")

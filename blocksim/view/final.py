@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.view import style
+from blocksim.view.forces import WithContacts, draw_forces, force_scale
 from blocksim.view.ground import Canvas, draw_ruler
 from blocksim.view.moments import Floats, FramesLike, drawable_frames
 from blocksim.view.panel import Page, depth_of, finish_panel, page_for
@@ -27,7 +28,7 @@ LINE = 9.5  # points, of a line of text
 FONT = 7.0  # points
 BAR = 9.0  # points, of a measured range
 SPACE = 10.0, 7.0  # points between labels, across and down
-LETTERS, TITLE_LETTERS = 14, 48  # of a name, of the title
+LETTERS = 14  # of a name
 MOST_ROWS = 4  # of labels below their blocks
 MOST_LINES = 36  # below the panel; more labels than that fit nobody's page
 COLOUR_BAR = 0.5  # inches
@@ -49,37 +50,45 @@ class Label:
 
 
 def draw_final(
-    frames: FramesLike,
+    frames: WithContacts,
     path: Path | str,
     title: str | None = None,
     measured: MeasuredTable | None = None,
     support: Support | None = None,
+    *,
+    forces: bool = False,
 ) -> None:
     """Draw the last frame; below each block its x and rotation, and the measured mean and range of its centre.
 
-    Where labels of all blocks do not fit below the picture, the blocks are coloured by their rotation instead. The same
-    input gives the same bytes. Raises InvalidInputError for an unknown picture format or nothing to draw, and
-    OutputError when the file cannot be written.
+    Where labels of all blocks do not fit below the picture, the blocks are coloured by their rotation instead. `forces`
+    draws those of all contacts. The same input gives the same bytes. Raises InvalidInputError for an unknown picture
+    format, forces that were not stored or nothing to draw, and OutputError when the file cannot be written.
     """
     path = Path(path)
     style.picture_suffix(path)
     support = support or Support()
     drawable = drawable_frames(frames)
+    scale = force_scale(frames) if forces else None
     frame = int(drawable[-1])
     extent = widened(extent_of(frames, drawable[-1:], support), [])
     page = page_for(extent, WIDTH, TALLEST, (SIDE, HEAD, AXIS))
     labels = arranged(labels_of(frames, frame, page, measured), page)
     is_labelled = lines_of(labels) <= MOST_LINES
     room = depth(labels) / style.POINTS_PER_INCH if is_labelled else COLOUR_BAR
-    height = page.height + room + FOOT
+    legend = _legend(labels, is_labelled=is_labelled)
+    notes = [legend] if scale is None else [legend, scale.told]
+    foot = FOOT + (len(notes) - 1) * LINE / style.POINTS_PER_INCH
+    height = page.height + room + foot
     with style.styled_figure(WIDTH, height) as figure:
         canvas = _draw_panel(figure, frames, frame, page, support)
         if is_labelled:
             draw_centres(canvas, frames, frame)
-            _draw_labels(figure, labels, page, room)
+            _draw_labels(figure, labels, page, (foot, room))
         else:
-            _draw_turns(figure, canvas, frames, frame)
-        _draw_texts(figure, title, _caption(frames, frame), _legend(labels, is_labelled=is_labelled))
+            _draw_turns(figure, canvas, frames, frame, foot)
+        if scale is not None:
+            draw_forces(canvas, frames, frame, scale)
+        _draw_texts(figure, title, _caption(frames, frame), "\n".join(notes))
         style.save_figure(figure, path)
 
 
@@ -194,10 +203,11 @@ def _draw_panel(figure: "Figure", frames: FramesLike, frame: int, page: Page, su
     return canvas
 
 
-def _draw_labels(figure: "Figure", labels: Sequence[Label], page: Page, room: float) -> None:
-    """Draw the labels below the axis, on a scale of points."""
+def _draw_labels(figure: "Figure", labels: Sequence[Label], page: Page, heights: tuple[float, float]) -> None:
+    """Draw the labels below the axis, on a scale of points; `heights` (inches) of the foot and of their room."""
+    foot, room = heights
     height = float(figure.get_figheight())
-    axes = figure.add_axes((SIDE / WIDTH, FOOT / height, page.panel_width / WIDTH, room / height))
+    axes = figure.add_axes((SIDE / WIDTH, foot / height, page.panel_width / WIDTH, room / height))
     axes.set_axis_off()
     axes.set_xlim(0.0, page.panel_width * style.POINTS_PER_INCH)
     axes.set_ylim(-room * style.POINTS_PER_INCH, 0.0)
@@ -228,8 +238,8 @@ def _draw_bar(axes: "Axes", bar: tuple[float, float, float], y: float) -> None:
     axes.plot(mean, y, marker="o", markersize=3.2, **line)
 
 
-def _draw_turns(figure: "Figure", canvas: Canvas, frames: FramesLike, frame: int) -> None:
-    """Fill the blocks by their rotation and draw what the colours mean below."""
+def _draw_turns(figure: "Figure", canvas: Canvas, frames: FramesLike, frame: int, foot: float) -> None:
+    """Fill the blocks by their rotation and draw what the colours mean below, over a foot (inches)."""
     from matplotlib.collections import PolyCollection  # noqa: PLC0415 - see style
 
     turns = np.degrees(frames.angle[frame] - frames.angle[0])
@@ -242,7 +252,7 @@ def _draw_turns(figure: "Figure", canvas: Canvas, frames: FramesLike, frame: int
     fills.set_clim(-most, most)
     canvas.axes.add_collection(fills)
     height = float(figure.get_figheight())
-    place = figure.add_axes((0.3, (FOOT + 0.32) / height, 0.4, 0.10 / height))
+    place = figure.add_axes((0.3, (foot + 0.32) / height, 0.4, 0.10 / height))
     bar = figure.colorbar(fills, cax=place, orientation="horizontal", extend="both" if farthest > most else "neither")
     bar.set_label("rotation (°)", labelpad=1.0)
 
@@ -252,7 +262,8 @@ def _draw_texts(figure: "Figure", title: str | None, caption: str, legend: str) 
     left, top = SIDE / WIDTH, 1.0 - 0.08 / height
     figure.text(1.0 - left, top, caption, ha="right", va="top")
     if title:
-        figure.text(left, top, style.shortened(title, TITLE_LETTERS), va="top", fontsize=style.TITLE_SIZE)
+        room = (WIDTH - 2.0 * SIDE) * style.POINTS_PER_INCH - style.width_of(caption, style.FONT_SIZE) - SPACE[0]
+        figure.text(left, top, style.cut_to(title, room, style.TITLE_SIZE), va="top", fontsize=style.TITLE_SIZE)
     figure.text(left, 0.06 / height, legend, color=style.FAINT_INK, va="bottom")
 
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from blocksim.simulation.contacts import Contacts, borne
 from blocksim.view import style
+from blocksim.view.forces import contacts_of
 from blocksim.view.moments import Floats, FramesLike, Indices, drawable_frames
 from blocksim.view.strip import MeasuredTable
 from blocksim.view.support import Support
@@ -24,8 +26,10 @@ PANEL, GAP = 1.25, 0.14  # inches
 MOST_BLOCKS = len(style.BLOCK_COLOURS)  # that get a line of their own
 MOST_POINTS = 2000  # of a line
 MOST_PATHS = 50  # grey lines in an SVG or PDF; more of them are stored as an image
-LETTERS, TITLE_LETTERS, NOTE_LETTERS = 16, 60, 105  # of a name, of the title, of a line below the panels
+LETTERS, NOTE_LETTERS = 16, 105  # of a name, of a line below the panels
+NAME_ROOM = 1.2  # inches, for a name beside the panels
 LINE = 0.155  # inches, of each further line below the panels
+MOST_WEIGHTS = 3.0  # of all blocks: forces of supports beyond that are cut, those of impacts are far beyond
 SMALL_SHARE = 1e-3  # of the largest energy; what stays below is not drawn
 ENERGIES = {  # how entries of the ledger are drawn together
     "kinetic": ("kinetic",),
@@ -48,6 +52,11 @@ Entries = dict[str, Floats]
 
 class HistoryLike(FramesLike, Protocol):
     """Frames with what was measured of the whole scene."""
+
+    @property
+    def contacts(self) -> Contacts | None:
+        """Contacts of all frames, where they were recorded."""
+        ...
 
     @property
     def energy(self) -> Entries:
@@ -75,28 +84,36 @@ def draw_history(
     title: str | None = None,
     measured: MeasuredTable | None = None,
     support: Support | None = None,
+    *,
+    forces: bool = False,
 ) -> None:
     """Draw x, y, rotation, energies and contacts over time; measured means and ranges stand at the end.
 
-    Of more than six blocks the six that come farthest are coloured, the others grey. The same input gives the same
-    bytes. Raises InvalidInputError for an unknown picture format or nothing to draw, and OutputError when the file
-    cannot be written.
+    Where contacts were stored, a last panel has the force with which ground and walls hold all blocks, over their
+    weight; `forces` asks for it. Of more than six blocks the six that come farthest are coloured, the others grey. The
+    same input gives the same bytes. Raises InvalidInputError for an unknown picture format, forces that were not stored
+    or nothing to draw, and OutputError when the file cannot be written.
     """
     path = Path(path)
     style.picture_suffix(path)
+    support = support or Support()
     chosen = _thinned(drawable_frames(frames))
-    shown = farthest_blocks(frames, chosen, support or Support())
+    held = weights_held(frames, chosen, support, forces=forces)
+    shown = farthest_blocks(frames, chosen, support)
     energies = drawn_energies(frames.energy, chosen)
     notes = wrap(_legend(frames, shown, is_measured=measured is not None), NOTE_LETTERS)
     foot = FOOT + (len(notes) - 1) * LINE
-    height = HEAD + 5 * PANEL + 4 * GAP + foot
+    count = 5 if held is None else 6
+    height = HEAD + count * PANEL + (count - 1) * GAP + foot
     with style.styled_figure(WIDTH, height) as figure:
-        panels = _panels(figure, foot)
+        panels = _panels(figure, foot, count)
         for axes, motion in zip(panels, _motions(frames, chosen), strict=False):
             _draw_motion(axes, frames.time[chosen], motion, shown)
             _draw_measured(axes, frames, motion, shown, measured)
         _draw_energies(panels[3], frames.time[chosen], energies)
         _draw_contacts(panels[4], frames.time[chosen], frames.contact_count[chosen])
+        if held is not None:
+            _draw_held(panels[5], frames.time[chosen], held)
         _draw_legends(panels, frames, shown)
         _draw_texts(figure, height, title, "\n".join(notes))
         style.save_figure(figure, path)
@@ -125,6 +142,17 @@ def drawn_energies(energy: Entries, chosen: Indices) -> Entries:
     return {label: values for label, values in sums.items() if float(np.abs(values).max()) > SMALL_SHARE * most}
 
 
+def weights_held(frames: HistoryLike, chosen: Indices, support: Support, *, forces: bool) -> Floats | None:
+    """Return the force upwards on all free blocks by what they stand on, over their weight; None where not stored.
+
+    Raises InvalidInputError where `forces` asks for what was not stored.
+    """
+    if not forces and (frames.contacts is None or support.weight <= 0.0):
+        return None
+    up = float(np.sin(support.tilt)), float(np.cos(support.tilt))
+    return borne(contacts_of(frames), up, support.fixed)[chosen] / (support.weight or 1.0)
+
+
 def energy_unit(most: float) -> tuple[float, str]:
     """Return factor and unit in which energies up to this one (J) are best read."""
     for factor, unit in ((1e-3, "kJ"), (1.0, "J"), (1e3, "mJ")):
@@ -147,15 +175,15 @@ def _motions(frames: FramesLike, chosen: Indices) -> list[Motion]:
     ]
 
 
-def _panels(figure: "Figure", foot: float) -> list["Axes"]:
-    """Add five panels, one below the other, with one axis of time."""
+def _panels(figure: "Figure", foot: float, count: int) -> list["Axes"]:
+    """Add so many panels, one below the other, with one axis of time."""
     height = float(figure.get_figheight())
     width, panels = (WIDTH - LEFT - RIGHT) / WIDTH, []
-    for row in range(5):
-        bottom = foot + (4 - row) * (PANEL + GAP)
+    for row in range(count):
+        bottom = foot + (count - 1 - row) * (PANEL + GAP)
         axes = figure.add_axes((LEFT / WIDTH, bottom / height, width, PANEL / height))
         axes.spines[["right", "top"]].set_visible(False)
-        axes.tick_params(axis="x", labelbottom=row == 4)  # noqa: PLR2004 - the last of five
+        axes.tick_params(axis="x", labelbottom=row == count - 1)
         axes.yaxis.set_label_coords(-0.5 / (WIDTH - LEFT - RIGHT), 0.5)
         panels.append(axes)
     panels[-1].set_xlabel("time (s)", labelpad=2.0)
@@ -218,13 +246,26 @@ def _draw_contacts(axes: "Axes", time: Floats, count: Floats) -> None:
     axes.yaxis.set_major_locator(MaxNLocator(nbins=5, integer=True))
 
 
+def _draw_held(axes: "Axes", time: Floats, held: Floats) -> None:
+    """Draw the force of the supports over the weight; where it is cut, its largest value is told beside."""
+    axes.axhline(1.0, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (4, 3)))
+    axes.plot(time, held, color=style.INK, linewidth=0.8)
+    axes.set_ylabel("held / weight")
+    largest = float(held.max(initial=0.0))
+    axes.set_ylim(0.0, min(max(1.1 * largest, 1.5), MOST_WEIGHTS))
+    told = "force up from what\nblocks stand on\ndashed: their weight"
+    more = f"\nlargest: {largest:.3g}" if largest > MOST_WEIGHTS else ""
+    axes.text(1.04, 1.0, told + more, transform=axes.transAxes, va="top")
+
+
 def _draw_legends(panels: Sequence["Axes"], frames: FramesLike, shown: Sequence[int]) -> None:
     """Name the coloured blocks beside the first panel and give all panels one axis of time."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
 
     if shown:
+        room = NAME_ROOM * style.POINTS_PER_INCH
         handles = [Line2D([], [], color=_colour(shown, block)) for block in shown]
-        names = [style.shortened(frames.names[block], LETTERS) for block in shown]
+        names = [style.cut_to(style.shortened(frames.names[block], LETTERS), room, style.FONT_SIZE) for block in shown]
         panels[0].legend(handles, names, **BESIDE, title="block", alignment="left")
     start, end = float(frames.time[0]), float(frames.time[-1])
     for axes in panels:
@@ -239,7 +280,8 @@ def _colour(shown: Sequence[int], block: int) -> str:
 def _draw_texts(figure: "Figure", height: float, title: str | None, legend: str) -> None:
     if title:
         place = 0.12 / WIDTH, 1.0 - 0.08 / height
-        figure.text(*place, style.shortened(title, TITLE_LETTERS), va="top", fontsize=style.TITLE_SIZE)
+        room = (WIDTH - 0.24) * style.POINTS_PER_INCH
+        figure.text(*place, style.cut_to(title, room, style.TITLE_SIZE), va="top", fontsize=style.TITLE_SIZE)
     figure.text(0.12 / WIDTH, 0.06 / height, legend, color=style.FAINT_INK, va="bottom")
 
 

@@ -18,6 +18,7 @@ PANEL_WIDTH, PANEL_HEIGHT = 3.3, 2.7  # inches
 LEFT, RIGHT, HEAD, FOOT, GAP = 0.72, 1.05, 0.80, 0.50, 0.35  # inches
 LINE = 0.14  # inches, of one row of text above a panel
 LEGEND_ROW, LEGEND_ENTRY = 0.18, 1.55  # inches: height of a row of the legend, width of an entry
+LEGEND_NAME = 0.42  # inches, for the name of a block in an entry
 DEPTH = 1e-3  # of the tolerance, or of the farthest level where that is less: what is closer is drawn there
 MARKERS = "osD^vP"
 MOST_BLOCKS = 4
@@ -73,6 +74,7 @@ def draw_levels(
         figure.axes[0].set_ylabel("distance from the finest level (mm)")
         if title:
             top = 1.0 - 0.06 / height
+            title = style.cut_to(title, (width - 0.24) * style.POINTS_PER_INCH, style.TITLE_SIZE)
             figure.suptitle(title, x=0.12 / width, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE)
         figure.legend(handles=_legend(panels[0].blocks, shown), loc="lower left", ncols=columns, frameon=False)
         style.save_figure(figure, path)
@@ -174,5 +176,10 @@ def _legend(blocks: Sequence[str], shown: Sequence[int]) -> "list[Line2D]":
     """Name the lines."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
 
-    lines = [Line2D([], [], **_look(shown, block), label=f"x of block {blocks[block]}") for block in shown]
+    room = LEGEND_NAME * style.POINTS_PER_INCH
+    names = [style.cut_to(blocks[block], room, style.FONT_SIZE) for block in shown]
+    lines = [
+        Line2D([], [], **_look(shown, block), label=f"x of block {name}")
+        for block, name in zip(shown, names, strict=True)
+    ]
     return [*lines, Line2D([], [], **LARGEST, label="largest, with turns")]

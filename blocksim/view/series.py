@@ -18,6 +18,8 @@ WIDTH = 7.6  # inches
 LEFT, RIGHT, HEAD, FOOT = 0.62, 0.15, 0.62, 0.68  # inches
 COLUMN_GAP, ROW_GAP = 0.25, 0.36  # inches
 ROW_HEIGHT = 1.35  # inches
+SHORT_NAME = "1000"  # for which there is room in any caption
+LABEL_DEPTH = 0.25  # inches from the panels down to a label that is below all of them
 MOST_ROWS, MOST_COLUMNS = 4, 4
 STAYS_MM = 0.01  # a block whose final x varies less than this is not drawn beside others
 LEAST_SPAN_MM = 1.0  # of an axis, so that round-off does not look like scatter
@@ -84,9 +86,10 @@ def draw_series(
         _draw_panels(figure, drawn, [(block, blocks[block]) for block in rows], key, measured or {})
         for axes, one in zip(figure.axes, drawn, strict=False):
             place = axes.get_position().x0, 1.0 - 0.29 / height
-            figure.text(*place, one.label, va="top", weight="bold")
+            figure.text(*place, _heading(one.label, panel_width(len(drawn))), va="top", weight="bold")
         if title:
-            figure.suptitle(title, x=0.1 / WIDTH, y=1.0 - 0.06 / height, ha="left", va="top", fontsize=style.TITLE_SIZE)
+            shown = style.cut_to(title, (WIDTH - 0.2) * style.POINTS_PER_INCH, style.TITLE_SIZE)
+            figure.suptitle(shown, x=0.1 / WIDTH, y=1.0 - 0.06 / height, ha="left", va="top", fontsize=style.TITLE_SIZE)
         texts = _legend(len(rows), len(blocks), len(series) - len(drawn), is_measured=bool(measured))
         figure.text(0.1 / WIDTH, 0.06 / height, texts, color=style.FAINT_INK, va="bottom")
         style.save_figure(figure, path)
@@ -103,7 +106,9 @@ def _draw_panels(
     axis = value_axis(np.concatenate([one.values for one in series]), *key)
     joined = all(is_smooth(one.x_mm[:, block]) for one in series for block, _ in rows)
     height = float(figure.get_figheight())
-    panel = (WIDTH - LEFT - RIGHT - (len(series) - 1) * COLUMN_GAP) / len(series)
+    room = panel_width(len(series))
+    panel = room / style.POINTS_PER_INCH
+    captions = captions_of(series, rows, room)
     for row, (block, name) in enumerate(rows):
         limits = _limits(series, block, measured.get(name))
         bottom = FOOT + (len(rows) - 1 - row) * (ROW_HEIGHT + ROW_GAP)
@@ -113,8 +118,32 @@ def _draw_panels(
             axes.set_ylim(*limits)
             _draw_band(axes, measured.get(name))
             _draw_points(axes, one, block, axis, joined=joined)
-            _finish(axes, axis, is_first=column == 0, is_last=row == len(rows) - 1)
-            axes.set_title(_caption(name, one.x_mm[:, block]), loc="left", pad=3.0)
+            _finish(axes, is_log=axis.is_log, is_first=column == 0, is_last=row == len(rows) - 1)
+            axes.set_title(captions[row][column], loc="left", pad=3.0)
+    _name_axis(figure, axis.label, len(series), room)
+
+
+def _heading(label: str, room: float) -> str:
+    """Return what is told above a column (points wide); of `key = value` the end is what tells columns apart."""
+    return style.cut_to(label[::-1], room, style.FONT_SIZE, bold=True)[::-1]
+
+
+def panel_width(columns: int) -> float:
+    """Return the width of a panel (points) where so many stand beside one another."""
+    return (WIDTH - LEFT - RIGHT - (columns - 1) * COLUMN_GAP) / columns * style.POINTS_PER_INCH
+
+
+def _name_axis(figure: "Figure", label: str, columns: int, room: float) -> None:
+    """Write the label below every column, or once below all where it is wider than a column."""
+    whole = (WIDTH - LEFT - RIGHT) * style.POINTS_PER_INCH
+    label = style.cut_to(label, whole, style.FONT_SIZE)
+    if style.width_of(label, style.FONT_SIZE) <= room:
+        for axes in figure.axes[-columns:]:
+            axes.set_xlabel(label, labelpad=2.0)
+        return
+    middle = (LEFT + 0.5 * (WIDTH - LEFT - RIGHT)) / WIDTH
+    place = (FOOT - LABEL_DEPTH) / float(figure.get_figheight())
+    figure.text(middle, place, label, ha="center", va="top")
 
 
 def moving_blocks(series: Sequence[SeriesLike]) -> list[int]:
@@ -205,7 +234,7 @@ def _draw_band(axes: "Axes", band: tuple[float, float] | None) -> None:
             axes.axhline(end, color=style.MEASURED_COLOUR, linewidth=style.LINE_WIDTH, zorder=1)
 
 
-def _finish(axes: "Axes", axis: ValueAxis, *, is_first: bool, is_last: bool) -> None:
+def _finish(axes: "Axes", *, is_log: bool, is_first: bool, is_last: bool) -> None:
     from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter  # noqa: PLC0415 - see style
 
     axes.spines[["right", "top"]].set_visible(False)
@@ -213,18 +242,34 @@ def _finish(axes: "Axes", axis: ValueAxis, *, is_first: bool, is_last: bool) -> 
     for side in (axes.xaxis, axes.yaxis):
         side.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}"))
         side.set_minor_formatter(NullFormatter())
-    if not axis.is_log:
+    if not is_log:
         axes.xaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]))
     axes.tick_params(axis="x", labelbottom=is_last)
     axes.tick_params(axis="y", labelleft=is_first)
     if is_first:
         axes.set_ylabel("final x (mm)")
-    if is_last:
-        axes.set_xlabel(axis.label, labelpad=2.0)
 
 
-def _caption(name: str, x: Floats) -> str:
-    return f"block {name}: {x.min():.2f} to {x.max():.2f} mm, {np.ptp(x):.2f} mm apart"
+def captions_of(series: Sequence[SeriesLike], rows: Sequence[tuple[int, str]], room: float) -> list[list[str]]:
+    """Return what stands above every panel, as long as there is room (points) for all; names are cut if they must."""
+    told = [[_extent(one.x_mm[:, block]) for one in series] for block, _ in rows]
+    least = style.width_of(f"block {SHORT_NAME}: ", style.FONT_SIZE)
+    widest = max(style.width_of(extent[0], style.FONT_SIZE) for row in told for extent in row)
+    form = 0 if least + widest <= room else 1
+    return [
+        [_caption(name, f": {extent[form]}", room) for extent in row] for (_, name), row in zip(rows, told, strict=True)
+    ]
+
+
+def _extent(x: Floats) -> tuple[str, str]:
+    """Return where a block ends in all runs of a series, in more and in fewer words."""
+    apart = f"{np.ptp(x):.2f} mm apart"
+    return f"{x.min():.2f} to {x.max():.2f} mm, {apart}", apart
+
+
+def _caption(name: str, text: str, room: float) -> str:
+    left = room - style.width_of(f"block {text}", style.FONT_SIZE)
+    return f"block {style.cut_to(name, left, style.FONT_SIZE)}{text}"
 
 
 def _legend(rows: int, blocks: int, more_series: int, *, is_measured: bool) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from blocksim.view import style
+from blocksim.view.forces import ForceScale, WithContacts, draw_forces, force_scale
 from blocksim.view.ground import Canvas, draw_ruler
 from blocksim.view.moments import FramesLike, Indices, drawable_frames, moments_at, moments_by_motion
 from blocksim.view.panel import ROW_HEIGHT, depth_of, finish_panel, room_below
@@ -24,7 +25,7 @@ WIDTH = 10.0  # inches, of the whole strip
 SIDE, GAP = 0.25, 0.25  # inches, at the left and right end and between columns
 HEAD, TITLE, FOOT = 0.22, 0.30, 0.52  # inches: time above a panel, title of the strip, axis and legend below
 LINE = 0.155  # inches, of each further line of text above a panel or below the strip
-LETTERS, TITLE_LETTERS = 150, 100  # in a line below the strip, in its title
+LETTERS = 150  # in a line below the strip
 TICKS = 0.26  # inches, for the numbers under a row of panels
 TALLEST_PANEL = 4.0  # inches
 WIDEST_IN_FOURS, WIDEST_IN_PAIRS = 2.5, 6.0  # width over height, so that a panel stays about an inch tall
@@ -71,25 +72,29 @@ class Layout:
         return left / WIDTH, bottom / self.height, self.panel_width / WIDTH, self.panel_height / self.height
 
 
-def draw_strip(
-    frames: FramesLike,
+def draw_strip(  # noqa: PLR0913 - one argument for each option of the command
+    frames: WithContacts,
     path: Path | str,
     times: Sequence[float] | None = None,
     title: str | None = None,
     measured: MeasuredTable | None = None,
     support: Support | None = None,
+    *,
+    forces: bool = False,
 ) -> None:
     """Draw the run as 6 to 8 panels from release to the final state and write them as PNG, SVG or PDF.
 
     `times` (s) picks the panels by hand. With `measured` the last panel shows mean and range of the measured
-    centres below the ground. `support` is what the blocks stand on: level ground at rest if it is not given. The same
-    input gives the same bytes. Raises InvalidInputError for an unknown picture format, a time that was not recorded,
-    or nothing to draw, and OutputError when the file cannot be written.
+    centres below the ground. `support` is what the blocks stand on: level ground at rest if it is not given. `forces`
+    draws those of all contacts. The same input gives the same bytes. Raises InvalidInputError for an unknown picture
+    format, a time that was not recorded, forces that were not, or nothing to draw, and OutputError when the file cannot
+    be written.
     """
     path = Path(path)
     style.picture_suffix(path)
     support = support or Support()
     drawable = drawable_frames(frames)
+    scale = force_scale(frames) if forces else None
     extent = extent_of(frames, drawable, support)
     ranges = [] if measured is None else measured_ranges(measured, frames.names, extent.width)
     extent = widened(extent, ranges)
@@ -100,11 +105,13 @@ def draw_strip(
     else:
         chosen = moments_at(frames, drawable, times)
         ranges = ranges if chosen[-1] == drawable[-1] else []  # they belong to the final state
-    notes = wrap(_legend(ranges, support), LETTERS)
+    notes = wrap(_legend(ranges, support, scale), LETTERS)
     captions = 1 if support.motion is None else 2
     layout = plan(extent, columns, len(chosen), rows_of(ranges), captions, len(notes))
     with style.styled_figure(WIDTH, layout.height) as figure:
         _draw_panels(figure, frames, chosen, layout, ranges, support)
+        if scale is not None:
+            _draw_forces(figure, frames, chosen, layout, scale)
         _draw_texts(figure, layout, title, notes)
         style.save_figure(figure, path)
 
@@ -193,13 +200,18 @@ def _draw_panels(
         canvas.axes.set_title(_caption(frames, frame, support), loc="left", pad=3.0)
 
 
+def _draw_forces(figure: "Figure", frames: WithContacts, chosen: Indices, layout: Layout, scale: ForceScale) -> None:
+    """Add the contact forces of every moment to its panel."""
+    for axes, frame in zip(figure.axes, chosen, strict=True):
+        draw_forces(Canvas(axes, layout.extent, layout.points_per_mm), frames, int(frame), scale)
+
+
 def _draw_texts(figure: "Figure", layout: Layout, title: str | None, notes: Sequence[str]) -> None:
     side = SIDE / WIDTH
     if title:
         top = 1.0 - 0.06 / layout.height
-        figure.suptitle(
-            style.shortened(title, TITLE_LETTERS), x=side, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE
-        )
+        shown = style.cut_to(title, (WIDTH - 2.0 * SIDE) * style.POINTS_PER_INCH, style.TITLE_SIZE)
+        figure.suptitle(shown, x=side, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE)
     figure.text(side, 0.05 / layout.height, "\n".join(notes), color=style.FAINT_INK, va="bottom")
 
 
@@ -217,7 +229,7 @@ def _caption(frames: FramesLike, frame: int, support: Support) -> str:
     return f"{time}\nsupport {shown} mm"
 
 
-def _legend(ranges: Sequence[MeasuredRange], support: Support) -> str:
+def _legend(ranges: Sequence[MeasuredRange], support: Support, scale: ForceScale | None) -> str:
     texts = ["Thick line inside a block: its own upper side."]
     if any(support.fixed):
         texts.append("Grey: fixed.")
@@ -230,4 +242,6 @@ def _legend(ranges: Sequence[MeasuredRange], support: Support) -> str:
         texts.append(f"The ground is tilted by {angle}, gravity points down; x along the ground in mm.")
     if ranges:
         texts.append("Last panel: simulated centres marked on the ground, measured mean and range below it.")
+    if scale is not None:
+        texts.append(scale.told)
     return " ".join(texts)

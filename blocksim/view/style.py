@@ -1,7 +1,7 @@
 """The one place for colours, fonts and sizes, and for making a picture file."""
 
 import warnings
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
@@ -30,10 +30,14 @@ SMALLEST_FONT = 4.0  # smaller text is left out
 LETTER = 0.64, 1.2  # width and height of a digit in units of the font size
 LINE_WIDTH = 0.8  # points
 
+FONT = ["DejaVu Sans"]
+NARROWEST = 0.25  # width of the narrowest letters over the font size
+SURE = 0.98  # letters are put on whole pixels
+
 # A fixed salt and no dates: the same picture is the same file.
 SETTINGS: dict[Any, Any] = {
     "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
+    "font.sans-serif": FONT,
     "font.size": FONT_SIZE,
     "axes.titlesize": FONT_SIZE,
     "axes.linewidth": LINE_WIDTH,
@@ -126,6 +130,26 @@ def shortened(text: str, letters: int) -> str:
     if not ends or ends[-1] <= letters:
         return line
     return f"{line[: bisect_right(ends, letters - 1)]}…"
+
+
+def width_of(text: str, size: float, *, bold: bool = False) -> float:
+    """Return the width (points) of one line of text at a font size (points), as it is on paper."""
+    from matplotlib.font_manager import FontProperties  # noqa: PLC0415 - see in_style
+    from matplotlib.textpath import text_to_path  # noqa: PLC0415
+
+    font = FontProperties(family=FONT, size=size, weight="bold" if bold else "normal")
+    with no_word_of_missing_letters():
+        return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0])
+
+
+def cut_to(text: str, room: float, size: float, *, bold: bool = False) -> str:
+    """Return a text in one line that is no wider than `room` (points), with an ellipsis where it is cut."""
+    room *= SURE
+    line = shortened(text, max(1, int(room / (NARROWEST * size))))
+    if width_of(line, size, bold=bold) <= room:
+        return line
+    fits = bisect_left(range(len(line)), 1, key=lambda count: width_of(f"{line[:count]}…", size, bold=bold) > room)
+    return f"{line[: max(fits - 1, 0)]}…"
 
 
 def fitting_font(text: str, room: tuple[float, float], largest: float = FONT_SIZE) -> float:

@@ -15,7 +15,7 @@ class Support:
     """Ground, walls and fixed bodies of one run; x runs along the ground, all in SI. The default: level and at rest.
 
     `profile` is the surface towards +x, level beyond both ends. `fixed` tells for every body whether it moves with the
-    support. A tilt raises the +x end. Without `motion` all rest.
+    support. A tilt raises the +x end. Without `motion` all rest. `weight` (N) is that of all free bodies.
     """
 
     profile: tuple[tuple[float, float], ...] = ((0.0, 0.0), (1.0, 0.0))
@@ -24,6 +24,7 @@ class Support:
     tilt: float = 0.0
     direction: tuple[float, float] = (1.0, 0.0)
     motion: MotionPieces | None = None
+    weight: float = 0.0
 
     def displacement(self, times: Floats) -> Floats:
         """Return the displacement (m) along `direction` at these times (s)."""
@@ -54,11 +55,13 @@ class Support:
 
 def support_of(scenario: Scenario) -> Support:
     """Return the support of a scenario's runs."""
+    placed = place_bodies(scenario)
     return Support(
         profile=scenario.ground.profile or Support.profile,
         walls=wall_segments(scenario),
-        fixed=tuple(body.fixed for body in place_bodies(scenario)),
+        fixed=tuple(body.fixed for body in placed),
         tilt=scenario.ground.tilt,
         direction=motion_direction(scenario),
         motion=None if scenario.motion is None else motion_pieces(scenario),
+        weight=scenario.gravity * sum(body.mass for body in placed if not body.fixed),
     )

@@ -23,6 +23,7 @@ from blocksim.world.sag import column_sag, inverse_mass, point_stiffness
 SECONDS_PER_BODY_AND_STEP = 75e-9
 SECONDS_IN_A_CROWD = 250e-9  # where bodies have neighbours on all sides
 CROWD = 50  # bodies
+CONTACTS_OF_A_BODY = 4  # recorded in a frame, of corners and rigid faces: hardly ever more
 SECONDS_IN_A_SUBSTEP = 400e-9  # a block, where contacts are rigid
 RIGID_RULES = ("friction", "restitution")  # what decides where contacts are rigid
 STIFFNESS_UNITS = {"linear": "N/m", "hertz-mindlin": "N/m^1.5"}
@@ -91,6 +92,8 @@ def describe(scenario: Scenario) -> Description:
     step = float(world.controls[0].step)
     steps = max(1, round(scenario.time.end / step))
     frames = min(steps, round(scenario.time.end / scenario.output.every)) + 1
+    particles = _particles(scenario, placed)
+    contacts = max(CONTACTS_OF_A_BODY * len(placed), particles) if scenario.output.contacts else 0
     return Description(
         bodies=placed,
         pairs=tuple(_pairs(scenario, world, placed)),
@@ -99,9 +102,9 @@ def describe(scenario: Scenario) -> Description:
         steps=steps,
         frames=frames,
         seconds=steps * len(placed) * _seconds_per_step(scenario, len(placed)),
-        bytes=file_bytes(len(placed), frames),
-        memory=replace(size, frames=frames).bytes_needed,
-        particles=_particles(scenario, placed),
+        bytes=file_bytes(len(placed), frames, contacts),
+        memory=replace(size, frames=frames, contacts=contacts).bytes_needed,
+        particles=particles,
         skin=float(world.controls[0].skin),
         rigid=_rigid(scenario, placed, world, step),
     )

@@ -24,6 +24,7 @@ VALUE = np.dtype(np.float64).itemsize
 OBJECT_BYTES = 450  # a placed body with its name, and its places in lists; measured 410
 MOTION_VALUES = 6  # of a body in a frame: place, angle, velocity, spin
 FRAME_VALUES = 12  # of a frame beside those: step, time, energies, number of contacts, largest overlap
+CONTACT_VALUES = 8  # of a recorded contact: two bodies in one, place, normal, overlap, forces
 COPIES = 2  # of all frames at the end of a run: as they came, and joined
 UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB", "EB")
 THOUSAND = 1000
@@ -51,6 +52,7 @@ class Size(ABC):
     bodies: int
     pairs: int  # of neighbours that there is room for
     frames: int  # recorded, at most
+    contacts: int  # recorded in every frame, at most
 
     @property
     @abstractmethod
@@ -60,7 +62,7 @@ class Size(ABC):
     @property
     def record_bytes(self) -> int:
         """Bytes that all frames take until the end of a run."""
-        return COPIES * file_bytes(self.bodies, self.frames)
+        return COPIES * file_bytes(self.bodies, self.frames, self.contacts)
 
     @property
     def bytes_needed(self) -> int:
@@ -77,6 +79,7 @@ class SceneSize(Size):
     slots: int  # corners or particles of a pair that can come into contact
     frames: int = 0
     has_particles: bool = False
+    contacts: int = 0
 
     @property
     def world_bytes(self) -> int:
@@ -97,6 +100,7 @@ class RigidSize(Size):
     bodies: int
     pairs: int
     frames: int = 0
+    contacts: int = 0
 
     @property
     def world_bytes(self) -> int:
@@ -106,9 +110,9 @@ class RigidSize(Size):
         return self.bodies * body + self.pairs * pair
 
 
-def file_bytes(bodies: int, frames: int) -> int:
-    """Return the bytes that frames take in a file."""
-    return frames * VALUE * (FRAME_VALUES + MOTION_VALUES * bodies)
+def file_bytes(bodies: int, frames: int, contacts: int = 0) -> int:
+    """Return the bytes that frames with so many contacts each take in a file."""
+    return frames * VALUE * (FRAME_VALUES + MOTION_VALUES * bodies + CONTACT_VALUES * contacts)
 
 
 def refuse_if_too_large(size: Size) -> None:

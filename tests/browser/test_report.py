@@ -17,7 +17,7 @@ from blocksim.view.report.page import write_report
 from blocksim.view.report.stored import read_stored
 from blocksim.view.report.subjects import run_subject
 from tests.browser.conftest import PLAYER, Open, Opened
-from tests.view.report.folders import write_run, write_sweep
+from tests.view.report.folders import write_experiment, write_run, write_sweep
 
 pytestmark = pytest.mark.long
 FRAMES_A_SECOND = 30.0
@@ -212,6 +212,24 @@ def test_sweep_is_sorted_filtered_and_its_members_open(swept: Path, open_page: O
     assert one.page.locator(".map canvas").is_visible()
 
 
+def test_measured_range_is_marked_in_the_map_and_the_table(tmp_path: Path, open_page: Open) -> None:
+    write_sweep(tmp_path / "sweep", kept=0)
+    write_experiment(tmp_path / "repeats.csv")
+    report(tmp_path / "sweep", "--experiment", tmp_path / "repeats.csv", "--out", tmp_path / "report.html")
+    one = open_page(tmp_path / "report.html")
+    assert one.page.locator("table.cases td.inside", has_text="69.00").count() == 1
+    assert one.page.locator("table.cases td.outside", has_text="70.00").count() == 1
+    one.page.locator("[data-option=up]").select_option("1.x_mm")
+    assert "counts as inside" in one.page.locator(".map .legend").inner_text()
+    one.keep("sweep-judged")
+    band = (246, 217, 196)
+    url = one.page.evaluate("document.querySelector('.map canvas').toDataURL()")
+    picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(url.split(",")[1]))).convert("RGB"), dtype=np.int64)
+    rows = np.nonzero((picture == band).all(axis=-1).any(axis=1))[0]
+    height = one.page.evaluate("document.querySelector('.map canvas').clientHeight") - 12 - 46
+    assert np.ptp(rows) + 1 == pytest.approx(0.9 * height * 2.0 / 4.0, abs=2.0)  # 67 to 69 on an axis from 66 to 70
+
+
 def test_case_without_frames_says_how_to_get_them(swept: Path, open_page: Open) -> None:
     one = open_page(swept)
     one.page.locator(".map canvas").focus()
@@ -271,3 +289,29 @@ def test_paper_is_white_and_has_no_controls(three: tuple[Path, Frames], open_pag
     corner = pixels(one)[3, 3]
     assert corner.tolist() == [255, 255, 255]
     one.keep("three-print")
+
+
+def test_forces_are_shown_on_request_and_where_the_contacts_are(tmp_path: Path, open_page: Open) -> None:
+    write_run(tmp_path / "run", count=5, overrides={"output.contacts": True})
+    report(tmp_path / "run", "--out", tmp_path / "report.html")
+    one = open_page(tmp_path / "report.html")
+    one.page.evaluate(f"{PLAYER}.toggle('names')")
+    one.page.evaluate(f"{PLAYER}.show(4)")
+    before = pixels(one)
+    one.page.keyboard.press("f")
+    assert one.page.get_by_label("contact forces").is_checked()
+    changed = (pixels(one) != before).any(axis=-1)
+    scale, centres = one.state()["scale"], np.array(one.state()["centres"])
+    columns = np.nonzero(changed.any(axis=0))[0]
+    for x, _ in centres:  # made-up contacts are below the centres
+        assert np.abs(columns - x).min() <= 1.0
+    assert all(np.abs(centres[:, 0] - column).min() < 8.0 for column in columns)
+    assert np.nonzero(changed.any(axis=1))[0].size == pytest.approx(0.6 * 41.0 * scale, abs=6.0)
+    assert "Arrows: contact forces" in one.page.locator(".player .notes").inner_text()
+    one.keep("three-blocks-forces")
+
+
+def test_run_without_contacts_says_how_to_store_them(three: tuple[Path, Frames], open_page: Open) -> None:
+    one = open_page(three[0])
+    assert one.page.get_by_label("contact forces").count() == 0
+    assert "--set output.contacts=true" in one.page.locator(".player .notes").inner_text()

@@ -6,7 +6,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from tests.cli.conftest import Command
+from tests.cli.conftest import SOFT, Command
 
 
 def test_csv_ends_where_the_final_table_does(blocksim: Command, finished: Path) -> None:
@@ -65,3 +65,16 @@ def test_damaged_frames_are_told(blocksim: Command, copied: Path, content: bytes
     answer = blocksim("export", copied)
     assert answer.code == (66 if content is None else 65)
     assert "run.h5" in answer.err
+
+
+def test_contacts_get_a_file_beside_where_they_are_stored(blocksim: Command, tmp_path: Path) -> None:
+    nominal = "scenarios/three_blocks_nominal.toml"
+    settings = ("--set", "time.end=0.02", "--set", "output.contacts=true", *SOFT)
+    assert blocksim("run", nominal, *settings, "--out", tmp_path / "run", "--quiet").code == 0
+    answer = blocksim("export", tmp_path / "run", "--out", "all.csv")
+    assert answer.code == 0
+    assert "file: all_contacts.csv (" in answer.err
+    with Path("all_contacts.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["body_b"] for row in rows} >= {"", "2", "3"}
+    assert "replaces an older file" in blocksim("export", tmp_path / "run", "--out", "all.csv").err

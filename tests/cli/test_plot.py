@@ -1,5 +1,7 @@
 """blocksim plot: pictures of finished, failed and damaged runs."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -136,3 +138,46 @@ def test_table_of_sensitivities_is_drawn(blocksim: Command) -> None:
     answer = blocksim("plot", "indices.csv")
     assert (answer.code, answer.err) == (0, "picture: indices.png\n")
     assert "drawn as 'tornado', not as 'map'" in blocksim("plot", "indices.csv", "--kind", "map").err
+
+
+def test_forces_are_drawn_where_contacts_are_stored_and_else_it_says_how(blocksim: Command, finished: Path) -> None:
+    brief = ("--set", "time.end=0.02", "--set", "output.contacts=true", "--out", "out", "--quiet")
+    assert blocksim("run", "scenarios/three_blocks_nominal.toml", *SOFT, *brief).code == 0
+    assert blocksim("plot", "out", "--forces", "--out", "strip.svg").code == 0
+    assert "Arrows: contact" in Path("strip.svg").read_text(encoding="utf-8")
+    answer = blocksim("plot", finished, "--forces")
+    assert answer.code == 65
+    assert "this run has stored no contacts" in answer.err
+    assert "--set output.contacts=true" in answer.err
+
+
+SOLVER_FREE = """
+import sys
+from typer.testing import CliRunner
+from blocksim.cli.app import app
+for arguments in {calls}:
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, (arguments, result.output, result.stderr)
+assert "numba" not in sys.modules
+assert not any(name.startswith("blocksim.kernels") for name in sys.modules)
+"""
+
+
+def test_stored_results_are_shown_without_the_solver(blocksim: Command, finished: Path, tmp_path: Path) -> None:
+    assert blocksim(*SWEEP, "--vary", "structures.0.overlap=9 mm:11 mm:3").code == 0
+    run = str(finished)
+    calls = [
+        *(["plot", run, "--kind", kind, "--out", f"{kind}.png"] for kind in ("strip", "final", "history")),
+        ["animate", run, "--speed", "1", "--fps", "5", "--width", "200", "--out", "film.gif"],
+        *(["export", run, "--format", form, "--out", f"run.{form}"] for form in ("csv", "vtkhdf")),
+        ["report", run, "swept", "--out", "report.html"],
+        ["plot", "swept", "--out", "sweep.png"],
+    ]
+    done = subprocess.run(
+        [sys.executable, "-c", SOLVER_FREE.format(calls=calls)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr

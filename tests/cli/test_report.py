@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.cli.conftest import Command
-from tests.view.report.folders import write_run, write_sweep
+from tests.view.report.folders import write_experiment, write_run, write_sweep
 
 REPORT = Path("report.html")
 
@@ -51,6 +51,20 @@ def test_members_beyond_the_limit_are_named(blocksim: Command, tmp_path: Path) -
     sweep = data_of(REPORT)
     assert list(sweep["members"]) == ["000000000000"]
     assert sweep["left_out"] == ["000000000001", "000000000002"]
+
+
+def test_sweep_is_judged_by_the_repeats(blocksim: Command, tmp_path: Path) -> None:
+    write_sweep(tmp_path / "sweep", kept=0)
+    write_experiment(tmp_path / "repeats.csv")
+    assert blocksim("report", "sweep", "--experiment", "repeats.csv").code == 0
+    text = REPORT.read_text(encoding="utf-8")
+    assert "3 of 6 members (50.0 %) are inside in everything measured" in text
+    assert "[67.00, 69.00]" in text
+    assert data_of(REPORT)["measured"] == {"1.x_mm": [67.0, 69.0], "1.rotation_deg": [-95.0, -85.0]}
+    (tmp_path / "other.csv").write_text("block,quantity,unit,replicate,value\nnobody,x,mm,1,5.0\n", encoding="utf-8")
+    answer = blocksim("report", "sweep", "--experiment", "other.csv")
+    assert answer.code == 65
+    assert "nobody" in answer.err
 
 
 def test_run_needs_no_solver(tmp_path: Path) -> None:

@@ -57,14 +57,9 @@ class Child:
         raise AssertionError(f"blocksim {' '.join(map(str, arguments))} {what}")
 
     def _started(self) -> subprocess.Popen[str]:
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", START],
-            cwd=self.root,
-            text=True,
-            bufsize=1,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-        )
+        pipe = subprocess.PIPE
+        command = [sys.executable, "-c", START]
+        self.process = subprocess.Popen(command, cwd=self.root, text=True, bufsize=1, stdin=pipe, stdout=pipe)
         return self.process
 
     def close(self) -> None:

@@ -11,23 +11,24 @@ from blocksim.world.build import build_world
 from tests.simulation.conftest import Shipped
 
 
-def test_rare_output_does_not_make_the_loop_deaf(soft: Shipped, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop, "BODY_STEPS_A_CALL", 400)
-    scenario = soft(time__end=0.02, time__stop_at_rest=False)
+def test_rare_output_does_not_make_the_loop_deaf(soft: Shipped) -> None:
+    scenario = soft(time__end=20.0, time__stop_at_rest=False)
     world = build_world(scenario)
-    recorder = Recorder(place_bodies(scenario), 1.0, float(world.controls[0].step))
+    recorder = Recorder(place_bodies(scenario), 100.0, float(world.controls[0].step))
     seen: list[loop.Progress] = []
-    ended = loop.run_loop(world, recorder, 0.02, on_progress=seen.append, is_stopped=lambda: len(seen) == 3)
-    assert [where.steps for where in seen] == [100, 200, 300]
-    assert ended.outcome.status == "interrupted"
-    assert recorder.steps == [0, 300]
+    attendance = loop.Attendance(seen.append, lambda: "enough" if len(seen) == 3 else "")
+    ended = loop.run_loop(world, recorder, 20.0, attendance=attendance)
+    assert (ended.outcome.status, ended.outcome.reason, ended.outcome.exit_code) == ("interrupted", "enough", 75)
+    assert len(seen) == 3
+    assert recorder.steps == [0, seen[-1].steps]
+    assert 0 < seen[0].steps < seen[1].steps < seen[2].steps < recorder.next_step(0)
 
 
 def test_stop_before_the_first_step_leaves_one_frame(soft: Shipped) -> None:
     scenario = soft()
     world = build_world(scenario)
     recorder = Recorder(place_bodies(scenario), 1e-3, float(world.controls[0].step))
-    ended = loop.run_loop(world, recorder, 1.0, is_stopped=lambda: True)
+    ended = loop.run_loop(world, recorder, 1.0, attendance=loop.Attendance(stop=lambda: "at once"))
     assert ended.outcome.status == "interrupted"
     assert recorder.steps == [0]
 
@@ -44,6 +45,7 @@ def test_loss_of_energy_fails_a_run(soft: Shipped, monkeypatch: pytest.MonkeyPat
     recorder = Recorder(place_bodies(scenario), 1e-2, float(world.controls[0].step))
     ended = loop.run_loop(world, recorder, 0.25)
     assert (ended.outcome.status, ended.outcome.exit_code) == ("failed", 76)
+    assert "the fastest is block " in ended.outcome.reason
 
 
 def test_body_that_hangs_in_the_air_does_not_rest_however_slowly_it_falls() -> None:

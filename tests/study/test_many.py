@@ -44,9 +44,21 @@ def test_columns_are_values_outcome_verdict_and_ends(quick: Document, tmp_path: 
     assert list(table.columns) == ["case", KINETIC, "status", "reason", "seconds", "inside", *ends]
 
 
+def test_cases_are_drawn_as_the_command_draws_them(quick: Document, tmp_path: Path) -> None:
+    drawn = {KINETIC: {"from": 0.2, "to": 0.25}}
+    tables = [
+        sweep(quick, drawn, mode="lhs", samples=3, seed=seed, out=tmp_path / name).table[KINETIC]
+        for seed, name in ((7, "one"), (7, "same"), (8, "other"))
+    ]
+    assert len(tables[0]) == 3
+    assert tables[0].between(0.2, 0.25).all()
+    assert tables[0].equals(tables[1])
+    assert not tables[0].equals(tables[2])
+
+
 def test_folder_holds_plan_table_and_manifest(quick: Document, tmp_path: Path) -> None:
     result = sweep(quick, TWO, out=tmp_path)
-    files = {"sweep.toml", "sweep.csv", "manifest.jsonl", "timings.csv", "experiment.csv"}
+    files = {"sweep.toml", "sweep.json", "sweep.csv", "manifest.jsonl", "timings.csv", "experiment.csv"}
     assert {path.name for path in tmp_path.iterdir()} == files
     pd.testing.assert_frame_equal(read_sweep(tmp_path).table, result.table, check_exact=True)
     timings = pd.read_csv(tmp_path / "timings.csv")

@@ -1,11 +1,14 @@
 """Frames that no run has made: blocks in rows of ten that topple to the right."""
 
+from dataclasses import replace
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from blocksim.simulation.contacts import SUPPORT, Contacts, empty_rows
 from blocksim.simulation.frames import Frames
 
 HOSTILE = (
@@ -44,6 +47,17 @@ def toppling(blocks: int, steps: int = 40, end: float = 0.6) -> Frames:
     )
 
 
+def pressed(frames: Frames, force: float = 2.0) -> Frames:
+    """Return the same frames with two contacts of each block with the ground, at its middle and right of it."""
+    steps, blocks = frames.x.shape
+    rows = empty_rows(2 * steps * blocks)
+    rows["body_a"], rows["body_b"] = np.tile(np.repeat(np.arange(blocks), 2), steps), SUPPORT
+    rows["x"] = np.repeat(frames.x.ravel(), 2) + np.tile([0.0, 0.012], steps * blocks)
+    rows["normal_y"], rows["normal_force"] = 1.0, force * (1.0 + rows["body_a"])
+    rows["shear_force"] = np.tile([0.0, -0.3 * force], steps * blocks)
+    return replace(frames, contacts=Contacts(2 * blocks * np.arange(1, steps + 1), rows))
+
+
 def stacked(blocks: int) -> Frames:
     """Return a tower at rest."""
     frames = toppling(blocks)
@@ -57,7 +71,8 @@ def texts_of(figure: Figure) -> list[Text]:
     texts = list(figure.texts)
     for axes in figure.axes:
         legend = axes.get_legend()
-        texts += [*axes.texts, *(legend.get_texts() if legend else [])]
+        titles = [child for child in axes.get_children() if isinstance(child, Text)]  # and what else is written there
+        texts += [*titles, *(legend.get_texts() if legend else [])]
         if axes.axison:
             texts += [*_of_axis(axes, "x"), *_of_axis(axes, "y")]
     return [text for text in texts if text.get_text() and text.get_visible()]

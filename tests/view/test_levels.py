@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError, OutputError
 from blocksim.view.levels import MOST_BLOCKS, Panel, chosen_blocks, draw_levels, limits_of
+from tests.view.made_up import HOSTILE, overlapping
 
 
 def panel(blocks: int = 3, levels: int = 4, size_mm: float = 1.0) -> Panel:
@@ -73,3 +75,11 @@ def test_wrong_files_are_refused(tmp_path: Path) -> None:
         draw_levels([panel()], tmp_path / "levels.bmp")
     with pytest.raises(OutputError, match="cannot be written"):
         draw_levels([panel()], tmp_path / "nix" / "levels.png")
+
+
+@pytest.mark.parametrize("name", ["W" * 200, *HOSTILE])
+@pytest.mark.parametrize("count", [1, 3])
+def test_long_and_hostile_names_cover_nothing(caught: list[Figure], name: str, count: int) -> None:
+    named = replace(panel(), blocks=("b0", name, "b2"))
+    draw_levels([named] * count, "levels.png", title=name, measured={name: 7.0})
+    assert overlapping(caught[0]) == []

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 from blocksim.view.series import MOST_ROWS, draw_series, is_smooth, moving_blocks, value_axis
+from tests.view.made_up import HOSTILE, boxes_of, overlapping
 
 Floats = NDArray[np.float64]
 
@@ -89,3 +91,30 @@ def test_blocks_that_stay_are_left_out_and_many_are_cut() -> None:
 def test_unknown_format_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="no picture format"):
         draw_series([made_up(2)], ("a", "b"), ("gravity", ""), tmp_path / "series.bmp")
+
+
+NAMES = ("W" * 200, *HOSTILE)
+
+
+@pytest.mark.parametrize("columns", [1, 2, 4])
+@pytest.mark.parametrize("name", NAMES)
+def test_long_and_hostile_names_cover_nothing(caught: list[Figure], columns: int, name: str) -> None:
+    series, names = [made_up(3, name) for _ in range(columns)], ("1", name, "3")
+    key = f"blocks.{name}.width", "m"
+    draw_series(series, names, key, "series.png", title=name, measured={"3": (1.0, 2.0)})
+    assert overlapping(caught[0]) == []
+
+
+def test_short_names_are_whole(caught: list[Figure]) -> None:
+    draw_series([made_up(3), made_up(3)], ("1", "2", "brick"), ("overlap", "m"), "series.png", title="a short title")
+    texts = {text for text, _ in boxes_of(caught[0])}
+    assert "a short title" in texts
+    assert any(text.startswith("block brick: 68.00 to 72.00 mm, 4.00 mm apart") for text in texts)
+    assert not any("…" in text for text in texts)
+
+
+def test_headings_of_narrow_columns_keep_their_values(caught: list[Figure]) -> None:
+    series = [made_up(3, f"friction.block_block.kinetic = 0.{number}") for number in range(4)]
+    draw_series(series, ("1", "2", "3"), ("gravity", ""), "series.png")
+    texts = [text for text, _ in boxes_of(caught[0])]
+    assert [sum(text.endswith(f" = 0.{number}") for text in texts) for number in range(4)] == [1, 1, 1, 1]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from blocksim.analysis import load_table
 from blocksim.errors import InvalidInputError, OutputError
 from blocksim.scenario.motion import MotionPieces
+from blocksim.simulation.contacts import Contacts
 from blocksim.view import strip, style
 from blocksim.view.strip import arrangement, draw_strip, measured_ranges, plan, widened
 from blocksim.view.support import Support
@@ -35,6 +36,7 @@ class MadeUpFrames:
     size_x: Floats
     size_y: Floats
     names: tuple[str, ...]
+    contacts: Contacts | None = None
 
 
 @dataclass

@@ -9,9 +9,11 @@ from blocksim.view.style import (
     MEASURED_COLOUR,
     SMALLEST_FONT,
     block_colour,
+    cut_to,
     fitting_font,
     shortened,
     text_colour,
+    width_of,
 )
 
 
@@ -51,3 +53,10 @@ def test_long_names_are_cut(name: str, shown: str) -> None:
 def test_signs_that_are_no_letters_become_boxes_and_wide_ones_count_twice() -> None:
     assert shortened("a\nb\u202e", 12) == "a□b□"
     assert shortened("\N{GRINNING FACE}" * 9, 12) == "\N{GRINNING FACE}" * 5 + "…"
+
+
+@pytest.mark.parametrize("text", ["W" * 200, "i" * 2000, "\u202e" * 50, "\N{GRINNING FACE}" * 40, "Sturz", ""])
+def test_texts_are_cut_to_what_they_take_on_paper(text: str) -> None:
+    cut = cut_to(text, 100.0, 8.0)
+    assert width_of(cut, 8.0) <= 100.0
+    assert cut == text or (cut.endswith("…") and width_of(f"{cut[:-1]}{cut[0]}…", 8.0) > 90.0)

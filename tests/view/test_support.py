@@ -34,7 +34,8 @@ def test_the_resolved_scenario_of_a_run_tells_all(tmp_path: Path) -> None:
 def test_a_plain_scenario_has_level_ground_at_rest() -> None:
     plain = {key: value for key, value in SCENE.items() if key not in {"ground", "walls", "motion", "bodies"}}
     support = support_of(scenario_from_mapping(plain))
-    assert support == Support(fixed=(False, False))
+    assert support == Support(fixed=(False, False), weight=support.weight)
+    assert support.weight == pytest.approx(19.62)  # two blocks of one kilogram
     assert support.height(np.array([-1e6, 0.0, 1e6])).tolist() == [0.0, 0.0, 0.0]
     assert support.offset(np.array([0.0, 5.0])).tolist() == [[0.0, 0.0], [0.0, 0.0]]
     assert support.corners().tolist() == []

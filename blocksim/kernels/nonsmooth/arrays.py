@@ -26,7 +26,7 @@ ROW = record_type(
     "shear_arm_a shear_arm_b "  # m: r x t, the same for both points, as they lie on one face
     "gap_one gap_two "  # m: when the step began; FAR where there is no such point
     "normal_one normal_two shear "  # N s: impulses of the last substep: pushing apart, on body a along the tangent
-    "bend shear_bend",  # m/s: what the velocities at the points gain within half a substep, as the bodies turn
+    "bend shear_bend",  # m/s: what the velocities at the points gain within half a substep, as bodies turn; bends.py
     indices="a b touch",  # bodies; place in the table of interactions
     flags="reach",  # of the manifold in the step under way: AWAY, OPEN or TOUCHING
 )
@@ -70,7 +70,9 @@ STEPPING = record_type(
     "margin "  # m: points with a larger gap are left out of the step under way
     "support_vx support_vy "  # m/s: of the ground and all that is fixed, in the substep under way
     "support_x support_y "  # m: how far they have come
-    "listed_x listed_y",  # m: how far they had come when the pair list was made
+    "listed_x listed_y "  # m: how far they had come when the pair list was made
+    "bend_share "  # -: of the bend of a row, what velocities gain up to the middle of the substep under way
+    "bend_time next_bend_time",  # s: times the bend, by how much gaps at its start and end are off
     "substeps "
     "velocity_sweeps "  # at most
     "colours row_count active_count group_count "  # now

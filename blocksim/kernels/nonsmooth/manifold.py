@@ -29,6 +29,7 @@ from blocksim.kernels.lanes import (
     write_fields_8,
 )
 from blocksim.kernels.nonsmooth.arrays import AWAY, OPEN, TOUCHING, Contacts
+from blocksim.kernels.nonsmooth.bends import bend_of
 from blocksim.kernels.nonsmooth.faces import (
     Block,
     Points,
@@ -42,7 +43,7 @@ from blocksim.kernels.nonsmooth.faces import (
     points_of,
 )
 from blocksim.kernels.nonsmooth.pieces import points_on_ground, points_on_piece
-from blocksim.kernels.nonsmooth.slip import Motion, bend_of
+from blocksim.kernels.nonsmooth.slip import Motion
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller half side: two faces that face each other over less are passed by

@@ -80,10 +80,11 @@ def warm_group(contacts: Contacts, group: Record, lane: Lane) -> None:
 
 
 @kernel
-def gaps(group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes]:
-    """Return both gaps (m) as they are now."""
+def gaps(group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies, bend_time: float) -> tuple[Lanes, Lanes]:
+    """Return both gaps (m) as they are now; `bend_time` (s) is that of bends.py now."""
     slip = slip_of(row, a.dx - b.dx, a.dy - b.dy, a.turned, b.turned)
-    return load(lane, group.gap_one) + slip.one, load(lane, group.gap_two) + slip.two
+    bent = bend_time * load(lane, group.bend)
+    return load(lane, group.gap_one) + slip.one + bent, load(lane, group.gap_two) + slip.two + bent
 
 
 @kernel
@@ -93,14 +94,14 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     row = rows_of(group, lane)
     a = bodies_at(contacts, group.a, lane)
     b = bodies_at(contacts, group.b, lane)
-    gap_one, gap_two = gaps(group, lane, row, a, b)
+    gap_one, gap_two = gaps(group, lane, row, a, b, stepping.bend_time)
     slip = slip_of(row, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
     one, mixed, two = masses(row, a, b)
     old_one = load(lane, group.normal_one)
     old_two = load(lane, group.normal_two)
     k_one = one + select(gap_one > 0.0, 0.0, stepping.softness) * one
     k_two = two + select(gap_two > 0.0, 0.0, stepping.softness) * two
-    bend = load(lane, group.bend)
+    bend = stepping.bend_share * load(lane, group.bend)
     free_one = slip.one + bend + select(gap_one > 0.0, stepping.open_bias, stepping.closed_bias) * gap_one
     free_two = slip.two + bend + select(gap_two > 0.0, stepping.open_bias, stepping.closed_bias) * gap_two
     q_one = free_one - (one * old_one + mixed * old_two)
@@ -130,7 +131,7 @@ def target(impulse: Lanes, gap: Lanes, approach: Lanes, restitution: Lanes, step
 def aim(contacts: Contacts, group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes]:
     """Fix what the velocity pass has to reach at the points of rows."""
     stepping = contacts.stepping[0]
-    gap_one, gap_two = gaps(group, lane, row, a, b)
+    gap_one, gap_two = gaps(group, lane, row, a, b, stepping.next_bend_time)
     normal_one = load(lane, group.normal_one)
     normal_two = load(lane, group.normal_two)
     if is_all((lesser(gap_one, gap_two) > 0.0) & (greater(normal_one, normal_two) <= 0.0)):
@@ -213,7 +214,8 @@ def reach(
     old_one = load(lane, group.normal_one)
     old_two = load(lane, group.normal_two)
     old_shear = load(lane, group.shear)
-    bend = load(lane, group.bend)
+    share = contacts.stepping[0].bend_share
+    bend = share * load(lane, group.bend)
     q_one = slip.one + bend - t_one - one * old_one - mixed * old_two
     q_two = slip.two + bend - t_two - mixed * old_one - two * old_two
     new_one, new_two = solve_two(one, mixed, two, q_one, q_two)
@@ -228,7 +230,7 @@ def reach(
     turn = row.width * d_two
     rate = (
         slip.shear
-        + load(lane, group.shear_bend)
+        + share * load(lane, group.shear_bend)
         + coupled_a * (row.arm_a * normal - turn)
         + coupled_b * (row.arm_b * normal - turn)
     )

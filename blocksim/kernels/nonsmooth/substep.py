@@ -5,6 +5,7 @@ import math
 from blocksim.kernels.arrays import TEAM_SIZE, Integers
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import COLOURS, Contacts, Nonsmooth
+from blocksim.kernels.nonsmooth.bends import follow_bends
 from blocksim.kernels.nonsmooth.guard import TRIES, gains, weaken
 from blocksim.kernels.nonsmooth.motion import drift_all, kick_all, kick_all_warm
 from blocksim.kernels.nonsmooth.supports import drive
@@ -118,6 +119,7 @@ def substep(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
     first, last = bodies_of(contacts, k, team[TEAM_SIZE])
     if k == 0:
         drive(scene, number)
+        follow_bends(stepping, number)
     if number == 0:
         kick_all(contacts.lines, contacts.before, first, last, share, hx, hy)
         meet(team)

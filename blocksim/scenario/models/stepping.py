@@ -99,3 +99,4 @@ class Output(Table):
     """What is recorded; it never changes the motion."""
 
     every: q.PositiveTime = Field(default=0.001, description="time between two recorded frames")
+    contacts: bool = Field(default=False, description="true to record all contacts and their forces in every frame")

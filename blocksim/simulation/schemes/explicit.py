@@ -4,6 +4,7 @@ from blocksim.kernels.advance import advance, advance_in_team
 from blocksim.kernels.arrays import World
 from blocksim.kernels.energy import LEDGER_ROW, measure
 from blocksim.kernels.ensemble import advance_members
+from blocksim.simulation.schemes.explicit_contacts import explicit_contacts
 from blocksim.simulation.schemes.scheme import Scheme
 from blocksim.world.build import build_worlds, with_more_room, with_threads
 
@@ -28,5 +29,6 @@ EXPLICIT = Scheme(
     with_threads=with_threads,
     threads_of=lambda world: int(world.shares.size),
     for_another_thread=with_own_work_space,
+    contacts=explicit_contacts,
     measure=measure,
 )

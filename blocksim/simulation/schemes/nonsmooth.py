@@ -4,6 +4,7 @@ from blocksim.kernels.nonsmooth.advance import advance_nonsmooth, advance_nonsmo
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER, measure_nonsmooth
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
+from blocksim.simulation.schemes.nonsmooth_contacts import nonsmooth_contacts
 from blocksim.simulation.schemes.scheme import Scheme
 from blocksim.world.nonsmooth import build_nonsmooths, threads_of, with_more_rows, with_more_threads
 
@@ -20,5 +21,6 @@ NONSMOOTH = Scheme(
     with_threads=with_more_threads,
     threads_of=threads_of,
     for_another_thread=lambda scene: scene,  # rows are solved in registers
+    contacts=nonsmooth_contacts,
     measure=measure_nonsmooth,
 )

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 from blocksim.kernels.arrays import World
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import Scenario
+from blocksim.simulation.contacts import Rows
 from blocksim.world.stacks import Refusal, Stack
 
 AnyScene = World | Nonsmooth
@@ -36,6 +37,7 @@ class Scheme:
     with_threads: Callable[[Any, int], Any]  # with room for what they tell one another
     threads_of: Callable[[Any], int]  # for how many threads there is such room
     for_another_thread: Callable[[Any], Any]  # the same scene with work space of its own
+    contacts: Callable[[Any, int], Rows]  # of a scene with so many blocks
     measure: Callable[[Any, Any], None]  # writes energies, number of contacts and largest overlap into a row
 
     @property

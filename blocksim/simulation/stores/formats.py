@@ -2,20 +2,32 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 from blocksim.errors import InvalidInputError
+from blocksim.scenario import Scenario
+from blocksim.simulation.contacts import Contacts
 from blocksim.simulation.frames import Frames
+from blocksim.simulation.stores.contacts_csv import write_contacts_csv
 from blocksim.simulation.stores.frames_csv import write_csv
 from blocksim.simulation.stores.vtkhdf import write_vtkhdf
 
-# Each writes a file and returns the number of frames in it; a format is one file and one line here.
-FORMATS: dict[str, Callable[[Path, Frames], int]] = {
-    "csv": write_csv,
-    "vtkhdf": write_vtkhdf,
+
+class Format(NamedTuple):
+    """How a format is written; both functions return how many frames or contacts there are in the file."""
+
+    write: Callable[[Path, Frames, Scenario], int]
+    write_contacts: Callable[[Path, Frames, Contacts], int] | None = None  # into a file of their own
+
+
+# A format is one file and one line here.
+FORMATS: dict[str, Format] = {
+    "csv": Format(lambda path, frames, _: write_csv(path, frames), write_contacts_csv),
+    "vtkhdf": Format(write_vtkhdf),
 }
 
 
-def format_named(name: str) -> Callable[[Path, Frames], int]:
+def format_named(name: str) -> Format:
     """Return what writes files of a format. Raises InvalidInputError for an unknown one."""
     if name not in FORMATS:
         message = f"--format {name}: no such format, choose {' or '.join(FORMATS)}"

@@ -15,6 +15,7 @@ from blocksim.simulation.frames import Frames
 from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
 from blocksim.simulation.stores import hdf5_layout as layout
 from blocksim.simulation.stores import hdf5_safety as safety
+from blocksim.simulation.stores.hdf5_contacts import read_contacts
 from blocksim.simulation.stores.hdf5_open import DAMAGE, is_left_open, opened
 
 PAUSES = (0.05, 0.2)  # s
@@ -65,6 +66,7 @@ def _read(path: Path, file: Any, bodies: int) -> tuple[float, Rows]:
         np.stack([one[:count] for one in moving.values()], axis=1, dtype=np.float64),
         np.stack([one[:count] for one in measured.values()], axis=1, dtype=np.float64),
         ledger,
+        read_contacts(path, file, count, bodies),
     )
     return _time_step(steps, rows.steps), rows
 

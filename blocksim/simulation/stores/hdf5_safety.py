@@ -61,20 +61,20 @@ def member(file: Any, name: str) -> Any:
     return place
 
 
-def refuse_too_many(path: Path, sets: dict[str, Any], rows: int) -> None:
+def refuse_too_many(path: Path, sets: dict[str, Any], rows: int, what: str = "frames") -> None:
     """Raise UnsafeError where the first `rows` of data sets cannot all be in the file, or not in the memory."""
     size, wanted = path.stat().st_size, 0
     for name, one in sets.items():
         if one.shape[0] < rows:
-            raise UnsafeError(f"{name}: holds {one.shape[0]} frames, not {rows}")
+            raise UnsafeError(f"{name}: holds {one.shape[0]} {what}, not {rows}")
         row_bytes = one.dtype.itemsize * (one.shape[1] if one.ndim > 1 else 1)
         wanted += rows * row_bytes
     if wanted > size:
-        raise UnsafeError(f"announces {readable(wanted)} of frames in a file of {readable(size)}")
+        raise UnsafeError(f"announces {readable(wanted)} of {what} in a file of {readable(size)}")
     available = available_bytes()
     if available is not None and 3 * wanted > available:  # as read, put together, and as frames
         raise UnsafeError(
-            f"its frames need about {readable(3 * wanted)} of memory; {readable(available)} are available"
+            f"its {what} need about {readable(3 * wanted)} of memory; {readable(available)} are available"
         )
 
 

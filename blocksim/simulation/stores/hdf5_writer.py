@@ -8,7 +8,7 @@ is followed by a new value of `n_committed`. HDF5 cannot recover from a write th
 import contextlib
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -20,8 +20,10 @@ from numpy.typing import NDArray
 
 from blocksim.errors import OutputError
 from blocksim.scenario import PlacedBody
+from blocksim.simulation.contacts import Rows
 from blocksim.simulation.recorder import MOTION, Frame
 from blocksim.simulation.stores import hdf5_layout as layout
+from blocksim.simulation.stores.hdf5_contacts import append_contacts, bytes_of_contacts, create_contacts
 
 FLUSH_SECONDS = 0.25
 MOST_CHUNK_ROWS = 64
@@ -40,7 +42,7 @@ def _try_room(path: Path) -> None:
 class FrameFile:
     """Writes frames as they come; use as a context manager."""
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - what a file begins with
         self,
         path: Path,
         placed: Sequence[PlacedBody],
@@ -48,10 +50,17 @@ class FrameFile:
         scenario_toml: str,
         *,
         ledger: Sequence[str],
+        kept: Iterable[Frame] = (),
+        contacts: bool = False,
     ) -> None:
-        """Create the file with all its data sets, `ledger` names the energies; raises OutputError when that fails."""
+        """Create the file with all its data sets, `ledger` names the energies; raises OutputError when that fails.
+
+        It begins with the frames that are `kept` from an earlier part of the run. Only with those on the disk it takes
+        the place of an older file. With `contacts` every frame has to bring its contacts.
+        """
         self.path = path
         self.units = layout.measured_units(ledger)
+        self.has_contacts = contacts
         self.time_step = time_step
         self.count = 0
         self.chunk_rows = min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // len(placed)))
@@ -63,10 +72,27 @@ class FrameFile:
         with self._telling_trouble():
             _try_room(unnamed)
             self.file = h5py.File(unnamed, "w", libver="latest")
-            self._reserve(len(scenario_toml))
-            self._create(placed, scenario_toml)
-            self.file.swmr_mode = True
-            unnamed.replace(path)
+            try:
+                self._reserve(len(scenario_toml))
+                self._create(placed, scenario_toml)
+                self.file.swmr_mode = True
+                self._begin_with(kept)
+                unnamed.replace(path)
+            except BaseException:
+                self._abandon(unnamed)
+                raise
+
+    def _begin_with(self, kept: Iterable[Frame]) -> None:
+        self.waiting.extend(kept)
+        if self.waiting:
+            self.commit()
+            self.sync()
+
+    def _abandon(self, unnamed: Path) -> None:
+        """Leave nothing where there is no room, or no time."""
+        with contextlib.suppress(OSError, RuntimeError):
+            self.file.close()
+        unnamed.unlink(missing_ok=True)
 
     def _create(self, placed: Sequence[PlacedBody], scenario_toml: str) -> None:
         h5md = self.file.create_group("h5md")
@@ -80,6 +106,8 @@ class FrameFile:
         self.file.create_group(layout.OBSERVABLES, track_order=True)  # readers list the energies as the scheme does
         for name, unit in self.units.items():
             self._growing(f"{layout.OBSERVABLES}/{name}", np.float64, unit)
+        if self.has_contacts:
+            create_contacts(self.file, self.chunk_rows)
         for name, unit in layout.BODY_UNITS.items():
             values = np.array([getattr(body, name) for body in placed])
             self.file.create_dataset(f"{layout.BLOCKS}/{name}", data=values).attrs["unit"] = unit
@@ -107,23 +135,37 @@ class FrameFile:
         """Bring all frames so far to the disk and then say how many there are. Raises OutputError (disk full …)."""
         with self._telling_trouble():
             if self.waiting:
-                self._reserve((len(self.waiting) + 2 * self.chunk_rows) * self.row_bytes)
+                self._reserve((len(self.waiting) + 2 * self.chunk_rows) * self.row_bytes + self._contact_bytes())
                 self._write_waiting()
                 self.file.flush()
             self.file[layout.COMMITTED][()] = self.count
             self.file.flush()
         self.flushed_at = time.monotonic()
 
+    def sync(self) -> None:
+        """Commit, and wait until it is on the disk, where it outlives a power failure. Raises OutputError."""
+        self.commit()
+        with self._telling_trouble():
+            os.fsync(self.file.id.get_vfd_handle())
+
     def _write_waiting(self) -> None:
-        steps, motions, rows = zip(*self.waiting, strict=True)
+        steps, motions, rows, _ = zip(*self.waiting, strict=True)
         self._put(layout.STEP, np.array(steps))
         self._put(layout.TIME, np.array(steps) * self.time_step)
         for name, values in zip(MOTION, np.stack(motions, axis=1), strict=True):
             self._put(f"{layout.BLOCKS}/{name}", values)
         for name, values in zip(self.units, np.stack(rows, axis=1), strict=True):
             self._put(f"{layout.OBSERVABLES}/{name}", values)
+        if self.has_contacts:
+            append_contacts(self.file, self._waiting_contacts())
         self.count += len(self.waiting)
         self.waiting.clear()
+
+    def _waiting_contacts(self) -> list[Rows]:
+        return [frame.contacts for frame in self.waiting if frame.contacts is not None]
+
+    def _contact_bytes(self) -> int:
+        return bytes_of_contacts(self._waiting_contacts()) if self.has_contacts else 0
 
     def _put(self, name: str, values: NDArray[Any]) -> None:
         data_set = self.file[name]
@@ -159,5 +201,6 @@ class FrameFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the file, whatever happened."""
+        """Close the file, whatever happened; who asks for the second time to stop at once does not wait for frames."""
+        self.is_broken |= kind is not None and not issubclass(kind, Exception)
         self.close()

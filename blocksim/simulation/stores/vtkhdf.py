@@ -1,9 +1,10 @@
-"""All frames of a run as one temporal VTKHDF file, which ParaView opens: every block a rectangle.
+"""All frames of a run as one temporal VTKHDF file, which ParaView opens: every block a rectangle, ground and walls too.
 
 After the VTKHDF format specification, version 2.0 (docs.vtk.org): an unstructured grid whose cells stay the same while
 its points and the data of its cells have a part for every time. `Steps` says where each time's parts begin.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError, OutputError
+from blocksim.scenario import Scenario
 from blocksim.simulation.atomic import replacing
 from blocksim.simulation.frames import Frames
+from blocksim.simulation.stores.support_quads import support_motion, support_quads
 
 VERSION = (2, 0)
 QUAD = 9  # VTK's number of a cell with four corners
@@ -21,22 +24,33 @@ CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # coun
 BATCH = 1 << 16  # blocks times frames that are computed at once
 CHUNK = 1 << 14  # rows of a data set that are packed together
 PACKED: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
-DATA = {"velocity_m_s": 3, "rotation_deg": 1, "spin_deg_s": 1}  # of the blocks at every time, with components
+DATA = {"velocity_m_s": 3, "rotation_deg": 1, "spin_deg_s": 1}  # of the cells at every time, with components
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-def write_vtkhdf(path: Path, frames: Frames) -> int:
+@dataclass(frozen=True)
+class Supports:
+    """Ground and walls: corners (m, (q, 4, 2)) at rest; displacement (m) and velocity (m/s) at every frame, (n, 2)."""
+
+    quads: Floats
+    displacement: Floats
+    velocity: Floats
+
+
+def write_vtkhdf(path: Path, frames: Frames, scenario: Scenario) -> int:
     """Write all frames in which every number is finite and return their number.
 
-    Points in m, z = 0. Beside the VTK group the names of the blocks are kept, `blocksim/block_names`, in the order of
-    the cells. Raises InvalidInputError when there is nothing to write, and OutputError.
+    Points in m, z = 0. The cells of the blocks come first; ground and walls follow as cells of block number 0. Beside
+    the VTK group the names of the blocks are kept, `blocksim/block_names`, in the order of the cells. Raises
+    InvalidInputError when there is nothing to write, and OutputError.
     """
     chosen = _finite(frames)
+    supports = Supports(support_quads(scenario, frames), *support_motion(scenario, frames.time))
     with replacing(path) as temporary:
         try:
             with h5py.File(temporary, "w") as file:
-                _write_grid(file.create_group("VTKHDF"), frames, chosen)
+                _write_grid(file.create_group("VTKHDF"), frames, chosen, supports)
                 names = [name.encode() for name in frames.names]
                 file.create_dataset("blocksim/block_names", data=names, dtype=h5py.string_dtype())
         except RuntimeError as error:  # what HDF5 raises when a disk is full
@@ -57,30 +71,33 @@ def _finite(frames: Frames) -> Indices:
     return chosen
 
 
-def _write_grid(group: Any, frames: Frames, chosen: Indices) -> None:
+def _write_grid(group: Any, frames: Frames, chosen: Indices, supports: Supports) -> None:
     blocks = len(frames.names)
+    cells = blocks + len(supports.quads)
     group.attrs["Version"] = np.array(VERSION, dtype=np.int64)
     group.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
-    _write_cells(group, blocks)
-    _write_steps(group.create_group("Steps"), frames.time[chosen], blocks)
-    _write_times(group, frames, chosen)
+    _write_cells(group, blocks, cells)
+    _write_steps(group.create_group("Steps"), frames.time[chosen], cells)
+    _write_times(group, frames, chosen, supports)
 
 
-def _write_cells(group: Any, blocks: int) -> None:
-    """Write what stays the same: how points make cells, and the number of every block."""
+def _write_cells(group: Any, blocks: int, cells: int) -> None:
+    """Write what stays the same: how points make cells, and the number of every block; 0 for what is none."""
     for name, count in (
-        ("NumberOfPoints", 4 * blocks),
-        ("NumberOfCells", blocks),
-        ("NumberOfConnectivityIds", 4 * blocks),
+        ("NumberOfPoints", 4 * cells),
+        ("NumberOfCells", cells),
+        ("NumberOfConnectivityIds", 4 * cells),
     ):
         group[name] = np.array([count], dtype=np.int64)
-    group["Connectivity"] = np.arange(4 * blocks, dtype=np.int64)
-    group["Offsets"] = 4 * np.arange(blocks + 1, dtype=np.int64)
-    group["Types"] = np.full(blocks, QUAD, dtype=np.uint8)
-    group["CellData/block"] = np.arange(1, blocks + 1, dtype=np.int64)
+    group["Connectivity"] = np.arange(4 * cells, dtype=np.int64)
+    group["Offsets"] = 4 * np.arange(cells + 1, dtype=np.int64)
+    group["Types"] = np.full(cells, QUAD, dtype=np.uint8)
+    numbers = np.zeros(cells, dtype=np.int64)
+    numbers[:blocks] = np.arange(1, blocks + 1)
+    group["CellData/block"] = numbers
 
 
-def _write_steps(group: Any, times: Floats, blocks: int) -> None:
+def _write_steps(group: Any, times: Floats, cells: int) -> None:
     """Write the times (s) and where the parts of each of them begin."""
     count = len(times)
     first, zero = np.arange(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
@@ -88,28 +105,44 @@ def _write_steps(group: Any, times: Floats, blocks: int) -> None:
     group["Values"] = times
     group["NumberOfParts"] = zero + 1
     group["PartOffsets"] = zero
-    group["PointOffsets"] = 4 * blocks * first
+    group["PointOffsets"] = 4 * cells * first
     group["CellOffsets"] = zero[:, None]
     group["ConnectivityIdOffsets"] = zero[:, None]
     group["CellDataOffsets/block"] = zero
     for name in DATA:
-        group[f"CellDataOffsets/{name}"] = blocks * first
+        group[f"CellDataOffsets/{name}"] = cells * first
 
 
-def _write_times(group: Any, frames: Frames, chosen: Indices) -> None:
+def _write_times(group: Any, frames: Frames, chosen: Indices, supports: Supports) -> None:
     """Write what changes: points, and the data of the cells."""
-    blocks = len(frames.names)
-    points = _created(group, "Points", 4 * blocks * len(chosen), 3)
-    data = {name: _created(group, f"CellData/{name}", blocks * len(chosen), size) for name, size in DATA.items()}
-    size = max(1, BATCH // blocks)
+    cells = len(frames.names) + len(supports.quads)
+    points = _created(group, "Points", 4 * cells * len(chosen), 3)
+    data = {name: _created(group, f"CellData/{name}", cells * len(chosen), size) for name, size in DATA.items()}
+    size = max(1, BATCH // cells)
     for start in range(0, len(chosen), size):
         some = chosen[start : start + size]
-        first, last = start * blocks, (start + len(some)) * blocks
-        points[4 * first : 4 * last] = _corners(frames, some)
-        velocity = np.stack([frames.vx[some], frames.vy[some], np.zeros_like(frames.vx[some])], axis=-1)
-        data["velocity_m_s"][first:last] = velocity.reshape(-1, 3)
-        data["rotation_deg"][first:last] = np.degrees(frames.rotation[some]).ravel()
-        data["spin_deg_s"][first:last] = np.degrees(frames.spin[some]).ravel()
+        first, last = start * cells, (start + len(some)) * cells
+        points[4 * first : 4 * last] = _corners(frames, some, supports)
+        data["velocity_m_s"][first:last] = _velocities(frames, some, supports)
+        data["rotation_deg"][first:last] = _with_zeros(np.degrees(frames.rotation[some]), supports)
+        data["spin_deg_s"][first:last] = _with_zeros(np.degrees(frames.spin[some]), supports)
+
+
+def _velocities(frames: Frames, some: Indices, supports: Supports) -> Floats:
+    """Return the velocities (m/s) of all cells in some frames, (cells * frames, 3)."""
+    blocks = np.stack([frames.vx[some], frames.vy[some]], axis=-1)
+    others = np.repeat(supports.velocity[some][:, None], len(supports.quads), axis=1)
+    return _in_space(np.concatenate([blocks, others], axis=1))
+
+
+def _with_zeros(values: Floats, supports: Supports) -> Floats:
+    """Return the values of blocks in some frames with zeros for what never turns, (cells * frames,)."""
+    return np.pad(values, ((0, 0), (0, len(supports.quads)))).ravel()
+
+
+def _in_space(plane: Floats) -> Floats:
+    """Return vectors (..., 2) with a third component of zero, one after the other."""
+    return np.pad(plane.reshape(-1, 2), ((0, 0), (0, 1)))
 
 
 def _created(group: Any, name: str, rows: int, components: int) -> Any:
@@ -118,10 +151,11 @@ def _created(group: Any, name: str, rows: int, components: int) -> Any:
     return group.create_dataset(name, shape, dtype=np.float64, chunks=chunks, **PACKED)
 
 
-def _corners(frames: Frames, some: Indices) -> Floats:
-    """Return the corners (m) of all blocks in some frames, (4 * blocks * frames, 3)."""
+def _corners(frames: Frames, some: Indices, supports: Supports) -> Floats:
+    """Return the corners (m) of all cells in some frames, (4 * cells * frames, 3)."""
     local = CORNERS * np.stack([frames.size_x, frames.size_y], axis=-1)[:, None]
     cosine, sine = np.cos(frames.angle[some])[..., None], np.sin(frames.angle[some])[..., None]
     x = frames.x[some][..., None] + cosine * local[..., 0] - sine * local[..., 1]
     y = frames.y[some][..., None] + sine * local[..., 0] + cosine * local[..., 1]
-    return np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    others = supports.quads + supports.displacement[some][:, None, None]
+    return _in_space(np.concatenate([np.stack([x, y], axis=-1), others], axis=1))

@@ -18,13 +18,13 @@ by at least 1/M, and their mean misses by less than 2, so by less than 1/M in th
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import isfinite
 
+from blocksim.analysis.proportion import interval
 from blocksim.study.members import Member
 from blocksim.study.targets import Range, are_inside, values_at
 
 FAILED = 1.0
-Z_95 = 1.959963984540054  # 97.5 % quantile of the standard normal distribution
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ class Score:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The 95 % interval of the probability that this share estimates, for members drawn independently."""
-        return wilson(self.inside, self.members)
+        """95 % limits (Clopper-Pearson) of the probability behind this share, for members drawn independently."""
+        return interval(self.inside, self.members)
 
 
 def score_of(members: Iterable[Member], ranges: Sequence[Range]) -> Score:
@@ -83,15 +83,3 @@ def miss_of(values: Sequence[float], ranges: Sequence[Range]) -> float:
 def _beyond(off: float) -> float:
     """Return how far outside, from 0 at the limit to 1; above 0 also where rounding hides by how much."""
     return max(1.0 - 1.0 / off, 1e-15)
-
-
-def wilson(hits: int, count: int, z: float = Z_95) -> tuple[float, float]:
-    """Return the interval of a probability from hits among independent trials.
-
-    E. B. Wilson, Journal of the American Statistical Association 22 (1927) 209-212: all p with
-    |hits/count - p| <= z sqrt(p (1 - p) / count).
-    """
-    share, scale = hits / count, 1.0 + z * z / count
-    middle = (share + z * z / (2.0 * count)) / scale
-    half = z * sqrt(share * (1.0 - share) / count + z * z / (4.0 * count**2)) / scale
-    return max(0.0, middle - half), min(1.0, middle + half)

@@ -10,10 +10,10 @@ import time
 from collections.abc import Generator, Iterator, Sequence
 
 from blocksim.scenario import Scenario
-from blocksim.simulation import run_in_batches
+from blocksim.simulation import MemberEnd, MemberFailure, run_in_batches
 from blocksim.study.executors.batches import BatchSize, take
 from blocksim.study.executors.task import Batch, Setting, Task, needs_nothing
-from blocksim.study.rows import Row, row_of_error, row_of_member
+from blocksim.study.rows import Row, row_of, row_of_error
 
 PATIENCE = 0.7  # s that a batch has to end once the user wants to stop
 POLL = 0.05  # s
@@ -76,9 +76,16 @@ def rows_of(scenarios: Sequence[Scenario], threads: int) -> list[Row]:
     if not scenarios:
         return []
     try:
-        return [row_of_member(one) for batch in run_in_batches(scenarios, threads=threads) for one in batch]
+        return [_row_of(one) for batch in run_in_batches(scenarios, threads=threads) for one in batch]
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         if len(scenarios) == 1:
             return [row_of_error(error)]
     middle = len(scenarios) // 2
     return rows_of(scenarios[:middle], threads) + rows_of(scenarios[middle:], threads)
+
+
+def _row_of(member: MemberEnd | MemberFailure) -> Row:
+    """Return the row of a member."""
+    if isinstance(member, MemberFailure):
+        return row_of_error(member.error)
+    return row_of(member.outcome.status, member.outcome.reason, member.seconds, member.columns)

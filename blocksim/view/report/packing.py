@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.simulation.contacts import Contacts
 from blocksim.simulation.frames import Frames
+from blocksim.view.forces import force_scale, pushing_up
 from blocksim.view.moments import Indices, drawable_frames
 
 Floats = NDArray[np.float64]
@@ -17,6 +19,7 @@ EXACT_VALUES = 200_000  # up to so many values are kept as 32-bit floats
 MOST_BYTES = 12_000_000  # of the frames of one run, before they become text, which takes a third more
 LEVELS = 65_535  # steps of a rounded value
 SHORT_BYTES = 2
+CONTACT_BYTES = 16  # of a contact in a frame
 CHANNELS = {"x": "mm", "y": "mm", "rotation": "deg", "vx": "mm/s", "vy": "mm/s", "spin": "deg/s"}
 
 
@@ -42,8 +45,7 @@ class Packed:
 
 def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
     """Return the drawable frames in mm and degrees. Raises InvalidInputError when there is none."""
-    drawable = drawable_frames(frames)
-    kept = _thinned(drawable, len(frames.names), most_bytes)
+    kept = frame_indices(frames, most_bytes)
     channels = _channels(frames, kept)
     packed = {name: pack(values) for name, values in channels.items()}
     data = {
@@ -62,7 +64,35 @@ def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
 
 def frame_indices(frames: Frames, most_bytes: int = MOST_BYTES) -> Indices:
     """Return the frames that `pack_frames` keeps."""
-    return _thinned(drawable_frames(frames), len(frames.names), most_bytes)
+    contacts = frames.contacts
+    more = 0 if contacts is None else CONTACT_BYTES * len(contacts.rows) // len(contacts)
+    return _thinned(drawable_frames(frames), len(frames.names), most_bytes, more)
+
+
+def pack_forces(frames: Frames, kept: Indices, tilt: float) -> dict[str, Any] | None:
+    """Return the contacts of some frames: places (mm) and forces (N), each on the block that it pushes up.
+
+    `ends` counts contacts up to and with each frame; `scale` is mm for a newton, and `longest` (mm) where arrows are
+    cut. None where no contacts were stored.
+    """
+    if frames.contacts is None:
+        return None
+    rows, ends = _of_frames(frames.contacts, kept)
+    forces, scale = pushing_up(rows, tilt), force_scale(frames)
+    columns = {"x": MILLI * rows["x"], "y": MILLI * rows["y"], "fx": forces[:, 0], "fy": forces[:, 1]}
+    return {
+        "ends": ends,
+        "scale": float(f"{scale.mm_per_newton:.5g}"),
+        "longest": float(f"{scale.longest:.5g}"),
+        "told": scale.told,
+        **{name: pack(values, exact=True)[0] for name, values in columns.items()},
+    }
+
+
+def _of_frames(contacts: Contacts, kept: Indices) -> tuple[NDArray[Any], list[int]]:
+    """Return the contacts of some frames, and how many there are up to and with each of them."""
+    tables = [contacts.at(int(frame)) for frame in kept]
+    return np.concatenate(tables), np.cumsum([len(table) for table in tables]).tolist()
 
 
 def pack(values: Floats, *, exact: bool = False) -> tuple[dict[str, Any], float]:
@@ -81,10 +111,10 @@ def pack(values: Floats, *, exact: bool = False) -> tuple[dict[str, Any], float]
     return {"type": "u2", "low": low, "step": step, "data": _text(steps)}, _largest(low + step * steps - values)
 
 
-def _thinned(drawable: Indices, blocks: int, most_bytes: int) -> Indices:
-    """Return evenly chosen frames, first and last included, that fit."""
+def _thinned(drawable: Indices, blocks: int, most_bytes: int, more: int) -> Indices:
+    """Return evenly chosen frames, first and last included, that fit; each has so many bytes more beside blocks."""
     values = len(drawable) * blocks * len(CHANNELS)
-    bytes_each = (4 if len(drawable) * blocks <= EXACT_VALUES else SHORT_BYTES) * blocks * len(CHANNELS)
+    bytes_each = (4 if len(drawable) * blocks <= EXACT_VALUES else SHORT_BYTES) * blocks * len(CHANNELS) + more
     most = max(2, most_bytes // bytes_each)
     if len(drawable) <= most or values == 0:
         return drawable

@@ -7,7 +7,7 @@ from typing import Any
 
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.table import rows_of
-from blocksim.view.report.packing import MOST_BYTES, frame_indices, pack_frames
+from blocksim.view.report.packing import MOST_BYTES, frame_indices, pack_forces, pack_frames
 from blocksim.view.report.scene import scene_data
 from blocksim.view.report.stored import StoredRun
 
@@ -26,6 +26,9 @@ LEDGER = {  # name in run.json: what a person reads
     "in_play": "in play",
     "residual": "residual",
 }
+
+
+NO_FORCES = "This run has stored no contacts, so their forces cannot be shown; --set output.contacts=true stores them."
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,7 @@ def run_subject(
         "provenance": _provenance(run),
         "has_player": data is not None,
         "has_particles": bool(data and data["scene"]["particles"]),
+        "has_forces": bool(data and data["forces"]),
     }
     return Subject(key, "run", run.name, page, {"kind": "run", "name": run.name, "frames": data})
 
@@ -81,11 +85,13 @@ def _moving(run: StoredRun, most_bytes: int) -> tuple[dict[str, Any] | None, lis
         packed = pack_frames(run.frames, most_bytes)
     except InvalidInputError as error:
         return None, [], [str(error)]
-    scene = scene_data(run.frames, run.scenario, frame_indices(run.frames, most_bytes))
+    kept = frame_indices(run.frames, most_bytes)
+    scene = scene_data(run.frames, run.scenario, kept)
+    forces = pack_forces(run.frames, kept, scene["tilt"])
     found = packed.data["energy"]
     energy = {told: found[name] for name, told in LEDGER.items() if name in found}
-    notes = [*packed.notes, "Contact forces are not stored with a run."]
-    return {**packed.data, "energy": energy, "scene": scene}, notes, []
+    notes = [*packed.notes, NO_FORCES if forces is None else forces["told"]]
+    return {**packed.data, "energy": energy, "scene": scene, "forces": forces}, notes, []
 
 
 def _reason(run: StoredRun) -> str:
@@ -112,6 +118,8 @@ def _summary(run: StoredRun) -> list[tuple[str, str]]:
 
 
 def _share(value: float) -> str:
+    if value == 0.0:
+        return "nothing"
     return f"{value:.1e} of what was in play" if math.isfinite(value) else "not known"
 
 

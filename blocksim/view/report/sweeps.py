@@ -63,17 +63,23 @@ def read_sweep_table(folder: Path) -> SweepTable:
     return SweepTable(folder, lines[0], tuple(line for line in lines[1:] if len(line) == len(lines[0])))
 
 
-def sweep_subject(
+COLUMN_OF = {"x": "x_mm", "rotation": "rotation_deg"}
+"""Measured quantities whose final values are in the page."""
+
+
+def sweep_subject(  # noqa: PLR0913 - the parts of a sweep
     key: str,
     table: SweepTable,
     scenario: Scenario | None,
     members: Mapping[str, str],
     problems: Sequence[str] = (),
     left_out: Sequence[str] = (),
+    *,
+    judged: Mapping[str, Any] | None = None,
 ) -> Subject:
     """Return a sweep for a report; `members` are the keys of the subjects of its cases.
 
-    `left_out` are cases that have frames, for which there was no room.
+    `left_out` are cases that have frames, for which there was no room. `judged` is what `Judgement.to_dict` gives.
     """
     name = table.folder.name if scenario is None else scenario.name
     shown = table.blocks[: max(1, MOST_VALUES // (2 * max(1, len(table.rows))))]
@@ -84,6 +90,7 @@ def sweep_subject(
         "problems": list(problems),
         "hidden_blocks": len(table.blocks) - len(shown),
         "has_members": bool(members),
+        "judged": judged,
     }
     data = {
         "kind": "sweep",
@@ -91,9 +98,16 @@ def sweep_subject(
         "place": str(table.folder),
         "columns": _columns(table, shown),
         "left_out": list(left_out),
+        "measured": {} if judged is None else _limits(judged),
         "members": dict(members),
     }
     return Subject(key, "sweep", name, page, data)
+
+
+def _limits(judged: Mapping[str, Any]) -> dict[str, list[float]]:
+    """Return the ends of what counts as inside, by the column of the table."""
+    rows = [row for row in judged["metrics"]["inside"]["rows"] if row["quantity"] in COLUMN_OF and row["limits"]]
+    return {f"{row['block']}.{COLUMN_OF[row['quantity']]}": list(row["limits"]) for row in rows}
 
 
 def _columns(table: SweepTable, blocks: Sequence[str]) -> list[dict[str, Any]]:

@@ -10,11 +10,18 @@ import pytest
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError, OutputError
+from blocksim.scenario import load_scenario
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.stores import vtkhdf
+from blocksim.simulation.stores.support_quads import support_quads
 from blocksim.simulation.stores.vtkhdf import write_vtkhdf
 from blocksim.view.scene import corners
 from tests.view.made_up import HOSTILE, toppling
+
+SCENARIOS = Path(__file__).parents[3] / "scenarios"
+SLOPE = load_scenario(SCENARIOS / "slope.toml")
+LEVEL = load_scenario(SCENARIOS / "three_blocks.toml")
+CELLS = 4  # three blocks and the ground
 
 
 @pytest.fixture(params=[1, 7, 1 << 16], ids=lambda size: f"batch {size}")
@@ -22,7 +29,7 @@ def written(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.
     """Give frames of three blocks and their file, written some blocks at once."""
     monkeypatch.setattr(vtkhdf, "BATCH", request.param)
     frames = toppling(3, steps=11)
-    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames) == 11
+    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames, LEVEL) == 11
     return frames, tmp_path / "run.vtkhdf"
 
 
@@ -39,22 +46,22 @@ def test_parts_of_every_time_are_found_where_the_steps_say(written: tuple[Frames
             assert steps["NumberOfParts"][frame] == 1
             start = int(steps["PointOffsets"][frame])
             points = group["Points"][start : start + int(group["NumberOfPoints"][0])]
-            np.testing.assert_allclose(points[:, :2], 1e-3 * corners(frames, frame).reshape(-1, 2), atol=1e-15)
+            np.testing.assert_allclose(points[:12, :2], 1e-3 * corners(frames, frame).reshape(-1, 2), atol=1e-15)
             first = int(steps["CellDataOffsets/rotation_deg"][frame])
-            rotation = group["CellData/rotation_deg"][first : first + 3]
-            assert rotation.tolist() == np.degrees(frames.rotation[frame]).tolist()
+            rotation = group["CellData/rotation_deg"][first : first + CELLS]
+            assert rotation.tolist() == [*np.degrees(frames.rotation[frame]).tolist(), 0.0]
 
 
 def test_cells_are_rectangles_of_consecutive_points(written: tuple[Frames, Path]) -> None:
     with h5py.File(written[1]) as file:
         group = file["VTKHDF"]
-        assert group["Types"][:].tolist() == [9, 9, 9]
-        assert group["Offsets"][:].tolist() == [0, 4, 8, 12]
-        assert group["Connectivity"][:].tolist() == list(range(12))
+        assert group["Types"][:].tolist() == [9, 9, 9, 9]
+        assert group["Offsets"][:].tolist() == [0, 4, 8, 12, 16]
+        assert group["Connectivity"][:].tolist() == list(range(16))
         assert [int(group[name][0]) for name in ("NumberOfCells", "NumberOfPoints", "NumberOfConnectivityIds")] == [
-            3,
-            12,
-            12,
+            4,
+            16,
+            16,
         ]
 
 
@@ -70,13 +77,24 @@ def test_vtk_reads_back_every_time(written: tuple[Frames, Path]) -> None:
         reader.SetStep(frame)
         reader.Update()
         grid = reader.GetOutputDataObject(0)
-        assert [grid.GetCellType(cell) for cell in range(grid.GetNumberOfCells())] == [9, 9, 9]
-        np.testing.assert_allclose(points_of(grid), 1e-3 * corners(frames, frame), atol=1e-15)
+        assert [grid.GetCellType(cell) for cell in range(grid.GetNumberOfCells())] == [9, 9, 9, 9]
+        np.testing.assert_allclose(points_of(grid)[:3], 1e-3 * corners(frames, frame), atol=1e-15)
         data = grid.GetCellData()
-        assert values(data, "block").tolist() == [1, 2, 3]
-        assert values(data, "rotation_deg").tolist() == np.degrees(frames.rotation[frame]).tolist()
-        assert values(data, "spin_deg_s").tolist() == np.degrees(frames.spin[frame]).tolist()
-        assert values(data, "velocity_m_s").tolist() == [[0.25, -0.5, 0.0]] * 3
+        assert values(data, "block").tolist() == [1, 2, 3, 0]
+        assert values(data, "rotation_deg")[:3].tolist() == np.degrees(frames.rotation[frame]).tolist()
+        assert values(data, "spin_deg_s")[:3].tolist() == np.degrees(frames.spin[frame]).tolist()
+        assert values(data, "velocity_m_s").tolist() == [[0.25, -0.5, 0.0]] * 3 + [[0.0, 0.0, 0.0]]
+
+
+def test_vtk_shows_ground_and_walls_where_they_are(tmp_path: Path) -> None:
+    hdf = pytest.importorskip("vtkmodules.vtkIOHDF", reason="reading back needs the extra paraview-check (vtk)")
+    write_vtkhdf(tmp_path / "run.vtkhdf", toppling(2, steps=3), SLOPE)
+    reader = hdf.vtkHDFReader()
+    reader.SetFileName(str(tmp_path / "run.vtkhdf"))
+    reader.SetStep(2)
+    reader.Update()
+    found = points_of(reader.GetOutputDataObject(0))[2:]
+    np.testing.assert_allclose(found, support_quads(SLOPE, toppling(2, steps=3)))
 
 
 def times_of(reader: Any) -> list[float]:
@@ -104,7 +122,7 @@ def values(data: Any, name: str) -> NDArray[Any]:
 
 def test_names_are_kept_as_they_are(tmp_path: Path) -> None:
     names = (*HOSTILE, "plain")
-    write_vtkhdf(tmp_path / "run.vtkhdf", replace(toppling(len(names), steps=1), names=names))
+    write_vtkhdf(tmp_path / "run.vtkhdf", replace(toppling(len(names), steps=1), names=names), LEVEL)
     with h5py.File(tmp_path / "run.vtkhdf") as file:
         assert tuple(name.decode() for name in file["blocksim/block_names"][:]) == names
 
@@ -112,10 +130,10 @@ def test_names_are_kept_as_they_are(tmp_path: Path) -> None:
 def test_frames_that_are_not_finite_are_left_out(tmp_path: Path) -> None:
     frames = toppling(2, steps=4)
     frames.vx[3, 1] = np.inf
-    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames) == 3
+    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames, LEVEL) == 3
     frames.x[:] = np.nan
     with pytest.raises(InvalidInputError, match="no frame to export"):
-        write_vtkhdf(tmp_path / "other.vtkhdf", frames)
+        write_vtkhdf(tmp_path / "other.vtkhdf", frames, LEVEL)
 
 
 def test_full_disk_is_told_and_leaves_the_older_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,6 +143,6 @@ def test_full_disk_is_told_and_leaves_the_older_file(tmp_path: Path, monkeypatch
     (tmp_path / "run.vtkhdf").write_text("older")
     monkeypatch.setattr(vtkhdf, "_write_times", no_room)
     with pytest.raises(OutputError, match=r"run\.vtkhdf: cannot be written: Unable to write"):
-        write_vtkhdf(tmp_path / "run.vtkhdf", toppling(1))
+        write_vtkhdf(tmp_path / "run.vtkhdf", toppling(1), LEVEL)
     assert (tmp_path / "run.vtkhdf").read_text() == "older"
     assert len(list(tmp_path.iterdir())) == 1

@@ -6,7 +6,7 @@ import math
 import pytest
 from scipy.stats import binomtest
 
-from blocksim.study.calibrate.objective import Score, miss_of, score_of, wilson
+from blocksim.study.calibrate.objective import Score, miss_of, score_of
 from blocksim.study.members import Member
 from blocksim.study.targets import Range
 
@@ -17,10 +17,11 @@ def member(x: float, rotation: float = -90.0) -> Member:
     return Member({"block": ["1", "2"], "x_mm": [x, 0.0], "rotation_deg": [0.0, rotation]})
 
 
-@pytest.mark.parametrize(("hits", "count"), [(0, 1), (1, 1), (0, 64), (5, 64), (64, 64), (301, 512)])
-def test_wilson_interval_is_that_of_scipy(hits: int, count: int) -> None:
-    exact = binomtest(hits, count).proportion_ci(method="wilson")
-    assert wilson(hits, count) == pytest.approx((exact.low, exact.high), abs=1e-12)
+def test_interval_is_the_one_that_sweeps_are_judged_with() -> None:
+    exact = binomtest(301, 512).proportion_ci(method="exact")
+    score = Score(members=512, inside=301, failed=0, miss=0.0)
+    assert score.interval == pytest.approx((exact.low, exact.high), abs=1e-9)
+    assert score.interval[0] < score.share_inside < score.interval[1]
 
 
 def test_miss_is_zero_at_the_limit_and_grows_steadily_outwards() -> None:
@@ -60,10 +61,3 @@ def test_failed_members_count_as_outside_and_are_told() -> None:
     score = score_of([member(12.0), Member(None, "overlap"), member(math.nan)], RANGES)
     assert (score.members, score.inside, score.failed) == (3, 1, 2)
     assert score.share_inside == pytest.approx(1 / 3)
-
-
-def test_interval_is_about_the_share() -> None:
-    score = Score(members=512, inside=256, failed=0, miss=0.0)
-    low, high = score.interval
-    assert low < 0.5 < high
-    assert high - low == pytest.approx(0.0863, abs=1e-3)

@@ -4,9 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.scenario import Scenario, load_scenario, place_bodies
 from blocksim.simulation import folder as files
+from blocksim.simulation.contacts import SUPPORT, Rows, empty_rows
 from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.ledger import EnergyLedger
@@ -44,12 +46,22 @@ def write_frames(path: Path, scenario: Scenario, count: int) -> None:
     start = np.array([[body.x, body.y, body.angle, 0.0, 0.0, 0.0] for body in placed]).T
     numbers = np.arange(len(placed)) / len(placed)
     speed = np.array([0.5 * numbers, 0.2 * numbers, -4.0 * numbers])
-    with FrameFile(path, placed, TIME_STEP, "", ledger=LEDGER) as file:
+    contacts = scenario.output.contacts
+    with FrameFile(path, placed, TIME_STEP, "", ledger=LEDGER, contacts=contacts) as file:
         for step in range(count):
             motion = start.copy()
             motion[:3] += speed * step * TIME_STEP * 10.0
             motion[3:] = 10.0 * speed
-            file.append(Frame(10 * step, motion, np.array([0.1 * step, 5.0 - 0.1 * step, 0.0, 4.0, 1e-5])))
+            measured = np.array([0.1 * step, 5.0 - 0.1 * step, 0.0, 4.0, 1e-5])
+            file.append(Frame(10 * step, motion, measured, contacts_of(motion) if contacts else None))
+
+
+def contacts_of(motion: NDArray[np.float64]) -> Rows:
+    """Return a contact of every block with the ground below its centre, 2 N upwards."""
+    rows = empty_rows(motion.shape[1])
+    rows["body_a"], rows["body_b"] = np.arange(len(rows)), SUPPORT
+    rows["x"], rows["normal_y"], rows["normal_force"] = motion[0], 1.0, 2.0
+    return rows
 
 
 def summary_of(name: str, count: int) -> Summary:
@@ -87,3 +99,9 @@ def write_sweep(folder: Path, cases: int = 6, kept: int = 2) -> None:
         if number < kept:
             write_run(folder / "cases" / case, count=5)
     (folder / "sweep.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_experiment(path: Path) -> None:
+    """Write repeats of the block that `write_sweep` tells of: three of its five finished members are inside."""
+    rows = [f"1,{name},{value}" for name, value in (("x,mm,1", 67.0), ("x,mm,2", 69.0), ("rotation,deg,1", -90.0))]
+    path.write_text("\n".join(["block,quantity,unit,replicate,value", *rows]) + "\n", encoding="utf-8")

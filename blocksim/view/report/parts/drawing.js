@@ -49,6 +49,7 @@ class Drawing {
     if (options.trails) this.drawTrails();
     if (options.particles) this.drawParticles(frame);
     if (options.names) this.drawNames(frame);
+    if (options.forces) this.drawForces(frame);
     if (marked >= 0) this.drawMark(frame, marked);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.drawScale(view.scale);
@@ -196,6 +197,39 @@ class Drawing {
       context.fillStyle = fill === "#0072B2" ? "#ffffff" : fill ? "#222222" : this.colours.ink;
       context.fillText(frames.names[block], x, y);
     }
+  }
+
+  // Draws an arrow for every contact, in pixels: shaft and head in one path, with a light line around it.
+  drawForces(frame) {
+    const { context, frames, view, ratio, colours } = this;
+    const { x, y, fx, fy, scale, longest } = frames.forces;
+    const [first, last] = frames.contactsOf(frame);
+    const path = new Path2D();
+    for (let at = first; at < last; at += 1) {
+      const length = scale * Math.hypot(fx[at], fy[at]);
+      const reach = view.scale * Math.min(length, longest);
+      if (!(reach > 1)) continue;
+      const [px, py] = view.toPixels(x[at], y[at]);
+      const [qx, qy] = view.toPixels(x[at] + fx[at], y[at] + fy[at]);
+      const way = Math.hypot(qx - px, qy - py);
+      const [ux, uy] = [(qx - px) / way, (qy - py) / way];
+      const head = Math.min(6, 0.6 * reach);
+      const [ex, ey] = [px + reach * ux, py + reach * uy];
+      path.moveTo(px, py);
+      path.lineTo(ex, ey);
+      path.moveTo(ex - head * (ux - 0.5 * uy), ey - head * (uy + 0.5 * ux));
+      path.lineTo(ex, ey);
+      path.lineTo(ex - head * (ux + 0.5 * uy), ey - head * (uy - 0.5 * ux));
+    }
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.lineCap = context.lineJoin = "round";
+    for (const [width, ink] of [[4, colours.stage], [1.6, colours.ink]]) {
+      context.lineWidth = width;
+      context.strokeStyle = ink;
+      context.stroke(path);
+    }
+    context.lineCap = "butt";
+    context.lineJoin = "miter";
   }
 
   drawMark(frame, block) {

@@ -10,6 +10,7 @@ class Frames {
     this.energy = Object.entries(data.energy).map(([name, part]) => [name, decode(part)]);
     this.contactCount = decode(data.contact_count);
     for (const [name, part] of Object.entries(data.channels)) this[name] = decode(part);
+    this.forces = data.forces && { ...data.forces, ...Object.fromEntries(["x", "y", "fx", "fy"].map((name) => [name, decode(data.forces[name])])) };
   }
 
   get count() { return this.time.length; }
@@ -22,6 +23,9 @@ class Frames {
   }
 
   offset(frame) { return this.scene.offset ? this.scene.offset[frame] : [0, 0]; }
+
+  // From which to before which contact those of a frame are.
+  contactsOf(frame) { return [frame > 0 ? this.forces.ends[frame - 1] : 0, this.forces.ends[frame]]; }
 
   // The last frame that is not later than a time (s).
   at(time) {

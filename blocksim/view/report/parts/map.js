@@ -169,6 +169,7 @@ class OutcomeMap {
     this.up = new Axis(this.column(this.selects.up.value), this.count);
     const context = canvas.getContext("2d");
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.drawMeasured(context);
     this.drawAxes(context);
     this.places = Array.from({ length: this.count }, (_, row) => this.place(row));
     const { fills, forms, legend } = this.colours();
@@ -177,6 +178,26 @@ class OutcomeMap {
     const at = this.places[this.current];
     if (at) { context.lineWidth = 2.5; context.strokeStyle = colour("link"); context.strokeRect(at[0] - size - 4, at[1] - size - 4, 2 * size + 8, 2 * size + 8); }
     this.drawLegend(legend);
+  }
+
+  // Bands where an axis is the final state of a measured block: from the least to the largest repeat.
+  drawMeasured(context) {
+    const { measured } = this.data;
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    const inner = [width - EDGE.left - EDGE.right, height - EDGE.top - EDGE.bottom];
+    const within = (axis, value) => Math.min(Math.max(axis.share(value), 0), 1);
+    context.fillStyle = colour("band");
+    const across = measured[this.selects.across.value];
+    if (across) {
+      const [low, high] = across.map((value) => EDGE.left + inner[0] * within(this.across, value));
+      context.fillRect(low, EDGE.top, Math.max(high - low, 1), inner[1]);
+    }
+    const up = measured[this.selects.up.value];
+    if (up) {
+      const [low, high] = up.map((value) => height - EDGE.bottom - inner[1] * within(this.up, value));
+      context.fillRect(EDGE.left, high, inner[0], Math.max(low - high, 1));
+    }
+    this.hasBand = Boolean(across || up);
   }
 
   sign(context, x, y, size, fill, form) {
@@ -231,9 +252,11 @@ class OutcomeMap {
   }
 
   drawLegend(legend) {
-    this.root.querySelector(".legend").replaceChildren(...legend.map(([fill, text, form]) => {
+    const all = this.hasBand ? [...legend, [colour("band"), "band: counts as inside", "band"]] : legend;
+    this.root.querySelector(".legend").replaceChildren(...all.map(([fill, text, form]) => {
       const node = draw("svg", { width: 14, height: 14, viewBox: "0 0 14 14", "aria-hidden": "true" });
-      if (form === "cross") node.append(draw("path", { d: "M2 2L12 12M2 12L12 2", stroke: fill, "stroke-width": 2.5 }));
+      if (form === "band") node.append(draw("rect", { width: 14, height: 14, fill }));
+      else if (form === "cross") node.append(draw("path", { d: "M2 2L12 12M2 12L12 2", stroke: fill, "stroke-width": 2.5 }));
       else node.append(draw("circle", { cx: 7, cy: 7, r: 5, fill: form === "ring" ? "none" : fill, stroke: fill, "stroke-width": 2.5 }));
       return make("small", {}, node, " ", text);
     }));

@@ -6,6 +6,7 @@ class CaseTable {
     this.root = root;
     this.columns = data.columns;
     this.members = data.members;
+    this.measured = data.measured;
     this.numeric = new Set(data.columns.filter((column) => this.isNumber(column)));
     this.open = open;
     this.count = data.columns[0].values.length;
@@ -77,6 +78,11 @@ class CaseTable {
     }
     const kind = this.numeric.has(column) ? "n" : "text";
     if (column.name === "inside") return make("td", { class: value === "True" ? "inside" : value === "False" ? "outside" : "" }, { True: "✓ inside", False: "✗ outside" }[value] ?? "–");
+    const limits = typeof value === "number" ? this.measured[column.name] : undefined;
+    if (limits) {
+      const inside = limits[0] <= value && value <= limits[1];
+      return make("td", { class: `n ${inside ? "inside" : "outside"}` }, `${inside ? "✓" : "✗"} ${shown(value)}`);
+    }
     const text = column.role === "block" && typeof value === "number" ? shown(value) : brief(value);
     return make("td", { class: kind }, isolated(text));
   }

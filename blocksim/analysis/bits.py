@@ -1,0 +1,103 @@
+"""Two recordings of what should be the same run, compared bit for bit."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.simulation.frames import Floats, Frames
+
+MILLI = 1e3
+MOTION = {  # quantity of a frame: its name in tables, and SI -> that unit
+    "x": ("x_mm", MILLI),
+    "y": ("y_mm", MILLI),
+    "angle": ("angle_deg", 180.0 / np.pi),
+    "vx": ("vx_mm_s", MILLI),
+    "vy": ("vy_mm_s", MILLI),
+    "spin": ("spin_deg_s", 180.0 / np.pi),
+}
+
+
+@dataclass(frozen=True)
+class FirstDifference:
+    """Where two recordings part: in which frame (from 0), when, which block (none: the whole scene) and quantity."""
+
+    frame: int
+    time: float  # s
+    block: str | None
+    quantity: str
+    stored: float
+    now: float
+
+
+@dataclass(frozen=True)
+class Differences:
+    """How two recordings differ; in nothing, where `is_none`."""
+
+    frames: tuple[int, int]  # how many the stored one has, and the new one
+    first: FirstDifference | None = None
+    largest_mm: float = 0.0  # of all centres in all frames that both have
+    largest_deg: float = 0.0  # of all angles, in the same
+
+    @property
+    def is_none(self) -> bool:
+        """Tell whether all frames have the same bits."""
+        return self.first is None and self.frames[0] == self.frames[1]
+
+
+def differences(stored: Frames, now: Frames) -> Differences:
+    """Compare all numbers of all frames of the same blocks: steps, motion, energies, contacts and overlaps.
+
+    A difference in the sign of zero counts as one. Differences of places are those of the frames that both have, NaN
+    where a state is not finite.
+    """
+    counts = (len(stored), len(now))
+    first = min(_firsts(stored, now, min(counts)), key=lambda one: one.frame, default=None)
+    if first is None:
+        return Differences(counts)
+    places = [_largest(stored, now, min(counts), names) for names in (("x", "y"), ("angle",))]
+    return Differences(counts, first, MILLI * places[0], float(np.degrees(places[1])))
+
+
+def _firsts(stored: Frames, now: Frames, count: int) -> list[FirstDifference]:
+    """Return the first difference in each quantity of the first `count` frames."""
+    lacking = np.full(count, np.nan)
+    scene = [
+        ("step", stored.step.astype(np.float64), now.step.astype(np.float64)),
+        ("time_s", stored.time, now.time),
+        *((f"{name}_J", values, now.energy.get(name, lacking)) for name, values in stored.energy.items()),
+        ("contact_count", stored.contact_count, now.contact_count),
+        ("largest_overlap_mm", MILLI * stored.largest_overlap, MILLI * now.largest_overlap),
+    ]
+    found = [_first_in_motion(stored, now, count, name) for name in MOTION]
+    found += [_first_in_scene(stored, count, *one) for one in scene]
+    return [one for one in found if one is not None]
+
+
+def _first_in_motion(stored: Frames, now: Frames, count: int, name: str) -> FirstDifference | None:
+    old, new = getattr(stored, name)[:count], getattr(now, name)[:count]
+    where = np.argwhere(_is_other(old, new))
+    if not where.size:
+        return None
+    frame, block = where[0].tolist()
+    quantity, unit = MOTION[name]
+    values = (unit * float(one[frame, block]) for one in (old, new))
+    return FirstDifference(frame, float(stored.time[frame]), stored.names[block], quantity, *values)
+
+
+def _first_in_scene(stored: Frames, count: int, name: str, old: Floats, new: Floats) -> FirstDifference | None:
+    where = np.flatnonzero(_is_other(old[:count], new[:count]))
+    if not where.size:
+        return None
+    frame = int(where[0])
+    return FirstDifference(frame, float(stored.time[frame]), None, name, float(old[frame]), float(new[frame]))
+
+
+def _is_other(old: Floats, new: Floats) -> NDArray[np.bool_]:
+    """Tell where the bits of two arrays differ."""
+    return np.not_equal(*(np.ascontiguousarray(one).view(np.uint64) for one in (old, new)), dtype=np.bool_)
+
+
+def _largest(stored: Frames, now: Frames, count: int, names: tuple[str, ...]) -> float:
+    with np.errstate(invalid="ignore"):  # infinity minus infinity
+        return max(float(np.max(np.abs(getattr(stored, name)[:count] - getattr(now, name)[:count]))) for name in names)

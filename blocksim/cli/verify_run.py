@@ -1,0 +1,187 @@
+"""blocksim verify-run: whether stored results come out again, bit for bit."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from blocksim.cli import options
+from blocksim.cli.output import answer, note, print_json
+from blocksim.cli.progress import tell_compilation, watching
+from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedEarlyError
+from blocksim.simulation.compilation import kernels_of
+from blocksim.study.judge import is_sweep
+from blocksim.study.many import kernels_for
+from blocksim.study.sweep_folder import read_plan
+from blocksim.study.verify_run import Origin, RunVerdict, scenario_of, verify_run
+from blocksim.study.verify_sweep import SAMPLE, SweepVerdict, verify_sweep
+
+INDENT = "  "
+MOST_CELLS = 5
+LONGEST = 60  # characters of an entry of the provenance
+MOST_WORDS = 12
+UNITS = {"_mm": " mm", "_deg": "°", "_mm_s": " mm/s", "_deg_s": "°/s", "_J": " J", "_s": " s"}
+
+
+@dataclass(frozen=True)
+class Verified:
+    """What is to be said of one place: for people, for programs, and the exit code."""
+
+    lines: tuple[str, ...]
+    data: dict[str, object]
+    code: ExitCode
+
+
+def verify_run_command(
+    places: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DIR", help="Run folder, results/NAME (its newest finished run), scenario file, or sweep folder."
+        ),
+    ],
+    threads: options.Threads = 1,
+    sample: Annotated[int, typer.Option(min=1, metavar="N", help="Of a sweep, how many rows are run again.")] = SAMPLE,
+    seed: Annotated[int, typer.Option(min=0, metavar="S", help="Which rows these are.")] = 0,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Run stored results again and compare the bits.
+
+    Of a run: checksums of all files, final state, every frame of run.h5, and final.csv. Of a sweep: every cell of a
+    sample of its rows. Exit code 1 says that something differs; then the answer tells where first, by how much at most,
+    and what is not the same as when the results were made: code, versions, processor. Nothing is written.
+
+    Example: blocksim verify-run results/three_blocks
+    """
+    silent = quiet or as_json
+    verified = [_verified(place, threads, sample, seed, silent=silent) for place in places]
+    if as_json:
+        print_json([one.data for one in verified])
+    else:
+        answer("\n".join(line for one in verified for line in one.lines))
+    raise typer.Exit(max(one.code for one in verified))  # of several the gravest: 65, 66 before 1 before 0
+
+
+def _verified(place: Path, threads: int, sample: int, seed: int, *, silent: bool) -> Verified:
+    """Verify one place; what is wrong with it does not keep the others from being looked at."""
+    try:
+        if is_sweep(place):
+            return _of_sweep(_sample_again(place, sample, seed, silent=silent))
+        return _of_run(_run_again(place, threads, silent=silent), told=not silent)
+    except StoppedEarlyError:
+        raise
+    except BlocksimError as error:
+        note(str(error))
+        kind = "missing" if isinstance(error, InputMissingError) else "damaged"
+        data = {"agrees": False, "kind": kind, "folder": str(place), "error": str(error)}
+        return Verified((f"{place}: {kind}",), data, error.exit_code)
+
+
+def _run_again(place: Path, threads: int, *, silent: bool) -> RunVerdict:
+    tell_compilation(kernels_of(scenario_of(place)), quiet=silent)
+    with watching(quiet=silent) as on_progress:
+        return verify_run(place, threads=threads, on_progress=on_progress)
+
+
+def _sample_again(folder: Path, sample: int, seed: int, *, silent: bool) -> SweepVerdict:
+    for kernels in kernels_for(read_plan(folder)):
+        tell_compilation(kernels, quiet=silent)
+    return verify_sweep(folder, sample, seed)
+
+
+def _of_run(verdict: RunVerdict, *, told: bool) -> Verified:
+    count = verdict.frames.frames[0]
+    if verdict.agrees:
+        lines = [f"{verdict.folder}: the same bits: final state, {count} frames, final.csv"]
+        if verdict.origins and told:
+            note("\n".join(_told_origins(verdict.origins)))
+    else:
+        lines = [f"{verdict.folder}: differs", *(INDENT + line for line in _reasons(verdict))]
+    return Verified(tuple(lines), verdict.to_dict(), _code(agrees=verdict.agrees))
+
+
+def _reasons(verdict: RunVerdict) -> Iterator[str]:
+    """Tell in what a run differs."""
+    yield from (f"{name} is not as the run left it (SHA-256 in run.json)" for name in verdict.changed)
+    then, now = verdict.status
+    if then != now:
+        yield f"the run was {then}, its repetition {now}"
+    if not verdict.state:
+        yield "the final state has another hash than run.json tells"
+    if not verdict.table:
+        yield "final.csv is not what comes out"
+    yield from _parting(verdict)
+    yield from _told_origins(verdict.origins)
+
+
+def _parting(verdict: RunVerdict) -> Iterator[str]:
+    """Tell where the frames of a run part from those of its repetition."""
+    frames = verdict.frames
+    stored, now = frames.frames
+    if stored != now:
+        yield f"run.h5 has {stored} frames, the repetition {now}"
+    first = frames.first
+    if first is None:
+        yield "every frame that both have is the same" if stored != now else f"all {stored} frames are the same"
+        return
+    whose = "" if first.block is None else f"block {first.block}, "
+    name, unit = _named(first.quantity)
+    yield (
+        f"first difference: frame {first.frame} of {stored} at {first.time:.6g} s, {whose}{name}: "
+        f"{first.stored!r}{unit} stored, {first.now!r}{unit} now"
+    )
+    yield f"largest difference: {frames.largest_mm:.3g} mm, {frames.largest_deg:.3g}°"
+
+
+def _named(quantity: str) -> tuple[str, str]:
+    """Return a quantity without its unit, and the unit."""
+    ends = (end for end in sorted(UNITS, key=len, reverse=True) if quantity.endswith(end))
+    end = next(ends, "")
+    return quantity.removesuffix(end), UNITS.get(end, "")
+
+
+def _told_origins(origins: tuple[Origin, ...]) -> list[str]:
+    """Tell what is not the same as when results were made."""
+    if not origins:
+        return ["code, versions and processor are the same as then"]
+    return [f"since then {one.name}: {_change(one)}" for one in origins]
+
+
+def _change(one: Origin) -> str:
+    """Return a change in few words; of long lists only what has gone or come."""
+    then, now = set(one.then.split()), set(one.now.split())
+    if len(then | now) > MOST_WORDS:
+        return " ".join([f"-{word}" for word in sorted(then - now)] + [f"+{word}" for word in sorted(now - then)])
+    return f"{one.then[:LONGEST]} -> {one.now[:LONGEST]}"
+
+
+def _of_sweep(verdict: SweepVerdict) -> Verified:
+    count = f"{len(verdict.checked)} of {verdict.rows} rows"
+    if verdict.agrees:
+        kept = f", the same bits in {len(verdict.runs)} kept runs" if verdict.runs else ""
+        lines = [f"{verdict.folder}: the same numbers in {count}{kept}"]
+    else:
+        rows = {one.row for one in verdict.cells}
+        lines = [f"{verdict.folder}: differs in {len(rows)} of the {count} that were run again"]
+        lines += [INDENT + line for line in _cells(verdict)]
+        runs = [_of_run(run, told=False) for run in verdict.runs if not run.agrees]
+        lines += [INDENT + line for run in runs for line in run.lines]
+    return Verified(tuple(lines), verdict.to_dict(), _code(agrees=verdict.agrees))
+
+
+def _cells(verdict: SweepVerdict) -> Iterator[str]:
+    """Tell which cells of a sweep differ."""
+    for one in verdict.cells[:MOST_CELLS]:
+        values = f"{one.stored or 'nothing'} stored, {one.now or 'nothing'} now"
+        yield f"row {one.row}, case {one.case}, {one.column}: {values}"
+    if len(verdict.cells) > MOST_CELLS:
+        yield f"and {len(verdict.cells) - MOST_CELLS} cells more"
+    if verdict.cells:
+        yield f"largest difference: {verdict.largest_mm:.3g} mm, {verdict.largest_deg:.3g}°"
+    yield from _told_origins(verdict.origins)
+
+
+def _code(*, agrees: bool) -> ExitCode:
+    return ExitCode.SUCCESS if agrees else ExitCode.OUTSIDE

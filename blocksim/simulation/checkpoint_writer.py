@@ -1,0 +1,125 @@
+"""When a run writes its checkpoints, and where: two files by turns, so that a whole one is always there."""
+
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from blocksim.simulation.checkpoint import Position, write_checkpoint
+from blocksim.simulation.checkpoint_origin import Origin
+from blocksim.simulation.folder import CHECKPOINTS
+from blocksim.simulation.precautions import CHECKPOINT_SECONDS
+from blocksim.simulation.schemes import AnyScene
+
+NEVER = sys.maxsize  # steps
+
+
+class Standing(NamedTuple):
+    """What the time loop knows of a run, beside its arrays."""
+
+    step: int  # steps done
+    frames: int  # recorded up to then, at output times
+    start_energy: float  # J
+    solver_seconds: float  # in all parts of the run
+    threads: int
+
+
+@dataclass(frozen=True)
+class Past:
+    """What the parts of a run before this one have left."""
+
+    seconds: float = 0.0  # of wall time
+    resumed_from: tuple[int, ...] = ()
+    checkpoint: Path | None = None  # from which this part goes on
+    step: int | None = None  # of that checkpoint
+
+    @classmethod
+    def of(cls, path: Path, position: Position) -> "Past":
+        """Return the past of a run that goes on from a checkpoint."""
+        parts = (*position.resumed_from, position.step)
+        return cls(position.total_seconds, parts, path, position.step)
+
+
+NO_PAST = Past()
+
+
+class Keeper(Protocol):
+    """Whoever keeps checkpoints of a run."""
+
+    def next_step(self, done: int) -> int:
+        """Return the step after `done` at which the loop has to stop for one."""
+
+    def is_due(self, done: int) -> bool:
+        """Tell whether one is to be kept now."""
+
+    def keep(self, scene: AnyScene, standing: Standing) -> None:
+        """Keep one."""
+
+
+class NothingKept:
+    """Keeps no checkpoints: of runs that have no folder."""
+
+    def next_step(self, _: int) -> int:
+        """Never."""
+        return NEVER
+
+    def is_due(self, _: int) -> bool:
+        """Never."""
+        return False
+
+    def keep(self, _scene: AnyScene, _standing: Standing) -> None:
+        """Do nothing."""
+
+
+KEEPS_NOTHING = NothingKept()
+
+
+class Synced(Protocol):
+    """The file of the frames, which has to be on the disk before a checkpoint counts them."""
+
+    def sync(self) -> None:
+        """Bring all frames so far to the disk."""
+
+
+@dataclass
+class CheckpointWriter:
+    """Writes the checkpoints of one run into its folder."""
+
+    folder: Path
+    origin: Origin
+    frames: Synced
+    periods: tuple[int, ...] = ()  # in steps
+    seconds: float = CHECKPOINT_SECONDS  # of wall time between two
+    past: Past = NO_PAST
+
+    def __post_init__(self) -> None:
+        """Write nothing yet; the checkpoint that the run goes on from is the last one to be replaced."""
+        self.paths = sorted((self.folder / name for name in CHECKPOINTS), key=lambda path: path == self.past.checkpoint)
+        self.last_step = self.past.step
+        self.began = self.written_at = time.monotonic()
+
+    @property
+    def total_seconds(self) -> float:
+        """Wall time of all parts of the run so far."""
+        return self.past.seconds + time.monotonic() - self.began
+
+    def next_step(self, done: int) -> int:
+        """As Keeper."""
+        return min(((done // period + 1) * period for period in self.periods), default=NEVER)
+
+    def is_due(self, done: int) -> bool:
+        """As Keeper."""
+        return any(done % period == 0 for period in self.periods) or (
+            time.monotonic() - self.written_at >= self.seconds
+        )
+
+    def keep(self, scene: AnyScene, standing: Standing) -> None:
+        """Write one, once the frames before it are on the disk. Raises OutputError."""
+        if standing.step == self.last_step:
+            return
+        self.frames.sync()
+        position = Position(**standing._asdict(), total_seconds=self.total_seconds, resumed_from=self.past.resumed_from)
+        write_checkpoint(self.paths[0], scene, position, self.origin)
+        self.paths.reverse()
+        self.last_step, self.written_at = standing.step, time.monotonic()

@@ -1,0 +1,34 @@
+"""Whether the results of a run have room on the disk: better told before the run than in its last hour."""
+
+import shutil
+from pathlib import Path
+
+from blocksim.errors import OutputError
+from blocksim.scenario import Scenario
+from blocksim.simulation.folder import CHECKPOINTS
+from blocksim.simulation.loop import last_step_of
+from blocksim.simulation.schemes import AnyScene
+from blocksim.simulation.stacking import arrays_of
+from blocksim.world.memory import file_bytes, readable
+
+CHECKPOINT_FILES = len(CHECKPOINTS) + 1  # the last one while it is written
+
+
+def refuse_full_disk(folder: Path, scenario: Scenario, scene: AnyScene) -> None:
+    """Raise OutputError where a run may leave more than there is room for on the disk of a folder (yet to be made)."""
+    needed = bytes_needed(scenario, scene)
+    place = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+    free = shutil.disk_usage(place).free
+    if needed > free:
+        raise OutputError(
+            f"{folder}: the results may take {readable(needed)} and {readable(free)} are free on that disk; write "
+            "elsewhere with --out DIR, or fewer frames (output.every, time.end)"
+        )
+
+
+def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
+    """Return the bytes that the frames of a run and its checkpoints take at most."""
+    steps = last_step_of(scenario.time.end, float(scene.world.controls[0].step))
+    frames = min(steps, round(scenario.time.end / scenario.output.every)) + 2  # the first, and wherever it ends
+    bodies = scene.world.bodies.size - 1
+    return file_bytes(bodies, frames) + CHECKPOINT_FILES * sum(array.nbytes for array in arrays_of(scene))

@@ -1,0 +1,139 @@
+"""Whether a stored run comes out again, bit for bit, and if not, where it parts and what may be the reason."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+
+from blocksim.analysis.bits import Differences, differences
+from blocksim.errors import InvalidInputError, StoppedEarlyError
+from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_hash
+from blocksim.simulation import Progress, Result, Watcher, read_result, simulate
+from blocksim.simulation import folder as files
+from blocksim.simulation.atomic import sha256_of
+from blocksim.simulation.provenance import ROOM_PREFIX, environment
+from blocksim.simulation.summary import Summary, read_summary
+from blocksim.simulation.table import csv_text
+from blocksim.study.places import find_run
+
+INTERRUPTED = "interrupted"
+SCENARIO = "scenario"  # its hash, beside the entries of `environment`
+CODE = "code"
+DECIDES = ("blocksim", ROOM_PREFIX, "python", "numpy", "numba", "llvmlite", "platform", "processor", "cpu")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """One thing that the bits may depend on, as it was when the run was made and as it is now."""
+
+    name: str
+    then: str
+    now: str
+
+
+@dataclass(frozen=True)
+class RunVerdict:
+    """What came of running a stored run again."""
+
+    folder: Path
+    changed: tuple[str, ...]  # files that are not as the run left them, or gone
+    state: bool  # whether the final state has the same hash,
+    table: bool  # and final.csv the same bytes,
+    status: tuple[str, str]  # and how the run ended, then and now
+    frames: Differences
+    origins: tuple[Origin, ...]  # that are not the same as then
+
+    @cached_property
+    def agrees(self) -> bool:
+        """Tell whether the folder is what its scenario gives, to the last bit."""
+        is_same = self.state and self.table and self.frames.is_none and self.status[0] == self.status[1]
+        return is_same and not self.changed
+
+    def to_dict(self) -> dict[str, object]:
+        """Return it for programs."""
+        return {"agrees": self.agrees, "kind": "run", **asdict(self), "folder": str(self.folder)}
+
+
+def _ignore(_: Progress) -> None:
+    pass
+
+
+def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = _ignore) -> RunVerdict:
+    """Run the scenario of a run folder again, in memory, and compare everything that the folder keeps.
+
+    A run that was interrupted is repeated as far as it came. Raises InputMissingError where no run is there,
+    InvalidInputError (ScenarioError) for files that cannot be read, StoppedEarlyError where the repetition is stopped.
+    """
+    folder = find_run(place)
+    summary = read_summary(folder / files.SUMMARY)
+    changed = _changed(folder, summary)
+    stored = _read(folder, changed)
+    again = simulate(_as_far(stored.scenario, summary), threads=threads, on_progress=on_progress)
+    if again.status == INTERRUPTED:
+        message = f"{folder}: stopped before the repetition was complete"
+        raise StoppedEarlyError(message)
+    return RunVerdict(
+        folder,
+        changed,
+        state=again.summary.final_state_sha256 == summary.final_state_sha256,
+        table=csv_text(again.columns).encode() == (folder / files.FINAL).read_bytes(),
+        status=_ends(summary, again.summary),
+        frames=differences(stored.frames, again.frames),
+        origins=origins(summary, stored.scenario),
+    )
+
+
+def scenario_of(place: Path | str) -> Scenario:
+    """Return the scenario of a stored run. Raises what `find_run` and loading it raise."""
+    return load_scenario(find_run(place) / files.SCENARIO)
+
+
+def _changed(folder: Path, summary: Summary) -> tuple[str, ...]:
+    """Return the files that do not have the checksums that run.json has for them."""
+    return tuple(
+        name
+        for name, digest in summary.sha256.items()
+        if not (folder / Path(name).name).is_file() or sha256_of(folder / Path(name).name) != digest
+    )
+
+
+def _read(folder: Path, changed: tuple[str, ...]) -> Result:
+    """Read what the run left; what cannot be read because it was changed is told as such."""
+    try:
+        stored = read_result(folder)
+    except InvalidInputError as error:
+        if not changed:
+            raise
+        message = f"{error}\n{folder}: changed since the run, by their checksums: {', '.join(changed)}"
+        raise InvalidInputError(message) from error
+    if stored.columns["block"] != [body.name for body in place_bodies(stored.scenario)]:
+        message = f"{folder / files.FINAL}: holds other blocks than {files.SCENARIO}"
+        raise InvalidInputError(message)
+    return stored
+
+
+def _as_far(scenario: Scenario, summary: Summary) -> Scenario:
+    """Return the scenario, ending where the run was interrupted, if it was."""
+    if summary.status != INTERRUPTED:
+        return scenario
+    time = scenario.time.model_copy(update={"end": summary.simulated_time_s})
+    return scenario.model_copy(update={"time": time})
+
+
+def _ends(then: Summary, now: Summary) -> tuple[str, str]:
+    """Return how the run ended, then and now; an interruption is not to be repeated."""
+    return (now.status, now.status) if then.status == INTERRUPTED else (then.status, now.status)
+
+
+def origins(summary: Summary, scenario: Scenario) -> tuple[Origin, ...]:
+    """Return what is not the same now as when a run was made, of all that its run.json tells of."""
+    hashes = () if (now := scenario_hash(scenario)) == summary.scenario_hash else ((summary.scenario_hash, now),)
+    return (*(Origin(SCENARIO, *pair) for pair in hashes), *changed_origins(summary.environment))
+
+
+def changed_origins(then: Mapping[str, str]) -> tuple[Origin, ...]:
+    """Return which entries of an older `environment` are others now; what it does not tell cannot be compared."""
+    now = environment()
+    whole = () if any(name.startswith(ROOM_PREFIX) for name in then) else (CODE,)  # rooms tell more
+    known = [name for name in now if name in then and (name in whole or name.startswith(DECIDES))]
+    return tuple(Origin(name, then[name], now[name]) for name in known if then[name] != now[name])

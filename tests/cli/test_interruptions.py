@@ -1,0 +1,255 @@
+"""Runs that are killed, stopped, or run out of disk, as real processes; and how they go on."""
+
+import json
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from blocksim.scenario import load_scenario
+from blocksim.simulation.stores.hdf5_reader import read_frames
+from tests.cli.conftest import SOFT, Command, Process, Running
+
+PATIENCE = 60.0  # s
+NOMINAL = "scenarios/three_blocks_nominal.toml"
+LONG = ("run", NOMINAL, *SOFT, "--set", "time.end=20", "--set", "time.stop_at_rest=false", "--quiet")
+OFTEN = ("--checkpoint-every", "50 ms")
+Wanted = dict[str, object]
+
+
+def wait_for(path: Path, running: Running) -> None:
+    began = time.monotonic()
+    while not path.exists():
+        assert running.poll() is None, running.communicate()
+        assert time.monotonic() - began < PATIENCE
+        time.sleep(0.005)
+
+
+def told(folder: Path) -> Wanted:
+    summary: Wanted = json.loads((folder / "run.json").read_text())
+    return summary
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Give the folder of the run that is interrupted below, run in one go; not to be changed."""
+    from typer.testing import CliRunner  # noqa: PLC0415
+
+    from blocksim.cli.app import app  # noqa: PLC0415
+    from tests.cli.conftest import SCENARIOS  # noqa: PLC0415
+
+    folder = tmp_path_factory.mktemp("whole") / "run"
+    arguments = [str(SCENARIOS / Path(word).name) if word == NOMINAL else word for word in LONG]
+    assert CliRunner().invoke(app, [*arguments, "--out", str(folder)]).exit_code == 0
+    return folder
+
+
+def assert_same(folder: Path, whole: Path) -> None:
+    """Assert that a run has the bits of the whole one, in its final state and in every frame."""
+    assert told(folder)["final_state_sha256"] == told(whole)["final_state_sha256"]
+    assert (folder / "final.csv").read_bytes() == (whole / "final.csv").read_bytes()
+    one, other = (read_frames(path / "run.h5", load_scenario(path / "scenario.toml")) for path in (folder, whole))
+    for name in ("step", "x", "y", "angle", "vx", "vy", "spin", "contact_count", "largest_overlap"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def kill_again_and_again(process: Process, folder: Path, kills: int, most: float) -> int:
+    """Kill a run that goes on and on; look at its folder each time; return how many times it was killed."""
+    moments = np.random.default_rng(kills)
+    killed = 0
+    while killed < kills and not (folder / "done.json").exists():
+        running = process(*LONG, *OFTEN, "--out", folder, "--resume")
+        wait_for(folder / "scenario.toml", running)
+        time.sleep(moments.uniform(0.0, most))
+        before = committed(folder / "run.h5")
+        if running.poll() is None:
+            running.kill()
+            killed += 1
+        running.communicate()
+        assert frames_in(folder) >= before
+    return killed
+
+
+def committed(path: Path) -> int:
+    """Return how many frames a file announces while it is written."""
+    try:
+        with h5py.File(path, "r", libver="latest", swmr=True) as file:
+            return int(file["n_committed"][()])
+    except FileNotFoundError:
+        return 0
+
+
+def frames_in(folder: Path) -> int:
+    """Return how many frames of a folder can be read, all of them finite and one after the other."""
+    if (folder / "done.json").exists():
+        assert told(folder)["status"] == "finished"
+    if committed(folder / "run.h5") == 0:
+        return 0
+    frames = read_frames(folder / "run.h5", load_scenario(folder / "scenario.toml"))
+    assert np.all(np.diff(frames.step) > 0)
+    assert np.isfinite(frames.x).all()
+    return len(frames)
+
+
+def test_killed_run_goes_on_to_the_same_bits(process: Process, tmp_path: Path, whole: Path) -> None:
+    folder = tmp_path / "out"
+    assert kill_again_and_again(process, folder, 3, 1.2) >= 1
+    running = process(*LONG, "--out", "out", "--resume")
+    _, err = running.communicate(timeout=PATIENCE)
+    assert running.returncode == 0, err
+    assert_same(folder, whole)
+
+
+@pytest.mark.long
+def test_hundred_kills_lose_nothing(process: Process, tmp_path: Path, whole: Path) -> None:
+    killed = resumed = 0
+    for number in range(100):
+        folder = tmp_path / str(number)
+        killed += kill_again_and_again(process, folder, min(12, 100 - killed), 1.5)
+        running = process(*LONG, "--out", folder, "--resume")
+        running.communicate(timeout=PATIENCE)
+        assert running.returncode == 0
+        assert_same(folder, whole)
+        resumed += bool(told(folder)["resumed_from"])
+        if killed == 100:
+            break
+    assert killed == 100
+    assert resumed > 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+def test_stopped_run_goes_on_to_the_same_bits(
+    process: Process, tmp_path: Path, whole: Path, number: signal.Signals
+) -> None:
+    running = process(*LONG, "--out", "out")
+    wait_for(tmp_path / "out" / "run.h5", running)
+    time.sleep(0.2)
+    sent = time.monotonic()
+    running.send_signal(number)
+    _, err = running.communicate(timeout=PATIENCE)
+    assert time.monotonic() - sent < 10.0
+    assert running.returncode == 75
+    assert f"stopped by {number.name}" in err
+    assert "go on with --resume (checkpoint at step " in err
+    step = told(tmp_path / "out")["steps"]
+    running = process(*LONG, "--out", "out", "--resume")
+    running.communicate(timeout=PATIENCE)
+    assert told(tmp_path / "out")["resumed_from"] == [step]
+    assert_same(tmp_path / "out", whole)
+
+
+def test_second_signal_stops_while_a_checkpoint_is_being_written(process: Process, tmp_path: Path) -> None:
+    slow = "import blocksim.simulation.checkpoint_writer as w, time; w.write_checkpoint = lambda *_: time.sleep(60)"
+    running = process(*LONG, "--out", "out", before=slow)
+    wait_for(tmp_path / "out" / "run.h5", running)
+    time.sleep(0.5)
+    running.send_signal(signal.SIGINT)
+    time.sleep(1.0)
+    assert running.poll() is None
+    sent = time.monotonic()
+    running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=PATIENCE)
+    assert time.monotonic() - sent < 10.0
+    assert (running.returncode, err) == (75, "stopped\n")
+    assert committed(tmp_path / "out" / "run.h5") > 0
+
+
+def test_wall_time_stops_and_resume_tells_where_it_goes_on(blocksim: Command, tmp_path: Path, whole: Path) -> None:
+    stopped = blocksim(*LONG, "--out", "out", "--wall-time", "0.3 s")
+    assert stopped.code == 75
+    assert "interrupted: wall-time limit of 0.3 s reached" in stopped.err
+    step = told(tmp_path / "out")["steps"]
+    assert blocksim(*LONG, "--out", "out").code == 73
+    again = blocksim(*LONG[:-1], "--out", "out", "--resume")
+    assert again.code == 0
+    assert again.err.startswith(f"goes on at step {step}, ")
+    assert_same(tmp_path / "out", whole)
+    shown = blocksim(*LONG[:-1], "--out", "out", "--resume")
+    assert shown.err.startswith("already there, --overwrite repeats it")
+
+
+def test_run_of_other_code_or_values_that_waits_is_told(blocksim: Command) -> None:
+    stopped = blocksim(*LONG, "--wall-time", "0.2 s")
+    assert stopped.code == 75
+    other = ("run", NOMINAL, *SOFT, "--set", "time.end=0.01")
+    answer = blocksim(*other, "--resume")
+    assert answer.code == 0
+    assert "a run of another scenario or version of the code waits in results/three_blocks_nominal/" in answer.err
+
+
+@pytest.mark.parametrize("executor", ["ensemble", "processes"])
+def test_sweep_around_a_case_that_blows_up_goes_on(blocksim: Command, tmp_path: Path, executor: str) -> None:
+    forced = ("--set", "time.force_step=true", "--set", "contact.max_overlap=1", "--vary", "time.step=1e-6,5e-4,2e-6")
+    shorter = ("--set", "time.end=0.01", "--jobs", "1", "--executor", executor)
+    answer = blocksim("sweep", NOMINAL, *SOFT, *forced, *shorter, "--out", "out")
+    assert answer.code == 77
+    rows = (tmp_path / "out" / "sweep.csv").read_text().splitlines()
+    assert [("finished" in row, "failed" in row) for row in rows[1:]] == [(True, False), (False, True), (True, False)]
+    assert "the fastest is block " in rows[2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        (["--resume", "--overwrite"], "--resume: cannot go with --overwrite"),
+        (["--wall-time", "3"], 'the unit is missing, write it as in "2 s"'),
+        (["--wall-time", "0 s"], "is too small; a time above 0"),
+        (["--checkpoint-time", "3 mm"], "is a length"),
+        (["--checkpoint-every", "soon"], "is not a time"),
+        (["--checkpoint-steps", "0"], "should be greater than or equal to 1"),
+    ],
+)
+def test_mistakes_of_usage_are_2(blocksim: Command, tmp_path: Path, arguments: list[str], what: str) -> None:
+    answer = blocksim(*LONG, *arguments)
+    assert answer.code == 2
+    assert what in " ".join(answer.err.split())
+    assert not (tmp_path / "results").exists()
+
+
+def test_results_that_cannot_fit_are_told_before_the_start(blocksim: Command, tmp_path: Path) -> None:
+    answer = blocksim("run", NOMINAL, "--set", "output.every=1e-9", "--set", "time.end=1e6", "--out", "out")
+    assert answer.code == 74
+    assert "out: the results may take " in answer.err
+    assert " are free on that disk; write elsewhere with --out DIR" in answer.err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """Give a disk of 2 MB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = shutil.which("mount")
+    if mount is None or subprocess.run([mount, "-t", "tmpfs", "-o", "size=2m", "none", folder], check=False).returncode:
+        pytest.skip("a disk can be mounted by root only")
+    yield folder
+    subprocess.run(["umount", folder], check=True)  # noqa: S607 - where mount was found
+
+
+def test_disk_that_fills_is_74_and_keeps_what_was_there(process: Process, small_disk: Path, whole: Path) -> None:
+    small_disk.joinpath("others").write_bytes(bytes(1_200_000))
+    roomy = "import shutil; shutil.disk_usage = lambda _: type('', (), {'free': 1 << 60})"  # as if others filled it
+    running = process(*LONG, *OFTEN, "--out", small_disk / "out", before=roomy)
+    _, err = running.communicate(timeout=PATIENCE)
+    assert (running.returncode, err.count("\n")) == (74, 1)
+    assert "No space left on device" in err
+    folder = small_disk / "out"
+    before = len(read_frames(folder / "run.h5", load_scenario(folder / "scenario.toml")))
+    assert before > 100
+    assert not [path for path in folder.iterdir() if path.name.startswith(".")]
+    small_disk.joinpath("others").unlink()
+    running = process(*LONG, "--out", small_disk / "out", "--resume", before=roomy)
+    running.communicate(timeout=PATIENCE)
+    assert running.returncode in {0, 74}  # it may not fit at all
+    elsewhere = shutil.copytree(folder, small_disk.parent / "elsewhere")
+    if running.returncode == 74:
+        running = process(*LONG, "--out", elsewhere, "--resume")
+        assert running.communicate(timeout=PATIENCE)[1] == ""
+    assert told(elsewhere)["resumed_from"]
+    assert_same(elsewhere, whole)

@@ -1,0 +1,52 @@
+"""Contacts in run.h5: whole for all frames that are committed, whatever happens to the writer."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from blocksim.scenario import place_bodies
+from blocksim.simulation.contacts import Rows, empty_rows
+from blocksim.simulation.recorder import MOTION, Frame
+from blocksim.simulation.schemes import SCHEMES
+from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.stores.hdf5_writer import FrameFile
+from tests.simulation.conftest import Shipped
+
+MEASURED = SCHEMES["explicit"].measured
+
+
+def table_of(step: int) -> Rows:
+    """Return as many contacts as the step has digits of three, at places that tell them apart."""
+    rows = empty_rows(step % 3)
+    rows["x"] = step + 0.25 * np.arange(len(rows))
+    rows["body_b"] = -1
+    return rows
+
+
+def add_frames(sink: FrameFile, first: int, last: int) -> None:
+    for step in range(first, last):
+        motion, measured = np.full((len(MOTION), 3), float(step)), np.zeros(len(MEASURED))
+        sink.append(Frame(step, motion, measured, table_of(step)))
+
+
+def test_what_was_committed_is_there_after_a_kill(soft: Shipped, tmp_path: Path) -> None:
+    scenario = soft(output__contacts=True)
+    path, ledger = tmp_path / "run.h5", SCHEMES["explicit"].ledger
+    with FrameFile(path, place_bodies(scenario), 1e-6, "", ledger=ledger, contacts=True) as sink:
+        add_frames(sink, 0, 1000)
+        sink.commit()
+        add_frames(sink, 1000, 1400)
+        shutil.copyfile(path, tmp_path / "killed.h5")  # the writer never closed this one
+    for name, count in (("killed.h5", 1000), ("run.h5", 1400)):
+        contacts = read_frames(tmp_path / name, scenario).contacts
+        assert contacts is not None
+        assert len(contacts) == count
+        for step in (0, 1, 2, 500, count - 1):
+            np.testing.assert_array_equal(contacts.at(step), table_of(step))
+
+
+def test_file_without_contacts_has_none(soft: Shipped, tmp_path: Path) -> None:
+    with FrameFile(tmp_path / "run.h5", place_bodies(soft()), 1e-6, "", ledger=SCHEMES["explicit"].ledger) as sink:
+        add_frames(sink, 0, 3)
+    assert read_frames(tmp_path / "run.h5", soft()).contacts is None

@@ -1,0 +1,95 @@
+"""A checkpoint gives back every bit, and refuses what is damaged or of another scene."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from blocksim.errors import InvalidInputError, OutputError
+from blocksim.kernels.arrays import CACHE_LINE
+from blocksim.simulation.checkpoint import Position, read_checkpoint, restored, write_checkpoint
+from blocksim.simulation.checkpoint_origin import origin_of
+from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.stacking import arrays_of
+from blocksim.simulation.team import ALONE
+from tests.simulation.sliding import MODELS, sliding
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+AT = Position(step=100, frames=3, start_energy=0.1 + 0.2, solver_seconds=1.5, total_seconds=2.5, threads=2)
+
+
+@pytest.mark.parametrize("name", ["surface-linear", "particles-linear", "nonsmooth"])
+def test_scene_comes_back_to_the_last_bit_in_arrays_of_the_same_types(tmp_path: Path, name: str) -> None:
+    scenario = sliding(MODELS[name])
+    scene, _ = ALONE.advance(build_scene(scenario), 20)
+    scene.world.bodies[0].torque = -0.0
+    scene.world.bodies[0].fx = np.nan
+    path = tmp_path / "checkpoint.0"
+    write_checkpoint(path, scene, AT, origin_of(scenario))
+    stored = read_checkpoint(path)
+    back = restored(stored, build_scene(scenario))
+    assert stored.position == AT
+    assert type(back) is type(scene)
+    for one, other in zip(arrays_of(back), arrays_of(scene), strict=True):
+        assert (type(one), one.dtype, one.shape) == (type(other), other.dtype, other.shape)
+        assert one.size == 0 or one.ctypes.data % CACHE_LINE == 0
+        for field in one.dtype.names or (...,):
+            assert np.ascontiguousarray(one[field]).tobytes() == np.ascontiguousarray(other[field]).tobytes()
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Path:
+    """Return a whole checkpoint, to be damaged."""
+    scenario = sliding({})
+    write_checkpoint(tmp_path / "checkpoint.0", build_scene(scenario), AT, origin_of(scenario))
+    return tmp_path / "checkpoint.0"
+
+
+def test_every_flipped_bit_is_seen(written: Path) -> None:
+    whole = written.read_bytes()
+    for place in np.random.default_rng(1).integers(0, len(whole), 50).tolist():
+        content = bytearray(whole)
+        content[place] ^= 1 << place % 8
+        written.write_bytes(content)
+        with pytest.raises(InvalidInputError, match=r"checkpoint\.0: not a whole checkpoint"):
+            read_checkpoint(written)
+
+
+@pytest.mark.parametrize("length", [0, 1, 31, 32, 33, 5000])
+def test_cut_file_is_seen(written: Path, length: int) -> None:
+    written.write_bytes(written.read_bytes()[:length])
+    with pytest.raises(InvalidInputError, match="not a whole checkpoint"):
+        read_checkpoint(written)
+
+
+def test_file_that_is_whole_but_no_checkpoint_is_refused(written: Path) -> None:
+    from hashlib import sha256  # noqa: PLC0415
+
+    for body in (b"", b"{}\n", b'{"format": "blocksim checkpoint 1"}\n', b"\x80\x04pickle\n"):
+        written.write_bytes(body + sha256(body).digest())
+        with pytest.raises(InvalidInputError, match="not a whole checkpoint"):
+            read_checkpoint(written)
+
+
+@pytest.mark.parametrize("name", ["particles-linear", "nonsmooth"])
+def test_arrays_of_another_scene_are_refused(written: Path, name: str) -> None:
+    with pytest.raises(InvalidInputError, match="of this scene"):
+        restored(read_checkpoint(written), build_scene(sliding(MODELS[name])))
+
+
+def test_write_that_fails_leaves_the_older_one(written: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = written.read_bytes()
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("blocksim.simulation.checkpoint.npy.write_array", fail)
+    scenario = sliding({})
+    with pytest.raises(OutputError, match="No space left on device"):
+        write_checkpoint(written, build_scene(scenario), AT, origin_of(scenario))
+    assert [path.name for path in written.parent.iterdir()] == [written.name]
+    assert written.read_bytes() == whole

@@ -1,0 +1,139 @@
+"""Recorded contacts: they explain the motion to the last digit, and recording them does not change it."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import Scenario, place_bodies
+from blocksim.simulation import Result, simulate, simulate_into
+from blocksim.simulation.contacts import SUPPORT, Contacts, borne, forces_on_a
+from blocksim.simulation.stores.hdf5_reader import read_frames
+from tests.simulation.conftest import Shipped
+
+EVERY_STEP = 1e-9  # s; no step is shorter
+MODELS = ["surface", "particles", "kernel"]
+
+
+def accelerations(result: Result) -> NDArray[np.float64]:
+    """Return what contacts and weight make of every block at every frame: along x and y, and of its turning."""
+    frames, contacts = result.frames, result.frames.contacts
+    assert contacts is not None
+    placed = place_bodies(result.scenario)
+    inertia = np.array([(body.mass, body.mass, body.inertia) for body in placed])
+    total = np.zeros((len(frames), len(placed), 3))
+    forces = forces_on_a(contacts.rows)
+    for side, sign in (("body_a", 1.0), ("body_b", -1.0)):
+        here = contacts.rows[side] != SUPPORT
+        frame, body, rows = contacts.frame[here], contacts.rows[side][here], contacts.rows[here]
+        fx, fy = sign * forces[here].T
+        rx, ry = rows["x"] - frames.x[frame, body], rows["y"] - frames.y[frame, body]
+        np.add.at(total, (frame, body), np.stack([fx, fy, rx * fy - ry * fx], axis=-1))
+    return np.asarray(total / inertia - [0.0, result.scenario.gravity, 0.0])
+
+
+def changes(result: Result) -> NDArray[np.float64]:
+    """Return how velocities and spins change from frame to frame, divided by the time."""
+    frames = result.frames
+    rates = np.stack([frames.vx, frames.vy, frames.spin], axis=-1)
+    return np.asarray(np.diff(rates, axis=0) / np.diff(frames.time)[:, None, None])
+
+
+@pytest.mark.parametrize(
+    ("model", "law", "scale"),
+    [*((model, "linear", 1e-5) for model in MODELS), *((model, "hertz-mindlin", 1e-3) for model in MODELS)],
+)
+def test_contacts_and_weight_are_all_that_accelerates_blocks(soft: Shipped, model: str, law: str, scale: float) -> None:
+    contact = {"model": model, "law": law, "stiffness_scale": scale}
+    values = {f"contact__{key}": value for key, value in contact.items()}
+    end = 0.25 if law == "linear" else 0.03
+    scenario = soft("three_blocks_nominal", time__end=end, output__contacts=True, output__every=EVERY_STEP, **values)
+    result = simulate(scenario)
+    expected = accelerations(result)
+    expected = 0.5 * (expected[1:] + expected[:-1])  # velocity Verlet: half a kick at both ends of a step
+    found = changes(result)
+    assert np.abs(found).max(axis=(0, 1)).min() > 1.0
+    assert (np.abs(found - expected).max(axis=(0, 1)) <= 1e-9 * np.abs(found).max(axis=(0, 1))).all()
+
+
+def test_impulses_and_weight_are_all_that_accelerates_blocks_without_springs(soft: Shipped) -> None:
+    result = simulate(soft("three_blocks_nonsmooth", time__end=0.5, time__substeps=1, output__contacts=True))
+    found, expected = changes(result), accelerations(result)[1:]
+    # velocities live half a step before positions; blocks in flight are shown half a kick later
+    half_kick = 0.5 * result.scenario.gravity
+    off = np.abs(found - expected)
+    assert off[..., 1].max() <= half_kick * (1.0 + 1e-6)
+    assert off[..., 0].max() <= 1e-9 * np.abs(found[..., 0]).max()
+    assert off[..., 2].max() <= 1e-3 * np.abs(found[..., 2]).max()  # arms are those of the middle of the step
+    assert (off[..., 1] > 1e-6).any(axis=1).mean() < 0.1
+
+
+def contacts_of(scenario: Scenario) -> tuple[Result, Contacts]:
+    result = simulate(scenario)
+    assert result.frames.contacts is not None
+    return result, result.frames.contacts
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
+@pytest.mark.parametrize("name", ["three_blocks_nominal", "slope"])
+def test_ground_holds_what_blocks_at_rest_weigh(soft: Shipped, name: str, scheme: str) -> None:
+    result, contacts = contacts_of(soft(name, time__scheme=scheme, output__contacts=True))
+    assert result.reason == "at rest"
+    free = [body for body in place_bodies(result.scenario) if not body.fixed]
+    fixed = [body.fixed for body in place_bodies(result.scenario)]
+    weight = sum(body.mass for body in free) * result.scenario.gravity
+    tilt = result.scenario.ground.tilt
+    held = borne(contacts, (float(np.sin(tilt)), float(np.cos(tilt))), fixed)
+    assert held[-1] == pytest.approx(weight, rel=1e-6)
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
+def test_there_are_as_many_as_are_counted_and_they_keep_within_the_cone(soft: Shipped, scheme: str) -> None:
+    result, contacts = contacts_of(soft(time__scheme=scheme, output__contacts=True))
+    counts = np.diff(contacts.ends, prepend=0)
+    np.testing.assert_array_equal(counts, result.frames.contact_count)
+    rows = contacts.rows
+    assert (rows["normal_force"] >= 0.0).all()
+    assert (np.abs(rows["shear_force"]) <= 0.38 * rows["normal_force"] * (1.0 + 1e-9)).all()
+    np.testing.assert_allclose(np.hypot(rows["normal_x"], rows["normal_y"]), 1.0, rtol=1e-9)
+    assert {SUPPORT} < set(rows["body_b"].tolist())
+    assert contacts.at(len(contacts) - 1)["y"].min() == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
+def test_recording_changes_no_bit_and_is_read_back(soft: Shipped, tmp_path: Path, scheme: str) -> None:
+    without = simulate(soft(time__scheme=scheme, time__end=0.3))
+    scenario = soft(time__scheme=scheme, time__end=0.3, output__contacts=True)
+    kept = simulate_into(scenario, tmp_path / "run")
+    assert kept.summary.final_state_sha256 == without.summary.final_state_sha256
+    np.testing.assert_array_equal(kept.frames.x, without.frames.x)
+    assert without.frames.contacts is None
+    found, expected = read_frames(tmp_path / "run" / "run.h5", scenario).contacts, kept.frames.contacts
+    assert found is not None
+    assert expected is not None
+    np.testing.assert_array_equal(found.ends, expected.ends)
+    np.testing.assert_array_equal(found.rows, expected.rows)
+
+
+def test_threads_record_the_same_contacts(soft: Shipped) -> None:
+    scenario = soft("wall", time__scheme="nonsmooth", time__end=0.02, output__contacts=True)
+    one, two = simulate(scenario).frames.contacts, simulate(scenario, threads=2).frames.contacts
+    assert one is not None
+    assert two is not None
+    np.testing.assert_array_equal(one.rows, two.rows)
+    np.testing.assert_array_equal(one.ends, two.ends)
+
+
+def test_contacts_that_are_cut_off_are_refused(soft: Shipped, tmp_path: Path) -> None:
+    scenario = soft(time__end=0.05, output__contacts=True)
+    simulate_into(scenario, tmp_path / "run")
+    path = tmp_path / "run" / "run.h5"
+    with h5py.File(path, "r+") as file:
+        units = {name: file[f"contacts/{name}"].attrs["unit"] for name in ("x", "normal_force", "overlap", "body_a")}
+        assert units == {"x": "m", "normal_force": "N", "overlap": "m", "body_a": "1"}
+        file["contacts/normal_force"].resize(3, axis=0)
+    with pytest.raises(InvalidInputError, match="not a complete run file: contacts/normal_force has 3 of"):
+        read_frames(path, scenario)

@@ -1,0 +1,233 @@
+"""A run that is interrupted and goes on leaves the bits of one that is not, or says why it cannot."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from blocksim.errors import InvalidInputError, OutputExistsError
+from blocksim.scenario import load_scenario
+from blocksim.simulation import simulate_into
+from blocksim.simulation.checkpoint import read_checkpoint
+from blocksim.simulation.precautions import Precautions
+from blocksim.simulation.resumption import find_resumption
+from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.stacking import arrays_of
+from blocksim.simulation.team import Team
+from tests.simulation.sliding import MODELS, assert_same, interrupted_at, sliding
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from blocksim.scenario import Scenario
+    from blocksim.simulation import Result
+    from blocksim.simulation.schemes import AnyScene
+
+
+@pytest.fixture
+def two_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let as many threads work as are asked for, however few blocks there are."""
+
+    def team(_: AnyScene, threads: int) -> Team:
+        return Team(threads)
+
+    monkeypatch.setattr("blocksim.simulation.running.team_for", team)
+
+
+def points(whole: Result, seed: str, count: int) -> list[int]:
+    """Return steps, in order, somewhere in a run while blocks slide: friction takes energy around them."""
+    taken = np.diff(whole.frames.energy["friction"]) > 0.0
+    edges = zip(whole.frames.step[:-1][taken].tolist(), whole.frames.step[1:][taken].tolist(), strict=True)
+    steps = [step for first, last in edges for step in range(first + 1, last)]
+    assert len(steps) > whole.summary.steps // 4
+    return sorted(np.random.default_rng([*map(ord, seed)]).choice(steps, count, replace=False).tolist())
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_resumed_run_has_the_bits_of_a_continuous_one(tmp_path: Path, name: str) -> None:
+    scenario = sliding(MODELS[name], end=0.02)
+    whole = simulate_into(scenario, tmp_path / "whole")
+    steps = points(whole, name, 3)
+    stopped = interrupted_at(scenario, tmp_path / "parts", steps)
+    resumed = simulate_into(scenario, tmp_path / "parts", resume=True)
+    assert stopped == steps
+    assert resumed.summary.resumed_from == tuple(steps)
+    assert_same(whole, resumed)
+
+
+@pytest.mark.usefixtures("two_threads")
+@pytest.mark.parametrize("name", ["surface-linear", "nonsmooth"])
+def test_run_goes_on_with_another_number_of_threads(tmp_path: Path, name: str) -> None:
+    scenario = sliding(MODELS[name], end=0.01)
+    whole = simulate_into(scenario, tmp_path / "whole")
+    for threads, then in ((1, 2), (2, 1), (2, 2)):
+        folder = tmp_path / f"{threads}{then}"
+        (step,) = interrupted_at(scenario, folder, points(whole, folder.name, 1), threads)
+        resumed = simulate_into(scenario, folder, resume=True, threads=then)
+        assert resumed.summary.resumed_from == (step,)
+        assert_same(whole, resumed)
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("two_threads")
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("name", MODELS)
+def test_fifty_interruptions_change_no_bit(tmp_path: Path, name: str, threads: int) -> None:
+    scenario = sliding(MODELS[name])
+    whole = simulate_into(scenario, tmp_path / "whole")
+    steps = points(whole, f"{name} {threads}", 50)
+    interrupted_at(scenario, tmp_path / "parts", steps, threads)
+    resumed = simulate_into(scenario, tmp_path / "parts", resume=True, threads=threads)
+    assert resumed.summary.resumed_from == tuple(steps)
+    assert_same(whole, resumed)
+
+
+@pytest.mark.parametrize("name", ["surface-linear", "particles-hertz", "nonsmooth"])
+def test_lists_that_have_grown_come_back_as_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.setattr("blocksim.world.build.LEAST_PAIRS", 1)
+    monkeypatch.setattr("blocksim.world.build.PAIRS_PER_BODY", 0)
+    scenario = sliding(MODELS[name], end=0.01)
+    whole = simulate_into(scenario, tmp_path / "whole")
+    interrupted_at(scenario, tmp_path / "parts", [whole.summary.steps // 2])
+    stored = read_checkpoint(tmp_path / "parts" / "checkpoint.0").head.arrays
+    assert [kind.shape for kind in stored] != [array.shape for array in arrays_of(build_scene(scenario))]
+    assert_same(whole, simulate_into(scenario, tmp_path / "parts", resume=True))
+
+
+def test_frames_after_the_checkpoint_are_kept_once_and_that_of_the_interruption_goes(tmp_path: Path) -> None:
+    scenario = sliding({}, end=0.02, every=1e-3)
+    whole = simulate_into(scenario, tmp_path / "whole")
+    last = whole.summary.steps
+    folder = tmp_path / "parts"
+    interrupted_at(scenario, folder, [last // 3])
+    kept = {name: (folder / name).read_bytes() for name in ("checkpoint.0",)}
+    (later,) = interrupted_at_once(scenario, folder, 2 * last // 3)
+    for name in ("checkpoint.0", "checkpoint.1"):  # as if it had been killed before it wrote another one
+        (folder / name).unlink(missing_ok=True)
+    (folder / "checkpoint.0").write_bytes(kept["checkpoint.0"])
+    assert later not in whole.frames.step
+    resumed = simulate_into(scenario, folder, resume=True)
+    assert resumed.summary.resumed_from == (last // 3,)
+    assert_same(whole, resumed)
+
+
+def interrupted_at_once(scenario: Scenario, folder: Path, step: int) -> list[int]:
+    """Go on with a run until a step."""
+    part = simulate_into(scenario, folder, resume=True, precautions=Precautions(wall_time=1e-9))
+    assert part.summary.steps < step
+    return [part.summary.steps]
+
+
+def test_checkpoints_threads_and_outputs_change_no_bit(tmp_path: Path) -> None:
+    scenario = sliding({}, end=0.02)
+    often = Precautions(checkpoint_steps=7, checkpoint_time=1e-4, checkpoint_seconds=1e-3)
+    one = simulate_into(scenario, tmp_path / "one")
+    other = simulate_into(scenario, tmp_path / "other", precautions=often)
+    assert_same(one, other)
+    assert not [path for path in (tmp_path / "other").iterdir() if path.name.startswith(("checkpoint", "."))]
+    rare = simulate_into(sliding({}, end=0.02, every=0.0137), tmp_path / "rare", precautions=often)
+    assert rare.summary.final_state_sha256 == one.summary.final_state_sha256
+
+
+@pytest.fixture
+def begun(tmp_path: Path) -> Path:
+    """Return the folder of a run with two checkpoints that was interrupted."""
+    interrupted_at(sliding({}), tmp_path / "begun", [500, 1000])
+    assert (tmp_path / "begun" / "checkpoint.1").is_file()
+    return tmp_path / "begun"
+
+
+def newest(folder: Path) -> Path:
+    return max(folder.glob("checkpoint.*"), key=lambda path: read_checkpoint(path).position.step)
+
+
+@pytest.mark.parametrize("damage", ["flip", "cut", "empty"])
+def test_damaged_checkpoint_falls_back_to_the_older_one_and_says_so(begun: Path, tmp_path: Path, damage: str) -> None:
+    path = newest(begun)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes({"flip": bytes(content), "cut": bytes(content[:-100]), "empty": b""}[damage])
+    resumed = simulate_into(sliding({}), begun, resume=True)
+    assert resumed.summary.resumed_from == (500,)
+    assert f"{path}: not a whole checkpoint" in resumed.summary.warnings[0]
+    assert_same(simulate_into(sliding({}), tmp_path / "whole"), resumed)
+
+
+def test_nothing_goes_on_where_no_checkpoint_is_whole(begun: Path) -> None:
+    for path in begun.glob("checkpoint.*"):
+        path.write_bytes(b"rubbish")
+    before = {path.name: path.read_bytes() for path in begun.iterdir()}
+    with pytest.raises(InvalidInputError, match="no checkpoint is whole; --overwrite starts anew"):
+        simulate_into(sliding({}), begun, resume=True)
+    assert {path.name: path.read_bytes() for path in begun.iterdir()} == before
+
+
+def test_other_scenario_is_refused_with_the_keys(begun: Path) -> None:
+    other = sliding({"contact": {"law": "hertz-mindlin"}}, end=0.07)
+    told = r"of another scenario: contact\.law linear -> hertz-mindlin, time\.end 0\.05 -> 0\.07; --overwrite"
+    with pytest.raises(InvalidInputError, match=told):
+        simulate_into(other, begun, resume=True)
+    for path in begun.glob("checkpoint.*"):
+        path.unlink()
+    with pytest.raises(InvalidInputError, match=r"scenario\.toml: of another scenario: contact\.law linear"):
+        simulate_into(other, begun, resume=True)
+
+
+def test_other_code_is_refused_with_what_differs(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = "blocksim.kernels.jit.source_hash"
+    monkeypatch.setattr(source, lambda folder: "new" if folder.name in {"kernels", "world"} else "old")
+    with pytest.raises(InvalidInputError, match="it differs in blocksim/kernels"):
+        find_resumption(begun, sliding({}))
+    monkeypatch.setattr("numba.__version__", "99.1")
+    with pytest.raises(InvalidInputError, match=r"another version of the code: numba [\d.]+ -> 99\.1; --overwrite"):
+        find_resumption(begun, sliding({}))
+
+
+def test_missing_frames_are_no_ground_to_go_on(begun: Path, tmp_path: Path) -> None:
+    shorter = simulate_into(sliding({}, end=0.002), tmp_path / "shorter")
+    assert shorter.folder is not None
+    shutil.copy(shorter.folder / "run.h5", begun / "run.h5")
+    with pytest.raises(InvalidInputError, match=r"run\.h5: holds \d of the \d+ frames before step 1000"):
+        simulate_into(sliding({}), begun, resume=True)
+
+
+def test_run_without_a_checkpoint_starts_anew_and_says_so(begun: Path, tmp_path: Path) -> None:
+    for path in begun.glob("checkpoint.*"):
+        path.unlink()
+    again = simulate_into(sliding({}), begun, resume=True)
+    assert again.status == "finished"
+    assert again.summary.resumed_from == ()
+    assert again.summary.warnings == (f"{begun}: no checkpoint was written, the run starts anew",)
+    nothing = simulate_into(sliding({}), tmp_path / "nothing", resume=True)
+    assert nothing.summary.warnings == ()
+    assert_same(again, nothing)
+
+
+def test_another_finished_run_is_not_resumed_over(begun: Path) -> None:
+    simulate_into(sliding({}), begun, resume=True)
+    with pytest.raises(OutputExistsError, match="another run is there"):
+        simulate_into(sliding({}, end=0.07), begun, resume=True)
+
+
+def test_times_of_all_parts_are_summed_and_told(begun: Path) -> None:
+    before = json.loads((begun / "run.json").read_text())
+    resumed = simulate_into(load_scenario(begun / "scenario.toml"), begun, resume=True)
+    told = json.loads((begun / "run.json").read_text())
+    assert told["resumed_from"] == [500, 1000]
+    assert told["solver_seconds"] > before["solver_seconds"] > 0.0
+    assert told["total_seconds"] > before["total_seconds"]
+    assert before["last_checkpoint"] == 1000
+    assert told["last_checkpoint"] is None
+    assert {path.name for path in begun.iterdir()} == {"scenario.toml", "final.csv", "run.h5", "run.json", "done.json"}
+    assert resumed.reason == "end of simulated time"
+
+
+def test_nothing_half_written_is_left_by_a_run_that_goes_on(begun: Path) -> None:
+    (begun / ".checkpoint.0.abc.0").write_bytes(b"half")
+    (begun / ".run.h5.new").write_bytes(b"half")
+    simulate_into(sliding({}), begun, resume=True)
+    assert not [path for path in begun.iterdir() if path.name.startswith(".")]

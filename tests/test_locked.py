@@ -1,0 +1,61 @@
+"""What `make` installs: exact versions with hashes, complete, and without the address of a registry."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+LOCKED = sorted((ROOT / "tests").glob("constraints*.txt"))
+ENTRY = re.compile(r"^([a-z0-9][a-z0-9-]*)==([^ ;\\]+)", flags=re.MULTILINE)
+EXTRAS = {"constraints.txt": ("study",), "constraints-dev.txt": ("study", "dev"), "constraints-bench.txt": ("bench",)}
+
+
+def normal(name: str) -> str:
+    """Return a name as indexes compare it."""
+    return re.sub(r"[-_.]+", "-", re.split(r"[<>=!~\[ ;]", name)[0]).lower()
+
+
+def versions(path: Path) -> dict[str, str]:
+    """Return what a file and those that it includes lock."""
+    text = path.read_text()
+    included = (
+        {} if (match := re.search(r"^-r (.*)$", text, flags=re.MULTILINE)) is None else versions(path.parent / match[1])
+    )
+    return {**included, **dict(ENTRY.findall(text))}
+
+
+@pytest.fixture(scope="module")
+def project() -> dict[str, object]:
+    """Return pyproject.toml."""
+    return tomllib.loads((ROOT / "pyproject.toml").read_text())
+
+
+@pytest.mark.parametrize("path", LOCKED, ids=lambda path: path.name)
+def test_every_version_has_hashes_and_no_address(path: Path) -> None:
+    text = path.read_text()
+    assert not re.search(r"https?:|//|--(extra-)?index|--find-links|--trusted", text)
+    for entry in re.split(r"\n(?=[a-z0-9])", text.partition("\n")[2].removeprefix("-r constraints.txt\n")):
+        assert re.match(r"[a-z0-9-]+==\S+( ; [^\\]+)? \\\n( +--hash=sha256:[0-9a-f]{64}( \\)?\n?)+$", entry), entry[:80]
+
+
+@pytest.mark.parametrize("path", LOCKED, ids=lambda path: path.name)
+def test_everything_that_the_project_asks_for_is_locked(path: Path, project: dict) -> None:  # type: ignore[type-arg]
+    asked = list(project["project"]["dependencies"])
+    for extra in EXTRAS[path.name]:
+        asked += [one for one in project["project"]["optional-dependencies"][extra] if not one.startswith("blocksim")]
+    assert {normal(one) for one in asked} <= set(versions(path))
+
+
+def test_builder_is_locked_at_the_version_that_it_is_asked_for(project: dict) -> None:  # type: ignore[type-arg]
+    (wanted,) = project["build-system"]["requires"]
+    name, version = wanted.split("==")
+    assert versions(ROOT / "tests" / "constraints.txt")[name] == version
+
+
+def test_no_two_files_lock_different_versions() -> None:
+    locked = [dict(ENTRY.findall(path.read_text())) for path in LOCKED]
+    names = [name for one in locked for name in one]
+    shared = {name for name in names if names.count(name) > 1}
+    assert all(len({one[name] for one in locked if name in one}) == 1 for name in shared)

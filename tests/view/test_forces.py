@@ -1,0 +1,115 @@
+"""Arrows of contact forces: where, how long, on which block, and what is told of them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from blocksim.errors import InvalidInputError
+from blocksim.simulation.contacts import Contacts, borne, empty_rows
+from blocksim.view.animation import Look, Pace, draw_film
+from blocksim.view.forces import FORCES, ForceScale, arrows, contacts_of, force_scale, rounded
+from blocksim.view.kinds import KINDS
+from blocksim.view.support import Support
+from tests.view.made_up import overlapping, pressed, toppling
+
+SCALE = ForceScale(mm_per_newton=10.0, longest=35.0)
+
+
+def test_arrow_is_that_of_the_force_on_the_block_that_it_pushes_up() -> None:
+    rows = empty_rows(2)
+    rows["x"], rows["y"] = [0.1, 0.2], 0.05
+    rows["normal_y"], rows["normal_force"] = [1.0, -1.0], 2.0  # body a above body b, and below it
+    rows["shear_force"] = 0.5
+    found = arrows(rows, SCALE, 0.0)
+    np.testing.assert_allclose(found[:, 0], [[100.0, 50.0], [200.0, 50.0]])
+    np.testing.assert_allclose(found[:, 1] - found[:, 0], [[-5.0, 20.0], [-5.0, 20.0]])
+
+
+def test_long_arrows_are_cut_and_what_is_not_finite_is_left_out() -> None:
+    rows = empty_rows(3)
+    rows["normal_x"], rows["normal_force"] = 1.0, [1.0, 100.0, np.nan]
+    found = arrows(rows, SCALE, 0.0)
+    assert (found[:, 1] - found[:, 0])[:, 0].tolist() == pytest.approx([10.0, 35.0])
+
+
+def test_scale_is_that_of_usual_forces_not_of_impacts() -> None:
+    frames = pressed(toppling(3))
+    scale = force_scale(frames)
+    assert frames.contacts is not None
+    frames.contacts.rows["normal_force"][:5] = 1e6
+    assert force_scale(frames).mm_per_newton == pytest.approx(scale.mm_per_newton, rel=0.1)
+    assert scale.longest == pytest.approx(2.0 * 0.6 * 41.0)
+    assert "5 N is 20.4 mm long, from 12.1 N on they are cut" in scale.told
+
+
+def test_run_without_a_single_contact_has_a_scale() -> None:
+    frames = replace(toppling(1, steps=3), contacts=Contacts(np.zeros(3, dtype=np.int64), empty_rows(0)))
+    assert force_scale(frames).mm_per_newton > 0.0
+
+
+@pytest.mark.parametrize(("value", "expected"), [(1.0, 1.0), (0.0199, 0.01), (7.3, 5.0), (0.2, 0.2), (999.0, 500.0)])
+def test_round_numbers_are_not_larger(value: float, expected: float) -> None:
+    assert rounded(value) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("blocks", [1, 3, 7])
+@pytest.mark.parametrize("kind", ["strip", "final"])
+def test_every_panel_has_its_arrows_and_nothing_overlaps(caught: list[Figure], kind: str, blocks: int) -> None:
+    KINDS[kind](pressed(toppling(blocks)), "picture.png", title="forces", forces=True)
+    (figure,) = caught
+    panels = [axes for axes in figure.axes if axes.get_xlabel() == "x (mm)" or axes.get_title(loc="left")]
+    assert panels
+    for axes in panels:
+        shafts = [one for one in axes.collections if isinstance(one, LineCollection) and one.get_zorder() == FORCES]
+        assert [len(one.get_segments()) for one in shafts] == [2 * blocks]
+    assert overlapping(figure) == []
+    assert any("Arrows: contact forces" in text.get_text() for text in figure.texts)
+
+
+def test_history_shows_what_the_supports_hold_over_the_weight(caught: list[Figure]) -> None:
+    frames = pressed(toppling(3))
+    KINDS["history"](frames, "picture.png", support=Support(weight=12.0), forces=True)
+    held = caught[0].axes[5]
+    assert held.get_ylabel() == "held / weight"
+    assert frames.contacts is not None
+    np.testing.assert_allclose(np.array(held.lines[1].get_ydata(), dtype=float), borne(frames.contacts) / 12.0)
+    assert overlapping(caught[0]) == []
+
+
+def test_history_cuts_impacts_and_tells_the_largest(caught: list[Figure]) -> None:
+    KINDS["history"](pressed(toppling(3)), "picture.png", support=Support(weight=0.1))
+    held = caught[0].axes[5]
+    assert held.get_ylim() == (0.0, 3.0)
+    assert "largest: 240" in held.texts[0].get_text()
+    assert overlapping(caught[0]) == []
+
+
+def test_history_of_a_run_without_contacts_has_five_panels(caught: list[Figure]) -> None:
+    KINDS["history"](toppling(3), "picture.png", support=Support(weight=1.0))
+    assert len(caught[0].axes) == 5
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_missing_contacts_are_told_with_what_to_do(tmp_path: Path, kind: str) -> None:
+    with pytest.raises(InvalidInputError, match=r"stored no contacts.* --set output\.contacts=true"):
+        KINDS[kind](toppling(3), tmp_path / "picture.png", forces=True)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_film_with_forces_differs_and_one_of_a_run_without_is_refused(tmp_path: Path) -> None:
+    frames, pace = pressed(toppling(2, steps=4)), Pace(1.0, 5.0)
+    draw_film(frames, tmp_path / "with.gif", pace, Look(240, forces=True))
+    draw_film(frames, tmp_path / "without.gif", pace, Look(240))
+    assert (tmp_path / "with.gif").read_bytes() != (tmp_path / "without.gif").read_bytes()
+    with pytest.raises(InvalidInputError, match="stored no contacts"):
+        draw_film(toppling(2), tmp_path / "none.gif", pace, Look(240, forces=True))
+    assert not (tmp_path / "none.gif").exists()
+
+
+def test_contacts_are_given_where_they_are() -> None:
+    frames = pressed(toppling(1))
+    assert contacts_of(frames) is frames.contacts
