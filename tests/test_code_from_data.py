@@ -9,7 +9,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "blocksim"
 MODULES = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "yaml", "ctypes"}
 MODULES |= {"code", "codeop", "runpy", "tarfile", "zipfile", "xml", "telnetlib", "urllib", "http", "ftplib", "socket"}
-CALLS = {"eval", "exec", "compile", "__import__", "system", "popen", "execv", "execve", "spawnl", "fromfile"}
+CALLS = {"eval", "exec", "compile", "__import__", "os.system", "popen", "execv", "execve", "spawnl", "fromfile"}
 CALLS |= {"read_pickle", "subprocess.run", "subprocess.Popen", "subprocess.call", "subprocess.check_output"}
 FLAGS = {"shell", "allow_pickle"}
 

@@ -27,9 +27,27 @@ def read_limited(path: Path, limit: int) -> bytes:
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         raise _unreadable(path, error) from None
     if len(content) > limit:
-        message = f"{path}: larger than {limit / MEGABYTE:g} MB, which is the most that is read"
+        message = f"{path}: {_too_large(limit)}"
         raise InvalidInputError(message)
     return content
+
+
+def refuse_large(path: Path, limit: int) -> None:
+    """Look whether a file that a library will open by itself is one, and not too large. Raises as `read_limited`."""
+    try:
+        size, is_file = path.stat().st_size, path.is_file()
+    except FileNotFoundError:
+        message = f"{path}: no such file"
+        raise InputMissingError(message) from None
+    except (OSError, ValueError) as error:
+        raise _unreadable(path, error) from None
+    if not is_file or size > limit:
+        message = f"{path}: {_too_large(limit) if is_file else 'not a file'}"
+        raise InvalidInputError(message)
+
+
+def _too_large(limit: int) -> str:
+    return f"larger than {limit / MEGABYTE:g} MB, which is the most that is read"
 
 
 def _at_once(name: str, flags: int) -> int:

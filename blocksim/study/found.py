@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from blocksim.analysis.compare import limits, prediction_half_width
 from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.analysis.members import Members
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, load_scenario
 from blocksim.scenario import quantities as q
@@ -17,7 +18,7 @@ from blocksim.study.places import FINISHED
 from blocksim.study.ranges import Ranges
 from blocksim.study.rows import blocks_in
 from blocksim.study.sweep_folder import PLAN
-from blocksim.study.table import read_sweep
+from blocksim.study.table import TABLE, read_sweep
 from blocksim.view.sweeps.found import QUARTER, FoundSweep, Input, Measured
 
 Floats = NDArray[np.float64]
@@ -36,14 +37,15 @@ def read_found(folder: Path, experiment: Path | None = None) -> FoundSweep:
     if not blocks or not finished.any():
         message = f"{folder}: no case of this sweep has finished, there is nothing to draw"
         raise InvalidInputError(message)
+    members = Members(table, str(folder / TABLE))
     path = experiment or (None if scenario.experiment is None else scenario.experiment.table)
     return FoundSweep(
         title=scenario.description or scenario.name,
         mode="" if scenario.sweep is None else scenario.sweep.mode,
         inputs=_inputs(scenario, table),
         blocks=blocks,
-        x_mm=_columns(table, blocks, "x_mm", finished),
-        rotation_deg=_columns(table, blocks, "rotation_deg", finished),
+        x_mm=_columns(members, "x"),
+        rotation_deg=_columns(members, "rotation"),
         finished=finished,
         inside=None if path is None else _inside(table, Ranges.read(path)) & finished,
         measured=Measured() if path is None else measured_of(load_table(path), blocks),
@@ -67,15 +69,13 @@ def measured_of(table: ExperimentTable, blocks: tuple[str, ...]) -> Measured:
     )
 
 
-def _columns(table: pd.DataFrame, blocks: tuple[str, ...], name: str, finished: NDArray[np.bool_]) -> Floats:
-    values = table[[f"{block}.{name}" for block in blocks]].to_numpy(dtype=float, na_value=np.nan)
-    return np.where(finished[:, None], values, np.nan)
+def _columns(members: Members, quantity: str) -> Floats:
+    """Return one quantity of all blocks, (count, b); NaN where a member has none. Raises InvalidInputError."""
+    return np.stack([members.values(block, quantity) for block in blocks_in(map(str, members.table.columns))], axis=1)
 
 
 def _inside(table: pd.DataFrame, ranges: Ranges) -> NDArray[np.bool_]:
-    ranges.count(table)  # refuses a table of other blocks
-    inside = [table[name].between(*ends) for name, ends in ranges.limits.items()]
-    return np.array([all(row) for row in zip(*inside, strict=True)], dtype=np.bool_)
+    return np.array(ranges.inside(table), dtype=np.bool_)
 
 
 def _inputs(scenario: Scenario, table: pd.DataFrame) -> tuple[Input, ...]:

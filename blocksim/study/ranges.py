@@ -12,6 +12,8 @@ from blocksim.study.targets import ranges_of
 if TYPE_CHECKING:
     import pandas as pd
 
+NUMBERS = "if"  # kinds of numpy
+
 
 @dataclass(frozen=True)
 class Ranges:
@@ -33,10 +35,17 @@ class Ranges:
         return all(isinstance(value, float) and lower <= value <= upper for value, lower, upper in values)
 
     def count(self, table: "pd.DataFrame") -> int:
-        """Return how many rows of a table are inside. Raises InvalidInputError where it has no such block."""
+        """Return how many rows of a table are inside. Raises InvalidInputError for no such block, or no numbers."""
+        return sum(self.inside(table))
+
+    def inside(self, table: "pd.DataFrame") -> list[bool]:
+        """Tell of every row of a table whether it is inside. Raises as `count`."""
         missing = [name for name in self.limits if name not in table]
         if missing:
             message = f"{self.source} measures {missing[0]}, but the sweep has no such column"
             raise InvalidInputError(message)
+        texts = [name for name in self.limits if table[name].dtype.kind not in NUMBERS and table[name].notna().any()]
+        if texts:
+            raise InvalidInputError(f"the column {texts[0]} of the sweep does not hold numbers only")
         inside = [table[name].between(lower, upper) for name, (lower, upper) in self.limits.items()]
-        return sum(map(all, zip(*inside, strict=True)))
+        return [all(row) for row in zip(*inside, strict=True)]

@@ -10,7 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.errors import InvalidInputError
+from blocksim.scenario.limited import MEGABYTE, refuse_large
 from blocksim.simulation.atomic import writing
 from blocksim.study.done import Done
 from blocksim.study.places import FINISHED
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 TABLE = "sweep.csv"
 TEXT_COLUMNS = {"case": str, "status": str, "reason": str}
+MOST_BYTES = 2000 * MEGABYTE
+"""Of sweep.csv: a million cases of a hundred blocks do not fit into most memories."""
 OUTCOME = ("status", "reason", "seconds")
 SOONEST = 2.0  # s between two tables while the sweep runs
 SHARE = 0.02  # of the time, at most, goes into tables that are soon replaced
@@ -133,10 +136,8 @@ def _read(path: Path) -> "pd.DataFrame":
     import pandas as pd  # noqa: PLC0415 - a third of a second that a sweep need not wait for before it begins
 
     try:
+        refuse_large(path, MOST_BYTES)
         table = pd.read_csv(path, dtype=TEXT_COLUMNS)
-    except FileNotFoundError:
-        message = f"{path}: no such file"
-        raise InputMissingError(message) from None
     except (OSError, ValueError) as error:
         message = f"{path}: not the table of a sweep: {str(error).strip()}"
         raise InvalidInputError(message) from error

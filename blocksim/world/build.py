@@ -220,8 +220,8 @@ def _controls(scenario: Scenario, stride: Stride) -> dict[str, float]:
     motion_x, motion_y = support_direction(scenario)
     kernel = KERNEL_CODES[contact.kernel]
     smoothing_length = contact.resolved_smoothing_length
-    few = min(CHEAP_CHECKS, round(LONGEST_CHECK / step))
-    every = min(max(1, few, round(CHECK_INTERVAL / step)), MOST_STEPS)
+    few = round(min(CHEAP_CHECKS, LONGEST_CHECK / step))  # of a quotient that may be infinite
+    every = max(1, few, round(min(MOST_STEPS, CHECK_INTERVAL / step)))
     rest_checks = max(1, math.ceil(min(time.rest_hold / (every * step), MOST_STEPS))) if time.stop_at_rest else 0
     return {
         "step": step,

@@ -233,3 +233,9 @@ def test_step_that_is_too_long_for_rigid_contacts_is_shown_where_it_stands(block
     forced = ["--set", "time.force_step=true"]
     again = ("check", "scenarios/tower.toml", "--set", "time.scheme=nonsmooth", "--set", "time.step=20 ms", *forced)
     assert blocksim(*again, "--quiet").code == 0
+
+
+@pytest.mark.parametrize("end", ["5e-324", "1e-310", "1e-300 s"])
+def test_an_end_of_next_to_nothing_is_no_internal_error(blocksim: Command, end: str) -> None:
+    answer = blocksim("check", "scenarios/three_blocks.toml", "--set", f"time.end={end}")
+    assert answer.code in {0, 65}  # the interval of checks was infinite

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.scenario.limited import read_limited
+from blocksim.scenario.limited import read_limited, refuse_large
 
 
 @pytest.fixture
@@ -44,3 +44,13 @@ def test_pipes_devices_and_folders_are_not_waited_for(tmp_path: Path) -> None:
     for place in (tmp_path / "pipe", tmp_path, Path(os.devnull), Path("/dev/zero")):
         with pytest.raises(InvalidInputError, match="not a file"):
             read_limited(place, 10)
+
+
+def test_files_that_a_library_opens_are_held_to_the_same(path: Path, tmp_path: Path) -> None:
+    refuse_large(path, 10)
+    for place, limit, told in ((path, 9, "larger than"), (tmp_path, 10, "not a file")):
+        with pytest.raises(InvalidInputError, match=told):
+            refuse_large(place, limit)
+    for name in ("nothing", "x" * 300, "a\0b"):
+        with pytest.raises(InputMissingError):
+            refuse_large(tmp_path / name, 10)

@@ -71,7 +71,7 @@ def test_folder_holds_only_its_own_scenario(kept: Result, soft: Shipped) -> None
     assert not holds_run(kept.folder, soft(friction__block_block=0.3))
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "{}", "\0"])
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", "\0", "[" * 100_000, "x" * 2_000_000], ids=lambda text: text[:2])
 def test_rubbish_in_done_is_no_finished_run(copy: Path, soft: Shipped, text: str) -> None:
     (copy / "done.json").write_text(text)
     assert not holds_run(copy, soft())

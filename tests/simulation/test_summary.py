@@ -46,3 +46,16 @@ def test_energy_that_is_not_finite_survives_json(kept: Result, tmp_path: Path) -
     (tmp_path / "run.json").write_text(broken.to_json())
     assert json.loads(broken.to_json())["energy_J"]["kinetic"] is None
     assert math.isnan(read_summary(tmp_path / "run.json").energy_J.kinetic)
+
+
+def test_summary_of_any_size_is_not_read(tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text('{"name": "' + "x" * 2_000_000 + '"}', encoding="utf-8")
+    with pytest.raises(InvalidInputError, match=r"run\.json: larger than 1 MB"):
+        read_summary(tmp_path / "run.json")
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"name":' * 100_000, '{"steps": ' + "9" * 100_000 + "}"])
+def test_endless_structures_are_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / "run.json").write_text(text, encoding="utf-8")
+    with pytest.raises(InvalidInputError, match=r"run\.json: not the summary of a run"):
+        read_summary(tmp_path / "run.json")

@@ -1,6 +1,7 @@
 """Lines of the manifest are whole, or not there."""
 
 import math
+import zlib
 from pathlib import Path
 
 import pytest
@@ -56,3 +57,21 @@ def test_second_writer_is_refused_until_the_first_has_gone(tmp_path: Path) -> No
         Manifest(path)
     first.close()
     Manifest(path).close()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 100_000,
+        '{"number":0',
+        '{"number":"0","case":"","values":"0","row":{}',
+        '{"number":true,"case":"","values":"0","row":{}',
+        '{"number":0,"case":"","values":"0x","row":{}',
+        '{"number":0,"case":"","values":"ffffffffffffffffffff","row":{}',
+        '{"number":0,"case":"","values":"0","row":[]',
+        '{"number":0,"case":[],"values":"0","row":{}',
+    ],
+)
+def test_line_with_a_right_sum_that_no_sweep_has_written_is_passed_over(text: str) -> None:
+    head = text.encode()
+    assert Entry.from_line(b'%s,"sum":"%08x"}\n' % (head, zlib.crc32(head))) is None

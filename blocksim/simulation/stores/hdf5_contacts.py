@@ -55,7 +55,7 @@ def read_contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts |
 
     Raises KeyError or ValueError where columns are missing, do not go together or name no body.
     """
-    if GROUP not in file:
+    if not safety.has(file, GROUP):
         return None
     ends = safety.data_set(file, ENDS, 1)[:frames].astype(np.int64)
     if len(ends) != frames or (np.diff(ends, prepend=0) < 0).any():

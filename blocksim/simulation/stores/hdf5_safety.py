@@ -48,14 +48,18 @@ def group(file: Any, name: str) -> Any:
     return found
 
 
+def has(file: Any, name: str) -> bool:
+    """Tell whether there is a member or a link of this name, which is not followed."""
+    return bool(file.id.links.exists(name.encode()))
+
+
 def member(file: Any, name: str) -> Any:
     """Return what a name means, where no part of it is a link to elsewhere. Raises UnsafeError, KeyError."""
     place = file
     for part in name.split("/"):
         if not isinstance(place, h5py.Group):
             raise UnsafeError(f"{name}: not in a group")
-        link = place.get(part, getlink=True)
-        if not isinstance(link, h5py.HardLink):
+        if place.id.links.get_info(part.encode()).type != h5py.h5l.TYPE_HARD:  # h5py's own get() follows links first
             raise UnsafeError(f"{name}: a link to elsewhere; links are not followed")
         place = place[part]
     return place

@@ -7,6 +7,8 @@ from typing import TypeVar
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario
+from blocksim.scenario.document import MAX_BYTES
+from blocksim.scenario.limited import read_limited
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.stores.hdf5_reader import read_frames
@@ -80,6 +82,6 @@ def read_stored(folder: Path) -> StoredRun:
 def _text(folder: Path) -> str | None:
     """Return the resolved scenario as it lies in the folder."""
     try:
-        return (folder / files.SCENARIO).read_text(encoding="utf-8", errors="replace")
-    except OSError:
+        return read_limited(folder / files.SCENARIO, MAX_BYTES).decode(errors="replace")
+    except BlocksimError:
         return None

@@ -1,17 +1,20 @@
 """Sweeps in a report: the table as it lies in sweep.csv, and the members whose frames were kept."""
 
 import csv
+import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
+from blocksim.scenario.limited import MEGABYTE, read_limited
 from blocksim.view.report.subjects import Subject
 
 TABLE = "sweep.csv"
+MOST_BYTES = 200 * MEGABYTE  # of the table
 HEAD, TAIL = ("case",), ("status", "reason", "seconds", "inside")
 NEEDED = {"case", "status"}
 OF_BLOCKS = (".x_mm", ".y_mm", ".rotation_deg", ".left_mm", ".right_mm")
@@ -49,11 +52,8 @@ def read_sweep_table(folder: Path) -> SweepTable:
     """Return the table of a sweep's folder; rows that are cut off are left out. Raises InvalidInputError."""
     path = folder / TABLE
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            lines = [tuple(line) for line in csv.reader(file) if line]
-    except OSError as error:
-        message = f"{path}: cannot be read: {error.strerror}"
-        raise InputMissingError(message) from error
+        text = read_limited(path, MOST_BYTES).decode()
+        lines = [tuple(line) for line in csv.reader(io.StringIO(text, newline="")) if line]
     except (ValueError, csv.Error) as error:
         message = f"{path}: not the table of a sweep: {error}"
         raise InvalidInputError(message) from error
