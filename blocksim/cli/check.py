@@ -12,7 +12,7 @@ from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
 from blocksim.study.single import check_experiment
 from blocksim.world.describe import Description, MotionDescription, PairDescription, SagDescription, describe
-from blocksim.world.memory import readable
+from blocksim.world.free_memory import readable
 
 MOST_BODIES = 12
 SIDES = ("along x", "upright", "depth mm", "mass kg", "inertia kg m²")

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from blocksim.cli.output import answer, duration, note, print_json
 from blocksim.scenario import Document
 from blocksim.study.estimate import Estimate, estimate
-from blocksim.world.memory import readable
+from blocksim.world.free_memory import readable
 
 
 def show_estimate(document: Document, jobs: int | None, *, keep_cases: bool, as_json: bool) -> None:

@@ -9,7 +9,8 @@ from blocksim.simulation.folder import CHECKPOINTS
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.stacking import arrays_of
-from blocksim.world.memory import file_bytes, readable, recorded_contacts
+from blocksim.world.free_memory import readable
+from blocksim.world.memory import file_bytes, recorded_contacts
 
 CHECKPOINT_FILES = len(CHECKPOINTS) + 1  # the last one while it is written
 

@@ -1,14 +1,10 @@
-"""How much memory a run needs, told before anything is allocated, and how much there is.
+"""How much memory a run needs, told before anything is allocated.
 
 Sizes follow from the types in blocksim.kernels.arrays, so that they change with them.
 """
 
-import os
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +12,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.kernels.arrays import BODY, CONTACT, CONTACTS, OPERATOR, PAIR, PARTICLE_CONTACT, POINT
 from blocksim.kernels.lanes import WIDTH
 from blocksim.kernels.nonsmooth.arrays import BEFORE, BOOK, GROUP, KEPT, LINE, PART, ROW, SPOT
+from blocksim.world.free_memory import available_bytes, readable
 
 LISTS = 2  # of candidate pairs: the present one and the one being built
 OPERATORS = 2  # of a pair: along the normal and along the tangent
@@ -27,10 +24,6 @@ FRAME_VALUES = 12  # of a frame beside those: step, time, energies, number of co
 CONTACT_VALUES = 8  # of a recorded contact: two bodies in one, place, normal, overlap, forces
 CONTACTS_OF_A_BODY = 4  # recorded in a frame, of corners and rigid faces: hardly ever more
 COPIES = 2  # of all frames at the end of a run: as they came, and joined
-UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB", "EB")
-THOUSAND = 1000
-MOST_SHOWN = 999.5  # rounds to four digits
-KIBI = 1024
 
 
 class SceneTooLargeError(InvalidInputError):
@@ -126,72 +119,3 @@ def refuse_if_too_large(size: Size) -> None:
     available = available_bytes()
     if available is not None and size.bytes_needed > available:
         raise SceneTooLargeError(size, available)
-
-
-def readable(count: int) -> str:
-    """Return bytes in the largest unit of which there is at least one, such as "3.1 GB"."""
-    value, unit = float(count), 0
-    while value >= MOST_SHOWN and unit + 1 < len(UNITS):
-        value, unit = value / THOUSAND, unit + 1
-    return f"{value:.3g} {UNITS[unit]}"
-
-
-def available_bytes(root: Path = Path("/")) -> int | None:
-    """Return the memory (bytes) that a process can still get, or None on a system that does not tell.
-
-    That of the machine, or what is left of the limit of a control group (container, batch job). Swap does not count.
-    """
-    limits = [limit for limit in (_of_machine(root), *_of_groups(root)) if limit is not None]
-    return max(0, min(limits)) if limits else None
-
-
-def _of_machine(root: Path) -> int | None:
-    for name, value, *_ in (line.split() for line in _lines(root / "proc/meminfo")):
-        if name == "MemAvailable:":
-            return int(value) * KIBI
-    names = getattr(os, "sysconf_names", {})
-    if "SC_AVPHYS_PAGES" in names:
-        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    return None
-
-
-class _Names(NamedTuple):
-    """Files of a control group."""
-
-    folder: str
-    limit: str
-    usage: str
-    reclaimable: str  # entry of memory.stat: cached files that are given up when memory runs short
-
-
-VERSION_1 = _Names("sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
-VERSION_2 = _Names("sys/fs/cgroup", "memory.max", "memory.current", "inactive_file")
-
-
-def _of_groups(root: Path) -> Iterator[int | None]:
-    """Yield what is left of the limits of the control group that this process is in and of all groups around it."""
-    for line in _lines(root / "proc/self/cgroup"):  # hierarchy:controllers:path
-        _, controllers, path = line.split(":", 2)
-        if controllers in ("", "memory"):
-            names = VERSION_1 if controllers else VERSION_2
-            folder = root / names.folder
-            own = folder / path.strip("/")
-            for group in (own, *own.parents):
-                if group.is_relative_to(folder):
-                    yield _left_in(group, names)
-
-
-def _left_in(group: Path, names: _Names) -> int | None:
-    limit, usage = _lines(group / names.limit), _lines(group / names.usage)
-    if not (limit and usage) or not limit[0].isdecimal():  # "max": no limit
-        return None
-    stat = dict(line.split() for line in _lines(group / "memory.stat"))
-    return int(limit[0]) - int(usage[0]) + int(stat.get(names.reclaimable, "0"))
-
-
-def _lines(path: Path) -> list[str]:
-    """Return the lines of a file, none where it cannot be read."""
-    try:
-        return path.read_text(encoding="ascii").splitlines()
-    except (OSError, ValueError):
-        return []

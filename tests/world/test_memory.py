@@ -12,14 +12,8 @@ from blocksim.kernels.arrays import World
 from blocksim.scenario import load_scenario, place_bodies
 from blocksim.simulation.recorder import Recorder
 from blocksim.world import build_world, memory
-from blocksim.world.memory import (
-    SceneSize,
-    SceneTooLargeError,
-    available_bytes,
-    file_bytes,
-    readable,
-    refuse_if_too_large,
-)
+from blocksim.world.free_memory import available_bytes, readable
+from blocksim.world.memory import SceneSize, SceneTooLargeError, file_bytes, refuse_if_too_large
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 GIB = 1 << 30

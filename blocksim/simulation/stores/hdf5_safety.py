@@ -10,7 +10,7 @@ from typing import Any
 
 import h5py
 
-from blocksim.world.memory import available_bytes, readable
+from blocksim.world.free_memory import available_bytes, readable
 
 MOST_ENERGIES = 64
 """In `observables`; the schemes have a dozen."""
