@@ -56,13 +56,15 @@ def _live_line(console: Console) -> Iterator[Callable[[Where], None]]:
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("", total=1.0, visible=False, speed="", residual="")
         shown_at = 0.0
+        steps: int | None = None  # when first looked at: a run that goes on has done some before
 
         def show(where: Where) -> None:
-            nonlocal shown_at
+            nonlocal shown_at, steps
             now = time.monotonic()
+            steps = where.steps if steps is None else steps
             if now - shown_at > LIVE_SECONDS:
                 shown_at = now
-                speed = f"{where.steps / max(now - began, 1e-9):.1e}"
+                speed = f"{(where.steps - steps) / max(now - began, 1e-9):.1e}"
                 residual = f"{where.relative_residual:.0e}"
                 progress.update(
                     task, completed=where.time, total=where.end, visible=True, speed=speed, residual=residual

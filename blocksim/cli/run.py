@@ -56,8 +56,8 @@ def run_command(
         if not known:
             check_experiment(ready)
             warn_of_threads(threads)
-            if resume:
-                tell_resumption(folder, ready, quiet=silent)
+            if resume and not silent:
+                tell_resumption(folder, ready)
             tell_compilation(kernels_of(ready), quiet=silent)
         with watching(quiet=silent or known) as on_progress:
             result = run(
@@ -114,12 +114,12 @@ def _way_on(result: Result) -> str:
     return "no checkpoint was written by then" if step is None else f"last good checkpoint at step {step}"
 
 
-def tell_resumption(folder: Path, scenario: Scenario, *, quiet: bool) -> None:
+def tell_resumption(folder: Path, scenario: Scenario) -> None:
     """Tell from where a run is going on, and what is left where nothing can. Raises what `find_resumption` raises."""
     found = find_resumption(folder, scenario)
     for remark in found.remarks:
         note(remark)
-    if not quiet and found.checkpoint is not None:
+    if found.checkpoint is not None:
         position = found.checkpoint.position
         note(f"goes on at step {position.step}, {position.frames} frames are there: {folder}")
     if found is NEW:

@@ -40,14 +40,20 @@ def replacing(path: Path) -> Iterator[Path]:
 
 def sync_folder(folder: Path) -> None:
     """Bring the names in a folder to the disk: a file whose name is not there is lost when the power fails."""
-    if os.name != "posix":
-        return
-    handle = os.open(folder, os.O_RDONLY)
     try:
-        os.fsync(handle)
+        sync_file(folder)
     except OSError as error:
         if error.errno not in NO_SUCH_SYNC:
             raise
+
+
+def sync_file(path: Path) -> None:
+    """Wait until what was written to a file is on the disk, where it outlives a power failure. Raises OSError."""
+    if os.name != "posix":  # elsewhere that takes a file that is open for writing
+        return
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
     finally:
         os.close(handle)
 

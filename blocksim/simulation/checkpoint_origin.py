@@ -1,10 +1,10 @@
 """What a checkpoint came from, and in what another run differs from that."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic import BaseModel
 
 from blocksim.errors import InvalidInputError
@@ -12,6 +12,7 @@ from blocksim.scenario import Scenario
 from blocksim.scenario.resolved import deciding_values
 from blocksim.simulation.provenance import code_hashes, code_version, machine
 
+COMPILERS = ("numba", "llvmlite", "numpy")
 MOST_NAMED = 6  # differences in a message
 NONE = "none"
 AGAIN = "--overwrite starts anew, --out DIR keeps both"
@@ -28,11 +29,9 @@ class Origin(BaseModel, frozen=True):
 
 def origin_of(scenario: Scenario) -> Origin:
     """Return what a run of a scenario comes from, here and now."""
-    import numba  # noqa: PLC0415 - a run has it anyway, who only reads results has not
-
     return Origin(
         scenario=deciding_values(scenario),
-        versions={"blocksim": code_version(), "numba": numba.__version__, "numpy": np.__version__},
+        versions={"blocksim": code_version(), **{name: metadata.version(name) for name in COMPILERS}},
         rooms=code_hashes(),
         machine=machine(),
     )

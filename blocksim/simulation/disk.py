@@ -9,7 +9,7 @@ from blocksim.simulation.folder import CHECKPOINTS
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.stacking import arrays_of
-from blocksim.world.memory import file_bytes, readable
+from blocksim.world.memory import file_bytes, readable, recorded_contacts
 
 CHECKPOINT_FILES = len(CHECKPOINTS) + 1  # the last one while it is written
 
@@ -30,5 +30,6 @@ def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
     """Return the bytes that the frames of a run and its checkpoints take at most."""
     steps = last_step_of(scenario.time.end, float(scene.world.controls[0].step))
     frames = min(steps, round(scenario.time.end / scenario.output.every)) + 2  # the first, and wherever it ends
-    bodies = scene.world.bodies.size - 1
-    return file_bytes(bodies, frames) + CHECKPOINT_FILES * sum(array.nbytes for array in arrays_of(scene))
+    bodies, particles = scene.world.bodies.size - 1, scene.world.particles
+    contacts = recorded_contacts(bodies, 0 if particles is None else particles.size) if scenario.output.contacts else 0
+    return file_bytes(bodies, frames, contacts) + CHECKPOINT_FILES * sum(array.nbytes for array in arrays_of(scene))

@@ -40,10 +40,10 @@ class Part:
 
     def run(self, toml: str, precautions: Precautions, team: Team, attendance: Attendance) -> LoopResult:
         """Run to the end or an interruption; the file of the frames says `toml`. Raises OutputError."""
-        path, names, kept = self.folder / files.FRAMES, scheme_named(self.scenario).ledger, self.recorder.recorded()
+        path, names, kept = self.folder / files.FRAMES, scheme_named(self.scenario).ledger, self.recorder.held
         contacts = self.scenario.output.contacts
         with FrameFile(path, self.placed, self.step, toml, ledger=names, kept=kept, contacts=contacts) as sink:
-            self.recorder.sink = sink
+            self.recorder.pour_into(sink)
             files.clear_remains(self.folder, (files.FINAL, files.SUMMARY))  # they tell of the part before
             self.writer = self._writer(sink, precautions)
             watched = Attendance(attendance.on_progress, attendance.stop, self.writer)

@@ -78,7 +78,7 @@ def environment() -> dict[str, str]:
 
 def machine() -> str:
     """Return processor, system and its C library, whose sines may differ in the last digit, in one line."""
-    parts = (_processor(), platform.system(), platform.machine(), *platform.libc_ver())
+    parts = (_processor(), sys.platform, platform.machine(), *platform.libc_ver())
     return " ".join(part for part in parts if part)
 
 

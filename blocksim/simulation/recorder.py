@@ -35,7 +35,7 @@ class FrameSink(Protocol):
 
 
 class Recorder:
-    """Frames, growing as the run goes on."""
+    """Frames, growing as the run goes on; with a sink only the last one, so that long runs need no more memory."""
 
     def __init__(
         self,
@@ -46,7 +46,7 @@ class Recorder:
         *,
         contacts: bool = False,
     ) -> None:
-        """Record every `every` seconds, at the nearest step of length `step` (s); `sink` gets all frames too.
+        """Record every `every` seconds, at the nearest step of length `step` (s); where there is a `sink`, in there.
 
         With `contacts` the contacts of every frame are recorded as well.
         """
@@ -55,10 +55,9 @@ class Recorder:
         self.sink = sink
         self.steps_per_frame = max(every / step, 1.0)
         self.steps: list[int] = []
-        self.motion: list[NDArray[np.float64]] = []
-        self.measured: list[NDArray[np.float64]] = []
+        self.held: list[Frame] = []  # the last ones: all, or one
         self.ledger: tuple[str, ...] = ()
-        self.contacts: list[ContactRows] | None = [] if contacts else None
+        self.with_contacts = contacts
 
     def next_step(self, done: int) -> int:
         """Return the next step to record after `done` steps, wherever those end."""
@@ -79,13 +78,13 @@ class Recorder:
         """Begin with the frames of an earlier part of the run; what it recorded is not recorded again."""
         self.ledger = rows.ledger
         self.steps = rows.steps.tolist()
-        self.motion, self.measured = [*rows.motion], [*rows.measured]
-        self.contacts = None if rows.contacts is None else rows.contacts.tables()
+        contacts = [None] * len(self.steps) if rows.contacts is None else rows.contacts.tables()
+        self.held = [Frame(*one) for one in zip(self.steps, rows.motion, rows.measured, contacts, strict=True)]
 
-    def recorded(self) -> list[Frame]:
-        """Return the frames so far, one by one."""
-        contacts = [None] * len(self.steps) if self.contacts is None else self.contacts
-        return [Frame(*one) for one in zip(self.steps, self.motion, self.measured, contacts, strict=True)]
+    def pour_into(self, sink: FrameSink) -> None:
+        """Hold no more than the last frame from now on; `sink` has those so far, and gets all others."""
+        self.sink = sink
+        del self.held[:-1]
 
     def sample(self, scene: "AnyScene") -> None:
         """Add a frame of the present state, unless this step has one already."""
@@ -98,20 +97,19 @@ class Recorder:
         motion = np.stack([scene.world.bodies[name][: len(self.placed)] for name in MOTION])
         scheme = scheme_of(scene)
         self.ledger = scheme.ledger
-        touching = None if self.contacts is None else scheme.contacts(scene, len(self.placed))
+        touching = scheme.contacts(scene, len(self.placed)) if self.with_contacts else None
+        frame = Frame(step, motion, row, touching)
         self.steps.append(step)
-        self.motion.append(motion)
-        self.measured.append(row)
-        if self.contacts is not None and touching is not None:
-            self.contacts.append(touching)
         if self.sink is not None:
-            self.sink.append(Frame(step, motion, row, touching))
+            self.sink.append(frame)
+            self.held.clear()
+        self.held.append(frame)
 
     def frames(self) -> Frames:
-        """Return all frames so far."""
-        steps = np.array(self.steps, dtype=np.int64)
-        contacts = None if self.contacts is None else joined(self.contacts)
-        rows = Rows(steps, np.stack(self.motion), np.stack(self.measured), self.ledger, contacts)
+        """Return all frames that are held: those so far, or, with a sink, the last one."""
+        steps, motion, measured, tables = zip(*self.held, strict=True)
+        contacts = joined(tables) if self.with_contacts else None
+        rows = Rows(np.array(steps, dtype=np.int64), np.stack(motion), np.stack(measured), self.ledger, contacts)
         return frames_from_rows(self.placed, self.time_step, rows)
 
 

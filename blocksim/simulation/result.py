@@ -1,6 +1,6 @@
 """A finished, failed or interrupted run as an object, and back from its folder."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,10 +22,18 @@ class Result:
 
     name: str
     columns: Columns
-    frames: Frames
     summary: Summary
     scenario: Scenario
     folder: Path | None = None
+    held: Frames | None = field(default=None, repr=False)  # frames in memory, where they are
+
+    @cached_property
+    def frames(self) -> Frames:
+        """The frames, read from the folder when first asked for. Raises what reading them raises."""
+        if self.held is not None:
+            return self.held
+        assert self.folder is not None  # noqa: S101 - one of the two is there
+        return read_frames(self.folder / files.FRAMES, self.scenario)
 
     @cached_property
     def final(self) -> "pd.DataFrame":
@@ -53,4 +61,4 @@ def read_result(folder: Path) -> Result:
     summary = read_summary(folder / files.SUMMARY)
     scenario = load_scenario(folder / files.SCENARIO)
     frames = read_frames(folder / files.FRAMES, scenario)
-    return Result(scenario.name, read_table(folder / files.FINAL), frames, summary, scenario, folder)
+    return Result(scenario.name, read_table(folder / files.FINAL), summary, scenario, folder, frames)

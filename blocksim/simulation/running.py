@@ -114,7 +114,7 @@ def _keep_scenario(scenario: Scenario, tables: Mapping[str, bytes], folder: Path
 def _result(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Result:
     frames = recorder.frames()
     summary = _summary(scenario, ended, seconds)
-    return Result(scenario.name, final_columns(frames), frames, summary, scenario)
+    return Result(scenario.name, final_columns(frames), summary, scenario, held=frames)
 
 
 def _summary(scenario: Scenario, ended: LoopResult, seconds: float) -> Summary:
@@ -161,4 +161,4 @@ def _keep_result(result: Result, summary: Summary, folder: Path) -> Result:
     if result.status == "finished":
         write_text(folder / files.DONE, json.dumps({"run": summary.run, "status": summary.status}) + "\n")
         files.clear_remains(folder, files.CHECKPOINTS)
-    return Result(result.name, result.columns, result.frames, summary, result.scenario, folder)
+    return Result(result.name, result.columns, summary, result.scenario, folder)

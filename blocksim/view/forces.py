@@ -25,7 +25,9 @@ LONGEST = 2.0  # of that length; longer arrows are cut
 HEAD = 4.0, 1.7  # points: length and half width of a head
 LEAST = 0.5  # points; shorter arrows are left out
 WIDTH, HALO = 1.1, 2.6  # points: of a shaft, and of the light line below it
-FORCES, BELOW = 3.6, 3.5  # order of drawing: above everything else
+WHOLE = 24.0  # points: where the longest arrow is shorter, all of that is smaller in proportion
+FORCES, BELOW, VEIL = 3.6, 3.5, 3.4  # order of drawing: above everything else
+VEIL_ALPHA = 0.6  # of the white over many small blocks, whose colours would hide small arrows
 ROUND = (1.0, 2.0, 5.0, 10.0)
 MISSING = (
     "this run has stored no contacts, so their forces cannot be shown; run it again with --set output.contacts=true"
@@ -107,27 +109,44 @@ def arrows(rows: Rows, scale: ForceScale, tilt: float) -> Floats:
 def draw_forces(canvas: Canvas, frames: WithContacts, frame: int, scale: ForceScale) -> None:
     """Draw the forces of all contacts of one frame."""
     found = arrows(contacts_of(frames).at(frame), scale, canvas.extent.tilt)
-    for part in _parts(found, canvas):
+    size = min(1.0, scale.longest * canvas.points_per_mm / WHOLE)
+    if size < 1.0:
+        _draw_veil(canvas)
+    for part in _parts(found, canvas, size):
         canvas.axes.add_collection(part)
 
 
-def _parts(found: Floats, canvas: Canvas) -> "list[Collection]":
-    """Return shafts and heads of arrows, with a light line around them that keeps them apart from dark blocks."""
+def _draw_veil(canvas: Canvas) -> None:
+    """Make everything above the ground paler."""
+    from matplotlib.patches import Rectangle  # noqa: PLC0415 - see style
+
+    extent = canvas.extent
+    place = (extent.left, extent.lowest), extent.width, extent.top - extent.lowest
+    canvas.axes.add_artist(Rectangle(*place, facecolor="#FFFFFF", alpha=VEIL_ALPHA, linewidth=0.0, zorder=VEIL))
+
+
+def _parts(found: Floats, canvas: Canvas, size: float) -> "list[Collection]":
+    """Return shafts and heads of arrows, with a light line around them that keeps them apart from dark blocks.
+
+    `size` is that of heads and lines over their usual one.
+    """
     from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415 - see style
 
     ways = found[:, 1] - found[:, 0]
     lengths = np.hypot(*ways.T)
     found, ways, lengths = (one[lengths * canvas.points_per_mm >= LEAST] for one in (found, ways, lengths))
     along = ways / lengths[:, None]
-    head = np.minimum(HEAD[0] / canvas.points_per_mm, lengths)
+    head = np.minimum(size * HEAD[0] / canvas.points_per_mm, lengths)
     necks = found[:, 1] - head[:, None] * along
     across = np.stack([-along[:, 1], along[:, 0]], axis=-1) * (head * HEAD[1] / HEAD[0])[:, None]
     heads = list(np.stack([found[:, 1], necks + across, necks - across], axis=1))
     shafts = list(np.stack([found[:, 0], necks], axis=1))
     at: dict[str, Any] = {"transform": canvas.scene}
     return [
-        LineCollection(shafts, colors="#FFFFFF", linewidths=HALO, zorder=BELOW, **at),
-        PolyCollection(heads, facecolors="#FFFFFF", edgecolors="#FFFFFF", linewidths=HALO - WIDTH, zorder=BELOW, **at),
-        LineCollection(shafts, colors=style.INK, linewidths=WIDTH, zorder=FORCES, **at),
+        LineCollection(shafts, colors="#FFFFFF", linewidths=size * HALO, zorder=BELOW, **at),
+        PolyCollection(
+            heads, facecolors="#FFFFFF", edgecolors="#FFFFFF", linewidths=size * (HALO - WIDTH), zorder=BELOW, **at
+        ),
+        LineCollection(shafts, colors=style.INK, linewidths=size * WIDTH, zorder=FORCES, **at),
         PolyCollection(heads, facecolors=style.INK, linewidths=0.0, zorder=FORCES, **at),
     ]

@@ -14,7 +14,7 @@ from blocksim.world.boundary import particle_count
 from blocksim.world.bounds import bounds_of
 from blocksim.world.build import build_world
 from blocksim.world.interactions import ContactClass, contact_classes, interactions_of, pair_of
-from blocksim.world.memory import RigidSize, SceneSize, file_bytes
+from blocksim.world.memory import RigidSize, SceneSize, file_bytes, recorded_contacts
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
 from blocksim.world.rigid_step import longest_step
 from blocksim.world.sag import column_sag, inverse_mass, point_stiffness
@@ -23,7 +23,6 @@ from blocksim.world.sag import column_sag, inverse_mass, point_stiffness
 SECONDS_PER_BODY_AND_STEP = 75e-9
 SECONDS_IN_A_CROWD = 250e-9  # where bodies have neighbours on all sides
 CROWD = 50  # bodies
-CONTACTS_OF_A_BODY = 4  # recorded in a frame, of corners and rigid faces: hardly ever more
 SECONDS_IN_A_SUBSTEP = 400e-9  # a block, where contacts are rigid
 RIGID_RULES = ("friction", "restitution")  # what decides where contacts are rigid
 STIFFNESS_UNITS = {"linear": "N/m", "hertz-mindlin": "N/m^1.5"}
@@ -93,7 +92,7 @@ def describe(scenario: Scenario) -> Description:
     steps = max(1, round(scenario.time.end / step))
     frames = min(steps, round(scenario.time.end / scenario.output.every)) + 1
     particles = _particles(scenario, placed)
-    contacts = max(CONTACTS_OF_A_BODY * len(placed), particles) if scenario.output.contacts else 0
+    contacts = recorded_contacts(len(placed), particles) if scenario.output.contacts else 0
     return Description(
         bodies=placed,
         pairs=tuple(_pairs(scenario, world, placed)),

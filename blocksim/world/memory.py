@@ -25,6 +25,7 @@ OBJECT_BYTES = 450  # a placed body with its name, and its places in lists; meas
 MOTION_VALUES = 6  # of a body in a frame: place, angle, velocity, spin
 FRAME_VALUES = 12  # of a frame beside those: step, time, energies, number of contacts, largest overlap
 CONTACT_VALUES = 8  # of a recorded contact: two bodies in one, place, normal, overlap, forces
+CONTACTS_OF_A_BODY = 4  # recorded in a frame, of corners and rigid faces: hardly ever more
 COPIES = 2  # of all frames at the end of a run: as they came, and joined
 UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB", "EB")
 THOUSAND = 1000
@@ -113,6 +114,11 @@ class RigidSize(Size):
 def file_bytes(bodies: int, frames: int, contacts: int = 0) -> int:
     """Return the bytes that frames with so many contacts each take in a file."""
     return frames * VALUE * (FRAME_VALUES + MOTION_VALUES * bodies + CONTACT_VALUES * contacts)
+
+
+def recorded_contacts(bodies: int, particles: int) -> int:
+    """Return how many contacts a frame hardly ever has more of, where they are recorded."""
+    return max(CONTACTS_OF_A_BODY * bodies, particles)
 
 
 def refuse_if_too_large(size: Size) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from blocksim.scenario import Scenario
-    from blocksim.simulation import Progress, Result
+    from blocksim.simulation import Frames, Progress, Result
 
 MODELS: dict[str, dict[str, dict[str, object]]] = {
     "surface-linear": {"contact": {"model": "surface", "law": "linear"}},
@@ -47,7 +47,7 @@ def sliding(parts: Mapping[str, Mapping[str, object]], end: float = 0.05, every:
             "friction": {"block_block": 0.9, "block_ground": 0.9},
             "contact": {"stiffness_scale": SOFT, **parts.get("contact", {})},
             "time": {"end": end, "stop_at_rest": False, **parts.get("time", {})},
-            "output": {"every": every},
+            "output": {"every": every, **parts.get("output", {})},
         }
     )
 
@@ -80,6 +80,13 @@ def assert_same(one: Result, other: Result) -> None:
         assert {name: getattr(mine, name).tobytes() for name in SERIES} == {
             name: getattr(its, name).tobytes() for name in SERIES
         }
+        assert contacts_of(mine) == contacts_of(its)
         assert {name: values.tobytes() for name, values in mine.energy.items()} == {
             name: values.tobytes() for name, values in its.energy.items()
         }
+
+
+def contacts_of(frames: Frames) -> tuple[bytes, bytes] | None:
+    """Return all bits of the contacts of frames, where they were recorded."""
+    contacts = frames.contacts
+    return None if contacts is None else (contacts.ends.tobytes(), contacts.rows.tobytes())

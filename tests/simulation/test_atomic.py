@@ -1,5 +1,7 @@
 """A file is whole or not there."""
 
+import errno
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -23,6 +25,26 @@ def test_failed_write_leaves_the_old_file_and_nothing_else(tmp_path: Path, monke
     with pytest.raises(OutputError, match=r"a\.txt: cannot be written: No space left on device"):
         atomic.write_text(tmp_path / "a.txt", "new")
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "old"}
+
+
+def test_the_name_goes_to_the_disk_too_once_the_file_has_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[tuple[Path, str]] = []
+    monkeypatch.setattr(atomic, "sync_file", lambda path: synced.append((path, (tmp_path / "a.txt").read_text())))
+    atomic.write_text(tmp_path / "a.txt", "new")
+    assert synced == [(tmp_path, "new")]
+
+
+def test_folder_that_cannot_be_brought_to_the_disk_is_no_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in (errno.EINVAL, errno.EIO):
+
+        def fail(_: Path, number: int = number) -> None:
+            raise OSError(number, "no")
+
+        monkeypatch.setattr(atomic, "sync_file", fail)
+        with nullcontext() if number == errno.EINVAL else pytest.raises(OutputError):
+            atomic.write_text(tmp_path / "a.txt", "new")
 
 
 def test_a_file_takes_the_place_of_the_older_one_once_it_is_whole(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from blocksim.scenario import load_scenario
 from blocksim.simulation import simulate_into
 from blocksim.simulation.checkpoint import read_checkpoint
 from blocksim.simulation.precautions import Precautions
+from blocksim.simulation.provenance import code_hashes
 from blocksim.simulation.resumption import find_resumption
 from blocksim.simulation.schemes import build_scene
 from blocksim.simulation.stacking import arrays_of
@@ -122,6 +123,17 @@ def interrupted_at_once(scenario: Scenario, folder: Path, step: int) -> list[int
     return [part.summary.steps]
 
 
+@pytest.mark.parametrize("name", ["surface-linear", "particles-linear", "nonsmooth"])
+def test_contacts_of_all_frames_are_kept_once(tmp_path: Path, name: str) -> None:
+    scenario = sliding({**MODELS[name], "output": {"contacts": True}}, end=0.02)
+    whole = simulate_into(scenario, tmp_path / "whole")
+    interrupted_at(scenario, tmp_path / "parts", [whole.summary.steps // 3, whole.summary.steps // 2])
+    resumed = simulate_into(scenario, tmp_path / "parts", resume=True)
+    assert whole.frames.contacts is not None
+    assert len(whole.frames.contacts.rows) > 10
+    assert_same(whole, resumed)
+
+
 def test_checkpoints_threads_and_outputs_change_no_bit(tmp_path: Path) -> None:
     scenario = sliding({}, end=0.02)
     often = Precautions(checkpoint_steps=7, checkpoint_time=1e-4, checkpoint_seconds=1e-3)
@@ -178,12 +190,13 @@ def test_other_scenario_is_refused_with_the_keys(begun: Path) -> None:
 
 
 def test_other_code_is_refused_with_what_differs(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    source = "blocksim.kernels.jit.source_hash"
-    monkeypatch.setattr(source, lambda folder: "new" if folder.name in {"kernels", "world"} else "old")
-    with pytest.raises(InvalidInputError, match="it differs in blocksim/kernels"):
+    origin = "blocksim.simulation.checkpoint_origin"
+    other = {**code_hashes(), "kernels": "new", "world": "new"}
+    monkeypatch.setattr(f"{origin}.code_hashes", lambda: other)
+    with pytest.raises(InvalidInputError, match="it differs in blocksim/kernels, blocksim/world; --overwrite"):
         find_resumption(begun, sliding({}))
-    monkeypatch.setattr("numba.__version__", "99.1")
-    with pytest.raises(InvalidInputError, match=r"another version of the code: numba [\d.]+ -> 99\.1; --overwrite"):
+    monkeypatch.setattr(f"{origin}.code_version", lambda: "99.1")
+    with pytest.raises(InvalidInputError, match=r"another version of the code: blocksim [\d.]+ -> 99\.1; --overwrite"):
         find_resumption(begun, sliding({}))
 
 

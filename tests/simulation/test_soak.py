@@ -20,7 +20,7 @@ WARM = 1.0  # s, by which all lists have found their size
 SETTLED = 3.0  # s
 AT_REST = 1e-6  # m/s
 CREEP = 1e-9  # m, until the end; measured for 1000 blocks: 8e-11
-GROWTH = 0.05  # of the memory; frames that are kept in memory are few here: 48 bytes a block and frame
+GROWTH = 0.05  # of the memory; frames go to the disk
 MEMORY = Path("/proc/self/statm")
 
 
@@ -31,7 +31,7 @@ def memory() -> float:
 
 @pytest.mark.long
 def test_long_run_keeps_its_memory_its_energy_and_its_rest(tmp_path: Path) -> None:
-    values = {"time.end": END, "time.stop_at_rest": False, "output.every": "0.1 s", **SIZE}
+    values = {"time.end": END, "time.stop_at_rest": False, "output.every": "10 ms", **SIZE}
     sizes: list[float] = []
     residuals: list[float] = []
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import OutputError
 from blocksim.scenario import PlacedBody
+from blocksim.simulation.atomic import sync_file
 from blocksim.simulation.contacts import Rows
 from blocksim.simulation.recorder import MOTION, Frame
 from blocksim.simulation.stores import hdf5_layout as layout
@@ -185,7 +186,7 @@ class FrameFile:
             raise OutputError(message) from error
 
     def close(self) -> None:
-        """Commit and close the file normally. Raises OutputError, unless trouble was told already."""
+        """Commit, close the file normally, wait for the disk. Raises OutputError, unless trouble was told already."""
         if self.is_broken:
             with contextlib.suppress(OSError, RuntimeError):
                 self.file.close()
@@ -193,6 +194,7 @@ class FrameFile:
         self.commit()
         with self._telling_trouble():
             self.file.close()
+            sync_file(self.path)  # no mark of a finished run may outlive its frames
 
     def __enter__(self) -> Self:
         """Return itself."""

@@ -57,10 +57,10 @@ def write_frames(path: Path, scenario: Scenario, count: int) -> None:
 
 
 def contacts_of(motion: NDArray[np.float64]) -> Rows:
-    """Return a contact of every block with the ground below its centre, 2 N upwards."""
-    rows = empty_rows(motion.shape[1])
-    rows["body_a"], rows["body_b"] = np.arange(len(rows)), SUPPORT
-    rows["x"], rows["normal_y"], rows["normal_force"] = motion[0], 1.0, 2.0
+    """Return four contacts of every block with the ground below its centre, 2 N upwards each."""
+    rows = empty_rows(4 * motion.shape[1])
+    rows["body_a"], rows["body_b"] = np.arange(len(rows)) // 4, SUPPORT
+    rows["x"], rows["normal_y"], rows["normal_force"] = np.repeat(motion[0], 4), 1.0, 2.0
     return rows
 
 

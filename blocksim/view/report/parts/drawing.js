@@ -1,4 +1,6 @@
 // Draws one frame.
+const FEW_ARROWS = 400;
+
 class Drawing {
   constructor(canvas, frames) {
     this.canvas = canvas;
@@ -199,37 +201,45 @@ class Drawing {
     }
   }
 
-  // Draws an arrow for every contact, in pixels: shaft and head in one path, with a light line around it.
+  // Draws an arrow for every contact in pixels, all in one path. Few get a light line around them, which
+  // takes time; many get paler blocks below.
   drawForces(frame) {
-    const { context, frames, view, ratio, colours } = this;
-    const { x, y, fx, fy, scale, longest } = frames.forces;
-    const [first, last] = frames.contactsOf(frame);
+    const { context, ratio, colours } = this;
+    const [first, last] = this.frames.contactsOf(frame);
     const path = new Path2D();
-    for (let at = first; at < last; at += 1) {
-      const length = scale * Math.hypot(fx[at], fy[at]);
-      const reach = view.scale * Math.min(length, longest);
-      if (!(reach > 1)) continue;
-      const [px, py] = view.toPixels(x[at], y[at]);
-      const [qx, qy] = view.toPixels(x[at] + fx[at], y[at] + fy[at]);
-      const way = Math.hypot(qx - px, qy - py);
-      const [ux, uy] = [(qx - px) / way, (qy - py) / way];
-      const head = Math.min(6, 0.6 * reach);
-      const [ex, ey] = [px + reach * ux, py + reach * uy];
-      path.moveTo(px, py);
-      path.lineTo(ex, ey);
-      path.moveTo(ex - head * (ux - 0.5 * uy), ey - head * (uy + 0.5 * ux));
-      path.lineTo(ex, ey);
-      path.lineTo(ex - head * (ux + 0.5 * uy), ey - head * (uy - 0.5 * ux));
-    }
+    for (let at = first; at < last; at += 1) this.traceForce(path, at);
+    const few = last - first <= FEW_ARROWS;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.lineCap = context.lineJoin = "round";
-    for (const [width, ink] of [[4, colours.stage], [1.6, colours.ink]]) {
+    if (!few) {
+      context.globalAlpha = 0.55;
+      context.fillStyle = colours.stage;
+      context.fillRect(0, 0, this.canvas.width / ratio, this.canvas.height / ratio);
+      context.globalAlpha = 1;
+    }
+    for (const [width, ink] of few ? [[4, colours.stage], [1.6, colours.ink]] : [[1, colours.ink]]) {
       context.lineWidth = width;
       context.strokeStyle = ink;
       context.stroke(path);
     }
-    context.lineCap = "butt";
-    context.lineJoin = "miter";
+  }
+
+  traceForce(path, at) {
+    const { view } = this;
+    const { x, y, fx, fy, scale, longest } = this.frames.forces;
+    const force = Math.hypot(fx[at], fy[at]);
+    const reach = view.scale * Math.min(scale * force, longest);
+    if (!(reach > 1)) return;
+    const [px, py] = view.toPixels(x[at], y[at]);
+    const ux = (view.cos * fx[at] - view.sin * fy[at]) / force;
+    const uy = -(view.sin * fx[at] + view.cos * fy[at]) / force;
+    const [ex, ey] = [px + reach * ux, py + reach * uy];
+    path.moveTo(px, py);
+    path.lineTo(ex, ey);
+    const head = Math.min(6, 0.5 * reach);
+    if (head < 2) return;
+    path.moveTo(ex - head * (ux - 0.5 * uy), ey - head * (uy + 0.5 * ux));
+    path.lineTo(ex, ey);
+    path.lineTo(ex - head * (ux + 0.5 * uy), ey - head * (uy - 0.5 * ux));
   }
 
   drawMark(frame, block) {
