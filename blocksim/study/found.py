@@ -22,6 +22,7 @@ from blocksim.study.table import TABLE, read_sweep
 from blocksim.view.sweeps.found import QUARTER, FoundSweep, Input, Measured
 
 Floats = NDArray[np.float64]
+LARGEST = 1e30  # of inputs (SI) and of places (mm) that are drawn
 
 
 def read_found(folder: Path, experiment: Path | None = None) -> FoundSweep:
@@ -71,7 +72,10 @@ def measured_of(table: ExperimentTable, blocks: tuple[str, ...]) -> Measured:
 
 def _columns(members: Members, quantity: str) -> Floats:
     """Return one quantity of all blocks, (count, b); NaN where a member has none. Raises InvalidInputError."""
-    return np.stack([members.values(block, quantity) for block in blocks_in(map(str, members.table.columns))], axis=1)
+    found = np.stack([members.values(block, quantity) for block in blocks_in(map(str, members.table.columns))], axis=1)
+    if np.nanmax(np.abs(found), initial=0.0) > LARGEST:
+        raise InvalidInputError(f"{members.source}: a block has gone farther than can be drawn")
+    return found
 
 
 def _inside(table: pd.DataFrame, ranges: Ranges) -> NDArray[np.bool_]:
@@ -82,6 +86,10 @@ def _inputs(scenario: Scenario, table: pd.DataFrame) -> tuple[Input, ...]:
     """Return the keys that take more than one value, or the first where none does."""
     vary = {} if scenario.sweep is None else scenario.sweep.vary
     keys = [str(key) for key in table.columns if key in vary]
+    missing = [key for key in vary if key not in keys]
+    if missing or not keys:
+        message = f"{TABLE} has no column {missing[0]}" if missing else f"{PLAN} varies no key"
+        raise InvalidInputError(f"{message}; the two do not belong together")
     inputs = [_input(scenario, key, table[key]) for key in keys]
     varied = [one for one in inputs if one.count > 1]
     return tuple(varied or inputs[:1])
@@ -89,6 +97,8 @@ def _inputs(scenario: Scenario, table: pd.DataFrame) -> tuple[Input, ...]:
 
 def _input(scenario: Scenario, key: str, column: pd.Series) -> Input:
     numbers = [_number(value) for value in column]
+    if not all(number is None or abs(number) <= LARGEST for number in numbers):
+        raise InvalidInputError(f"{TABLE}: the column {key} holds what is no number, or too large a one")
     if all(number is not None for number in numbers):
         return Input(key, _unit(scenario, key), np.array(numbers, dtype=np.float64), is_even=_is_even(scenario, key))
     words = [q.shown(value).strip('"') for value in column]

@@ -82,8 +82,11 @@ def choose_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> floa
         message = f"scenario {scenario.name} is not one of the explicit scheme"
         raise ValueError(message)  # noqa: TRY004 - the scenario is of the right type
     with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused below
-        load = expected_load(scenario, bounds)
-        limit = admissible_step(bounds, table, scenario.time.safety, scenario.contact.law, load)
+        try:
+            load = expected_load(scenario, bounds)
+            limit = admissible_step(bounds, table, scenario.time.safety, scenario.contact.law, load)
+        except ArithmeticError:  # Python's own powers do not end in infinity
+            limit = 0.0
     limit = min(limit, scenario.time.end)
     asked = scenario.time.step
     step = limit if asked == "auto" else asked

@@ -239,3 +239,11 @@ def test_step_that_is_too_long_for_rigid_contacts_is_shown_where_it_stands(block
 def test_an_end_of_next_to_nothing_is_no_internal_error(blocksim: Command, end: str) -> None:
     answer = blocksim("check", "scenarios/three_blocks.toml", "--set", f"time.end={end}")
     assert answer.code in {0, 65}  # the interval of checks was infinite
+
+
+@pytest.mark.parametrize("modulus", ["1e308", "1e200"])
+def test_an_absurd_stiffness_is_no_internal_error(blocksim: Command, modulus: str) -> None:
+    setting = f"materials.aluminium.young_modulus={modulus}"
+    answer = blocksim("check", "scenarios/three_blocks.toml", "--set", setting, "--set", "contact.stiffness_scale=1")
+    assert answer.code == 65  # its square overflowed
+    assert "time.step" in answer.err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import resource
 import select
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 PATIENCE = 30.0  # s of wall time, after which a command counts as hanging; machines of tests are busy
 MOST_SECONDS = 2.0  # of processor time
 MOST_BYTES = 10**9
+COLLECTED = 10  # commands between two collections of garbage
 ADDRESSES = 8 << 30  # bytes of address space, so that nothing takes the machine's memory; libraries map some of it
 START = "from tests.fuzz.child import serve; serve()"
 
@@ -86,7 +88,9 @@ def serve() -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
-    for line in sys.stdin:
+    for number, line in enumerate(sys.stdin):
+        if number % COLLECTED == 0:  # commands leave that to the end of their process
+            gc.collect()
         answers.write(json.dumps(_left(**json.loads(line))) + "\n")
         answers.flush()
 

@@ -30,7 +30,7 @@ OFTEN = (*COMMANDS[:2], *COMMANDS[:2], COMMANDS[2])
 def _table() -> bytes:
     """Return the table of nine cases, of which one has failed."""
     ends = [f"{block}.{name}" for block in ENDS for name in KEPT]
-    keys = ("friction.block_block", "contact.stiffness_scale")
+    keys = ("friction.block_block.static", "contact.stiffness_scale")
     lines = [",".join(("case", *keys, "status", "reason", "seconds", "inside", *ends))]
     for number in range(9):
         values = (f"{value + 0.3 * number}" for block in ENDS.values() for value in block)
@@ -61,6 +61,26 @@ def _try(child: Child, folder: Path, usual: dict[tuple[str, ...], float], data: 
     assert_harmless(left, {0, 1, 65}, usual[command])
     if left.code == 65:
         assert "sweep" in left.err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (b",friction.block_block.static,", b",nan,", "no column friction.block_block.static"),
+        (b"\n000000000000,0.2,", b"\n000000000000,nan,", "holds what is no number"),
+        (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,1e308,", "farther than can be drawn"),
+        (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,sixteen,", "not a number"),
+        (b",1.rotation_deg,", b",turned,", "no column 1.rotation_deg"),
+    ],
+)
+def test_tables_that_do_not_go_with_their_plan_are_not_drawn(  # found by the damage below
+    child: Child, folder: Path, usual: object, old: bytes, new: bytes, told: str
+) -> None:
+    assert usual
+    (folder / "sweep" / "sweep.csv").write_bytes(_table().replace(old, new, 1))
+    left = child.call(folder, "plot", "sweep", "--out", "sweep.png")
+    assert_harmless(left, {65}, 1.0)
+    assert told in left.err
 
 
 @settings(max_examples=QUICK)
