@@ -62,7 +62,7 @@ def read_contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts |
         raise ValueError(f"{ENDS} does not count the contacts of {frames} frames")
     count = int(ends[-1]) if frames else 0
     columns = {name: safety.data_set(file, f"{GROUP}/{name}", 1) for name in COLUMN_UNITS}
-    safety.refuse_too_many(path, columns, count, "contacts")
+    safety.refuse_too_many(path, {f"{GROUP}/{name}": one for name, one in columns.items()}, count, "contacts")
     rows = empty_rows(count)
     for name, column in columns.items():
         rows[name] = column[:count]
