@@ -81,7 +81,7 @@ def test_failed_run_is_told_kept_and_76(blocksim: Command) -> None:
         ([*RUN, "--set", "experiment.table=nix.csv"], 65, "no such file"),
         ([*RUN, "--set", "experiment.table=../tests/bad.csv"], 65, "no such file"),
         ([*RUN, "--out", "broken.toml"], 73, "broken.toml: cannot be created"),
-        ([*RUN, "--out", "broken.toml/x"], 73, "broken.toml/x: cannot be created: Not a directory"),
+        ([*RUN, "--out", "broken.toml/x"], 73, "broken.toml/x: cannot be created: broken.toml is a file, not a folder"),
         ([*RUN, "--out", "foreign"], 73, "holds files that are not a blocksim run (thesis.tex)"),
         ([*RUN, "--out", "foreign", "--overwrite"], 73, "holds files that are not a blocksim run (thesis.tex)"),
     ],

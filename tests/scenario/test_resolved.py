@@ -62,7 +62,7 @@ TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=30)
 SCENARIOS = st.fixed_dictionaries(
     {
         "schema": st.just(1),
-        "name": st.from_regex(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,20}", fullmatch=True),
+        "name": st.from_regex(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,20}[A-Za-z0-9_-]", fullmatch=True),
         "materials": st.fixed_dictionaries(
             {
                 "m": st.fixed_dictionaries(
@@ -254,6 +254,7 @@ HASHED = {
     "time.rest_speed": 1.0,
     "time.rest_hold": 1.0,
     "output.every": 1.0,
+    "output.contacts": True,
 }
 SINGLE_CHOICE = {"schema", "time.scheme", "materials.m.unit_weight", "motion.kind"}
 

@@ -135,7 +135,5 @@ def test_contacts_that_are_cut_off_are_refused(soft: Shipped, tmp_path: Path) ->
         units = {name: file[f"contacts/{name}"].attrs["unit"] for name in ("x", "normal_force", "overlap", "body_a")}
         assert units == {"x": "m", "normal_force": "N", "overlap": "m", "body_a": "1"}
         file["contacts/normal_force"].resize(3, axis=0)
-    with pytest.raises(
-        InvalidInputError, match="contacts/normal_force: holds 3 contacts, not"
-    ):
+    with pytest.raises(InvalidInputError, match="contacts/normal_force: holds 3 contacts, not"):
         read_frames(path, scenario)
