@@ -55,8 +55,9 @@ test: $(DEV_STAMP) ## Run the tests (sets up .venv first)
 	$(VENV_PYTHON) -m pytest $(ON_ALL_CORES)
 
 .PHONY: test-long
-test-long: $(DEV_STAMP) ## Run the full sizes of the verification cases, some minutes
-	$(VENV_PYTHON) -m pytest -m long
+test-long: $(DEV_STAMP) ## Full sizes: verification, kills, resumed runs, fuzz, soak, clusters, browser; twenty minutes
+	$(VENV_PYTHON) -m pytest -m long $(ON_ALL_CORES) --ignore tests/browser
+	$(VENV_PYTHON) -m pytest -m long tests/browser
 
 .PHONY: test-nojit
 test-nojit: $(DEV_STAMP) ## Run the tests of the kernels as plain Python, without the compiler
