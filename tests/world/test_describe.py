@@ -18,6 +18,11 @@ def test_the_step_that_is_told_is_the_one_that_is_taken() -> None:
     assert told.steps * told.step == pytest.approx(scenario.time.end, abs=told.step)
 
 
+def test_frames_closer_than_any_step_are_as_many_as_steps() -> None:
+    told = describe(load_scenario(SCENARIOS / "slide.toml", {"output.every": 1e-320}))
+    assert told.frames == told.steps + 1
+
+
 def test_ground_and_block_pairs_are_told_with_their_own_friction_and_restitution() -> None:
     scenario = load_scenario(SCENARIOS / "three_blocks.toml", ["contact.restitution.block_ground=0.1"])
     ground, block = describe(scenario).pairs
