@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fuzz.conftest import LONG, QUICK, assert_harmless
+from tests.fuzz.conftest import LONG, QUICK, assert_harmless, in_all
 from tests.fuzz.mutations import BINARY, JSON, SCENARIO, TABLE, damaged
 from tests.fuzz.runs import FRAMES
 
@@ -68,7 +68,7 @@ def test_damaged_results_are_told_in_a_line(
 
 
 @pytest.mark.long
-@settings(LONG, max_examples=500)
+@settings(LONG, max_examples=in_all(500))
 @given(data=st.data())
 def test_five_hundred_damaged_results(
     child: Child, run: Run, usual: dict[tuple[str, ...], float], data: st.DataObject

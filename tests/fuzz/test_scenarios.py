@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fuzz.conftest import LONG, QUICK, assert_harmless
+from tests.fuzz.conftest import LONG, QUICK, assert_harmless, in_all
 from tests.fuzz.mutations import SCENARIO, damaged
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def test_damaged_scenarios_are_refused_with_their_place(child: Child, folder: Pa
 
 
 @pytest.mark.long
-@settings(LONG, max_examples=5000)
+@settings(LONG, max_examples=in_all(5000))
 @given(content=SCENARIOS)
 def test_five_thousand_damaged_scenarios(child: Child, folder: Path, content: bytes) -> None:
     _check(child, folder, content)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fuzz.conftest import LONG, QUICK, ROOT, assert_harmless
+from tests.fuzz.conftest import LONG, QUICK, ROOT, assert_harmless, in_all
 from tests.fuzz.mutations import TABLE, damaged
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def test_damaged_tables_of_sweeps_do_no_harm(
 
 
 @pytest.mark.long
-@settings(LONG, max_examples=200)
+@settings(LONG, max_examples=in_all(200))
 @given(data=st.data())
 def test_two_hundred_damaged_tables_of_sweeps(
     child: Child, folder: Path, usual: dict[tuple[str, ...], float], data: st.DataObject

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fuzz.conftest import LONG, QUICK, ROOT, assert_harmless
+from tests.fuzz.conftest import LONG, QUICK, ROOT, assert_harmless, in_all
 from tests.fuzz.mutations import TABLE, damaged
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def test_damaged_tables_are_refused_with_their_line(child: Child, place: Path, d
 
 
 @pytest.mark.long
-@settings(LONG, max_examples=1000)
+@settings(LONG, max_examples=in_all(1000))
 @given(data=st.data(), kind=TABLES)
 def test_a_thousand_damaged_tables(child: Child, place: Path, data: st.DataObject, kind: str) -> None:
     _try(child, place, kind, data.draw(damaged(TEXTS[kind], TABLE)))
