@@ -10,7 +10,7 @@ from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.stacking import arrays_of
 from blocksim.world.free_memory import readable
-from blocksim.world.memory import file_bytes, recorded_contacts
+from blocksim.world.memory import file_bytes, output_count, recorded_contacts
 
 CHECKPOINT_FILES = len(CHECKPOINTS) + 1  # the last one while it is written
 
@@ -30,7 +30,7 @@ def refuse_full_disk(folder: Path, scenario: Scenario, scene: AnyScene) -> None:
 def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
     """Return the bytes that the frames of a run and its checkpoints take at most."""
     steps = last_step_of(scenario.time.end, float(scene.world.controls[0].step))
-    frames = round(min(steps, scenario.time.end / scenario.output.every)) + 2  # the first, and wherever it ends
+    frames = output_count(steps, scenario.time.end, scenario.output.every) + 2  # the first, and wherever it ends
     bodies, particles = scene.world.bodies.size - 1, scene.world.particles
     contacts = recorded_contacts(bodies, 0 if particles is None else particles.size) if scenario.output.contacts else 0
     return file_bytes(bodies, frames, contacts) + CHECKPOINT_FILES * sum(array.nbytes for array in arrays_of(scene))

@@ -14,7 +14,7 @@ from blocksim.world.boundary import particle_count
 from blocksim.world.bounds import bounds_of
 from blocksim.world.build import build_world
 from blocksim.world.interactions import ContactClass, contact_classes, interactions_of, pair_of
-from blocksim.world.memory import RigidSize, SceneSize, file_bytes, recorded_contacts
+from blocksim.world.memory import RigidSize, SceneSize, file_bytes, output_count, recorded_contacts
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
 from blocksim.world.rigid_step import longest_step
 from blocksim.world.sag import column_sag, inverse_mass, point_stiffness
@@ -90,7 +90,7 @@ def describe(scenario: Scenario) -> Description:
     world, size = _built(scenario, len(placed))
     step = float(world.controls[0].step)
     steps = max(1, round(scenario.time.end / step))
-    frames = round(min(steps, scenario.time.end / scenario.output.every)) + 1
+    frames = output_count(steps, scenario.time.end, scenario.output.every) + 1
     particles = _particles(scenario, placed)
     contacts = recorded_contacts(len(placed), particles) if scenario.output.contacts else 0
     return Description(

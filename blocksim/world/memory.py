@@ -104,6 +104,11 @@ class RigidSize(Size):
         return self.bodies * body + self.pairs * pair
 
 
+def output_count(steps: int, end: float, every: float) -> int:
+    """Return how many frames follow the first, one every `every` (s) until `end` (s), but at most one a step."""
+    return round(min(steps, end / every))
+
+
 def file_bytes(bodies: int, frames: int, contacts: int = 0) -> int:
     """Return the bytes that frames with so many contacts each take in a file."""
     return frames * VALUE * (FRAME_VALUES + MOTION_VALUES * bodies + CONTACT_VALUES * contacts)

@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -53,6 +54,16 @@ def blocksim(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
 
 Running = subprocess.Popen[str]
 Process = Callable[..., Running]
+PATIENCE = 300.0  # s with a process, on a machine that does much else; alone it takes ten
+
+
+def wait_for(path: Path, running: Running) -> None:
+    """Wait until a process has made a file."""
+    began = time.monotonic()
+    while not path.exists():
+        assert running.poll() is None, running.communicate()
+        assert time.monotonic() - began < PATIENCE
+        time.sleep(0.005)
 
 
 @pytest.fixture

@@ -14,21 +14,12 @@ import pytest
 
 from blocksim.scenario import load_scenario
 from blocksim.simulation.stores.hdf5_reader import read_frames
-from tests.cli.conftest import SOFT, Command, Process, Running
+from tests.cli.conftest import PATIENCE, SOFT, Command, Process, wait_for
 
-PATIENCE = 300.0  # s, on a machine that does much else; alone they take ten
 NOMINAL = "scenarios/three_blocks_nominal.toml"
 LONG = ("run", NOMINAL, *SOFT, "--set", "time.end=20", "--set", "time.stop_at_rest=false", "--quiet")
 OFTEN = ("--checkpoint-every", "50 ms")
 Wanted = dict[str, object]
-
-
-def wait_for(path: Path, running: Running) -> None:
-    began = time.monotonic()
-    while not path.exists():
-        assert running.poll() is None, running.communicate()
-        assert time.monotonic() - began < PATIENCE
-        time.sleep(0.005)
 
 
 def told(folder: Path) -> Wanted:

@@ -12,7 +12,7 @@ import pytest
 
 from blocksim.scenario import load_scenario
 from blocksim.simulation.stores.hdf5_reader import read_frames
-from tests.cli.conftest import SOFT, Process, Running
+from tests.cli.conftest import PATIENCE, SOFT, Process, wait_for
 
 SLOW = (
     "run",
@@ -24,15 +24,6 @@ SLOW = (
     "time.stop_at_rest=false",
 )
 LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))"
-PATIENCE = 60.0  # s
-
-
-def wait_for(path: Path, running: Running) -> None:
-    began = time.monotonic()
-    while not path.exists():
-        assert running.poll() is None, running.communicate()
-        assert time.monotonic() - began < PATIENCE
-        time.sleep(0.005)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])

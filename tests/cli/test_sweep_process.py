@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.study.manifest import read_entries
-from tests.cli.conftest import Process, Running
-from tests.cli.test_process import PATIENCE, wait_for
+from tests.cli.conftest import PATIENCE, Process, Running, wait_for
 
 Sweep = Callable[..., Running]
 
