@@ -1,10 +1,12 @@
 """Two recordings of what should be the same run, compared bit for bit."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.simulation.contacts import CONTACT_ROW, UNITS, Contacts, Rows
 from blocksim.simulation.frames import Floats, Frames
 
 MILLI = 1e3
@@ -16,6 +18,7 @@ MOTION = {  # quantity of a frame: its name in tables, and SI -> that unit
     "vy": ("vy_mm_s", MILLI),
     "spin": ("spin_deg_s", 180.0 / np.pi),
 }
+CONTACT_ENDS = {name: f"_{unit}" for name, unit in UNITS.items() if unit != "1"}
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Differences:
 
 
 def differences(stored: Frames, now: Frames) -> Differences:
-    """Compare all numbers of all frames of the same blocks: steps, motion, energies, contacts and overlaps.
+    """Compare all numbers of all frames of the same blocks, recorded contacts with their forces included.
 
     A difference in the sign of zero counts as one. Differences of places are those of the frames that both have, NaN
     where a state is not finite.
@@ -71,6 +74,7 @@ def _firsts(stored: Frames, now: Frames, count: int) -> list[FirstDifference]:
     ]
     found = [_first_in_motion(stored, now, count, name) for name in MOTION]
     found += [_first_in_scene(stored, count, *one) for one in scene]
+    found += [_first_in_contacts(stored, now, count)]
     return [one for one in found if one is not None]
 
 
@@ -91,6 +95,37 @@ def _first_in_scene(stored: Frames, count: int, name: str, old: Floats, new: Flo
         return None
     frame = int(where[0])
     return FirstDifference(frame, float(stored.time[frame]), None, name, float(old[frame]), float(new[frame]))
+
+
+def _first_in_contacts(stored: Frames, now: Frames, count: int) -> FirstDifference | None:
+    """Return the first frame whose recorded contacts differ; where one recording has none, that is in the first."""
+    old, new = stored.contacts, now.contacts
+    if old is None or new is None:
+        return None if old is new else _in_frame(stored, 0, "recorded_contacts", *map(_number_in_all, (old, new)))
+    for frame in range(count):
+        tables = (old.at(frame), new.at(frame))
+        if len(tables[0]) != len(tables[1]):
+            return _in_frame(stored, frame, "recorded_contacts", *map(len, tables))
+        if tables[0].tobytes() != tables[1].tobytes():
+            return _first_in_tables(stored, frame, *tables)
+    return None
+
+
+def _first_in_tables(stored: Frames, frame: int, old: Rows, new: Rows) -> FirstDifference:
+    """Return where two tables of contacts, of as many rows but with other bytes, differ first."""
+    names = CONTACT_ROW.names or ()
+    columns = {name: (old[name].astype(float), new[name].astype(float)) for name in names}
+    row, name = min((int(np.argmax(other)), name) for name in names if (other := _is_other(*columns[name])).any())
+    values = (float(one[row]) for one in columns[name])
+    return _in_frame(stored, frame, f"contact {row + 1}, {name}{CONTACT_ENDS.get(name, '')}", *values)
+
+
+def _number_in_all(contacts: Contacts | None) -> float:
+    return math.nan if contacts is None else len(contacts.rows)
+
+
+def _in_frame(stored: Frames, frame: int, quantity: str, old: float, new: float) -> FirstDifference:
+    return FirstDifference(frame, float(stored.time[frame]), None, quantity, float(old), float(new))
 
 
 def _is_other(old: Floats, new: Floats) -> NDArray[np.bool_]:

@@ -22,7 +22,7 @@ INDENT = "  "
 MOST_CELLS = 5
 LONGEST = 60  # characters of an entry of the provenance
 MOST_WORDS = 12
-UNITS = {"_mm": " mm", "_deg": "°", "_mm_s": " mm/s", "_deg_s": "°/s", "_J": " J", "_s": " s"}
+UNITS = {"_mm": " mm", "_deg": "°", "_mm_s": " mm/s", "_deg_s": "°/s", "_J": " J", "_s": " s", "_m": " m", "_N": " N"}
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ Nothing in it can be executed when it is read.
 
 import hashlib
 import io
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, NamedTuple
@@ -21,8 +22,10 @@ from blocksim.simulation.atomic import writing
 from blocksim.simulation.checkpoint_origin import Origin
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.stacking import arrays_of
+from blocksim.world.free_memory import available_bytes, readable
 
 FORMAT: Literal["blocksim checkpoint 1"] = "blocksim checkpoint 1"
+COPIES = 3  # of the content, while it is read: the file, its arrays, the scene
 DIGEST_BYTES = hashlib.sha256().digest_size
 
 
@@ -83,15 +86,23 @@ def write_checkpoint(path: Path, scene: AnyScene, position: Position, origin: Or
 def read_checkpoint(path: Path) -> Stored:
     """Read a checkpoint. Raises InvalidInputError for one that is damaged, or none of ours."""
     try:
-        content = path.read_bytes()
+        content = _content(path)
         body, digest = content[:-DIGEST_BYTES], content[-DIGEST_BYTES:]
         if hashlib.sha256(body).digest() != digest:
             raise ValueError("its checksum is not that of its content")  # noqa: TRY301 - told as all other damage
         head, arrays = _parts(body)
-    except (OSError, ValueError, ValidationError) as error:
+    except (OSError, ValueError, MemoryError, ValidationError) as error:  # memory: of an array of a forged size
         reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
         raise InvalidInputError(f"{path}: not a whole checkpoint: {reason}") from error
     return Stored(path, head, arrays)
+
+
+def _content(path: Path) -> bytes:
+    """Return all bytes of a file. Raises OSError, and ValueError where their copies would not fit into memory."""
+    size, available = path.stat().st_size, available_bytes()
+    if available is not None and COPIES * size > available:
+        raise ValueError(f"it has {readable(size)}, and {readable(available)} of memory are free")
+    return path.read_bytes()
 
 
 def restored(stored: Stored, built: AnyScene) -> AnyScene:
@@ -116,8 +127,8 @@ def _filled(part: Any, arrays: Iterator[tuple[ArrayType, NDArray[np.uint8]]], pa
 
 def _array_like(built: NDArray[Any], kind: ArrayType, content: NDArray[np.uint8], path: Path) -> NDArray[Any]:
     """Return an array of the type of `built` with other content; its size may differ where lists have grown."""
-    count = int(np.prod(kind.shape))
-    is_alike = kind.dtype == str(built.dtype) and len(kind.shape) == built.ndim
+    count = math.prod(kind.shape)
+    is_alike = kind.dtype == str(built.dtype) and len(kind.shape) == built.ndim and min(kind.shape, default=0) >= 0
     if not is_alike or content.size != count * built.dtype.itemsize:
         raise InvalidInputError(f"{path}: an array {kind} is not one of this scene")
     array: NDArray[Any] = zeros(kind.shape, built.dtype).view(type(built))

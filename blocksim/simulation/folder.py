@@ -56,8 +56,8 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
         if present and not overwrite:
             _refuse_finished(folder)
             message = (
-                f"{folder}: a run that did not finish (stopped, failed or still running) is there; --resume goes on "
-                "with it, --overwrite replaces it, --out DIR writes elsewhere"
+                f"{folder}: a run that did not finish (stopped or failed) is there; --resume goes on with it, "
+                "--overwrite replaces it, --out DIR writes elsewhere"
             )
             raise OutputExistsError(message)
         for name in sorted(present, key=DONE.__ne__):  # the mark of a finished run goes first

@@ -9,6 +9,7 @@ from pathlib import Path
 from blocksim.scenario import Scenario, place_bodies, scenario_hash
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import sha256_of, write_text
+from blocksim.simulation.claim import claimed
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
 from blocksim.simulation.disk import refuse_full_disk
@@ -66,24 +67,31 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
 
     With `resume` it goes on from the newest whole checkpoint there, to the same bits as without the interruption;
     without any it starts anew. Raises InvalidInputError for checkpoints of another scenario or version of the code,
-    OutputExistsError where the folder is not free and OutputError where writing fails. A signal (SIGINT, SIGTERM,
-    SIGUSR1) or the limit of wall time ends it with the status `interrupted`, and what there is by then is kept.
+    OutputExistsError where the folder is not free, or another run is going on in it, and OutputError where writing
+    fails. A signal (SIGINT, SIGTERM, SIGUSR1) or the limit of wall time ends it with the status `interrupted`, and what
+    there is by then is kept.
     """
     limit = WallTime(precautions.wall_time)
     compile_kernels(kernels_of(scenario))
     began = time.perf_counter()
     built = build_scene(scenario)
     refuse_full_disk(folder, scenario, built)
-    part = Part(scenario, folder, built, find_resumption(folder, scenario) if resume else NEW)
-    tables = read_tables(scenario)
+    with claimed(folder):
+        part = Part(scenario, folder, built, find_resumption(folder, scenario) if resume else NEW)
+        toml = _made_ready(part, overwrite=overwrite or resume)
+        with stop_requests() as requests, team_for(part.scene, threads) as team:
+            attendance = Attendance(on_progress, lambda: requests.reason() or limit.reason())
+            ended = part.run(toml, precautions, team, attendance)
+            result = _result(scenario, part.recorder, ended, time.perf_counter() - began)
+            return _keep_result(result, part.account(result.summary), folder)
+
+
+def _made_ready(part: Part, *, overwrite: bool) -> str:
+    """Make the folder of a run ready for this part of it; return the resolved scenario."""
+    tables = read_tables(part.scenario)
     if not part.goes_on:
-        files.prepare_folder(folder, overwrite=overwrite or resume)
-    toml = _keep_scenario(scenario, tables, folder)
-    with stop_requests() as requests, team_for(part.scene, threads) as team:
-        attendance = Attendance(on_progress, lambda: requests.reason() or limit.reason())
-        ended = part.run(toml, precautions, team, attendance)
-        result = _result(scenario, part.recorder, ended, time.perf_counter() - began)
-        return _keep_result(result, part.account(result.summary), folder)
+        files.prepare_folder(part.folder, overwrite=overwrite)
+    return _keep_scenario(part.scenario, tables, part.folder)
 
 
 def renew_copies(scenario: Scenario, folder: Path) -> None:

@@ -6,9 +6,9 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from pathlib import Path
 
-from blocksim.errors import BlocksimError
+from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Scenario
-from blocksim.simulation import Summary
+from blocksim.simulation import Result, Summary
 from blocksim.simulation import folder as files
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.summary import read_summary
@@ -49,15 +49,23 @@ def _outcome(future: Future[Row]) -> Row:
 
 
 def run_case(scenario: Scenario, folder: Path) -> Row:
-    """Run one case into its folder, unless it is there already, and return its row."""
+    """Run one case into its folder, or what is left of it, unless it is there already, and return its row."""
     try:
         row = _known_row(scenario, folder)
         if row is None:
-            result = run(scenario, out=folder, overwrite=True)
+            result = _run_on(scenario, folder)
             row = row_of(result.status, result.reason, result.summary.simulated_time_s, result.columns)
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         return row_of_error(error)
     return row
+
+
+def _run_on(scenario: Scenario, folder: Path) -> Result:
+    """Run a case from where an interruption has left it; anew, where that cannot be taken up, or there was none."""
+    try:
+        return run(scenario, out=folder, resume=True)
+    except (InvalidInputError, InputMissingError, OutputExistsError):
+        return run(scenario, out=folder, overwrite=True)
 
 
 def _known_row(scenario: Scenario, folder: Path) -> Row | None:

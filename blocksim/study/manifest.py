@@ -5,7 +5,6 @@ values), `row` (what sweep.csv tells of it), and last `sum`, the CRC-32 of all b
 by a kill, or by a full disk) counts as not written.
 """
 
-import fcntl
 import hashlib
 import itertools
 import json
@@ -19,6 +18,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from blocksim.errors import OutputError, OutputExistsError
+from blocksim.simulation.claim import takes_lock
 from blocksim.study.rows import Row
 
 NAME = "manifest.jsonl"
@@ -86,7 +86,7 @@ class Manifest:
         except OSError as error:
             message = f"{path}: cannot be written: {error.strerror}"
             raise OutputError(message) from error
-        if not _locked(self._file):
+        if not takes_lock(self._file):
             os.close(self._file)
             message = f"{path.parent}: this sweep is running already; wait for it, or write elsewhere with --out DIR"
             raise OutputExistsError(message)
@@ -117,19 +117,10 @@ class Manifest:
         os.close(self._file)
 
 
-def _locked(file: int) -> bool:
-    """Take the lock of an open file; it goes with the process, however that ends."""
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
-
-
 def is_in_use(path: Path) -> bool:
     """Tell whether another process appends to a manifest."""
     with path.open("rb") as file:
-        return not _locked(file.fileno())
+        return not takes_lock(file.fileno())
 
 
 def read_entries(path: Path) -> Iterator[tuple[int, Entry]]:

@@ -1,11 +1,13 @@
 """Any changed bit of any frame is found, and where it is."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from blocksim.analysis.bits import differences
+from blocksim.simulation.contacts import SUPPORT, UNITS, empty_rows, joined
 from blocksim.simulation.frames import Frames
 
 COUNT, BLOCKS = 5, 3
@@ -107,3 +109,44 @@ def test_missing_frames_are_a_difference() -> None:
     assert found.frames == (COUNT, 3)
     assert found.first is None
     assert not found.is_none
+
+
+def with_contacts(counts: Sequence[int] = (0, 2, 3, 1, 0)) -> Frames:
+    """Return frames with so many contacts each, all numbers different."""
+    tables = [empty_rows(count) for count in counts]
+    for number, table in enumerate(tables):
+        table["body_b"] = SUPPORT
+        for column, name in enumerate(UNITS):
+            table[name] = np.linspace(1.0, 2.0, len(table)) + number + 10 * column
+    return replace(frames(), contacts=joined(tables))
+
+
+def test_same_contacts_do_not_differ() -> None:
+    assert differences(with_contacts(), with_contacts()).is_none
+
+
+@pytest.mark.parametrize(("name", "told"), [("normal_force", "normal_force_N"), ("body_a", "body_a"), ("x", "x_m")])
+def test_one_last_bit_of_a_contact_is_found(name: str, told: str) -> None:
+    other = with_contacts()
+    assert other.contacts is not None
+    table = other.contacts.at(2)
+    old = float(table[name][1])
+    table[name][1] = new = old + 1.0 if name == "body_a" else np.nextafter(old, np.inf)
+    first = differences(with_contacts(), other).first
+    assert first is not None
+    assert (first.frame, first.block, first.quantity) == (2, None, f"contact 2, {told}")
+    assert (first.stored, first.now) == (old, new)
+
+
+def test_a_contact_more_is_found() -> None:
+    first = differences(with_contacts(), with_contacts((0, 2, 3, 2, 0))).first
+    assert first is not None
+    assert (first.frame, first.quantity, first.stored, first.now) == (3, "recorded_contacts", 1.0, 2.0)
+
+
+def test_contacts_that_only_one_recording_has_are_a_difference() -> None:
+    for pair in ((with_contacts(), frames()), (frames(), with_contacts())):
+        first = differences(*pair).first
+        assert first is not None
+        assert first.quantity == "recorded_contacts"
+        assert {first.stored, first.now} >= {6.0}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from hashlib import sha256
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 
 from blocksim.errors import InvalidInputError, OutputError
 from blocksim.kernels.arrays import CACHE_LINE
-from blocksim.simulation.checkpoint import Position, read_checkpoint, restored, write_checkpoint
+from blocksim.simulation.checkpoint import DIGEST_BYTES, Position, read_checkpoint, restored, write_checkpoint
 from blocksim.simulation.checkpoint_origin import origin_of
 from blocksim.simulation.schemes import build_scene
 from blocksim.simulation.stacking import arrays_of
@@ -67,12 +69,40 @@ def test_cut_file_is_seen(written: Path, length: int) -> None:
 
 
 def test_file_that_is_whole_but_no_checkpoint_is_refused(written: Path) -> None:
-    from hashlib import sha256  # noqa: PLC0415
-
     for body in (b"", b"{}\n", b'{"format": "blocksim checkpoint 1"}\n', b"\x80\x04pickle\n"):
         written.write_bytes(body + sha256(body).digest())
         with pytest.raises(InvalidInputError, match="not a whole checkpoint"):
             read_checkpoint(written)
+
+
+def forged(path: Path, old: bytes, new: bytes) -> Path:
+    """Change a checkpoint so that its checksum is right."""
+    content = path.read_bytes()[:-DIGEST_BYTES]
+    assert old in content
+    content = content.replace(old, new, 1)
+    path.write_bytes(content + sha256(content).digest())
+    return path
+
+
+def test_array_that_claims_to_fill_all_memory_is_refused(written: Path) -> None:
+    first = next(line for line in written.read_bytes().split(b"\x93NUMPY") if b"'shape': (" in line)
+    shape = first[first.index(b"'shape': (") :].split(b"}")[0]
+    with pytest.raises(InvalidInputError, match="not a whole checkpoint"):
+        read_checkpoint(forged(written, shape, b"'shape': (9" + b"9" * (len(shape) - 13) + b",)"))
+
+
+@pytest.mark.parametrize("shape", ["[-1,-4]", "[4294967296,4294967296]", "[1099511627776,1]", "[-4]"])
+def test_shapes_that_no_array_has_are_refused(written: Path, shape: str) -> None:
+    old = f",{json.dumps(read_checkpoint(written).head.arrays[0].shape)}]".encode()
+    stored = read_checkpoint(forged(written, old, f",{shape}]".encode()))
+    with pytest.raises(InvalidInputError, match="not one of this scene"):
+        restored(stored, build_scene(sliding({})))
+
+
+def test_checkpoint_larger_than_the_memory_is_not_read(written: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("blocksim.simulation.checkpoint.available_bytes", lambda: 2 * written.stat().st_size)
+    with pytest.raises(InvalidInputError, match="of memory are free"):
+        read_checkpoint(written)
 
 
 @pytest.mark.parametrize("name", ["particles-linear", "nonsmooth"])

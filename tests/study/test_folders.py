@@ -10,7 +10,11 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import Document
-from blocksim.study.folders import _outcome, run_all
+from blocksim.simulation import folder as files
+from blocksim.simulation.precautions import Precautions
+from blocksim.simulation.summary import read_summary
+from blocksim.study.folders import _outcome, run_all, run_case
+from blocksim.study.single import run
 
 
 def test_dead_worker_fails_its_case_and_says_what_to_do() -> None:
@@ -19,6 +23,21 @@ def test_dead_worker_fails_its_case_and_says_what_to_do() -> None:
     row = _outcome(future)
     assert row["status"] == "failed"
     assert "runs this case again" in str(row["reason"])
+
+
+@pytest.mark.parametrize("lost", [None, "run.h5", "checkpoint.0"])
+def test_interrupted_case_goes_on_where_it_can(nominal: Document, tmp_path: Path, lost: str | None) -> None:
+    scenario = nominal.with_values({"time.end": 0.01}).build()
+    whole = run_case(scenario, tmp_path / "whole")
+    stopped = run(scenario, out=tmp_path / "case", precautions=Precautions(wall_time=0.0))
+    assert stopped.status == "interrupted"
+    if lost is not None:
+        (tmp_path / "case" / lost).unlink()
+    assert run_case(scenario, tmp_path / "case") == whole
+    parts = read_summary(tmp_path / "case" / files.SUMMARY).resumed_from
+    assert parts == (() if lost else (stopped.summary.steps,))
+    ends = [(tmp_path / name / files.FINAL).read_bytes() for name in ("whole", "case")]
+    assert ends[0] == ends[1]
 
 
 def test_ctrl_c_ends_the_workers_at_once(nominal: Document, tmp_path: Path) -> None:
