@@ -21,6 +21,9 @@ _NUMBER = r"[+-]?(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _TEXT = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
 _MAX_LENGTH = 80
 _MAX_SHOWN = 40
+LEAST, MOST = 1e-18, 1e18
+"""What is positive lies above, and everything below (SI): products of many such numbers stay those of a double."""
+IN_SI = f"between {LEAST:g} and {MOST:g} (SI) is possible"
 
 
 def shown(value: object) -> str:
@@ -152,6 +155,9 @@ class Quantity:
         )
         if too_small or too_large:
             message = f"{shown(value)} is too {'small' if too_small else 'large'}; {self.wanted} is needed"
+            raise invalid(message)
+        if abs(number) > MOST or (self.above == 0.0 and number < LEAST):
+            message = f"{shown(value)} is too {'large' if abs(number) > MOST else 'small'} to compute with; {IN_SI}"
             raise invalid(message)
         return number
 

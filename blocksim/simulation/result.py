@@ -5,7 +5,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.scenario import Scenario, load_scenario
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import Scenario, load_scenario, place_bodies
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.stores.hdf5_reader import read_frames
@@ -61,4 +62,14 @@ def read_result(folder: Path) -> Result:
     summary = read_summary(folder / files.SUMMARY)
     scenario = load_scenario(folder / files.SCENARIO)
     frames = read_frames(folder / files.FRAMES, scenario)
-    return Result(scenario.name, read_table(folder / files.FINAL), summary, scenario, folder, frames)
+    return Result(scenario.name, read_final(folder, scenario), summary, scenario, folder, frames)
+
+
+def read_final(folder: Path, scenario: Scenario) -> Columns:
+    """Return the final table in the folder of a run of a scenario. Raises InputMissingError or InvalidInputError."""
+    path = folder / files.FINAL
+    columns = read_table(path)
+    if columns["block"] != [body.name for body in place_bodies(scenario)]:
+        message = f"{path}: holds other blocks than {files.SCENARIO} beside it"
+        raise InvalidInputError(message)
+    return columns

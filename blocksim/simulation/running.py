@@ -76,9 +76,10 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
     began = time.perf_counter()
     built = build_scene(scenario)
     refuse_full_disk(folder, scenario, built)
+    tables = read_tables(scenario)
     with claimed(folder):
         part = Part(scenario, folder, built, find_resumption(folder, scenario) if resume else NEW)
-        toml = _made_ready(part, overwrite=overwrite or resume)
+        toml = _made_ready(part, tables, overwrite=overwrite or resume)
         with stop_requests() as requests, team_for(part.scene, threads) as team:
             attendance = Attendance(on_progress, lambda: requests.reason() or limit.reason())
             ended = part.run(toml, precautions, team, attendance)
@@ -86,9 +87,8 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
             return _keep_result(result, part.account(result.summary), folder)
 
 
-def _made_ready(part: Part, *, overwrite: bool) -> str:
+def _made_ready(part: Part, tables: Mapping[str, bytes], *, overwrite: bool) -> str:
     """Make the folder of a run ready for this part of it; return the resolved scenario."""
-    tables = read_tables(part.scenario)
     if not part.goes_on:
         files.prepare_folder(part.folder, overwrite=overwrite)
     return _keep_scenario(part.scenario, tables, part.folder)

@@ -10,8 +10,9 @@ from blocksim.scenario import Scenario, load_scenario, place_bodies
 from blocksim.simulation import Progress, Result, Watcher, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation import folder as files
 from blocksim.simulation.precautions import DEFAULTS, Precautions
+from blocksim.simulation.result import read_final
 from blocksim.simulation.summary import read_summary
-from blocksim.simulation.table import COLUMNS, read_table
+from blocksim.simulation.table import COLUMNS
 from blocksim.study.places import FINISHED as FINISHED  # noqa: PLC0414 - their old home, for those who look there
 from blocksim.study.places import find_run as find_run  # noqa: PLC0414
 
@@ -87,9 +88,10 @@ def compare(run: "Result | pd.DataFrame | Path | str", experiment: Path | str | 
     folder = find_run(run)
     summary = read_summary(folder / files.SUMMARY)
     _refuse_unfinished(str(folder), summary.status, summary.reason)
+    was = load_scenario(folder / files.SCENARIO)
     # a scenario file may name another table by now than it did when it was run
-    named = load_scenario(run if Path(run).is_file() else folder / files.SCENARIO).experiment
-    return compare_final(read_table(folder / files.FINAL), _table(experiment, named.table if named else None))
+    named = (load_scenario(run) if Path(run).is_file() else was).experiment
+    return compare_final(read_final(folder, was), _table(experiment, named.table if named else None))
 
 
 def _table(given: Path | str | None, named: Path | None) -> ExperimentTable:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
-from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_hash
+from blocksim.scenario import Scenario, load_scenario, scenario_hash
 from blocksim.simulation import Progress, Result, Watcher, read_result, simulate
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import sha256_of
@@ -100,16 +100,12 @@ def _changed(folder: Path, summary: Summary) -> tuple[str, ...]:
 def _read(folder: Path, changed: tuple[str, ...]) -> Result:
     """Read what the run left; what cannot be read because it was changed is told as such."""
     try:
-        stored = read_result(folder)
+        return read_result(folder)
     except InvalidInputError as error:
         if not changed:
             raise
         message = f"{error}\n{folder}: changed since the run, by their checksums: {', '.join(changed)}"
         raise InvalidInputError(message) from error
-    if stored.columns["block"] != [body.name for body in place_bodies(stored.scenario)]:
-        message = f"{folder / files.FINAL}: holds other blocks than {files.SCENARIO}"
-        raise InvalidInputError(message)
-    return stored
 
 
 def _as_far(scenario: Scenario, summary: Summary) -> Scenario:

@@ -202,19 +202,20 @@ bad.toml:20: structures.0.velocity: this list is too short; two values are neede
     "places beyond all numbers": (
         WALL + "gap = 1e308\n",
         """
-bad.toml:15: structures.0: body 3 would be at (inf, 0.01) m with a velocity of (0, 0) m/s and a spin of 0 rad/s; \
-check the keys of its structure
-   15 | [[structures]]
-      |   ^^^^^^^^^^
+bad.toml:20: structures.0.gap: 1e+308 is too large to compute with; between 1e-18 and 1e+18 (SI) is possible
+   20 | gap = 1e308
+      |       ^^^^^
 """,
     ),
     "velocity beyond all numbers": (
         WALL + "velocity = [1e308, 0]\nshear_velocity = 1e308\n",
         """
-bad.toml:15: structures.0: body 17 would be at (0.02, 0.09) m with a velocity of (inf, 0) m/s and a spin of 0 rad/s; \
-check the keys of its structure
-   15 | [[structures]]
-      |   ^^^^^^^^^^
+bad.toml:20: structures.0.velocity.0: 1e+308 is too large to compute with; between 1e-18 and 1e+18 (SI) is possible
+   20 | velocity = [1e308, 0]
+      |             ^^^^^
+bad.toml:21: structures.0.shear_velocity: 1e+308 is too large to compute with; between 1e-18 and 1e+18 (SI) is possible
+   21 | shear_velocity = 1e308
+      |                  ^^^^^
 """,
     ),
     "random shifts into the ground": (

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
+from pydantic_core import PydanticCustomError
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.quantities import LENGTH, parse_quantity, shown
+from blocksim.scenario.quantities import LENGTH, STIFFNESS, TIME, UNIT_WEIGHT, Kind, Quantity, parse_quantity, shown
 
 
 @pytest.mark.parametrize(
@@ -117,3 +118,21 @@ def test_bounds(annotation: Any, inside: object, outside: object) -> None:
 )
 def test_values_are_shown_as_in_toml_and_short(value: object, text: str) -> None:
     assert shown(value) == text
+
+
+@pytest.mark.parametrize("kind", [LENGTH, TIME, UNIT_WEIGHT, STIFFNESS])
+@pytest.mark.parametrize(("value", "word"), [(1e-19, "small"), (5e-324, "small"), (1e19, "large"), (1e308, "large")])
+def test_numbers_whose_products_no_double_holds_are_refused(kind: Kind, value: float, word: str) -> None:
+    quantity = Quantity(kind, above=0.0)
+    assert quantity.read(1.1e-18) == 1.1e-18
+    assert quantity.read(0.9e18) == 0.9e18
+    with pytest.raises(PydanticCustomError, match=f"is too {word} to compute with; between 1e-18 and 1e"):
+        quantity.read(value)
+
+
+def test_places_may_be_round_off() -> None:
+    for value in (0.0, -0.0, 5e-324, -1e-300, 0.1 * 3 - 0.3):
+        assert Quantity(LENGTH).read(value) == value
+        assert Quantity(LENGTH, at_least=0.0).read(abs(value)) == abs(value)
+    with pytest.raises(PydanticCustomError, match="is too large to compute with"):
+        Quantity(LENGTH).read(-1e19)

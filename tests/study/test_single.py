@@ -103,6 +103,13 @@ def test_missing_file_of_a_run_is_named(copy: Path, name: str) -> None:
         compare(copy, SCENARIOS / "experiments" / "three_blocks.csv")
 
 
+def test_final_table_without_one_of_the_blocks_is_named(copy: Path) -> None:  # and not the experiment's, which has it
+    lines = (copy / "final.csv").read_text().splitlines(keepends=True)
+    (copy / "final.csv").write_text("".join(lines[:1] + lines[2:]))
+    with pytest.raises(InvalidInputError, match=r"final\.csv: holds other blocks than scenario\.toml"):
+        compare(copy)
+
+
 def test_status_in_run_json_counts(copy: Path) -> None:
     data = json.loads((copy / "run.json").read_text())
     (copy / "run.json").write_text(json.dumps({**data, "status": "interrupted"}))

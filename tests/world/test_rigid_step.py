@@ -75,7 +75,7 @@ def test_speed_at_the_start_counts_for_the_whole_step() -> None:
         step_of(thrown, step=0.9e-3)
 
 
-@pytest.mark.parametrize("step", [1e-300, 1e-20])
+@pytest.mark.parametrize("step", [1e-18])
 def test_steps_that_cannot_be_counted_are_refused(step: float) -> None:
     with pytest.raises(UncountableStepsError):
         step_of(RESTING, step=step)
