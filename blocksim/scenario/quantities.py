@@ -21,7 +21,7 @@ _NUMBER = r"[+-]?(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _TEXT = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
 _MAX_LENGTH = 80
 _MAX_SHOWN = 40
-LEAST, MOST = 1e-18, 1e18
+LEAST, MOST = 1e-18, 1e30
 """What is positive lies above, and everything below (SI): products of many such numbers stay those of a double."""
 IN_SI = f"between {LEAST:g} and {MOST:g} (SI) is possible"
 

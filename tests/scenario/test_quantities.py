@@ -121,11 +121,11 @@ def test_values_are_shown_as_in_toml_and_short(value: object, text: str) -> None
 
 
 @pytest.mark.parametrize("kind", [LENGTH, TIME, UNIT_WEIGHT, STIFFNESS])
-@pytest.mark.parametrize(("value", "word"), [(1e-19, "small"), (5e-324, "small"), (1e19, "large"), (1e308, "large")])
+@pytest.mark.parametrize(("value", "word"), [(1e-19, "small"), (5e-324, "small"), (1e31, "large"), (1e308, "large")])
 def test_numbers_whose_products_no_double_holds_are_refused(kind: Kind, value: float, word: str) -> None:
     quantity = Quantity(kind, above=0.0)
     assert quantity.read(1.1e-18) == 1.1e-18
-    assert quantity.read(0.9e18) == 0.9e18
+    assert quantity.read(0.9e30) == 0.9e30
     with pytest.raises(PydanticCustomError, match=f"is too {word} to compute with; between 1e-18 and 1e"):
         quantity.read(value)
 
@@ -135,4 +135,4 @@ def test_places_may_be_round_off() -> None:
         assert Quantity(LENGTH).read(value) == value
         assert Quantity(LENGTH, at_least=0.0).read(abs(value)) == abs(value)
     with pytest.raises(PydanticCustomError, match="is too large to compute with"):
-        Quantity(LENGTH).read(-1e19)
+        Quantity(LENGTH).read(-1e31)
