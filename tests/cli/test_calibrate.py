@@ -159,6 +159,7 @@ def test_single_run_without_scatter_says_that_it_is_one(slide: Slide) -> None:
     assert "one run, without input scatter: inside all ranges" in answer.out
 
 
+@pytest.mark.long
 def test_stopped_killed_and_resumed_it_finds_the_same(slide: Slide, process: Process, tmp_path: Path) -> None:
     many = (*FIT, *SCATTER, "--trials", 22, "--members", 4, "--fresh", 4)
     assert slide(*many, "--out", "whole.toml", "--quiet").code == 0

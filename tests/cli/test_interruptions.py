@@ -17,8 +17,9 @@ from blocksim.simulation.stores.hdf5_reader import read_frames
 from tests.cli.conftest import PATIENCE, SOFT, Command, Process, wait_for
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"
-LONG = ("run", NOMINAL, *SOFT, "--set", "time.end=20", "--set", "time.stop_at_rest=false", "--quiet")
+LONG = ("run", NOMINAL, *SOFT, "--set", "time.end=10", "--set", "time.stop_at_rest=false", "--quiet")
 OFTEN = ("--checkpoint-every", "50 ms")
+OTHERS = [pytest.param(number, marks=pytest.mark.long) for number in (signal.SIGTERM, signal.SIGUSR1)]
 Wanted = dict[str, object]
 
 
@@ -88,6 +89,7 @@ def frames_in(folder: Path) -> int:
     return len(frames)
 
 
+@pytest.mark.long
 def test_killed_run_goes_on_to_the_same_bits(process: Process, tmp_path: Path, whole: Path) -> None:
     folder = tmp_path / "out"
     assert kill_again_and_again(process, folder, 3, 1.2) >= 1
@@ -114,7 +116,7 @@ def test_hundred_kills_lose_nothing(process: Process, tmp_path: Path, whole: Pat
     assert resumed > 0
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+@pytest.mark.parametrize("number", [signal.SIGINT, *OTHERS])
 def test_stopped_run_goes_on_to_the_same_bits(
     process: Process, tmp_path: Path, whole: Path, number: signal.Signals
 ) -> None:
@@ -223,6 +225,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", folder], check=True)  # noqa: S607 - where mount was found
 
 
+@pytest.mark.long
 def test_disk_that_fills_is_74_and_keeps_what_was_there(process: Process, small_disk: Path, whole: Path) -> None:
     small_disk.joinpath("others").write_bytes(bytes(1_200_000))
     roomy = "import shutil; shutil.disk_usage = lambda _: type('', (), {'free': 1 << 60})"  # as if others filled it

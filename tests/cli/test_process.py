@@ -42,7 +42,9 @@ def test_stopped_run_is_75_and_keeps_its_frames(process: Process, tmp_path: Path
     assert len(frames) > 10
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.003, 0.1, 0.6, 0.9])
+@pytest.mark.parametrize(
+    "delay", [0.0, 0.1, *(pytest.param(delay, marks=pytest.mark.long) for delay in (0.003, 0.6, 0.9))]
+)
 def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path, delay: float) -> None:
     running = process(*SLOW, "--set", "output.every=1e-5", "--out", "out", "--quiet")
     wait_for(tmp_path / "out" / "run.h5", running)

@@ -52,6 +52,7 @@ def check_kills(start: Sweep, folder: Path, count: int, shares: Iterable[float],
         shutil.rmtree(place)
 
 
+@pytest.mark.long
 def test_killed_sweep_goes_on_to_the_same_table(start: Sweep, tmp_path: Path) -> None:
     check_kills(start, tmp_path, 150, (0.6, 0.9))
 
@@ -96,6 +97,7 @@ def test_same_sweep_twice_at_a_time_is_refused(process: Process, tmp_path: Path)
     first.communicate()
 
 
+@pytest.mark.long
 def test_shards_at_a_time_share_a_folder(start: Sweep, process: Process, tmp_path: Path) -> None:
     finish(start("whole", 20))
     for running in [start("parts", 20, "--shard", f"{index}/2", "--jobs", 1) for index in range(2)]:
