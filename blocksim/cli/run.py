@@ -1,6 +1,7 @@
 """blocksim run: simulate one scenario."""
 
 import os
+from contextlib import nullcontext
 from itertools import islice
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from blocksim.cli.scenario import read_scenario
 from blocksim.cli.verdict import comparison_table, verdict_lines
 from blocksim.scenario import Scenario
 from blocksim.simulation import Result
+from blocksim.simulation.claim import claimed
 from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.folder import default_folder, holds_run, unfinished_beside
 from blocksim.simulation.precautions import CHECKPOINT_SECONDS, Precautions
@@ -115,8 +117,12 @@ def _way_on(result: Result) -> str:
 
 
 def tell_resumption(folder: Path, scenario: Scenario) -> None:
-    """Tell from where a run is going on, and what is left where nothing can. Raises what `find_resumption` raises."""
-    found = find_resumption(folder, scenario)
+    """Tell from where a run is going on, and what is left where nothing can.
+
+    Raises what `find_resumption` raises, and OutputExistsError while another process runs there.
+    """
+    with claimed(folder) if folder.is_dir() else nullcontext():
+        found = find_resumption(folder, scenario)
     for remark in found.remarks:
         note(remark)
     if found.checkpoint is not None:

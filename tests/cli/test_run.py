@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from blocksim.simulation.claim import claimed
 from tests.cli.conftest import SCENARIOS, SOFT, Command
 
 RUN = ("run", "scenarios/three_blocks_nominal.toml", *SOFT)
@@ -214,3 +215,15 @@ def test_rigid_contacts_run_compare_and_sweep_like_springs(blocksim: Command, tm
     table = (tmp_path / "sweep" / "sweep.csv").read_text().splitlines()
     assert len(table) == 5
     assert all("finished" in line for line in table[1:])
+
+
+@pytest.mark.parametrize("how", [(), ("--resume",), ("--overwrite",)])
+def test_folder_of_a_run_that_is_going_on_is_left_alone(
+    blocksim: Command, tmp_path: Path, how: tuple[str, ...]
+) -> None:
+    (tmp_path / "out").mkdir()
+    with claimed(tmp_path / "out"):
+        answer = blocksim("run", "scenarios/three_blocks_nominal.toml", *SOFT, "--out", "out", *how)
+    assert answer.code == 73
+    assert answer.err == "out: a run is going on here; wait for it, or write elsewhere with --out DIR\n"
+    assert not any((tmp_path / "out").iterdir())
