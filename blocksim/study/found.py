@@ -39,14 +39,16 @@ def read_found(folder: Path, experiment: Path | None = None) -> FoundSweep:
         message = f"{folder}: no case of this sweep has finished, there is nothing to draw"
         raise InvalidInputError(message)
     members = Members(table, str(folder / TABLE))
+    x_mm, rotation_deg = (_columns(members, quantity) for quantity in ("x", "rotation"))
+    _refuse_cut(members, finished & ~np.isfinite(x_mm + rotation_deg).all(axis=1))
     path = experiment or (None if scenario.experiment is None else scenario.experiment.table)
     return FoundSweep(
         title=scenario.description or scenario.name,
         mode="" if scenario.sweep is None else scenario.sweep.mode,
         inputs=_inputs(scenario, table),
         blocks=blocks,
-        x_mm=_columns(members, "x"),
-        rotation_deg=_columns(members, "rotation"),
+        x_mm=x_mm,
+        rotation_deg=rotation_deg,
         finished=finished,
         inside=None if path is None else _inside(table, Ranges.read(path)) & finished,
         measured=Measured() if path is None else measured_of(load_table(path), blocks),
@@ -76,6 +78,13 @@ def _columns(members: Members, quantity: str) -> Floats:
     if np.nanmax(np.abs(found), initial=0.0) > LARGEST:
         raise InvalidInputError(f"{members.source}: a block has gone farther than can be drawn")
     return found
+
+
+def _refuse_cut(members: Members, cut: NDArray[np.bool_]) -> None:
+    """Raise InvalidInputError where the row of a finished case is not whole; it has neither ended nor failed."""
+    if cut.any():
+        case = members.table["case"].iloc[int(np.argmax(cut))]
+        raise InvalidInputError(f"{members.source}: case {case} has finished, but its row lacks places of blocks")
 
 
 def _inside(table: pd.DataFrame, ranges: Ranges) -> NDArray[np.bool_]:

@@ -63,6 +63,13 @@ def test_cases_are_inside_by_the_rules_of_compare_and_failed_ones_never(nominal:
     assert found.outcomes == [(0, -90, -90), (0, -90, -90), None]
 
 
+@pytest.mark.parametrize("kept", [3, 4, 6, 11, 15])
+def test_table_that_was_cut_off_in_a_finished_case_is_refused(nominal: Document, tmp_path: Path, kept: int) -> None:
+    cut = ",".join(ended(67.0, 130.0).split(",")[:kept])
+    with pytest.raises(InvalidInputError, match=r"sweep\.csv: case case1 has finished, but its row lacks places"):
+        stored(nominal, tmp_path, {"gravity": [1.0, 2.0]}, [f"1.0,{ended(74.0, 130.0)}", f"2.0,{cut}"])
+
+
 def test_repeats_come_with_their_range_and_prediction_interval(nominal: Document, tmp_path: Path) -> None:
     known = stored(nominal, tmp_path, {"gravity": [1.0]}, [f"1.0,{ended(74.0, 130.0)}"]).measured
     assert known.x_mm["2"].tolist() == [71.69, 76.57, 72.70, 73.22, 73.73, 78.53]
