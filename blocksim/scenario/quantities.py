@@ -23,7 +23,6 @@ _MAX_LENGTH = 80
 _MAX_SHOWN = 40
 LEAST, MOST = 1e-18, 1e30
 """What is positive lies above, and everything below (SI): products of many such numbers stay those of a double."""
-IN_SI = f"between {LEAST:g} and {MOST:g} (SI) is possible"
 
 
 def shown(value: object) -> str:
@@ -156,8 +155,11 @@ class Quantity:
         if too_small or too_large:
             message = f"{shown(value)} is too {'small' if too_small else 'large'}; {self.wanted} is needed"
             raise invalid(message)
-        if abs(number) > MOST or (self.above == 0.0 and number < LEAST):
-            message = f"{shown(value)} is too {'large' if abs(number) > MOST else 'small'} to compute with; {IN_SI}"
+        if abs(number) > MOST:
+            message = f"{shown(value)} is too large to compute with; at most {MOST:g} (SI) is possible"
+            raise invalid(message)
+        if self.above == 0.0 and number < LEAST:
+            message = f"{shown(value)} is too small to compute with; at least {LEAST:g} (SI) is possible"
             raise invalid(message)
         return number
 

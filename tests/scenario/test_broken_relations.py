@@ -246,7 +246,7 @@ bad.toml:15: structures: 1000001 bodies are too many; at most 1000000 are possib
         WIDTH,
         "width = 1e308",
         """
-bad.toml:10: blocks.brick.width: 1e+308 is too large to compute with; between 1e-18 and 1e+30 (SI) is possible
+bad.toml:10: blocks.brick.width: 1e+308 is too large to compute with; at most 1e+30 (SI) is possible
    10 | width = 1e308
       |         ^^^^^
 """,

@@ -202,7 +202,7 @@ bad.toml:20: structures.0.velocity: this list is too short; two values are neede
     "places beyond all numbers": (
         WALL + "gap = 1e308\n",
         """
-bad.toml:20: structures.0.gap: 1e+308 is too large to compute with; between 1e-18 and 1e+30 (SI) is possible
+bad.toml:20: structures.0.gap: 1e+308 is too large to compute with; at most 1e+30 (SI) is possible
    20 | gap = 1e308
       |       ^^^^^
 """,
@@ -210,10 +210,10 @@ bad.toml:20: structures.0.gap: 1e+308 is too large to compute with; between 1e-1
     "velocity beyond all numbers": (
         WALL + "velocity = [1e308, 0]\nshear_velocity = 1e308\n",
         """
-bad.toml:20: structures.0.velocity.0: 1e+308 is too large to compute with; between 1e-18 and 1e+30 (SI) is possible
+bad.toml:20: structures.0.velocity.0: 1e+308 is too large to compute with; at most 1e+30 (SI) is possible
    20 | velocity = [1e308, 0]
       |             ^^^^^
-bad.toml:21: structures.0.shear_velocity: 1e+308 is too large to compute with; between 1e-18 and 1e+30 (SI) is possible
+bad.toml:21: structures.0.shear_velocity: 1e+308 is too large to compute with; at most 1e+30 (SI) is possible
    21 | shear_velocity = 1e308
       |                  ^^^^^
 """,

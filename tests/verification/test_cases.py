@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -14,23 +13,17 @@ from blocksim.verification.reference import BEGIN, END, SETTINGS, STORE, read_st
 from blocksim.verification.verify import Outcome, run_case
 from tests.verification.rows import allowed, missed, same_kind
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
 ROOT = Path(__file__).parents[2]
 LAWS = {"linear": "linear", "Hertz–Mindlin": "hertz-mindlin"}  # head of the column in the README: law
-
-
 HEAVY = ("V13", "V23")  # cases that take half a minute under Hertz' law, in their quick size too
 
 
-def both_laws(names: Iterable[str]) -> list[object]:
-    """Return all cases with each of these names of laws; the heavy ones are for make test-long."""
+def with_both(linear: str, hertzian: str) -> list[object]:
+    """Return all cases with both laws, as they are named; the heavy ones are for make test-long."""
+    heavy = [(case, hertzian) for case in CASES if case.id in HEAVY]
     return [
-        pytest.param(
-            case, name, id=f"{case.id}-{name}", marks=[pytest.mark.long] * (case.id in HEAVY and "ertz" in name)
-        )
-        for name in names
+        pytest.param(case, law, id=f"{case.id}-{law}", marks=pytest.mark.long if (case, law) in heavy else ())
+        for law in (linear, hertzian)
         for case in CASES
     ]
 
@@ -41,7 +34,7 @@ def outcome(case_id: str, law: str, *, quick: bool) -> Outcome:
     return run_case(case, Setting(law=law, quick=quick))
 
 
-@pytest.mark.parametrize(("case", "law"), both_laws(LAWS.values()))
+@pytest.mark.parametrize(("case", "law"), with_both(*LAWS.values()))
 def test_case_is_inside_its_tolerances(case: Case, law: str) -> None:
     found = outcome(case.id, law, quick=True)
     assert found.rows
@@ -70,7 +63,7 @@ def test_kept_results_have_all_cases_in_every_column() -> None:
         assert all(column.values())
 
 
-@pytest.mark.parametrize(("case", "head"), both_laws(LAWS))
+@pytest.mark.parametrize(("case", "head"), with_both(*LAWS))
 def test_kept_results_are_what_is_measured_now(case: Case, head: str) -> None:
     """The quick size may leave rows out; numbers are compared where the sizes are the same."""
     kept = {row.quantity: row for row in stored_rows(read_store(ROOT / STORE), head, case)}
