@@ -64,15 +64,19 @@ test-nojit: $(DEV_STAMP) ## Run the tests of the kernels as plain Python, withou
 	NUMBA_DISABLE_JIT=1 $(VENV_PYTHON) -m pytest $(ON_ALL_CORES) tests/kernels
 
 .PHONY: verify-table
-verify-table: $(DEV_STAMP) ## Measure all verification cases anew and write their table into the README
-	$(VENV_PYTHON) -m blocksim.verification.reference README.md --measure
+verify-table: $(DEV_STAMP) ## Measure all verification cases and write their table into blocksim/verification/README.md
+	$(VENV_PYTHON) -m blocksim.verification.reference blocksim/verification/README.md --measure
+
+.PHONY: findings
+findings: $(DEV_STAMP) ## Run what results/README.md quotes and write its table
+	$(VENV_PYTHON) -m blocksim.verification.findings results/README.md --measure
 
 .PHONY: bench
 bench: $(RUN_STAMP) ## Measure speed and memory, some minutes; nothing else should run
 	$(BLOCKSIM) bench --out results/bench.json
 
 .PHONY: bench-peers
-bench-peers: $(BENCH_STAMP) ## The same scenes by pymunk and Box2D too, some minutes; draws the picture of the README
+bench-peers: $(BENCH_STAMP) ## The same scenes by pymunk and Box2D too, some minutes; draws the picture in results/
 	$(BLOCKSIM) bench --peers --out results/bench-peers.json
 
 .PHONY: smoke
@@ -98,11 +102,11 @@ format: $(DEV_STAMP) ## Bring the code into shape
 	$(VENV_PYTHON) -m ruff check --fix
 
 .PHONY: readme
-readme: $(DEV_STAMP) ## Write the table of scenario keys in the README anew, from the models
-	$(VENV_PYTHON) -m blocksim.scenario.reference README.md
+readme: $(DEV_STAMP) ## Write the table of scenario keys in scenarios/README.md from the models
+	$(VENV_PYTHON) -m blocksim.scenario.reference scenarios/README.md
 
 .PHONY: pictures
-pictures: $(RUN_STAMP) ## Draw the pictures of the README anew
+pictures: $(RUN_STAMP) ## Draw the pictures of the findings in results/
 	$(BLOCKSIM) run $(SCENARIO) --quiet
 	$(BLOCKSIM) plot $(SCENARIO) --out results/three_blocks.png
 	$(BLOCKSIM) sweep scenarios/stiffness_levels.toml --out $(PICTURES)/stiffness --overwrite --quiet

@@ -7,7 +7,7 @@ import pytest
 
 from blocksim import __version__
 
-CHANGELOG = (Path(__file__).parents[1] / "CHANGELOG.md").read_text(encoding="utf-8")
+CHANGELOG = (Path(__file__).parents[1] / "blocksim" / "CHANGELOG.md").read_text(encoding="utf-8")
 VERSIONS = re.findall(r"^## (\S+)", CHANGELOG, flags=re.MULTILINE)
 LANDINGS = re.split(r"^### ", CHANGELOG, flags=re.MULTILINE)[1:]
 

@@ -1,4 +1,4 @@
-"""The README must not promise keys, commands or files that are not there."""
+"""The pages must not promise keys, commands or files that are not there, and the first one is for ten minutes."""
 
 import re
 import subprocess
@@ -6,16 +6,31 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 
+from blocksim.cli.app import app
 from blocksim.scenario import Document
 from blocksim.scenario.reference import with_key_table
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = [
+    ROOT / "README.md",
+    *sorted((ROOT / "blocksim").rglob("*.md")),
+    ROOT / "scenarios/README.md",
+    ROOT / "results/README.md",
+]
+TEXTS = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in PAGES}
+
+
+def test_the_first_page_is_short() -> None:
+    assert len(README.encode()) <= 10_000
 
 
 def test_the_table_of_keys_is_the_one_of_the_models() -> None:
-    assert with_key_table(README) == README, "run: make readme"
+    page = TEXTS["scenarios/README.md"]
+    assert "<!-- keys" in page
+    assert with_key_table(page) == page, "run: make readme"
 
 
 def test_the_scenario_in_the_readme_is_valid() -> None:
@@ -24,16 +39,31 @@ def test_the_scenario_in_the_readme_is_valid() -> None:
     assert Document.parse(text.group(1), "README.md").build().name == "my_tower"
 
 
-PLACES = sorted(set(re.findall(r"`((?:blocksim|tests|scenarios|results)/[a-z_/.]+)`", README)))
+PLACES = sorted({(page, place) for page, text in TEXTS.items()
+                 for place in re.findall(r"`((?:blocksim|tests|scenarios|results)/[a-z_/.]+)`", text)})  # fmt: skip
 
 
-@pytest.mark.parametrize("place", PLACES)
-def test_every_place_that_the_readme_names_exists(place: str) -> None:
-    assert (ROOT / place).exists()
+@pytest.mark.parametrize(("page", "place"), PLACES)
+def test_every_place_that_a_page_names_exists(page: str, place: str) -> None:
+    assert (ROOT / place).exists(), page
 
 
-def test_the_picture_of_the_readme_is_there() -> None:
-    assert (ROOT / "results" / "three_blocks.png").stat().st_size > 0
+LINKS = sorted({(page, link) for page, text in TEXTS.items() for link in re.findall(r"\]\(([^)#]+)\)", text)})
+
+
+@pytest.mark.parametrize(("page", "link"), LINKS)
+def test_every_link_and_picture_of_a_page_is_there(page: str, link: str) -> None:
+    assert (ROOT / page).parent.joinpath(link).stat().st_size > 0
+
+
+def test_every_scenario_that_ships_is_described() -> None:
+    page = TEXTS["scenarios/README.md"]
+    assert not [path.name for path in (ROOT / "scenarios").glob("*.toml") if f"`{path.name}`" not in page]
+
+
+def test_every_command_is_named_on_the_first_page() -> None:
+    group = typer.main.get_command(app)
+    assert not [name for name in getattr(group, "commands", {}) if name not in README]
 
 
 def test_the_python_example_runs_as_a_script(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The table of all scenario keys and their defaults, for the README; written from the models, so that it cannot lie."""
+"""The table of all scenario keys and their defaults in scenarios/README.md, written from the models."""
 
 import re
 import sys

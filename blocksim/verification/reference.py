@@ -1,8 +1,8 @@
-"""The verification table of the README: measured, kept in results/verify.json, written as Markdown.
+"""The verification tables of this folder's README: measured, kept in results/verify.json, written as Markdown.
 
-`python -m blocksim.verification.reference README.md` writes the table anew from the kept results. With `--measure` all
-cases are run first (a quarter of an hour) and the results replaced; column heads after it limit that to these columns:
-`--measure nonsmooth` takes half a minute and leaves all others as they are.
+`python -m blocksim.verification.reference blocksim/verification/README.md` writes the tables from the kept results.
+With `--measure` all cases are run first (a quarter of an hour) and the results replaced; column heads after it limit that to
+these columns: `--measure nonsmooth` takes half a minute and leaves all others as they are.
 """
 
 import json
@@ -18,7 +18,7 @@ from blocksim.verification.verify import expected_text, number, run_case, tolera
 
 BEGIN = "<!-- verify: written by `make verify-table` -->"
 END = "<!-- end of verify -->"
-STORE = Path("results") / "verify.json"
+STORE = Path("results") / "verify.json"  # below the current folder
 COLUMNS = {  # head of the column: how it is measured
     "linear": Setting(),
     "Hertz–Mindlin": Setting(law="hertz-mindlin"),
@@ -141,7 +141,7 @@ def _finite(data: Any) -> Any:
 def main(arguments: Sequence[str]) -> None:
     """Write the table into the README named first, after measuring where asked to."""
     readme, *options = arguments
-    store = Path(readme).parent / STORE
+    store = STORE
     if options[:1] == ["--measure"]:
         measure(store, options[1:] or list(SETTINGS))
     text = Path(readme).read_text(encoding="utf-8")

@@ -49,7 +49,7 @@ def test_case_in_full_is_inside_its_tolerances(case: Case, law: str) -> None:
 
 
 def test_table_of_the_readme_is_that_of_the_kept_results() -> None:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    readme = (ROOT / "blocksim/verification/README.md").read_text(encoding="utf-8")
     assert BEGIN in readme
     assert END in readme
     assert with_table(readme, read_store(ROOT / STORE)) == readme, "run: make verify-table"

@@ -47,7 +47,7 @@ def test_case_is_inside_its_tolerances_with_rigid_contacts(case: Case) -> None:
 def test_kept_results_of_rigid_contacts_are_what_is_measured_now(case: Case) -> None:
     kept = stored_rows(read_store(ROOT / STORE), RIGID, case)
     rows = outcome(case.id).rows
-    assert len(kept) == len(rows), f"run: python -m blocksim.verification.reference README.md --measure {RIGID}"
+    assert len(kept) == len(rows), "run: make verify-table"
     for old, new in zip(kept, rows, strict=True):
         assert same_kind(old, new)
         assert old.measured == pytest.approx(new.measured, rel=1e-9, abs=allowed(new))
