@@ -1,8 +1,15 @@
 """Simulate collapses of rigid blocks and compare them with measurements.
 
-from blocksim import load, run, sweep, compare
-result = run(load("scenarios/three_blocks.toml"))
-print(result.final, compare(result).to_frame())
+>>> from blocksim import compare, load, run
+>>> result = run(load("scenarios/three_blocks.toml", {"contact.stiffness_scale": 0.01}))
+>>> result.final.round(1)[["block", "x_mm", "rotation_deg"]].to_string(index=False).splitlines()[-1].split()
+['3', '130.7', '-90.0']
+>>> compare(result).inside
+True
+
+Scenarios: `load` (a file or dictionaries), `replace` (change keys, validated). Runs: `run`, `open_run`; a result has
+`final`, `frames`, `to_frame()`, `to_xarray()`. Studies: `sweep`, `open_sweep`, `calibrate`, `sensitivity`, `converge`.
+Judging: `compare`. Every function has the options of the command of the same name.
 """
 
 from importlib import import_module
@@ -10,18 +17,39 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from blocksim.scenario import load_scenario as load
+    from blocksim.scenario import replace_values as replace
+    from blocksim.study.converge import converge
     from blocksim.study.judge import compare
     from blocksim.study.many import sweep
-    from blocksim.study.single import run
+    from blocksim.study.scripting import calibrate, sensitivity
+    from blocksim.study.single import open_run, run
+    from blocksim.study.table import read_sweep as open_sweep
 
 __version__ = "0.1.0"
-__all__ = ["compare", "load", "run", "sweep"]
+__all__ = [
+    "calibrate",
+    "compare",
+    "converge",
+    "load",
+    "open_run",
+    "open_sweep",
+    "replace",
+    "run",
+    "sensitivity",
+    "sweep",
+]
 
 # found when first asked for, so that `blocksim --help` need not wait for numba and pandas
 _HOMES = {
-    "load": ("blocksim.scenario", "load_scenario"),
-    "run": ("blocksim.study.single", "run"),
+    "calibrate": ("blocksim.study.scripting", "calibrate"),
     "compare": ("blocksim.study.judge", "compare"),
+    "converge": ("blocksim.study.converge", "converge"),
+    "load": ("blocksim.scenario", "load_scenario"),
+    "open_run": ("blocksim.study.single", "open_run"),
+    "open_sweep": ("blocksim.study.table", "read_sweep"),
+    "replace": ("blocksim.scenario", "replace_values"),
+    "run": ("blocksim.study.single", "run"),
+    "sensitivity": ("blocksim.study.scripting", "sensitivity"),
     "sweep": ("blocksim.study.many", "sweep"),
 }
 
@@ -32,3 +60,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(message)
     module, attribute = _HOMES[name]
     return getattr(import_module(module), attribute)
+
+
+def __dir__() -> list[str]:
+    """Return what `help(blocksim)` and completion show."""
+    return sorted({*globals(), *__all__})

@@ -3,7 +3,7 @@
 import csv
 import io
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -164,19 +164,11 @@ def _tell_end(found: Sensitivity, out: Path | None) -> None:
     note(f"{found.runs} runs" + (f"; table: {out}" if out is not None else ""))
 
 
-def _records(found: Sensitivity) -> Iterator[dict[str, object]]:
-    """Yield one row an output that varies and key."""
-    for output in found.outputs:
-        for index, key in enumerate(found.keys if output.varies else ()):
-            numbers = {column: values[index] for column, values in output.numbers.items()}
-            yield {"output": output.name, "unit": output.unit, "key": key, **numbers}
-
-
 def _csv(found: Sensitivity) -> str:
     text = io.StringIO()
     writer = csv.DictWriter(text, ["output", "unit", "key", *found.method.columns], lineterminator="\n")
     writer.writeheader()
-    writer.writerows(_records(found))
+    writer.writerows(found.records())
     return text.getvalue()
 
 
@@ -193,5 +185,5 @@ def _data(found: Sensitivity) -> dict[str, object]:
             {"output": one.name, "unit": one.unit, "mean": one.mean, "sd": one.sd, "varies": one.varies}
             for one in found.outputs
         ],
-        "indices": list(_records(found)),
+        "indices": list(found.records()),
     }

@@ -1,7 +1,7 @@
 """Scenarios: declared in TOML, checked, and given to the other rooms as frozen objects in SI."""
 
 from blocksim.scenario.document import Document
-from blocksim.scenario.load import load_scenario, scenario_from_mapping
+from blocksim.scenario.load import Source, document_of, load_scenario, replace_values, scenario_from_mapping
 from blocksim.scenario.models.boundary import Ground, Wall
 from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
 from blocksim.scenario.models.geometry import Block, BodySpec, Material
@@ -32,14 +32,17 @@ __all__ = [
     "ResolvedPair",
     "Restitution",
     "Scenario",
+    "Source",
     "Sweep",
     "Time",
     "Wall",
+    "document_of",
     "json_schema",
     "load_scenario",
     "motion_table_content",
     "place_bodies",
     "place_segments",
+    "replace_values",
     "resolve_pair",
     "scenario_from_mapping",
     "scenario_hash",

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, place_bodies
@@ -12,12 +13,15 @@ from blocksim.simulation.frames import Frames
 from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import Columns, as_frame, read_table
+from blocksim.simulation.tidy import data_set, tidy_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
+MOST_ROWS = 20  # of the table that a notebook shows
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Result:
     """One run: columns of the final table (mm, degrees), frames (SI), and the summary that run.json holds."""
 
@@ -40,6 +44,31 @@ class Result:
     def final(self) -> "pd.DataFrame":
         """The final table, a row a block."""
         return as_frame(self.columns)
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return the trajectories, one row per frame and block: time_s, block, x_mm, y_mm, rotation_deg, velocities."""
+        return tidy_table(self.frames)
+
+    def to_xarray(self) -> Any:
+        """Return the trajectories as an xarray.Dataset (time, block) in SI. Raises UnavailableError without xarray."""
+        return data_set(self.frames, self.name)
+
+    def __repr__(self) -> str:
+        """Return a line: name, status and reason, blocks, simulated time, folder."""
+        where = "in memory" if self.folder is None else str(self.folder)
+        count = len(self.columns["block"])
+        blocks = f"{count} block{'s' if count != 1 else ''}"
+        return f"<Result {self.name}: {self.status} ({self.reason}), {blocks}, {self._seconds}, {where}>"
+
+    def _repr_html_(self) -> str:
+        """Return the same line above the final table, for notebooks."""
+        line = f"{self.name}: {self.status} ({self.reason}), {self._seconds}"
+        table: str = self.final.to_html(index=False, max_rows=MOST_ROWS, float_format="{:.2f}".format)
+        return f"<p>{escape(line)}</p>{table}"
+
+    @property
+    def _seconds(self) -> str:
+        return f"{self.summary.simulated_time_s:.4g} s simulated"
 
     @property
     def status(self) -> str:

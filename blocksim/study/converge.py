@@ -10,7 +10,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
-from blocksim.scenario import Scenario, load_scenario
+from blocksim.scenario import Scenario, Source, load_scenario
 from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.provenance import run_hash
@@ -32,7 +32,7 @@ OnRun = Callable[[str, Row], None]
 
 
 def converge(  # noqa: PLR0913 - one argument for each option of the command
-    scenario: Scenario | Path | str,
+    scenario: Source,
     *,
     tolerance_mm: float = TOLERANCE_MM,
     levels: int = LEVELS,

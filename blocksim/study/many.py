@@ -13,7 +13,7 @@ from multiprocessing import current_process
 from pathlib import Path
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Document, Scenario, scenario_hash
+from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
 from blocksim.scenario.models.study import Sweep
 from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernel_set
@@ -40,7 +40,7 @@ MEASURED = "experiment.table"
 
 
 def sweep(  # noqa: PLR0913 - one argument for each option of the command
-    scenario: Path | str | Document,
+    scenario: Source,
     vary: Mapping[str, Values] | None = None,
     *,
     mode: str | None = None,
@@ -74,9 +74,7 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     executor = _chosen(executor, scheduler, keep_cases=keep_cases)
     _refuse_loss(shard, overwrite=overwrite)
     runner = executor_named(executor)
-    document = with_sweep(
-        scenario if isinstance(scenario, Document) else Document.read(scenario), vary, mode, samples=samples, seed=seed
-    )
+    document = with_sweep(document_of(scenario), vary, mode, samples=samples, seed=seed)
     base = document.build()
     plan = _plan_of(base)
     cases = cases_of(document, plan)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from blocksim.analysis.compare import Comparison, compare_final
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.scenario import Scenario, load_scenario, place_bodies
+from blocksim.scenario import Scenario, Source, load_scenario, place_bodies
 from blocksim.simulation import Progress, Result, Watcher, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation import folder as files
 from blocksim.simulation.precautions import DEFAULTS, Precautions
@@ -25,7 +25,7 @@ def _ignore(_: Progress) -> None:
 
 
 def run(  # noqa: PLR0913 - what a user can choose for a run
-    scenario: Scenario | Path | str,
+    scenario: Source,
     *,
     out: Path | str | None = None,
     overwrite: bool = False,
@@ -92,6 +92,14 @@ def compare(run: "Result | pd.DataFrame | Path | str", experiment: Path | str | 
     # a scenario file may name another table by now than it did when it was run
     named = (load_scenario(run) if Path(run).is_file() else was).experiment
     return compare_final(read_final(folder, was), _table(experiment, named.table if named else None))
+
+
+def open_run(place: Path | str) -> Result:
+    """Return a stored run: a run folder, `results/NAME` (its newest finished run) or a scenario file that has been run.
+
+    Raises InputMissingError where there is none and InvalidInputError for a damaged one.
+    """
+    return read_result(find_run(place))
 
 
 def _table(given: Path | str | None, named: Path | None) -> ExperimentTable:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,7 @@ MOST_BYTES = 2000 * MEGABYTE
 """Of sweep.csv: a million cases of a hundred blocks do not fit into most memories."""
 OUTCOME = ("status", "reason", "seconds")
 SOONEST = 2.0  # s between two tables while the sweep runs
+MOST_ROWS = 20  # that a notebook shows
 SHARE = 0.02  # of the time, at most, goes into tables that are soon replaced
 
 
@@ -83,7 +85,7 @@ class SweepTable:
         return [self.ranges.hold(row) if row.get("status") == FINISHED else None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SweepResult:
     """The folder of a sweep and its table, a row a case."""
 
@@ -95,6 +97,19 @@ class SweepResult:
     def table(self) -> "pd.DataFrame":
         """The rows of the table (pandas 3 reads every bit). Raises InputMissingError or InvalidInputError."""
         return _read(self.folder / self.name)
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return the table, one row per case."""
+        return self.table
+
+    def __repr__(self) -> str:
+        """Return a line: folder, cases and what varies."""
+        failed = f", {self.failed} failed" if self.failed else ""
+        return f"<SweepResult {self.folder}: {len(self.table)} cases{failed}; varied: {', '.join(self.keys)}>"
+
+    def _repr_html_(self) -> str:
+        """Return the same line above the table, for notebooks."""
+        return f"<p>{escape(repr(self)[1:-1])}</p>{self.table.to_html(index=False, max_rows=MOST_ROWS)}"
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -125,9 +140,9 @@ class SweepResult:
         return Ranges.read(experiment).count(finished) / len(self.table)
 
 
-def read_sweep(folder: Path) -> SweepResult:
+def read_sweep(folder: Path | str) -> SweepResult:
     """Return the sweep that a folder holds. Raises InputMissingError or InvalidInputError."""
-    result = SweepResult(folder)
+    result = SweepResult(Path(folder))
     _ = result.table
     return result
 

@@ -1,8 +1,8 @@
 """The verification tables of this folder's README: measured, kept in results/verify.json, written as Markdown.
 
 `python -m blocksim.verification.reference blocksim/verification/README.md` writes the tables from the kept results.
-With `--measure` all cases are run first (a quarter of an hour) and the results replaced; column heads after it limit that to
-these columns: `--measure nonsmooth` takes half a minute and leaves all others as they are.
+With `--measure` all cases are run first (a quarter of an hour) and the results replaced; column heads after it limit
+that to these columns: `--measure nonsmooth` takes half a minute and leaves all others as they are.
 """
 
 import json

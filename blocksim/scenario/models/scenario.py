@@ -50,3 +50,10 @@ class Scenario(Table):
         default={},
         description="where values come from: dotted key and text, for calibrated or assumed values",
     )
+
+    def __repr__(self) -> str:
+        """Return a line: the name and what it holds; all values are in `scenario_to_toml`."""
+        parts = [structure.kind for structure in self.structures]
+        if self.bodies:
+            parts.append(f"{len(self.bodies)} single {'body' if len(self.bodies) == 1 else 'bodies'}")
+        return f"<Scenario {self.name}: {', '.join(parts)}; scheme {self.time.scheme}>"

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from blocksim.study.sampling.distributions import drawn
 from blocksim.study.sampling.draws import open_interval
 from blocksim.study.sensitivity.methods.method import Floats, Method
 from blocksim.study.sensitivity.outputs import INDICATOR, Output, outputs_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TAIL = 0.005  # of a normal distribution is left out at either end, for methods that go to the ends of the unit cube
 LEAST_VARIATION = {"mm": 0.01, "deg": 0.01, INDICATOR: 0.0}  # standard deviations below are no answer to anything
@@ -56,6 +60,19 @@ class Sensitivity:
     first_problem: str
     blocks: int
     left_out: int
+
+    def records(self) -> Iterator[dict[str, object]]:
+        """Yield one row per output that varies and key: output, unit, key, and the columns of the method."""
+        for output in self.outputs:
+            for index, key in enumerate(self.keys if output.varies else ()):
+                numbers = {column: values[index] for column, values in output.numbers.items()}
+                yield {"output": output.name, "unit": output.unit, "key": key, **numbers}
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return the same rows as a pandas table."""
+        import pandas as pd  # noqa: PLC0415 - a third of a second that the command does not pay
+
+        return pd.DataFrame(list(self.records()))
 
 
 def sensitivity(

@@ -1,0 +1,104 @@
+"""What a script or a notebook gets from `import blocksim`."""
+
+import doctest
+import pydoc
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import blocksim
+from blocksim.errors import InvalidInputError, ScenarioError
+
+ROOT = Path(__file__).parent.parent
+SLIDE = ROOT / "scenarios" / "slide.toml"
+SOFT = {"contact.stiffness_scale": 0.001}
+
+
+@pytest.fixture(scope="module")
+def slide() -> "blocksim.study.single.Result":
+    return blocksim.run(blocksim.load(SLIDE, SOFT))
+
+
+def test_example_of_the_package_prints_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    assert doctest.testmod(blocksim) == (0, 4)
+
+
+def test_help_lists_every_public_function() -> None:
+    text = pydoc.plain(pydoc.render_doc(blocksim))
+    assert [name for name in blocksim.__all__ if f"    {name}(" not in text and f"    {name} = " not in text] == []
+
+
+def test_a_scenario_from_dictionaries_is_that_of_the_file() -> None:
+    data = tomllib.loads(SLIDE.read_text(encoding="utf-8"))
+    assert blocksim.load(data) == blocksim.load(SLIDE)
+
+
+def test_replace_validates_like_a_file_and_leaves_the_scenario_alone() -> None:
+    flat = blocksim.load(SLIDE)
+    tilted = blocksim.replace(flat, {"ground.tilt": "5 deg"})
+    assert (flat.ground.tilt, tilted.ground.tilt) == (0.0, pytest.approx(np.radians(5.0)))
+    with pytest.raises(ScenarioError, match=r"ground.tlt: unknown key, did you mean 'tilt'"):
+        blocksim.replace(flat, {"ground.tlt": "5 deg"})
+
+
+def test_replace_keeps_the_experiment_table_of_a_scenario() -> None:
+    path = ROOT / "scenarios" / "three_blocks.toml"
+    changed = blocksim.replace(blocksim.load(path), {"contact.restitution": 0.1})
+    assert changed.experiment == blocksim.load(path).experiment
+
+
+def test_trajectories_are_a_tidy_table(slide: "blocksim.study.single.Result") -> None:
+    table = slide.to_frame()
+    assert len(table) == len(slide.frames) * 1
+    assert table.iloc[-1]["x_mm"] == pytest.approx(slide.final["x_mm"][0], abs=1e-12)
+    assert table["vx_mm_s"].iloc[0] == pytest.approx(500.0)
+
+
+def test_trajectories_of_several_blocks_keep_their_names() -> None:
+    result = blocksim.run(blocksim.load(ROOT / "scenarios" / "three_blocks.toml", {**SOFT, "time.end": 0.01}))
+    table = result.to_frame()
+    assert list(table["block"][:4]) == ["1", "2", "3", "1"]
+    last = table[table["time_s"] == table["time_s"].max()]
+    np.testing.assert_array_equal(last["y_mm"], result.final["y_mm"])
+
+
+def test_trajectories_as_a_data_set_carry_units(slide: "blocksim.study.single.Result") -> None:
+    data = slide.to_xarray()
+    assert dict(data.sizes) == {"time": len(slide.frames), "block": 1}
+    assert data["x"].attrs["units"] == "m"
+    assert float(data["x"].sel(block="block").isel(time=-1)) == slide.frames.x[-1, 0]
+    assert "energy_kinetic" in data
+
+
+def test_results_and_scenarios_show_as_one_line(slide: "blocksim.study.single.Result") -> None:
+    assert repr(slide).startswith("<Result slide: finished (at rest), 1 block, 0.18")
+    assert repr(slide.scenario) == "<Scenario slide: 1 single body; scheme explicit>"
+    assert "<table" in slide._repr_html_()
+
+
+def test_stored_runs_and_sweeps_open_again(tmp_path: Path) -> None:
+    kept = blocksim.run(blocksim.load(SLIDE, SOFT), out=tmp_path / "run")
+    assert blocksim.open_run(tmp_path / "run").final.equals(kept.final)
+    swept = blocksim.sweep(blocksim.load(SLIDE, SOFT), {"gravity": [9.7, 9.8]}, out=tmp_path / "sweep", jobs=1)
+    assert blocksim.open_sweep(tmp_path / "sweep").table.equals(swept.table)
+    assert repr(swept).endswith("2 cases; varied: gravity>")
+
+
+def test_sensitivity_takes_a_scenario_and_plain_ranges() -> None:
+    found = blocksim.sensitivity(blocksim.load(SLIDE, SOFT), {"gravity": {"from": 9.7, "to": 9.9}}, samples=2)
+    assert set(found.to_frame()["key"]) == {"gravity"}
+    with pytest.raises(InvalidInputError, match="unknown method 'moris'"):
+        blocksim.sensitivity(SLIDE, method="moris")
+
+
+def test_calibrate_takes_a_file_and_priors(tmp_path: Path) -> None:
+    prior = {"contact.restitution": {"from": 0.2, "to": 0.35}}
+    found = blocksim.calibrate(
+        blocksim.load(ROOT / "scenarios" / "three_blocks.toml", {"contact.stiffness_scale": 0.01}),
+        prior, {"structures.0.overlap": {"mean": "10 mm", "sd": "0.3 mm"}},
+        trials=2, members=2, fresh_members=4, out=tmp_path / "fitted.toml",
+    )  # fmt: skip
+    assert blocksim.load(found.path, allow_outside=True).name == "three_blocks"
