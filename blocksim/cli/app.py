@@ -8,7 +8,7 @@ import typer
 
 from blocksim import __version__
 from blocksim.cli.collector import leave_all
-from blocksim.cli.commands import CommandGroup, add_commands
+from blocksim.cli.commands import HELP, CommandGroup, add_commands
 from blocksim.cli.failures import tell_internal_error
 from blocksim.errors import ExitCode
 
@@ -18,8 +18,9 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
+    context_settings=HELP,
     help="Simulate collapses of rigid blocks and compare them with measurements.",
-    epilog="Start with: blocksim run scenarios/three_blocks.toml",
+    epilog="Start with: blocksim new wall my_wall; blocksim run my_wall.toml",
 )
 add_commands(app)
 

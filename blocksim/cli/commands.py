@@ -32,9 +32,24 @@ COMMANDS = {  # name: module in this folder, function in it, first line of its h
     "schema": ("schema", "schema_command", "Print the JSON Schema of scenario files, for editors."),
 }
 
+GROUPS = {  # heads of the list in `blocksim --help`
+    "Run": ("new", "run", "schema"),
+    "Look": ("plot", "animate", "report", "export"),
+    "Study": ("sweep", "calibrate", "sensitivity", "converge"),
+    "Check": ("check", "compare", "verify", "verify-run", "bench"),
+}
+HELP = {"help_option_names": ["-h", "--help"]}
+
 
 class CommandGroup(TyperGroup):
     """The group of all commands; it also turns errors into messages and exit codes."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - the signature is the base class's
+        """Write the list of commands, by what they are for."""
+        width = max(map(len, COMMANDS))
+        for head, names in GROUPS.items():
+            with formatter.section(head):
+                formatter.write_dl([(name.ljust(width), COMMANDS[name][2]) for name in names])
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
         """Import the command that was asked for."""
@@ -53,7 +68,7 @@ def loaded(name: str) -> Any:
     with loading():
         command = getattr(import_module(f"blocksim.cli.{module}"), function)
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
-    alone.command(name, short_help=summary)(command)
+    alone.command(name, short_help=summary, context_settings=HELP)(command)
     return add_outside(name, typer.main.get_command(alone))
 
 

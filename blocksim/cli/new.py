@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli import options
+from blocksim.cli import completion, options
 from blocksim.cli.output import answer, note
 from blocksim.errors import OutputExistsError
 from blocksim.scenario.findings import did_you_mean
@@ -25,7 +25,12 @@ def templates() -> dict[str, Traversable]:
 
 
 def new_command(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help=f"One of {', '.join(templates())}.")],
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="KIND", help=f"One of {', '.join(templates())}.", autocompletion=completion.of_names(templates)
+        ),
+    ],
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the scenario, and of its file without ending.")],
     quiet: options.Quiet = False,
 ) -> None:

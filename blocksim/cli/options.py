@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from blocksim.cli import completion
+
 
 def seconds_of(text: object) -> float:
     """Return a time in s, written with its unit. Raises BadParameter, a mistake of usage."""
@@ -26,7 +28,10 @@ Forces = Annotated[bool, typer.Option("--forces", help="Draw contact forces, whe
 Settings = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="Set a scenario key, e.g. contact.stiffness_scale=0.01. Repeatable."
+        "--set",
+        metavar="KEY=VALUE",
+        help="Set a scenario key, e.g. contact.stiffness_scale=0.01. Repeatable.",
+        autocompletion=completion.scenario_keys,
     ),
 ]
 OutFolder = Annotated[

@@ -1,6 +1,7 @@
 """The command itself: help, version, mistyped commands, and that it starts quickly."""
 
 import inspect
+import os
 import subprocess
 import sys
 from importlib import import_module
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from blocksim import __version__
-from blocksim.cli.commands import COMMANDS
+from blocksim.cli.commands import COMMANDS, GROUPS
 from tests.cli.conftest import SOFT, Command
 
 HEAVY = ("numba", "pandas", "h5py", "matplotlib", "pint", "numpy")
@@ -82,3 +83,36 @@ def test_help_does_not_wait_for_heavy_packages() -> None:
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_every_command_is_in_one_group_of_the_list() -> None:
+    assert sorted(name for names in GROUPS.values() for name in names) == sorted(COMMANDS)
+
+
+@pytest.mark.parametrize("arguments", [[], ["run"]])
+def test_short_help_is_the_long_one(blocksim: Command, arguments: list[str]) -> None:
+    assert blocksim(*arguments, "-h").out == blocksim(*arguments, "--help").out != ""
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("new wa", ["wall"]),
+        ("run scenarios/slide.toml --set contact.sti", ["contact.stiffness_scale="]),
+        ("run scenarios/slide.toml --set bodies.0.vel", ["bodies.0.velocity="]),
+        ("run no_such.toml --set contact.", []),
+        ("plo", ["plot"]),
+    ],
+)
+def test_shell_completes_kinds_and_keys(line: str, offered: list[str]) -> None:
+    words = {
+        "_BLOCKSIM_COMPLETE": "complete_bash",
+        "COMP_WORDS": f"blocksim {line}",
+        "COMP_CWORD": str(line.count(" ") + 1),
+    }
+    code = "from blocksim.cli.app import app; app(prog_name='blocksim')"
+    root = Path(__file__).parents[2]
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, **words}, cwd=root, capture_output=True, text=True, check=False
+    )
+    assert (done.stdout.split(), done.stderr) == (offered, "")

@@ -53,7 +53,7 @@ class Scenario(Table):
 
     def __repr__(self) -> str:
         """Return a line: the name and what it holds; all values are in `scenario_to_toml`."""
-        parts = [structure.kind for structure in self.structures]
+        parts: list[str] = [structure.kind for structure in self.structures]
         if self.bodies:
             parts.append(f"{len(self.bodies)} single {'body' if len(self.bodies) == 1 else 'bodies'}")
         return f"<Scenario {self.name}: {', '.join(parts)}; scheme {self.time.scheme}>"
