@@ -140,7 +140,9 @@ class Document:
         inside = found[: len(path)] == path
         on_the_way = path[: len(found)] == found and found not in self.source.places
         beside = finding.relation and path[:-1] == found[:-1]
-        return inside or (bool(found) and on_the_way) or beside
+        table = found[:-1]
+        in_new_table = bool(table) and table not in self.source.places and path[: len(table)] == table
+        return inside or (bool(found) and on_the_way) or beside or in_new_table
 
 
 def _pair(key: str, value: object) -> Pair:

@@ -1,5 +1,6 @@
 """Mistakes in the data of a scenario, in a person's words, with the path of the guilty key."""
 
+import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -126,12 +127,15 @@ def did_you_mean_or_list(word: str, known: Iterable[object]) -> str:
 
 
 def similar_word(word: str, known: Iterable[str]) -> str | None:
-    """Return the known word that is nearly the one found, or begins like it."""
+    """Return the known word that has the fewest slips, begins like the one found, or shares most of it."""
     known = tuple(islice(known, MAX_COMPARED))
     similar = nearest(word, known, most=max(1, len(word) // 3))
-    if similar is None and len(word) >= MIN_BEGINNING:
-        similar = next((other for other in known if other.startswith(word) or word.startswith(other)), None)
-    return similar
+    if similar is not None or len(word) < MIN_BEGINNING:
+        return similar
+    alike = [other for other in known if other.startswith(word) or word.startswith(other)]
+    if alike:
+        return min(alike, key=lambda other: abs(len(other) - len(word)))
+    return next(iter(difflib.get_close_matches(word.lower(), known, n=1)), None)
 
 
 def _kinds(path: KeyPath) -> str:

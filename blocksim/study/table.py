@@ -15,7 +15,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario.limited import MEGABYTE, refuse_large
 from blocksim.simulation.atomic import writing
 from blocksim.study.done import Done
-from blocksim.study.places import FINISHED
+from blocksim.study.places import FINISHED, SWEEP
 from blocksim.study.plan import Cases
 from blocksim.study.ranges import Ranges
 from blocksim.study.rows import KEPT
@@ -24,7 +24,7 @@ from blocksim.study.shard import WHOLE, Shard
 if TYPE_CHECKING:
     import pandas as pd
 
-TABLE = "sweep.csv"
+TABLE = SWEEP
 TEXT_COLUMNS = {"case": str, "status": str, "reason": str}
 MOST_BYTES = 2000 * MEGABYTE
 """Of sweep.csv: a million cases of a hundred blocks do not fit into most memories."""

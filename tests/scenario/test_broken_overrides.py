@@ -79,6 +79,23 @@ CASES = {
       | ^^^^^^^^^^
 """,
     ),
+    "key that shares most of its letters with a longer one": (
+        "contact.stifness=0.01",
+        """
+--set contact.stifness=0.01: unknown key, did you mean 'stiffness_scale'?
+      | contact.stifness=0.01
+      | ^^^^^^^^^^^^^^^^
+""",
+    ),
+    "missing key of a table that the setting begins": (
+        "motion.kind=table",
+        """
+--set motion.kind=table: motion.table: this key is missing: CSV table, relative to the scenario file: \
+time_s and displacement_m, _mm or acceleration_g, _m_s2
+      | motion.kind=table
+      | ^^^^^^^^^^^
+""",
+    ),
     "bad TOML": (
         "bodies=[{block=",
         """

@@ -123,6 +123,24 @@ def test_scenario_without_its_run_says_what_to_do(tmp_path: Path, monkeypatch: p
         find_run(SCENARIOS / "tower.toml")
 
 
+def test_scenario_run_with_other_values_names_the_newest_of_those_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    values = {"time.end": 0.001, "contact.stiffness_scale": 0.001}
+    kept = blocksim.run(blocksim.load(SCENARIOS / "tower.toml", values), out="results/tower/other")
+    assert kept.folder is not None
+    with pytest.raises(InputMissingError, match=r"runs with other values .* the newest: results/tower/other"):
+        find_run(SCENARIOS / "tower.toml")
+
+
+def test_folder_that_holds_a_sweep_only_names_the_sweep(tmp_path: Path) -> None:
+    (tmp_path / "sweep-a").mkdir()
+    (tmp_path / "sweep-a" / "sweep.csv").touch()
+    with pytest.raises(InputMissingError, match=r"no finished run in this folder, but a sweep: .*sweep-a"):
+        find_run(tmp_path)
+
+
 def test_folder_without_a_run_is_told(tmp_path: Path) -> None:
     with pytest.raises(InputMissingError, match="no finished run in this folder"):
         find_run(tmp_path)
