@@ -4,6 +4,7 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import asdict
 from enum import StrEnum
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
@@ -63,8 +64,9 @@ def converge_command(
 
     One of time step, contact stiffness and particle spacing (with rigid contacts: of step and tolerance) is refined at
     a time, the others stay as the scenario has them, until two refinements in a row move no block by more than the
-    tolerance. Exit code 0 says that the question is answered, whatever the answer. Called again, only runs that are
-    missing are done.
+    tolerance. Where a block ends on another side or farther away than its size, the outcome flips, and no order or
+    shrinking of changes is read from that. Exit code 0 says that the question is answered, whatever the answer. Called
+    again, only runs that are missing are done.
 
     Example: blocksim converge scenarios/three_blocks_nominal.toml
     """
@@ -154,17 +156,35 @@ def _cells(level: Level, chosen: list[int]) -> tuple[str, ...]:
 def _verdict(study: Study) -> list[str]:
     match study.verdict:
         case Verdict.CONVERGED:
-            return [_told_convergence(study)]
+            return [_told_convergence(study), *_flips(study)]
         case Verdict.NOT_YET:
             more = sum(not level.is_own for level in study.levels[study.levels.index(study.own) :]) + 2
-            return [f"not yet converged: the changes shrink; try --levels {more}"]
+            return [f"not yet converged: the changes shrink; try --levels {more}", *_flips(study)]
         case Verdict.SCATTERED:
             return [
                 "not converged: the changes do not shrink. Impacts amplify small differences, so",
                 "a single run may mean little: vary the start by a micrometre (blocksim sweep)",
             ]
+        case Verdict.FLIPS:
+            return [
+                "not converged: the outcome flips between levels. A single run says little:",
+                "vary the start by a micrometre (blocksim sweep) and report how often each occurs",
+                *_flips(study),
+            ]
         case Verdict.FAILED:
             return [f"not judged: {_told_failures(study)}"]
+
+
+def _flips(study: Study) -> list[str]:
+    """Report between which levels blocks end in another place or on another side, a line each."""
+    lines = []
+    for before, level in pairwise(study.levels):
+        if level.flipped:
+            named = ", ".join(map(_short, level.flipped[:MOST_BLOCKS]))
+            more = f" and {len(level.flipped) - MOST_BLOCKS} more" if len(level.flipped) > MOST_BLOCKS else ""
+            blocks = "block" if len(level.flipped) == 1 else "blocks"
+            lines.append(f"outcome differs between {before.value:g} and {level.value:g}: {blocks} {named}{more}")
+    return lines
 
 
 def _told_failures(study: Study) -> str:

@@ -27,7 +27,8 @@ FOLDER = "converge"
 TOLERANCE_MM = 0.1
 LEVELS = 4  # refinements of the scenario's own value
 FEWEST_LEVELS = 2  # refinements that it takes to converge
-UNFINISHED = {Verdict.NOT_YET, Verdict.SCATTERED}
+UNFINISHED = {Verdict.NOT_YET, Verdict.SCATTERED, Verdict.FLIPS}
+UNRELIABLE = {Verdict.SCATTERED, Verdict.FLIPS}
 OnRun = Callable[[str, Row], None]
 
 
@@ -127,7 +128,7 @@ def _refine(
 
 def _recommended(scenario: Scenario, studies: tuple[Study, ...], runs: _Runs, tolerance_mm: float) -> Joint | None:
     """Try all recommended values together, then each alone, the cheapest first; None where none holds the tolerance."""
-    if any(study.verdict is Verdict.SCATTERED for study in studies) or not studies[0].own.is_finished:
+    if any(study.verdict in UNRELIABLE for study in studies) or not studies[0].own.is_finished:
         return None
     changed = [(level, study.key) for study in studies if (level := study.recommended) and not level.is_own]
     together = {key: level.value for level, key in changed}

@@ -4,6 +4,10 @@ The distance between two results is the largest over all blocks of |change of x|
 the diagonal, which is how far the turn moves a corner; both in mm. The observed order is Richardson's: with r the
 factor of a refinement, a change of order p shrinks by r^p, so p = log(change before / change) / log(r), taken from the
 coordinate that changes most and given only where it goes on in the same direction by less.
+
+The outcome of a block flips between two levels where it ends turned by more than 45 degrees, farther away than its
+longest side, or higher or lower by more than half its shortest side (on another block, or on none). A distance between
+two outcomes is no error of discretisation: it has no order, and that it shrinks means nothing.
 """
 
 from collections.abc import Sequence
@@ -23,6 +27,7 @@ from blocksim.study.single import FINISHED
 ROUND_OFF_MM = 1e-6  # a smaller change says nothing about the order
 SHRINKING = 0.75  # a change is at most this part of the one before it where changes shrink
 MILLI = 1e3
+ANOTHER_FACE_DEG = 45.0  # turned by more, a block ends on another of its sides
 NO_COORDINATES = np.zeros(0)
 Floats = NDArray[np.float64]
 
@@ -33,6 +38,7 @@ class Verdict(StrEnum):
     CONVERGED = "converged"  # two refinements in a row change less than the tolerance
     NOT_YET = "not yet converged"  # the changes shrink, but were still too large at the last level
     SCATTERED = "not converged"  # the changes do not shrink
+    FLIPS = "outcome flips"  # in one of the last two refinements some block ends in another place or on another side
     FAILED = "failed"  # a level that was needed did not run to its end
 
 
@@ -50,6 +56,7 @@ class Level:
     change_mm: float  # distance to the level before; NaN where there is none
     order: float  # observed; NaN where there is none
     to_finest_mm: float  # distance to the finest level that finished
+    flipped: tuple[str, ...] = ()  # blocks whose outcome is another one than at the level before
 
     @property
     def is_finished(self) -> bool:
@@ -132,21 +139,32 @@ class Coordinates:
         placed = place_bodies(scenario)
         self.blocks = tuple(body.name for body in placed)
         self._reach = np.array([0.5 * MILLI * hypot(body.size_x, body.size_y) for body in placed])
+        sides = MILLI * np.array([(body.size_x, body.size_y) for body in placed])
+        self._longest, self._shortest = sides.max(axis=1), sides.min(axis=1)
 
     def read(self, row: Row) -> tuple[Floats, Floats]:
         """Return final x (mm) and rotation (degrees) of every block, of no block where the run did not finish."""
         if row["status"] != FINISHED:
             return NO_COORDINATES, NO_COORDINATES
-        x, rotation = (
-            np.array([row[f"{name}.{column}"] for name in self.blocks], dtype=float)
-            for column in ("x_mm", "rotation_deg")
-        )
-        return x, rotation
+        return self._column(row, "x_mm"), self._column(row, "rotation_deg")
+
+    def _column(self, row: Row, column: str) -> Floats:
+        return np.array([row[f"{name}.{column}"] for name in self.blocks], dtype=float)
 
     def point(self, row: Row) -> Floats:
         """Return the coordinates (mm), empty where the run did not finish."""
         x, rotation = self.read(row)
         return np.concatenate([x, np.radians(rotation) * self._reach[: len(rotation)]])
+
+    def flipped(self, before: Row, row: Row) -> tuple[str, ...]:
+        """Return the blocks whose outcome differs between two runs; none where one of them did not finish."""
+        if {before["status"], row["status"]} != {FINISHED}:
+            return ()
+        x, y, turn = (
+            np.abs(self._column(row, name) - self._column(before, name)) for name in ("x_mm", "y_mm", "rotation_deg")
+        )
+        elsewhere = (np.hypot(x, y) > self._longest) | (y > 0.5 * self._shortest)
+        return tuple(self.blocks[i] for i in np.flatnonzero(elsewhere | (turn > ANOTHER_FACE_DEG)))
 
 
 def distance(one: Floats, other: Floats) -> float:
@@ -186,9 +204,11 @@ def judge(rows: dict[int, Row], refinement: Refinement, coordinates: Coordinates
                 change_mm=distance(points[i - 1], points[i]) if i else nan,
                 order=observed_order(points[i - 2 : i + 1], refinement.factor) if i > 1 else nan,
                 to_finest_mm=distance(points[i], finest),
+                flipped=coordinates.flipped(rows[order[i - 1]], rows[number]) if i else (),
             )
         )
-    verdict = verdict_of([level.change_mm for level in levels[1:]], tolerance_mm)
+    flips = any(level.flipped for level in levels[-2:])
+    verdict = verdict_of([level.change_mm for level in levels[1:]], tolerance_mm, flips=flips)
     return Study(
         refinement.study,
         refinement.title,
@@ -200,11 +220,16 @@ def judge(rows: dict[int, Row], refinement: Refinement, coordinates: Coordinates
     )
 
 
-def verdict_of(changes_mm: Sequence[float], tolerance_mm: float) -> Verdict:
-    """Judge the changes from level to level, from coarse to fine; NaN is a change to or from a failed level."""
+def verdict_of(changes_mm: Sequence[float], tolerance_mm: float, *, flips: bool) -> Verdict:
+    """Judge the changes from level to level, from coarse to fine; NaN is a change to or from a failed level.
+
+    `flips` says that an outcome changes in one of the last two refinements.
+    """
     last = changes_mm[-2:]
     if len(last) < 2 or not all(map(isfinite, last)):  # noqa: PLR2004 - two refinements in a row
         return Verdict.FAILED
+    if flips:
+        return Verdict.FLIPS
     if max(last) < tolerance_mm:
         return Verdict.CONVERGED
     before = next((change for change in reversed(changes_mm[:-2]) if isfinite(change)), inf)

@@ -28,12 +28,13 @@ def coordinates(slide: Scenario) -> Coordinates:
     return Coordinates(slide)
 
 
-def finished(x_mm: float, rotation_deg: float = 0.0, seconds: float = 1.0) -> Row:
+def finished(x_mm: float, rotation_deg: float = 0.0, seconds: float = 1.0, y_mm: float = 12.5) -> Row:
     return {
         "status": "finished",
         "reason": "at rest",
         "seconds": seconds,
         "block.x_mm": x_mm,
+        "block.y_mm": y_mm,
         "block.rotation_deg": rotation_deg,
     }
 
@@ -78,6 +79,33 @@ def test_verdict_looks_at_two_refinements_in_a_row(
     coordinates: Coordinates, places: list[float], verdict: Verdict
 ) -> None:
     assert judged(coordinates, places).verdict is verdict
+
+
+def test_changes_that_shrink_from_outcome_to_outcome_are_no_convergence(coordinates: Coordinates) -> None:
+    study = judged(coordinates, [70.0, 9000.0, 4900.0, 4900.0 - 2100.0])
+    assert study.verdict is Verdict.FLIPS
+    assert [level.flipped for level in study.levels] == [(), ("block",), ("block",), ("block",)]
+    assert study.recommended is None
+    settled = judged(coordinates, [9000.0, 70.0, 70.05, 70.02])
+    assert settled.verdict is Verdict.CONVERGED
+    assert [bool(level.flipped) for level in settled.levels] == [False, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("end", "flips"),
+    [
+        (finished(10.0 + 31.0), False),  # the block is 32 mm long and 25 mm high
+        (finished(10.0 + 33.0), True),
+        (finished(10.0, 44.0), False),
+        (finished(10.0, -46.0), True),
+        (finished(10.0, y_mm=12.5 + 12.0), False),
+        (finished(10.0, y_mm=12.5 + 13.0), True),  # on another block
+        ({"status": "failed", "reason": "", "seconds": 0.1}, False),
+    ],
+)
+def test_outcome_is_another_one_beyond_the_size_of_a_block(coordinates: Coordinates, end: Row, flips: bool) -> None:
+    assert bool(coordinates.flipped(finished(10.0), end)) is flips
+    assert bool(coordinates.flipped(end, finished(10.0))) is flips
 
 
 def test_only_what_has_converged_is_recommended(coordinates: Coordinates) -> None:
