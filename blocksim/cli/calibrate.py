@@ -8,9 +8,10 @@ from typing import Annotated
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.output import answer, note, print_json, table_lines
+from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.progress import tell_compilation
 from blocksim.cli.vary import read_variations
+from blocksim.errors import ExitCode
 from blocksim.scenario import Document
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study.calibrate.calibrate import FRESH_MEMBERS, MEMBERS, TRIALS, Fit, calibrate
@@ -59,8 +60,10 @@ def calibrate_command(
     What is maximised is the probability that a run is inside all measured ranges (as in compare) while the other inputs
     scatter as stated, not the agreement of one run. Writes the scenario with the fitted values and where they come from
     in [provenance]. Every trial is kept as it ends; a search that was stopped goes on with --resume. Needs the extra
-    blocksim[study]. The example takes the scatter from [sweep], as in "structures.0.overlap" = { mean = "10 mm", sd =
-    "0.3 mm" }; --scatter "structures.0.overlap=10 mm+-0.3 mm" says the same.
+    blocksim[study]. Exit code 1: nothing inside all ranges was found. The search then goes by the distance to the
+    ranges, and the file holds the nearest values. The example takes the scatter from [sweep], as in
+    "structures.0.overlap" = { mean = "10 mm", sd = "0.3 mm" }; --scatter "structures.0.overlap=10 mm+-0.3 mm" says the
+    same.
 
     Example: blocksim calibrate mine.toml --fit contact.restitution=0.2:0.35
     """
@@ -89,6 +92,7 @@ def calibrate_command(
         answer("\n".join(_lines(found)))
     if not silent:
         _tell_end(found)
+    raise typer.Exit(ExitCode.SUCCESS if found.found else ExitCode.OUTSIDE)
 
 
 def _telling() -> Callable[[Trial, Trial, int], None]:
@@ -101,15 +105,40 @@ def _telling() -> Callable[[Trial, Trial, int], None]:
         if trial is best or now - told_at > TOLD_SECONDS or trial.number == trials:
             told_at = now
             values = ", ".join(f"{'.'.join(key.split('.')[-2:])} {value}" for key, value in trial.values.items())
-            share, most = trial.score.share_inside, best.score.share_inside
-            note(f"{trial.number}/{trials}: {share:.0%} inside (best {most:.0%}): {values}")
+            note(f"{trial.number}/{trials}: {_agreement(trial, best)}: {values}")
 
     return tell
 
 
+def _agreement(trial: Trial, best: Trial) -> str:
+    """Return the share inside; where no trial has any, how far off: 0 at the ranges, towards 1 far from them."""
+    if best.score.inside:
+        return f"{trial.score.share_inside:.0%} inside (best {best.score.share_inside:.0%})"
+    return f"nothing inside, {trial.score.miss:.3f} off (best {best.score.miss:.3f} of 0 to 1)"
+
+
 def _lines(found: Fit) -> list[str]:
     rows = [[prior.key, str(prior), str(found.best.values[prior.key])] for prior in found.plan.priors]
-    return [*table_lines(COLUMNS, rows, left=1), "", *_probability(found)]
+    nothing = [] if found.found else ["", *_nothing_found(found)]
+    return [*table_lines(COLUMNS, rows, left=1), "", *_probability(found), *nothing]
+
+
+def _nothing_found(found: Fit) -> list[str]:
+    """Report how far the nearest values are off, by quantity."""
+    rows = [
+        [
+            f"{hit.range.column} of {hit.range.block}",
+            f"[{number(hit.range.lower)}, {number(hit.range.upper)}]",
+            number(hit.median),
+            f"{hit.share_inside:.0%}",
+        ]
+        for hit in found.hits
+    ]
+    return [
+        "nothing found: no member is inside all ranges. The values above are the nearest",
+        "of those tried; widen the priors, fit other keys or raise --trials",
+        *table_lines(("quantity", "measured", "median", "inside"), rows, left=1),
+    ]
 
 
 def _probability(found: Fit) -> list[str]:
@@ -138,6 +167,7 @@ def _data(found: Fit) -> dict[str, object]:
     low, high = found.score.interval
     return {
         "scenario": str(found.path),
+        "found": found.found,
         "fitted": [
             {
                 "key": prior.key,
@@ -159,4 +189,14 @@ def _data(found: Fit) -> dict[str, object]:
         "interval": [low, high],
         "fresh_members": found.score.members,
         "failed": found.score.failed,
+        "quantities": [
+            {
+                "block": hit.range.block,
+                "quantity": hit.range.column,
+                "range": [hit.range.lower, hit.range.upper],
+                "median": hit.median,
+                "share_inside": hit.share_inside,
+            }
+            for hit in found.hits
+        ],
     }

@@ -15,6 +15,7 @@ from tests.cli.conftest import SCENARIOS, SOFT, Answer, Command, Process
 FRICTION, SPEED = "friction.block_ground", "bodies.0.velocity.0"
 TABLE = "block,quantity,unit,replicate,value\nblock,x,mm,1,41\nblock,x,mm,2,43\n"
 FIT = ("--fit", f"{FRICTION}=0.2:0.5")
+NEAR = ("--fit", f"{FRICTION}=0.3:0.307")  # all of which stop in the range without scatter
 SCATTER = ("--scatter", f"{SPEED}=0.5 m/s+-0.01 m/s")
 SHORT = ("--trials", 20, "--members", 8, "--fresh", 128)
 Slide = Callable[..., Answer]
@@ -51,9 +52,27 @@ def test_friction_of_the_slide_is_found(slide: Slide, blocksim: Command) -> None
     assert "as in Table 1" in fitted.source.text  # the user's comments stay
 
 
+def test_nothing_found_is_1_and_the_nearest_is_told(slide: Slide) -> None:
+    few = ("--trials", 20, "--members", 4, "--fresh", 8)
+    answer = slide("--fit", f"{FRICTION}=0.4:0.9", *SCATTER, *few, "--out", "fitted.toml")
+    assert answer.code == 1
+    assert "nothing found: no member is inside all ranges" in answer.out
+    head, _, row = (line.split() for line in answer.out.splitlines()[-3:])
+    assert head == ["quantity", "measured", "median", "inside"]
+    assert row[:5] == ["x_mm", "of", "block", "[41.00,", "43.00]"]
+    x = float(row[5])
+    assert 29.0 < x < 32.5  # the search goes towards the range, to the least friction: 0.5^2 / (2 * 9.81 * 0.4) = 31.9
+    assert row[6] == "0%"
+    assert "nothing inside, 0." in answer.err
+    assert max(map(len, answer.out.splitlines())) <= 80
+    assert "not calibrated (nothing inside all ranges" in Path("fitted.toml").read_text()
+    again = slide("--fit", f"{FRICTION}=0.4:0.9", *SCATTER, *few, "--out", "fitted.toml", "--overwrite", "--json")
+    assert (again.code, json.loads(again.out)["found"]) == (1, False)
+
+
 def test_table_fits_the_screen_and_bounds_are_warned_of(slide: Slide) -> None:
     answer = slide("--fit", f"{FRICTION}=0.4:0.5", *SCATTER, *SHORT, "--out", "fitted.toml")
-    assert answer.code == 0
+    assert answer.code == 1
     lines = answer.out.splitlines()
     assert lines[0].split() == ["key", "prior", "fitted"]
     assert max(map(len, lines)) <= 80
@@ -64,7 +83,7 @@ def test_table_fits_the_screen_and_bounds_are_warned_of(slide: Slide) -> None:
 
 
 def test_nothing_is_overwritten_unless_asked(slide: Slide, tmp_path: Path) -> None:
-    few = (*FIT, *SCATTER, "--trials", 2, "--members", 2, "--fresh", 2, "--out", "fitted.toml", "--quiet")
+    few = (*NEAR, *SCATTER, "--trials", 2, "--members", 2, "--fresh", 2, "--out", "fitted.toml", "--quiet")
     assert slide(*few).code == 0
     before = (tmp_path / "fitted.toml").read_text()
     again = slide(*few)

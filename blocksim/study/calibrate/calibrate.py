@@ -8,7 +8,7 @@ from blocksim.errors import InvalidInputError, OutputExistsError, StoppedEarlyEr
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.stopping import interruptible
-from blocksim.study.calibrate.objective import Score, score_of
+from blocksim.study.calibrate.objective import Hit, Score, hits_of, score_of
 from blocksim.study.calibrate.plan import Plan
 from blocksim.study.calibrate.prior import Prior
 from blocksim.study.calibrate.search import Trial, finished_trials, opened, search
@@ -32,6 +32,12 @@ class Fit:
     score: Score
     trials: int
     path: Path
+    hits: tuple[Hit, ...]  # of the fresh members, a quantity each
+
+    @property
+    def found(self) -> bool:
+        """Whether any member of the best trial or any fresh one is inside all ranges; if not, it is the nearest one."""
+        return _is_found(self.best, self.score)
 
     @property
     def at_bounds(self) -> tuple[Prior, ...]:
@@ -61,10 +67,13 @@ def calibrate(  # noqa: PLR0913 - one argument for each option of the command
     prepare(path, journal, resume=resume, overwrite=overwrite)
     best = _searched(plan, journal, trials, on_trial)
     fresh = plan.scatter.fresh_members(best.values, fresh_members if plan.scatter.plan else 1, plan.seed)
-    score = _score(plan, fresh)
-    text = with_fitted(plan.document, best.values, _provenance(plan, score, trials), path.parent, _head(plan, best))
+    members = list(run_members(plan.bare, fresh))
+    score = score_of(members, plan.ranges)
+    text = with_fitted(
+        plan.document, best.values, _provenance(plan, best, score, trials), path.parent, _head(plan, best)
+    )
     write_text(path, text)
-    return Fit(plan, best, score, trials, path)
+    return Fit(plan, best, score, trials, path, hits_of(members, plan.ranges))
 
 
 def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None:
@@ -110,7 +119,11 @@ def _score(plan: Plan, members: Iterable[Values]) -> Score:
     return score_of(run_members(plan.bare, members), plan.ranges)
 
 
-def _provenance(plan: Plan, score: Score, trials: int) -> dict[str, str]:
+def _is_found(best: Trial, score: Score) -> bool:
+    return best.score.inside + score.inside > 0
+
+
+def _provenance(plan: Plan, best: Trial, score: Score, trials: int) -> dict[str, str]:
     """Say of every fitted value where it comes from."""
     table = Path(plan.table.source).name
     if plan.scatter.plan is None:
@@ -124,7 +137,8 @@ def _provenance(plan: Plan, score: Score, trials: int) -> dict[str, str]:
             f"{score.share_inside:.3f} [{low:.3f}, {high:.3f}] of {score.members} fresh members, {table}, "
             f"scatter (SI): {scatter}"
         )
-    return {prior.key: f"calibrated, prior {prior}, {found}" for prior in plan.priors}
+    verb = "calibrated" if _is_found(best, score) else "not calibrated (nothing inside all ranges, nearest values)"
+    return {prior.key: f"{verb}, prior {prior}, {found}" for prior in plan.priors}
 
 
 def _head(plan: Plan, best: Trial) -> str:

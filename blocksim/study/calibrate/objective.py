@@ -18,7 +18,8 @@ by at least 1/M, and their mean misses by less than 2, so by less than 1/M in th
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
+from statistics import median
 
 from blocksim.analysis.proportion import interval
 from blocksim.study.members import Member
@@ -50,6 +51,26 @@ class Score:
     def interval(self) -> tuple[float, float]:
         """95 % limits (Clopper-Pearson) of the probability behind this share, for members drawn independently."""
         return interval(self.inside, self.members)
+
+
+@dataclass(frozen=True)
+class Hit:
+    """How one measured quantity agrees: where the members end (mm or degrees), and the share that is inside."""
+
+    range: Range
+    median: float  # of the finished members; NaN where there is none
+    share_inside: float  # of all members
+
+
+def hits_of(members: Sequence[Member], ranges: Sequence[Range]) -> tuple[Hit, ...]:
+    """Look at each quantity by itself, for at least one member."""
+    finals = [member.final for member in members if member.final is not None]
+    values = [values_at(final, ranges) for final in finals]
+    columns = [[row[i] for row in values if isfinite(row[i])] for i in range(len(ranges))]
+    return tuple(
+        Hit(one, median(column) if column else nan, sum(map(one.holds, column)) / len(members))
+        for one, column in zip(ranges, columns, strict=True)
+    )
 
 
 def score_of(members: Iterable[Member], ranges: Sequence[Range]) -> Score:

@@ -6,7 +6,7 @@ import math
 import pytest
 from scipy.stats import binomtest
 
-from blocksim.study.calibrate.objective import Score, miss_of, score_of
+from blocksim.study.calibrate.objective import Score, hits_of, miss_of, score_of
 from blocksim.study.members import Member
 from blocksim.study.targets import Range
 
@@ -61,3 +61,13 @@ def test_failed_members_count_as_outside_and_are_told() -> None:
     score = score_of([member(12.0), Member(None, "overlap"), member(math.nan)], RANGES)
     assert (score.members, score.inside, score.failed) == (3, 1, 2)
     assert score.share_inside == pytest.approx(1 / 3)
+
+
+def test_each_quantity_is_told_by_itself() -> None:
+    members = [member(12.0, 0.0), member(20.0), member(22.0), Member(None, "overlap")]
+    x, rotation = hits_of(members, RANGES)
+    assert (x.median, x.share_inside) == (20.0, 0.25)
+    assert (rotation.median, rotation.share_inside) == (-90.0, 0.5)
+    (nothing, _) = hits_of(members[3:], RANGES)
+    assert math.isnan(nothing.median)
+    assert nothing.share_inside == 0.0
