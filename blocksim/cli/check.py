@@ -48,7 +48,7 @@ def check_command(
 
 
 def _data(description: Description) -> dict[str, object]:
-    bodies = [{**asdict(body), "mass": body.mass, "inertia": body.inertia} for body in description.bodies]
+    bodies = [{**body._asdict(), "mass": body.mass, "inertia": body.inertia} for body in description.bodies]
     return {**asdict(replace(description, bodies=())), "bodies": bodies}
 
 

@@ -1,7 +1,8 @@
 """Which placed rectangles overlap, and which reach into the ground or a wall, exactly (separating axes)."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from operator import attrgetter
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -34,8 +35,10 @@ class Rectangles(NamedTuple):
     @classmethod
     def of(cls, bodies: Sequence[PlacedBody]) -> Self:
         """Take the outlines of placed bodies."""
-        rows = [(b.x, b.y, b.size_x / 2, b.size_y / 2, math.cos(b.angle), math.sin(b.angle)) for b in bodies]
-        return cls(*np.array(rows, dtype=np.float64).reshape(-1, len(cls._fields)).T)
+        x, y, size_x, size_y = (_column(bodies, attrgetter(name)) for name in ("x", "y", "size_x", "size_y"))
+        # math, as numpy's functions may differ in the last digit
+        cosine, sine = (np.fromiter((of(body.angle) for body in bodies), np.float64) for of in (math.cos, math.sin))
+        return cls(x, y, 0.5 * size_x, 0.5 * size_y, cosine, sine)
 
     @classmethod
     def along(cls, segments: Sequence[PlacedSegment]) -> Self:
@@ -58,6 +61,10 @@ class Rectangles(NamedTuple):
     def bottom(self) -> Floats:
         """Heights of the lowest corners."""
         return self.y - self.reach(0.0, 1.0)
+
+
+def _column(bodies: Sequence[PlacedBody], value: Callable[[PlacedBody], float]) -> Floats:
+    return np.fromiter(map(value, bodies), np.float64, len(bodies))
 
 
 def penetration(ones: Rectangles, others: Rectangles) -> Floats:

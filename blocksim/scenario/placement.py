@@ -1,16 +1,14 @@
 """From declared structures and bodies to placed rectangles."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Protocol
+import weakref
+from typing import NamedTuple, Protocol
 
 from blocksim.scenario.keys import KeyPath
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.structures import Pose
 
 
-@dataclass(frozen=True, slots=True)
-class PlacedBody:
+class PlacedBody(NamedTuple):
     """One rectangle at the start: centre x, y, turned by angle, all in SI (m, kg/m³, rad, m/s, rad/s)."""
 
     name: str
@@ -39,26 +37,57 @@ class PlacedBody:
         return self.mass * (self.size_x * self.size_x + self.size_y * self.size_y) / 12.0
 
 
+class _Placement(NamedTuple):
+    """All bodies of a scenario and where they come from."""
+
+    scenario: weakref.ref[Scenario]
+    bodies: tuple[PlacedBody, ...]
+    origins: tuple[tuple[KeyPath, int], ...]  # structure or body, and how many bodies it gives
+
+
+_latest: list[_Placement] = []  # at most one, for as long as its scenario lives: a million bodies take seconds to place
+
+
 def place_bodies(scenario: Scenario) -> tuple[PlacedBody, ...]:
     """Place all bodies: structures first, then single bodies, each in the order of the file.
 
-    Raises UnfitError where a structure does not go with its block; loading a scenario has checked that.
+    Called again for the same scenario object, the same bodies are returned. Raises UnfitError where a structure does
+    not go with its block; loading a scenario has checked that.
     """
-    return tuple(body for _, body in placed_with_origin(scenario))
+    return _placement(scenario).bodies
 
 
-def placed_with_origin(scenario: Scenario) -> Iterator[tuple[KeyPath, PlacedBody]]:
-    """Yield every placed body with the path of the structure or body that it comes from."""
-    index = 0
+def origins_of(scenario: Scenario) -> list[KeyPath]:
+    """Return for every placed body the path of the structure or body that it comes from."""
+    return [path for path, count in _placement(scenario).origins for _ in range(count)]
+
+
+def _placement(scenario: Scenario) -> _Placement:
+    known = next(iter(_latest), None)
+    if known is None or known.scenario() is not scenario:
+        known = _placed(scenario)
+        _latest[:] = [known]
+    return known
+
+
+def _forget(dead: weakref.ref[Scenario]) -> None:
+    _latest[:] = [one for one in _latest if one.scenario is not dead]
+
+
+def _placed(scenario: Scenario) -> _Placement:
+    bodies: list[PlacedBody] = []
+    origins: list[tuple[KeyPath, int]] = []
     for number, structure in enumerate(scenario.structures):
+        poses = structure.start(scenario.blocks[structure.block])
         place = _placer(scenario, structure.block)
-        for pose in structure.start(scenario.blocks[structure.block]):
-            index += 1
-            yield ("structures", number), place(str(index), pose, fixed=False)
+        bodies += [place(str(index), pose, fixed=False) for index, pose in enumerate(poses, start=len(bodies) + 1)]
+        origins.append((("structures", number), len(poses)))
     for number, spec in enumerate(scenario.bodies):
-        index += 1
         pose = Pose(spec.x, spec.y, spec.angle, *spec.velocity, spec.spin)
-        yield ("bodies", number), _placer(scenario, spec.block)(spec.name or str(index), pose, fixed=spec.fixed)
+        name = spec.name or str(len(bodies) + 1)
+        bodies.append(_placer(scenario, spec.block)(name, pose, fixed=spec.fixed))
+        origins.append((("bodies", number), 1))
+    return _Placement(weakref.ref(scenario, _forget), tuple(bodies), tuple(origins))
 
 
 class _Place(Protocol):
@@ -73,6 +102,6 @@ def _placer(scenario: Scenario, key: str) -> _Place:
     density = scenario.materials[material].density
 
     def place(name: str, pose: Pose, *, fixed: bool) -> PlacedBody:
-        return PlacedBody(name, key, material, size_x, size_y, depth, density, *pose, fixed=fixed)
+        return PlacedBody(name, key, material, size_x, size_y, depth, density, *pose, fixed)
 
     return place

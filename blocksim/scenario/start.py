@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import islice, pairwise
+from itertools import chain, islice, pairwise
+from operator import attrgetter
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from blocksim.scenario.findings import MAX_FINDINGS, Finding
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.motion import PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.placement import PlacedBody, placed_with_origin
+from blocksim.scenario.placement import PlacedBody, origins_of, place_bodies
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.segments import TOLERANCE, profile_segments, surface_heights, wall_segments
 from blocksim.scenario.structures import MAX_BLOCKS, UnfitError
@@ -42,25 +43,31 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
     yield from _endless_motion(scenario)
     yield from _fixed_stiffnesses(scenario)
     yield from _impossible_masses(scenario)
-    unfit = list(_unfit_structures(scenario))
-    if unfit:
-        yield from unfit
+    try:
+        bodies, origins = place_bodies(scenario), origins_of(scenario)
+    except UnfitError:
+        yield from _unfit_structures(scenario)
         return
-    origins, bodies = zip(*placed_with_origin(scenario), strict=True)
     endless = list(_endless_places(origins, bodies))
     if endless:
         yield from endless
         return
-    smallest = min(min(body.size_x, body.size_y) for body in bodies)
+    smallest = min(map(min, {(body.size_x, body.size_y) for body in bodies}))
     yield from _coarse_particles(scenario, smallest)
     yield from _fine_particles(scenario)
-    farthest = max(max(abs(body.x), abs(body.y)) for body in bodies)
+    farthest = max(max(abs(one) for one in ends) for ends in (_ends(bodies, "x"), _ends(bodies, "y")))
     yield from _unfit_skin(scenario, smallest, farthest)
     yield from _short_segments(scenario, SHORTEST_SHARE * smallest)
     yield from _equal_names(origins, bodies)
     yield from _below_ground(scenario, origins, bodies)
     yield from _in_walls(scenario, origins, bodies)
     yield from _overlaps(origins, bodies)
+
+
+def _ends(bodies: Sequence[PlacedBody], name: str) -> tuple[float, float]:
+    """Return the least and the greatest of a number that every body has."""
+    values = list(map(attrgetter(name), bodies))
+    return min(values), max(values)
 
 
 def _too_many(scenario: Scenario) -> Iterator[Finding]:
@@ -105,8 +112,11 @@ def _unfit_structures(scenario: Scenario) -> Iterator[Finding]:
 def _endless_places(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
     """Find structures whose keys are possible numbers while a place or velocity that follows from them is not."""
     told = set()
-    for origin, body in zip(origins, bodies, strict=True):
-        if origin not in told and not all(map(math.isfinite, (body.x, body.y, body.vx, body.vy, body.spin))):
+    numbers = map(attrgetter("x", "y", "vx", "vy", "spin"), bodies)
+    values = np.fromiter(chain.from_iterable(numbers), np.float64, 5 * len(bodies)).reshape(-1, 5)
+    for index in np.flatnonzero(~np.isfinite(values).all(axis=1)).tolist():
+        origin, body = origins[index], bodies[index]
+        if origin not in told:
             told.add(origin)
             yield Finding(
                 origin,
@@ -182,6 +192,8 @@ def _short_segments(scenario: Scenario, least: float) -> Iterator[Finding]:
 
 
 def _equal_names(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+    if len({body.name for body in bodies}) == len(bodies):
+        return
     seen: set[str] = set()
     for origin, body in zip(origins, bodies, strict=True):
         if body.name in seen:

@@ -160,33 +160,38 @@ def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> 
     """Yield every pair of classes that can touch: blocks with the ground, with walls and with blocks."""
     classes = contact_classes(scenario, placed)
     names = _class_names(classes)
+    softest = _softest(placed) if isinstance(scenario.time, Nonsmooth) else {}
     for i, block in enumerate(classes):
         for j, other in enumerate(classes):
             if not block.is_ground and (other.is_ground or j <= i):
                 materials = (str(block.material), names[j] if other.is_ground else str(other.material))
                 pair, row = pair_of(scenario, block, other), world.interactions[i, j]
                 found = _pair((names[i], names[j]), materials, pair, row, scenario.contact.law)
-                touching = [body for one in (block, other) for body in _softest(placed, one)]
-                yield (
-                    found
-                    if not isinstance(scenario.time, Nonsmooth)
-                    else replace(
-                        found,
-                        normal_stiffness=point_stiffness(
-                            float(world.controls[0].step) / scenario.time.substeps, touching
-                        ),
-                        normal_damping_ratio=None,
-                        shear_damping_ratio=None,
-                        shear_stiffness_ratio=None,
-                        rules={key: rule for key, rule in pair.rules.items() if key in RIGID_RULES},
-                    )
-                )
+                if isinstance(scenario.time, Nonsmooth):
+                    substep = float(world.controls[0].step) / scenario.time.substeps
+                    found = _rigid_pair(found, substep, [softest[one] for one in (block, other) if one in softest])
+                yield found
 
 
-def _softest(placed: Sequence[PlacedBody], one: ContactClass) -> list[PlacedBody]:
-    """Return the block of a class that gives way most; none for the ground and walls."""
-    blocks = [body for body in placed if (body.material, body.depth) == (one.material, one.depth)]
-    return [max(blocks, key=inverse_mass)] if blocks and not one.is_ground else []
+def _rigid_pair(found: PairDescription, substep: float, touching: Sequence[PlacedBody]) -> PairDescription:
+    """Return the parameters that a pair has where contacts are rigid; `touching` are its softest blocks."""
+    return replace(
+        found,
+        normal_stiffness=point_stiffness(substep, touching),
+        normal_damping_ratio=None,
+        shear_damping_ratio=None,
+        shear_stiffness_ratio=None,
+        rules={key: rule for key, rule in found.rules.items() if key in RIGID_RULES},
+    )
+
+
+def _softest(placed: Sequence[PlacedBody]) -> dict[ContactClass, PlacedBody]:
+    """Return the block that gives way most of every class of blocks."""
+    kinds = {(body.material, body.depth, body.size_x, body.size_y, body.density, body.fixed): body for body in placed}
+    found: dict[ContactClass, PlacedBody] = {}
+    for body in sorted(kinds.values(), key=inverse_mass):
+        found[ContactClass(body.material, body.depth)] = body
+    return found
 
 
 def _pair(

@@ -1,6 +1,8 @@
 """Where bodies are at the start."""
 
+import gc
 import math
+import weakref
 from pathlib import Path
 
 import pytest
@@ -68,3 +70,18 @@ def test_a_unit_weight_is_divided_by_standard_gravity_whatever_the_gravity() -> 
     data = scenario_data(gravity=1.62, bodies=[{"block": "brick", "x": 0, "y": 1}])
     (body,) = place_bodies(scenario_from_mapping({**data, "materials": {"aluminium": light}}))
     assert body.density == 100.0
+
+
+def test_a_scenario_is_placed_once_and_its_bodies_go_with_it() -> None:
+    # placing a million blocks takes seconds; check, build and describe all ask for them
+    path = Path(__file__).parents[2] / "scenarios" / "wall.toml"
+    scenario = load_scenario(path)
+    bodies = place_bodies(scenario)
+    assert place_bodies(scenario) is bodies
+    other = scenario.model_copy(update={"structures": ()})
+    assert place_bodies(other) != bodies
+    assert place_bodies(scenario) == bodies
+    weak = weakref.ref(scenario)
+    del scenario
+    gc.collect()
+    assert weak() is None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -32,7 +31,7 @@ def test_column_sinks_by_what_is_told(count: int, substeps: int) -> None:
 
 def test_sag_goes_with_the_square_of_the_substep_and_not_with_the_mass() -> None:
     one = place_bodies(stack(1).scenario())[0]
-    heavy = replace(one, density=2.0 * one.density)
+    heavy = one._replace(density=2.0 * one.density)
     assert column_sag(2e-4, one, 3, 9.81) == pytest.approx(4.0 * column_sag(1e-4, one, 3, 9.81))
     assert point_stiffness(1e-4, [one, one]) == pytest.approx(0.5 * point_stiffness(1e-4, [one]))
     assert column_sag(1e-4, heavy, 3, 9.81) == pytest.approx(column_sag(1e-4, one, 3, 9.81))

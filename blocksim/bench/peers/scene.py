@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -37,7 +37,7 @@ class Scene:
     def placed(self) -> list[PlacedBody]:
         """Return the blocks at the start."""
         bodies = place_bodies(self.make())
-        return [replace(body, x=body.x + by) for body, by in zip(bodies, self.shift.tolist(), strict=True)]
+        return [body._replace(x=body.x + by) for body, by in zip(bodies, self.shift.tolist(), strict=True)]
 
 
 class Final(NamedTuple):
