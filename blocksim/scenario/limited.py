@@ -1,62 +1,108 @@
-"""Files that others may have made, read up to a size: a file of any size must not take all memory."""
+"""Files that others may have made: regular files only, read up to a size.
+
+A pipe or a device may never end, a file of any size must not take all memory, and a link in a result folder may lead to
+a file that is nobody's business but its owner's. A link that a person names (`links=True`) is followed.
+"""
 
 import errno
 import os
+import stat
+from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 from blocksim.errors import InputMissingError, InvalidInputError
 
 MEGABYTE = 1_000_000
+IS_LINK = "a link; links in result folders are not followed"
+KINDS = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a pipe; save its content in a file first"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+)
 
 
-def read_limited(path: Path, limit: int) -> bytes:
-    """Return what a file holds, at most `limit` bytes.
+def open_regular(path: Path, *, links: bool = False) -> BinaryIO:
+    """Open a regular file for reading, without waiting for anybody at the other end of a pipe.
 
-    Raises InputMissingError where there is no file or it cannot be read, InvalidInputError where it is larger, or is
-    no file but a folder, a pipe or a device, which may never end.
+    Raises InputMissingError where there is no file or it cannot be read, InvalidInputError where it is a folder, a pipe
+    or a device, or, without `links`, where its last part is a link.
     """
     try:
-        with open(path, "rb", opener=_at_once) as file:
-            if not path.is_file():
-                message = f"{path}: not a file"
-                raise InvalidInputError(message)
-            content = file.read(limit + 1)
-    except FileNotFoundError:
-        message = f"{path}: no such file"
-        raise InputMissingError(message) from None
+        check_regular(path, links=links)
+        file = open(path, "rb", opener=_opener(links=links))  # noqa: SIM115 - the caller closes it
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
-        raise _unreadable(path, error) from None
+        raise unreadable(path, error) from None
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):  # replaced since
+        file.close()
+        message = f"{path}: not a file"
+        raise InvalidInputError(message)
+    return file
+
+
+def check_regular(path: Path, *, links: bool = False) -> int:
+    """Return the size (bytes) of a regular file that a library will open by itself. Raises as `open_regular`."""
+    try:
+        found = path.stat(follow_symlinks=links)
+    except (OSError, ValueError) as error:
+        raise unreadable(path, error) from None
+    if stat.S_ISLNK(found.st_mode):
+        message = f"{path}: {IS_LINK}"
+        raise InvalidInputError(message)
+    if not stat.S_ISREG(found.st_mode):
+        kind = next((what for is_kind, what in KINDS if is_kind(found.st_mode)), "")
+        message = f"{path}: not a file{kind and ', but '}{kind}"
+        raise InvalidInputError(message)
+    return found.st_size
+
+
+def read_limited(path: Path, limit: int, *, links: bool = False) -> bytes:
+    """Return what a file holds, at most `limit` bytes. Raises as `open_regular`, InvalidInputError for a larger one."""
+    with open_regular(path, links=links) as file:
+        content = _read(path, file, limit + 1)
     if len(content) > limit:
         message = f"{path}: {_too_large(limit)}"
         raise InvalidInputError(message)
     return content
 
 
+def read_head(path: Path, count: int) -> bytes:
+    """Return the first bytes of a file, at most `count`. Raises as `open_regular`."""
+    with open_regular(path) as file:
+        return _read(path, file, count)
+
+
 def refuse_large(path: Path, limit: int) -> None:
-    """Look whether a file that a library will open by itself is one, and not too large. Raises as `read_limited`."""
-    try:
-        size, is_file = path.stat().st_size, path.is_file()
-    except FileNotFoundError:
-        message = f"{path}: no such file"
-        raise InputMissingError(message) from None
-    except (OSError, ValueError) as error:
-        raise _unreadable(path, error) from None
-    if not is_file or size > limit:
-        message = f"{path}: {_too_large(limit) if is_file else 'not a file'}"
+    """Check that a file that a library will open by itself is regular, and not too large. Raises as `read_limited`."""
+    if check_regular(path) > limit:
+        message = f"{path}: {_too_large(limit)}"
         raise InvalidInputError(message)
+
+
+def unreadable(path: Path, error: OSError | ValueError) -> InputMissingError | InvalidInputError:
+    """Return the error to raise for a file that cannot be opened or read."""
+    number = getattr(error, "errno", None)
+    if number == errno.ENOENT:
+        return InputMissingError(f"{path}: no such file")
+    if number == errno.EISDIR:
+        return InvalidInputError(f"{path}: not a file, but a folder")
+    reason = getattr(error, "strerror", None) or str(error)
+    return InputMissingError(f"{path}: cannot be read: {reason}")
+
+
+def _opener(*, links: bool) -> Callable[[str, int], int]:
+    extra = getattr(os, "O_NONBLOCK", 0) | (0 if links else getattr(os, "O_NOFOLLOW", 0))
+    return lambda name, flags: os.open(name, flags | extra)
+
+
+def _read(path: Path, file: BinaryIO, count: int) -> bytes:
+    try:
+        return file.read(count)
+    except OSError as error:
+        raise unreadable(path, error) from None
 
 
 def _too_large(limit: int) -> str:
     return f"larger than {limit / MEGABYTE:g} MB, which is the most that is read"
-
-
-def _at_once(name: str, flags: int) -> int:
-    """Open a file without waiting for somebody at the other end of a pipe."""
-    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
-
-
-def _unreadable(path: Path, error: OSError | ValueError) -> InputMissingError | InvalidInputError:
-    reason = getattr(error, "strerror", None) or str(error)
-    if getattr(error, "errno", None) == errno.EISDIR:
-        return InvalidInputError(f"{path}: not a file")
-    return InputMissingError(f"{path}: cannot be read: {reason}")

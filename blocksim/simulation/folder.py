@@ -8,9 +8,9 @@ from pathlib import Path
 from blocksim.errors import BlocksimError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario
 from blocksim.scenario.limited import MEGABYTE, read_limited
-from blocksim.scenario.resolved import HEADER
 from blocksim.simulation.output_folder import make_folder
 from blocksim.simulation.provenance import run_hash
+from blocksim.simulation.written import RUN_KINDS, is_leftover, is_written
 
 RESULTS = Path("results")
 SCENARIO = "scenario.toml"  # resolved; written first
@@ -83,11 +83,22 @@ def clear_remains(folder: Path, names: Iterable[str]) -> None:
     chosen = set(names)
     try:
         for path in folder.iterdir():
-            if path.name in chosen or (path.name not in OURS and _is_ours(path.name)):
+            if path.name in chosen or is_leftover(path.name, OURS):
                 path.unlink(missing_ok=True)
     except OSError as error:
         message = f"{folder}: cannot be written: {error.strerror}"
         raise OutputError(message) from error
+
+
+def remove_run(folder: Path) -> None:
+    """Remove a folder with the run in it; a link, or a folder that holds anything else, stays. Raises OSError."""
+    if folder.is_symlink() or not folder.is_dir():
+        return
+    present = list(folder.iterdir())
+    if all(is_written(path, RUN_KINDS) for path in present):
+        for path in present:
+            path.unlink(missing_ok=True)
+        folder.rmdir()
 
 
 def _refuse_finished(folder: Path) -> None:
@@ -98,23 +109,10 @@ def _refuse_finished(folder: Path) -> None:
 
 def _refuse_foreign(folder: Path, present: set[str]) -> None:
     """Raise OutputExistsError unless everything here was written by a run."""
-    foreign = sorted(name for name in present if not _is_ours(name))
-    if not foreign and SCENARIO in present and not _is_resolved(folder / SCENARIO):
-        foreign = [SCENARIO]
+    foreign = sorted(name for name in present if not is_written(folder / name, RUN_KINDS))
     if foreign:
         message = f"{folder}: holds files that are not a blocksim run ({foreign[0]}); choose another folder with --out"
         raise OutputExistsError(message)
-
-
-def _is_ours(name: str) -> bool:
-    """Tell whether a run writes a file of this name, or left it half written when it was killed."""
-    return name in OURS or name.startswith(tuple(f".{ours}." for ours in OURS))
-
-
-def _is_resolved(scenario: Path) -> bool:
-    """Tell whether a scenario was written by a run, and not by a person."""
-    with scenario.open("rb") as file:
-        return file.readline() == HEADER.encode()
 
 
 def newest_finished(folder: Path) -> Path | None:

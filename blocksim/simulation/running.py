@@ -11,7 +11,7 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import sha256_of, write_text
 from blocksim.simulation.claim import claimed
 from blocksim.simulation.compilation import compile_kernels, kernels_of
-from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
+from blocksim.simulation.copies import keep_scenario, read_tables
 from blocksim.simulation.disk import refuse_full_disk
 from blocksim.simulation.loop import Attendance, LoopResult, Progress, Watcher, run_loop
 from blocksim.simulation.outcome import RESIDUAL_PROMISE
@@ -91,7 +91,7 @@ def _made_ready(part: Part, tables: Mapping[str, bytes], *, overwrite: bool) -> 
     """Make the folder of a run ready for this part of it; return the resolved scenario."""
     if not part.goes_on:
         files.prepare_folder(part.folder, overwrite=overwrite)
-    return _keep_scenario(part.scenario, tables, part.folder)
+    return keep_scenario(part.scenario, tables, part.folder)
 
 
 def renew_copies(scenario: Scenario, folder: Path) -> None:
@@ -101,7 +101,7 @@ def renew_copies(scenario: Scenario, folder: Path) -> None:
     """
     tables = read_tables(scenario)
     old = tuple(_bytes_of(folder / name) for name in COPIES)
-    _keep_scenario(scenario, tables, folder)
+    keep_scenario(scenario, tables, folder)
     if old != tuple(_bytes_of(folder / name) for name in COPIES):
         summary = _with_checksums(read_summary(folder / files.SUMMARY), folder)
         write_text(folder / files.SUMMARY, summary.to_json())
@@ -109,14 +109,6 @@ def renew_copies(scenario: Scenario, folder: Path) -> None:
 
 def _bytes_of(path: Path) -> bytes | None:
     return path.read_bytes() if path.is_file() else None
-
-
-def _keep_scenario(scenario: Scenario, tables: Mapping[str, bytes], folder: Path) -> str:
-    """Write the resolved scenario, and beside it copies of the tables that it names; return the TOML."""
-    toml = resolved_beside(scenario, tables)
-    write_text(folder / files.SCENARIO, toml)
-    keep_tables(tables, folder)
-    return toml
 
 
 def _result(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Result:

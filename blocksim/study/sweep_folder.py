@@ -1,6 +1,9 @@
 """The folder of a sweep: whose it is, what it came from, and that nothing in it is lost by mistake."""
 
-import shutil
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -8,17 +11,27 @@ from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
+from blocksim.scenario.limited import MEGABYTE, read_head, read_limited
 from blocksim.simulation.atomic import write_text
-from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
+from blocksim.simulation.copies import keep_scenario, read_tables, refuse_foreign_copies
+from blocksim.simulation.folder import remove_run
 from blocksim.simulation.output_folder import make_folder
 from blocksim.simulation.provenance import environment
-from blocksim.study.manifest import PATTERN, is_in_use
+from blocksim.simulation.written import Kind, begins, grows_from, has_keys, is_leftover, is_resolved, is_written
+from blocksim.study.manifest import is_in_use
 
 PLAN = "sweep.toml"
 ORIGIN = "sweep.json"
 CASES = "cases"
-HEAD = "# Sweep "
-RESULTS = (PATTERN, "timings*.csv", "sweep*.csv", ORIGIN)
+HEAD = b"# Sweep "
+SHARD = r"(?:-\d+-of-\d+)?"
+KINDS: dict[str, Kind] = {  # of results, by the pattern of their names; shards have files of their own
+    rf"sweep{SHARD}\.csv": begins(b"case,"),
+    rf"manifest{SHARD}\.jsonl": grows_from(b'{"number":'),
+    rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
+    r"sweep\.json": has_keys("began_at", "environment"),
+}
+LEFTOVER = re.compile(r"\.(sweep[-\w]*\.csv|sweep\.json|sweep\.toml)\..*")
 
 
 class Origin(BaseModel, frozen=True):
@@ -28,22 +41,30 @@ class Origin(BaseModel, frozen=True):
     mode: str | None = None
     seed: int | None = None
     environment: dict[str, str]
+    sha256: dict[str, str] = {}  # of the copies of tables, as they were written
 
 
 def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool) -> None:
     """Make the folder and write the plan into it. Raises OutputExistsError when something else is there."""
-    head = f"{HEAD}{name}. To run it again: blocksim sweep FILE\n"
+    head = f"{HEAD.decode()}{name}. To run it again: blocksim sweep FILE\n"
     tables = read_tables(base)
     try:
         make_folder(folder)
-        _make_free(folder, head, overwrite=overwrite)
+        _make_free(folder, head.encode(), tables, overwrite=overwrite)
     except OSError as error:
         message = f"{folder}: cannot be created: {error.strerror}"
         raise OutputExistsError(message) from error
-    write_text(folder / PLAN, head + resolved_beside(base, tables))
-    keep_tables(tables, folder)
-    if not (folder / ORIGIN).is_file():  # whoever goes on with a sweep did not begin it
-        write_text(folder / ORIGIN, _origin_of(base).model_dump_json(indent=2) + "\n")
+    keep_scenario(base, tables, folder, PLAN, head)
+    _keep_origin(folder, base, tables)
+
+
+def _keep_origin(folder: Path, base: Scenario, tables: Mapping[str, bytes]) -> None:
+    """Write sweep.json where there is none: whoever goes on with a sweep did not begin it; renew its checksums."""
+    known = read_origin(folder)
+    sums = {name: hashlib.sha256(content).hexdigest() for name, content in tables.items()}
+    if known is None or known.sha256 != sums:
+        origin = (known or _origin_of(base)).model_copy(update={"sha256": sums})
+        write_text(folder / ORIGIN, origin.model_dump_json(indent=2) + "\n")
 
 
 def _origin_of(base: Scenario) -> Origin:
@@ -61,43 +82,72 @@ def read_origin(folder: Path) -> Origin | None:
     """Return what a sweep came from, None where it is older than this file. Raises InvalidInputError."""
     path = folder / ORIGIN
     try:
-        return Origin.model_validate_json(path.read_bytes())
-    except FileNotFoundError:
+        return Origin.model_validate_json(read_limited(path, MEGABYTE))
+    except InputMissingError:
         return None
-    except (OSError, ValidationError) as error:
+    except ValidationError as error:
         message = f"{path}: not what a sweep came from: {str(error).splitlines()[0]}"
         raise InvalidInputError(message) from None
 
 
-def _make_free(folder: Path, head: str, *, overwrite: bool) -> None:
-    present = {path.name for path in folder.iterdir() if not path.name.startswith(f".{PLAN}.")}
+def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], *, overwrite: bool) -> None:
+    """Raise OutputExistsError where the folder is not free; with `overwrite` remove what an older sweep has written."""
+    present = [path for path in sorted(folder.iterdir()) if not is_leftover(path.name, (PLAN,))]
     if not present:
         return
-    plan = (folder / PLAN).read_text(encoding="utf-8", errors="replace") if PLAN in present else ""
-    if not plan.startswith(HEAD):
+    if not is_resolved(folder / PLAN) or not read_head(folder / PLAN, len(HEAD)).startswith(HEAD):
         message = f"{folder}: holds files that are not a sweep; choose another folder with --out"
         raise OutputExistsError(message)
-    if overwrite:
-        _empty(folder)
-    elif not plan.startswith(head):
+    is_same = read_head(folder / PLAN, len(head)) == head
+    if not (overwrite or is_same):
         message = f"{folder}: another sweep is there; --overwrite replaces it, --out DIR writes elsewhere"
         raise OutputExistsError(message)
+    _refuse_foreign(present)
+    refuse_foreign_copies(tables, folder, PLAN)
+    if overwrite:
+        _empty(folder)
+
+
+def _refuse_foreign(present: Sequence[Path]) -> None:
+    """Raise OutputExistsError where a file of somebody else has the name of a result."""
+    foreign = next((path for path in present if _kind_of(path.name) and not _is_ours(path)), None)
+    if foreign is not None:
+        message = f"{foreign}: not as a sweep writes it; move it away, or write elsewhere with --out DIR"
+        raise OutputExistsError(message)
+
+
+def _kind_of(name: str) -> Kind | None:
+    return next((kind for pattern, kind in KINDS.items() if re.fullmatch(pattern, name)), None)
+
+
+def _is_ours(path: Path) -> bool:
+    """Return True for a file that a sweep has written, or left half written when it was killed."""
+    kind = _kind_of(path.name)
+    if kind is not None:
+        return is_written(path, {path.name: kind}, PLAN)
+    named = LEFTOVER.fullmatch(path.name)
+    return named is not None and is_leftover(path.name, (named[1],)) and path.is_file()
 
 
 def _empty(folder: Path) -> None:
-    """Remove all results, unless somebody is writing them."""
-    if any(is_in_use(path) for path in folder.glob(PATTERN)):
+    """Remove the results of a sweep, unless somebody is writing them; whatever else lies there stays."""
+    results = [path for path in folder.iterdir() if path.name != PLAN and _is_ours(path)]
+    if any(is_in_use(path) for path in results if path.suffix == ".jsonl"):
         message = f"{folder}: a sweep is running here; wait for it, or write elsewhere with --out DIR"
         raise OutputExistsError(message)
-    for pattern in RESULTS:
-        for path in folder.glob(pattern):
-            path.unlink()
-    shutil.rmtree(folder / CASES, ignore_errors=True)
+    for path in results:
+        path.unlink()
+    cases = folder / CASES
+    if cases.is_dir() and not cases.is_symlink():
+        for case in cases.iterdir():
+            remove_run(case)
+        with suppress(OSError):  # not empty
+            cases.rmdir()
 
 
 def read_plan(folder: Path) -> Document:
     """Return the plan of a sweep. Raises InputMissingError where the folder holds none."""
-    if not (folder / PLAN).is_file():
+    if not (folder / PLAN).exists():
         message = f"{folder}: no sweep is there (no {PLAN})"
         raise InputMissingError(message)
     return Document.read(folder / PLAN)

@@ -1,14 +1,16 @@
 """Nothing that a run has not written is ever removed."""
 
 import os
+import re
 import shutil
 from pathlib import Path
 
 import pytest
 
 from blocksim.errors import OutputExistsError
-from blocksim.simulation import Result
-from blocksim.simulation.folder import default_folder, holds_run, newest_finished, prepare_folder
+from blocksim.simulation import Result, renew_copies
+from blocksim.simulation.folder import clear_remains, default_folder, holds_run, newest_finished, prepare_folder
+from blocksim.simulation.written import RUN_KINDS
 from tests.simulation.conftest import SCENARIOS, Shipped
 
 
@@ -35,7 +37,7 @@ def test_overwriting_empties_a_run(copy: Path) -> None:
 def test_leftovers_of_a_kill_do_not_block_a_folder(copy: Path) -> None:
     for name in ("done.json", "run.json", "final.csv"):
         (copy / name).unlink()
-    (copy / ".final.csv.k2j3h4").write_text("half")
+    (copy / ".final.csv.k2j3h4_x.csv").write_text("half")
     (copy / ".run.h5.new").write_text("half")
     with pytest.raises(OutputExistsError, match="did not finish"):
         prepare_folder(copy, overwrite=False)
@@ -50,6 +52,43 @@ def test_foreign_file_is_never_removed(copy: Path, overwrite: bool) -> None:
     with pytest.raises(OutputExistsError, match=r"not a blocksim run \(thesis\.tex\)"):
         prepare_folder(copy, overwrite=overwrite)
     assert names(copy) == before
+
+
+@pytest.mark.parametrize("name", [*RUN_KINDS, "experiment.csv", "motion.csv", ".final.csv.swp"])
+def test_a_file_of_a_person_with_the_name_of_a_result_is_never_removed(tmp_path: Path, copy: Path, name: str) -> None:
+    for folder in (tmp_path / "alone", copy):
+        folder.mkdir(exist_ok=True)
+        (folder / name).write_text("years,of,work\n")
+        before = {path: path.read_bytes() for path in folder.iterdir()}
+        with pytest.raises(OutputExistsError, match=re.escape(name)):
+            prepare_folder(folder, overwrite=True)
+        assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_a_link_in_the_place_of_a_result_is_never_removed(copy: Path, tmp_path: Path) -> None:
+    shutil.move(copy / "final.csv", tmp_path / "mine.csv")
+    (copy / "final.csv").symlink_to(tmp_path / "mine.csv")
+    with pytest.raises(OutputExistsError, match=r"final\.csv"):
+        prepare_folder(copy, overwrite=True)
+    assert (copy / "final.csv").is_symlink()
+
+
+def test_end_of_a_run_leaves_the_unsaved_edits_of_an_editor(copy: Path) -> None:
+    for name in (".final.csv.swp", ".run.h5.new", ".run.json.abcd1234.json"):
+        (copy / name).write_text("unsaved")
+    clear_remains(copy, ())
+    assert {name for name in names(copy) if name.startswith(".")} == {".final.csv.swp"}
+
+
+def test_table_of_a_person_is_neither_replaced_nor_removed_as_a_copy(copy: Path, soft: Shipped) -> None:
+    scenario = soft()
+    (copy / "motion.csv").write_text("time_s,displacement_mm\n0,0\n1,2\n")
+    renew_copies(scenario, copy)
+    assert (copy / "motion.csv").is_file()
+    (copy / "experiment.csv").write_text("corrected by hand")
+    with pytest.raises(OutputExistsError, match=r"experiment\.csv: not as blocksim wrote it"):
+        renew_copies(scenario, copy)
+    assert (copy / "experiment.csv").read_text() == "corrected by hand"
 
 
 def test_scenario_written_by_a_person_is_never_removed(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from blocksim.errors import OutputError, OutputExistsError
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.folder import prepare_folder
 from blocksim.simulation.output_folder import make_folder
+from blocksim.simulation.table import COLUMNS, csv_text
 
 
 @pytest.fixture
@@ -59,7 +60,7 @@ def test_what_a_run_replaces_is_a_link_and_not_what_it_leads_to(tmp_path: Path) 
     folder = tmp_path / "run"
     folder.mkdir()
     (folder / "final.csv").symlink_to(tmp_path / "theirs.csv")
-    write_text(folder / "final.csv", "ours")
+    write_text(folder / "final.csv", csv_text({name: [] for name in COLUMNS}))
     prepare_folder(folder, overwrite=True)
     assert (tmp_path / "theirs.csv").read_text(encoding="utf-8") == "theirs"
     assert list(folder.iterdir()) == []

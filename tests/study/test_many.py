@@ -13,8 +13,10 @@ from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsEr
 from blocksim.scenario import Document, load_scenario
 from blocksim.study.manifest import Manifest
 from blocksim.study.many import read_sweep, sweep
+from blocksim.study.plan import with_sweep
 from blocksim.study.shard import Shard
 from blocksim.study.single import run
+from blocksim.study.sweep_folder import prepare
 from tests.study.conftest import SCENARIOS
 
 KINETIC = "friction.block_block.kinetic"
@@ -181,6 +183,55 @@ def test_foreign_folder_is_left_alone(quick: Document, tmp_path: Path, overwrite
     with pytest.raises(OutputExistsError, match="not a sweep"):
         sweep(quick, TWO, out=tmp_path, overwrite=overwrite)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+MINE = {
+    "sweep_notes.csv": "case,remark\n",
+    "timings_lab.csv": "mine",
+    "manifest_of_samples.jsonl": "{}",
+    "cases/notes.txt": "mine",
+    "cases/mine/run.h5": "mine",
+    ".sweep.csv.swp": "unsaved",
+}
+
+
+def test_overwriting_a_sweep_leaves_all_that_it_did_not_write(quick: Document, tmp_path: Path) -> None:
+    short = quick.with_values({END: 0.01})
+    first = sweep(short, TWO, out=tmp_path, keep_cases=True, jobs=1).table["case"]
+    (tmp_path / "cases" / first[0] / "remarks.txt").write_text("this one looks odd")
+    kept = {path: path.read_bytes() for path in (tmp_path / "cases" / first[0]).iterdir()}
+    (tmp_path / "cases" / "mine").mkdir()
+    for name, text in MINE.items():
+        (tmp_path / name).write_text(text)
+    again = sweep(short, {KINETIC: [0.1]}, out=tmp_path, overwrite=True)
+    assert again.table[KINETIC].tolist() == [0.1]
+    assert {name: (tmp_path / name).read_text() for name in MINE} == MINE
+    assert {path: path.read_bytes() for path in (tmp_path / "cases" / first[0]).iterdir()} == kept
+    assert not (tmp_path / "cases" / first[1]).exists()
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("sweep.toml", "# Sweep of the lab, March\nschema = 1\n"),
+        ("sweep.csv", "sample,mass\n"),
+        ("timings.csv", "sample,time\n"),
+        ("manifest.jsonl", "{}\n"),
+        ("sweep.json", "{}\n"),
+        ("experiment.csv", "corrected by hand\n"),
+    ],
+)
+def test_a_file_of_a_person_in_the_place_of_a_result_stays(
+    quick: Document, tmp_path: Path, name: str, text: str, overwrite: bool
+) -> None:
+    folder = tmp_path / "sweep"
+    prepare(folder, with_sweep(quick, TWO, None).build(), "0123", overwrite=False)
+    (folder / name).write_text(text)
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(OutputExistsError, match="not a sweep" if name == "sweep.toml" else name):
+        prepare(folder, with_sweep(quick, TWO, None).build(), "0123", overwrite=overwrite)
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
 def test_mistake_leaves_no_folder(quick: Document, tmp_path: Path) -> None:

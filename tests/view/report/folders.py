@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from blocksim.scenario import Scenario, load_scenario, place_bodies
 from blocksim.simulation import folder as files
 from blocksim.simulation.contacts import SUPPORT, Rows, empty_rows
-from blocksim.simulation.copies import keep_tables, read_tables, resolved_beside
+from blocksim.simulation.copies import keep_scenario, read_tables
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.ledger import EnergyLedger
 from blocksim.simulation.recorder import Frame
@@ -29,14 +29,12 @@ def write_run(
     """Write a finished run of a shipped scenario with `count` frames and return them."""
     scenario = load_scenario(SCENARIOS / f"{name}.toml", dict(overrides or {}))
     folder.mkdir(parents=True)
-    tables = read_tables(scenario)
-    keep_tables(tables, folder)
-    (folder / files.SCENARIO).write_text(resolved_beside(scenario, tables), encoding="utf-8")
+    keep_scenario(scenario, read_tables(scenario), folder)
     write_frames(folder / files.FRAMES, scenario, count)
     frames = read_frames(folder / files.FRAMES, scenario)
     (folder / files.FINAL).write_text(csv_text(final_columns(frames)), encoding="utf-8")
     (folder / files.SUMMARY).write_text(summary_of(scenario.name, count).to_json(), encoding="utf-8")
-    (folder / files.DONE).write_text('{"run": "made-up"}', encoding="utf-8")
+    (folder / files.DONE).write_text('{"run": "made-up", "status": "finished"}', encoding="utf-8")
     return frames
 
 

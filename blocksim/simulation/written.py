@@ -1,0 +1,152 @@
+"""Which files of a result folder blocksim wrote: known by name and content together, never by the name alone.
+
+A folder may hold files that a person put beside the results, or in their place. Only what is recognised here may be
+removed or replaced without being named on the command line. Folders of version 0.1 keep no list of their files, so the
+content decides; an empty file of one of the names holds nothing that could be lost.
+"""
+
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+from blocksim.errors import BlocksimError
+from blocksim.scenario.limited import MEGABYTE, read_head, read_limited
+from blocksim.scenario.resolved import HEADER
+from blocksim.simulation.atomic import sha256_of
+from blocksim.simulation.table import COLUMNS
+
+HEAD_BYTES = 4096
+MOST_BYTES = 10 * MEGABYTE  # of a scenario or a summary
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+FRAME_MARKS = (b"h5md", b"n_committed")  # names in the root group, which libver latest keeps at the start of the file
+RESOLVED = HEADER.encode()
+CHECKPOINT = b'{"format":"blocksim checkpoint '
+Kind = Callable[[bytes], bool]  # whether content, or its first HEAD_BYTES, is of a kind
+
+
+def begins(start: bytes) -> Kind:
+    """Return the kind of content that begins with these bytes."""
+    return lambda head: head.startswith(start)
+
+
+def grows_from(start: bytes) -> Kind:
+    """Return the kind of content that is appended to, and may have been torn in its first line by a kill."""
+
+    def is_kind(head: bytes) -> bool:
+        first = head.split(b"\n", 1)[0].rstrip(b"\0")
+        return first.startswith(start.rstrip()) or (first != b"" and start.startswith(first)) or not head.strip(b"\0")
+
+    return is_kind
+
+
+def has_header(columns: Iterable[str]) -> Kind:
+    """Return the kind of a CSV file with exactly these columns."""
+    line = ",".join(columns).encode()
+    return lambda head: head.split(b"\n", 1)[0].rstrip(b"\r") == line
+
+
+def is_frames(head: bytes) -> bool:
+    """Return True for the head of run.h5, also of one that was killed or cut off."""
+    return head.startswith(SIGNATURE) and all(mark in head for mark in FRAME_MARKS)
+
+
+def has_keys(*keys: str) -> Kind:
+    """Return the kind of a JSON object with at least these keys; it needs all bytes of the file."""
+
+    def is_kind(content: bytes) -> bool:
+        try:
+            data = json.loads(content)
+        except (ValueError, RecursionError):
+            return False
+        return isinstance(data, dict) and set(keys) <= data.keys()
+
+    return is_kind
+
+
+SCENARIO = "scenario.toml"
+RUN_KINDS: Mapping[str, Kind] = {
+    SCENARIO: begins(RESOLVED),
+    "final.csv": has_header(COLUMNS),
+    "run.h5": is_frames,
+    "run.json": has_keys("run", "scenario_hash", "status"),
+    "done.json": has_keys("run", "status"),
+    "checkpoint.0": begins(CHECKPOINT),
+    "checkpoint.1": begins(CHECKPOINT),
+}
+"""The files of a run but the copies of tables, whose content is a person's: see `copies`."""
+COPIES = ("experiment.csv", "motion.csv")
+
+
+def is_written(path: Path, kinds: Mapping[str, Kind], plan: str = SCENARIO) -> bool:
+    """Return True if blocksim wrote a file: one of these kinds, a copy that the plan beside it names, or a leftover."""
+    if not _is_plain_file(path):
+        return False
+    if path.name in COPIES:
+        return path.name in copies(path.parent, plan)
+    if path.name in kinds:
+        return _is_of_kind(path, kinds[path.name])
+    return is_leftover(path.name, (*kinds, *COPIES))
+
+
+def _is_of_kind(path: Path, kind: Kind) -> bool:
+    try:
+        content = read_limited(path, MOST_BYTES) if path.suffix == ".json" else read_head(path, HEAD_BYTES)
+    except BlocksimError:
+        return False
+    return not content or kind(content)
+
+
+def is_leftover(name: str, names: Iterable[str]) -> bool:
+    """Return True for what is left of one of these files when its writer was killed: `.final.csv.k2j3h4_x.csv`."""
+    return any(_leftover(of).fullmatch(name) for of in names)
+
+
+def _leftover(name: str) -> re.Pattern[str]:
+    """Return how `atomic.replacing` (with the suffix, or without it as in 0.1) and run.h5 name unfinished files."""
+    suffix = re.escape(Path(name).suffix)
+    return re.compile(rf"\.{re.escape(name)}\.(?:new|[a-z0-9_]{{8}}(?:{suffix})?)")
+
+
+def copies(folder: Path, plan: str = SCENARIO) -> frozenset[str]:
+    """Return the names of the copies of tables that belong to a folder.
+
+    Those are what run.json (of a sweep: sweep.json) has listed, as long as nobody has changed them; where it lists none
+    (a folder of 0.1, or of a run that was killed), those that the resolved scenario names.
+    """
+    listed, named = _listed(folder / f"{'run' if plan == SCENARIO else 'sweep'}.json"), _named(folder / plan)
+    present = (name for name in COPIES if _is_plain_file(folder / name))
+    return frozenset(name for name in present if _belongs(folder / name, listed.get(name), is_named=name in named))
+
+
+def _belongs(path: Path, digest: object, *, is_named: bool) -> bool:
+    return is_named if digest is None else digest == sha256_of(path)
+
+
+def _listed(path: Path) -> dict[str, object]:
+    """Return the checksums (hexadecimal) of files that a summary lists by name."""
+    try:
+        return dict(json.loads(read_limited(path, MOST_BYTES))["sha256"])
+    except (BlocksimError, ValueError, KeyError, TypeError, RecursionError):
+        return {}
+
+
+def _named(plan: Path) -> frozenset[str]:
+    """Return the copies that a resolved scenario names; none for a file that a person wrote."""
+    if not is_resolved(plan):
+        return frozenset()
+    lines = read_limited(plan, MOST_BYTES).splitlines(keepends=True)
+    return frozenset(name for name in COPIES if f'table = "{name}"\n'.encode() in lines)
+
+
+def is_resolved(plan: Path) -> bool:
+    """Return True for a scenario (or the plan of a sweep) that blocksim wrote, False for that of a person."""
+    try:
+        lines = read_head(plan, HEAD_BYTES).splitlines(keepends=True)
+    except BlocksimError:
+        return False
+    return not lines or RESOLVED in lines[:2]  # a sweep has a line of its own before
+
+
+def _is_plain_file(path: Path) -> bool:
+    return path.is_file() and not path.is_symlink()
