@@ -129,7 +129,7 @@ pictures: $(RUN_STAMP) ## Draw the pictures of the findings in results/
 demo: $(RUN_STAMP) ## Run the three blocks with contact forces; strip, film and report in results/demo
 	$(BLOCKSIM) run $(SCENARIO) --set output.contacts=true --out $(DEMO)/run --overwrite --quiet
 	$(BLOCKSIM) plot $(DEMO)/run --forces --out $(DEMO)/strip.png
-	$(BLOCKSIM) animate $(DEMO)/run --forces --speed 0.1 --fps 20 --width 640 --out $(DEMO)/film.gif
+	$(BLOCKSIM) animate $(DEMO)/run --forces --speed 0.1 --fps 20 --width 640 --out $(DEMO)/film.gif --overwrite
 	$(BLOCKSIM) report $(DEMO)/run --out $(DEMO)/report.html
 
 .PHONY: setup

@@ -7,6 +7,7 @@ import typer
 
 from blocksim.cli import options
 from blocksim.cli.output import note, replacement
+from blocksim.simulation.own_files import is_film, refuse_foreign
 from blocksim.study.stored import stored_run
 from blocksim.view.animation import Look, Pace, draw_film, writer_of
 from blocksim.view.support import support_of
@@ -24,13 +25,14 @@ def animate_command(
     ] = None,
     forces: options.Forces = False,
     width: Annotated[int, typer.Option(min=200, max=4000, metavar="PX", help="Width in pixels.")] = 800,
+    overwrite: options.Replace = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Show a run as a film, GIF or MP4.
 
     The default is a GIF, NAME.gif, at a quarter of the real speed; the last picture is held for a while. A run that was
     stopped or killed is shown as far as it came. --forces needs a run that has stored contacts (output.contacts =
-    true), MP4 the extra `video`.
+    true), MP4 the extra `video`. An older animation of blocksim is replaced; any other file only with --overwrite.
 
     Example: blocksim animate scenarios/three_blocks.toml --speed 0.1
     """
@@ -38,6 +40,7 @@ def animate_command(
         writer_of(out)
     stored = stored_run(run)
     film = out or Path(f"{stored.scenario.name}.gif")
+    refuse_foreign(film, is_film, overwrite=overwrite)
     support = support_of(stored.scenario)
     older = replacement(film)
     look = Look(width, trails, stored.scenario.name, forces)

@@ -18,6 +18,7 @@ from blocksim.cli.output import answer, note, print_json, table_lines
 from blocksim.cli.progress import tell_compilation
 from blocksim.errors import OutputError
 from blocksim.simulation.atomic import write_text
+from blocksim.simulation.own_files import is_bench, is_picture, refuse_foreign
 from blocksim.verification.verify import number
 from blocksim.view.work_precision import draw_work_precision
 
@@ -42,6 +43,7 @@ def bench_command(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Write everything as JSON; the picture goes beside it.")
     ] = None,
+    overwrite: options.Replace = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -56,7 +58,7 @@ def bench_command(
     wanted = chosen(names or [], peers=peers)
     if peers:
         require_all()
-    _refuse_folder(out)
+    _refuse_present(out, peers=peers, overwrite=overwrite)
     machine = this_machine()
     tell_compilation("surface", quiet=silent)
     outcomes: list[Outcome] = []
@@ -67,11 +69,19 @@ def bench_command(
             _show(machine, outcomes, out, as_json=as_json, quiet=silent)
 
 
-def _refuse_folder(out: Path | None) -> None:
-    """Notice before minutes of measuring that the report cannot be written."""
+def _refuse_present(out: Path | None, *, peers: bool, overwrite: bool) -> None:
+    """Notice before minutes of measuring that the report, or the picture that --peers draws, cannot be written."""
     if out is not None and (out.is_dir() or not out.absolute().parent.is_dir()):
         message = f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'there is no such folder'}"
         raise OutputError(message)
+    if out is not None:
+        refuse_foreign(out, is_bench, overwrite=overwrite)
+    if peers:
+        refuse_foreign(_picture(out), is_picture, overwrite=overwrite)
+
+
+def _picture(out: Path | None) -> Path:
+    return PICTURE if out is None else out.with_suffix(".png")
 
 
 def _run(measurements: Sequence[Measurement], setting: Setting, *, quiet: bool) -> Iterator[Outcome]:
@@ -86,7 +96,7 @@ def _show(machine: Machine, outcomes: list[Outcome], out: Path | None, *, as_jso
     data = report(machine, outcomes)
     if out is not None:
         write_text(out, json.dumps(data, indent=2) + "\n")
-    picture = _draw(outcomes, PICTURE if out is None else out.with_suffix(".png"))
+    picture = _draw(outcomes, _picture(out))
     if as_json:
         print_json(data)
     else:

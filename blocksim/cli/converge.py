@@ -18,6 +18,7 @@ from blocksim.cli.scenario import read_scenario
 from blocksim.errors import ExitCode
 from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.folder import RESULTS
+from blocksim.simulation.own_files import is_picture, refuse_foreign
 from blocksim.study.converge import FEWEST_LEVELS, LEVELS, TOLERANCE_MM, converge
 from blocksim.study.convergence import Convergence, Joint, Level, Study, Verdict
 from blocksim.study.picture import draw_convergence
@@ -57,6 +58,7 @@ def converge_command(
         typer.Option("--out", metavar="FILE", help="Picture: .png, .svg or .pdf (default: results/NAME/converge.png)."),
     ] = None,
     picture: Annotated[bool, typer.Option(help="Draw a picture.")] = True,
+    overwrite: options.Replace = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -74,6 +76,8 @@ def converge_command(
     with read_scenario(scenario, settings or []) as ready:
         path = out or RESULTS / ready.name / "converge.png"
         picture_suffix(path)
+        if picture:
+            refuse_foreign(path, is_picture, overwrite=overwrite)
         tell_compilation(kernels_of(ready), quiet=silent)
         result = converge(
             ready,

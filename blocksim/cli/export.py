@@ -9,6 +9,8 @@ from blocksim.cli import options
 from blocksim.cli.output import note, replacement
 from blocksim.errors import OutputExistsError
 from blocksim.simulation import folder as files
+from blocksim.simulation.own_files import is_table, refuse_foreign
+from blocksim.simulation.stores.contacts_csv import COLUMNS as CONTACT_COLUMNS
 from blocksim.simulation.stores.formats import format_named
 from blocksim.study.stored import stored_run
 
@@ -21,6 +23,7 @@ def export_command(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="File to write (default: NAME.csv, NAME.vtkhdf).")
     ] = None,
+    overwrite: options.Replace = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Write all frames of a run as CSV or VTKHDF.
@@ -29,6 +32,8 @@ def export_command(
     file, NAME_contacts.csv. VTKHDF: one file with all times, blocks as rectangles with number, velocity and rotation,
     ground and walls with number 0; ParaView opens it. A run that was stopped or killed is written as far as it came.
 
+    An older export is replaced; any other file only with --overwrite.
+
     Example: blocksim export scenarios/three_blocks.toml --format vtkhdf
     """
     form = format_named(kind)
@@ -36,6 +41,9 @@ def export_command(
     file = out or Path(f"{stored.scenario.name}.{kind}")
     beside = file.with_name(f"{file.stem}_contacts{file.suffix}")
     _refuse_own_files(file, stored.folder)
+    refuse_foreign(file, form.is_own, overwrite=overwrite)
+    if form.write_contacts is not None and stored.frames.contacts is not None:
+        refuse_foreign(beside, is_table(*CONTACT_COLUMNS), overwrite=overwrite)
     told = [f"file: {file} ({replacement(file)}{form.write(file, stored.frames, stored.scenario)} frames)"]
     if form.write_contacts is not None and stored.frames.contacts is not None:
         older = replacement(beside)

@@ -9,8 +9,9 @@ import typer
 
 from blocksim.cli import completion, options
 from blocksim.cli.output import answer, note
-from blocksim.errors import OutputExistsError
+from blocksim.errors import OutputError, OutputExistsError
 from blocksim.scenario.findings import did_you_mean
+from blocksim.simulation.atomic import write_text
 
 TEMPLATES = "templates"
 PLACE = "@NAME@"
@@ -72,13 +73,18 @@ def _refuse_bad_name(name: str) -> None:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write a file that must not be there yet. Raises OutputExistsError."""
+    """Write a file that must not be there yet. Raises OutputExistsError, and OutputError where the disk is full."""
     try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
+        file = path.open("x", encoding="utf-8")
     except FileExistsError:
         message = f"{path}: is there already; choose another name"
         raise OutputExistsError(message) from None
     except OSError as error:
         message = f"{path}: cannot be created: {error.strerror}"
         raise OutputExistsError(message) from error
+    file.close()
+    try:
+        write_text(path, text)
+    except OutputError:
+        path.unlink(missing_ok=True)  # it was made here, and is empty
+        raise

@@ -41,6 +41,7 @@ SweepFolder = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results (default: results/NAME/sweep-HASH).")
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Run again and replace what is there.")]
+Replace = Annotated[bool, typer.Option("--overwrite", help="Replace a file that blocksim did not write.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped or killed.")]
 CheckpointEvery = Annotated[
     float,

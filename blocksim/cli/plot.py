@@ -1,5 +1,7 @@
 """blocksim plot: a strip of frames, where the blocks of a sweep end, or which inputs matter."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +11,7 @@ from blocksim.analysis.experiment import load_table
 from blocksim.cli import options
 from blocksim.cli.output import note
 from blocksim.errors import InvalidInputError
+from blocksim.simulation.own_files import is_picture, refuse_foreign
 from blocksim.study.picture import draw_indices, draw_sweep
 from blocksim.study.stored import stored_run
 from blocksim.study.table import TABLE
@@ -39,6 +42,7 @@ def plot_command(
     ] = None,
     experiment: options.ExperimentPath = None,
     forces: options.Forces = False,
+    overwrite: options.Replace = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Draw a run, a sweep or a table of sensitivities.
@@ -51,23 +55,32 @@ def plot_command(
     A sweep over one key, or a second one with few values, shows final x as lines; one over two keys a map of
     run-outs and outcomes; a sampled one every two of its inputs. The measured range is marked in all of them.
 
+    An older picture of blocksim is replaced; any other file only with --overwrite.
+
     Example: blocksim plot scenarios/three_blocks.toml --out strip.png
     """
     moments = _times(times)
+    ready = partial(refuse_foreign, is_own=is_picture, overwrite=overwrite)
     if (run / TABLE).is_file():
         _refuse_times(run, times, forces, "a sweep")
-        picture = draw_sweep(run, out, experiment, kind)
+        picture = draw_sweep(run, out, experiment, kind, ready=ready)
     elif run.suffix.lower() == ".csv":
         _refuse_times(run, times, forces, "a table")
-        picture = draw_indices(run, out, kind)
+        picture = draw_indices(run, out, kind, ready=ready)
     else:
-        picture = _draw_run(run, out, moments, experiment, kind or STRIP, forces)
+        picture = _draw_run(run, out, moments, experiment, kind or STRIP, forces, ready)
     if not quiet:
         note(f"picture: {picture}")
 
 
 def _draw_run(
-    run: Path, out: Path | None, moments: list[float] | None, experiment: Path | None, kind: str, forces: bool
+    run: Path,
+    out: Path | None,
+    moments: list[float] | None,
+    experiment: Path | None,
+    kind: str,
+    forces: bool,
+    ready: Callable[[Path], None],
 ) -> Path:
     draw = kind_named(kind)
     chosen = {} if moments is None else {"times": moments}
@@ -79,6 +92,7 @@ def _draw_run(
     table = experiment or (scenario.experiment.table if scenario.experiment is not None else None)
     measured = None if table is None else load_table(table)
     picture = out or Path(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
+    ready(picture)
     look = {"title": scenario.name, "measured": measured, "support": support_of(scenario), "forces": forces}
     draw(stored.frames, picture, **look, **chosen)
     if stored.remark:

@@ -14,6 +14,7 @@ from blocksim.cli.output import note
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
 from blocksim.scenario import Scenario, load_scenario
 from blocksim.simulation import folder as files
+from blocksim.simulation.own_files import is_report, refuse_foreign
 from blocksim.study.judge import compare_sweep
 from blocksim.study.places import find_run
 from blocksim.view.report.packing import MOST_BYTES
@@ -39,6 +40,7 @@ def report_command(
     members: Annotated[
         int, typer.Option(min=0, metavar="N", help="Most members of a sweep to put into the page, in its order.")
     ] = MEMBERS,
+    overwrite: options.Replace = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Write runs and sweeps into one HTML file.
@@ -47,10 +49,11 @@ def report_command(
     for a sweep the share of its members inside, a table, a map and, where --keep-cases kept their frames, its members.
     The file loads nothing from anywhere and can be opened from the disk or sent by mail. Many frames are thinned and
     rounded; the page says so. A run that was killed or damaged is shown as far as it can be read (exit code 65 where
-    something is damaged). An older report is replaced, any other file is not.
+    something is damaged). An older report is replaced; any other file only with --overwrite.
 
     Example: blocksim report scenarios/three_blocks.toml --out three_blocks.html
     """
+    refuse_foreign(out, is_report, overwrite=overwrite)
     shown: list[Subject] = []
     problems: list[str] = []
     for place in places:

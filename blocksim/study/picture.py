@@ -1,5 +1,6 @@
 """Pictures of studies: what was found, brought into the form that the view draws."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,8 +42,21 @@ def draw_convergence(result: "Convergence", scenario: Scenario, path: Path) -> b
     return bool(panels)
 
 
-def draw_sweep(folder: Path, path: Path | None = None, experiment: Path | None = None, kind: str | None = None) -> Path:
+def _anything_goes(_: Path) -> None:
+    """Let a picture be written wherever it is to go."""
+
+
+def draw_sweep(
+    folder: Path,
+    path: Path | None = None,
+    experiment: Path | None = None,
+    kind: str | None = None,
+    *,
+    ready: Callable[[Path], None] = _anything_goes,
+) -> Path:
     """Draw a sweep, by default as the kind that suits it; return the picture's path (default: NAME.png).
+
+    `ready` is asked about the path before anything is drawn; it raises where no picture may go there.
 
     Raises what `read_found` raises, InvalidInputError for an unknown picture format or kind and for one that cannot
     show this sweep, OutputError.
@@ -55,13 +69,17 @@ def draw_sweep(folder: Path, path: Path | None = None, experiment: Path | None =
         raise InvalidInputError(message)
     path = path or Path(f"{load_scenario(folder / PLAN).name}.png")
     picture_suffix(path)
+    ready(path)
     (chosen or kind_for(found)).draw(found, path)
     return path
 
 
-def draw_indices(table: Path, path: Path | None = None, kind: str | None = None) -> Path:
+def draw_indices(
+    table: Path, path: Path | None = None, kind: str | None = None, *, ready: Callable[[Path], None] = _anything_goes
+) -> Path:
     """Draw the table of a sensitivity study; return the picture's path (default: that of the table, as PNG).
 
+    `ready` is asked as in `draw_sweep`.
     Raises what `read_indices` raises, InvalidInputError for an unknown picture format or another kind, OutputError.
     """
     if kind not in {None, TORNADO}:
@@ -69,6 +87,7 @@ def draw_indices(table: Path, path: Path | None = None, kind: str | None = None)
         raise InvalidInputError(message)
     panels, labels = read_indices(table)
     path = path or Path(f"{table.stem}.png")
+    ready(path)
     draw_tornado(panels, labels, path, title="Which inputs matter")
     return path
 

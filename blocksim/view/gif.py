@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.atomic import write_bytes
+from blocksim.simulation.own_files import NAME
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -45,6 +46,7 @@ def write_gif(path: Path, pictures: Iterator[Pixels], seconds: NDArray[np.float6
         append_images=map(palette.reduced, pictures),
         duration=[int(10 * duration) for duration in durations],
         loop=0,
+        comment=NAME,
     )
     write_bytes(path, buffer.getvalue())
 

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from blocksim.errors import OutputError, UnavailableError
 from blocksim.simulation.atomic import replacing
+from blocksim.simulation.own_files import NAME
 
 QUALITY = 8.0  # of 10; thin lines stay sharp
-OPTIONS = ["-movflags", "+faststart"]  # a browser may begin before it has all
+OPTIONS = ["-movflags", "+faststart", "-metadata", f"comment={NAME.decode()}"]  # a browser may begin before it has all
 
 
 def write_mp4(path: Path, pictures: Iterator[NDArray[np.uint8]], seconds: NDArray[np.float64]) -> None:

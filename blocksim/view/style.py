@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from unicodedata import east_asian_width
 
-from blocksim.errors import InvalidInputError, OutputError
+from blocksim.errors import InvalidInputError
+from blocksim.simulation.atomic import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -108,11 +109,7 @@ def save_figure(figure: "Figure", path: Path) -> None:
     buffer = BytesIO()
     with no_word_of_missing_letters():
         figure.savefig(buffer, format=suffix[1:], metadata=METADATA[suffix])
-    try:
-        path.write_bytes(buffer.getvalue())
-    except OSError as error:
-        message = f"{path}: cannot be written: {error.strerror}"
-        raise OutputError(message) from None
+    write_bytes(path, buffer.getvalue())
 
 
 @contextmanager

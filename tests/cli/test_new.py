@@ -1,5 +1,6 @@
 """blocksim new: every template works as it is, and nothing is replaced."""
 
+import errno
 from pathlib import Path
 
 import pytest
@@ -52,6 +53,16 @@ def test_a_new_table_can_be_compared_with(blocksim: Command) -> None:
     scenario = Path("scenarios/three_blocks_nominal.toml").read_text()
     Path("mine.toml").write_text(scenario.replace("experiments/three_blocks.csv", "data.csv"))
     assert blocksim("check", "mine.toml").code == 0
+
+
+def test_a_full_disk_leaves_no_half_file(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", fail)
+    answer = blocksim("new", "stack", "mine")
+    assert (answer.code, answer.err) == (74, "mine.toml: cannot be written: No space left on device\n")
+    assert not Path("mine.toml").exists()
 
 
 def test_a_file_that_is_there_stays_as_it_is(blocksim: Command) -> None:

@@ -20,6 +20,18 @@ def test_picture_has_the_name_of_the_scenario(blocksim: Command, finished: Path)
     assert Path("three_blocks_nominal.png").is_file()
 
 
+@pytest.mark.parametrize("command", ["plot", "export", "animate", "report"])
+def test_file_of_others_is_replaced_only_when_asked(blocksim: Command, finished: Path, command: str) -> None:
+    out = {"plot": "thesis.pdf", "export": "lab.csv", "animate": "clip.gif", "report": "index.html"}[command]
+    Path(out).write_text("years of work")
+    brief = ("--speed", "1", "--fps", "5", "--width", "200") if command == "animate" else ()
+    answer = blocksim(command, finished, "--out", out, *brief)
+    assert (answer.code, answer.err) == (73, f"{out}: already exists; rerun with --overwrite\n")
+    assert Path(out).read_text() == "years of work"
+    assert blocksim(command, finished, "--out", out, *brief, "--overwrite").code == 0
+    assert blocksim(command, finished, "--out", out, *brief).code == 0
+
+
 @pytest.mark.parametrize(("kind", "told"), [("final", "measured 74.41 [71.69, 78.53]"), ("history", "energy (mJ)")])
 def test_other_kinds_are_drawn(blocksim: Command, finished: Path, kind: str, told: str) -> None:
     assert blocksim("plot", finished, "--kind", kind).err == f"picture: three_blocks_nominal_{kind}.png\n"

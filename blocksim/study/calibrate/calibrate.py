@@ -11,7 +11,7 @@ from blocksim.simulation.stopping import interruptible
 from blocksim.study.calibrate.objective import Hit, Score, hits_of, score_of
 from blocksim.study.calibrate.plan import Plan
 from blocksim.study.calibrate.prior import Prior
-from blocksim.study.calibrate.search import Trial, finished_trials, opened, search
+from blocksim.study.calibrate.search import Trial, finished_trials, opened, refuse_other_file, search
 from blocksim.study.calibrate.written import with_fitted
 from blocksim.study.members import Values, run_members
 
@@ -87,8 +87,9 @@ def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None
         raise OutputExistsError(message)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        if overwrite and not resume:
-            journal.unlink(missing_ok=True)
+        if overwrite and not resume and journal.exists():
+            refuse_other_file(journal)
+            journal.unlink()
     except OSError as error:
         raise OutputExistsError(f"{path.parent}: cannot be created: {error.strerror}") from error
 

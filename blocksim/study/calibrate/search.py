@@ -18,6 +18,7 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.extras import loaded
+from blocksim.scenario.limited import read_head
 from blocksim.study.calibrate.objective import Score
 from blocksim.study.calibrate.prior import Prior
 
@@ -105,6 +106,8 @@ def opened(journal: Path, plan: Mapping[str, object]) -> "Iterator[Study]":
     Raises OutputExistsError where the journal is of another plan or in use, InvalidInputError where the file is none,
     OutputError where it cannot be written.
     """
+    if journal.exists():
+        refuse_other_file(journal)  # also before a pipe is opened, which would wait
     loaded("optuna", PURPOSE).logging.set_verbosity(logging.ERROR)
     try:
         with journal.open("ab") as file:
@@ -155,12 +158,18 @@ def _take(file: Any, journal: Path) -> None:
         raise OutputExistsError(message) from None
 
 
-def _drop_torn_line(journal: Path) -> None:
-    """Cut off a last line that has no end: what was written when the power failed. Leaves other files alone."""
-    content = journal.read_bytes()
-    if content and not content.startswith(BEGINNING[: len(content)]):
+def refuse_other_file(journal: Path) -> None:
+    """Raise InvalidInputError for a file that is no journal; one that is empty, or torn, may be."""
+    content = read_head(journal, len(BEGINNING))
+    if not BEGINNING.startswith(content):
         message = f"{journal}: not the journal of a calibration; choose another file with --out"
         raise InvalidInputError(message)
+
+
+def _drop_torn_line(journal: Path) -> None:
+    """Cut off a last line that has no end: what was written when the power failed. Leaves other files alone."""
+    refuse_other_file(journal)
+    content = journal.read_bytes()
     whole = content.rfind(b"\n") + 1
     if whole < len(content):
         with journal.open("r+b") as file:

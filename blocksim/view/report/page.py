@@ -6,15 +6,12 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.errors import OutputExistsError
 from blocksim.simulation.atomic import write_text
 from blocksim.view.report.subjects import Subject
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-MARK = '<meta name="generator" content="blocksim report">'
-MARK_WITHIN = 2000  # bytes from the start of a file
 SCRIPTS = ("decode", "frames", "view", "drawing", "player", "history", "table", "map", "main")  # in this order
 PARTS = resources.files("blocksim.view.report") / "parts"
 
@@ -22,9 +19,8 @@ PARTS = resources.files("blocksim.view.report") / "parts"
 def write_report(subjects: Sequence[Subject], path: Path, *, title: str, version: str) -> int:
     """Write subjects, the members of sweeps among them, into one file; return its size in bytes.
 
-    Raises OutputExistsError where another file than a report is there, and OutputError.
+    Raises OutputError.
     """
-    _refuse_foreign(path)
     text = page_text(subjects, title=title, version=version)
     write_text(path, text)
     return len(text.encode())
@@ -69,15 +65,3 @@ def _fixed(value: float, digits: int) -> str:
 
 def _part(name: str) -> str:
     return (PARTS / name).read_text(encoding="utf-8")
-
-
-def _refuse_foreign(path: Path) -> None:
-    """Raise OutputExistsError where a file would be lost that is no report."""
-    if not path.exists():
-        return
-    if path.is_file():
-        with path.open("rb") as file:
-            if MARK.encode() in file.read(MARK_WITHIN):
-                return
-    message = f"{path}: is there and is no report of blocksim; choose another name with --out"
-    raise OutputExistsError(message)

@@ -1,0 +1,102 @@
+"""Own pictures, animations, reports and exports are known by their marks, and files of others are not."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from blocksim.errors import OutputExistsError
+from blocksim.simulation.own_files import (
+    PNG,
+    REPORT,
+    IsOwn,
+    is_bench,
+    is_film,
+    is_picture,
+    is_report,
+    is_table,
+    is_vtkhdf,
+    refuse_foreign,
+)
+from blocksim.view.gif import write_gif
+from blocksim.view.mp4 import write_mp4
+from blocksim.view.style import save_figure, styled_figure
+
+ALL: tuple[IsOwn, ...] = (is_picture, is_film, is_report, is_bench, is_vtkhdf, is_table("time_s", "block"))
+OTHERS = {
+    "thesis.pdf": b"%PDF-1.5\n1 0 obj\n<< /Creator (blocksim) >>\nendobj\n2 0 obj\n<< /Creator (TeX) >>\nendobj\n"
+    b"trailer\n<< /Root 3 0 R /Info 2 0 R >>\n%%EOF\n",
+    "photo.png": PNG + b"\0\0\0\x0dIHDR" + bytes(17) + b"\0\0\0\x11tEXtComment\0blocksim" + bytes(4),
+    "drawing.svg": b"<svg><text>blocksim</text></svg>",
+    "clip.gif": b"GIF89a blocksim",
+    "clip.mp4": b"\0\0\0\x10ftypisom\0\0\0\0\0\0\0\x10moovblocksim",
+    "site.html": b"<html>blocksim report</html>",
+    "data.csv": b"time_s,block,mass\n",
+    "data.json": b'{"machine": "blocksim"}',
+    "data.vtkhdf": b"\x89HDF\r\n\x1a\nVTKHDF blocksim",
+    "empty": b"",
+}
+
+
+def draw(path: Path) -> None:
+    with styled_figure(2.0, 1.0) as figure:
+        figure.text(0.5, 0.5, "blocksim")
+        save_figure(figure, path)
+
+
+def film(path: Path) -> None:
+    writer = write_gif if path.suffix == ".gif" else write_mp4
+    writer(path, iter([np.full((64, 64, 3), 255, dtype=np.uint8)] * 3), np.full(3, 0.1))
+
+
+def vtkhdf(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file.create_group("VTKHDF")
+        file["blocksim/block_names"] = [b"1"]
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "is_own"),
+    [
+        ("a.png", draw, is_picture),
+        ("a.svg", draw, is_picture),
+        ("a.pdf", draw, is_picture),
+        ("a.gif", film, is_film),
+        ("a.mp4", film, is_film),
+        ("a.html", lambda path: path.write_bytes(b"<!doctype html>" + REPORT), is_report),
+        ("a.json", lambda path: path.write_text(json.dumps({"machine": {}, "measurements": []})), is_bench),
+        ("a.csv", lambda path: path.write_text("time_s,block\n0,1\n"), is_table("time_s", "block")),
+        ("a.vtkhdf", vtkhdf, is_vtkhdf),
+    ],
+)
+def test_own_file_is_known_and_replaced(
+    tmp_path: Path, name: str, write: Callable[[Path], object], is_own: IsOwn
+) -> None:
+    write(tmp_path / name)
+    refuse_foreign(tmp_path / name, is_own)
+    with (tmp_path / name).open("rb") as file:
+        known = [is_one(file) for is_one in ALL if file.seek(0) == 0]
+    assert sum(known) == 1
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_file_of_others_is_replaced_only_when_asked(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(OTHERS[name])
+    for is_own in ALL:
+        with pytest.raises(OutputExistsError, match="already exists; rerun with --overwrite"):
+            refuse_foreign(tmp_path / name, is_own)
+        refuse_foreign(tmp_path / name, is_own, overwrite=True)
+
+
+@pytest.mark.parametrize("what", ["folder", "device", "link that leads nowhere"])
+def test_what_is_no_file_is_never_replaced(tmp_path: Path, what: str) -> None:
+    place = tmp_path / "out.png"
+    if what == "folder":
+        place.mkdir()
+    else:
+        place.symlink_to("/dev/null" if what == "device" else tmp_path / "nowhere")
+    with pytest.raises(OutputExistsError, match=r"out\.png: .*write elsewhere with --out"):
+        refuse_foreign(place, is_picture, overwrite=True)
