@@ -8,6 +8,7 @@ from rich.console import Console
 
 from blocksim.cli.collector import loading
 from blocksim.cli.output import note
+from blocksim.kernels import jit
 from blocksim.simulation import Progress as Where
 from blocksim.simulation.compilation import compile_kernels, is_compiled
 
@@ -40,6 +41,9 @@ def tell_compilation(kernels: str, *, quiet: bool) -> None:
         return
     note("Compiling the solver, once after installation (less than a minute) ...")
     note(f"Compiled in {compile_kernels(kernels):.0f} s.")
+    if not is_compiled(kernels):
+        folder = jit.cache_folder() or jit.cache_root()
+        note(f"{folder}: the compiled solver cannot be kept there; make room, or set BLOCKSIM_CACHE_DIR")
 
 
 @contextmanager

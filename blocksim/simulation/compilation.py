@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 
+from blocksim.errors import OutputError
 from blocksim.kernels import jit
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.simulation.schemes import AnyScene, build_scene, measured_row, scheme_of
@@ -43,16 +44,27 @@ def kernel_set(scheme: str, model: str) -> str:
 def compile_kernels(kernels: str = SURFACE) -> float:
     """Compile a set of kernels, or load it from the cache on disk; return the seconds it took.
 
-    Works once a process.
+    Works once a process. Raises OutputError where the disk of the cache fails.
     """
     began = time.perf_counter()
+    try:
+        _compile(kernels)
+    except OSError as error:
+        message = (
+            f"{jit.cache_folder()}: the compiled solver cannot be kept there: {error.strerror or error}; "
+            "make room, or set BLOCKSIM_CACHE_DIR to a folder on another disk"
+        )
+        raise OutputError(message) from error
+    return time.perf_counter() - began
+
+
+def _compile(kernels: str) -> None:
     scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **CHANGES[kernels]})), 0)
     measured_row(scene)
     if kernels == RIGID:
         _compile_ensemble(stack_of_one(scene))
     if kernels != SURFACE:
         jit.mark(kernels)
-    return time.perf_counter() - began
 
 
 def _compile_ensemble(scenes: AnyScene) -> None:

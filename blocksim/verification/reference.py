@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from blocksim.simulation.atomic import write_text
 from blocksim.verification.case import Case, Row, Setting, Verdict
 from blocksim.verification.cases import CASES, chosen, left_out
 from blocksim.verification.verify import expected_text, number, run_case, tolerance_text
@@ -127,7 +128,7 @@ def write_store(path: Path, stored: Stored) -> None:
     """Keep results; one row a line, numbers that are not finite as null."""
     text = json.dumps(_finite(stored), indent=1, ensure_ascii=False, allow_nan=False)
     folded = re.sub(r"\{\n\s+\"quantity\".*?\}", lambda row: " ".join(row.group().split()), text, flags=re.DOTALL)
-    path.write_text(folded + "\n", encoding="utf-8")
+    write_text(path, folded + "\n")
 
 
 def _finite(data: Any) -> Any:
@@ -145,7 +146,7 @@ def main(arguments: Sequence[str]) -> None:
     if options[:1] == ["--measure"]:
         measure(store, options[1:] or list(SETTINGS))
     text = Path(readme).read_text(encoding="utf-8")
-    Path(readme).write_text(with_table(text, read_store(store)), encoding="utf-8")
+    write_text(Path(readme), with_table(text, read_store(store)))
 
 
 def measure(store: Path, heads: Sequence[str]) -> None:

@@ -247,3 +247,28 @@ def test_disk_that_fills_is_74_and_keeps_what_was_there(process: Process, small_
         assert running.communicate(timeout=PATIENCE)[1] == ""
     assert told(elsewhere)["resumed_from"]
     assert_same(elsewhere, whole)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("free", [0, 40_000])
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        ("a.vtkhdf", ("export", "--format", "vtkhdf")),
+        ("a.csv", ("export", "--format", "csv")),
+        ("a.png", ("plot", "--times", ",".join(str(0.01 * number) for number in range(40)))),
+        ("a.gif", ("animate", "--width", "2000", "--speed", "4", "--fps", "10")),
+    ],
+)
+def test_full_disk_leaves_the_older_picture_or_export(
+    process: Process, small_disk: Path, whole: Path, name: str, command: tuple[str, ...], free: int
+) -> None:
+    calls = (*command, whole, "--out", small_disk / name)
+    (small_disk / name).write_bytes(b"older")
+    room = shutil.disk_usage(small_disk).free
+    (small_disk / "others").write_bytes(bytes(max(0, room - free - 8192)))
+    running = process(*calls, "--overwrite")
+    _, err = running.communicate(timeout=PATIENCE)
+    assert (running.returncode, err.count("\n")) == (74, 1), err
+    assert f"{name}: cannot be written: No space left on device" in err
+    assert {path.name: path.stat().st_size for path in small_disk.iterdir() if path.name != "others"} == {name: 5}

@@ -2,9 +2,11 @@
 
 import json
 import math
+from pathlib import Path
 
 import pytest
 
+from blocksim.cli import progress
 from blocksim.cli.output import note, number, print_json, table_lines
 
 
@@ -43,3 +45,14 @@ def test_json_has_null_for_what_is_not_finite(capsys: pytest.CaptureFixture[str]
 def test_notes_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
     note("0.1:x:3 [bold] é")
     assert capsys.readouterr().err == "0.1:x:3 [bold] é\n"
+
+
+def test_compiled_solver_that_cannot_be_kept_is_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(progress, "is_compiled", lambda _: False)
+    monkeypatch.setattr(progress, "compile_kernels", lambda _: 30.0)
+    monkeypatch.setattr("blocksim.cli.progress.jit.cache_folder", lambda: Path("/disk/blocksim/0123"))
+    progress.tell_compilation("surface", quiet=False)
+    told = capsys.readouterr().err.splitlines()
+    assert told[-1].startswith("/disk/blocksim/0123: the compiled solver cannot be kept there; make room")

@@ -1,9 +1,12 @@
 """Colours and letters that can be read."""
 
+import errno
 from itertools import combinations
+from pathlib import Path
 
 import pytest
 
+from blocksim.errors import OutputError
 from blocksim.view.style import (
     BLOCK_COLOURS,
     MEASURED_COLOUR,
@@ -11,7 +14,9 @@ from blocksim.view.style import (
     block_colour,
     cut_to,
     fitting_font,
+    save_figure,
     shortened,
+    styled_figure,
     text_colour,
     width_of,
 )
@@ -60,3 +65,17 @@ def test_texts_are_cut_to_what_they_take_on_paper(text: str) -> None:
     cut = cut_to(text, 100.0, 8.0)
     assert width_of(cut, 8.0) <= 100.0
     assert cut == text or (cut.endswith("…") and width_of(f"{cut[:-1]}{cut[0]}…", 8.0) > 90.0)
+
+
+def test_full_disk_leaves_the_older_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    (tmp_path / "a.png").write_text("older")
+    monkeypatch.setattr("os.fsync", fail)
+    with (
+        styled_figure(1.0, 1.0) as figure,
+        pytest.raises(OutputError, match=r"a\.png: cannot be written: No space"),
+    ):
+        save_figure(figure, tmp_path / "a.png")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.png": "older"}

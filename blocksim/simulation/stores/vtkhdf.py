@@ -4,6 +4,7 @@ After the VTKHDF format specification, version 2.0 (docs.vtk.org): an unstructur
 its points and the data of its cells have a part for every time. `Steps` says where each time's parts begin.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.errors import InvalidInputError, OutputError
+from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
 from blocksim.simulation.atomic import replacing
 from blocksim.simulation.frames import Frames
+from blocksim.simulation.stores.hdf5_sink import SafeFile
 from blocksim.simulation.stores.support_quads import support_motion, support_quads
 
 VERSION = (2, 0)
@@ -47,15 +49,10 @@ def write_vtkhdf(path: Path, frames: Frames, scenario: Scenario) -> int:
     """
     chosen = _finite(frames)
     supports = Supports(support_quads(scenario, frames), *support_motion(scenario, frames.time))
-    with replacing(path) as temporary:
-        try:
-            with h5py.File(temporary, "w") as file:
-                _write_grid(file.create_group("VTKHDF"), frames, chosen, supports)
-                names = [name.encode() for name in frames.names]
-                file.create_dataset("blocksim/block_names", data=names, dtype=h5py.string_dtype())
-        except RuntimeError as error:  # what HDF5 raises when a disk is full
-            message = f"{path}: cannot be written: {error}"
-            raise OutputError(message) from error
+    with replacing(path) as temporary, SafeFile(temporary) as safe:
+        _write_grid(safe.file.create_group("VTKHDF"), frames, chosen, supports, safe.check)
+        names = [name.encode() for name in frames.names]
+        safe.file.create_dataset("blocksim/block_names", data=names, dtype=h5py.string_dtype())
     return len(chosen)
 
 
@@ -71,14 +68,14 @@ def _finite(frames: Frames) -> Indices:
     return chosen
 
 
-def _write_grid(group: Any, frames: Frames, chosen: Indices, supports: Supports) -> None:
+def _write_grid(group: Any, frames: Frames, chosen: Indices, supports: Supports, check: Callable[[], None]) -> None:
     blocks = len(frames.names)
     cells = blocks + len(supports.quads)
     group.attrs["Version"] = np.array(VERSION, dtype=np.int64)
     group.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
     _write_cells(group, blocks, cells)
     _write_steps(group.create_group("Steps"), frames.time[chosen], cells)
-    _write_times(group, frames, chosen, supports)
+    _write_times(group, frames, chosen, supports, check)
 
 
 def _write_cells(group: Any, blocks: int, cells: int) -> None:
@@ -113,8 +110,8 @@ def _write_steps(group: Any, times: Floats, cells: int) -> None:
         group[f"CellDataOffsets/{name}"] = cells * first
 
 
-def _write_times(group: Any, frames: Frames, chosen: Indices, supports: Supports) -> None:
-    """Write what changes: points, and the data of the cells."""
+def _write_times(group: Any, frames: Frames, chosen: Indices, supports: Supports, check: Callable[[], None]) -> None:
+    """Write what changes: points, and the data of the cells; `check` raises where the disk is full by now."""
     cells = len(frames.names) + len(supports.quads)
     points = _created(group, "Points", 4 * cells * len(chosen), 3)
     data = {name: _created(group, f"CellData/{name}", cells * len(chosen), size) for name, size in DATA.items()}
@@ -126,6 +123,7 @@ def _write_times(group: Any, frames: Frames, chosen: Indices, supports: Supports
         data["velocity_m_s"][first:last] = _velocities(frames, some, supports)
         data["rotation_deg"][first:last] = _with_zeros(np.degrees(frames.rotation[some]), supports)
         data["spin_deg_s"][first:last] = _with_zeros(np.degrees(frames.spin[some]), supports)
+        check()
 
 
 def _velocities(frames: Frames, some: Indices, supports: Supports) -> Floats:
