@@ -1,8 +1,8 @@
 """The one place that decides how kernels are compiled and where the machine code is kept.
 
 numba's disk cache looks only at the file of the cached function itself: after an edit of a law in another file the
-old physics would run silently. Here the cache folder is named by a hash of *all* kernel sources and of the numba
-and numpy versions, so any edit of any kernel file starts an empty cache.
+old physics would run silently. Here the cache folder is named by a hash of *all* kernel sources and of the numba,
+llvmlite and numpy versions, so any edit of any kernel file starts an empty cache.
 """
 
 import contextlib
@@ -14,11 +14,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
+import llvmlite
 import numba
 import numpy as np
 from numba import config as numba_config
 from numba import types as numba_types
 from numba.core.registry import CPUDispatcher
+
+from blocksim.kernels.cache import KernelCache
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -40,8 +43,9 @@ KERNEL_FOLDER = Path(__file__).resolve().parent
 
 
 def source_hash(folder: Path = KERNEL_FOLDER) -> str:
-    """Return a hash of every Python source below `folder`, with the numba and numpy versions."""
-    digest = hashlib.sha256(f"numba {numba.__version__} numpy {np.__version__}".encode())
+    """Return a hash of every Python source below `folder`, with the versions of what compiles it."""
+    versions = f"numba {numba.__version__} llvmlite {llvmlite.__version__} numpy {np.__version__}"
+    digest = hashlib.sha256(versions.encode())
     for path in sorted(folder.rglob("*.py")):
         digest.update(path.relative_to(folder).as_posix().encode())
         digest.update(path.read_bytes())
@@ -67,7 +71,8 @@ def _is_usable(folder: Path) -> bool:
 
 
 def _cache_roots() -> Iterator[Path]:
-    yield cache_root()
+    with contextlib.suppress(RuntimeError):  # an unknown user without HOME has no folder
+        yield cache_root()
     with contextlib.suppress(OSError):  # there may be no folder for temporary files either
         yield Path(tempfile.gettempdir()) / f"blocksim-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
 
@@ -103,14 +108,22 @@ def mark(name: str) -> None:
 
 
 def _compiled(function: Function, **options: object) -> Function:
+    compiled: Any = njit(**OPTIONS, **options)(function)
     folder = cache_folder()
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(folder or "")
-    try:
-        compiled: Function = njit(cache=folder is not None, **OPTIONS, **options)(function)
-    finally:
-        config.CACHE_DIR = before
-    return compiled
+    if folder is not None and not config.DISABLE_JIT:
+        with contextlib.suppress(OSError):  # a function without a source file
+            compiled._cache = KernelCache(function, folder, _stamp(function))  # noqa: SLF001 - as enable_caching does
+    wrapped: Function = compiled
+    return wrapped
+
+
+def _stamp(function: Callable[..., object]) -> object:
+    """Return what tells an edit of the source of a function; of those here the folder's name does. Raises OSError."""
+    source = Path(function.__code__.co_filename)
+    if source.is_relative_to(KERNEL_FOLDER):
+        return None
+    state = source.stat()
+    return str(source), state.st_mtime_ns, state.st_size
 
 
 def plain_type(one: Any) -> Any:
