@@ -1,50 +1,34 @@
-"""The command `blocksim`."""
+"""What the command `blocksim` calls first: light, so that Ctrl-C is handled before anything heavy is imported."""
 
 import io
 import sys
-from typing import Annotated
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from blocksim import __version__
-from blocksim.cli.collector import leave_all
-from blocksim.cli.commands import HELP, CommandGroup, add_commands
-from blocksim.cli.failures import tell_internal_error
+from blocksim.cli.interrupts import take_interrupts
 from blocksim.errors import ExitCode
 
-app = typer.Typer(
-    cls=CommandGroup,
-    name="blocksim",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings=HELP,
-    help="Simulate collapses of rigid blocks and compare them with measurements.",
-    epilog="Start with: blocksim new wall my_wall; blocksim run my_wall.toml",
-)
-add_commands(app)
+if TYPE_CHECKING:
+    from blocksim.cli.application import app as app  # noqa: PLC0414 - found when first asked for, as in blocksim
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
-        print(f"blocksim {__version__}")  # noqa: T201 - this is the answer
-        raise typer.Exit
-
-
-@app.callback()
-def common(
-    _version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
-    ] = False,
-) -> None:
-    """Take the options of the command itself."""
+def __getattr__(name: str) -> Any:
+    if name != "app":
+        message = f"module '{__name__}' has no attribute '{name}'"
+        raise AttributeError(message)
+    return import_module("blocksim.cli.application").app
 
 
 def main() -> None:
     """Run the command line; every error becomes a message and an exit code."""
+    take_interrupts()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without ± is no reason to fail
+    from blocksim.cli.application import app
+    from blocksim.cli.collector import leave_all
+    from blocksim.cli.failures import tell_internal_error
+
     try:
         app()
     except KeyboardInterrupt:

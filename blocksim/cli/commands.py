@@ -11,6 +11,7 @@ from typer.core import TyperGroup
 
 from blocksim.cli.collector import loading
 from blocksim.cli.failures import told
+from blocksim.cli.interrupts import clearing_up
 from blocksim.cli.outside import add_outside
 
 COMMANDS = {  # name: module in this folder, function in it, first line of its help
@@ -58,14 +59,14 @@ class CommandGroup(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
-        with told():
+        with told(), clearing_up(wanted=True):
             return super().invoke(ctx)
 
 
 def loaded(name: str) -> Any:
     """Return the command of a name, ready to be called."""
     module, function, summary = COMMANDS[name]
-    with loading():
+    with loading(), clearing_up(wanted=False):
         command = getattr(import_module(f"blocksim.cli.{module}"), function)
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
     alone.command(name, short_help=summary, context_settings=HELP)(command)

@@ -1,16 +1,15 @@
 """What happens when something goes wrong: a message, an exit code, and never a traceback."""
 
 import errno
-import os
 import sys
 import tempfile
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 
 import typer
 
-from blocksim.cli.output import note
+from blocksim.cli.output import abandon, note
 from blocksim.errors import BlocksimError, ExitCode
 
 PATH_TROUBLE = {errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES}
@@ -38,7 +37,7 @@ def told() -> Iterator[None]:
 def _tell_trouble(error: OSError) -> ExitCode:
     """Tell an input or output error; raises it again when a user has no part in it."""
     if isinstance(error, BrokenPipeError):  # whoever read our answer has gone: nothing to tell
-        _abandon_answer()
+        abandon(sys.stdout)
         return ExitCode.INPUT_OUTPUT
     if error.errno in PATH_TROUBLE and error.filename is not None:
         note(f"{_shortened(error.filename)}: cannot be reached: {error.strerror}")
@@ -46,7 +45,7 @@ def _tell_trouble(error: OSError) -> ExitCode:
     if error.errno not in DISK_TROUBLE:
         raise error
     note(f"{error.filename or 'the answer'}: cannot be written: {error.strerror}")
-    _abandon_answer()
+    abandon(sys.stdout)
     return ExitCode.INPUT_OUTPUT
 
 
@@ -54,12 +53,6 @@ def _shortened(name: object) -> str:
     """Return a name for a line of a message."""
     text = "".join(c if c.isprintable() else "\ufffd" for c in str(name))
     return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}…"
-
-
-def _abandon_answer() -> None:
-    """Keep Python from failing once more when it flushes at its end."""
-    with suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def tell_internal_error(error: Exception) -> None:

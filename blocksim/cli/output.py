@@ -2,10 +2,13 @@
 
 import json
 import math
+import os
 import shutil
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import TextIO
 
 NARROW = 80
 GAP = "  "
@@ -14,8 +17,17 @@ LONG_TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))  # s
 
 
 def note(text: str) -> None:
-    """Print a line about what is going on, to standard error."""
-    print(text, file=sys.stderr, flush=True)  # noqa: T201 - this is the place for it
+    """Print a line about what is going on, to standard error; where nobody reads it any more, nothing happens."""
+    try:
+        print(text, file=sys.stderr, flush=True)  # noqa: T201 - this is the place for it
+    except OSError:
+        abandon(sys.stderr)
+
+
+def abandon(stream: TextIO) -> None:
+    """Keep Python from failing once more when it flushes a stream at its end."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def replacement(path: Path) -> str:

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from rich.console import Console
 
@@ -57,24 +57,27 @@ def _live_line(console: Console) -> Iterator[Callable[[Where], None]]:
         TimeRemainingColumn(),
     )
     began = time.monotonic()
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("", total=1.0, visible=False, speed="", residual="")
-        shown_at = 0.0
-        steps: int | None = None  # when first looked at: a run that goes on has done some before
+    progress = Progress(*columns, console=console, transient=True)
+    task = progress.add_task("", total=1.0, visible=False, speed="", residual="")
+    shown_at = 0.0
+    steps: int | None = None  # when first looked at: a run that goes on has done some before
 
-        def show(where: Where) -> None:
-            nonlocal shown_at, steps
-            now = time.monotonic()
-            steps = where.steps if steps is None else steps
-            if now - shown_at > LIVE_SECONDS:
-                shown_at = now
-                speed = f"{(where.steps - steps) / max(now - began, 1e-9):.1e}"
-                residual = f"{where.relative_residual:.0e}"
-                progress.update(
-                    task, completed=where.time, total=where.end, visible=True, speed=speed, residual=residual
-                )
+    def show(where: Where) -> None:
+        nonlocal shown_at, steps
+        now = time.monotonic()
+        steps = where.steps if steps is None else steps
+        if now - shown_at > LIVE_SECONDS:
+            shown_at = now
+            speed = f"{(where.steps - steps) / max(now - began, 1e-9):.1e}"
+            residual = f"{where.relative_residual:.0e}"
+            progress.update(task, completed=where.time, total=where.end, visible=True, speed=speed, residual=residual)
 
+    progress.start()
+    try:
         yield show
+    finally:
+        with suppress(OSError):  # the terminal has gone, and so has its line
+            progress.stop()
 
 
 def _plain_lines() -> Callable[[Where], None]:

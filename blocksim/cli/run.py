@@ -1,7 +1,7 @@
 """blocksim run: simulate one scenario."""
 
 import os
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from itertools import islice
 from pathlib import Path
 
@@ -44,7 +44,8 @@ def run_command(
     """Simulate a scenario and show where the blocks end.
 
     Where the scenario names an experiment, the measured ranges stand beside. A run that is there already is shown
-    again. Ctrl-C, SIGTERM, SIGUSR1 and --wall-time stop a run so that --resume goes on with it, to the same bits.
+    again. Ctrl-C, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1 and --wall-time stop a run so that --resume goes on with it, to the
+    same bits.
 
     Example: blocksim run scenarios/three_blocks.toml --set time.end=0.1
     """
@@ -73,7 +74,8 @@ def run_command(
             )
     if known and not silent:
         note(f"already there, --overwrite repeats it: {folder}")
-    show_result(result, as_json=as_json, quiet=silent)
+    with nullcontext() if result.status == FINISHED else suppress(OSError):  # the terminal that is lost, SIGHUP tells
+        show_result(result, as_json=as_json, quiet=silent)
     raise typer.Exit(result.summary.exit_code)
 
 

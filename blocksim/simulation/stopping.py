@@ -1,4 +1,4 @@
-"""Ctrl-C, being terminated, and limits of time: when a run or a sweep takes notice of them."""
+"""Ctrl-C, being terminated, a lost connection and limits of time: when a run or a sweep takes notice of them."""
 
 import signal
 import threading
@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-NAMES = ("SIGINT", "SIGTERM", "SIGUSR1")  # the last one is what batch systems send ahead of their time limit
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGUSR1")  # the last: of batch systems ahead of their time limit
 SIGNALS = tuple(signal.Signals[name] for name in NAMES if hasattr(signal, name))
-DEFAULT = (signal.default_int_handler, signal.SIG_DFL)
+FOR_ALL = tuple(number for number in SIGNALS if number != signal.SIGTERM)  # a terminal or batch system sends them so
+DEFAULT = (signal.default_int_handler, signal.SIG_DFL)  # what is ignored, as under nohup, stays so
 
 
 class StopRequests:
@@ -61,8 +62,8 @@ class WallTime:
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Let SIGTERM raise KeyboardInterrupt, as Ctrl-C does."""
-    with _handling((signal.SIGTERM,), signal.default_int_handler):
+    """Let all other signals to stop raise KeyboardInterrupt, as Ctrl-C does."""
+    with _handling(tuple(set(SIGNALS) - {signal.SIGINT}), signal.default_int_handler):
         yield
 
 
@@ -73,7 +74,7 @@ def _handling(numbers: tuple[signal.Signals, ...], handler: Callable[[int, Any],
         yield
         return
     before = {number: signal.getsignal(number) for number in numbers}
-    taken = [number for number in numbers if before[number] in DEFAULT]
+    taken = [number for number in numbers if _gives_way(before[number])]
     for number in taken:
         signal.signal(number, handler)
     try:
@@ -81,3 +82,8 @@ def _handling(numbers: tuple[signal.Signals, ...], handler: Callable[[int, Any],
     finally:
         for number in taken:
             signal.signal(number, before[number])
+
+
+def _gives_way(handler: Any) -> bool:
+    """Tell whether a handler is Python's own, or one that lets others take its place."""
+    return handler in DEFAULT or getattr(handler, "gives_way", False)

@@ -26,7 +26,7 @@ SLOW = (
 LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1])
 def test_stopped_run_is_75_and_keeps_its_frames(process: Process, tmp_path: Path, number: signal.Signals) -> None:
     running = process(*SLOW, "--out", "out", "--quiet")
     wait_for(tmp_path / "out" / "run.h5", running)
@@ -136,7 +136,7 @@ def test_stopped_sweep_is_75_and_ends_its_workers(process: Process, tmp_path: Pa
     line = running.stderr.readline()
     while line and "1/3 finished" not in line:
         line = running.stderr.readline()
-    os.killpg(running.pid, signal.SIGINT)
+    os.killpg(running.pid, signal.SIGHUP)  # to all, as when a terminal is lost
     _, err = running.communicate(timeout=PATIENCE)  # returns when the workers, too, have let go of the pipes
     assert running.returncode == 75
     assert err == "stopped with 1 of 3 cases done; the same command does the others\n"

@@ -10,7 +10,7 @@ import pytest
 from blocksim.simulation.stopping import WallTime, interruptible, stop_requests
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1])
 def test_signal_becomes_a_request_and_the_handler_comes_back(number: signal.Signals) -> None:
     before = signal.getsignal(number)
     with stop_requests() as is_stopped:
@@ -62,7 +62,18 @@ def test_runs_in_other_threads_leave_signals_alone() -> None:
     assert answers == [False]
 
 
-def test_being_terminated_is_like_ctrl_c_during_a_sweep() -> None:
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
+def test_being_terminated_is_like_ctrl_c_during_a_study(number: signal.Signals) -> None:
     with pytest.raises(KeyboardInterrupt), interruptible():
-        os.kill(os.getpid(), signal.SIGTERM)
-    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+        os.kill(os.getpid(), number)
+    assert signal.getsignal(number) is signal.SIG_DFL
+
+
+def test_lost_connection_stays_ignored_where_nohup_wants_that() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stop_requests() as is_stopped:
+            os.kill(os.getpid(), signal.SIGHUP)
+            assert not is_stopped()
+    finally:
+        signal.signal(signal.SIGHUP, before)

@@ -57,9 +57,10 @@ def _read(path: Path, file: Any, bodies: int) -> tuple[float, Rows]:
     names = (*ledger, *layout.COUNTED_UNITS)
     measured = {name: safety.data_set(file, f"{layout.OBSERVABLES}/{name}", 1) for name in names}
     found = {one.shape[1] for one in moving.values()}
-    if count <= 0 or found != {bodies}:
-        told = "/".join(map(str, sorted(found)))
-        raise ValueError(f"holds {steps.shape[0]} frames, {count} announced, of {told} bodies, not {bodies}")
+    if found != {bodies}:
+        raise ValueError(f"holds {'/'.join(map(str, sorted(found)))} bodies, not {bodies}")
+    if count <= 0:
+        raise ValueError("holds no frame: the run was killed before its first one, or has only just begun")
     safety.refuse_too_many(path, {layout.STEP: steps, **moving, **measured}, count)
     rows = Rows(
         steps[:count],

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 from os import _exit
 
+from blocksim.simulation.stopping import FOR_ALL
+
 
 @contextmanager
 def pool_of(workers: int) -> Iterator[ProcessPoolExecutor]:
@@ -26,8 +28,9 @@ def pool_of(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _start_worker() -> None:
-    """Leave Ctrl-C to the parent, and end with it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Leave to the parent what a terminal sends to all processes, and end with it."""
+    for number in FOR_ALL:
+        signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

@@ -106,8 +106,16 @@ def test_missing_data_set_is_refused(kept: Result, soft: Shipped, tmp_path: Path
 
 
 def test_file_of_other_bodies_is_refused(kept: Result, soft: Shipped) -> None:
-    with pytest.raises(InvalidInputError, match="of 3 bodies, not 10"):
+    with pytest.raises(InvalidInputError, match="holds 3 bodies, not 10"):
         read_frames(file_of(kept), soft("tower"))
+
+
+def test_file_without_a_frame_says_so(soft: Shipped, tmp_path: Path) -> None:
+    scenario = soft()
+    with FrameFile(tmp_path / "run.h5", place_bodies(scenario), 1e-6, "", ledger=()):
+        pass
+    with pytest.raises(InvalidInputError, match="holds no frame: the run was killed before its first one"):
+        read_frames(tmp_path / "run.h5", scenario)
 
 
 def test_missing_file_is_told(soft: Shipped, tmp_path: Path) -> None:

@@ -1,0 +1,61 @@
+"""Ctrl-C where no run is going on: while the program is loaded, while a command works, and while the process ends.
+
+Python would raise KeyboardInterrupt wherever it happens to be, and print a traceback from where nobody catches it: in
+the middle of an import, or of leaving.
+"""
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, NoReturn
+
+from blocksim.errors import ExitCode
+
+
+class Interrupts:
+    """The handler of Ctrl-C of the whole process; whoever can stop in a better way may take its place for a while."""
+
+    gives_way = True
+
+    def __init__(self) -> None:
+        """Begin to be loaded."""
+        self.has_to_clear_up = self.has_come = False
+
+    def __call__(self, _number: int, _frame: Any) -> None:
+        """Hear of Ctrl-C."""
+        if not self.has_to_clear_up:
+            leave_now()
+        self.has_to_clear_up, self.has_come = False, True
+        raise KeyboardInterrupt
+
+
+def take_interrupts() -> None:
+    """Take over Ctrl-C for the rest of the process, unless somebody has it or it is ignored."""
+    with suppress(ValueError):  # not the main thread, which alone hears signals
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            signal.signal(signal.SIGINT, Interrupts())
+
+
+@contextmanager
+def clearing_up(*, wanted: bool) -> Iterator[None]:
+    """Say for a while whether something is begun that has to be cleared up.
+
+    If not, as during an import, Ctrl-C ends the process; else the first one raises KeyboardInterrupt.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    if not isinstance(handler, Interrupts):
+        yield
+        return
+    before, handler.has_to_clear_up = handler.has_to_clear_up, wanted
+    try:
+        yield
+    finally:
+        handler.has_to_clear_up = before and not handler.has_come
+
+
+def leave_now() -> NoReturn:
+    """End the process."""
+    with suppress(OSError):
+        os.write(2, b"stopped\n")
+    os._exit(ExitCode.STOPPED_EARLY)

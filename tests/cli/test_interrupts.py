@@ -1,0 +1,80 @@
+"""Ctrl-C and a lost terminal, at any moment of a process: exit code 75, no traceback, and nothing lost."""
+
+import fcntl
+import json
+import os
+import pty
+import signal
+import termios
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import PATIENCE, SOFT, Process, wait_for
+
+LONG = ("run", "scenarios/three_blocks_nominal.toml", *SOFT, "--set", "time.end=500")
+LONGER = (*LONG, "--set", "time.stop_at_rest=false", "--out", "out")
+WHILE_IMPORTED = """
+import os, signal, sys
+
+class Finder:
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        if name == "{module}":
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Finder)
+"""
+
+
+@pytest.mark.parametrize("module", ["typer", "numba", "blocksim.simulation.running"])
+def test_ctrl_c_during_an_import_prints_no_traceback(process: Process, module: str) -> None:
+    running = process(*LONGER, before=WHILE_IMPORTED.format(module=module))
+    out, err = running.communicate(timeout=PATIENCE)
+    assert (running.returncode, out, err) == (75, "", "stopped\n")
+
+
+def test_ctrl_c_during_the_last_moments_prints_no_traceback(process: Process) -> None:
+    late = "import atexit, os, signal; atexit.register(os.kill, os.getpid(), signal.SIGINT)"
+    running = process("schema", before=late)
+    _, err = running.communicate(timeout=PATIENCE)
+    assert (running.returncode, err) == (75, "stopped\n")
+
+
+def test_three_times_ctrl_c_prints_no_traceback(process: Process, tmp_path: Path) -> None:
+    slow = (
+        "import blocksim.simulation.part as p, time\n"
+        "close = p.FrameFile.__exit__\n"
+        "p.FrameFile.__exit__ = lambda *a: (time.sleep(600), close(*a))"  # as a slow disk
+    )
+    running = process(*LONGER, "--quiet", before=slow)
+    wait_for(tmp_path / "out" / "run.h5", running)
+    for pause in (0.5, 0.5, 0.002):  # s
+        time.sleep(pause)
+        running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=PATIENCE)
+    assert running.returncode == 75
+    assert err.count("\n") <= 3
+    assert "Traceback" not in err
+
+
+def test_lost_terminal_stops_a_run_with_a_checkpoint(process: Process, tmp_path: Path) -> None:
+    leader, follower = pty.openpty()
+    running = process(
+        *LONGER,
+        stdin=follower,
+        stdout=follower,
+        stderr=follower,
+        start_new_session=True,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+    )
+    os.close(follower)
+    wait_for(tmp_path / "out" / "run.h5", running)
+    time.sleep(0.5)
+    os.close(leader)
+    running.wait(timeout=PATIENCE)
+    assert running.returncode == 75
+    told = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert (told["status"], told["reason"]) == ("interrupted", "stopped by SIGHUP")
+    assert told["last_checkpoint"] == told["steps"]
