@@ -100,7 +100,11 @@ def _value(cell: Cell, unit: str | None) -> object:
 
 @functools.lru_cache(maxsize=1024)
 def _word(text: str) -> object:
-    return parse_value(text)
+    value = parse_value(text)
+    if isinstance(value, list | dict):
+        message = f"a cell holds one value, not a {'list' if isinstance(value, list) else 'table'}"
+        raise ValueError(message)  # noqa: TRY004 - a mistake of the user's, told with its cell
+    return value
 
 
 def refuse_wrong_values(document: Document, columns: Iterable[Column]) -> None:
