@@ -13,6 +13,7 @@ from blocksim.scenario.pairs import DEFAULT, MATERIALS
 from blocksim.study.single import check_experiment
 from blocksim.world.describe import Description, MotionDescription, PairDescription, SagDescription, describe
 from blocksim.world.free_memory import readable
+from blocksim.world.memory import PROCESS_BYTES
 
 MOST_BODIES = 12
 SIDES = ("along x", "upright", "depth mm", "mass kg", "inertia kg m²")
@@ -139,10 +140,22 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
         f"neighbours are listed up to {MILLI * description.skin:.3g} mm apart",
         f"time step  {description.step:.3e} s, at most {description.steps} steps",
         *_sag(description.rigid),
-        f"solving    at most about {duration(description.seconds)} on one core",
-        f"memory     at most about {readable(description.memory)}",
+        f"solving    at most about {duration(description.seconds)} on one core{_until_rest(scenario)}",
+        f"memory     about {readable(description.memory)}, of which {readable(PROCESS_BYTES)} for the program itself",
         f"results    at most {description.frames} frames, about {readable(description.bytes)}",
+        *_short_interval(scenario, description),
     ]
+
+
+def _until_rest(scenario: Scenario) -> str:
+    return ", less if it stops at rest" if scenario.time.stop_at_rest else ""
+
+
+def _short_interval(scenario: Scenario, description: Description) -> list[str]:
+    """Report an output interval that no run can keep."""
+    if not description.frames_at_every_step:
+        return []
+    return [f"           output.every = {scenario.output.every:.3g} s is shorter than a step: a frame at every step"]
 
 
 def _boundary(scenario: Scenario, description: Description) -> list[str]:

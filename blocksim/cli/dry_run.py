@@ -26,8 +26,14 @@ def _lines(found: Estimate, cores: int) -> list[str]:
         f"cases      {found.cases}",
         f"solving    at most about {duration(found.seconds / cores)} on {cores} {'core' if cores == 1 else 'cores'}",
         f"results    at most about {readable(found.bytes)}",
-        f"from the steps of {found.looked_at} cases and the measured speed of a step, as if nothing came to rest",
+        f"memory     about {readable(found.memory)} for a process that runs one case",
+        f"from the steps of {found.looked_at} cases and the measured speed of a step{_until_rest(found)}",
     ]
     if found.impossible:
         lines.append(f"{found.impossible} of these {found.looked_at} cannot be simulated; the first: {found.reason}")
     return lines
+
+
+def _until_rest(found: Estimate) -> str:
+    """Return what makes the estimate an upper limit."""
+    return "; cases that stop at rest take less" if found.stop_at_rest else ""

@@ -26,6 +26,7 @@ from blocksim.simulation.stopping import WallTime, stop_requests
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import csv_text, final_columns
 from blocksim.simulation.team import team_for
+from blocksim.world.memory import is_shorter_than_step
 
 COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION)
 
@@ -137,16 +138,19 @@ def _summary(scenario: Scenario, ended: LoopResult, seconds: float) -> Summary:
         total_seconds=seconds,
         energy_J=ended.ledger,
         threads=ended.threads,
-        warnings=_warnings(ended),
+        warnings=_warnings(scenario, ended),
         environment=environment(),
     )
 
 
-def _warnings(ended: LoopResult) -> tuple[str, ...]:
-    residual = ended.ledger.relative_residual
-    if residual <= RESIDUAL_PROMISE:
-        return ()
-    return (f"energy is off by {residual:.1e} of the energy in play, more than {RESIDUAL_PROMISE:g}",)
+def _warnings(scenario: Scenario, ended: LoopResult) -> tuple[str, ...]:
+    found = []
+    residual, every = ended.ledger.relative_residual, scenario.output.every
+    if residual > RESIDUAL_PROMISE:
+        found.append(f"energy is off by {residual:.1e} of the energy in play, more than {RESIDUAL_PROMISE:g}")
+    if is_shorter_than_step(every, float(ended.world.controls[0].step)):
+        found.append(f"output.every = {every:.3g} s is shorter than a step: a frame at every step")
+    return tuple(found)
 
 
 def _with_checksums(summary: Summary, folder: Path) -> Summary:

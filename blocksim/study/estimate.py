@@ -30,6 +30,8 @@ class Estimate:
     reason: str  # why the first impossible one is
     seconds: float  # of solving all cases on one core, at most: as if none came to rest before its end
     bytes: int  # of all that the sweep writes, at most
+    memory: int  # bytes of one process that runs a case, of the largest case looked at
+    stop_at_rest: int  # cases of those looked at that end before, where they come to rest
     remarks: tuple[str, ...]
 
 
@@ -55,6 +57,8 @@ def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
         reason=problems[0] if problems else "",
         seconds=share * len(cases) * fmean([one.seconds for one in described] or [0.0]),
         bytes=round(share * len(cases) * fmean([_bytes(one, keep_cases=keep_cases) for one in described] or [0.0])),
+        memory=max((one.memory for one in described), default=0),
+        stop_at_rest=sum(case.scenario.time.stop_at_rest for case in chosen if case.scenario is not None),
         remarks=tuple(remarks(base.sweep)),
     )
 

@@ -14,7 +14,15 @@ from blocksim.world.boundary import particle_count
 from blocksim.world.bounds import bounds_of
 from blocksim.world.build import build_world
 from blocksim.world.interactions import ContactClass, contact_classes, interactions_of, pair_of
-from blocksim.world.memory import RigidSize, SceneSize, file_bytes, output_count, recorded_contacts
+from blocksim.world.memory import (
+    PROCESS_BYTES,
+    RigidSize,
+    SceneSize,
+    file_bytes,
+    is_shorter_than_step,
+    output_count,
+    recorded_contacts,
+)
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
 from blocksim.world.rigid_step import longest_step
 from blocksim.world.sag import column_sag, inverse_mass, point_stiffness
@@ -23,6 +31,8 @@ from blocksim.world.sag import column_sag, inverse_mass, point_stiffness
 SECONDS_PER_BODY_AND_STEP = 75e-9
 SECONDS_IN_A_CROWD = 250e-9  # where bodies have neighbours on all sides
 CROWD = 50  # bodies
+# with particles: a block, and each particle around it; in a crowd as many times that, as all its faces touch others
+SECONDS_WITH_PARTICLES = {"kernel": (1.5e-6, 10e-9, 5.0), "particles": (0.7e-6, 6e-9, 2.0)}
 SECONDS_IN_A_SUBSTEP = 400e-9  # a block, where contacts are rigid
 RIGID_RULES = ("friction", "restitution")  # what decides where contacts are rigid
 STIFFNESS_UNITS = {"linear": "N/m", "hertz-mindlin": "N/m^1.5"}
@@ -78,7 +88,8 @@ class Description:
     frames: int  # at most
     seconds: float  # estimated time of solving, at most
     bytes: int  # estimated size of run.h5, at most
-    memory: int  # bytes that the run needs, at most
+    memory: int  # bytes of the process that runs it into a folder
+    frames_at_every_step: bool  # output.every is shorter than a step
     particles: int  # on all boundaries, corners included
     skin: float  # m, how far apart bodies are listed as neighbours
     rigid: SagDescription | None  # where contacts are
@@ -100,9 +111,10 @@ def describe(scenario: Scenario) -> Description:
         step=step,
         steps=steps,
         frames=frames,
-        seconds=steps * len(placed) * _seconds_per_step(scenario, len(placed)),
+        seconds=steps * _seconds_per_step(scenario, len(placed), particles),
         bytes=file_bytes(len(placed), frames, contacts),
-        memory=replace(size, frames=frames, contacts=contacts).bytes_needed,
+        memory=PROCESS_BYTES + size.bytes_needed,  # without frames: into a folder, they are written as they come
+        frames_at_every_step=is_shorter_than_step(scenario.output.every, step),
         particles=particles,
         skin=float(world.controls[0].skin),
         rigid=_rigid(scenario, placed, world, step),
@@ -119,11 +131,15 @@ def _built(scenario: Scenario, count: int) -> tuple[World, SceneSize | RigidSize
     return world, SceneSize(count, world.pairs.size, slots, has_particles=world.particles is not None)
 
 
-def _seconds_per_step(scenario: Scenario, blocks: int) -> float:
-    """Return what a step costs a block (s)."""
+def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
+    """Return what a step costs (s) with so many blocks and particles around them."""
+    is_crowd = blocks > CROWD
     if isinstance(scenario.time, Nonsmooth):
-        return SECONDS_IN_A_SUBSTEP * scenario.time.substeps
-    return SECONDS_IN_A_CROWD if blocks > CROWD else SECONDS_PER_BODY_AND_STEP
+        return blocks * SECONDS_IN_A_SUBSTEP * scenario.time.substeps
+    if scenario.contact.model in SECONDS_WITH_PARTICLES:
+        block, particle, more = SECONDS_WITH_PARTICLES[scenario.contact.model]
+        return (more if is_crowd else 1.0) * (blocks * block + particles * particle)
+    return blocks * (SECONDS_IN_A_CROWD if is_crowd else SECONDS_PER_BODY_AND_STEP)
 
 
 def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, step: float) -> SagDescription | None:

@@ -23,6 +23,8 @@ MOTION_VALUES = 6  # of a body in a frame: place, angle, velocity, spin
 FRAME_VALUES = 12  # of a frame beside those: step, time, energies, number of contacts, largest overlap
 CONTACT_VALUES = 8  # of a recorded contact: two bodies in one, place, normal, overlap, forces
 CONTACTS_OF_A_BODY = 4  # recorded in a frame, of corners and rigid faces: hardly ever more
+PROCESS_BYTES = 210_000_000  # Python, packages and compiled kernels; measured 207 to 210 MB
+ROUNDING = 1e-9  # of a step, by which the time between frames may miss it
 COPIES = 2  # of all frames at the end of a run: as they came, and joined
 
 
@@ -107,6 +109,11 @@ class RigidSize(Size):
 def output_count(steps: int, end: float, every: float) -> int:
     """Return how many frames follow the first, one every `every` (s) until `end` (s), but at most one a step."""
     return round(min(steps, end / every))
+
+
+def is_shorter_than_step(every: float, step: float) -> bool:
+    """Return True if frames every `every` (s) would be closer than steps (s), so that there is one at every step."""
+    return every < (1.0 - ROUNDING) * step
 
 
 def file_bytes(bodies: int, frames: int, contacts: int = 0) -> int:

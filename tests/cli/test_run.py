@@ -227,3 +227,9 @@ def test_folder_of_a_run_that_is_going_on_is_left_alone(
     assert answer.code == 73
     assert answer.err == "out: a run is going on here; wait for it, or write elsewhere with --out DIR\n"
     assert not any((tmp_path / "out").iterdir())
+
+
+def test_frames_closer_than_a_step_are_warned_of(blocksim: Command) -> None:
+    answer = blocksim("run", "scenarios/slide.toml", *SOFT, "--set", "output.every=1e-9 s", "--set", "time.end=1e-4")
+    assert answer.code == 0
+    assert "warning: output.every = 1e-09 s is shorter than a step: a frame at every step" in answer.err

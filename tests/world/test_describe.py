@@ -89,3 +89,36 @@ def test_more_output_costs_more_bytes_but_not_more_steps() -> None:
     coarse, fine = (describe(load_scenario(shipped, [f"output.every={every}"])) for every in (0.01, 0.001))
     assert fine.bytes > 9 * coarse.bytes
     assert fine.steps == coarse.steps
+
+
+def test_frames_closer_than_a_step_are_reported() -> None:
+    slide = SCENARIOS / "slide.toml"
+    step = describe(load_scenario(slide)).step
+    told = [describe(load_scenario(slide, {"output.every": share * step})) for share in (0.9, 1.0, 1.1)]
+    assert [one.frames_at_every_step for one in told] == [True, False, False]
+
+
+def test_frames_that_go_into_a_folder_take_no_memory() -> None:
+    shipped = SCENARIOS / "tower.toml"
+    coarse, fine = (describe(load_scenario(shipped, [f"output.every={every}"])) for every in (0.01, 1e-5))
+    assert fine.memory == coarse.memory
+    assert 200e6 < coarse.memory < 220e6  # measured: 207 MB
+
+
+def test_kernels_of_a_crowd_cost_more_than_of_a_few() -> None:
+    # every block of a wall touches others on all sides: measured 6 times the time a block and step
+    few, many = (
+        describe(
+            load_scenario(
+                SCENARIOS / "wall.toml",
+                {
+                    "contact.model": "kernel",
+                    "structures.0.columns": columns,
+                    "structures.0.rows": rows,
+                },
+            )
+        )
+        for columns, rows in ((3, 3), (20, 10))
+    )
+    a, b = (one.seconds / one.steps / len(one.bodies) for one in (few, many))
+    assert 4.0 < b / a < 8.0
