@@ -4,6 +4,9 @@ import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
+from typing import Annotated
+
+import typer
 
 from blocksim.cli import options
 from blocksim.cli.output import GAP, answer, duration, note, number, print_json, table_lines, width_of_screen
@@ -27,13 +30,16 @@ MICRO = 1e6
 def check_command(
     scenario: options.ScenarioPath,
     settings: options.Settings = None,
+    resolved: Annotated[
+        bool, typer.Option("--resolved", help="Print the resolved scenario instead: every value, in SI.")
+    ] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Validate a scenario and show what it comes to.
 
-    Prints every value that will be used, then masses, contact parameters, time step, and what the run will cost.
-    Nothing is run; with --quiet only mistakes are printed.
+    Prints time step and cost, then masses, inertias, contact parameters and the keys that decided them. Nothing is run;
+    with --quiet only mistakes are printed. --resolved writes a scenario file with every value that will be used.
 
     Example: blocksim check scenarios/three_blocks.toml
     """
@@ -42,8 +48,9 @@ def check_command(
     check_experiment(ready)
     if as_json:
         print_json({"scenario": ready.model_dump(mode="json", by_alias=True), **_data(description)})
-    elif not quiet:
+    elif resolved:
         answer(scenario_to_toml(ready))
+    elif not quiet:
         answer("\n\n".join("\n".join(lines) for lines in _tables(ready, description)))
         note(f"{ready.name}: valid")
 
@@ -55,10 +62,10 @@ def _data(description: Description) -> dict[str, object]:
 
 def _tables(scenario: Scenario, description: Description) -> list[list[str]]:
     return [
+        _cost(scenario, description),
         _bodies(description.bodies),
         _pairs(scenario, description.pairs),
         _rules(description.pairs),
-        _cost(scenario, description),
     ]
 
 
@@ -135,15 +142,15 @@ def _wrapped(key: str, pairs: Iterable[str], room: int) -> Iterator[tuple[str, s
 
 def _cost(scenario: Scenario, description: Description) -> list[str]:
     return [
-        *_motion(description.motion),
-        *_boundary(scenario, description),
-        f"neighbours are listed up to {MILLI * description.skin:.3g} mm apart",
         f"time step  {description.step:.3e} s, at most {description.steps} steps",
         *_sag(description.rigid),
         f"solving    at most about {duration(description.seconds)} on one core{_until_rest(scenario)}",
         f"memory     about {readable(description.memory)}, of which {readable(PROCESS_BYTES)} for the program itself",
         f"results    at most {description.frames} frames, about {readable(description.bytes)}",
         *_short_interval(scenario, description),
+        *_motion(description.motion),
+        *_boundary(scenario, description),
+        f"neighbours listed up to {MILLI * description.skin:.3g} mm apart",
     ]
 
 
