@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
+from blocksim.scenario.limited import is_folder, open_regular, unreadable
 
 LARGEST_FILE = 1_000_000  # bytes
 LONGEST_LINE = 1_000  # characters
@@ -167,16 +168,13 @@ def _text(path: Path, limit: int) -> str:
 
 
 def _bytes(path: Path, limit: int) -> bytes:
-    if path.is_dir():
+    if is_folder(path):
         raise InputMissingError(Problem(str(path), "is a folder, not a table").render())
-    try:
-        with path.open("rb") as file:
+    with open_regular(path, links=True) as file:
+        try:
             return file.read(limit + 1)
-    except FileNotFoundError:
-        raise InputMissingError(Problem(str(path), "no such file").render()) from None
-    except (OSError, ValueError) as error:  # ValueError: a null character in the name
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputMissingError(Problem(str(path), f"cannot be read: {reason}").render()) from None
+        except OSError as error:
+            raise unreadable(path, error) from None
 
 
 def _printable(line: str) -> str:

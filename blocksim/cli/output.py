@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import shutil
 import sys
 from collections.abc import Iterable, Sequence
@@ -13,13 +14,18 @@ from typing import TextIO
 NARROW = 80
 GAP = "  "
 SHORTEST = 8
+STEERING = re.compile(
+    r"[\x00-\x08\x0b-\x1f\x7f-\x9f"  # control characters of ASCII and Latin-1 but tab and newline
+    r"\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # marks that turn the direction of what follows
+    r"\ud800-\udfff]"  # halves of characters
+)
 LONG_TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))  # s
 
 
 def note(text: str) -> None:
     """Print a line about what is going on, to standard error; where nobody reads it any more, nothing happens."""
     try:
-        print(text, file=sys.stderr, flush=True)  # noqa: T201 - this is the place for it
+        print(harmless(text), file=sys.stderr, flush=True)  # noqa: T201 - this is the place for it
     except OSError:
         abandon(sys.stderr)
 
@@ -37,7 +43,7 @@ def replacement(path: Path) -> str:
 
 def answer(text: str) -> None:
     """Print text that was asked for, to standard output."""
-    print(text)  # noqa: T201 - this is the place for it
+    print(harmless(text))  # noqa: T201 - this is the place for it
 
 
 def print_json(data: object) -> None:
@@ -98,3 +104,11 @@ def duration(seconds: float) -> str:
     """Return a time in the largest unit of which there are two."""
     worth, unit = next((entry for entry in LONG_TIMES if seconds >= 2.0 * entry[0]), (1.0, "s"))
     return f"{seconds / worth:.1f} {unit}"
+
+
+def harmless(text: str) -> str:
+    """Return a text without what steers a terminal, or shows a line in another order than it has.
+
+    Names, descriptions and reasons may come from the files of a stranger.
+    """
+    return STEERING.sub("\ufffd", text)

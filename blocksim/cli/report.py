@@ -12,19 +12,18 @@ from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.cli import options
 from blocksim.cli.output import note
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
-from blocksim.scenario import Scenario, load_scenario
+from blocksim.scenario import Scenario, load_stored
 from blocksim.simulation import folder as files
 from blocksim.simulation.own_files import is_report, refuse_foreign
 from blocksim.study.judge import compare_sweep
 from blocksim.study.places import find_run
+from blocksim.study.sweep_folder import PLAN, case_folder
 from blocksim.view.report.packing import MOST_BYTES
 from blocksim.view.report.page import write_report
 from blocksim.view.report.stored import StoredRun, read_stored
 from blocksim.view.report.subjects import Subject, run_subject
 from blocksim.view.report.sweeps import TABLE, SweepTable, read_sweep_table, sweep_subject
 
-PLAN = "sweep.toml"
-CASES = "cases"
 FINISHED = "finished"
 MEMBERS = 50
 MEGABYTE = 1e6
@@ -151,7 +150,7 @@ def _judged(
 
 def _plan(place: Path) -> tuple[Scenario | None, tuple[str, ...]]:
     try:
-        return load_scenario(place / PLAN), ()
+        return load_stored(place / PLAN), ()
     except InputMissingError:
         return None, ()
     except BlocksimError as error:
@@ -165,6 +164,6 @@ def _kept(table: SweepTable) -> Mapping[str, Path]:
 
 def _folders(table: SweepTable) -> Iterator[tuple[str, Path]]:
     for case in table.column("case"):
-        folder = table.folder / CASES / Path(case).name
-        if case and (folder / files.FRAMES).is_file():
+        folder = case_folder(table.folder, case)
+        if folder is not None and (folder / files.FRAMES).is_file():
             yield case, folder

@@ -1,7 +1,14 @@
 """Scenarios: declared in TOML, checked, and given to the other rooms as frozen objects in SI."""
 
 from blocksim.scenario.document import Document
-from blocksim.scenario.load import Source, document_of, load_scenario, replace_values, scenario_from_mapping
+from blocksim.scenario.load import (
+    Source,
+    document_of,
+    load_scenario,
+    load_stored,
+    replace_values,
+    scenario_from_mapping,
+)
 from blocksim.scenario.models.boundary import Ground, Wall
 from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
 from blocksim.scenario.models.geometry import Block, BodySpec, Material
@@ -39,6 +46,7 @@ __all__ = [
     "document_of",
     "json_schema",
     "load_scenario",
+    "load_stored",
     "motion_table_content",
     "place_bodies",
     "place_segments",

@@ -13,6 +13,7 @@ from blocksim.errors import InputMissingError, Problem, ScenarioError
 from blocksim.scenario.check import examine
 from blocksim.scenario.findings import Finding
 from blocksim.scenario.keys import MAX_PARTS
+from blocksim.scenario.limited import NoSuchFileError, is_folder, open_regular, unreadable
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overrides import (
     Data,
@@ -40,7 +41,8 @@ ENDLESS_KEY = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART})
 class Document:
     """Raw data of one scenario with its text, so that mistakes can be shown where they stand.
 
-    Relative paths inside are resolved against `folder`; with `allow_outside` they may lead anywhere.
+    Relative paths inside are resolved against `folder`; with `allow_outside` they may lead anywhere. Of a file in a
+    folder of results (`is_stored`), no link is followed: it may come from a stranger and lead to a private file.
     """
 
     data: Data
@@ -48,15 +50,18 @@ class Document:
     folder: Path = Path()
     overrides: tuple[Override, ...] = ()
     allow_outside: bool = field(default_factory=is_anywhere)
+    is_stored: bool = False
 
     @classmethod
-    def read(cls, path: Path | str) -> Self:
-        """Read a TOML file.
+    def read(cls, path: Path | str, *, is_stored: bool = False) -> Self:
+        """Read a TOML file, `is_stored` in a folder of results.
 
-        Raises InputMissingError where it cannot be read, ScenarioError where it is no TOML.
+        Raises InputMissingError where it cannot be read, ScenarioError where it is no TOML, InvalidInputError where it
+        is no regular file.
         """
         path = Path(path)
-        return cls.parse(_decoded(_content(path), str(path)), str(path), path.parent)
+        text = _decoded(_content(path, is_stored=is_stored), str(path))
+        return replace(cls.parse(text, str(path), path.parent), is_stored=is_stored)
 
     @classmethod
     def parse(cls, text: str, where: str = "scenario", folder: Path = Path()) -> Self:
@@ -114,7 +119,7 @@ class Document:
 
     def build(self) -> Scenario:
         """Validate; raises ScenarioError with every mistake, those in the file first and by line."""
-        with reaching(anywhere=self.allow_outside):
+        with reaching(anywhere=self.allow_outside, links=not self.is_stored):
             scenario, findings = examine(self.data, self.folder)
         if scenario is None:
             raise ScenarioError(self._problems(findings))
@@ -158,19 +163,18 @@ def _unusable(where: str, message: str) -> ScenarioError:
     return ScenarioError([Problem(where, message)])
 
 
-def _content(path: Path) -> bytes:
+def _content(path: Path, *, is_stored: bool) -> bytes:
     """Read a file, but never much more than a scenario can be."""
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except FileNotFoundError:
-        raise InputMissingError(f"{path}: no such file{_similar_file(path)}") from None
-    except IsADirectoryError:
+    if is_folder(path):
         message = f"{path}: this is a folder; a scenario file is needed{_similar_file(path / path.name)}"
-        raise InputMissingError(message) from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputMissingError(f"{path}: cannot be read: {reason}") from None
+        raise InputMissingError(message)
+    try:
+        with open_regular(path, links=not is_stored) as file:
+            content = file.read(MAX_BYTES + 1)
+    except NoSuchFileError as error:
+        raise InputMissingError(f"{error}{_similar_file(path)}") from None
+    except OSError as error:
+        raise unreadable(path, error) from None
     if len(content) > MAX_BYTES:
         raise _unusable(str(path), f"larger than {MAX_BYTES // 1_000_000} MB; this is not a scenario")
     return content

@@ -24,6 +24,18 @@ KINDS = (
 )
 
 
+class NoSuchFileError(InputMissingError):
+    """There is nothing of this name."""
+
+
+def is_folder(path: Path) -> bool:
+    """Return True for a folder, or a link to one; False also for a name that no file can have."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
 def open_regular(path: Path, *, links: bool = False) -> BinaryIO:
     """Open a regular file for reading, without waiting for anybody at the other end of a pipe.
 
@@ -85,7 +97,7 @@ def unreadable(path: Path, error: OSError | ValueError) -> InputMissingError | I
     """Return the error to raise for a file that cannot be opened or read."""
     number = getattr(error, "errno", None)
     if number == errno.ENOENT:
-        return InputMissingError(f"{path}: no such file")
+        return NoSuchFileError(f"{path}: no such file")
     if number == errno.EISDIR:
         return InvalidInputError(f"{path}: not a file, but a folder")
     reason = getattr(error, "strerror", None) or str(error)

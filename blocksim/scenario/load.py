@@ -12,6 +12,14 @@ from blocksim.scenario.resolved import scenario_to_toml
 Source = Path | str | Mapping[str, object] | Scenario | Document
 
 
+def load_stored(path: Path | str) -> Scenario:
+    """Read and check a scenario in a folder of results, which a stranger may have made: no link is followed.
+
+    Raises as `load_scenario`, and InvalidInputError for a link.
+    """
+    return Document.read(path, is_stored=True).build()
+
+
 def load_scenario(
     source: Source,
     overrides: Mapping[str, object] | Sequence[str] = (),

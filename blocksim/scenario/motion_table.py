@@ -15,6 +15,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from blocksim.errors import BlocksimError
+from blocksim.scenario.limited import read_limited
 from blocksim.scenario.quantities import shown
 
 STANDARD_GRAVITY = 9.80665
@@ -55,14 +57,10 @@ class MotionTable:
 def read_motion_table(path: Path) -> MotionTable:
     """Read a table of motion; raises MotionTableError with the line of the first mistake."""
     try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        message = f"cannot be read: {error.strerror}"
+        content = read_limited(path, MAX_BYTES, links=True)
+    except BlocksimError as error:
+        message = str(error).removeprefix(f"{path}: ")
         raise MotionTableError(message) from None
-    if len(content) > MAX_BYTES:
-        message = f"larger than {MAX_BYTES // 1_000_000} MB"
-        raise MotionTableError(message)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -9,11 +9,13 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
+from blocksim.scenario.limited import IS_LINK
 from blocksim.scenario.quantities import shown
 
 WAY_OUT = "--allow-outside (in Python allow_outside=True) reads it all the same"
 
 _is_anywhere = ContextVar("_is_anywhere", default=False)
+_follows_links = ContextVar("_follows_links", default=True)
 
 
 class ByHand(str):
@@ -32,13 +34,14 @@ def is_anywhere() -> bool:
 
 
 @contextmanager
-def reaching(*, anywhere: bool) -> Iterator[None]:
-    """Let scenarios that are read and checked meanwhile name any file, or only those within reach."""
-    token = _is_anywhere.set(anywhere)
+def reaching(*, anywhere: bool, links: bool = True) -> Iterator[None]:
+    """Let scenarios that are read and checked meanwhile name any file, or only those within reach; and links or not."""
+    anywhere_before, links_before = _is_anywhere.set(anywhere), _follows_links.set(links)
     try:
         yield
     finally:
-        _is_anywhere.reset(token)
+        _is_anywhere.reset(anywhere_before)
+        _follows_links.reset(links_before)
 
 
 def said_by_hand(key: str | Sequence[str | int], value: object) -> object:
@@ -49,19 +52,30 @@ def said_by_hand(key: str | Sequence[str | int], value: object) -> object:
 
 def table_in(folder: Path | str, text: str) -> Path:
     """Return the file that a scenario in `folder` names, all links followed. Raises OutOfReachError."""
+    if not _follows_links.get() and not isinstance(text, ByHand) and Path(folder, text).is_symlink():
+        message = f"{shown(text)}: {IS_LINK}"
+        raise OutOfReachError(message)
     try:
         table = Path(folder, text).resolve()
         _refuse_outside(Path(folder), text, table)
-        is_file, is_folder = table.is_file(), table.is_dir()
+        what = _what_it_is(table)
     except (OSError, RuntimeError) as error:  # a name that is too long; links in a circle
         reason = getattr(error, "strerror", None) or str(error)
         message = f"{shown(text)}: cannot be read: {reason}"
         raise OutOfReachError(message) from None
-    if not is_file:
-        what = "is a folder, not a table" if is_folder else "no such file"
+    if what:
         message = f"{shown(text)}: {what} (paths are relative to the scenario file)"
         raise OutOfReachError(message)
     return table
+
+
+def _what_it_is(table: Path) -> str:
+    """Return what is in the place of a table; nothing where it is a file."""
+    if table.is_file():
+        return ""
+    if table.is_dir():
+        return "is a folder, not a table"
+    return "is a pipe or a device, not a file" if table.exists() else "no such file"
 
 
 def _refuse_outside(folder: Path, text: str, table: Path) -> None:

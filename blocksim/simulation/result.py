@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Scenario, load_scenario, place_bodies
+from blocksim.scenario import Scenario, load_stored, place_bodies
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.stores.hdf5_reader import read_frames
@@ -89,7 +89,7 @@ class Result:
 def read_result(folder: Path) -> Result:
     """Return the run that a folder holds. Raises InputMissingError or InvalidInputError."""
     summary = read_summary(folder / files.SUMMARY)
-    scenario = load_scenario(folder / files.SCENARIO)
+    scenario = load_stored(folder / files.SCENARIO)
     frames = read_frames(folder / files.FRAMES, scenario)
     return Result(scenario.name, read_final(folder, scenario), summary, scenario, folder, frames)
 

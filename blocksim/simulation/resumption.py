@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from blocksim.errors import BlocksimError, InvalidInputError
-from blocksim.scenario import Scenario, load_scenario
+from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario.resolved import deciding_values
 from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint import Stored, read_checkpoint
@@ -94,7 +94,7 @@ def _refuse_other_start(folder: Path, scenario: Scenario) -> None:
     """Raise InvalidInputError where the unfinished run in a folder is of another scenario."""
     path = folder / files.SCENARIO
     try:
-        begun = load_scenario(path)
+        begun = load_stored(path)
     except BlocksimError:  # killed before it was written, or damaged: there is nothing in this folder to lose
         return
     refuse_other_scenario(path, deciding_values(begun), deciding_values(scenario))

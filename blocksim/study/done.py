@@ -5,6 +5,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from blocksim.scenario.limited import open_regular
 from blocksim.study.manifest import PATTERN, Entry, read_entries, values_hash
 from blocksim.study.places import FINISHED
 from blocksim.study.rows import blocks_in
@@ -83,7 +84,7 @@ class Reader:
         """Return the entry of a case that has a row, or None where the file has changed since."""
         source = int(self.done.sources[number])
         if source not in self.files:
-            self.files[source] = self.done.paths[source].open("rb")
+            self.files[source] = open_regular(self.done.paths[source])
         file = self.files[source]
         file.seek(int(self.done.starts[number]))
         return Entry.from_line(file.readline())

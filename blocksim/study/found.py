@@ -10,7 +10,7 @@ from blocksim.analysis.compare import limits, prediction_half_width
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.analysis.members import Members
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Scenario, load_scenario
+from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario import quantities as q
 from blocksim.scenario.keys import KeyPath, field_at, follow, parse_key
 from blocksim.scenario.models.variation import Normal, Uniform
@@ -32,7 +32,7 @@ def read_found(folder: Path, experiment: Path | None = None) -> FoundSweep:
     table measures what the sweep does not have.
     """
     table = read_sweep(folder).table
-    scenario = load_scenario(folder / PLAN)
+    scenario = load_stored(folder / PLAN)
     blocks = blocks_in(map(str, table.columns))
     finished = (table["status"] == FINISHED).to_numpy(dtype=bool)
     if not blocks or not finished.any():

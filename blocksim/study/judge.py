@@ -8,7 +8,7 @@ from blocksim.analysis.experiment import load_table
 from blocksim.analysis.judgement import Judgement, Settings, judge
 from blocksim.analysis.members import Members
 from blocksim.errors import InputMissingError
-from blocksim.scenario import Scenario, load_scenario
+from blocksim.scenario import Scenario, load_stored
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.table import TABLE, SweepResult, read_sweep
 
@@ -71,7 +71,7 @@ def compare_sweep(
 def _scenario(folder: Path) -> Scenario | None:
     """Return the scenario of a sweep, None where its folder does not have it."""
     plan = folder / PLAN
-    return load_scenario(plan) if plan.is_file() else None
+    return load_stored(plan) if plan.exists() else None
 
 
 def _remarks(scenario: Scenario | None) -> tuple[str, ...]:

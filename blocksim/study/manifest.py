@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from blocksim.errors import OutputError, OutputExistsError
+from blocksim.scenario.limited import open_regular
 from blocksim.simulation.claim import takes_lock
 from blocksim.study.rows import Row
 
@@ -26,6 +27,7 @@ PATTERN = "manifest*.jsonl"
 DIGITS = 12
 SUM = b',"sum":"'
 NEWLINE = b"\n"
+NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 LONGEST = 1 << 30
 """Bytes of a line that are read at once; a row of a million blocks has 200 million."""
 
@@ -82,7 +84,7 @@ class Manifest:
         """Open the file and keep others out. Raises OutputExistsError where another process has it, and OutputError."""
         self.path = path
         try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, 0o644)
         except OSError as error:
             message = f"{path}: cannot be written: {error.strerror}"
             raise OutputError(message) from error
@@ -119,14 +121,14 @@ class Manifest:
 
 def is_in_use(path: Path) -> bool:
     """Tell whether another process appends to a manifest."""
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return not takes_lock(file.fileno())
 
 
 def read_entries(path: Path) -> Iterator[tuple[int, Entry]]:
     """Yield where each whole line of a manifest begins, and its entry."""
     start = 0
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         while line := file.readline(LONGEST):
             entry = Entry.from_line(line)
             if entry is not None:

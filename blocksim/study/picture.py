@@ -8,7 +8,7 @@ import numpy as np
 
 from blocksim.analysis.experiment import load_table
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Scenario, load_scenario
+from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario.findings import did_you_mean_or_list
 from blocksim.study.found import read_found
 from blocksim.study.indices import read_indices
@@ -67,7 +67,7 @@ def draw_sweep(
     if reason:
         message = f"{folder}: {reason}"
         raise InvalidInputError(message)
-    path = path or Path(f"{load_scenario(folder / PLAN).name}.png")
+    path = path or Path(f"{load_stored(folder / PLAN).name}.png")
     picture_suffix(path)
     ready(path)
     (chosen or kind_for(found)).draw(found, path)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from blocksim.analysis.compare import Comparison, compare_final
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.scenario import Scenario, Source, load_scenario, place_bodies
+from blocksim.scenario import Scenario, Source, load_scenario, load_stored, place_bodies
 from blocksim.simulation import Progress, Result, Watcher, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation import folder as files
 from blocksim.simulation.precautions import DEFAULTS, Precautions
@@ -88,7 +88,7 @@ def compare(run: "Result | pd.DataFrame | Path | str", experiment: Path | str | 
     folder = find_run(run)
     summary = read_summary(folder / files.SUMMARY)
     _refuse_unfinished(str(folder), summary.status, summary.reason)
-    was = load_scenario(folder / files.SCENARIO)
+    was = load_stored(folder / files.SCENARIO)
     # a scenario file may name another table by now than it did when it was run
     named = (load_scenario(run) if Path(run).is_file() else was).experiment
     return compare_final(read_final(folder, was), _table(experiment, named.table if named else None))

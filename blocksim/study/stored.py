@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 
 from blocksim.errors import BlocksimError
-from blocksim.scenario import Scenario, load_scenario
+from blocksim.scenario import Scenario, load_stored
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.stores.hdf5_reader import read_frames
@@ -36,7 +36,7 @@ def stored_run(place: Path | str) -> StoredRun:
     Raises InputMissingError, ScenarioError, or InvalidInputError for frames that cannot be read.
     """
     folder = find_run(place, needed=(files.SCENARIO, files.FRAMES))
-    scenario = load_scenario(folder / files.SCENARIO)
+    scenario = load_stored(folder / files.SCENARIO)
     return StoredRun(folder, scenario, read_frames(folder / files.FRAMES, scenario))
 
 

@@ -145,9 +145,16 @@ def _empty(folder: Path) -> None:
             cases.rmdir()
 
 
+def case_folder(sweep: Path, case: str) -> Path | None:
+    """Return the folder that was kept for a case, None where there is none; links are not followed."""
+    folder = sweep / CASES / Path(case).name
+    is_real = not (folder.is_symlink() or folder.parent.is_symlink())
+    return folder if case and is_real and folder.is_dir() else None
+
+
 def read_plan(folder: Path) -> Document:
     """Return the plan of a sweep. Raises InputMissingError where the folder holds none."""
     if not (folder / PLAN).exists():
         message = f"{folder}: no sweep is there (no {PLAN})"
         raise InputMissingError(message)
-    return Document.read(folder / PLAN)
+    return Document.read(folder / PLAN, is_stored=True)

@@ -20,6 +20,7 @@ from blocksim.study.plan import Cases
 from blocksim.study.ranges import Ranges
 from blocksim.study.rows import KEPT
 from blocksim.study.shard import WHOLE, Shard
+from blocksim.study.spreadsheet import as_cell
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,7 +77,8 @@ class SweepTable:
                 if entry is not None:
                     row = entry.row
                     outcome = [row.get(name) for name in OUTCOME]
-                    yield [entry.case, *settings.values(), *outcome, *self._verdict(row), *map(row.get, ends)]
+                    cells = [entry.case, *settings.values(), *outcome, *self._verdict(row), *map(row.get, ends)]
+                    yield list(map(as_cell, cells))
 
     def _verdict(self, row: dict[str, object]) -> list[object]:
         """Judge here and not when the case ended: the measured table may be mended between two calls."""

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from blocksim.errors import OutputError
+from blocksim.study.spreadsheet import as_cell
 
 COLUMNS = ("case", "executor", "seconds", "host")
 
@@ -27,7 +28,7 @@ class Timings:
             text = io.StringIO()
             writer = csv.writer(text, lineterminator="\n")
             writer.writerows([COLUMNS] if is_new else [])
-            writer.writerows((name, self.executor, share, host) for name in names)
+            writer.writerows((name, self.executor, share, as_cell(host)) for name in names)
             with self.path.open("a", encoding="utf-8", newline="") as file:
                 file.write(("" if is_new or self._is_whole() else "\n") + text.getvalue())
         except OSError as error:

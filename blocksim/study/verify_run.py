@@ -7,7 +7,7 @@ from pathlib import Path
 
 from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
-from blocksim.scenario import Scenario, load_scenario, scenario_hash
+from blocksim.scenario import Scenario, load_stored, scenario_hash
 from blocksim.simulation import Progress, Result, Watcher, read_result, simulate
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import sha256_of
@@ -85,7 +85,7 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = _i
 
 def scenario_of(place: Path | str) -> Scenario:
     """Return the scenario of a stored run. Raises what `find_run` and loading it raise."""
-    return load_scenario(find_run(place) / files.SCENARIO)
+    return load_stored(find_run(place) / files.SCENARIO)
 
 
 def _changed(folder: Path, summary: Summary) -> tuple[str, ...]:

@@ -9,7 +9,8 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 
-from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.errors import InvalidInputError
+from blocksim.scenario.limited import open_regular
 from blocksim.study.done import Done
 from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.many import cases_in, ranges_of
@@ -17,7 +18,8 @@ from blocksim.study.plan import Case, Cases
 from blocksim.study.ranges import Ranges
 from blocksim.study.rows import Row, invalid_row
 from blocksim.study.single import FINISHED
-from blocksim.study.sweep_folder import CASES, read_origin, read_plan
+from blocksim.study.spreadsheet import as_cell
+from blocksim.study.sweep_folder import case_folder, read_origin, read_plan
 from blocksim.study.table import OUTCOME, TABLE
 from blocksim.study.verify_run import Origin, RunVerdict, changed_origins, verify_run
 
@@ -90,18 +92,15 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
         _largest(found, MM),
         _largest(found, DEGREES),
         () if (origin := read_origin(folder)) is None else changed_origins(origin.environment),
-        tuple(verify_run(kept) for row in rows if (kept := folder / CASES / Path(lines[row][0]).name).is_dir()),
+        tuple(verify_run(kept) for row in rows if (kept := case_folder(folder, lines[row][0])) is not None),
     )
 
 
 def _read_table(path: Path) -> tuple[list[str], list[list[str]]]:
     """Return heads and rows as texts: what a person cites. Raises InputMissingError or InvalidInputError."""
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            head, *lines = csv.reader(file)
-    except FileNotFoundError:
-        message = f"{path}: no such file"
-        raise InputMissingError(message) from None
+        with open_regular(path) as file, io.TextIOWrapper(file, encoding="utf-8", newline="") as text:
+            head, *lines = csv.reader(text)
     except (OSError, ValueError, csv.Error) as error:
         message = f"{path}: not the table of a sweep: {error}"
         raise InvalidInputError(message) from error
@@ -141,7 +140,7 @@ def _cells(columns: Sequence[str], case: Case, row: Row, ranges: Ranges | None) 
     if ranges is not None:
         values[INSIDE] = ranges.hold(row) if row["status"] == FINISHED else None
     text = io.StringIO(newline="")
-    csv.writer(text).writerow([values.get(name) for name in columns])
+    csv.writer(text).writerow([as_cell(values.get(name)) for name in columns])
     return dict(zip(columns, next(csv.reader(io.StringIO(text.getvalue(), newline=""))), strict=True))
 
 

@@ -15,7 +15,8 @@ from typing import Any
 
 import h5py
 
-from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.errors import BlocksimError, InvalidInputError
+from blocksim.scenario.limited import check_regular, read_head
 from blocksim.simulation.stores.hdf5_safety import told
 
 SUPERBLOCK = struct.Struct("<8s4B3QQI")  # signature; version, sizes, flags; base, extension, end; root; checksum
@@ -30,10 +31,8 @@ WORD = 0xFFFFFFFF
 
 @contextmanager
 def opened(path: Path) -> Iterator[Any]:
-    """Give the file to read from. Raises InputMissingError, or InvalidInputError for no HDF5 file, or one cut off."""
-    if not path.is_file():
-        message = f"{path}: no such file"
-        raise InputMissingError(message)
+    """Give the file to read from. Raises as `check_regular`; InvalidInputError for no HDF5 file, or one cut off."""
+    check_regular(path)  # again by name below: HDF5 opens most files by itself
     try:
         with path.open("rb", buffering=0) as raw:
             head = _head_as_closed(path, raw)
@@ -47,9 +46,8 @@ def opened(path: Path) -> Iterator[Any]:
 def is_left_open(path: Path) -> bool:
     """Tell whether a file has a writer who has not closed it: a run that goes on, or was killed."""
     try:
-        with path.open("rb") as file:
-            head = file.read(SUPERBLOCK.size)
-    except OSError:
+        head = read_head(path, SUPERBLOCK.size)
+    except BlocksimError:
         return False
     return len(head) == SUPERBLOCK.size and head.startswith(SIGNATURE) and bool(head[11] & SWMR)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
-from blocksim.scenario import Scenario, load_scenario
+from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario.document import MAX_BYTES
 from blocksim.scenario.limited import read_limited
 from blocksim.simulation import folder as files
@@ -68,7 +68,7 @@ class _Attempts:
 def read_stored(folder: Path) -> StoredRun:
     """Return what a run's folder holds. Raises InvalidInputError where nothing of it can be read."""
     attempts = _Attempts()
-    scenario = attempts.at(lambda: load_scenario(folder / files.SCENARIO))
+    scenario = attempts.at(lambda: load_stored(folder / files.SCENARIO))
     summary = attempts.at(lambda: read_summary(folder / files.SUMMARY))
     frames = None if scenario is None else attempts.at(lambda: read_frames(folder / files.FRAMES, scenario))
     final = attempts.at(lambda: read_table(folder / files.FINAL))
