@@ -4,6 +4,8 @@ import json
 import random
 import shutil
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -107,3 +109,34 @@ def test_shards_at_a_time_share_a_folder(start: Sweep, process: Process, tmp_pat
     assert merged.returncode == 0
     assert len(json.loads(out)["rows"]) == 20
     assert (tmp_path / "parts" / "sweep.csv").read_bytes() == (tmp_path / "whole" / "sweep.csv").read_bytes()
+
+
+CLUSTER = """
+import sys
+from distributed import LocalCluster
+
+if __name__ == "__main__":
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        sys.stdin.read()
+"""
+
+
+@pytest.mark.long
+def test_scheduler_that_dies_in_the_middle_is_told_in_one_line(start: Sweep, tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    script = tmp_path / "cluster.py"
+    script.write_text(CLUSTER)
+    with subprocess.Popen(
+        [sys.executable, script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as cluster:
+        assert cluster.stdout is not None
+        address = cluster.stdout.readline().strip()
+        running = start("swept", 20_000, "--scheduler", address)
+        wait_for(tmp_path / "swept" / "timings.csv", running)  # written after the first rows
+        cluster.kill()
+        _, err = running.communicate(timeout=PATIENCE)
+    assert err == f"the Dask scheduler at {address} has gone; the same command does the other cases\n"
+    assert running.returncode == 69
+    assert 0 < len(list(read_entries(tmp_path / "swept" / "manifest.jsonl"))) < 20_000
+    assert (tmp_path / "swept" / "sweep.csv").exists()

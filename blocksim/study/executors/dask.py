@@ -4,11 +4,12 @@ A worker runs a batch on one thread; how many batches it runs at a time is its o
 that dies is run by another one: Dask sees to that.
 """
 
+import logging
 import queue
 import time
 from collections import deque
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, NoReturn
 
 from blocksim.errors import InvalidInputError, UnavailableError
@@ -23,6 +24,7 @@ PATIENCE = 3.0  # s until a scheduler has answered
 GATHERING = 1.0  # s until the rows of a batch that has ended are here
 AHEAD = 2  # batches a thread of a worker
 POLL = 0.1  # s
+TALKERS = {"asyncio", "dask", "distributed", "tornado"}
 COUNT_EVERY = 2.0  # s between two looks at how many workers there are
 
 
@@ -42,15 +44,34 @@ def check(setting: Setting) -> None:
 def connected(address: str) -> Iterator[Any]:
     """Give a client of a scheduler. Raises UnavailableError where there is no package, or no answer."""
     distributed = loaded("distributed", "--scheduler", CLUSTER)  # here: a second that other executors do not pay
+    with silence():
+        try:
+            client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+        except Exception as error:  # noqa: BLE001 - whatever answers there, or does not, is no scheduler
+            message = f"no Dask scheduler answers at {address} ({type(error).__name__}); start one, or mend --scheduler"
+            raise UnavailableError(message) from None
+        try:
+            yield client
+        finally:
+            with suppress(OSError, TimeoutError):  # of a scheduler that has gone
+                client.close(timeout=PATIENCE)
+
+
+@contextmanager
+def silence() -> Iterator[None]:
+    """Keep the loggers of Dask, and of what it is made of, quiet: a lost scheduler is told in one line, by us.
+
+    Each of them has a level and a handler of its own, so that none can be silenced through its parent.
+    """
+    names = (name for name in logging.root.manager.loggerDict if name.partition(".")[0] in TALKERS)
+    loud = [logger for logger in map(logging.getLogger, names) if not logger.disabled]
+    for logger in loud:
+        logger.disabled = True
     try:
-        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
-    except Exception as error:  # noqa: BLE001 - whatever answers there, or does not, is no scheduler
-        message = f"no Dask scheduler answers at {address} ({type(error).__name__}); start one, or mend --scheduler"
-        raise UnavailableError(message) from None
-    try:
-        yield client
+        yield
     finally:
-        client.close(timeout=PATIENCE)
+        for logger in loud:
+            logger.disabled = False
 
 
 class Submission:
@@ -81,7 +102,7 @@ class Submission:
 
     def _fill(self) -> None:
         if time.monotonic() - self.counted_at > COUNT_EVERY:
-            self.room = AHEAD * max(1, sum(self.client.nthreads().values()))
+            self.room = AHEAD * max(1, self._threads())
             self.counted_at = time.monotonic()
         while len(self.pending) < self.room:
             tasks = self.again.popleft() if self.again else take(self.tasks, self.size.count, self.setting.is_stopped)
@@ -89,6 +110,13 @@ class Submission:
                 return
             payload = [(task.scenario, None) for task in tasks]
             self._await(self.client.submit(run_batch, payload, code_hash(), pure=False), tasks)
+
+    def _threads(self) -> int:
+        """Return how many batches the workers run at a time, all together."""
+        try:
+            return sum(self.client.nthreads().values())
+        except (OSError, TimeoutError):
+            self._scheduler_has_gone()
 
     def _await(self, future: Any, tasks: tuple[Task, ...]) -> None:
         self.pending[future.key] = (future, tasks)

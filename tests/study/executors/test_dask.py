@@ -1,5 +1,6 @@
 """Sweeps on a real Dask cluster of two worker processes; in a process of their own, which the cluster needs."""
 
+import logging
 import subprocess
 import sys
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import Document
+from blocksim.study.executors.dask import silence
 from blocksim.study.many import sweep
 from tests.study.conftest import SCENARIOS
 
@@ -29,6 +31,20 @@ if __name__ == "__main__":
         vary = {{"friction.block_ground": {{"from": 0.2, "to": 0.6, "count": {COUNT}}}}}
         sweep(document, vary, out=sys.argv[1], scheduler=cluster.scheduler_address, on_row=on_row)
 """
+
+
+def test_dask_is_quiet_while_a_sweep_uses_it_and_not_longer(capsys: pytest.CaptureFixture[str]) -> None:
+    logger = logging.getLogger("distributed.client")
+    handler = logging.StreamHandler(sys.stderr)
+    logger.addHandler(handler)
+    try:
+        with silence():
+            logger.error("Traceback: connection refused")
+        assert capsys.readouterr().err == ""
+        logger.error("something else")
+        assert capsys.readouterr().err == "something else\n"
+    finally:
+        logger.removeHandler(handler)
 
 
 @pytest.mark.long
