@@ -4,6 +4,7 @@ So `blocksim --help` need not wait for numba, pandas and HDF5, and `blocksim che
 """
 
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -13,6 +14,7 @@ from blocksim.cli.collector import loading
 from blocksim.cli.failures import told
 from blocksim.cli.interrupts import clearing_up
 from blocksim.cli.outside import add_outside
+from blocksim.errors import InputMissingError
 
 COMMANDS = {  # name: module in this folder, function in it, first line of its help
     "run": ("run", "run_command", "Simulate a scenario and show where the blocks end."),
@@ -55,12 +57,21 @@ class CommandGroup(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
         """Import the command that was asked for."""
         name, command, rest = super().resolve_command(ctx, args)
+        _refuse_no_folder()
         return name, loaded(name) if name in COMMANDS else command, rest
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
         with told(), clearing_up(wanted=True):
             return super().invoke(ctx)
+
+
+def _refuse_no_folder() -> None:
+    """Raise InputMissingError where the current folder was removed: no path could be told or written."""
+    try:
+        Path.cwd()
+    except OSError:
+        raise InputMissingError("the current folder does not exist any more; go to another one with cd") from None
 
 
 def loaded(name: str) -> Any:

@@ -15,6 +15,15 @@ from blocksim.errors import BlocksimError, ExitCode
 PATH_TROUBLE = {errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES}
 DISK_TROUBLE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
 
+MEMORY = "memory for this; end other programs, or raise the limit (ulimit -v)"
+FILES = "room for open files; raise the limit (ulimit -n)"
+THREADS = "room for another process or thread; use fewer (--threads, --jobs), or raise the limit (ulimit -u, ulimit -v)"
+SHORTAGES = (
+    (MEMORY, {errno.ENOMEM}, ("Cannot allocate memory", "failed to map segment", "nable to allocate")),
+    (FILES, {errno.EMFILE, errno.ENFILE}, ("Too many open files",)),
+    (THREADS, {errno.EAGAIN}, ("can't start new thread",)),
+)
+
 LONGEST_NAME = 200  # characters of a path that a message shows
 
 
@@ -30,8 +39,30 @@ def told() -> Iterator[None]:
     except KeyboardInterrupt:
         note("stopped")
         raise typer.Exit(ExitCode.STOPPED_EARLY) from None
-    except OSError as error:
+    except Exception as error:
+        missing = _shortage(error)
+        if missing:
+            note(f"the system has no more {missing}")
+            raise typer.Exit(ExitCode.INPUT_OUTPUT) from None
+        if not isinstance(error, OSError):
+            raise
         raise typer.Exit(_tell_trouble(error)) from None
+
+
+def _shortage(error: BaseException | None) -> str:
+    """Return what the system had no more of, in words; nothing where that was not the reason of an error.
+
+    Libraries wrap such an error in others, and the loader of shared libraries tells it as a text.
+    """
+    while error is not None:
+        for words, numbers, texts in SHORTAGES:
+            number = getattr(error, "errno", None)
+            if number in numbers or any(text in str(error) for text in texts):
+                return words
+        if isinstance(error, MemoryError):
+            return MEMORY
+        error = error.__cause__ or error.__context__
+    return ""
 
 
 def _tell_trouble(error: OSError) -> ExitCode:

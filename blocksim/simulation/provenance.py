@@ -72,7 +72,7 @@ def environment() -> dict[str, str]:
         "cpu": cpu,
         "cpu_features": features,
         "cores": str(os.cpu_count()),
-        "command": shlex.join(sys.argv),
+        "command": shlex.join(sys.argv).encode(errors="backslashreplace").decode(),  # names may be no text
     }
 
 

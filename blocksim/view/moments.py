@@ -51,9 +51,14 @@ class FramesLike(Protocol):
         ...
 
 
-def drawable_frames(frames: FramesLike) -> Indices:
-    """Return the indices of the frames in which every number is finite (a failed run may end in others).
+BEYOND_REACH = 1e34
+"""Metres or radians: ten thousand times what is computed with, and as 32-bit millimetres still a number."""
 
+
+def drawable_frames(frames: FramesLike) -> Indices:
+    """Return the indices of the frames in which every number is one (a failed run may end in others).
+
+    What lies beyond all reach, as in a file that is damaged, counts as none: millimetres and areas would overflow.
     Raises InvalidInputError when there is none, or no block.
     """
     if len(frames.names) == 0:
@@ -61,7 +66,7 @@ def drawable_frames(frames: FramesLike) -> Indices:
         raise InvalidInputError(message)
     finite = np.isfinite(frames.time)
     for field in (frames.x, frames.y, frames.angle):
-        finite &= np.isfinite(field).all(axis=1)
+        finite &= (np.abs(field) < BEYOND_REACH).all(axis=1)  # false for what is not finite
     indices = np.flatnonzero(finite)
     if len(indices) == 0:
         message = "there is no frame to draw"

@@ -30,6 +30,10 @@ def exit_code_of(error: BaseException) -> int:
         (OutputError("x: cannot be written"), ExitCode.INPUT_OUTPUT),
         (KeyboardInterrupt(), ExitCode.STOPPED_EARLY),
         (OSError(errno.ENOSPC, "No space left on device"), ExitCode.INPUT_OUTPUT),
+        (OSError(errno.EMFILE, "Too many open files"), ExitCode.INPUT_OUTPUT),
+        (MemoryError(), ExitCode.INPUT_OUTPUT),
+        (ImportError("x.so: failed to map segment from shared object"), ExitCode.INPUT_OUTPUT),
+        (RuntimeError("can't start new thread"), ExitCode.INPUT_OUTPUT),
     ],
 )
 def test_error_becomes_a_line_and_its_exit_code(
@@ -37,6 +41,29 @@ def test_error_becomes_a_line_and_its_exit_code(
 ) -> None:
     assert exit_code_of(error) == code
     assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_shortage_that_a_library_wraps_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    error = RuntimeError("cannot compile")
+    error.__cause__ = MemoryError()
+    assert exit_code_of(error) == ExitCode.INPUT_OUTPUT
+    assert capsys.readouterr().err.startswith("the system has no more memory for this")
+
+
+def test_error_that_is_no_shortage_stays_what_it_is() -> None:
+    with pytest.raises(ZeroDivisionError), told():
+        raise ZeroDivisionError
+
+
+def test_current_folder_that_is_gone_is_told(
+    blocksim: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    answer = blocksim("run", tmp_path / "scenarios" / "three_blocks_nominal.toml")
+    assert answer.code == 66
+    assert answer.err == "the current folder does not exist any more; go to another one with cd\n"
 
 
 def test_internal_error_is_one_line_and_a_file(

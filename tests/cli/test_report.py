@@ -1,12 +1,14 @@
 """blocksim report: what is written, what is refused, and what is left of damaged runs."""
 
 import json
+import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import h5py
 import pytest
 
 from tests.cli.conftest import Command
@@ -33,6 +35,22 @@ def test_report_of_a_run_is_written_and_told(blocksim: Command, tmp_path: Path) 
     for part in ("Comparison with the measurement", "Energy ledger (J)", "Resolved scenario", "Provenance", "Keys"):
         assert part in text
     assert not re.search(r"""(src|href)=["'](?!#|data:,)|url\(|https?://(?!www\.w3\.org/2000/svg)""", text)
+
+
+def test_report_of_a_folder_whose_name_is_no_text_is_written(blocksim: Command, tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(b"caf\xe9"))
+    write_run(tmp_path / folder)
+    assert blocksim("report", folder).code == 0
+    assert "caf?" in REPORT.read_text(encoding="utf-8")
+
+
+def test_frames_with_places_beyond_all_reach_are_left_out(blocksim: Command, tmp_path: Path) -> None:
+    write_run(tmp_path / "run")
+    with h5py.File("run/run.h5", "r+") as file:
+        file["particles/blocks/x"][-1, 0] = 1e300
+    assert blocksim("report", "run").code == 0
+    ((kept, recorded),) = re.findall(r"(\d+) of (\d+) recorded frames", REPORT.read_text(encoding="utf-8"))
+    assert int(kept) == int(recorded) - 1
 
 
 def test_several_places_are_parts_of_one_file(blocksim: Command, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """What a run tells of where its bits come from."""
 
 import json
+import os
 import platform
 from pathlib import Path
 
@@ -52,3 +53,9 @@ def test_summary_of_an_older_version_is_read(kept: Result, tmp_path: Path) -> No
     back = read_summary(tmp_path / "run.json")
     assert (back.threads, back.sha256) == (1, {})
     assert back.final_state_sha256 == kept.summary.final_state_sha256
+
+
+def test_command_with_a_name_that_is_no_text_can_be_written(kept: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.argv", ["blocksim", os.fsdecode(b"caf\xe9")])
+    summary = kept.summary.model_copy(update={"environment": provenance.environment()})
+    assert json.loads(summary.to_json())["environment"]["command"] == "blocksim 'caf\\udce9'"

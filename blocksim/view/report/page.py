@@ -6,7 +6,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.simulation.atomic import write_text
+from blocksim.simulation.atomic import write_bytes
 from blocksim.view.report.subjects import Subject
 
 if TYPE_CHECKING:
@@ -22,8 +22,9 @@ def write_report(subjects: Sequence[Subject], path: Path, *, title: str, version
     Raises OutputError.
     """
     text = page_text(subjects, title=title, version=version)
-    write_text(path, text)
-    return len(text.encode())
+    content = text.encode(errors="replace")  # names of folders may be no text
+    write_bytes(path, content)
+    return len(content)
 
 
 def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:

@@ -78,6 +78,8 @@ def test_cells_may_have_units_of_their_own(document: Document) -> None:
         ("# nothing\n", "the table is empty"),
         ("gravity\n1\n2,3\n", "3: 2 cells where the header has 1 columns"),
         ("gravity,time.end\n1,\n", "2: time.end: this cell is empty"),
+        ('time.end\n"[1, 2]"\n', "2: time.end: a cell holds one value, not a list"),
+        ("time.end\n{a = 1}\n", "2: time.end: a cell holds one value, not a table"),
         ("gravity [m/s^2]\n1\nx\n", "3: gravity [m/s^2]: 'x' is not a number"),
         ("gravity [mm]\n1\n", '2: gravity [mm]: "1 mm" is a length; an acceleration of at least 0'),
         ("contact.restitution\n0.1\n1.5\n", "3: contact.restitution: 1.5 is too large"),
