@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from blocksim.cli.output import note
+from blocksim.study.heads import Head
 from blocksim.study.rows import Row
 from blocksim.study.single import FINISHED
 
@@ -18,6 +19,7 @@ class Reporter:
     """Tells of rows as they come; `short` has the varied keys and their names for people."""
 
     short: Mapping[str, str]
+    heads: Mapping[str, Head] = field(default_factory=dict)
     began: float = field(default_factory=time.monotonic)
     told_at: float = field(default_factory=time.monotonic)
     new: int = 0
@@ -28,10 +30,14 @@ class Reporter:
         self.new += 1
         self.failed += row["status"] != FINISHED
         if total <= FEW:
-            values = ", ".join(f"{name} = {shown(row[key])}" for key, name in self.short.items())
+            values = ", ".join(f"{name} = {self._value(key, row[key])}" for key, name in self.short.items())
             note(f"{done}/{total} {row['status']}: {values}")
         elif done == total or time.monotonic() - self.told_at > EVERY:
             self._tell_pace(done, total)
+
+    def _value(self, key: str, value: object) -> str:
+        head = self.heads.get(key, Head(key))
+        return f"{shown(head.cell(value))} {head.unit}".rstrip()
 
     def _tell_pace(self, done: int, total: int) -> None:
         self.told_at = time.monotonic()

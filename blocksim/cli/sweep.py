@@ -17,6 +17,7 @@ from blocksim.cli.vary import with_vary
 from blocksim.errors import ExitCode, StoppedEarlyError
 from blocksim.scenario import Document
 from blocksim.study.executors.ensemble import is_still_running
+from blocksim.study.heads import Head, heads_of
 from blocksim.study.many import SweepResult, kernels_for, sweep
 from blocksim.study.merge import merge as merge_shards
 from blocksim.study.shard import WHOLE, Shard
@@ -54,7 +55,8 @@ def sweep_command(
         typer.Option(
             "--vary",
             metavar="KEY=VALUES",
-            help="KEY=a,b,c or KEY=from:to:count; to be drawn from, KEY=from:to or KEY=mean+-sd. Repeatable.",
+            help="KEY=a,b,c or KEY=from:to:count; to be drawn from, KEY=from:to or KEY=mean+-sd. With :log behind, "
+            "from:to is divided evenly in the logarithm. Repeatable.",
         ),
     ] = None,
     mode: Annotated[
@@ -129,7 +131,7 @@ def sweep_command(
         fail_fast=fail_fast,
         retry_failed=retry_failed,
         overwrite=overwrite,
-        on_row=(lambda *_: None) if silent else Reporter(short_keys(document)).tell,
+        on_row=(lambda *_: None) if silent else Reporter(short_keys(document), heads_in(document)).tell,
     )
     _tell(result, as_json=as_json, quiet=quiet)
 
@@ -165,6 +167,12 @@ def short_keys(document: Document) -> dict[str, str]:
     """Return the varied keys with the shortest ends that tell them apart."""
     plan = document.build().sweep
     return short_names(() if plan is None else tuple(plan.vary))
+
+
+def heads_in(document: Document) -> dict[str, Head]:
+    """Return the columns of the varied keys."""
+    plan = document.build().sweep
+    return {} if plan is None else {head.key: head for head in heads_of(plan)}
 
 
 def short_names(keys: Sequence[str]) -> dict[str, str]:

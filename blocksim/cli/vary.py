@@ -10,8 +10,9 @@ from blocksim.study.variation import Variations
 
 ENDS = ("from", "to", "count")
 LEAST_ENDS = 2
+LOG = "log"
 PLUS_MINUS = ("+-", "±")
-FORMS = "KEY=a,b,c, KEY=from:to:count, KEY=from:to or KEY=mean+-sd"
+FORMS = "KEY=a,b,c, KEY=from:to:count, KEY=from:to or KEY=mean+-sd (from:to also with :log at the end)"
 
 
 def with_vary(
@@ -58,6 +59,8 @@ def _values(text: str) -> Values:
         mean, _, sd = text.partition(sign)
         return {"mean": _value(mean), "sd": _value(sd)}
     parts = [_value(part) for part in text.split(":")]
+    if len(parts) > LEAST_ENDS and parts[-1] == LOG:
+        return {**dict(zip(ENDS, parts[:-1], strict=False)), "scale": LOG} if len(parts) <= len(ENDS) + 1 else parts
     if LEAST_ENDS <= len(parts) <= len(ENDS):
         return dict(zip(ENDS, parts, strict=False))
     return [_value(part) for part in text.split(",")]

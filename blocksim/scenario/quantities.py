@@ -214,6 +214,18 @@ def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
     return _times(number, worth.factor), worth.dimension
 
 
+def unit_in(text: str) -> str:
+    """Return the unit in a text such as "9.5 mm"; empty where it is no number with a unit that exists."""
+    found = _TEXT.fullmatch(text) if len(text) <= _MAX_LENGTH else None
+    if found is None or found[2] is None:
+        return ""
+    try:
+        units.parse_unit(found[2])
+    except units.UnitError:
+        return ""
+    return found[2].strip()
+
+
 def _unit_mistake(unit: str, unknown: str, wanted: Kind) -> str:
     if not unknown:
         return f"{shown(unit)[1:-1]!r} is not a unit"

@@ -14,6 +14,7 @@ from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario import quantities as q
 from blocksim.scenario.keys import KeyPath, field_at, follow, parse_key
 from blocksim.scenario.models.variation import Normal, Uniform
+from blocksim.study.heads import Head
 from blocksim.study.places import FINISHED
 from blocksim.study.ranges import Ranges
 from blocksim.study.rows import blocks_in
@@ -94,18 +95,19 @@ def _inside(table: pd.DataFrame, ranges: Ranges) -> NDArray[np.bool_]:
 def _inputs(scenario: Scenario, table: pd.DataFrame) -> tuple[Input, ...]:
     """Return the keys that take more than one value, or the first where none does."""
     vary = {} if scenario.sweep is None else scenario.sweep.vary
-    keys = [str(key) for key in table.columns if key in vary]
-    missing = [key for key in vary if key not in keys]
-    if missing or not keys:
+    heads = [head for name in table.columns if (head := Head.read(str(name))).key in vary]
+    missing = [key for key in vary if key not in {head.key for head in heads}]
+    if missing or not heads:
         message = f"{TABLE} has no column {missing[0]}" if missing else f"{PLAN} varies no key"
         raise InvalidInputError(f"{message}; the two do not belong together")
-    inputs = [_input(scenario, key, table[key]) for key in keys]
+    inputs = [_input(scenario, head, table[str(head)]) for head in heads]
     varied = [one for one in inputs if one.count > 1]
     return tuple(varied or inputs[:1])
 
 
-def _input(scenario: Scenario, key: str, column: pd.Series) -> Input:
-    numbers = [_number(value) for value in column]
+def _input(scenario: Scenario, head: Head, column: pd.Series) -> Input:
+    key = head.key
+    numbers = [None if (number := _number(value)) is None else head.si(number) for value in column]
     if not all(number is None or abs(number) <= LARGEST for number in numbers):
         raise InvalidInputError(f"{TABLE}: the column {key} holds what is no number, or too large a one")
     if all(number is not None for number in numbers):

@@ -14,6 +14,7 @@ from blocksim.scenario.models.variation import Normal, written
 from blocksim.scenario.overrides import Override, frozen, with_value
 from blocksim.scenario.quantities import shown
 from blocksim.simulation.provenance import run_hash
+from blocksim.study.heads import Head, heads_of
 from blocksim.study.sampling.design import Design, Settings
 from blocksim.study.sampling.modes import design_of
 from blocksim.study.sampling.table import read_columns, refuse_wrong_values
@@ -40,6 +41,7 @@ class Cases(Sequence[Case]):
 
     document: Document
     design: Design
+    heads: tuple[Head, ...]  # of the varied keys in the table
 
     def __len__(self) -> int:
         """Return the number of cases."""
@@ -116,7 +118,7 @@ def cases_of(document: Document, sweep: Sweep) -> Cases:
         message = f"{len(design)} cases are too many for one sweep; at most {MOST_CASES} are possible"
         raise InvalidInputError(message)
     _refuse_wrong_draws(document, sweep, design)
-    cases = Cases(_for_cases(document), design)
+    cases = Cases(_for_cases(document), design, heads_of(sweep))
     looked_at = min(len(cases), MOST_LOOKED_AT)
     if all(case.scenario is None for case in islice(cases, looked_at)):
         which = f"none of the {len(cases)} cases" if looked_at == len(cases) else f"none of the first {looked_at} cases"

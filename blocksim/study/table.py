@@ -15,6 +15,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario.limited import MEGABYTE, refuse_large
 from blocksim.simulation.atomic import writing
 from blocksim.study.done import Done
+from blocksim.study.heads import told
 from blocksim.study.places import FINISHED, SWEEP
 from blocksim.study.plan import Cases
 from blocksim.study.ranges import Ranges
@@ -66,7 +67,7 @@ class SweepTable:
     def _columns(self) -> list[str]:
         verdict = [] if self.ranges is None else ["inside"]
         ends = [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
-        return ["case", *self.cases.design.columns, *OUTCOME, *verdict, *ends]
+        return ["case", *map(str, self.cases.heads), *OUTCOME, *verdict, *ends]
 
     def _rows(self) -> Iterator[list[object]]:
         ends = [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
@@ -77,7 +78,8 @@ class SweepTable:
                 if entry is not None:
                     row = entry.row
                     outcome = [row.get(name) for name in OUTCOME]
-                    cells = [entry.case, *settings.values(), *outcome, *self._verdict(row), *map(row.get, ends)]
+                    values = told(self.cases.heads, settings).values()
+                    cells = [entry.case, *values, *outcome, *self._verdict(row), *map(row.get, ends)]
                     yield list(map(as_cell, cells))
 
     def _verdict(self, row: dict[str, object]) -> list[object]:
@@ -115,7 +117,7 @@ class SweepResult:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """The dotted keys that vary."""
+        """The columns of the dotted keys that vary, with the units of their numbers: "ground.tilt [deg]"."""
         names = [str(name) for name in self.table.columns]
         return tuple(names[names.index("case") + 1 : names.index("status")])
 

@@ -13,6 +13,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario.limited import open_regular
 from blocksim.study.done import Done
 from blocksim.study.executors.ensemble import rows_of
+from blocksim.study.heads import Head, told
 from blocksim.study.many import cases_in, ranges_of
 from blocksim.study.plan import Case, Cases
 from blocksim.study.ranges import Ranges
@@ -136,7 +137,8 @@ def _ends(cases: Sequence[Case]) -> Iterator[tuple[Case, Row]]:
 
 def _cells(columns: Sequence[str], case: Case, row: Row, ranges: Ranges | None) -> dict[str, str]:
     """Return the cells of a row as texts, as the table of a sweep has them."""
-    values: Row = {CASE: case.name, **case.settings, **row}
+    settings = told((Head.read(name) for name in columns if Head.read(name).key in case.settings), case.settings)
+    values: Row = {CASE: case.name, **settings, **row}
     if ranges is not None:
         values[INSIDE] = ranges.hold(row) if row["status"] == FINISHED else None
     text = io.StringIO(newline="")

@@ -73,6 +73,17 @@ def test_failed_case_is_77_and_its_reason_is_told(blocksim: Command) -> None:
     assert "1 of 2 cases did not finish; the first: an overlap exceeds contact.max_overlap" in answer.err
 
 
+def test_log_spacing_and_units_on_the_command_line(blocksim: Command) -> None:
+    slide = ("sweep", "scenarios/slide.toml", *SOFT, "--set", "time.end=1e-3", "--out", "out")
+    vary = ("--vary", "contact.stiffness_scale=1e-4:1e-2:3:log", "--vary", "ground.tilt=0 deg:2 deg:2")
+    answer = blocksim(*slide, *vary)
+    assert answer.code == 0
+    head, _, *rows = (line.split() for line in answer.out.splitlines())
+    assert head[:3] == ["stiffness_scale", "tilt", "[deg]"]
+    assert [row[:2] for row in rows] == [[scale, tilt] for scale in ("0.0001", "0.001", "0.01") for tilt in ("0", "2")]
+    assert "6/6 finished: stiffness_scale = 0.01, tilt = 2 deg" in answer.err
+
+
 @pytest.mark.parametrize(
     ("vary", "told"),
     [
@@ -200,7 +211,7 @@ def test_samples_from_the_command_line(blocksim: Command) -> None:
     assert answer.code == 0
     kinetic = sorted(float(row[KINETIC]) for row in rows())
     assert 0.1 < kinetic[0] < 0.2 < kinetic[1] < 0.3
-    assert all(0.0095 < float(row["structures.0.overlap"]) < 0.0105 for row in rows())
+    assert all(9.5 < float(row["structures.0.overlap [mm]"]) < 10.5 for row in rows())
     first = Path("out/sweep.csv").read_text()
     blocksim(*SHORT[:-1], "again", *SAMPLED, "--samples", 2, "--seed", 3)
     assert [row.split(",")[:3] for row in Path("again/sweep.csv").read_text().splitlines()] == [
@@ -228,7 +239,7 @@ def test_a_table_of_cases(blocksim: Command) -> None:
     Path("mine.toml").write_text(short + '\n[sweep]\nmode = "table"\ntable = "cases.csv"\n')
     answer = blocksim("sweep", "mine.toml", *SHORT[2:])
     assert answer.code == 0
-    assert [(row["structures.0.overlap"], row["time.scheme"]) for row in rows()] == [
-        ("9 mm", "explicit"),
-        ("10 mm", "nonsmooth"),
+    assert [(row["structures.0.overlap [mm]"], row["time.scheme"]) for row in rows()] == [
+        ("9.0", "explicit"),
+        ("10.0", "nonsmooth"),
     ]

@@ -21,33 +21,41 @@ Scale = Literal["linear", "log"]
 
 @dataclass(frozen=True, slots=True)
 class Uniform:
-    """Evenly distributed from `low` to `high`, or their logarithms are; SI, radians where `angle`."""
+    """Evenly distributed from `low` to `high`, or their logarithms are; SI, radians where `angle`.
+
+    `unit` is the one that the file has, if any.
+    """
 
     low: float
     high: float
     scale: Scale = "linear"
     angle: bool = False
+    unit: str = ""
 
     def as_table(self) -> dict[str, object]:
         """Return the table of the file that says this."""
-        ends = {"from": written(self.low, angle=self.angle), "to": written(self.high, angle=self.angle)}
+        ends = {"from": _typed(self.low, self), "to": _typed(self.high, self)}
         return ends if self.scale == "linear" else {**ends, "scale": self.scale}
 
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """Normally distributed, with nothing below `low` or above `high`; SI, radians where `angle`."""
+    """Normally distributed, with nothing below `low` or above `high`; SI, radians where `angle`.
+
+    `unit` is the one that the file has, if any.
+    """
 
     mean: float
     sd: float
     low: float = -math.inf
     high: float = math.inf
     angle: bool = False
+    unit: str = ""
 
     def as_table(self) -> dict[str, object]:
         """Return the table of the file that says this."""
         ends = {"mean": self.mean, "sd": self.sd, "from": self.low, "to": self.high}
-        return {name: written(end, angle=self.angle) for name, end in ends.items() if math.isfinite(end)}
+        return {name: _typed(end, self) for name, end in ends.items() if math.isfinite(end)}
 
 
 Distribution = Uniform | Normal
@@ -57,6 +65,21 @@ Variation = tuple[Any, ...] | Distribution
 def written(number: float, *, angle: bool) -> object:
     """Return a number as a scenario takes it: an angle as a text with its unit."""
     return f"{number!r} rad" if angle else number
+
+
+def _typed(number: float, values: Distribution) -> object:
+    """Return a number with the unit that it was typed in, where that gives the same number again."""
+    if values.unit:
+        text = f"{number / float(units.parse_unit(values.unit).factor):.{SIGNIFICANT}g} {values.unit}"
+        if q.parse_quantity(text)[0] == number:
+            return text
+    return written(number, angle=values.angle)
+
+
+def _unit(value: Mapping[str, Any], *names: str) -> str:
+    """Return the first unit that was typed at some keys."""
+    texts = (value[name] for name in names if isinstance(value.get(name), str))
+    return next((unit for text in texts if (unit := q.unit_in(text))), "")
 
 
 def rounded(number: float) -> float:
@@ -127,7 +150,7 @@ def _refuse_slips(value: Mapping[str, Any], known: tuple[str, ...], needed: tupl
 
 
 def _spread(value: Mapping[str, Any]) -> tuple[object, ...]:
-    """Return `count` evenly spaced values, both ends included; SI numbers, angles as texts in rad."""
+    """Return `count` evenly spaced values: both ends as written, between them SI numbers, angles as texts in rad."""
     count = value["count"]
     if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MAX_VALUES:  # noqa: PLR2004
         message = f"count {q.shown(count)} is not a whole number from 2 to {MAX_VALUES}"
@@ -139,7 +162,12 @@ def _spread(value: Mapping[str, Any]) -> tuple[object, ...]:
         inner = [rounded(first * (last / first) ** step) for step in steps]
     else:
         inner = [first + (last - first) * i / (count - 1) for i in range(1, count - 1)]
-    return tuple(written(number, angle=angle) for number in (first, *inner, last))
+    typed = (value[name] if isinstance(value[name], str) else None for name in ("from", "to"))  # these keep their unit
+    ends = [
+        written(number, angle=angle) if text is None else text
+        for text, number in zip(typed, (first, last), strict=True)
+    ]
+    return (ends[0], *(written(number, angle=angle) for number in inner), ends[1])
 
 
 def _uniform(value: Mapping[str, Any]) -> Uniform:
@@ -147,7 +175,7 @@ def _uniform(value: Mapping[str, Any]) -> Uniform:
     (low, high), angle = _numbers(value, "from", "to")
     scale = _scale(value, low, high)
     _refuse_empty(value, low, high)
-    return Uniform(low, high, scale, angle)
+    return Uniform(low, high, scale, angle, _unit(value, "from", "to"))
 
 
 def _normal(value: Mapping[str, Any]) -> Normal:
@@ -164,7 +192,7 @@ def _normal(value: Mapping[str, Any]) -> Normal:
     if low > mean + FARTHEST * sd or high < mean - FARTHEST * sd:
         message = f"the bounds leave nothing within {FARTHEST:g} standard deviations of the mean"
         raise q.invalid(message, "from" if low > mean else "to")
-    return Normal(mean, sd, low, high, angle)
+    return Normal(mean, sd, low, high, angle, _unit(value, "mean", "sd"))
 
 
 def _refuse_empty(value: Mapping[str, Any], low: float, high: float) -> None:

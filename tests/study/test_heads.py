@@ -1,0 +1,67 @@
+"""Varied values in the table of a sweep: numbers in the unit that was typed."""
+
+from pathlib import Path
+
+import pytest
+
+from blocksim.scenario import Document
+from blocksim.study.found import read_found
+from blocksim.study.heads import Head, heads_of
+from blocksim.study.many import sweep
+from blocksim.study.plan import Values, cases_of, with_sweep
+from blocksim.study.verify_sweep import verify_sweep
+from tests.study.conftest import SCENARIOS
+
+TILT, OVERLAP = "ground.tilt", "structures.0.overlap"
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "head", "cells"),
+    [
+        (TILT, {"from": "0 deg", "to": "10 deg", "count": 3}, "ground.tilt [deg]", [0.0, 5.0, 10.0]),
+        (TILT, ["1 deg", "0.1 rad"], "ground.tilt [deg]", [1.0, pytest.approx(5.729577951)]),
+        (OVERLAP, ["11 mm", 0.01, "0.9 cm"], "structures.0.overlap [mm]", [11.0, 10.0, 9.0]),
+        (OVERLAP, [0.01, 0.011], OVERLAP, [0.01, 0.011]),
+        ("gravity", [9.81, 1.62], "gravity", [9.81, 1.62]),
+        ("contact.model", ["surface", "kernel"], "contact.model", ["surface", "kernel"]),
+        ("time.step", ["auto", "1e-7 s"], "time.step", ["auto", "1e-7 s"]),
+    ],
+)
+def test_numbers_have_the_unit_that_was_typed(
+    nominal: Document, key: str, values: Values, head: str, cells: list[object]
+) -> None:
+    document = with_sweep(nominal, {key: values})
+    plan = document.build().sweep
+    assert plan is not None
+    (column,) = heads_of(plan)
+    assert str(column) == head
+    assert [column.cell(row[key]) for row in cases_of(document, plan).design] == cells
+
+
+def test_drawn_angles_are_numbers_in_the_unit_of_their_range(nominal: Document) -> None:
+    document = with_sweep(nominal, {TILT: {"from": "1 deg", "to": "3 deg"}}, "lhs", samples=4)
+    plan = document.build().sweep
+    assert plan is not None
+    (head,) = heads_of(plan)
+    cells = [head.cell(row[TILT]) for row in cases_of(document, plan).design]
+    assert str(head) == "ground.tilt [deg]"
+    assert all(isinstance(cell, float) and 1.0 < cell < 3.0 for cell in cells)
+    assert plan.as_table()[TILT] == {"from": "1 deg", "to": "3 deg"}
+
+
+def test_head_is_read_back_and_bare_keys_of_older_tables_too() -> None:
+    assert Head.read("ground.tilt [deg]") == Head(TILT, "deg")
+    assert Head.read("ground.tilt") == Head(TILT)
+    assert Head(TILT, "deg").si(180.0) == pytest.approx(3.141592653589793)
+
+
+def test_table_pictures_and_verification_agree_on_the_unit(tmp_path: Path) -> None:
+    settings = {"contact.stiffness_scale": 0.001, "time.end": 0.01}
+    document = Document.read(SCENARIOS / "slide.toml").with_values(settings)
+    found = sweep(document, {TILT: {"from": "0 deg", "to": "10 deg", "count": 3}}, out=tmp_path / "out")
+    assert found.keys == ("ground.tilt [deg]",)
+    assert found.table["ground.tilt [deg]"].tolist() == [0.0, 5.0, 10.0]
+    (tilt,) = read_found(found.folder).inputs
+    assert (tilt.key, tilt.unit) == (TILT, "rad")
+    assert tilt.values[1:] == pytest.approx([0.08726646, 0.17453293])
+    assert verify_sweep(found.folder).agrees
