@@ -10,6 +10,7 @@ from blocksim.cli.output import note, replacement
 from blocksim.simulation.own_files import is_film, refuse_foreign
 from blocksim.study.stored import stored_run
 from blocksim.view.animation import Look, Pace, draw_film, writer_of
+from blocksim.view.paint import PAINTS
 from blocksim.view.support import support_of
 
 
@@ -24,6 +25,7 @@ def animate_command(
         bool | None, typer.Option("--trails/--no-trails", help="Ways of the centres (default: up to 30 blocks).")
     ] = None,
     forces: options.Forces = False,
+    colour: options.Colour = "block",
     width: Annotated[int, typer.Option(min=200, max=4000, metavar="PX", help="Width in pixels.")] = 800,
     overwrite: options.Replace = False,
     quiet: options.Quiet = False,
@@ -32,7 +34,8 @@ def animate_command(
 
     The default is a GIF, NAME.gif, at a quarter of the real speed; the last picture is held for a while. A run that was
     stopped or killed is shown as far as it came. --forces needs a run that has stored contacts (output.contacts =
-    true), MP4 the extra `video`. An older animation of blocksim is replaced; any other file only with --overwrite.
+    true), MP4 the extra `video` or the system's ffmpeg. The window fits what the blocks occupy; a few that fly far off
+    leave it. An older animation of blocksim is replaced; any other file only with --overwrite.
 
     Example: blocksim animate scenarios/three_blocks.toml --speed 0.1
     """
@@ -43,9 +46,10 @@ def animate_command(
     refuse_foreign(film, is_film, overwrite=overwrite)
     support = support_of(stored.scenario)
     older = replacement(film)
-    look = Look(width, trails, stored.scenario.name, forces)
-    count = draw_film(stored.frames, film, Pace(speed, fps), look, support)
+    look = Look(width, trails, stored.scenario.name, forces, PAINTS[colour](stored.frames, stored.scenario))
+    count, beyond = draw_film(stored.frames, film, Pace(speed, fps), look, support)
     if stored.remark:
         note(stored.remark)
     if not quiet:
-        note(f"film: {film} ({older}{count} pictures)")
+        gone = f"; {beyond} of {len(stored.frames.names)} blocks fly out of the window" if beyond else ""
+        note(f"film: {film} ({older}{count} pictures{gone})")

@@ -1,11 +1,23 @@
 """Options that several commands share."""
 
+import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from blocksim.cli import completion
+
+if TYPE_CHECKING:
+    from blocksim.view.paper import Paper
+
+SIZE = re.compile(r"([0-9]+(?:\.[0-9]*)?)\s*[x×]\s*([0-9]+(?:\.[0-9]*)?)\s*(mm|cm|in|px)?")
+INCHES = {"mm": 1.0 / 25.4, "cm": 1.0 / 2.54, "in": 1.0}
+LEAST_SIDE, MOST_SIDE = 20.0 / 25.4 - 1e-9, 2000.0 / 25.4 + 1e-9  # inches
+SPARE_PIXEL = 0.25  # so that no round-off takes a whole one
+MOST_PIXELS = 1e8
+MOST_SHOWN = 40  # letters of a value in a message
 
 
 def seconds_of(text: object) -> float:
@@ -20,11 +32,84 @@ def seconds_of(text: object) -> float:
         raise typer.BadParameter(error.message()) from None
 
 
+@dataclass(frozen=True)
+class PageSize:
+    """A size of pictures as asked for: width and height in a unit."""
+
+    width: float
+    height: float
+    unit: str
+
+    def inches(self, dots: float) -> tuple[float, float]:
+        """Return width and height in inches; pixels are those of a PNG with so many dots per inch."""
+        if self.unit == "px":
+            return (self.width + SPARE_PIXEL) / dots, (self.height + SPARE_PIXEL) / dots
+        return self.width * INCHES[self.unit], self.height * INCHES[self.unit]
+
+
+def page_size(text: object) -> PageSize:
+    """Return a size of pictures, WxH with mm, cm, in or px. Raises BadParameter, a mistake of usage."""
+    found = SIZE.fullmatch(str(text).strip())
+    if found is None:
+        raise typer.BadParameter(f"{str(text)[:MOST_SHOWN]!r} is no size of a picture, such as 180x120mm or 1600x900px")
+    size = PageSize(float(found[1]), float(found[2]), found[3] or "mm")
+    if not all(LEAST_SIDE <= side <= MOST_SIDE for side in size.inches(150.0)):
+        raise typer.BadParameter("each side of a picture has 20 to 2000 mm (about 120 to 12 000 px)")
+    return size
+
+
+def paper_of(size: PageSize | None, dots: float | None) -> "Paper":
+    """Return the page for --size and --dpi. Raises BadParameter for more pixels than anybody can open."""
+    from blocksim.view.paper import Paper
+    from blocksim.view.style import DOTS_PER_INCH
+
+    resolution = dots or float(DOTS_PER_INCH)
+    inches = None if size is None else size.inches(resolution)
+    if inches is not None and inches[0] * inches[1] * resolution**2 > MOST_PIXELS:
+        raise typer.BadParameter(f"--size and --dpi make more than {MOST_PIXELS / 1e6:.0f} million pixels")
+    return Paper(inches, dots)
+
+
+def colour_name(text: object) -> str:
+    """Return a way to colour blocks. Raises BadParameter for an unknown one."""
+    from blocksim.view.paint import PAINTS
+
+    if text not in PAINTS:
+        raise typer.BadParameter(f"{str(text)[:MOST_SHOWN]!r} is unknown; choose {', '.join(PAINTS)}")
+    return str(text)
+
+
+def names_of(option: str, text: str | None) -> tuple[str, ...] | None:
+    """Return names separated by commas, None where none were given. Raises BadParameter for an empty list."""
+    if text is None:
+        return None
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not names:
+        raise typer.BadParameter("give one name or several, separated by commas", param_hint=option)
+    return names
+
+
 ScenarioPath = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (TOML).")]
 StoredRunPath = Annotated[
     Path, typer.Argument(metavar="RUN", help="Run folder, results/NAME (its newest finished run) or scenario file.")
 ]
 Forces = Annotated[bool, typer.Option("--forces", help="Draw contact forces, where the run has stored them.")]
+Size = Annotated[
+    PageSize | None,
+    typer.Option(
+        "--size", parser=page_size, metavar="WxH", help="Size of the picture: 180x120mm, 7x5in or 1600x900px."
+    ),
+]
+Dots = Annotated[
+    float | None,
+    typer.Option("--dpi", min=20.0, max=1200.0, metavar="N", help="Dots per inch of a PNG (default: 150)."),
+]
+Colour = Annotated[
+    str,
+    typer.Option(
+        "--colour", "--color", parser=colour_name, metavar="BY", help="Colour blocks by block, material, speed or turn."
+    ),
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option(

@@ -14,6 +14,7 @@ from blocksim.study.found import read_found
 from blocksim.study.indices import read_indices
 from blocksim.study.sweep_folder import PLAN
 from blocksim.view.levels import Panel, draw_levels
+from blocksim.view.paper import OWN, Paper
 from blocksim.view.style import picture_suffix
 from blocksim.view.sweeps.kind import Kind
 from blocksim.view.sweeps.kinds import KINDS, kind_for
@@ -51,6 +52,7 @@ def draw_sweep(
     path: Path | None = None,
     experiment: Path | None = None,
     kind: str | None = None,
+    paper: Paper = OWN,
     *,
     ready: Callable[[Path], None] = _anything_goes,
 ) -> Path:
@@ -70,12 +72,17 @@ def draw_sweep(
     path = path or Path(f"{load_stored(folder / PLAN).name}.png")
     picture_suffix(path)
     ready(path)
-    (chosen or kind_for(found)).draw(found, path)
+    (chosen or kind_for(found)).draw(found, path, paper)
     return path
 
 
 def draw_indices(
-    table: Path, path: Path | None = None, kind: str | None = None, *, ready: Callable[[Path], None] = _anything_goes
+    table: Path,
+    path: Path | None = None,
+    kind: str | None = None,
+    paper: Paper = OWN,
+    *,
+    ready: Callable[[Path], None] = _anything_goes,
 ) -> Path:
     """Draw the table of a sensitivity study; return the picture's path (default: that of the table, as PNG).
 
@@ -88,7 +95,7 @@ def draw_indices(
     panels, labels = read_indices(table)
     path = path or Path(f"{table.stem}.png")
     ready(path)
-    draw_tornado(panels, labels, path, title="Which inputs matter")
+    draw_tornado(panels, labels, path, title="Which inputs matter", paper=paper)
     return path
 
 

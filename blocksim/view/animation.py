@@ -15,10 +15,11 @@ from blocksim.view.gif import write_gif
 from blocksim.view.ground import Canvas, draw_ruler
 from blocksim.view.moments import Floats, FramesLike, Indices, drawable_frames
 from blocksim.view.mp4 import write_mp4
+from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import Page, depth_of, finish_panel, page_for
 from blocksim.view.scene import draw_blocks, draw_standing
 from blocksim.view.support import Support
-from blocksim.view.window import MILLIMETRES, extent_of
+from blocksim.view.window import MILLIMETRES, extent_of, together
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +30,8 @@ Writer = Callable[[Path, Iterator[Pixels], Floats], None]
 WRITERS: dict[str, Writer] = {".gif": write_gif, ".mp4": write_mp4}  # by suffix; a format is one file and a line here
 DOTS_PER_INCH = 100.0  # letters of 11 pixels
 MARGINS = 0.15, 0.50, 0.42  # inches: at the sides, above and below the panel
-HIGHEST = 1.0  # height of the panel over its width
+HIGHEST = 1.25  # height of the panel over its width
+KEY_FOOT = 0.04  # inches, below what explains the colours
 HELD = 1.5  # s that the last picture stays
 MOST_PICTURES = 10_000
 TIME_ROOM = 60.0  # points
@@ -53,6 +55,7 @@ class Look:
     trails: bool | None = None
     title: str = ""
     forces: bool = False
+    paint: Paint | None = None
 
 
 def draw_film(
@@ -61,19 +64,20 @@ def draw_film(
     pace: Pace | None = None,
     look: Look | None = None,
     support: Support | None = None,
-) -> int:
-    """Write a run as GIF or MP4 and return the number of pictures; the last one is held for a while.
+) -> tuple[int, int]:
+    """Write a run as GIF or MP4; the last picture is held for a while.
 
-    `support` is what the blocks stand on: level ground at rest if it is not given. Raises InvalidInputError for an
-    unknown format, forces that were not stored, nothing to draw or too many pictures, OutputError when the file cannot
-    be written and UnavailableError when the package for MP4 is missing.
+    Returns the number of pictures, and of blocks that leave the window. `support` is what the blocks stand on: level
+    ground at rest if it is not given. Raises InvalidInputError for an unknown format, forces that were not stored,
+    nothing to draw or too many pictures, OutputError when the file cannot be written and UnavailableError when what
+    writes MP4 is missing.
     """
     path = Path(path)
     write = writer_of(path)
     chosen, seconds = timed(frames, drawable_frames(frames), pace or Pace())
     film = Film(frames, support or Support(), look or Look())
     write(path, (film.picture(int(frame)) for frame in chosen), seconds)
-    return len(chosen)
+    return len(chosen), int((~film.seen).sum())
 
 
 def writer_of(path: Path) -> Writer:
@@ -115,9 +119,12 @@ class Film:
         self.forces = force_scale(frames) if look.forces else None
         self.drawable = drawable_frames(frames)
         self.has_trails = len(frames.names) <= FEW_BLOCKS if look.trails is None else look.trails
+        self.paint = look.paint or by_block(frames)
         across = look.width / DOTS_PER_INCH
         tallest = HIGHEST * (across - 2.0 * MARGINS[0])
-        self.page = page_for(extent_of(frames, self.drawable, support), across, tallest, MARGINS)
+        margins = (*MARGINS[:2], MARGINS[2] + self.paint.height)
+        self.seen = together(frames, self.drawable, support)
+        self.page = page_for(extent_of(frames, self.drawable, support, self.seen), across, tallest, margins)
         self._prepare(look.title)
 
     def _prepare(self, title: str) -> None:
@@ -140,6 +147,7 @@ class Film:
         shown = style.cut_to(title, self.page.panel_width * style.POINTS_PER_INCH, style.TITLE_SIZE)
         place = MARGINS[0] / self.page.width, 1.0 - 0.06 / self.page.height
         figure.text(*place, shown, va="top", fontsize=style.TITLE_SIZE)
+        draw_key(figure, self.paint, MARGINS[0], KEY_FOOT)
         if self.forces is not None:
             self._tell_scale(self.forces.example)
         if self.support.motion is None:
@@ -170,7 +178,7 @@ class Film:
         """Add to the panel what has moved since the last picture."""
         if self.support.motion is not None:
             draw_standing(self.canvas, self.frames, frame, self.support)
-        draw_blocks(self.canvas, self.frames, frame, self.support)
+        draw_blocks(self.canvas, self.frames, frame, self.support, self.paint)
         if self.has_trails:
             self._draw_trails(frame)
         if self.forces is not None:

@@ -1,4 +1,4 @@
-"""Histories of a run: x, y and rotation of the blocks, energies and the number of contacts over time."""
+"""Histories of a run: motions of the blocks, energies, contacts, forces and the ground's motion over time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,13 +8,41 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from blocksim.simulation.contacts import Contacts, borne
+from blocksim.errors import InvalidInputError
+from blocksim.simulation.contacts import Contacts
 from blocksim.view import style
+from blocksim.view.curves import (
+    CONTACTS,
+    ENERGY,
+    FORCE,
+    GROUND,
+    MOTIONS,
+    USUAL,
+    Choice,
+    HistoryFrames,
+    Motion,
+    Seen,
+    blocks_named,
+    farthest_blocks,
+    limits_of,
+    panels_named,
+)
 from blocksim.view.forces import contacts_of
-from blocksim.view.moments import Floats, FramesLike, Indices, drawable_frames
+from blocksim.view.moments import Floats, Indices, drawable_frames
+from blocksim.view.paint import Paint, by_block
+from blocksim.view.paper import OWN, Paper
 from blocksim.view.strip import MeasuredTable
 from blocksim.view.support import Support
-from blocksim.view.window import MILLIMETRES
+from blocksim.view.totals import (
+    BESIDE,
+    Entries,
+    draw_contacts,
+    draw_energies,
+    draw_force,
+    draw_ground,
+    drawn_energies,
+    support_force,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,34 +51,20 @@ if TYPE_CHECKING:
 WIDTH = 7.2  # inches
 LEFT, RIGHT, HEAD, FOOT = 0.72, 1.60, 0.36, 0.62  # inches; the legends stand on the right
 PANEL, GAP = 1.25, 0.14  # inches
-MOST_BLOCKS = len(style.BLOCK_COLOURS)  # that get a line of their own
+LOWEST, NARROWEST = 0.55, 1.0  # inches, of a panel on a page whose size was asked for
+MOST_BLOCKS = len(style.BLOCK_COLOURS)  # that get a line of their own, unless they are chosen
 MOST_POINTS = 2000  # of a line
 MOST_PATHS = 50  # grey lines in an SVG or PDF; more of them are stored as an image
-LETTERS, NOTE_LETTERS = 16, 105  # of a name, of a line below the panels
+LETTERS = 16  # of a name
+LETTERS_AN_INCH = 14.5  # in a line below the panels
 NAME_ROOM = 1.2  # inches, for a name beside the panels
-LINE = 0.155  # inches, of each further line below the panels
-MOST_WEIGHTS = 3.0  # of all blocks: forces of supports beyond that are cut, those of impacts are far beyond
-SMALL_SHARE = 1e-3  # of the largest energy; what stays below is not drawn
-ENERGIES = {  # how entries of the ledger are drawn together
-    "kinetic": ("kinetic",),
-    "potential": ("potential",),
-    "stored in contacts": ("stored_normal", "stored_shear"),
-    "lost to friction": ("friction",),
-    "lost in impacts": ("dashpot", "broken", "impacts", "correction"),
-    "given to support": ("to_support",),
-}
-ENERGY_COLOURS = ("#0072B2", "#E69F00", "#CC79A7", "#D55E00", "#009E73", "#777777")  # as in style, without the pale
-BESIDE: dict[str, Any] = {
-    "loc": "upper left",
-    "bbox_to_anchor": (1.04, 1.0),
-    "frameon": False,
-    "borderaxespad": 0.0,
-    "handlelength": 1.2,
-}
-Entries = dict[str, Floats]
+LINE = 0.155  # inches, of each further line below the panels or beside them
+LEGEND = 0.25  # inches, of the head of a legend and the gap below it
+PALE = 0.7  # brightness from which a line is drawn on a darker one
+DASHES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (8, 2)), (0, (2, 3)))
 
 
-class HistoryLike(FramesLike, Protocol):
+class HistoryLike(HistoryFrames, Protocol):
     """Frames with what was measured of the whole scene."""
 
     @property
@@ -70,15 +84,28 @@ class HistoryLike(FramesLike, Protocol):
 
 
 @dataclass(frozen=True)
-class Motion:
-    """One quantity of all blocks: n values of b blocks, and the column of the measured table that goes with it."""
+class _Drawing:
+    """What is drawn: n chosen frames, the blocks with lines of their own, and how those look."""
 
-    label: str
-    values: Floats
-    quantity: str
+    frames: HistoryLike
+    chosen: Indices
+    support: Support
+    shown: list[int]
+    looks: dict[int, dict[str, Any]]
+    others: bool  # whether all other blocks are drawn in grey
+    relative: bool
+
+    @property
+    def time(self) -> Floats:
+        """Times (s), (n,)."""
+        return self.frames.time[self.chosen]
+
+    def motion(self, name: str) -> Motion:
+        """Return one quantity of all blocks."""
+        return MOTIONS[name](Seen(self.frames, self.chosen, self.support, self.relative))
 
 
-def draw_history(
+def draw_history(  # noqa: PLR0913 - one argument for each option of the command
     frames: HistoryLike,
     path: Path | str,
     title: str | None = None,
@@ -86,79 +113,81 @@ def draw_history(
     support: Support | None = None,
     *,
     forces: bool = False,
+    choice: Choice | None = None,
+    paint: Paint | None = None,
+    paper: Paper = OWN,
 ) -> None:
-    """Draw x, y, rotation, energies and contacts over time; measured means and ranges stand at the end.
+    """Draw x, y, rotation, energies and contacts over time, or the panels of `choice`.
 
-    Where contacts were stored, a last panel has the force with which ground and walls hold all blocks, over their
-    weight; `forces` asks for it. Of more than six blocks the six that come farthest are coloured, the others grey. The
-    same input gives the same bytes. Raises InvalidInputError for an unknown picture format, forces that were not stored
-    or nothing to draw, and OutputError when the file cannot be written.
+    Measured means and ranges stand at the end. Where contacts were stored, a panel has the force with which ground and
+    walls hold all blocks; `forces` asks for it. Under a run whose ground moves stands its displacement. Of more than
+    six blocks the six that come farthest are coloured, the others grey, unless `choice` names blocks. The same input
+    gives the same bytes. Raises InvalidInputError for an unknown picture format, panels or blocks that are not there,
+    forces that were not stored, a page that is too small or nothing to draw, and OutputError when the file cannot be
+    written.
     """
     path = Path(path)
     style.picture_suffix(path)
-    support = support or Support()
-    chosen = _thinned(drawable_frames(frames))
-    held = weights_held(frames, chosen, support, forces=forces)
-    shown = farthest_blocks(frames, chosen, support)
-    energies = drawn_energies(frames.energy, chosen)
-    notes = wrap(_legend(frames, shown, is_measured=measured is not None), NOTE_LETTERS)
+    choice, support = choice or Choice(), support or Support()
+    drawing = _drawing(frames, support, choice, paint or by_block(frames))
+    names = _panel_names(drawing, choice, forces=forces)
+    notes = wrap(_legend(drawing, names, is_measured=measured is not None), int(LETTERS_AN_INCH * paper.width(WIDTH)))
+    width = paper.width(WIDTH, LEFT + RIGHT + NARROWEST)
     foot = FOOT + (len(notes) - 1) * LINE
-    count = 5 if held is None else 6
-    height = HEAD + count * PANEL + (count - 1) * GAP + foot
-    with style.styled_figure(WIDTH, height) as figure:
-        panels = _panels(figure, foot, count)
-        for axes, motion in zip(panels, _motions(frames, chosen), strict=False):
-            _draw_motion(axes, frames.time[chosen], motion, shown)
-            _draw_measured(axes, frames, motion, shown, measured)
-        _draw_energies(panels[3], frames.time[chosen], energies)
-        _draw_contacts(panels[4], frames.time[chosen], frames.contact_count[chosen])
-        if held is not None:
-            _draw_held(panels[5], frames.time[chosen], held)
-        _draw_legends(panels, frames, shown)
-        _draw_texts(figure, height, title, "\n".join(notes))
+    panel = _panel_height(paper, names, foot, len(drawing.shown))
+    height = paper.height(HEAD + len(names) * panel + (len(names) - 1) * GAP + foot)
+    with style.styled_figure(width, height, paper.dots) as figure:
+        panels = dict(zip(names, _panels(figure, foot, len(names), panel), strict=True))
+        for name, axes in panels.items():
+            _draw_panel(axes, drawing, name, measured)
+        _finish(panels, drawing)
+        _draw_texts(figure, title, "\n".join(notes))
         style.save_figure(figure, path)
 
 
-def farthest_blocks(frames: FramesLike, chosen: Indices, support: Support) -> list[int]:
-    """Return the blocks to colour, in their order: free ones, of many those that end farthest from their start."""
-    away = np.hypot(frames.x[chosen[-1]] - frames.x[0], frames.y[chosen[-1]] - frames.y[0])
-    free = ~np.array(support.fixed or (False,) * len(away))
-    ordered = [int(block) for block in np.argsort(-away, kind="stable") if free[block]]
-    return sorted(ordered[:MOST_BLOCKS])
+def line_looks(fills: Sequence[str], shown: Sequence[int]) -> dict[int, dict[str, Any]]:
+    """Return how the line of each block is drawn: in the colour of the block, dashed where another has it too."""
+    drawn: dict[str, int] = {}
+    looks: dict[int, dict[str, Any]] = {}
+    for block in shown:
+        number = drawn.get(fills[block], 0)
+        drawn[fills[block]] = number + 1
+        looks[block] = {"color": fills[block], "linestyle": DASHES[number % len(DASHES)]}
+    return looks
 
 
-def drawn_energies(energy: Entries, chosen: Indices) -> Entries:
-    """Return the energies (J) to draw, by what they are called: all that matter, potential from its least."""
-    known = {entry for entries in ENERGIES.values() for entry in entries}
-    groups = {**ENERGIES, **{name.replace("_", " "): (name,) for name in energy if name not in known}}
-    sums = {
-        label: np.sum([energy[entry][chosen] for entry in entries if entry in energy], axis=0)
-        for label, entries in groups.items()
-        if any(entry in energy for entry in entries)
-    }
-    if "potential" in sums:
-        sums["potential"] = sums["potential"] - sums["potential"].min()
-    most = max((float(np.abs(values).max()) for values in sums.values()), default=0.0)
-    return {label: values for label, values in sums.items() if float(np.abs(values).max()) > SMALL_SHARE * most}
+def _drawing(frames: HistoryLike, support: Support, choice: Choice, paint: Paint) -> _Drawing:
+    """Choose frames and blocks. Raises InvalidInputError for blocks that are not there."""
+    if not paint.is_lasting:
+        message = "lines of a history are coloured by block or material; speed and rotation are panels of their own"
+        raise InvalidInputError(message)
+    chosen = _thinned(drawable_frames(frames))
+    named = blocks_named(frames, choice.blocks)
+    shown = named or farthest_blocks(frames, chosen, support, MOST_BLOCKS)
+    looks = line_looks(paint.fills(0), shown)
+    return _Drawing(frames, chosen, support, shown, looks, others=not named, relative=choice.relative)
 
 
-def weights_held(frames: HistoryLike, chosen: Indices, support: Support, *, forces: bool) -> Floats | None:
-    """Return the force upwards on all free blocks by what they stand on, over their weight; None where not stored.
+def _panel_names(drawing: _Drawing, choice: Choice, *, forces: bool) -> tuple[str, ...]:
+    """Return what is drawn, from top to bottom; force and ground beside the usual panels where there are any."""
+    if choice.panels:
+        names = panels_named(choice.panels)
+    else:
+        has_ground = drawing.support.motion is not None
+        has_force = drawing.frames.contacts is not None and drawing.support.weight > 0.0
+        names = (*USUAL, *((FORCE,) if has_force else ()), *((GROUND,) if has_ground else ()))
+    if FORCE in names or forces:
+        contacts_of(drawing.frames)  # says what to do where none were stored
+    return names if not forces or FORCE in names else (*names, FORCE)
 
-    Raises InvalidInputError where `forces` asks for what was not stored.
-    """
-    if not forces and (frames.contacts is None or support.weight <= 0.0):
-        return None
-    up = float(np.sin(support.tilt)), float(np.cos(support.tilt))
-    return borne(contacts_of(frames), up, support.fixed)[chosen] / (support.weight or 1.0)
 
-
-def energy_unit(most: float) -> tuple[float, str]:
-    """Return factor and unit in which energies up to this one (J) are best read."""
-    for factor, unit in ((1e-3, "kJ"), (1.0, "J"), (1e3, "mJ")):
-        if most * factor >= 1.0:
-            return factor, unit
-    return 1e6, "µJ"
+def _panel_height(paper: Paper, names: Sequence[str], foot: float, blocks: int) -> float:
+    """Return the height of a panel (inches); names of many blocks need room before the next text at the side."""
+    legend = LEGEND + blocks * LINE
+    first = next((row for row, name in enumerate(names) if name in MOTIONS), 0)
+    told = next((row for row, name in enumerate(names) if row > first and name not in {*MOTIONS, CONTACTS}), len(names))
+    own = max(PANEL, (legend + GAP) / (told - first) - GAP)
+    return paper.panel(own, len(names), HEAD + (len(names) - 1) * GAP + foot, LOWEST)
 
 
 def _thinned(drawable: Indices) -> Indices:
@@ -167,128 +196,115 @@ def _thinned(drawable: Indices) -> Indices:
     return drawable[np.linspace(0, len(drawable) - 1, MOST_POINTS).round().astype(np.intp)]
 
 
-def _motions(frames: FramesLike, chosen: Indices) -> list[Motion]:
-    return [
-        Motion("x (mm)", MILLIMETRES * frames.x[chosen], "x"),
-        Motion("y (mm)", MILLIMETRES * frames.y[chosen], "y"),
-        Motion("rotation (°)", np.degrees(frames.angle[chosen] - frames.angle[0]), "rotation"),
-    ]
-
-
-def _panels(figure: "Figure", foot: float, count: int) -> list["Axes"]:
+def _panels(figure: "Figure", foot: float, count: int, panel: float) -> list["Axes"]:
     """Add so many panels, one below the other, with one axis of time."""
-    height = float(figure.get_figheight())
-    width, panels = (WIDTH - LEFT - RIGHT) / WIDTH, []
+    across, up = (float(size) for size in figure.get_size_inches())
+    inside = across - LEFT - RIGHT
+    panels = []
     for row in range(count):
-        bottom = foot + (count - 1 - row) * (PANEL + GAP)
-        axes = figure.add_axes((LEFT / WIDTH, bottom / height, width, PANEL / height))
+        bottom = foot + (count - 1 - row) * (panel + GAP)
+        axes = figure.add_axes((LEFT / across, bottom / up, inside / across, panel / up))
         axes.spines[["right", "top"]].set_visible(False)
         axes.tick_params(axis="x", labelbottom=row == count - 1)
-        axes.yaxis.set_label_coords(-0.5 / (WIDTH - LEFT - RIGHT), 0.5)
+        axes.yaxis.set_label_coords(-0.5 / inside, 0.5)
         panels.append(axes)
     panels[-1].set_xlabel("time (s)", labelpad=2.0)
     return panels
 
 
-def _draw_motion(axes: "Axes", time: Floats, motion: Motion, shown: Sequence[int]) -> None:
-    from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
+def _draw_panel(axes: "Axes", drawing: _Drawing, name: str, measured: MeasuredTable | None) -> None:
+    if name in MOTIONS:
+        motion = drawing.motion(name)
+        _draw_motion(axes, drawing, motion)
+        _draw_measured(axes, drawing, motion, measured)
+    elif name == ENERGY:
+        draw_energies(axes, drawing.time, drawn_energies(drawing.frames.energy, drawing.chosen))
+    elif name == CONTACTS:
+        draw_contacts(axes, drawing.time, drawing.frames.contact_count[drawing.chosen])
+    elif name == FORCE:
+        force = support_force(drawing.frames, drawing.chosen, drawing.support)
+        draw_force(axes, drawing.time, force, drawing.support.weight)
+    else:
+        draw_ground(axes, drawing.time, drawing.support)
 
-    others = np.setdiff1d(np.arange(motion.values.shape[1]), shown)
-    lines = [np.stack([time, motion.values[:, block]], axis=-1) for block in others]
+
+def _draw_motion(axes: "Axes", drawing: _Drawing, motion: Motion) -> None:
+    from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
+    from matplotlib.patheffects import Normal, Stroke  # noqa: PLC0415
+
+    others = (
+        np.setdiff1d(np.arange(motion.values.shape[1]), drawing.shown) if drawing.others else np.zeros(0, dtype=int)
+    )
+    lines = [np.stack([drawing.time, motion.values[:, block]], axis=-1) for block in others]
     faint = min(0.35, max(0.12, 30.0 / max(len(lines), 1)))
     look: dict[str, Any] = {"colors": style.FAINT_INK, "linewidths": 0.4, "alpha": faint}
     axes.add_collection(LineCollection(lines, **look, rasterized=len(lines) > MOST_PATHS))
-    for block in shown:
-        axes.plot(time, motion.values[:, block], color=_colour(shown, block), linewidth=1.2)
-    axes.autoscale_view()
-    low, high = axes.get_ylim()
-    if high - low < 1.0:  # of round-off nobody wants to see a picture
-        axes.set_ylim(0.5 * (low + high) - 0.5, 0.5 * (low + high) + 0.5)
+    edge = [Stroke(linewidth=2.0, foreground=style.FAINT_INK), Normal()]
+    for block in drawing.shown:
+        line, *_ = axes.plot(drawing.time, motion.values[:, block], linewidth=1.2, **drawing.looks[block])
+        if style.brightness(drawing.looks[block]["color"]) > PALE:
+            line.set_path_effects(edge)
+    axes.set_ylim(*limits_of(motion.values if drawing.others else motion.values[:, drawing.shown]))
     axes.set_ylabel(motion.label)
 
 
-def _draw_measured(
-    axes: "Axes", frames: FramesLike, motion: Motion, shown: Sequence[int], measured: MeasuredTable | None
-) -> None:
+def _draw_measured(axes: "Axes", drawing: _Drawing, motion: Motion, measured: MeasuredTable | None) -> None:
     """Draw mean and range of the repeats at the end of the lines of coloured blocks."""
-    if measured is None:
+    if measured is None or not motion.quantity:
         return
     statistics = measured.statistics()
-    names = {frames.names[block]: block for block in shown}
-    lines = statistics[(statistics["quantity"] == motion.quantity) & statistics["block"].isin(list(names))]
-    end = float(frames.time[-1])
+    names = [drawing.frames.names[block] for block in drawing.shown]
+    lines = statistics[(statistics["quantity"] == motion.quantity) & statistics["block"].isin(names)]
+    x = float(drawing.frames.time[-1]) * 1.02
     line: dict[str, Any] = {"color": style.MEASURED_COLOUR, "linewidth": 1.2, "zorder": 4.0}
+    known = [motion.values if drawing.others else motion.values[:, drawing.shown]]
     for item in lines.itertuples():
         mean, low, high = (float(getattr(item, key)) for key in ("mean", "minimum", "maximum"))
-        x = end * 1.02
         axes.plot([x, x], [low, high], marker="_", markersize=4.0, **line)
         axes.plot(x, mean, marker="o", markersize=3.2, **line)
+        known.append(np.array([low, high]))
+    axes.set_ylim(*limits_of(np.concatenate([values.ravel() for values in known])))
 
 
-def _draw_energies(axes: "Axes", time: Floats, energies: Entries) -> None:
-    from matplotlib.ticker import FuncFormatter  # noqa: PLC0415 - see style
-
-    factor, unit = energy_unit(max((float(np.abs(values).max()) for values in energies.values()), default=0.0))
-    for (label, values), colour in zip(energies.items(), ENERGY_COLOURS * len(energies), strict=False):
-        axes.plot(time, factor * values, color=colour, linewidth=1.0, label=label)
-    axes.set_ylabel(f"energy ({unit})")
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "−")))
-    if energies:
-        axes.legend(**BESIDE)
-
-
-def _draw_contacts(axes: "Axes", time: Floats, count: Floats) -> None:
-    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - see style
-
-    axes.plot(time, count, color=style.INK, linewidth=0.8, drawstyle="steps-post")
-    axes.set_ylabel("contacts")
-    axes.set_ylim(bottom=0.0)
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=5, integer=True))
-
-
-def _draw_held(axes: "Axes", time: Floats, held: Floats) -> None:
-    """Draw the force of the supports over the weight; where it is cut, its largest value is told beside."""
-    axes.axhline(1.0, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (4, 3)))
-    axes.plot(time, held, color=style.INK, linewidth=0.8)
-    axes.set_ylabel("held / weight")
-    largest = float(held.max(initial=0.0))
-    axes.set_ylim(0.0, min(max(1.1 * largest, 1.5), MOST_WEIGHTS))
-    told = "force up from what\nblocks stand on\ndashed: their weight"
-    more = f"\nlargest: {largest:.3g}" if largest > MOST_WEIGHTS else ""
-    axes.text(1.04, 1.0, told + more, transform=axes.transAxes, va="top")
-
-
-def _draw_legends(panels: Sequence["Axes"], frames: FramesLike, shown: Sequence[int]) -> None:
-    """Name the coloured blocks beside the first panel and give all panels one axis of time."""
+def _finish(panels: dict[str, "Axes"], drawing: _Drawing) -> None:
+    """Name the coloured blocks beside the first panel of theirs, write plain numbers, give all one axis of time."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
+    from matplotlib.ticker import FuncFormatter, MaxNLocator  # noqa: PLC0415
 
-    if shown:
+    first = next((axes for name, axes in panels.items() if name in MOTIONS), None)
+    if drawing.shown and first is not None:
         room = NAME_ROOM * style.POINTS_PER_INCH
-        handles = [Line2D([], [], color=_colour(shown, block)) for block in shown]
-        names = [style.cut_to(style.shortened(frames.names[block], LETTERS), room, style.FONT_SIZE) for block in shown]
-        panels[0].legend(handles, names, **BESIDE, title="block", alignment="left")
-    start, end = float(frames.time[0]), float(frames.time[-1])
-    for axes in panels:
+        handles = [Line2D([], [], **drawing.looks[block]) for block in drawing.shown]
+        names = [style.shortened(drawing.frames.names[block], LETTERS) for block in drawing.shown]
+        cut = [style.cut_to(name, room, style.FONT_SIZE) for name in names]
+        first.legend(handles, cut, **BESIDE, title="block", alignment="left")
+    start, end = float(drawing.frames.time[0]), float(drawing.frames.time[-1])
+    for name, axes in panels.items():
         axes.set_xlim(start, start + 1.04 * max(end - start, 1e-9))
+        axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10], integer=name == CONTACTS))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}".replace("-", "−")))
 
 
-def _colour(shown: Sequence[int], block: int) -> str:
-    """Return the colour of a block, its own as in other pictures where no two would look alike."""
-    return style.block_colour(block if max(shown) < MOST_BLOCKS else shown.index(block))
-
-
-def _draw_texts(figure: "Figure", height: float, title: str | None, legend: str) -> None:
+def _draw_texts(figure: "Figure", title: str | None, legend: str) -> None:
+    width, height = (float(size) for size in figure.get_size_inches())
     if title:
-        place = 0.12 / WIDTH, 1.0 - 0.08 / height
-        room = (WIDTH - 0.24) * style.POINTS_PER_INCH
+        place = 0.12 / width, 1.0 - 0.08 / height
+        room = (width - 0.24) * style.POINTS_PER_INCH
         figure.text(*place, style.cut_to(title, room, style.TITLE_SIZE), va="top", fontsize=style.TITLE_SIZE)
-    figure.text(0.12 / WIDTH, 0.06 / height, legend, color=style.FAINT_INK, va="bottom")
+    figure.text(0.12 / width, 0.06 / height, legend, color=style.FAINT_INK, va="bottom")
 
 
-def _legend(frames: FramesLike, shown: Sequence[int], *, is_measured: bool) -> str:
-    texts = ["Potential energy from its least."]
-    if is_measured:
+def _legend(drawing: _Drawing, names: Sequence[str], *, is_measured: bool) -> str:
+    texts = ["Potential energy relative to its minimum."] if ENERGY in names else []
+    if {"dx", "dy"} & set(names):
+        texts.append("Δx, Δy: displacement from the start.")
+    if drawing.relative and drawing.support.motion is not None and set(names) & set(MOTIONS):
+        texts.append("Places and velocities relative to the moving ground.")
+    if is_measured and {"x", "y", "rotation"} & set(names):
         texts.append("At the end: measured mean and range.")
-    if len(shown) < len(frames.names):
-        texts.append(f"Coloured: {len(shown)} of {len(frames.names)} blocks, those that end farthest from their start.")
-    return " ".join(texts)
+    shown, all_blocks = len(drawing.shown), len(drawing.frames.names)
+    if shown < all_blocks and drawing.others:
+        texts.append(f"Coloured: {shown} of {all_blocks} blocks, those that end farthest from their start.")
+    elif shown < all_blocks:
+        texts.append(f"{shown} of {all_blocks} blocks.")
+    return " ".join(texts) or " "

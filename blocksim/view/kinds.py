@@ -8,12 +8,12 @@ from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
 from blocksim.view.strip import draw_strip
 
-STRIP = "strip"
+STRIP, FINAL, HISTORY = "strip", "final", "history"
 # Each draws frames to a path, with title, measured table and support; a kind is one file and one line here.
 KINDS: dict[str, Callable[..., None]] = {
     STRIP: draw_strip,
-    "final": draw_final,
-    "history": draw_history,
+    FINAL: draw_final,
+    HISTORY: draw_history,
 }
 MOST_SLIPS = 2
 

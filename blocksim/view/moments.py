@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 
+PRINTED_DIGITS = 3  # of a time in s
+PRINTED = 0.000501  # s; half of the last digit of a printed time, and round-off
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
@@ -105,15 +107,18 @@ def moments_by_motion(frames: FramesLike, chosen: Indices, count: int, carried: 
 def moments_at(frames: FramesLike, chosen: Indices, times: Sequence[float]) -> Indices:
     """Return, for every time (s), the chosen frame nearest to it.
 
-    Raises InvalidInputError when there is no time or one lies outside the recorded span.
+    The last frame's time as pictures print it, rounded to milliseconds, means the last frame, though it may lie outside
+    or another frame may be nearer. Raises InvalidInputError when there is no
+    time or one lies outside the recorded span.
     """
     recorded = frames.time[chosen]
     first, last = float(recorded[0]), float(recorded[-1])
-    outside = [time for time in times if not first <= time <= last]
+    outside = [time for time in times if not first - PRINTED <= time <= last + PRINTED]
     if outside:
         message = f"time {outside[0]:g} s lies outside the recorded span, {first:g} to {last:g} s"
         raise InvalidInputError(message)
     if len(times) == 0:
         message = "no times to draw were given"
         raise InvalidInputError(message)
-    return chosen[[int(np.argmin(np.abs(recorded - time))) for time in times]]
+    wanted = [last if time == round(last, PRINTED_DIGITS) else time for time in times]
+    return chosen[[int(np.argmin(np.abs(recorded - time))) for time in wanted]]

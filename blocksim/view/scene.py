@@ -1,5 +1,6 @@
 """One moment of a run as a drawing: support, numbered blocks, measured positions. Millimetres."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from blocksim.view import style
 from blocksim.view.ground import Canvas, draw_shift, draw_start, draw_support
 from blocksim.view.moments import Floats, FramesLike
+from blocksim.view.paint import Paint, by_block
 from blocksim.view.support import Support
 from blocksim.view.window import MILLIMETRES
 
@@ -46,10 +48,10 @@ def readable_scale(frames: FramesLike) -> float:
     return float((np.maximum(wide * lengths, tall) / sizes).max())
 
 
-def draw_scene(canvas: Canvas, frames: FramesLike, frame: int, support: Support) -> None:
+def draw_scene(canvas: Canvas, frames: FramesLike, frame: int, support: Support, paint: Paint | None = None) -> None:
     """Draw the support and the blocks of one frame, with the blocks' names where there is room for all."""
     draw_standing(canvas, frames, frame, support)
-    draw_blocks(canvas, frames, frame, support)
+    draw_blocks(canvas, frames, frame, support, paint)
 
 
 def draw_standing(canvas: Canvas, frames: FramesLike, frame: int, support: Support) -> None:
@@ -60,11 +62,13 @@ def draw_standing(canvas: Canvas, frames: FramesLike, frame: int, support: Suppo
     draw_shift(canvas, support, offset, MILLIMETRES * float(frames.x[0].mean()))
 
 
-def draw_blocks(canvas: Canvas, frames: FramesLike, frame: int, support: Support) -> None:
+def draw_blocks(canvas: Canvas, frames: FramesLike, frame: int, support: Support, paint: Paint | None = None) -> None:
     """Draw the blocks of one frame, free and fixed ones, with their names where there is room for all."""
-    outlines, fixed = corners(frames, frame), _fixed(frames, support)
-    _draw_outlines(canvas, frames, frame, outlines, fixed)
-    _draw_names(canvas, frames, outlines.mean(axis=1), fixed)
+    fixed = _fixed(frames, support)
+    own = (paint or by_block(frames)).fills(frame)
+    fills = [style.GROUND_COLOUR if held else fill for held, fill in zip(fixed, own, strict=True)]
+    _draw_outlines(canvas, frames, frame, fixed, fills)
+    _draw_names(canvas, frames, frame, fixed, fills)
 
 
 def _fixed(frames: FramesLike, support: Support) -> Flags:
@@ -103,17 +107,18 @@ def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: flo
             )
 
 
-def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, outlines: Floats, fixed: Flags) -> None:
+def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags, fills: Sequence[str]) -> None:
     """Draw free blocks each in its colour, fixed ones hatched in that of the ground, and all upper sides."""
     from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415 - see style
 
+    outlines = corners(frames, frame)
     smallest = MILLIMETRES * canvas.points_per_mm * float(min(frames.size_x.min(), frames.size_y.min()))
     thin = min(style.LINE_WIDTH, 0.05 * smallest)
     line: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
-    fills = [style.block_colour(int(index)) for index in np.flatnonzero(~fixed)]
+    colours = [fill for fill, held in zip(fills, fixed, strict=True) if not held]
     hatch = FIXED_HATCH if smallest >= LEAST_HATCHED else None
     held = PolyCollection(list(outlines[fixed]), facecolors=style.GROUND_COLOUR, hatch=hatch, **line)
-    free = PolyCollection(list(outlines[~fixed]), facecolors=fills, **line)
+    free = PolyCollection(list(outlines[~fixed]), facecolors=colours, **line)
     sides = LineCollection(
         list(_upper_sides(frames, frame)[~fixed]), colors=style.INK, linewidths=2.0 * thin, transform=canvas.scene
     )
@@ -121,14 +126,15 @@ def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, outlines: Flo
         canvas.axes.add_collection(artist)
 
 
-def _draw_names(canvas: Canvas, frames: FramesLike, places: Floats, fixed: Flags) -> None:
+def _draw_names(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags, fills: Sequence[str]) -> None:
     """Write the names of free and of fixed blocks, of either kind only where there is room for all."""
+    places = corners(frames, frame).mean(axis=1)
     fonts = _label_fonts(frames, canvas.points_per_mm)
     for kind in (fixed, ~fixed):
         if not all(fonts[kind]):
             continue
         for index in np.flatnonzero(kind):
-            fill = style.GROUND_COLOUR if fixed[index] else style.block_colour(int(index))
+            fill = fills[int(index)]
             canvas.axes.text(
                 float(places[index, 0]),
                 float(places[index, 1]),

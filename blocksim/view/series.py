@@ -1,14 +1,16 @@
 """Where blocks end over the values of one key: a row for each block, a column for each series."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.view import style
+from blocksim.view.paper import OWN, Paper
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +20,10 @@ WIDTH = 7.6  # inches
 LEFT, RIGHT, HEAD, FOOT = 0.62, 0.15, 0.62, 0.68  # inches
 COLUMN_GAP, ROW_GAP = 0.25, 0.36  # inches
 ROW_HEIGHT = 1.35  # inches
-SHORT_NAME = "1000"  # for which there is room in any caption
+NARROWEST, LOWEST = 1.0, 0.5  # inches, of a panel on a page whose size was asked for
+TITLE = 0.29  # inches down to the headings
+LINE = 0.155  # inches, of a further line of text
+LETTERS_AN_INCH = 14.5  # in a line below the panels
 LABEL_DEPTH = 0.25  # inches from the panels down to a label that is below all of them
 MOST_ROWS, MOST_COLUMNS = 4, 4
 STAYS_MM = 0.01  # a block whose final x varies less than this is not drawn beside others
@@ -64,13 +69,15 @@ class ValueAxis:
         return (values - self.middle) * self.factor
 
 
-def draw_series(
+def draw_series(  # noqa: PLR0913 - what is drawn, and where
     series: Sequence[SeriesLike],
     blocks: Sequence[str],
     key: tuple[str, str],
     path: Path | str,
     title: str | None = None,
     measured: Mapping[str, tuple[float, float]] | None = None,
+    *,
+    paper: Paper = OWN,
 ) -> None:
     """Draw final x over a key, given with its SI unit, and write PNG, SVG or PDF; the same input gives the same bytes.
 
@@ -80,70 +87,94 @@ def draw_series(
     path = Path(path)
     style.picture_suffix(path)
     drawn = list(series)[:MOST_COLUMNS]
-    rows = moving_blocks(drawn)
-    height = HEAD + len(rows) * ROW_HEIGHT + (len(rows) - 1) * ROW_GAP + FOOT
-    with style.styled_figure(WIDTH, height) as figure:
-        _draw_panels(figure, drawn, [(block, blocks[block]) for block in rows], key, measured or {})
-        for axes, one in zip(figure.axes, drawn, strict=False):
-            place = axes.get_position().x0, 1.0 - 0.29 / height
-            figure.text(*place, _heading(one.label, panel_width(len(drawn))), va="top", weight="bold")
+    rows = [(block, blocks[block]) for block in moving_blocks(drawn)]
+    page = _page(drawn, rows, key, paper)
+    count = len(drawn)
+    texts = _legend(len(rows), len(blocks), len(series) - count, is_measured=bool(measured))
+    notes = wrap(texts, max(1, int(LETTERS_AN_INCH * page.width)))
+    page = replace(page, foot=page.foot + (len(notes) - 1) * LINE)
+    others = page.head + page.foot + (len(rows) - 1) * page.gap
+    page = replace(page, row=paper.panel(ROW_HEIGHT, len(rows), others, LOWEST))
+    page = replace(page, height=paper.height(others + len(rows) * page.row))
+    with style.styled_figure(page.width, page.height, paper.dots) as figure:
+        _draw_panels(figure, page, drawn, rows, measured or {})
+        for column, lines in enumerate(page.headings):
+            place = (LEFT + column * (page.panel + COLUMN_GAP)) / page.width, 1.0 - TITLE / page.height
+            figure.text(*place, "\n".join(lines), va="top", weight="bold")
         if title:
-            shown = style.cut_to(title, (WIDTH - 0.2) * style.POINTS_PER_INCH, style.TITLE_SIZE)
-            figure.suptitle(shown, x=0.1 / WIDTH, y=1.0 - 0.06 / height, ha="left", va="top", fontsize=style.TITLE_SIZE)
-        texts = _legend(len(rows), len(blocks), len(series) - len(drawn), is_measured=bool(measured))
-        figure.text(0.1 / WIDTH, 0.06 / height, texts, color=style.FAINT_INK, va="bottom")
+            shown = style.cut_to(title, (page.width - 0.2) * style.POINTS_PER_INCH, style.TITLE_SIZE)
+            place = 0.1 / page.width, 1.0 - 0.06 / page.height
+            figure.text(*place, shown, va="top", fontsize=style.TITLE_SIZE)
+        figure.text(0.1 / page.width, 0.06 / page.height, "\n".join(notes), color=style.FAINT_INK, va="bottom")
         style.save_figure(figure, path)
+
+
+@dataclass(frozen=True)
+class _Page:
+    """Widths and heights in inches, and texts that have been broken into lines to fit them."""
+
+    width: float
+    panel: float  # width of a panel
+    axis: ValueAxis
+    label: tuple[str, ...]  # below the panels, once for all where it is wider than one of them
+    headings: tuple[tuple[str, ...], ...]  # above each column
+    captions: tuple[tuple[str, ...], ...]  # above each panel, by row
+    head: float
+    foot: float
+    gap: float
+    row: float = ROW_HEIGHT  # height of a panel
+    height: float = 0.0
+
+
+def _page(series: Sequence[SeriesLike], rows: Sequence[tuple[int, str]], key: tuple[str, str], paper: Paper) -> _Page:
+    """Return the page, but for the heights that depend on how many lines stand below all."""
+    count = len(series)
+    sides = LEFT + RIGHT + (count - 1) * COLUMN_GAP
+    width = paper.width(WIDTH, sides + count * NARROWEST)
+    panel = (width - sides) / count
+    axis = value_axis(np.concatenate([one.values for one in series]), *key)
+    label = tuple(style.broken(axis.label, width - LEFT - RIGHT))
+    headings = tuple(tuple(style.broken(one.label, panel, bold=True)) for one in series)
+    captions = captions_of(series, rows, panel * style.POINTS_PER_INCH)
+    more = LINE * (max(text.count("\n") for row in captions for text in row))
+    head = HEAD + LINE * (max(map(len, headings)) - 1) + more
+    foot = FOOT + LINE * (len(label) - 1)
+    return _Page(width, panel, axis, label, headings, captions, head, foot, ROW_GAP + more)
 
 
 def _draw_panels(
     figure: "Figure",
+    page: _Page,
     series: Sequence[SeriesLike],
     rows: Sequence[tuple[int, str]],
-    key: tuple[str, str],
     measured: Mapping[str, tuple[float, float]],
 ) -> None:
     """Draw a row of panels for each block, given by number and name, and a column for each series."""
-    axis = value_axis(np.concatenate([one.values for one in series]), *key)
     joined = all(is_smooth(one.x_mm[:, block]) for one in series for block, _ in rows)
-    height = float(figure.get_figheight())
-    room = panel_width(len(series))
-    panel = room / style.POINTS_PER_INCH
-    captions = captions_of(series, rows, room)
     for row, (block, name) in enumerate(rows):
         limits = _limits(series, block, measured.get(name))
-        bottom = FOOT + (len(rows) - 1 - row) * (ROW_HEIGHT + ROW_GAP)
+        bottom = page.foot + (len(rows) - 1 - row) * (page.row + page.gap)
         for column, one in enumerate(series):
-            left = LEFT + column * (panel + COLUMN_GAP)
-            axes = figure.add_axes((left / WIDTH, bottom / height, panel / WIDTH, ROW_HEIGHT / height))
+            left = LEFT + column * (page.panel + COLUMN_GAP)
+            size = page.panel / page.width, page.row / page.height
+            axes = figure.add_axes((left / page.width, bottom / page.height, *size))
             axes.set_ylim(*limits)
             _draw_band(axes, measured.get(name))
-            _draw_points(axes, one, block, axis, joined=joined)
-            _finish(axes, is_log=axis.is_log, is_first=column == 0, is_last=row == len(rows) - 1)
-            axes.set_title(captions[row][column], loc="left", pad=3.0)
-    _name_axis(figure, axis.label, len(series), room)
+            _draw_points(axes, one, block, page.axis, joined=joined)
+            _finish(axes, is_log=page.axis.is_log, is_first=column == 0, is_last=row == len(rows) - 1)
+            axes.set_title(page.captions[row][column], loc="left", pad=3.0)
+    _name_axis(figure, page, len(series))
 
 
-def _heading(label: str, room: float) -> str:
-    """Return what is told above a column (points wide); of `key = value` the end is what tells columns apart."""
-    return style.cut_to(label[::-1], room, style.FONT_SIZE, bold=True)[::-1]
-
-
-def panel_width(columns: int) -> float:
-    """Return the width of a panel (points) where so many stand beside one another."""
-    return (WIDTH - LEFT - RIGHT - (columns - 1) * COLUMN_GAP) / columns * style.POINTS_PER_INCH
-
-
-def _name_axis(figure: "Figure", label: str, columns: int, room: float) -> None:
+def _name_axis(figure: "Figure", page: _Page, columns: int) -> None:
     """Write the label below every column, or once below all where it is wider than a column."""
-    whole = (WIDTH - LEFT - RIGHT) * style.POINTS_PER_INCH
-    label = style.cut_to(label, whole, style.FONT_SIZE)
-    if style.width_of(label, style.FONT_SIZE) <= room:
+    widest = max(style.width_of(line, style.FONT_SIZE) for line in page.label)
+    if len(page.label) == 1 and widest <= page.panel * style.POINTS_PER_INCH:
         for axes in figure.axes[-columns:]:
-            axes.set_xlabel(label, labelpad=2.0)
+            axes.set_xlabel(page.label[0], labelpad=2.0)
         return
-    middle = (LEFT + 0.5 * (WIDTH - LEFT - RIGHT)) / WIDTH
-    place = (FOOT - LABEL_DEPTH) / float(figure.get_figheight())
-    figure.text(middle, place, label, ha="center", va="top")
+    middle = (LEFT + 0.5 * (page.width - LEFT - RIGHT)) / page.width
+    figure.text(middle, (page.foot - LABEL_DEPTH) / page.height, "\n".join(page.label), ha="center", va="top")
 
 
 def moving_blocks(series: Sequence[SeriesLike]) -> list[int]:
@@ -250,26 +281,25 @@ def _finish(axes: "Axes", *, is_log: bool, is_first: bool, is_last: bool) -> Non
         axes.set_ylabel("final x (mm)")
 
 
-def captions_of(series: Sequence[SeriesLike], rows: Sequence[tuple[int, str]], room: float) -> list[list[str]]:
-    """Return what stands above every panel, as long as there is room (points) for all; names are cut if they must."""
+def captions_of(
+    series: Sequence[SeriesLike], rows: Sequence[tuple[int, str]], room: float
+) -> tuple[tuple[str, ...], ...]:
+    """Return what stands above every panel: block and range in one line where there is room (points), else in two."""
     told = [[_extent(one.x_mm[:, block]) for one in series] for block, _ in rows]
-    least = style.width_of(f"block {SHORT_NAME}: ", style.FONT_SIZE)
     widest = max(style.width_of(extent[0], style.FONT_SIZE) for row in told for extent in row)
-    form = 0 if least + widest <= room else 1
-    return [
-        [_caption(name, f": {extent[form]}", room) for extent in row] for (_, name), row in zip(rows, told, strict=True)
-    ]
+    form = 0 if widest <= style.SURE * room else 1
+    names = [f"block {style.shortened(name, style.MOST_LETTERS)}" for _, name in rows]
+    pairs = [(f"{name}: {extent[form]}", extent[form]) for name, row in zip(names, told, strict=True) for extent in row]
+    if all(style.width_of(line, style.FONT_SIZE) <= style.SURE * room for line, _ in pairs):
+        return tuple(tuple(f"{name}: {one[form]}" for one in row) for name, row in zip(names, told, strict=True))
+    cut = [style.cut_to(name, room, style.FONT_SIZE) for name in names]
+    return tuple(tuple(f"{name}\n{one[form]}" for one in row) for name, row in zip(cut, told, strict=True))
 
 
 def _extent(x: Floats) -> tuple[str, str]:
     """Return where a block ends in all runs of a series, in more and in fewer words."""
     apart = f"{np.ptp(x):.2f} mm apart"
     return f"{x.min():.2f} to {x.max():.2f} mm, {apart}", apart
-
-
-def _caption(name: str, text: str, room: float) -> str:
-    left = room - style.width_of(f"block {text}", style.FONT_SIZE)
-    return f"block {style.cut_to(name, left, style.FONT_SIZE)}{text}"
 
 
 def _legend(rows: int, blocks: int, more_series: int, *, is_measured: bool) -> str:

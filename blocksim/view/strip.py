@@ -12,7 +12,9 @@ from blocksim.view import style
 from blocksim.view.forces import ForceScale, WithContacts, draw_forces, force_scale
 from blocksim.view.ground import Canvas, draw_ruler
 from blocksim.view.moments import FramesLike, Indices, drawable_frames, moments_at, moments_by_motion
+from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import ROW_HEIGHT, depth_of, finish_panel, room_below
+from blocksim.view.paper import OWN, Paper
 from blocksim.view.scene import MeasuredRange, draw_centres, draw_measured, draw_scene, readable_scale
 from blocksim.view.support import Support
 from blocksim.view.window import MILLIMETRES, Extent, extent_of
@@ -25,7 +27,9 @@ WIDTH = 10.0  # inches, of the whole strip
 SIDE, GAP = 0.25, 0.25  # inches, at the left and right end and between columns
 HEAD, TITLE, FOOT = 0.22, 0.30, 0.52  # inches: time above a panel, title of the strip, axis and legend below
 LINE = 0.155  # inches, of each further line of text above a panel or below the strip
-LETTERS = 150  # in a line below the strip
+LETTERS_AN_INCH = 15.0  # in a line below the strip
+LEAST_WIDTH, NARROWEST_PANEL, LOWEST_PANEL = 1.6, 1.15, 0.25  # inches, on a page whose size was asked for
+POINTS = style.POINTS_PER_INCH
 TICKS = 0.26  # inches, for the numbers under a row of panels
 TALLEST_PANEL = 4.0  # inches
 WIDEST_IN_FOURS, WIDEST_IN_PAIRS = 2.5, 6.0  # width over height, so that a panel stays about an inch tall
@@ -45,6 +49,16 @@ class MeasuredTable(Protocol):
 
 
 @dataclass(frozen=True)
+class Lines:
+    """Lines of text above each panel and below the strip, rows of measured ranges, height of the key (inches)."""
+
+    captions: int = 1
+    notes: int = 1
+    measured_rows: int = 0
+    key: float = 0.0
+
+
+@dataclass(frozen=True)
 class Layout:
     """How the panels are arranged, in inches; `points_per_mm` is the scale of all of them."""
 
@@ -57,6 +71,7 @@ class Layout:
     extent: Extent
     head: float = HEAD
     foot: float = FOOT
+    width: float = WIDTH
 
     @property
     def ticks(self) -> float:
@@ -67,9 +82,9 @@ class Layout:
         """Return left, bottom, width, height of a panel as parts of the figure."""
         row, column = divmod(index, self.columns)
         used = self.columns * self.panel_width + (self.columns - 1) * GAP
-        left = 0.5 * (WIDTH - used) + column * (self.panel_width + GAP)
+        left = 0.5 * (self.width - used) + column * (self.panel_width + GAP)
         bottom = self.foot + (self.rows - 1 - row) * (self.panel_height + self.head + self.ticks)
-        return left / WIDTH, bottom / self.height, self.panel_width / WIDTH, self.panel_height / self.height
+        return left / self.width, bottom / self.height, self.panel_width / self.width, self.panel_height / self.height
 
 
 def draw_strip(  # noqa: PLR0913 - one argument for each option of the command
@@ -81,38 +96,42 @@ def draw_strip(  # noqa: PLR0913 - one argument for each option of the command
     support: Support | None = None,
     *,
     forces: bool = False,
+    count: int | None = None,
+    paint: Paint | None = None,
+    paper: Paper = OWN,
 ) -> None:
     """Draw the run as 6 to 8 panels from release to the final state and write them as PNG, SVG or PDF.
 
-    `times` (s) picks the panels by hand. With `measured` the last panel shows mean and range of the measured
-    centres below the ground. `support` is what the blocks stand on: level ground at rest if it is not given. `forces`
-    draws those of all contacts. The same input gives the same bytes. Raises InvalidInputError for an unknown picture
-    format, a time that was not recorded, forces that were not, or nothing to draw, and OutputError when the file cannot
-    be written.
+    `times` (s) picks the panels by hand, `count` is how many there are at most. With `measured` the last panel shows
+    mean and range of the measured centres below the ground. `support` is what the blocks stand on: level ground at rest
+    if it is not given. `forces` draws those of all contacts; `paint` colours the blocks. The same input gives the same
+    bytes. Raises InvalidInputError for an unknown picture format, a time that was not recorded, forces that were not, a
+    page that is too small or nothing to draw, and OutputError when the file cannot be written.
     """
     path = Path(path)
     style.picture_suffix(path)
-    support = support or Support()
+    support, paint = support or Support(), paint or by_block(frames)
     drawable = drawable_frames(frames)
     scale = force_scale(frames) if forces else None
     extent = extent_of(frames, drawable, support)
     ranges = [] if measured is None else measured_ranges(measured, frames.names, extent.width)
     extent = widened(extent, ranges)
-    columns, count = arrangement(extent, readable_scale(frames))
+    columns, usual = arrangement(extent, readable_scale(frames))
     if times is None:
         carried = support.offset(frames.time[drawable])
-        chosen = moments_by_motion(frames, drawable, count, carried)
+        chosen = moments_by_motion(frames, drawable, count or usual, carried)
     else:
         chosen = moments_at(frames, drawable, times)
         ranges = ranges if chosen[-1] == drawable[-1] else []  # they belong to the final state
-    notes = wrap(_legend(ranges, support, scale), LETTERS)
-    captions = 1 if support.motion is None else 2
-    layout = plan(extent, columns, len(chosen), rows_of(ranges), captions, len(notes))
-    with style.styled_figure(WIDTH, layout.height) as figure:
-        _draw_panels(figure, frames, chosen, layout, ranges, support)
+    notes = wrap(_legend(ranges, support, scale), int(LETTERS_AN_INCH * paper.width(WIDTH, LEAST_WIDTH)))
+    lines = Lines(1 if support.motion is None else 2, len(notes), rows_of(ranges), paint.height)
+    layout = plan_on(paper, extent, columns, len(chosen), lines)
+    with style.styled_figure(layout.width, layout.height, paper.dots) as figure:
+        _draw_panels(figure, frames, chosen, layout, ranges, support, paint)
         if scale is not None:
             _draw_forces(figure, frames, chosen, layout, scale)
         _draw_texts(figure, layout, title, notes)
+        draw_key(figure, paint, SIDE, 0.05 + len(notes) * LINE)
         style.save_figure(figure, path)
 
 
@@ -133,21 +152,67 @@ def plan(extent: Extent, columns: int, panels: int, measured_rows: int, captions
 
     `captions` and `notes` count the lines of text above each panel and below the strip.
     """
-    columns = min(columns, panels)
+    return plan_on(OWN, extent, columns, panels, Lines(captions, notes, measured_rows))
+
+
+def plan_on(paper: Paper, extent: Extent, columns: int, panels: int, lines: Lines) -> Layout:
+    """Fit the panels into a page. Where its size was asked for, as many columns as make them largest.
+
+    Raises InvalidInputError for a page that is too small.
+    """
+    width = paper.width(WIDTH, LEAST_WIDTH)
+    if paper.size is None:
+        columns = min(columns, panels)
+        scale = min(_panel_width(columns, width) / extent.width, TALLEST_PANEL / extent.height)  # inches per mm
+        return _laid_out(extent, columns, panels, lines, (width, scale))
+    most = max(1, min(panels, int((width - 2.0 * SIDE + GAP) / (NARROWEST_PANEL + GAP))))
+    scale, columns = max((_scale_on(paper, extent, columns, panels, lines), columns) for columns in range(1, most + 1))
     rows = -(-panels // columns)
-    scale = min(_panel_width(columns) / extent.width, TALLEST_PANEL / extent.height)  # inches per mm
-    below = max((extent.lowest - extent.bottom) * scale, room_below(extent, measured_rows) / style.POINTS_PER_INCH)
+    paper.panel(0.0, rows, _others(extent, columns, panels, lines), LOWEST_PANEL)  # refuses a page that is too small
+    layout = _laid_out(extent, columns, panels, lines, (width, scale))
+    spare = paper.size[1] - layout.height
+    return replace(layout, height=paper.size[1], head=layout.head + spare / layout.rows)
+
+
+def _scale_on(paper: Paper, extent: Extent, columns: int, panels: int, lines: Lines) -> float:
+    """Return the largest scale (inches per mm) at which so many columns fit into a page of a given size; 0 if none."""
+    rows = -(-panels // columns)
+    below = room_below(extent, lines.measured_rows) / style.POINTS_PER_INCH
+    height = (paper.height(0.0) - _others(extent, columns, panels, lines)) / rows
+    if height < LOWEST_PANEL:
+        return 0.0
+    tallest = min(height / (extent.top - extent.lowest), (height + below) / (extent.top - extent.bottom))
+    return min(_panel_width(columns, paper.width(WIDTH)) / extent.width, tallest)
+
+
+def _others(extent: Extent, columns: int, panels: int, lines: Lines) -> float:
+    """Return the height (inches) of all beside what panels show above the lowest ground."""
+    rows = -(-panels // columns)
+    ticks, head, foot = _heights(extent, lines)
+    below = room_below(extent, lines.measured_rows) / style.POINTS_PER_INCH
+    return TITLE + rows * (head + below) + (rows - 1) * ticks + foot
+
+
+def _laid_out(extent: Extent, columns: int, panels: int, lines: Lines, page: tuple[float, float]) -> Layout:
+    """Return the layout for a width (inches) and a scale (inches per mm)."""
+    width, scale = page
+    rows = -(-panels // columns)
+    below = max((extent.lowest - extent.bottom) * scale, room_below(extent, lines.measured_rows) / POINTS)
     panel_height = (extent.top - extent.lowest) * scale + below
-    ticks = 0.0 if extent.tilt else TICKS
-    head, foot = HEAD + (captions - 1) * LINE, FOOT - TICKS + ticks + (notes - 1) * LINE
+    ticks, head, foot = _heights(extent, lines)
     height = TITLE + rows * (panel_height + head) + (rows - 1) * ticks + foot
-    points_per_mm = scale * style.POINTS_PER_INCH
-    return Layout(columns, rows, extent.width * scale, panel_height, points_per_mm, height, extent, head, foot)
+    return Layout(columns, rows, extent.width * scale, panel_height, scale * POINTS, height, extent, head, foot, width)
 
 
-def _panel_width(columns: int) -> float:
+def _heights(extent: Extent, lines: Lines) -> tuple[float, float, float]:
+    """Return the heights (inches) of the numbers below a panel, the text above it, and all below the strip."""
+    ticks = 0.0 if extent.tilt else TICKS
+    return ticks, HEAD + (lines.captions - 1) * LINE, FOOT - TICKS + ticks + (lines.notes - 1) * LINE + lines.key
+
+
+def _panel_width(columns: int, width: float = WIDTH) -> float:
     """Return the width that a panel may have (inches)."""
-    return (WIDTH - 2.0 * SIDE - (columns - 1) * GAP) / columns
+    return (width - 2.0 * SIDE - (columns - 1) * GAP) / columns
 
 
 def measured_ranges(measured: MeasuredTable, names: Sequence[str], width: float) -> list[MeasuredRange]:
@@ -179,18 +244,19 @@ def widened(extent: Extent, ranges: Sequence[MeasuredRange]) -> Extent:
     return replace(extent, left=left, right=right)
 
 
-def _draw_panels(
+def _draw_panels(  # noqa: PLR0913, PLR0917 - what is drawn, and where
     figure: "Figure",
     frames: FramesLike,
     chosen: Indices,
     layout: Layout,
     ranges: list[MeasuredRange],
     support: Support,
+    paint: Paint,
 ) -> None:
     last = len(chosen) - 1
     for index, frame in enumerate(int(frame) for frame in chosen):
         canvas = Canvas(figure.add_axes(layout.place(index)), layout.extent, layout.points_per_mm)
-        draw_scene(canvas, frames, frame, support)
+        draw_scene(canvas, frames, frame, support, paint)
         if ranges and index == last:
             draw_centres(canvas, frames, frame)
             draw_measured(canvas, ranges, ROW_HEIGHT)
@@ -207,10 +273,10 @@ def _draw_forces(figure: "Figure", frames: WithContacts, chosen: Indices, layout
 
 
 def _draw_texts(figure: "Figure", layout: Layout, title: str | None, notes: Sequence[str]) -> None:
-    side = SIDE / WIDTH
+    side = SIDE / layout.width
     if title:
         top = 1.0 - 0.06 / layout.height
-        shown = style.cut_to(title, (WIDTH - 2.0 * SIDE) * style.POINTS_PER_INCH, style.TITLE_SIZE)
+        shown = style.cut_to(title, (layout.width - 2.0 * SIDE) * style.POINTS_PER_INCH, style.TITLE_SIZE)
         figure.suptitle(shown, x=side, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE)
     figure.text(side, 0.05 / layout.height, "\n".join(notes), color=style.FAINT_INK, va="bottom")
 

@@ -1,5 +1,6 @@
 """The one place for colours, fonts and sizes, and for making a picture file."""
 
+import re
 import warnings
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
@@ -33,6 +34,8 @@ LINE_WIDTH = 0.8  # points
 
 FONT = ["DejaVu Sans"]
 NARROWEST = 0.25  # width of the narrowest letters over the font size
+PARTS = re.compile(r"[^. _-]*[. _-]+|[^. _-]+")  # what a name may be broken into
+MOST_LETTERS = 200  # of a name in lines
 SURE = 0.98  # letters are put on whole pixels
 
 # A fixed salt and no dates: the same picture is the same file.
@@ -66,9 +69,14 @@ def block_colour(index: int) -> str:
 
 def text_colour(fill: str) -> str:
     """Return black or white, whichever reads better on `fill` (#rrggbb)."""
-    red, green, blue = (int(fill[start : start + 2], 16) / 255.0 for start in (1, 3, 5))
     bright = 0.4
-    return INK if 0.299 * red + 0.587 * green + 0.114 * blue > bright else "#FFFFFF"
+    return INK if brightness(fill) > bright else "#FFFFFF"
+
+
+def brightness(fill: str) -> float:
+    """Return how bright a colour (#rrggbb) is in grey, 0 to 1: luma after ITU-R BT.601."""
+    red, green, blue = (int(fill[start : start + 2], 16) / 255.0 for start in (1, 3, 5))
+    return 0.299 * red + 0.587 * green + 0.114 * blue
 
 
 def picture_suffix(path: Path) -> str:
@@ -81,25 +89,26 @@ def picture_suffix(path: Path) -> str:
 
 
 @contextmanager
-def styled_figure(width: float, height: float) -> Iterator["Figure"]:
-    """Give an empty figure of `width` x `height` inches, in this style; needs no display."""
+def styled_figure(width: float, height: float, dots: float | None = None) -> Iterator["Figure"]:
+    """Give an empty figure of `width` x `height` inches, in this style; needs no display. `dots` are those an inch."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415 - see in_style
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    with in_style():
+    with in_style(dots):
         figure = Figure(figsize=(width, height))
         FigureCanvasAgg(figure)
         yield figure
 
 
 @contextmanager
-def in_style() -> Iterator[None]:
-    """Let whatever is drawn be drawn in this style."""
+def in_style(dots: float | None = None) -> Iterator[None]:
+    """Let whatever is drawn be drawn in this style, a PNG with so many dots per inch."""
     from matplotlib import rc_context, rcParamsDefault  # noqa: PLC0415 - half a second, only for pictures
 
     # A user's own matplotlibrc must not change the file, but the backend is none of our business.
     settings: dict[Any, Any] = {key: value for key, value in rcParamsDefault.items() if not key.startswith("backend")}
-    with rc_context(settings | SETTINGS):
+    resolution: dict[Any, Any] = {} if dots is None else {"savefig.dpi": dots}
+    with rc_context(settings | SETTINGS | resolution):
         yield
 
 
@@ -147,6 +156,20 @@ def cut_to(text: str, room: float, size: float, *, bold: bool = False) -> str:
         return line
     fits = bisect_left(range(len(line)), 1, key=lambda count: width_of(f"{line[:count]}…", size, bold=bold) > room)
     return f"{line[: max(fits - 1, 0)]}…"
+
+
+def broken(text: str, room: float, size: float = FONT_SIZE, *, bold: bool = False) -> list[str]:
+    """Return a name in lines no wider than `room` (inches), broken after dots, spaces, hyphens and underscores.
+
+    A single part that is too wide is cut.
+    """
+    points = room * POINTS_PER_INCH
+    lines = [""]
+    for part in PARTS.findall(shortened(text, MOST_LETTERS)):
+        if lines[-1] and width_of(f"{lines[-1]}{part}".rstrip(), size, bold=bold) > points:
+            lines.append("")
+        lines[-1] += part
+    return [cut_to(line.rstrip(), points / SURE, size, bold=bold) for line in lines]
 
 
 def fitting_font(text: str, room: tuple[float, float], largest: float = FONT_SIZE) -> float:

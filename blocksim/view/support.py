@@ -30,6 +30,10 @@ class Support:
         """Return the displacement (m) along `direction` at these times (s)."""
         return np.zeros_like(times) if self.motion is None else displacement_and_velocity(self.motion, times)[0]
 
+    def velocity(self, times: Floats) -> Floats:
+        """Return the velocity (m/s) along `direction` at these times (s)."""
+        return np.zeros_like(times) if self.motion is None else displacement_and_velocity(self.motion, times)[1]
+
     def offset(self, times: Floats) -> Floats:
         """Return the displacement (m) along x and y at these times (s), (n, 2)."""
         return np.multiply.outer(self.displacement(times), self.direction)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.view import style
+from blocksim.view.paper import OWN, Paper
 from blocksim.view.sweeps import layout
 from blocksim.view.sweeps.found import short_names
 
@@ -16,10 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BAR, GAP, FOOT = 0.15, 0.46, 0.34  # inches: height of a bar, between panels, below them
-LETTER = 0.062  # inches, of a key's name
+LEAST_ROOM, MOST_ROOM = 0.5, 1.75  # inches, for the name of a key; longer ones take several lines
+BROKEN = 0.8  # of the height of a bar, for each line of keys
+NARROWEST, LEAST_BAR = 0.8, 0.12  # inches, on a page whose size was asked for
 MOST_KEYS, MOST_PANELS = 10, 8
 MOST_INTERVAL = 0.6  # of the longest bar, that an axis makes room for
-FEWEST_LETTERS, MOST_LETTERS = 8, 28
+BEYOND: dict[str, Any] = {"linestyle": "", "marker": ">", "markersize": 3.0, "color": style.INK, "clip_on": False}
 MAIN_COLOUR, FIRST_COLOUR = "#B5D6EA", "#0072B2"
 Floats = NDArray[np.float64]
 
@@ -35,31 +38,39 @@ class Bars:
     part: Floats | None = None  # (k,)
 
 
-def draw_tornado(panels: Sequence[Bars], labels: tuple[str, str], path: Path | str, title: str) -> None:
+def draw_tornado(
+    panels: Sequence[Bars], labels: tuple[str, str], path: Path | str, title: str, paper: Paper = OWN
+) -> None:
     """Draw bars of the indices and write PNG, SVG or PDF; `labels` name the whole bars and their dark parts.
 
-    Raises InvalidInputError for an unknown picture format and OutputError when the file cannot be written.
+    Raises InvalidInputError for an unknown picture format or a page that is too small, and OutputError when the file
+    cannot be written.
     """
     path = Path(path)
     style.picture_suffix(path)
     told = [panel for panel in panels if np.any(panel.values)] or list(panels)
-    panels = [_with_short_keys(panel) for panel in told[:MOST_PANELS]]
+    panels = [replace(panel, keys=tuple(map(broken, short_names(panel.keys)))) for panel in told[:MOST_PANELS]]
     left = _room_for_keys(panels)
-    heights = [BAR * (min(len(panel.keys), MOST_KEYS) + 0.6) for panel in panels]
-    rows = 2 if labels[1] else 1
-    foot = FOOT + 0.145 * rows + layout.EDGE
-    head = layout.title_height(title, layout.COLUMN_WIDTH) + 0.2
-    height = head + sum(heights) + GAP * (len(panels) - 1) + foot
-    with style.styled_figure(layout.COLUMN_WIDTH, height) as figure:
+    width = paper.width(layout.COLUMN_WIDTH, left + NARROWEST)
+    titles = ["\n".join(style.broken(panel.title, width - 2.0 * layout.EDGE)) for panel in panels]
+    rows = [min(len(panel.keys), MOST_KEYS) + 0.6 for panel in panels]
+    foot = FOOT + layout.LINE * (2 if labels[1] else 1) + layout.EDGE
+    head = layout.title_height(title, width) + 0.2
+    gaps = GAP * (len(panels) - 1) + layout.LINE * sum(one.count("\n") for one in titles)
+    lines = max(key.count("\n") + 1 for panel in panels for key in panel.keys)
+    bar = paper.panel(BAR * (1.0 if lines == 1 else BROKEN * lines), 1, head + gaps + foot, LEAST_BAR * sum(rows))
+    bar = bar if paper.size is None else bar / sum(rows)
+    height = paper.height(head + bar * sum(rows) + gaps + foot)
+    with style.styled_figure(width, height, paper.dots) as figure:
         layout.write_title(figure, title)
         bottom = height - head
-        for panel, size in zip(panels, heights, strict=True):
-            bottom -= size
-            width = layout.COLUMN_WIDTH - left - 2.0 * layout.EDGE
-            _draw_bars(layout.add_axes(figure, left, bottom, width, size), panel)
-            layout.write_text(figure, layout.EDGE, bottom + size + 0.05, panel.title)
+        for panel, told_title, count in zip(panels, titles, rows, strict=True):
+            bottom -= bar * count + layout.LINE * told_title.count("\n")
+            axes = layout.add_axes(figure, left, bottom, width - left - 2.0 * layout.EDGE, bar * count)
+            _draw_bars(axes, panel)
+            layout.write_text(figure, layout.EDGE, bottom + bar * count + 0.05, told_title)
             bottom -= GAP
-        place = (layout.EDGE / layout.COLUMN_WIDTH, layout.EDGE / height)
+        place = (layout.EDGE / width, layout.EDGE / height)
         look: dict[str, Any] = {"frameon": False, "borderpad": 0.0, "borderaxespad": 0.0, "labelspacing": 0.25}
         figure.legend(handles=_entries(labels), loc="lower left", bbox_to_anchor=place, **look)
         style.save_figure(figure, path)
@@ -70,18 +81,16 @@ def order_of(values: Floats) -> list[int]:
     return [int(key) for key in np.argsort(-np.abs(values), kind="stable")[:MOST_KEYS]]
 
 
-def shortened(name: str) -> str:
-    """Return the end of a long name."""
-    return name if len(name) <= MOST_LETTERS else f"…{name[1 - MOST_LETTERS :]}"
-
-
-def _with_short_keys(panel: Bars) -> Bars:
-    return replace(panel, keys=tuple(shortened(key) for key in short_names(panel.keys)))
+def broken(name: str) -> str:
+    """Return a key in as many lines as it needs beside the bars."""
+    return "\n".join(style.broken(name, MOST_ROOM))
 
 
 def _room_for_keys(panels: Sequence[Bars]) -> float:
-    letters = max(len(key) for panel in panels for key in panel.keys)
-    return LETTER * max(letters, FEWEST_LETTERS) + 0.15
+    """Return the width (inches) of the widest key, and a gap."""
+    lines = [line for panel in panels for key in panel.keys for line in key.split("\n")]
+    widest = max(style.width_of(line, style.FONT_SIZE) for line in lines) / style.POINTS_PER_INCH
+    return max(widest, LEAST_ROOM) + 0.2
 
 
 def _draw_bars(axes: "Axes", panel: Bars) -> None:
@@ -97,7 +106,10 @@ def _draw_bars(axes: "Axes", panel: Bars) -> None:
     axes.set_ylim(-0.8, len(order) - 0.2)
     axes.tick_params(axis="y", length=0.0)
     axes.spines[["right", "top", "left"]].set_visible(False)
-    axes.set_xlim(*limits_of(panel))
+    low, high = limits_of(panel)
+    axes.set_xlim(low, high)
+    beyond = places[panel.values[order] + intervals > high]
+    axes.plot(np.full(len(beyond), high), beyond, **BEYOND)
     layout.number_axis(axes.xaxis)
 
 

@@ -7,13 +7,17 @@ the turned axes, "scene" those of the scenario, with x along the ground.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.scenario.segments import ENDLESS
 from blocksim.view.moments import Floats, FramesLike, Indices
 from blocksim.view.support import Support
 
+Flags = NDArray[np.bool_]
 MILLIMETRES = 1e3  # per metre
 MARGIN = 0.04  # of the larger side, around everything
+FEW_LEFT_OUT, MANY = 0.05, 20  # share of the blocks that may be left out of a film's window; number of many blocks
+GAP, WIDE_GAP = 0.2, 1.5  # over the reach of all others: how far off a block has to be, of many and of few
 NEAR = 0.15  # of a side: what of the support is this near is shown as well; at least the largest block's diagonal
 
 
@@ -57,14 +61,19 @@ class Extent:
         return float(np.tan(self.tilt))
 
 
-def extent_of(frames: FramesLike, chosen: Indices, support: Support | None = None) -> Extent:
+def extent_of(
+    frames: FramesLike, chosen: Indices, support: Support | None = None, blocks: Flags | None = None
+) -> Extent:
     """Return what has to be shown so that no block is cut in any chosen frame, with a small margin.
 
-    The ground below every block is shown, and the corners of the ground and the walls that are near.
+    The ground below every block is shown, and the corners of the ground and the walls that are near. `blocks` (b,)
+    tells which blocks count, by default all.
     """
     support = support or Support()
     reached = _reached(frames, chosen, support)
-    low, high = reached.min(axis=0), reached.max(axis=0)
+    if blocks is not None:
+        reached = reached[:, blocks]
+    low, high = reached.min(axis=(0, 1)), reached.max(axis=(0, 1))
     shifts = _extreme_offsets(frames, chosen, support)
     diagonal = float(np.hypot(frames.size_x, frames.size_y).max())
     reach = np.maximum(diagonal, NEAR * (high - low))
@@ -75,6 +84,29 @@ def extent_of(frames: FramesLike, chosen: Indices, support: Support | None = Non
     (left, bottom), (right, top) = MILLIMETRES * low, MILLIMETRES * high
     extent = Extent(float(left), float(right), float(bottom), float(top), tilt=support.tilt)
     return replace(extent, base=MILLIMETRES * _lowest_ground(support, shifts, low, high))
+
+
+def together(frames: FramesLike, chosen: Indices, support: Support | None = None) -> Flags:
+    """Return True for every block that stays with the others, (b,); those that fly far off make a film's window vast.
+
+    Far off is what leaves a gap to the reach of all others, to a side or upwards, of a fifth of their width or height;
+    with few blocks, of which each matters, of one and a half times that. At most a twentieth of the blocks are left
+    out, or one, and never a fixed one.
+    """
+    support = support or Support()
+    reached = _reached(frames, chosen, support)
+    low, high = reached.min(axis=0), reached.max(axis=0)
+    count = len(low)
+    most, share = max(1, int(FEW_LEFT_OUT * count)), GAP if count >= MANY else WIDE_GAP
+    stays = np.ones(count, dtype=bool)
+    for reach, other in ((high[:, 0], low[:, 0]), (-low[:, 0], -high[:, 0]), (high[:, 1], low[:, 1])):
+        order = np.argsort(reach, kind="stable")
+        for last in range(max(count - most, 1), count):
+            near, far = order[:last], order[last:]
+            if reach[far[0]] - reach[near].max() > share * float(reach[near].max() - other[near].min()):
+                stays[far] = False
+                break
+    return np.asarray(stays | np.array(support.fixed or (False,) * count))
 
 
 def turned(points: Floats, angle: float) -> Floats:
@@ -95,7 +127,7 @@ def parts_within(line: Floats, low: Floats, high: Floats) -> Floats:
 
 
 def _reached(frames: FramesLike, chosen: Indices, support: Support) -> Floats:
-    """Return points (m, picture) around all that the blocks and the ground below them take up."""
+    """Return points (m, picture) around all that each block and the ground below it take up, (3 n, b, 2)."""
     angle = frames.angle[chosen] + support.tilt
     cosine, sine = np.abs(np.cos(angle)), np.abs(np.sin(angle))
     wide = cosine * frames.size_x + sine * frames.size_y
@@ -106,7 +138,7 @@ def _reached(frames: FramesLike, chosen: Indices, support: Support) -> Floats:
     offsets = support.offset(frames.time[chosen])[:, None]
     below = np.stack([x, support.height(x - offsets[..., 0]) + offsets[..., 1]], axis=-1)
     centres, below = turned(centres, support.tilt), turned(below, support.tilt)
-    return np.concatenate([centres - half, centres + half, below]).reshape(-1, 2)
+    return np.concatenate([centres - half, centres + half, below])
 
 
 def _extreme_offsets(frames: FramesLike, chosen: Indices, support: Support) -> Floats:

@@ -49,6 +49,7 @@ def test_mistakes_are_told(blocksim: Command, finished: Path, arguments: list[st
 
 def test_missing_package_for_mp4_is_told(blocksim: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setenv("PATH", "")
     answer = blocksim("animate", finished, "--out", "film.mp4")
     assert answer.code == 69
     assert "pip install 'blocksim[video]'" in answer.err

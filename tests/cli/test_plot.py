@@ -1,10 +1,12 @@
 """blocksim plot: pictures of finished, failed and damaged runs."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from tests.cli.conftest import SOFT, Command
 
@@ -39,6 +41,27 @@ def test_other_kinds_are_drawn(blocksim: Command, finished: Path, kind: str, tol
     assert f"<!-- {told} -->" in Path("picture.svg").read_text(encoding="utf-8")
 
 
+def test_the_last_frame_is_reached_by_the_time_printed_above_it(blocksim: Command, finished: Path) -> None:
+    assert blocksim("plot", finished, "--out", "strip.svg").code == 0
+    texts = Path("strip.svg").read_text(encoding="utf-8")
+    printed = re.findall(r"<!-- ([0-9.]+) s, final -->", texts)
+    for kind in ("strip", "final"):
+        for at in (printed[0], f"{printed[0]} s", f"{1000.0 * float(printed[0]):.0f} ms"):
+            assert blocksim("plot", finished, "--kind", kind, "--at", at, "--out", "end.svg").code == 0
+            assert f"<!-- {printed[0]} s, final -->" in Path("end.svg").read_text(encoding="utf-8")
+
+
+def test_page_frames_and_colours_are_those_asked_for(blocksim: Command, finished: Path) -> None:
+    look = ("--frames", 4, "--colour", "speed", "--size", "640x480px", "--dpi", 80)
+    assert blocksim("plot", finished, *look, "--out", "strip.png").code == 0
+    with Image.open("strip.png") as picture:
+        assert picture.size == (640, 480)
+    assert blocksim("plot", finished, *look[:4], "--out", "strip.svg").code == 0
+    texts = Path("strip.svg").read_text(encoding="utf-8")
+    assert len(re.findall(r"<!-- [0-9.]+ s(?:, \w+)? -->", texts)) == 4
+    assert "<!-- speed (m/s) -->" in texts
+
+
 def test_killed_run_is_drawn_and_told(blocksim: Command, copied: Path) -> None:
     for name in ("run.json", "done.json", "final.csv"):
         (copied / name).unlink()
@@ -69,9 +92,20 @@ def test_the_folder_alone_tells_what_the_blocks_stand_on(blocksim: Command) -> N
     [
         (["--out", "strip.bmp"], 65, "'.bmp' is no picture format"),
         (["--out", "nix/strip.png"], 74, "nix/strip.png: cannot be written"),
-        (["--times", "0,x"], 65, "--times 0,x: give times in seconds"),
+        (["--times", "0,x"], 2, "'x' is no time; give"),
+        (["--at", "5 furlongs"], 2, "'5 furlongs' is no time; give"),
+        (["--size", "10 by 20"], 2, "'10 by 20' is no size of a picture"),
+        (["--size", "5x3000mm"], 2, "20 to 2000 mm"),
+        (["--size", "40x30mm"], 65, "--size 40x30 mm is too small for this picture"),
+        (["--size", "2000x2000mm", "--dpi", "300"], 2, "million pixels"),
+        (["--colour", "mood"], 2, "'mood' is unknown; choose block, material, speed, turn"),
+        (["--block", ","], 2, "give one name or several"),
+        (["--block", "1"], 65, "--block chooses the blocks of a run's history, but this picture is of the kind strip"),
+        (["--kind", "history", "--block", "7"], 65, "--block 7: no such block in this run, its 3 blocks are 1, 2, 3"),
+        (["--kind", "history", "--at", "0"], 65, "--at picks frames of a run's strip or final picture"),
+        (["--kind", "history", "--colour", "speed"], 65, "coloured by block or material"),
         (["--kind", "finel"], 65, "--kind finel: no such picture of a run, did you mean 'final'?"),
-        (["--kind", "final", "--times", "0"], 65, "--kind final has none to pick"),
+        (["--kind", "final", "--frames", "4"], 65, "--frames counts the panels of a run's strip"),
         (["--times", "0,99"], 65, "outside the recorded span"),
         (["--experiment", "nix.csv"], 66, "nix.csv: no such file"),
     ],
@@ -110,7 +144,7 @@ def test_sweep_gets_the_picture_that_is_asked_for(blocksim: Command) -> None:
     vary = ("--vary", "structures.0.overlap=9 mm:11 mm:3", "--vary", "gravity=5:10:3")
     assert blocksim(*SWEEP, *vary).code == 0
     marks = {
-        "map": "turns of the blocks",
+        "map": "final rotations of all blocks",
         "matrix": "overlap (mm)",
         "histogram": "all 9 cases",
         "lines": "gravity = 5.0",
@@ -127,7 +161,7 @@ def test_sweep_gets_the_picture_that_is_asked_for(blocksim: Command) -> None:
         (["--kind", "mapp"], "--kind mapp: unknown kind, did you mean 'map'?"),
         (["--kind", "tornado"], "a tornado is drawn from a table of indices"),
         (["--out", "swept.bmp"], "'.bmp' is no picture format"),
-        (["--times", "0,0.01"], "--times picks frames of a run, but swept is a sweep"),
+        (["--times", "0,0.01"], "--at picks frames of a run's strip or final picture, but swept is a sweep"),
     ],
 )
 def test_sweep_that_cannot_be_drawn_is_told(blocksim: Command, arguments: list[str], told: str) -> None:

@@ -11,14 +11,17 @@ from matplotlib.colors import to_rgb
 from PIL.GifImagePlugin import GifImageFile
 
 from blocksim.errors import InvalidInputError, OutputError, UnavailableError
+from blocksim.scenario import load_scenario
 from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.frames import Frames
 from blocksim.view.animation import Film, Look, Pace, Pixels, draw_film, timed
 from blocksim.view.gif import ticks
+from blocksim.view.paint import PAINTS
 from blocksim.view.style import BLOCK_COLOURS
 from blocksim.view.support import Support
 from tests.view.made_up import HOSTILE, toppling
 
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
 FAST = Pace(speed=1.0, rate=10.0)
 SMALL = Look(width=240)
 MOVING = Support(motion=MotionPieces(np.array([0.0, 1.0]), np.array([[0.0, 0.02, 0.0, 0.0]]), 0.02))
@@ -111,7 +114,7 @@ def test_a_single_frame_is_a_film() -> None:
 
 def test_gif_plays_as_long_as_it_should(tmp_path: Path) -> None:
     path = tmp_path / "film.gif"
-    assert draw_film(toppling(3), path, Pace(0.5, 30.0), SMALL) == 37
+    assert draw_film(toppling(3), path, Pace(0.5, 30.0), SMALL) == (37, 0)
     with GifImageFile(path) as film:
         length = 0
         for index in range(film.n_frames):
@@ -192,8 +195,67 @@ def test_a_film_that_is_not_whole_is_not_kept(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_the_system_s_ffmpeg_writes_mp4_where_the_package_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = pytest.importorskip("imageio_ffmpeg", reason="no ffmpeg to stand for the system's")
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "ffmpeg").symlink_to(package.get_ffmpeg_exe())
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    path = tmp_path / "film.mp4"
+    draw_film(toppling(2), path, FAST, SMALL)
+    written, seconds = package.count_frames_and_secs(str(path))
+    assert written == 6 + 15
+    assert seconds == pytest.approx(2.1, abs=0.01)
+
+
+@pytest.mark.parametrize("program", ["exit 1", "head -c 1000 >/dev/null; exit 1", "cat >/dev/null; exit 3"])
+def test_a_film_that_the_system_s_ffmpeg_does_not_finish_is_not_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, program: str
+) -> None:
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "ffmpeg").write_text(f"#!/bin/sh\n{program}\n", encoding="utf-8")
+    (tmp_path / "bin" / "ffmpeg").chmod(0o755)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:/usr/bin:/bin")
+    with pytest.raises(OutputError, match=r"film\.mp4: cannot be written: ffmpeg stopped before the end"):
+        draw_film(toppling(1), tmp_path / "film.mp4", FAST, SMALL)
+    assert [one.name for one in tmp_path.iterdir()] == ["bin"]
+
+
+@pytest.mark.parametrize("name", ["material", "speed", "turn"])
+def test_a_film_is_coloured_like_the_other_pictures(name: str) -> None:
+    frames = toppling(2)
+    frames.vx[:, 1] *= 2.0
+    paint = PAINTS[name](frames, load_scenario(SCENARIOS / "slope.toml"))
+    film = Film(frames, Support(), Look(width=400, trails=False, paint=paint))
+    for block in range(2):
+        found = pixel_of(film, film.picture(20), *near_the_centre(frames, 20, block))
+        assert found == [round(255 * part) for part in to_rgb(paint.fills(20)[block])]
+
+
+def test_one_far_flyer_does_not_make_the_structure_small() -> None:
+    near, far = toppling(60), toppling(60)
+    far.x[-1, 59] += 5.0
+    films = [Film(frames, Support(), SMALL) for frames in (near, far)]
+    assert films[1].page.points_per_mm > 0.9 * films[0].page.points_per_mm
+    assert np.flatnonzero(~films[1].seen).tolist() == [59]
+    assert films[0].seen.all()
+
+
+def test_debris_of_a_collapse_and_each_of_few_blocks_stay_in_the_window() -> None:
+    frames = toppling(60)
+    frames.x[-1] += np.linspace(0.0, 1.0, 60)  # spread out, without a gap
+    assert Film(frames, Support(), SMALL).seen.all()
+    few = toppling(3)
+    few.x[-1, 2] += 0.1
+    assert Film(few, Support(), SMALL).seen.all()
+
+
 def test_missing_package_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setenv("PATH", "")
     with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[video\]'"):
         draw_film(toppling(1), tmp_path / "film.mp4", FAST, SMALL)
     assert list(tmp_path.iterdir()) == []

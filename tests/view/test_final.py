@@ -7,12 +7,15 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from blocksim.analysis import load_table
 from blocksim.errors import InvalidInputError, OutputError
-from blocksim.view import final
+from blocksim.view import final, style
 from blocksim.view.final import draw_final
+from blocksim.view.paint import by_turn
+from blocksim.view.paper import Paper
 from blocksim.view.support import Support
 from tests.view.made_up import HOSTILE, boxes_of, overlapping, stacked, toppling
 
@@ -71,16 +74,36 @@ def test_a_measured_range_is_drawn_where_it_was_measured(caught: list[Figure]) -
     assert any(len(bar) == 2 and np.allclose(bar, ends, atol=0.5) for bar in bars)
 
 
-def test_many_blocks_are_coloured_by_rotation(caught: list[Figure]) -> None:
+def test_many_blocks_keep_their_colours_or_take_those_of_their_rotation(caught: list[Figure]) -> None:
     frames = toppling(1000)
     frames.angle[-1, :5] = -10.0  # farther than half a turn
-    draw_final(frames, "final.png", title="many")
-    fills = [
-        one for one in caught[0].axes[0].collections if isinstance(one, PolyCollection) and one.get_array() is not None
-    ]
-    assert fills[0].get_array().tolist() == pytest.approx(np.degrees(frames.angle[-1]).tolist())  # type: ignore[union-attr]
-    assert fills[0].get_clim() == (-180.0, 180.0)
-    assert "1000 blocks, coloured by" in "".join(text for text, _ in boxes_of(caught[0]))
+    for paint in (None, by_turn(frames)):
+        draw_final(frames, "final.png", title="many", paint=paint)
+        assert overlapping(caught[-1]) == []
+        assert "1000 blocks: too many to name" in "".join(text for text, _ in boxes_of(caught[-1]))
+    own, turned = (fills_of(figure) for figure in caught)
+    assert own[:7] == [style.block_colour(index) for index in range(7)]
+    assert len(set(turned[:5])) == 1
+    assert turned[0] != turned[6] == turned[7]
+
+
+def fills_of(figure: Figure) -> list[str]:
+    """Return the fills of free blocks."""
+    drawn = [one for one in figure.axes[0].collections if isinstance(one, PolyCollection)]
+    return [to_hex(colour).upper() for colour in np.asarray(drawn[1].get_facecolor())]
+
+
+def test_another_moment_can_be_drawn_and_has_no_measured_ranges(caught: list[Figure]) -> None:
+    draw_final(toppling(3, steps=61), "final.png", measured=TABLE, times=[0.3])
+    texts = [text for text, _ in boxes_of(caught[0])]
+    assert "0.300 s" in texts
+    assert not any(text.startswith("measured") for text in texts)
+
+
+@pytest.mark.parametrize("size", [(3.2, 4.6), (7.0, 4.2), (12.0, 9.0)])
+def test_a_page_has_the_size_that_was_asked_for(caught: list[Figure], size: tuple[float, float]) -> None:
+    draw_final(toppling(3), "final.png", title="a title", measured=TABLE, paper=Paper(size))
+    assert caught[0].get_size_inches().tolist() == list(size)
     assert overlapping(caught[0]) == []
 
 

@@ -70,21 +70,23 @@ def test_every_panel_has_its_arrows_and_nothing_overlaps(caught: list[Figure], k
     assert any("Arrows: contact forces" in text.get_text() for text in figure.texts)
 
 
-def test_history_shows_what_the_supports_hold_over_the_weight(caught: list[Figure]) -> None:
+def test_history_shows_what_the_supports_hold_in_newtons_beside_the_weight(caught: list[Figure]) -> None:
     frames = pressed(toppling(3))
     KINDS["history"](frames, "picture.png", support=Support(weight=12.0), forces=True)
     held = caught[0].axes[5]
-    assert held.get_ylabel() == "held / weight"
+    assert held.get_ylabel() == "support force (N)"
     assert frames.contacts is not None
-    np.testing.assert_allclose(np.array(held.lines[1].get_ydata(), dtype=float), borne(frames.contacts) / 12.0)
+    np.testing.assert_allclose(np.array(held.lines[0].get_ydata(), dtype=float), borne(frames.contacts))
+    np.testing.assert_allclose(np.array(held.lines[1].get_ydata(), dtype=float), 12.0)
     assert overlapping(caught[0]) == []
 
 
 def test_history_cuts_impacts_and_tells_the_largest(caught: list[Figure]) -> None:
     KINDS["history"](pressed(toppling(3)), "picture.png", support=Support(weight=0.1))
     held = caught[0].axes[5]
-    assert held.get_ylim() == (0.0, 3.0)
-    assert "largest: 240" in held.texts[0].get_text()
+    assert held.get_ylabel() == "support force (mN)"
+    assert held.get_ylim() == pytest.approx((0.0, 300.0))
+    assert "largest: 2.4e+04 mN" in held.texts[0].get_text()
     assert overlapping(caught[0]) == []
 
 

@@ -92,6 +92,14 @@ def test_times_find_their_nearest_frames_in_the_order_given() -> None:
     assert list(moments_at(frames, drawable_frames(frames), [0.29, 0.0, 0.14])) == [3, 0, 1]
 
 
+def test_the_printed_time_of_the_last_frame_means_the_last_frame() -> None:
+    frames = moving([0.0, 1.0, 2.0, 3.0])
+    frames.time[:] = [0.0, 0.1, 0.299, 0.2994]  # a run that came to rest between two outputs
+    assert list(moments_at(frames, drawable_frames(frames), [0.299, 0.2990001])) == [3, 2]
+    frames.time[-1] = 0.3546
+    assert list(moments_at(frames, drawable_frames(frames), [0.355])) == [3]
+
+
 @pytest.mark.parametrize(
     ("times", "message"),
     [

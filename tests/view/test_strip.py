@@ -20,9 +20,11 @@ from blocksim.errors import InvalidInputError, OutputError
 from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.contacts import Contacts
 from blocksim.view import strip, style
+from blocksim.view.paper import Paper
 from blocksim.view.strip import arrangement, draw_strip, measured_ranges, plan, widened
 from blocksim.view.support import Support
 from blocksim.view.window import Extent
+from tests.view.made_up import overlapping
 
 Floats = NDArray[np.float64]
 
@@ -303,6 +305,24 @@ def test_a_scene_is_widened_to_hold_what_was_measured_and_a_tower_s_caption() ->
     assert wide.right > 400.0
     tower = widened(Extent(0.0, 30.0, 0.0, 1000.0), [])
     assert tower.width == pytest.approx(strip.NARROWEST * 1000.0)
+
+
+@pytest.mark.parametrize("size", [(4.0, 6.0), (10.0, 2.5), (3.0, 12.0)])
+@pytest.mark.parametrize("count", [2, 11])
+def test_a_page_has_the_size_that_was_asked_for_and_its_panels_lie_in_it(
+    picture: list[Figure], tmp_path: Path, size: tuple[float, float], count: int
+) -> None:
+    draw_strip(toppling(3), tmp_path / "strip.png", count=count, paper=Paper(size))
+    assert picture[0].get_size_inches().tolist() == list(size)
+    assert len(picture[0].axes) == count
+    assert overlapping(picture[0]) == []
+    boxes = [axes.get_position() for axes in picture[0].axes]
+    assert min(min(box.x0, box.y0, 1.0 - box.x1, 1.0 - box.y1) for box in boxes) > 0.0
+
+
+def test_a_page_that_is_too_small_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"--size 25.4x25.4 mm is too small for this picture: at least \d+ mm"):
+        draw_strip(toppling(3), tmp_path / "strip.png", paper=Paper((1.0, 1.0)))
 
 
 def test_importing_the_room_does_not_load_matplotlib() -> None:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 DOTS: dict[str, Any] = {"s": 9.0, "linewidth": 0.5, "zorder": 2}
+HALO: dict[str, Any] = {"colors": "#FFFFFF", "linewidths": 2.4, "zorder": 2.9}  # so that it is seen on any colour
 OUTLINE: dict[str, Any] = {"colors": style.MEASURED_COLOUR, "linewidths": 0.9, "zorder": 3}
 FAILED: dict[str, Any] = {"marker": "x", "s": 10.0, "linewidth": 0.7, "color": style.INK, "zorder": 4}
 MARGIN = 0.03  # of an axis around dots
@@ -73,15 +74,17 @@ def on_grid(plane: Plane, numbers: Floats) -> tuple[Floats, Floats, Floats]:
     return x, y, table
 
 
-def _draw_cells(axes: "Axes", plane: Plane, numbers: Floats, look: dict[str, Any], agrees: Flags | None) -> None:
+def _draw_cells(axes: "Axes", plane: Plane, numbers: Floats, colours: dict[str, Any], agrees: Flags | None) -> None:
     from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
 
     x, y, table = on_grid(plane, numbers)
     edges = (edges_of(x, is_log=plane.axes[0].is_log), edges_of(y, is_log=plane.axes[1].is_log))
-    axes.pcolormesh(*edges, np.ma.masked_invalid(table), **look, rasterized=True, zorder=1)
+    axes.pcolormesh(*edges, np.ma.masked_invalid(table), **colours, rasterized=True, zorder=1)
     if agrees is not None:
         mask = on_grid(plane, agrees.astype(np.float64))[2] == 1.0
-        axes.add_collection(LineCollection(outline_of(mask, *edges), **OUTLINE))
+        lines = outline_of(mask, *edges)
+        for look in (HALO, OUTLINE):
+            axes.add_collection(LineCollection(lines, **look, capstyle="projecting"))
 
 
 def _draw_dots(axes: "Axes", plane: Plane, numbers: Floats, look: dict[str, Any], agrees: Flags | None) -> None:

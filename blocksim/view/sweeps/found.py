@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.view.series import most_moving
+from blocksim.view.series import most_moving, scale_of
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -35,8 +35,11 @@ class Input:
         return len(np.unique(self.values))
 
     def told(self, value: float) -> str:
-        """Return a value as it stands in a label, in SI."""
-        return self.levels[int(value)] if self.levels else f"{value:.6g}{' ' if self.unit else ''}{self.unit}"
+        """Return a value as it stands in a label, in the unit in which it is best read."""
+        if self.levels:
+            return self.levels[int(value)]
+        factor, unit = scale_of(abs(value), self.unit) if self.unit else (1.0, "")
+        return f"{value * factor:.6g}{' ' if unit else ''}{unit}".replace("-", "−")
 
 
 @dataclass(frozen=True, eq=False)

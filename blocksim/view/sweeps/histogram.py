@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.view import style
+from blocksim.view.paper import OWN, Paper
 from blocksim.view.sweeps import layout
 from blocksim.view.sweeps.colours import percent
 from blocksim.view.sweeps.found import Flags, Floats, FoundSweep
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 LEFT, RIGHT, FOOT = 0.55, 0.2, 0.42  # inches
 PANEL_HEIGHT, GAP, ROOM = 1.15, 0.62, 0.26  # inches; ROOM is above the bars, for the repeats
+NARROWEST, LOWEST = 2.6, 0.6  # inches, of a page and a panel where a size was asked for
+NAME_ROOM = 1.2  # inches, for the name of a block
 CAPTION = 0.2  # inches, of the text above a panel
 LINE = 0.145  # inches, of a row of text
 MOST_BLOCKS = 4
@@ -35,23 +38,26 @@ def suits(_sweep: FoundSweep) -> bool:
     return True
 
 
-def draw(sweep: FoundSweep, path: Path) -> None:
+def draw(sweep: FoundSweep, path: Path, paper: Paper = OWN) -> None:
     """Draw a panel for each block that moves."""
     blocks = sweep.moving[-MOST_BLOCKS:]
     legend = _entries(sweep)
     foot = FOOT + LINE * -(-len(legend) // 2) + 2.0 * layout.EDGE
-    head = layout.title_height(sweep.title, layout.COLUMN_WIDTH) + CAPTION
-    height = head + len(blocks) * PANEL_HEIGHT + (len(blocks) - 1) * GAP + foot
-    with style.styled_figure(layout.COLUMN_WIDTH, height) as figure:
+    width = paper.width(layout.COLUMN_WIDTH, NARROWEST)
+    head = layout.title_height(sweep.title, width) + CAPTION
+    others = head + (len(blocks) - 1) * GAP + foot
+    panel = paper.panel(PANEL_HEIGHT, len(blocks), others, LOWEST)
+    height = paper.height(others + len(blocks) * panel)
+    with style.styled_figure(width, height, paper.dots) as figure:
         layout.write_title(figure, sweep.title)
         for row, block in enumerate(blocks):
-            bottom = foot + (len(blocks) - 1 - row) * (PANEL_HEIGHT + GAP)
-            place = (LEFT, bottom, layout.COLUMN_WIDTH - LEFT - RIGHT, PANEL_HEIGHT)
-            _draw_block(layout.add_axes(figure, *place), sweep, block)
+            bottom = foot + (len(blocks) - 1 - row) * (panel + GAP)
+            axes = layout.add_axes(figure, LEFT, bottom, width - LEFT - RIGHT, panel)
+            _draw_block(axes, sweep, block, ROOM / (panel - ROOM))
         figure.legend(
             handles=legend,
             loc="lower left",
-            bbox_to_anchor=(layout.EDGE / layout.COLUMN_WIDTH, layout.EDGE / height),
+            bbox_to_anchor=(layout.EDGE / width, layout.EDGE / height),
             ncols=2,
             frameon=False,
             borderpad=0.0,
@@ -70,7 +76,8 @@ def limits_of(x_mm: Floats, others: Floats) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _draw_block(axes: "Axes", sweep: FoundSweep, block: int) -> None:
+def _draw_block(axes: "Axes", sweep: FoundSweep, block: int, room: float) -> None:
+    """Draw a panel; `room` is that above the bars, over their height."""
     name = sweep.blocks[block]
     x = sweep.x_mm[sweep.finished, block]
     inside = None if sweep.inside is None else sweep.inside[sweep.finished]
@@ -80,13 +87,14 @@ def _draw_block(axes: "Axes", sweep: FoundSweep, block: int) -> None:
     top = _draw_bars(axes, x, inside, len(sweep.finished), limits)
     _draw_measured(axes, repeats, interval, top)
     axes.set_xlim(*limits)
-    axes.set_ylim(0.0, top * (1.0 + ROOM / (PANEL_HEIGHT - ROOM)))
+    axes.set_ylim(0.0, top * (1.0 + room))
     axes.spines[["right", "top"]].set_visible(False)
     for side in (axes.xaxis, axes.yaxis):
         layout.number_axis(side)
     axes.set_yticks([tick for tick in axes.get_yticks() if tick <= top])
     axes.set_ylabel("cases (%)")
-    axes.set_xlabel(f"final x of block {name} (mm)", labelpad=2.0)
+    shown = style.cut_to(name, NAME_ROOM * style.POINTS_PER_INCH, style.FONT_SIZE)
+    axes.set_xlabel(f"final x of block {shown} (mm)", labelpad=2.0)
     axes.set_title(_caption(x, limits), loc="left", pad=4.0)
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 from blocksim.view.sweeps.found import FoundSweep
 
@@ -17,4 +16,4 @@ class Kind:
     meaning: str
     refusal: Callable[[FoundSweep], str]  # why it cannot show a sweep; empty where it can
     suits: Callable[[FoundSweep], bool]
-    draw: Callable[[FoundSweep, Path], None]
+    draw: Callable[..., None]  # (sweep, path, paper = OWN)

@@ -15,6 +15,7 @@ EDGE = 0.08  # inches, between text and the figure's edge
 TITLE_LINE, TITLE_GAP = 0.19, 0.12  # inches
 WIDE_LETTER = 0.56  # of the font size, a mean of letters
 MANY = 5  # numbers along an axis
+LINE = 0.145  # inches, of a row of text
 
 
 def add_axes(figure: "Figure", left: float, bottom: float, width: float, height: float) -> "Axes":

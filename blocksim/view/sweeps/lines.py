@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from blocksim.view.paper import OWN, Paper
 from blocksim.view.series import MOST_COLUMNS, draw_series
 from blocksim.view.sweeps.found import Flags, Floats, FoundSweep, Input
 from blocksim.view.sweeps.kind import Kind
@@ -40,11 +41,12 @@ def suits(sweep: FoundSweep) -> bool:
     return other is None or other.count <= MOST_COLUMNS
 
 
-def draw(sweep: FoundSweep, path: Path) -> None:
+def draw(sweep: FoundSweep, path: Path, paper: Paper = OWN) -> None:
     """Draw the lines."""
     axis, _ = _axis_and_other(sweep)
     ranges = {block: ends for block in sweep.blocks if (ends := sweep.measured.range_of(block)) is not None}
-    draw_series(list(series_of(sweep)), sweep.blocks, (axis.key, axis.unit), path, title=sweep.title, measured=ranges)
+    key = axis.key, axis.unit
+    draw_series(list(series_of(sweep)), sweep.blocks, key, path, title=sweep.title, measured=ranges, paper=paper)
 
 
 def series_of(sweep: FoundSweep) -> Iterator[Series]:

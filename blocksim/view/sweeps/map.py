@@ -1,12 +1,13 @@
 """Outcome map: over two inputs, how far the blocks get and which class the outcome is of; a column a third input."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from blocksim.view import style
+from blocksim.view.paper import OWN, Paper
 from blocksim.view.series import MOST_COLUMNS, ValueAxis, value_axis
 from blocksim.view.sweeps import layout
 from blocksim.view.sweeps.cells import Plane, draw_panel, mark_failed
@@ -21,8 +22,10 @@ if TYPE_CHECKING:
 LEFT, RIGHT, FOOT = 0.80, 0.62, 0.42  # inches; the bars of colour are to the right
 ROW_HEIGHT, ROW_GAP, COLUMN_GAP = 1.25, 0.30, 0.12  # inches
 NARROWEST, WIDEST = 1.55, 2.1  # inches, of a panel
+LEAST, LOWEST = 0.7, 0.5  # inches, of a panel on a page whose size was asked for
+X_LABEL = 0.25  # inches from the panels down to the name of their axis
+NAME_ROOM = 1.2  # inches, for the name of a block
 HEADING = 0.18  # inches, of a heading above panels
-LINE = 0.145  # inches, of a row of text
 MOST_BLOCKS = 3
 AXES = 2
 FEWEST = 3  # values of an input that is an axis
@@ -38,6 +41,8 @@ class _Map:
     columns: tuple[tuple[str, Flags], ...]  # heading, and the cases (n,)
     blocks: list[int]
     axes: tuple[ValueAxis, ValueAxis]
+    paper: Paper = OWN
+    row_height: float = ROW_HEIGHT
 
     def plane(self, cases: Flags) -> Plane:
         """Return the inputs of some cases."""
@@ -47,10 +52,10 @@ class _Map:
     @property
     def panel_width(self) -> float:
         """Inches."""
-        if len(self.columns) == 1:
-            return layout.COLUMN_WIDTH - LEFT - RIGHT
-        room = layout.PAGE_WIDTH - LEFT - RIGHT - (len(self.columns) - 1) * COLUMN_GAP
-        return min(WIDEST, room / len(self.columns))
+        count, gaps = len(self.columns), LEFT + RIGHT + (len(self.columns) - 1) * COLUMN_GAP
+        if self.paper.size is not None:
+            return (self.paper.width(0.0, gaps + count * LEAST) - gaps) / count
+        return layout.COLUMN_WIDTH - gaps if count == 1 else min(WIDEST, (layout.PAGE_WIDTH - gaps) / count)
 
     @property
     def legend_columns(self) -> int:
@@ -60,7 +65,27 @@ class _Map:
     @property
     def head(self) -> float:
         """Inches between the title and the panels."""
-        return HEADING if len(self.columns) == 1 else 2.0 * HEADING
+        lines = max(len(self.heading(column)) for column in range(len(self.columns)))
+        return HEADING if len(self.columns) == 1 else 2.0 * HEADING + (lines - 1) * layout.LINE
+
+    def heading(self, column: int) -> list[str]:
+        """Return the lines above a column."""
+        return style.broken(self.columns[column][0], self.panel_width, bold=True)
+
+    @property
+    def x_label(self) -> list[str]:
+        """Return the lines below all panels."""
+        return style.broken(self.axes[0].label, self.width - LEFT)
+
+    @property
+    def rows(self) -> int:
+        """How many rows of panels there are."""
+        return len(self.blocks) + 1
+
+    @property
+    def panels_height(self) -> float:
+        """Inches of all rows."""
+        return self.rows * self.row_height + (self.rows - 1) * ROW_GAP
 
     @property
     def width(self) -> float:
@@ -83,26 +108,25 @@ def refusal(sweep: FoundSweep) -> str:
     return "a map needs two inputs that are numbers" if len(_axes_of(sweep)) < AXES else ""
 
 
-def draw(sweep: FoundSweep, path: Path) -> None:
+def draw(sweep: FoundSweep, path: Path, paper: Paper = OWN) -> None:
     """Draw the map. Samples over more than two inputs are seen along all others."""
-    found = _map_of(sweep)
+    found = _map_of(sweep, paper)
     classes = classes_of(sweep)
     notes = layout.wrapped(_notes(found), found.width - 2.0 * layout.EDGE)
-    labels = -(-len(_shown_classes(classes)) // found.legend_columns)
-    foot = FOOT + LINE * (len(notes) + labels) + 2.0 * layout.EDGE
-    rows = len(found.blocks) + 1
-    height = (
-        layout.title_height(sweep.title, found.width) + found.head + rows * ROW_HEIGHT + (rows - 1) * ROW_GAP + foot
-    )
-    with style.styled_figure(found.width, height) as figure:
+    below = len(notes) - (-len(_shown_classes(classes)) // found.legend_columns)
+    foot = FOOT + layout.LINE * (below + len(found.x_label) - 1) + 2.0 * layout.EDGE
+    others = layout.title_height(sweep.title, found.width) + found.head + foot
+    height = paper.panel(ROW_HEIGHT, found.rows, others + (found.rows - 1) * ROW_GAP, LOWEST)
+    found = replace(found, row_height=height)
+    with style.styled_figure(found.width, paper.height(others + found.panels_height), paper.dots) as figure:
         layout.write_title(figure, sweep.title)
         for row, block in enumerate(found.blocks):
-            _draw_block(figure, found, block, foot + (rows - 1 - row) * (ROW_HEIGHT + ROW_GAP))
+            _draw_block(figure, found, block, foot + (found.rows - 1 - row) * (height + ROW_GAP))
         _draw_classes(figure, found, classes, foot)
-        _name_axes(figure, found, foot, rows)
-        _draw_legend(figure, found, classes, layout.EDGE + LINE * (len(notes) + labels))
+        _name_axes(figure, found, foot)
+        _draw_legend(figure, found, classes, layout.EDGE + layout.LINE * below)
         for number, line in enumerate(reversed(notes)):
-            place = (layout.EDGE, layout.EDGE + LINE * number)
+            place = (layout.EDGE, layout.EDGE + layout.LINE * number)
             layout.write_text(figure, *place, line, color=style.FAINT_INK, va="bottom")
         style.save_figure(figure, path)
 
@@ -112,7 +136,7 @@ def _axes_of(sweep: FoundSweep) -> tuple[Input, ...]:
     return tuple(sorted((one for one in sweep.inputs if one.is_number), key=lambda one: -one.count)[:AXES])
 
 
-def _map_of(sweep: FoundSweep) -> _Map:
+def _map_of(sweep: FoundSweep, paper: Paper) -> _Map:
     x, y = axes = _axes_of(sweep)
     others = [one for one in sweep.inputs if one not in axes and one.count <= MOST_COLUMNS]
     everything = np.ones(len(sweep.finished), dtype=bool)
@@ -122,14 +146,14 @@ def _map_of(sweep: FoundSweep) -> _Map:
         values = np.unique(others[0].values)
         columns = [(f"{name} = {others[0].told(value)}", others[0].values == value) for value in values]
     shown = tuple(value_axis(one.values, one.key, one.unit, is_even=one.is_even) for one in axes)
-    return _Map(sweep, x, y, tuple(columns), sweep.moving[-MOST_BLOCKS:], (shown[0], shown[1]))
+    return _Map(sweep, x, y, tuple(columns), sweep.moving[-MOST_BLOCKS:], (shown[0], shown[1]), paper)
 
 
 def _panels(figure: "Figure", found: _Map, bottom: float) -> "list[Axes]":
     """Return a row of empty panels."""
     step = found.panel_width + COLUMN_GAP
     return [
-        layout.add_axes(figure, LEFT + column * step, bottom, found.panel_width, ROW_HEIGHT)
+        layout.add_axes(figure, LEFT + column * step, bottom, found.panel_width, found.row_height)
         for column in range(len(found.columns))
     ]
 
@@ -155,9 +179,10 @@ def _draw_block(figure: "Figure", found: _Map, block: int, bottom: float) -> Non
         agrees = None if band is None else (x >= band[0]) & (x <= band[1])
     _draw_row(figure, found, bottom, x, {"cmap": colours, "norm": norm}, agrees)
     left = found.width - RIGHT + 0.1
-    bar = layout.add_axes(figure, left, bottom, 0.1, ROW_HEIGHT)
+    bar = layout.add_axes(figure, left, bottom, 0.1, found.row_height)
     _draw_bar(bar, colours, norm, band)
-    layout.write_text(figure, LEFT, bottom + ROW_HEIGHT + 0.05, f"final x of block {found.sweep.blocks[block]} (mm)")
+    name = style.cut_to(found.sweep.blocks[block], NAME_ROOM * style.POINTS_PER_INCH, style.FONT_SIZE)
+    layout.write_text(figure, LEFT, bottom + found.row_height + 0.05, f"final x of block {name} (mm)")
 
 
 def _draw_bar(axes: "Axes", colours: Any, norm: Any, band: tuple[float, float] | None) -> None:
@@ -180,23 +205,22 @@ def _draw_classes(figure: "Figure", found: _Map, classes: Classes, bottom: float
         "norm": BoundaryNorm(np.arange(len(classes.colours) + 1) - 0.5, len(classes.colours)),
     }
     _draw_row(figure, found, bottom, classes.numbers, look, found.sweep.inside)
-    layout.write_text(figure, LEFT, bottom + ROW_HEIGHT + 0.05, "turns of the blocks")
+    layout.write_text(figure, LEFT, bottom + found.row_height + 0.05, "final rotations of all blocks")
 
 
-def _name_axes(figure: "Figure", found: _Map, foot: float, rows: int) -> None:
+def _name_axes(figure: "Figure", found: _Map, foot: float) -> None:
     """Write the keys once below and beside all panels, numbers only at the outer ones, and headings at the top."""
-    columns = len(found.columns)
     for axes in figure.axes:
         if axes.get_label() != "<colorbar>":
             axes.tick_params(axis="x", labelbottom=_bottom_of(axes, figure) < foot + 0.01)
-    middle = 0.5 * (LEFT + found.width - RIGHT)
-    layout.write_text(figure, middle, foot - FOOT + 0.04, found.axes[0].label, ha="center", va="bottom")
-    upright = foot + 0.5 * (rows * ROW_HEIGHT + (rows - 1) * ROW_GAP)
-    layout.write_text(figure, layout.EDGE, upright, found.axes[1].label, ha="left", va="center", rotation=90.0)
-    top = foot + rows * ROW_HEIGHT + (rows - 1) * ROW_GAP + 0.22
-    for column, (heading, _) in enumerate(found.columns if columns > 1 else ()):
+    middle, upright = 0.5 * (LEFT + found.width - RIGHT), foot + 0.5 * found.panels_height
+    layout.write_text(figure, middle, foot - X_LABEL, "\n".join(found.x_label), ha="center", va="top")
+    label = "\n".join(style.broken(found.axes[1].label, found.panels_height))
+    layout.write_text(figure, layout.EDGE, upright, label, ha="left", va="center", rotation=90.0)
+    top = foot + found.panels_height + 0.22
+    for column in range(len(found.columns) if len(found.columns) > 1 else 0):
         left = LEFT + column * (found.panel_width + COLUMN_GAP)
-        layout.write_text(figure, left, top, heading, weight="bold")
+        layout.write_text(figure, left, top, "\n".join(found.heading(column)), weight="bold", va="bottom")
 
 
 def _bottom_of(axes: "Axes", figure: "Figure") -> float:

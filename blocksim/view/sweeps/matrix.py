@@ -1,5 +1,6 @@
 """Scatter matrix: every two of the inputs and the final x of the blocks, cases that agree and the repeats marked."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -7,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.view import style
+from blocksim.view.paper import OWN, Paper
 from blocksim.view.series import ValueAxis, value_axis
 from blocksim.view.sweeps import layout
 from blocksim.view.sweeps.colours import percent
@@ -17,11 +19,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
 
-LEFT, RIGHT, FOOT = 0.46, 0.78, 0.34  # inches
-LEVELS_LEFT, LEVELS_FOOT = 0.62, 0.54  # inches, where names of levels stand there
+LEFT, FOOT = 0.46, 0.34  # inches; more where names of levels stand there
 GAP = 0.05  # inches, between panels
-LINE = 0.145  # inches, of a row of text
-LARGEST_PANEL, SMALL_FONT = 1.1, 6.0  # inches, points
+LARGEST_PANEL, LOWEST = 1.1, 0.35  # inches
+SMALL_FONT, NAME_FONT = 6.0, style.FONT_SIZE - 1.0  # points
+NAME_ROOM = 1.5  # inches, of a line of a name; longer ones take several
+LONGEST_LEVEL = 1.0  # inches
+FITTINGS = 4  # smaller panels leave less room for names beside them
+CROWDED = 0.08  # of an axis; a number this near to its start runs into the last one of the panel before
 MOST_INPUTS, MOST_BLOCKS = 9, 3
 BINS = 16
 RARE = 0.5  # percent of run-outs at either end that may lie beyond an axis
@@ -69,37 +74,86 @@ def variables_of(sweep: FoundSweep) -> list[Variable]:
     ]
 
 
-def draw(sweep: FoundSweep, path: Path) -> None:
+def draw(sweep: FoundSweep, path: Path, paper: Paper = OWN) -> None:
     """Draw the lower half of the matrix, with histograms on its diagonal."""
     variables = variables_of(sweep)
-    count, has_levels = len(variables), any(one.levels for one in variables)
-    left = LEVELS_LEFT if has_levels else LEFT
-    size = min(LARGEST_PANEL, (layout.PAGE_WIDTH - left - RIGHT - (count - 1) * GAP) / count)
-    legend = _entries(sweep)
-    foot = (LEVELS_FOOT if has_levels else FOOT) + LINE + 2.0 * layout.EDGE
-    across = max(left + RIGHT + count * size + (count - 1) * GAP, layout.COLUMN_WIDTH)
-    height = layout.title_height(sweep.title, across) + count * size + (count - 1) * GAP + foot
-    with style.styled_figure(across, height) as figure:
+    count, legend = len(variables), _entries(sweep)
+    sides = _sides_of(variables)
+    foot = sides.foot + layout.LINE + 2.0 * layout.EDGE
+    size = _panel_size(variables, sides, paper)
+    across = paper.width(max(sides.left + _right_of(variables, size) + _grid(count, size), layout.COLUMN_WIDTH))
+    head = layout.title_height(sweep.title, across)
+    if paper.size is not None:
+        size = min(size, paper.panel(0.0, count, head + foot + (count - 1) * GAP, LOWEST))
+    height = paper.height(head + _grid(count, size) + foot)
+    with style.styled_figure(across, height, paper.dots) as figure:
         layout.write_title(figure, sweep.title)
         for row in range(count):
             bottom = foot + (count - 1 - row) * (size + GAP)
             for column in range(row + 1):
-                axes = layout.add_axes(figure, left + column * (size + GAP), bottom, size, size)
+                axes = layout.add_axes(figure, sides.left + column * (size + GAP), bottom, size, size)
                 _draw_panel(axes, sweep, variables[row], variables[column])
                 _finish(axes, variables[row], variables[column], is_left=column == 0 < row, is_last=row == count - 1)
-            place = (left + row * (size + GAP) + size + 0.04, bottom + 0.5 * size)
-            layout.write_text(figure, *place, variables[row].name, va="center", fontsize=style.FONT_SIZE - 1.0)
+            place = (sides.left + row * (size + GAP) + size + 0.04, bottom + 0.5 * size)
+            layout.write_text(figure, *place, variables[row].name, va="center", fontsize=NAME_FONT)
         figure.legend(handles=legend, **_legend_place(across, height))
         style.save_figure(figure, path)
+
+
+@dataclass(frozen=True)
+class _Sides:
+    """Inches to the left of the panels and below them."""
+
+    left: float
+    foot: float
+
+
+def _sides_of(variables: Sequence[Variable]) -> _Sides:
+    """Return what numbers and names of levels need."""
+    levels = [level for one in variables for level in one.levels]
+    if not levels:
+        return _Sides(LEFT, FOOT)
+    widest = max(style.width_of(level, SMALL_FONT) for level in levels) / style.POINTS_PER_INCH + 0.12
+    return _Sides(max(LEFT, widest), max(FOOT, widest))
+
+
+def _grid(count: int, size: float) -> float:
+    return count * size + (count - 1) * GAP
+
+
+def _right_of(variables: Sequence[Variable], size: float) -> float:
+    """Return the room (inches) to the right of the panels that the names beside the diagonal need."""
+    lines = [(row, line) for row, one in enumerate(variables) for line in one.name.split("\n")]
+    widths = [
+        style.width_of(line, NAME_FONT) / style.POINTS_PER_INCH - (len(variables) - 1 - row) * (size + GAP)
+        for row, line in lines
+    ]
+    return max(*widths, 0.0) + 0.04 + layout.EDGE
+
+
+def _panel_size(variables: Sequence[Variable], sides: _Sides, paper: Paper) -> float:
+    """Return the side of a panel (inches) so that the matrix fills the width of the page. Raises InvalidInputError."""
+    count, size = len(variables), LARGEST_PANEL
+    least = sides.left + _right_of(variables, LOWEST) + _grid(count, LOWEST)
+    width = paper.width(layout.PAGE_WIDTH, least)
+    for _ in range(FITTINGS):
+        size = min(size, (width - sides.left - _right_of(variables, size) - (count - 1) * GAP) / count)
+    return max(size, LOWEST)
 
 
 def _of_input(one: Input, name: str) -> Variable:
     if one.levels:
         spread = SCATTER * (np.arange(len(one.values)) * GOLDEN % 1.0 - 0.5)
-        return Variable(name, one.values + spread, (-0.5, len(one.levels) - 0.5), levels=one.levels)
+        room = LONGEST_LEVEL * style.POINTS_PER_INCH
+        levels = tuple(style.cut_to(level, room, SMALL_FONT) for level in one.levels)
+        return Variable(_in_lines(name), one.values + spread, (-0.5, len(levels) - 0.5), levels=levels)
     axis = value_axis(one.values, name, one.unit, is_even=one.is_even)
     values = axis.shown(one.values)
-    return Variable(axis.label, values, _around(values, axis), is_log=axis.is_log)
+    return Variable(_in_lines(axis.label), values, _around(values, axis), is_log=axis.is_log)
+
+
+def _in_lines(name: str) -> str:
+    return "\n".join(style.broken(name, NAME_ROOM, NAME_FONT))
 
 
 def _of_block(sweep: FoundSweep, block: int) -> Variable:
@@ -107,7 +161,7 @@ def _of_block(sweep: FoundSweep, block: int) -> Variable:
     repeats = sweep.measured.x_mm.get(name)
     ends = np.nanpercentile(x, [RARE, 100.0 - RARE])
     known = ends if repeats is None else np.concatenate([ends, repeats])
-    return Variable(f"x of {name} (mm)", x, _around(known, None), repeats=repeats)
+    return Variable(_in_lines(f"x of {name} (mm)"), x, _around(known, None), repeats=repeats)
 
 
 def _around(values: Floats, axis: ValueAxis | None) -> tuple[float, float]:
@@ -177,11 +231,24 @@ def _finish(axes: "Axes", up: Variable, across: Variable, *, is_left: bool, is_l
 
 def _number(side: "Axis", one: Variable) -> None:
     layout.number_axis(side, None if not one.is_log else ValueAxis("", 0.0, 1.0, is_log=True), most=2)
+    if side is side.axes.xaxis and not one.levels:
+        side.set_ticks(_clear_of_the_start(*one.limits, is_log=one.is_log))
     if one.levels:
-        side.set_ticks(range(len(one.levels)), [level[:9] for level in one.levels])
+        side.set_ticks(range(len(one.levels)), list(one.levels))
     if side is side.axes.xaxis:
         for label in side.get_ticklabels():
-            label.set_rotation(90.0 if one.levels else 45.0)
+            label.set(rotation=90.0 if one.levels else 45.0, rotation_mode="default" if one.levels else "anchor")
+            label.set_horizontalalignment("center" if one.levels else "right")
+
+
+def _clear_of_the_start(low: float, high: float, *, is_log: bool) -> list[float]:
+    """Return two numbers for an axis, none so near to its start that it runs into the last one of the panel before."""
+    from matplotlib.ticker import LogLocator, MaxNLocator  # noqa: PLC0415 - see style
+
+    locator = LogLocator() if is_log else MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10])
+    first = low * (high / low) ** CROWDED if is_log else low + CROWDED * (high - low)
+    clear = [float(tick) for tick in locator.tick_values(low, high) if first < tick <= high]
+    return sorted({clear[0], clear[-1]}) if clear else [high]
 
 
 def _entries(sweep: FoundSweep) -> list[Any]:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from blocksim.view.paper import OWN
 from blocksim.view.sweeps.cells import edges_of, on_grid, outline_of
 from blocksim.view.sweeps.colours import CLASS_COLOURS, OTHER_COLOUR, classes_of, percent, run_out_scale
 from blocksim.view.sweeps.found import FoundSweep, Input
@@ -23,7 +24,7 @@ def test_map_names_axes_blocks_classes_and_columns(tmp_path: Path) -> None:
         "friction.block_block.static",
         "contact.stiffness_scale",
         "final x of block 2 (mm)",
-        "turns of the blocks",
+        "final rotations of all blocks",
         "upright = level2",
         "failed: 5 %",
     ):
@@ -47,7 +48,7 @@ def test_map_of_samples_says_that_other_inputs_vary_too(tmp_path: Path) -> None:
 
 def test_numbers_stand_in_the_cells_of_their_inputs() -> None:
     sweep = made_up(grid())
-    found = _map_of(sweep)
+    found = _map_of(sweep, OWN)
     x, y, table = on_grid(found.plane(np.ones(35, dtype=bool)), sweep.x_mm[:, 1])
     assert x.tolist() == pytest.approx(np.linspace(0.2, 0.4, 7).tolist())
     assert y.tolist() == pytest.approx(np.geomspace(1e-3, 1e-1, 5).tolist())
@@ -58,7 +59,7 @@ def test_numbers_stand_in_the_cells_of_their_inputs() -> None:
 def test_cells_that_were_not_run_stay_empty() -> None:
     friction, scale = grid()
     cut = tuple(Input(one.key, one.unit, one.values[:-1]) for one in (friction, scale))
-    found = _map_of(made_up(cut))
+    found = _map_of(made_up(cut), OWN)
     _, _, table = on_grid(found.plane(np.ones(34, dtype=bool)), np.ones(34))
     assert np.argwhere(np.isnan(table)).tolist() == [[4, 6]]
 

@@ -1,0 +1,157 @@
+"""What a history can show over time: motions of blocks, absolute or relative to the ground, and their names."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from blocksim.errors import InvalidInputError
+from blocksim.scenario.spelling import nearest
+from blocksim.view.moments import Floats, FramesLike, Indices
+from blocksim.view.paint import MovingFrames
+from blocksim.view.support import Support
+from blocksim.view.window import MILLIMETRES
+
+ENERGY, CONTACTS, FORCE, GROUND = "energy", "contacts", "force", "ground"
+GROUPS = {"displacement": ("dx", "dy"), "velocity": ("vx", "vy")}
+USUAL = ("x", "y", "rotation", ENERGY, CONTACTS)
+SCENE = (ENERGY, CONTACTS, FORCE, GROUND)
+MOST_SLIPS = 2
+MOST_CHOSEN = 12  # blocks; more names have no room beside the panels
+LEAST_SPAN = 0.05  # mm, degrees, mm/s, degrees/s: an axis never shows less, so that round-off looks flat
+
+
+class HistoryFrames(MovingFrames, Protocol):
+    """Frames with velocities and spins."""
+
+    @property
+    def spin(self) -> Floats:
+        """Angular velocities (rad/s), (n, b)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What to show: panels by name (none: the usual ones), blocks by name (none: those that come farthest).
+
+    With `relative`, places and velocities are those seen from the moving ground.
+    """
+
+    panels: tuple[str, ...] = ()
+    blocks: tuple[str, ...] = ()
+    relative: bool = False
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One quantity of all blocks: n values of b blocks, and the column of the measured table that goes with it."""
+
+    label: str
+    values: Floats
+    quantity: str = ""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Chosen frames as seen from where the ground was at the start, or from the moving ground."""
+
+    frames: HistoryFrames
+    chosen: Indices
+    support: Support
+    relative: bool = False
+
+    @property
+    def from_ground(self) -> str:
+        """What labels say after a place or a velocity."""
+        return " − ground" if self.relative and self.support.motion is not None else ""
+
+    def place(self, axis: int) -> Floats:
+        """Return centres (mm) along x (0) or y (1)."""
+        places = (self.frames.x, self.frames.y)[axis][self.chosen]
+        return np.asarray(MILLIMETRES * (places - self._carried[:, axis, None]))
+
+    def velocity(self, axis: int) -> Floats:
+        """Return velocities (mm/s) along x (0) or y (1)."""
+        velocities = (self.frames.vx, self.frames.vy)[axis][self.chosen]
+        carried = np.multiply.outer(self.support.velocity(self._time), self.support.direction)
+        return np.asarray(MILLIMETRES * (velocities - carried[:, axis, None] * bool(self.from_ground)))
+
+    @property
+    def _time(self) -> Floats:
+        return self.frames.time[self.chosen]
+
+    @property
+    def _carried(self) -> Floats:
+        """How far the ground has moved (m), (n, 2); nothing where it is not asked for."""
+        return np.asarray(self.support.offset(self._time) * bool(self.from_ground))
+
+
+def _rotation(seen: Seen) -> Motion:
+    angle = seen.frames.angle
+    return Motion("rotation (°)", np.degrees(angle[seen.chosen] - angle[0]), "rotation")
+
+
+def _displacement(seen: Seen, axis: int) -> Floats:
+    """Return displacements (mm) from the first frame of the run."""
+    start = MILLIMETRES * (seen.frames.x, seen.frames.y)[axis][0]
+    return np.asarray(seen.place(axis) - start)
+
+
+def _speed(seen: Seen) -> Motion:
+    name = "relative speed" if seen.from_ground else "speed"
+    return Motion(f"{name} (mm/s)", np.hypot(seen.velocity(0), seen.velocity(1)))
+
+
+MOTIONS: dict[str, Callable[[Seen], Motion]] = {
+    "x": lambda seen: Motion(f"x{seen.from_ground} (mm)", seen.place(0), "" if seen.from_ground else "x"),
+    "y": lambda seen: Motion(f"y{seen.from_ground} (mm)", seen.place(1), "" if seen.from_ground else "y"),
+    "dx": lambda seen: Motion(f"Δx{seen.from_ground} (mm)", _displacement(seen, 0)),
+    "dy": lambda seen: Motion(f"Δy{seen.from_ground} (mm)", _displacement(seen, 1)),
+    "rotation": _rotation,
+    "vx": lambda seen: Motion(f"vx{seen.from_ground} (mm/s)", seen.velocity(0)),
+    "vy": lambda seen: Motion(f"vy{seen.from_ground} (mm/s)", seen.velocity(1)),
+    "speed": _speed,
+    "spin": lambda seen: Motion("spin (°/s)", np.degrees(seen.frames.spin[seen.chosen])),
+}
+PANELS = (*MOTIONS, *SCENE, *GROUPS)
+
+
+def panels_named(names: Sequence[str]) -> tuple[str, ...]:
+    """Return panels in the order asked for, groups as their members. Raises InvalidInputError for an unknown name."""
+    for name in names:
+        if name not in PANELS:
+            meant = nearest(name, PANELS, MOST_SLIPS)
+            hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join(PANELS)}"
+            message = f"--panels {name}: unknown panel, {hint}"
+            raise InvalidInputError(message)
+    return tuple(dict.fromkeys(one for name in names for one in GROUPS.get(name, (name,))))
+
+
+def blocks_named(frames: FramesLike, names: Sequence[str]) -> list[int]:
+    """Return the numbers (from 0) of blocks with these names. Raises InvalidInputError for unknown ones or too many."""
+    known = {name: number for number, name in enumerate(frames.names)}
+    for name in names:
+        if name not in known:
+            first = ", ".join(frames.names[:MOST_CHOSEN]) + (", …" if len(frames.names) > MOST_CHOSEN else "")
+            message = f"--block {name}: no such block in this run, its {len(known)} blocks are {first}"
+            raise InvalidInputError(message)
+    if len(names) > MOST_CHOSEN:
+        message = f"--block: {len(names)} blocks are too many for one picture, at most {MOST_CHOSEN}"
+        raise InvalidInputError(message)
+    return list(dict.fromkeys(known[name] for name in names))
+
+
+def farthest_blocks(frames: FramesLike, chosen: Indices, support: Support, most: int) -> list[int]:
+    """Return the blocks to colour, in their order: free ones, of many those that end farthest from their start."""
+    away = np.hypot(frames.x[chosen[-1]] - frames.x[0], frames.y[chosen[-1]] - frames.y[0])
+    free = ~np.array(support.fixed or (False,) * len(away))
+    ordered = [int(block) for block in np.argsort(-away, kind="stable") if free[block]]
+    return sorted(ordered[:most])
+
+
+def limits_of(values: Floats) -> tuple[float, float]:
+    """Return the ends of an axis around values, with a margin, never so near to each other that round-off is seen."""
+    low, high = float(values.min()), float(values.max())
+    margin = max(0.05 * (high - low), 0.5 * (LEAST_SPAN - (high - low)), 1e-9 * max(abs(low), abs(high)))
+    return low - margin, high + margin

@@ -1,0 +1,183 @@
+"""How blocks are coloured: each in its own colour, or by material, speed or the angle they have turned.
+
+A block has the same colour in every picture: strip, final state, history, animation and report.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from blocksim.scenario import Scenario, place_bodies
+from blocksim.view import style
+from blocksim.view.moments import Floats, FramesLike, drawable_frames
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SPEED_COLOURS = "YlGnBu"  # light at rest; darker in steps that are seen in grey as well
+TURN_COLOURS = "PuOr"  # told apart with every common colour blindness
+HALF_TURN = 180.0  # degrees; blocks that have turned farther share the colour
+LEAST_TURN = 1.0  # degrees
+RARE = 0.995  # share of all speeds that the scale covers
+PEAK = 1.5  # largest over that speed, from which the scale leaves the rest beyond its end
+BAR_HEIGHT, ENTRIES_HEIGHT = 0.50, 0.24  # inches, of what explains the colours
+BAR = 0.10  # inches
+LETTERS = 24  # of a material's name
+
+Fills = Callable[[int], Sequence[str]]
+
+
+class MovingFrames(FramesLike, Protocol):
+    """Frames with velocities."""
+
+    @property
+    def vx(self) -> Floats:
+        """Velocities along the ground (m/s), (n, b)."""
+        ...
+
+    @property
+    def vy(self) -> Floats:
+        """Velocities normal to it (m/s), (n, b)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A bar of colours: what it shows, the map, its ends, and beyond which of them values lie."""
+
+    label: str
+    colours: str
+    low: float
+    high: float
+    extend: str = "neither"
+
+
+@dataclass(frozen=True)
+class Paint:
+    """The fills (#rrggbb) of all blocks in a frame, and what explains them: named colours, a scale, or nothing."""
+
+    fills: Fills
+    entries: tuple[tuple[str, str], ...] = ()
+    scale: Scale | None = None
+
+    @property
+    def height(self) -> float:
+        """Height (inches) of what explains the colours."""
+        if self.scale is not None:
+            return BAR_HEIGHT
+        return ENTRIES_HEIGHT if self.entries else 0.0
+
+    @property
+    def is_lasting(self) -> bool:
+        """Whether a block keeps its colour throughout the run."""
+        return self.scale is None
+
+
+def by_block(frames: FramesLike) -> Paint:
+    """Return the default: blocks take turns in six colours."""
+    fills = [style.block_colour(index) for index in range(len(frames.names))]
+    return Paint(lambda _: fills)
+
+
+def by_material(scenario: Scenario) -> Paint:
+    """Return a colour for each material, in the order of the blocks; fixed bodies keep the ground's."""
+    bodies = place_bodies(scenario)
+    materials = list(dict.fromkeys(body.material for body in bodies))
+    colours = {name: style.block_colour(index) for index, name in enumerate(materials)}
+    fills = [colours[body.material] for body in bodies]
+    return Paint(lambda _: fills, tuple((style.shortened(name, LETTERS), colours[name]) for name in materials))
+
+
+def by_speed(frames: MovingFrames) -> Paint:
+    """Return a scale from rest to the largest speed; to that of all but the rarest where a few are far beyond."""
+    chosen = drawable_frames(frames)
+    speeds = np.hypot(frames.vx, frames.vy)
+    known = speeds[chosen]
+    largest = float(known.max()) or 1.0
+    usual = float(np.quantile(known[known > 0.0], RARE)) if (known > 0.0).any() else largest
+    is_cut = largest > PEAK * usual
+    factor, unit = (1.0, "m/s") if largest >= 1.0 else (1e3, "mm/s")
+    high = factor * (usual if is_cut else largest)
+    scale = Scale(f"speed ({unit})", SPEED_COLOURS, 0.0, high, "max" if is_cut else "neither")
+    return _scaled(factor * speeds, scale)
+
+
+def by_turn(frames: FramesLike) -> Paint:
+    """Return a scale of the angle turned since the start, the same to both sides."""
+    turns = np.degrees(frames.angle - frames.angle[0])
+    farthest = float(np.abs(turns[drawable_frames(frames)]).max())
+    most = min(max(farthest, LEAST_TURN), HALF_TURN)
+    return _scaled(
+        turns, Scale("rotation (°)", TURN_COLOURS, -most, most, "both" if farthest > most * 1.001 else "neither")
+    )
+
+
+def material_paint(_: FramesLike, scenario: Scenario) -> Paint:
+    """Return `by_material`, called as all others are."""
+    return by_material(scenario)
+
+
+# Each takes the frames and the scenario; another way to colour is one function and one line here.
+PAINTS: dict[str, Callable[[Any, Scenario], Paint]] = {
+    "block": lambda frames, _: by_block(frames),
+    "material": material_paint,
+    "speed": lambda frames, _: by_speed(frames),
+    "turn": lambda frames, _: by_turn(frames),
+}
+
+
+def draw_key(figure: "Figure", paint: Paint, left: float, bottom: float) -> None:
+    """Draw what explains the colours, its lower left corner at a place given in inches."""
+    if paint.scale is not None:
+        _draw_scale(figure, paint.scale, left, bottom)
+    elif paint.entries:
+        _draw_entries(figure, paint.entries, left, bottom)
+
+
+def _scaled(values: Floats, scale: Scale) -> Paint:
+    """Return fills from a map of colours; `values` are (n, b)."""
+
+    def fills(frame: int) -> list[str]:
+        from matplotlib import colormaps  # noqa: PLC0415 - see style
+        from matplotlib.colors import to_hex  # noqa: PLC0415
+
+        shares = (np.nan_to_num(values[frame]) - scale.low) / (scale.high - scale.low)
+        return [to_hex(colour) for colour in colormaps[scale.colours](shares.clip(0.0, 1.0))]
+
+    return Paint(fills, scale=scale)
+
+
+def _draw_scale(figure: "Figure", scale: Scale, left: float, bottom: float) -> None:
+    from matplotlib.cm import ScalarMappable  # noqa: PLC0415 - see style
+    from matplotlib.colors import Normalize  # noqa: PLC0415
+    from matplotlib.ticker import FuncFormatter, MaxNLocator  # noqa: PLC0415
+
+    across, up = (float(size) for size in figure.get_size_inches())
+    width = min(0.4 * across, 3.0)
+    place = figure.add_axes((left / across + 0.06, (bottom + 0.34) / up, width / across, BAR / up))
+    colours = ScalarMappable(Normalize(scale.low, scale.high), scale.colours)
+    bar = figure.colorbar(colours, cax=place, orientation="horizontal", extend=scale.extend)
+    bar.outline.set_linewidth(style.LINE_WIDTH)
+    bar.locator = MaxNLocator(nbins=5, steps=[1, 2, 3, 4.5, 5, 9, 10])
+    bar.formatter = FuncFormatter(lambda value, _: f"{value:g}".replace("-", "−"))
+    bar.update_ticks()
+    figure.text(left / across + 0.06 + (width + 0.15) / across, (bottom + 0.39) / up, scale.label, va="center")
+
+
+def _draw_entries(figure: "Figure", entries: Sequence[tuple[str, str]], left: float, bottom: float) -> None:
+    from matplotlib.patches import Patch  # noqa: PLC0415 - see style
+
+    across, up = (float(size) for size in figure.get_size_inches())
+    handles = [Patch(facecolor=colour, edgecolor=style.INK, linewidth=0.5, label=name) for name, colour in entries]
+    figure.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(left / across, bottom / up),
+        ncols=max(1, min(len(handles), int(across / 1.6))),
+        frameon=False,
+        borderpad=0.0,
+        borderaxespad=0.0,
+        handlelength=1.2,
+    )

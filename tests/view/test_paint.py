@@ -1,0 +1,70 @@
+"""Colours of blocks: the same in every picture, by material, by speed on one scale, by turn on both sides of none."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.scenario import load_scenario
+from blocksim.view import paint, style
+from blocksim.view.paint import PAINTS, by_block, by_material, by_speed, by_turn
+from blocksim.view.sweeps.colours import CLASS_COLOURS
+from tests.view.made_up import toppling
+
+SCENARIOS = Path(paint.__file__).parents[2] / "scenarios"
+
+
+def test_a_block_keeps_its_colour_and_others_take_turns() -> None:
+    fills = by_block(toppling(8)).fills(0)
+    assert fills[0] == fills[6] == style.BLOCK_COLOURS[0]
+    assert len(set(fills[:6])) == 6
+
+
+def test_blocks_of_one_material_are_alike_and_the_key_names_it() -> None:
+    found = by_material(load_scenario(SCENARIOS / "slope.toml"))
+    assert set(found.fills(0)) == {found.entries[0][1]}
+    assert [name for name, _ in found.entries] == ["granite"]
+
+
+def test_speeds_have_one_scale_for_the_whole_run() -> None:
+    frames = toppling(2)
+    frames.vx[:], frames.vy[:] = 0.0, 0.0
+    frames.vx[:, 1] = np.linspace(0.0, 2.0, len(frames))
+    found = by_speed(frames)
+    assert found.fills(0)[0] == found.fills(len(frames) - 1)[0] == found.fills(0)[1]
+    shades = [style.brightness(found.fills(frame)[1]) for frame in range(0, len(frames), 4)]
+    assert shades == sorted(shades, reverse=True)
+    assert found.scale is not None
+    assert (found.scale.label, found.scale.low, found.scale.high) == ("speed (m/s)", 0.0, 2.0)
+
+
+def test_one_impact_does_not_make_all_other_speeds_look_like_rest() -> None:
+    frames = toppling(20, steps=100)
+    frames.vx[50, 3] = 100.0
+    found = by_speed(frames)
+    assert found.scale is not None
+    assert found.scale.extend == "max"
+    assert found.scale.high < 1.0
+
+
+def test_turns_to_either_side_differ_and_none_lies_between() -> None:
+    frames = replace(toppling(3))
+    frames.angle[:] = np.linspace(0.0, 1.0, len(frames))[:, None] * np.array([-1.0, 0.0, 1.0])
+    left, none, right = (style.brightness(fill) for fill in by_turn(frames).fills(len(frames) - 1))
+    assert none > max(left, right)
+    assert len(set(by_turn(frames).fills(len(frames) - 1))) == 3
+
+
+@pytest.mark.parametrize("name", PAINTS)
+def test_blocks_that_never_move_have_colours_too(name: str) -> None:
+    frames = toppling(5)
+    for field in (frames.vx, frames.vy, frames.angle):
+        field[:] = 0.0
+    fills = PAINTS[name](frames, load_scenario(SCENARIOS / "shaking_table.toml")).fills(0)
+    assert all(len(fill) == 7 for fill in fills)
+
+
+def test_classes_of_a_map_are_told_apart_in_grey() -> None:
+    shades = sorted(style.brightness(colour) for colour in CLASS_COLOURS)
+    assert min(np.diff(shades)) > 0.12
