@@ -40,6 +40,7 @@ SCENARIO := scenarios/three_blocks.toml
 DEMO := results/demo
 SMOKE := results/make-smoke
 PICTURES := results/make-pictures
+PAPER := results/paper
 
 .PHONY: help
 help: ## List the targets
@@ -124,6 +125,10 @@ pictures: $(RUN_STAMP) ## Draw the pictures of the findings in results/
 	$(BLOCKSIM) plot $(PICTURES)/ensemble --kind histogram --out results/ensemble.png
 	$(BLOCKSIM) sensitivity scenarios/ensemble_three_blocks.toml --samples 24 --out $(PICTURES)/morris.csv --overwrite --quiet
 	$(BLOCKSIM) plot $(PICTURES)/morris.csv --out results/sensitivity.png
+
+.PHONY: paper
+paper: $(RUN_STAMP) ## The paper's figures, tables and equations from the shipped scenarios, into results/paper
+	$(VENV_PYTHON) -m blocksim.verification.paper $(PAPER)
 
 .PHONY: demo
 demo: $(RUN_STAMP) ## Run the three blocks with contact forces; strip, film and report in results/demo

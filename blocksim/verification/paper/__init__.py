@@ -1,0 +1,1 @@
+"""The paper's figures, tables and equations beside what the shipped scenarios give."""

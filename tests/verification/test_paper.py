@@ -1,0 +1,74 @@
+"""The paper by one command: its tables beside what was simulated, its equations over simulated motions."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.analysis.experiment import load_table
+from blocksim.errors import BlocksimError
+from blocksim.scenario import load_scenario
+from blocksim.simulation.running import simulate
+from blocksim.verification.paper import laws, tables
+from blocksim.verification.paper.write import COLLAPSES, write_paper
+
+SCENARIOS = Path(laws.__file__).parents[3] / "scenarios"
+SOFT = {"contact.stiffness_scale": 0.001}
+
+
+def row(text: str, name: str) -> list[str]:
+    """Return the cells of the row of a table that begins with a name."""
+    return next([cell.strip() for cell in line.split("|")[2:-1]] for line in text.splitlines() if f"| {name} |" in line)
+
+
+def test_all_figures_and_tables_are_written_and_linked(tmp_path: Path) -> None:
+    written = write_paper(tmp_path / "paper", SCENARIOS, SOFT)
+    text = (tmp_path / "paper" / "README.md").read_text(encoding="utf-8")
+    linked = re.findall(r"\]\((\w+\.png)\)", text)
+    assert {path.name for path in written} == {*linked, "README.md"} == {p.name for p in (tmp_path / "paper").iterdir()}
+    assert sum(path.stat().st_size for path in written) < 1_000_000
+    assert row(text, "density ρ (a unit weight)")[:2] == ["26.7", "26.7"]
+    assert row(text, "left, block 3")[:7] == ["114.32", "114.07", "111.03", "104.93", "116.32", "106.21", "111.15"]
+    centres = row(text, "block 2")
+    assert centres[:8] == ["71.69", "76.57", "72.70", "73.22", "73.73", "78.53", "74.41", "76.05"]
+    assert len(centres) == 8 + len(COLLAPSES)
+    assert centres[8].endswith("✓")  # calibrated
+    assert centres[9].endswith("✗")  # nothing tuned: block 2 stops short
+
+
+def test_a_run_that_misses_is_marked() -> None:
+    run = simulate(load_scenario(SCENARIOS / "three_blocks_nominal.toml", {**SOFT, "time.end": 0.05}))
+    table = tables.centres_table(load_table(SCENARIOS / "experiments" / "three_blocks.csv"), [run])
+    assert row(table, "block 1")[-1].endswith("✓")
+    assert row(table, "block 3")[-1].endswith("✗")
+
+
+def test_a_bounce_follows_equation_10_and_another_restitution_does_not() -> None:
+    scenario = load_scenario(SCENARIOS / "bounce.toml")
+    run = simulate(scenario)
+    law = laws.bounce_law(run)
+    assert law.largest < 0.03  # mm, of 100: contact takes a little time
+    assert law.expected[0] == pytest.approx(100.0)
+    assert law.expected[-1] == 0.0
+    at_half = 0.5 * (law.marks[0] + law.marks[1])
+    assert np.interp(at_half, law.time, law.expected) == pytest.approx(25.0, abs=0.01)  # h0 e^2
+    for one in laws.bounces(run):
+        assert one.apex == pytest.approx(one.told_apex, rel=0.01, abs=0.002)
+        assert one.flight == pytest.approx(one.told_flight, rel=0.002)
+    assert len(laws.bounces(run)) == 6
+    wrong = {"contact.restitution": 0.45}
+    other = laws.bounce_law(simulate(load_scenario(SCENARIOS / "bounce.toml", wrong)))
+    assert np.abs(other.simulated - law.expected).max() > 1.0
+
+
+def test_a_slide_follows_equation_13() -> None:
+    law = laws.slide_law(simulate(load_scenario(SCENARIOS / "slide.toml")))
+    assert law.largest < 1e-3  # mm/s, of 500
+    assert law.marks[0] == pytest.approx(0.5 / (0.38 * 9.81))
+    assert law.expected[0] == pytest.approx(500.0)
+
+
+def test_a_run_that_does_not_finish_is_told(tmp_path: Path) -> None:
+    with pytest.raises(BlocksimError, match=r"three_blocks\.toml: the run has failed"):
+        write_paper(tmp_path, SCENARIOS, {**SOFT, "contact.max_overlap": 1e-9})
