@@ -111,7 +111,7 @@ def plot_command(
         _refuse(asked.of_runs(), f"{run} is a table")
         picture = draw_indices(run, out, kind, paper, ready=ready)
     else:
-        picture = _draw_run(run, out, asked, experiment, kind or STRIP, paper)
+        picture = _draw_run(run, out, asked, experiment, kind or STRIP, paper, ready)
     if not quiet:
         note(f"picture: {picture}")
 

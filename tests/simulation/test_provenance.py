@@ -12,6 +12,7 @@ import pytest
 from blocksim.kernels.jit import source_hash
 from blocksim.simulation import Result, provenance
 from blocksim.simulation.summary import read_summary
+from tests.simulation.conftest import Shipped
 
 NEW = ("llvmlite", "cpu", "cpu_features", "code_kernels", "code_scenario", "code_simulation", "code_world")
 
@@ -59,3 +60,9 @@ def test_command_with_a_name_that_is_no_text_can_be_written(kept: Result, monkey
     monkeypatch.setattr("sys.argv", ["blocksim", os.fsdecode(b"caf\xe9")])
     summary = kept.summary.model_copy(update={"environment": provenance.environment()})
     assert json.loads(summary.to_json())["environment"]["command"] == "blocksim 'caf\\udce9'"
+
+
+def test_edited_code_gives_runs_another_name(soft: Shipped, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = provenance.run_hash(soft())
+    monkeypatch.setattr(provenance, "code_hash", lambda: "of other code")
+    assert provenance.run_hash(soft()) != before
