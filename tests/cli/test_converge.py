@@ -108,7 +108,7 @@ def test_mistakes_are_told_before_anything_runs(
     assert {path.name for path in Path().iterdir()} == {"scenarios"}
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_ctrl_c_ends_all_runs_with_75(process: Process, tmp_path: Path, jobs: int) -> None:
     compile_kernels()  # into the cache on disk, so that the process starts at once
     endless = ("--set", "time.end=1e4", "--set", "time.stop_at_rest=false")

@@ -15,6 +15,7 @@ import pytest
 from blocksim.scenario import load_scenario
 from blocksim.simulation.stores.hdf5_reader import read_frames
 from tests.cli.conftest import PATIENCE, SOFT, Command, Process, wait_for
+from tests.sizes import in_all
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"
 LONG = ("run", NOMINAL, *SOFT, "--set", "time.end=10", "--set", "time.stop_at_rest=false", "--quiet")
@@ -102,17 +103,18 @@ def test_killed_run_goes_on_to_the_same_bits(process: Process, tmp_path: Path, w
 @pytest.mark.long
 def test_hundred_kills_lose_nothing(process: Process, tmp_path: Path, whole: Path) -> None:
     killed = resumed = 0
-    for number in range(100):
+    kills = in_all(100)
+    for number in range(kills):
         folder = tmp_path / str(number)
-        killed += kill_again_and_again(process, folder, min(12, 100 - killed), 1.5)
+        killed += kill_again_and_again(process, folder, min(12, kills - killed), 1.5)
         running = process(*LONG, "--out", folder, "--resume")
         running.communicate(timeout=PATIENCE)
         assert running.returncode == 0
         assert_same(folder, whole)
         resumed += bool(told(folder)["resumed_from"])
-        if killed == 100:
+        if killed == kills:
             break
-    assert killed == 100
+    assert killed == kills
     assert resumed > 0
 
 

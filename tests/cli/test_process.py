@@ -26,7 +26,10 @@ SLOW = (
 LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1])
+OTHERS = [pytest.param(number, marks=pytest.mark.long) for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, *OTHERS])
 def test_stopped_run_is_75_and_keeps_its_frames(process: Process, tmp_path: Path, number: signal.Signals) -> None:
     running = process(*SLOW, "--out", "out", "--quiet")
     wait_for(tmp_path / "out" / "run.h5", running)
@@ -43,7 +46,7 @@ def test_stopped_run_is_75_and_keeps_its_frames(process: Process, tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    "delay", [0.0, 0.1, *(pytest.param(delay, marks=pytest.mark.long) for delay in (0.003, 0.6, 0.9))]
+    "delay", [0.1, *(pytest.param(delay, marks=pytest.mark.long) for delay in (0.0, 0.003, 0.6, 0.9))]
 )
 def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path, delay: float) -> None:
     running = process(*SLOW, "--set", "output.every=1e-5", "--out", "out", "--quiet")
@@ -70,7 +73,14 @@ def wait_for_nothing_torn(path: Path) -> None:
         assert int(file["n_committed"][()]) in {0, 1}
 
 
-@pytest.mark.parametrize(("limit", "file"), [(1000, "scenario.toml"), (100_000, "run.h5"), (600_000, "run.h5")])
+@pytest.mark.parametrize(
+    ("limit", "file"),
+    [
+        (600_000, "run.h5"),
+        pytest.param(1000, "scenario.toml", marks=pytest.mark.long),
+        pytest.param(100_000, "run.h5", marks=pytest.mark.long),
+    ],
+)
 def test_full_disk_is_74_with_one_line(process: Process, tmp_path: Path, limit: int, file: str) -> None:
     running = process(*SLOW, "--set", "output.every=1e-5", "--out", "out", "-q", before=LIMIT.format(limit))
     out, err = running.communicate(timeout=PATIENCE)
@@ -79,6 +89,7 @@ def test_full_disk_is_74_with_one_line(process: Process, tmp_path: Path, limit: 
     assert not [path.name for path in (tmp_path / "out").iterdir() if path.name.startswith(".")]
 
 
+@pytest.mark.long
 def test_full_disk_keeps_the_frames_before(process: Process, tmp_path: Path) -> None:
     process(*SLOW, "--set", "output.every=1e-5", "--out", "out", "-q", before=LIMIT.format(600_000)).communicate()
     frames = read_frames(tmp_path / "out" / "run.h5", load_scenario(tmp_path / "out" / "scenario.toml"))
@@ -119,6 +130,7 @@ def test_terminal_without_the_signs_gets_an_answer(process: Process) -> None:
     assert "16.00 ? 0.00" in out
 
 
+@pytest.mark.long
 def test_stopped_sweep_is_75_and_ends_its_workers(process: Process, tmp_path: Path) -> None:
     vary = ("--vary", "time.end=0.001,1e4,2e4", "--set", "time.stop_at_rest=false", "--jobs", 2)
     arguments = (

@@ -14,6 +14,7 @@ import pytest
 
 from blocksim.study.manifest import read_entries
 from tests.cli.conftest import PATIENCE, Process, Running, wait_for
+from tests.sizes import in_all
 
 Sweep = Callable[..., Running]
 
@@ -62,7 +63,7 @@ def test_killed_sweep_goes_on_to_the_same_table(start: Sweep, tmp_path: Path) ->
 @pytest.mark.long
 def test_sweep_killed_at_20_moments_goes_on_to_the_same_table(start: Sweep, tmp_path: Path) -> None:
     moments = random.Random(6)  # noqa: S311 - no secret
-    check_kills(start, tmp_path, 500, [moments.random() for _ in range(20)])
+    check_kills(start, tmp_path, 500, [moments.random() for _ in range(in_all(20))])
 
 
 @pytest.mark.long
@@ -70,7 +71,7 @@ def test_killed_processes_leave_the_same_table(start: Sweep, tmp_path: Path) -> 
     check_kills(start, tmp_path, 500, (0.5, 0.8, 1.1), "--executor", "processes")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_endless_case_is_given_up_at_once(process: Process, tmp_path: Path, number: signal.Signals) -> None:
     endless = ("--vary", "time.end=1e4,2e4", "--set", "time.stop_at_rest=false")
     running = process("sweep", "scenarios/three_blocks_nonsmooth.toml", *endless, "--out", "out")
@@ -85,6 +86,7 @@ def test_endless_case_is_given_up_at_once(process: Process, tmp_path: Path, numb
     assert (tmp_path / "out" / "sweep.csv").read_text().count("\n") == 1
 
 
+@pytest.mark.long
 def test_same_sweep_twice_at_a_time_is_refused(process: Process, tmp_path: Path) -> None:
     vary = ("--vary", "time.end=1e4,2e4", "--set", "time.stop_at_rest=false", "--out", "out", "--jobs", 1)
     arguments = ("sweep", "scenarios/three_blocks_nonsmooth.toml", *vary)

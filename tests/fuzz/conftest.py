@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,11 +19,6 @@ ROOT = Path(__file__).parents[2]
 settings.register_profile("long", settings.get_profile("ci"), max_examples=5000)
 QUICK = 50
 LONG = settings.get_profile("long")
-
-
-def in_all(count: int) -> int:
-    """Return how many examples a long test tries: all, or a tenth where the environment says BLOCKSIM_FUZZ=tenth."""
-    return count // 10 if os.environ.get("BLOCKSIM_FUZZ") == "tenth" else count
 
 
 def assert_harmless(left: Left, codes: set[int], usual: float = 0.0) -> None:

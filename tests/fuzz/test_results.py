@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fuzz.conftest import LONG, QUICK, assert_harmless, in_all
+from tests.fuzz.conftest import LONG, QUICK, assert_harmless
 from tests.fuzz.mutations import BINARY, JSON, SCENARIO, TABLE, damaged
 from tests.fuzz.runs import FRAMES
+from tests.sizes import in_all
 
 if TYPE_CHECKING:
     from tests.fuzz.child import Child

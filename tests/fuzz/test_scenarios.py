@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fuzz.conftest import LONG, QUICK, assert_harmless, in_all
+from tests.fuzz.conftest import LONG, QUICK, assert_harmless
 from tests.fuzz.mutations import SCENARIO, damaged
+from tests.sizes import in_all
 
 if TYPE_CHECKING:
     from tests.fuzz.child import Child

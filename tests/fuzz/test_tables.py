@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fuzz.conftest import LONG, QUICK, ROOT, assert_harmless, in_all
+from tests.fuzz.conftest import LONG, QUICK, ROOT, assert_harmless
 from tests.fuzz.mutations import TABLE, damaged
+from tests.sizes import in_all
 
 if TYPE_CHECKING:
     from pathlib import Path

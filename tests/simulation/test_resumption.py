@@ -20,6 +20,7 @@ from blocksim.simulation.schemes import build_scene
 from blocksim.simulation.stacking import arrays_of
 from blocksim.simulation.team import Team
 from tests.simulation.sliding import MODELS, assert_same, interrupted_at, sliding
+from tests.sizes import in_all
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -80,7 +81,7 @@ def test_run_goes_on_with_another_number_of_threads(tmp_path: Path, name: str) -
 def test_fifty_interruptions_change_no_bit(tmp_path: Path, name: str, threads: int) -> None:
     scenario = sliding(MODELS[name])
     whole = simulate_into(scenario, tmp_path / "whole")
-    steps = points(whole, f"{name} {threads}", 50)
+    steps = points(whole, f"{name} {threads}", in_all(50))
     interrupted_at(scenario, tmp_path / "parts", steps, threads)
     resumed = simulate_into(scenario, tmp_path / "parts", resume=True, threads=threads)
     assert resumed.summary.resumed_from == tuple(steps)

@@ -13,6 +13,7 @@ from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.case import RIGID_STEP, Setting
 from blocksim.verification.scene import Simulation
+from tests.sizes import in_all
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -57,7 +58,9 @@ def stacks(draw: st.DrawFn, most: int = 5) -> Stack:
 
 def some(quick: int, long: int) -> Callable[[Any], Any]:
     """Give a test the number of its random examples: a few, and many in the long tier."""
-    return pytest.mark.parametrize("examples", [quick, pytest.param(long, marks=pytest.mark.long)])
+    return pytest.mark.parametrize(
+        "examples", [quick, pytest.param(in_all(long), marks=pytest.mark.long, id=f"{long}")]
+    )
 
 
 def for_all(strategy: st.SearchStrategy[Any], examples: int, check: Callable[[Any], None]) -> None:

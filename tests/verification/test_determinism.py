@@ -96,8 +96,11 @@ def test_reach_of_the_pair_list_does_not_change_a_bit_of_a_collapse(start: Start
 
 CROWDS = [
     {"stiffness_scale": 1e-3},
-    {"stiffness_scale": 1e-3, "law": "hertz-mindlin"},
-    {"stiffness_scale": 1e-4, "model": "kernel", "particle_spacing": 4e-3, "max_overlap": 5e-3},
+    pytest.param({"stiffness_scale": 1e-3, "law": "hertz-mindlin"}, marks=pytest.mark.long),
+    pytest.param(
+        {"stiffness_scale": 1e-4, "model": "kernel", "particle_spacing": 4e-3, "max_overlap": 5e-3},
+        marks=pytest.mark.long,
+    ),
 ]
 
 

@@ -14,10 +14,11 @@ from blocksim.verification.scene import HEIGHT, WIDTH
 from blocksim.verification.throws import GOLDEN, Throw, Thrower, kinetic_energy
 
 TILT = radians(30.0)
+BOTH = ["linear", pytest.param("hertz-mindlin", marks=pytest.mark.long)]
 PHASES = tuple((GOLDEN * k) % 1.0 for k in range(14))  # of a step; zero begins exactly at one
 
 
-@pytest.mark.parametrize("law", ["linear", "hertz-mindlin"])
+@pytest.mark.parametrize("law", BOTH)
 @pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
 @pytest.mark.parametrize("landing", LANDINGS)
 def test_where_in_a_step_a_contact_begins_does_not_matter(law: str, landing: str, e: float) -> None:
@@ -37,7 +38,7 @@ def test_particle_spacing_changes_no_bit_of_an_impact(landing: str) -> None:
     assert len(states) == 1
 
 
-@pytest.mark.parametrize("law", ["linear", "hertz-mindlin"])
+@pytest.mark.parametrize("law", BOTH)
 @pytest.mark.parametrize("speed", [0.1, 1.0, 10.0])
 @pytest.mark.parametrize("e", [0.3, 0.5, 0.8, 1.0])
 def test_impact_beside_the_centre_loses_the_asked_share_of_its_energy(law: str, speed: float, e: float) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass, replace
 from math import radians
 from pathlib import Path
@@ -16,7 +15,7 @@ from blocksim.verification.cases import CASES, SettingError, chosen, left_out
 from blocksim.verification.reference import RIGID, STORE, read_store, stored_rows
 from blocksim.verification.scene import HEIGHT
 from blocksim.verification.throws import Throw, Thrower
-from blocksim.verification.verify import Outcome, run_case
+from blocksim.verification.verify import run_case
 from blocksim.world import nonsmooth
 from tests.verification.rows import allowed, missed, same_kind
 
@@ -30,25 +29,14 @@ SETTING = Setting(scheme="nonsmooth")
 APPLY = chosen([], SETTING.scheme)
 
 
-@functools.cache
-def outcome(case_id: str) -> Outcome:
-    (case,) = chosen([case_id], SETTING.scheme)
-    return run_case(case, SETTING)
-
-
 @pytest.mark.parametrize("case", APPLY, ids=lambda case: case.id)
-def test_case_is_inside_its_tolerances_with_rigid_contacts(case: Case) -> None:
-    found = outcome(case.id)
+def test_case_is_inside_its_tolerances_and_what_the_readme_says_with_rigid_contacts(case: Case) -> None:
+    found = run_case(case, SETTING)
     assert found.rows
     assert missed(found) == []
-
-
-@pytest.mark.parametrize("case", APPLY, ids=lambda case: case.id)
-def test_kept_results_of_rigid_contacts_are_what_is_measured_now(case: Case) -> None:
     kept = stored_rows(read_store(ROOT / STORE), RIGID, case)
-    rows = outcome(case.id).rows
-    assert len(kept) == len(rows), "run: make verify-table"
-    for old, new in zip(kept, rows, strict=True):
+    assert len(kept) == len(found.rows), "run: make verify-table"
+    for old, new in zip(kept, found.rows, strict=True):
         assert same_kind(old, new)
         assert old.measured == pytest.approx(new.measured, rel=1e-9, abs=allowed(new))
 
