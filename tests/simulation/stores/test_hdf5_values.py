@@ -1,0 +1,32 @@
+"""What was written into run.h5 comes back under its own name: not compared with what the same reader has read before."""
+
+from pathlib import Path
+
+import numpy as np
+
+from blocksim.scenario import place_bodies
+from blocksim.simulation.recorder import MOTION, Frame
+from blocksim.simulation.schemes import SCHEMES
+from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.stores.hdf5_writer import FrameFile
+from tests.simulation.conftest import Shipped
+
+STEP = 1e-6  # s
+
+
+def test_every_number_comes_back_under_its_name(soft: Shipped, tmp_path: Path) -> None:
+    scheme, scenario = SCHEMES["explicit"], soft()
+    random = np.random.default_rng(1)
+    written = [Frame(step, random.random((len(MOTION), 3)), random.random(len(scheme.measured))) for step in (0, 5, 7)]
+    path = tmp_path / "run.h5"
+    with FrameFile(path, place_bodies(scenario), STEP, "schema = 1\n", ledger=scheme.ledger) as file:
+        for frame in written:
+            file.append(frame)
+    back = read_frames(path, scenario)
+    assert back.step.tolist() == [0, 5, 7]
+    assert back.time.tolist() == [0.0, 5 * STEP, 7 * STEP]
+    for place, name in enumerate(MOTION):
+        np.testing.assert_array_equal(getattr(back, name), [frame.motion[place] for frame in written], err_msg=name)
+    energies = [*back.energy.values(), back.contact_count, back.largest_overlap]
+    assert list(back.energy) == list(scheme.ledger)
+    np.testing.assert_array_equal(np.stack(energies, axis=1), [frame.measured for frame in written])
