@@ -5,7 +5,8 @@ from pathlib import Path
 from blocksim.study.done import Done
 from blocksim.study.manifest import Entry, values_hash
 
-ONE, OTHER = {"friction": 0.2}, {"friction": 0.3}
+ONE: dict[str, object] = {"friction": 0.2}
+OTHER: dict[str, object] = {"friction": 0.3}
 
 
 def entry(status: str, settings: dict[str, object] = ONE) -> Entry:

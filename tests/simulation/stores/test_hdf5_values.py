@@ -1,4 +1,4 @@
-"""What was written into run.h5 comes back under its own name: not compared with what the same reader has read before."""
+"""What was written into run.h5 comes back under its own name, whatever the same reader read before."""
 
 from pathlib import Path
 
