@@ -83,6 +83,15 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_is_measured(bloc
         assert answer.err.startswith(f"{out}: cannot be written: ")
 
 
+@pytest.mark.parametrize(("command", "name"), [("bench", "mine.json"), ("converge", "mine.png")])
+def test_a_file_of_others_is_refused_before_anything_is_measured(blocksim: Command, command: str, name: str) -> None:
+    Path(name).write_text("years of work")
+    what = "first" if command == "bench" else "scenarios/three_blocks_nominal.toml"
+    answer = blocksim(command, what, "--out", name)
+    assert (answer.code, answer.out, answer.err) == (73, "", f"{name}: already exists; rerun with --overwrite\n")
+    assert Path(name).read_text() == "years of work"
+
+
 def test_peers_without_their_packages_name_the_extra(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pymunk", None)
     answer = blocksim("bench", "--peers")

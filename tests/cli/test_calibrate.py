@@ -98,6 +98,11 @@ def test_nothing_is_overwritten_unless_asked(slide: Slide, tmp_path: Path) -> No
     assert "another calibration (seed differ)" in other.err
     assert slide(*few, "--overwrite").code == 0
     assert (tmp_path / "fitted.toml").read_text() == before
+    (tmp_path / "fitted.trials.jsonl").write_text("trials in the lab, by hand")
+    foreign = slide(*few, "--overwrite")
+    assert (foreign.code, foreign.out) == (65, "")
+    assert "fitted.trials.jsonl: not the journal of a calibration" in foreign.err
+    assert (tmp_path / "fitted.trials.jsonl").read_text() == "trials in the lab, by hand"
 
 
 def test_more_trials_go_on_where_fewer_ended(slide: Slide) -> None:

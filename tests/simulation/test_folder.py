@@ -65,6 +65,14 @@ def test_a_file_of_a_person_with_the_name_of_a_result_is_never_removed(tmp_path:
         assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
+@pytest.mark.parametrize("size", [0, 1000, 5000])
+def test_frames_that_were_cut_off_do_not_block_a_folder(copy: Path, size: int) -> None:
+    with (copy / "run.h5").open("r+b") as file:
+        file.truncate(size)
+    prepare_folder(copy, overwrite=True)
+    assert names(copy) == set()
+
+
 def test_a_link_in_the_place_of_a_result_is_never_removed(copy: Path, tmp_path: Path) -> None:
     shutil.move(copy / "final.csv", tmp_path / "mine.csv")
     (copy / "final.csv").symlink_to(tmp_path / "mine.csv")
