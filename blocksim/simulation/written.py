@@ -2,7 +2,8 @@
 
 A folder may hold files that a person put beside the results, or in their place. Only what is recognised here may be
 removed or replaced without being named on the command line. Folders of version 0.1 keep no list of their files, so the
-content decides; an empty file of one of the names holds nothing that could be lost.
+content decides: the head of a file, as what comes after may be damaged. An empty file of one of the names, or one of
+zeros, as a power failure leaves them, holds nothing that could be lost.
 """
 
 import json
@@ -22,7 +23,7 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 FRAME_MARKS = (b"h5md", b"n_committed")  # names in the root group, which libver latest keeps at the start of the file
 RESOLVED = HEADER.encode()
 CHECKPOINT = b'{"format":"blocksim checkpoint '
-Kind = Callable[[bytes], bool]  # whether content, or its first HEAD_BYTES, is of a kind
+Kind = Callable[[bytes], bool]  # whether the first HEAD_BYTES of a file are of a kind
 
 
 def begins(start: bytes) -> Kind:
@@ -35,7 +36,7 @@ def grows_from(start: bytes) -> Kind:
 
     def is_kind(head: bytes) -> bool:
         first = head.split(b"\n", 1)[0].rstrip(b"\0")
-        return first.startswith(start.rstrip()) or (first != b"" and start.startswith(first)) or not head.strip(b"\0")
+        return first.startswith(start.rstrip()) or (first != b"" and start.startswith(first))
 
     return is_kind
 
@@ -51,17 +52,9 @@ def is_frames(head: bytes) -> bool:
     return head.startswith(SIGNATURE) and all(mark in head for mark in FRAME_MARKS)
 
 
-def has_keys(*keys: str) -> Kind:
-    """Return the kind of a JSON object with at least these keys; it needs all bytes of the file."""
-
-    def is_kind(content: bytes) -> bool:
-        try:
-            data = json.loads(content)
-        except (ValueError, RecursionError):
-            return False
-        return isinstance(data, dict) and set(keys) <= data.keys()
-
-    return is_kind
+def holds(*marks: bytes) -> Kind:
+    """Return the kind of content that has all these marks near its start."""
+    return lambda head: all(mark in head for mark in marks)
 
 
 SCENARIO = "scenario.toml"
@@ -69,8 +62,8 @@ RUN_KINDS: Mapping[str, Kind] = {
     SCENARIO: begins(RESOLVED),
     "final.csv": has_header(COLUMNS),
     "run.h5": is_frames,
-    "run.json": has_keys("run", "scenario_hash", "status"),
-    "done.json": has_keys("run", "status"),
+    "run.json": holds(b'{\n  "name": "', b'"status": "', b'"scenario_hash": "'),
+    "done.json": begins(b'{"run": "'),
     "checkpoint.0": begins(CHECKPOINT),
     "checkpoint.1": begins(CHECKPOINT),
 }
@@ -91,10 +84,10 @@ def is_written(path: Path, kinds: Mapping[str, Kind], plan: str = SCENARIO) -> b
 
 def _is_of_kind(path: Path, kind: Kind) -> bool:
     try:
-        content = read_limited(path, MOST_BYTES) if path.suffix == ".json" else read_head(path, HEAD_BYTES)
+        head = read_head(path, HEAD_BYTES)
     except BlocksimError:
         return False
-    return not content or kind(content)
+    return not head.strip(b"\0") or kind(head)
 
 
 def is_leftover(name: str, names: Iterable[str]) -> bool:

@@ -17,7 +17,7 @@ from blocksim.simulation.copies import keep_scenario, read_tables, refuse_foreig
 from blocksim.simulation.folder import remove_run
 from blocksim.simulation.output_folder import make_folder
 from blocksim.simulation.provenance import environment
-from blocksim.simulation.written import Kind, begins, grows_from, has_keys, is_leftover, is_resolved, is_written
+from blocksim.simulation.written import Kind, begins, grows_from, is_leftover, is_resolved, is_written
 from blocksim.study.manifest import is_in_use
 
 PLAN = "sweep.toml"
@@ -29,7 +29,7 @@ KINDS: dict[str, Kind] = {  # of results, by the pattern of their names; shards 
     rf"sweep{SHARD}\.csv": begins(b"case,"),
     rf"manifest{SHARD}\.jsonl": grows_from(b'{"number":'),
     rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
-    r"sweep\.json": has_keys("began_at", "environment"),
+    r"sweep\.json": begins(b'{\n  "began_at": "'),
 }
 LEFTOVER = re.compile(r"\.(sweep[-\w]*\.csv|sweep\.json|sweep\.toml)\..*")
 
