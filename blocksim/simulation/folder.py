@@ -111,8 +111,10 @@ def _refuse_foreign(folder: Path, present: set[str]) -> None:
     """Raise OutputExistsError unless everything here was written by a run."""
     foreign = sorted(name for name in present if not is_written(folder / name, RUN_KINDS))
     if foreign:
-        message = f"{folder}: holds files that are not a blocksim run ({foreign[0]}); choose another folder with --out"
-        raise OutputExistsError(message)
+        raise OutputExistsError(
+            f"{folder}: holds files that are not a blocksim run ({foreign[0]}); "
+            "move them away, or choose another folder with --out"
+        )
 
 
 def newest_finished(folder: Path) -> Path | None:
