@@ -34,6 +34,7 @@ class Position(BaseModel, frozen=True):
 
     step: int  # steps done
     frames: int  # recorded so far, at output times
+    frames_sha256: str  # of their bits
     start_energy: float  # J, that of the ledger
     solver_seconds: float  # of wall time, in all parts so far
     total_seconds: float

@@ -20,6 +20,7 @@ class Standing(NamedTuple):
 
     step: int  # steps done
     frames: int  # recorded up to then, at output times
+    frames_sha256: str  # of their bits
     start_energy: float  # J
     solver_seconds: float  # in all parts of the run
     threads: int

@@ -145,8 +145,9 @@ class _Going:
 
     def keep_checkpoint(self) -> None:
         """Have the present state kept, before the frame of a moment that is no output time is recorded."""
-        frames, threads = self.recorder.count_until(self.done), self.team.threads
-        self.keeper.keep(self.scene, Standing(self.done, frames, self.start, self.seconds, threads))
+        done, recorder = self.done, self.recorder
+        frames = recorder.count_until(done), recorder.digest_until(done)
+        self.keeper.keep(self.scene, Standing(done, *frames, self.start, self.seconds, self.team.threads))
 
     def result(self, why: str) -> LoopResult:
         """Record where the run ended, and tell what it came to."""

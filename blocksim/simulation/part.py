@@ -34,9 +34,8 @@ class Part:
         self.past = NO_PAST
         if stored is not None:
             self.past = Past.of(stored.path, stored.position)
-            rows = kept_rows(folder, scenario, self.recorder)
-            check_frames(stored, rows)
-            self.recorder.take_over(rows)
+            self.recorder.take_over(kept_rows(folder, scenario, self.recorder))
+            check_frames(stored, self.recorder)
 
     def run(self, toml: str, precautions: Precautions, team: Team, attendance: Attendance) -> LoopResult:
         """Run to the end or an interruption; the file of the frames says `toml`. Raises OutputError."""

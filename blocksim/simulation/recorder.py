@@ -1,5 +1,6 @@
 """Samples the world at the output times. It names the next step it wants and never changes the motion."""
 
+import hashlib
 from bisect import bisect_right
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -25,6 +26,12 @@ class Frame(NamedTuple):
     motion: NDArray[np.float64]  # (6, b) as MOTION
     measured: NDArray[np.float64]  # as the scheme's `measured`
     contacts: ContactRows | None = None  # where they are recorded
+
+    def digest(self, before: bytes = b"") -> bytes:
+        """Return the SHA-256 of all its bits, and of the digest of the frame before it."""
+        parts = (np.int64(self.step).tobytes(), self.motion.tobytes(), self.measured.tobytes())
+        contacts = b"" if self.contacts is None else self.contacts.tobytes()
+        return hashlib.sha256(b"".join((before, *parts, contacts))).digest()
 
 
 class FrameSink(Protocol):
@@ -55,6 +62,7 @@ class Recorder:
         self.sink = sink
         self.steps_per_frame = max(every / step, 1.0)
         self.steps: list[int] = []
+        self.digests: list[bytes] = []  # of each frame and all before it
         self.held: list[Frame] = []  # the last ones: all, or one
         self.ledger: tuple[str, ...] = ()
         self.with_contacts = contacts
@@ -74,12 +82,23 @@ class Recorder:
         """Return the number of frames up to a step."""
         return bisect_right(self.steps, step)
 
+    def digest_until(self, step: int) -> str:
+        """Return the SHA-256 of all frames up to a step."""
+        count = self.count_until(step)
+        return self.digests[count - 1].hex() if count else ""
+
     def take_over(self, rows: "Rows") -> None:
         """Begin with the frames of an earlier part of the run; what it recorded is not recorded again."""
         self.ledger = rows.ledger
         self.steps = rows.steps.tolist()
         contacts = [None] * len(self.steps) if rows.contacts is None else rows.contacts.tables()
         self.held = [Frame(*one) for one in zip(self.steps, rows.motion, rows.measured, contacts, strict=True)]
+        self.digests = []
+        for frame in self.held:
+            self._note_digest(frame)
+
+    def _note_digest(self, frame: Frame) -> None:
+        self.digests.append(frame.digest(self.digests[-1] if self.digests else b""))
 
     def pour_into(self, sink: FrameSink) -> None:
         """Hold no more than the last frame from now on; `sink` has those so far, and gets all others."""
@@ -100,6 +119,7 @@ class Recorder:
         touching = scheme.contacts(scene, len(self.placed)) if self.with_contacts else None
         frame = Frame(step, motion, row, touching)
         self.steps.append(step)
+        self._note_digest(frame)
         if self.sink is not None:
             self.sink.append(frame)
             self.held.clear()

@@ -55,14 +55,22 @@ def kept_rows(folder: Path, scenario: Scenario, recorder: Recorder) -> Rows:
     return rows.chosen(np.array([recorder.is_output_time(step) for step in rows.steps.tolist()]))
 
 
-def check_frames(stored: Stored, rows: Rows) -> None:
-    """Raise InvalidInputError where frames before a checkpoint are missing."""
+def check_frames(stored: Stored, recorder: Recorder) -> None:
+    """Raise InvalidInputError where frames before a checkpoint are missing, or are not as they were recorded.
+
+    `recorder` has taken over all frames that there are.
+    """
     position = stored.position
-    count = int(np.count_nonzero(rows.steps <= position.step))
+    path, count = stored.path.parent / files.FRAMES, recorder.count_until(position.step)
     if count != position.frames:
         raise InvalidInputError(
-            f"{stored.path.parent / files.FRAMES}: holds {count} of the {position.frames} frames before step "
-            f"{position.step}, at which {stored.path.name} goes on; {ANEW}"
+            f"{path}: holds {count} of the {position.frames} frames before step {position.step}, at which "
+            f"{stored.path.name} goes on; {ANEW}"
+        )
+    if recorder.digest_until(position.step) != position.frames_sha256:
+        raise InvalidInputError(
+            f"{path}: changed since the run was interrupted: the {count} frames before step {position.step} do not "
+            f"have the SHA-256 that {stored.path.name} has of them; {ANEW}"
         )
 
 

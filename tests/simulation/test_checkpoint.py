@@ -21,7 +21,9 @@ from tests.simulation.sliding import MODELS, sliding
 if TYPE_CHECKING:
     from pathlib import Path
 
-AT = Position(step=100, frames=3, start_energy=0.1 + 0.2, solver_seconds=1.5, total_seconds=2.5, threads=2)
+AT = Position(
+    step=100, frames=3, frames_sha256="", start_energy=0.1 + 0.2, solver_seconds=1.5, total_seconds=2.5, threads=2
+)
 
 
 @pytest.mark.parametrize("name", ["surface-linear", "particles-linear", "nonsmooth"])

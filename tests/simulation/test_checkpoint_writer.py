@@ -31,7 +31,7 @@ class Frames:
 
 
 def at(step: int) -> Standing:
-    return Standing(step, frames=1, start_energy=1.0, solver_seconds=0.5, threads=1)
+    return Standing(step, frames=1, frames_sha256="", start_energy=1.0, solver_seconds=0.5, threads=1)
 
 
 def steps_in(folder: Path) -> dict[str, int]:

@@ -6,6 +6,7 @@ import json
 import shutil
 from typing import TYPE_CHECKING
 
+import h5py
 import numpy as np
 import pytest
 
@@ -207,6 +208,17 @@ def test_missing_frames_are_no_ground_to_go_on(begun: Path, tmp_path: Path) -> N
     shutil.copy(shorter.folder / "run.h5", begun / "run.h5")
     with pytest.raises(InvalidInputError, match=r"run\.h5: holds \d of the \d+ frames before step 1000"):
         simulate_into(sliding({}), begun, resume=True)
+
+
+@pytest.mark.parametrize("name", ["particles/blocks/vy", "observables/friction", "contacts/normal_force"])
+def test_frame_that_was_changed_before_the_run_goes_on_is_found(tmp_path: Path, name: str) -> None:
+    scenario = sliding({"output": {"contacts": True}}, end=0.02)
+    interrupted_at(scenario, tmp_path, [1000])
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        place = (4, 0) if file[name].ndim == 2 else 4
+        file[name][place] = np.nextafter(file[name][place], np.inf)
+    with pytest.raises(InvalidInputError, match=r"run\.h5: changed since the run was interrupted: the \d+ fr"):
+        simulate_into(scenario, tmp_path, resume=True)
 
 
 def test_run_without_a_checkpoint_starts_anew_and_says_so(begun: Path, tmp_path: Path) -> None:
