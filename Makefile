@@ -149,7 +149,7 @@ lock: ## Rewrite the locked versions and hashes: the newest that fit pyproject.t
 	index=$${PIP_INDEX_URL:-$$("$$folder/venv/bin/python" -m pip config get global.index-url 2>/dev/null || true)}; \
 	if [ -n "$$index" ]; then export UV_DEFAULT_INDEX="$$index"; fi; \
 	sed -n 's/^requires = \["\(hatchling==[^"]*\)"\].*/\1/p' pyproject.toml >"$$folder/build.in"; \
-	echo editables >>"$$folder/build.in"; \
+	printf '%s\n' editables pip >>"$$folder/build.in"; \
 	names() { sed -n 's/^\([a-z0-9][^= ]*\)==.*/\1/p' "$$1"; }; \
 	resolve() { "$$folder/venv/bin/uv" pip compile -q --universal --python-version 3.11 --generate-hashes --no-header \
 	    --no-annotate --fork-strategy fewest --no-emit-package colorama "$$@"; }; \

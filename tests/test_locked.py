@@ -59,3 +59,10 @@ def test_no_two_files_lock_different_versions() -> None:
     names = [name for one in locked for name in one]
     shared = {name for name in names if names.count(name) > 1}
     assert all(len({one[name] for one in locked if name in one}) == 1 for name in shared)
+
+
+def test_pip_is_locked_too_and_not_the_one_that_python_comes_with() -> None:
+    import ensurepip  # noqa: PLC0415
+
+    locked, bundled = versions(ROOT / "tests" / "constraints.txt")["pip"], ensurepip.version()
+    assert [*map(int, locked.split("."))] >= [*map(int, bundled.split("."))]
