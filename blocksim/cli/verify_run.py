@@ -20,6 +20,7 @@ from blocksim.study.verify_sweep import SAMPLE, SweepVerdict, verify_sweep
 
 INDENT = "  "
 MOST_CELLS = 5
+MOST_ENTRIES = 5
 LONGEST = 60  # characters of an entry of the provenance
 MOST_WORDS = 12
 UNITS = {"_mm": " mm", "_deg": "°", "_mm_s": " mm/s", "_deg_s": "°/s", "_J": " J", "_s": " s", "_m": " m", "_N": " N"}
@@ -49,9 +50,10 @@ def verify_run_command(
 ) -> None:
     """Run stored results again and compare the bits.
 
-    Of a run: checksums of all files, final state, every frame of run.h5, and final.csv. Of a sweep: every cell of a
-    sample of its rows. Exit code 1 says that something differs; then the answer tells where first, by how much at most,
-    and what is not the same as when the results were made: code, versions, processor. Nothing is written.
+    Of a run: checksums of all files, final state, every frame of run.h5, final.csv, and what run.json says of steps,
+    times, energies and the end. Of a sweep: the name of every case, and every cell of a sample of its rows. Exit code 1
+    says that something differs; then the answer tells where first, by how much at most, and what is not the same as
+    when the results were made: code, versions, processor. Nothing is written.
 
     Example: blocksim verify-run results/three_blocks
     """
@@ -112,6 +114,10 @@ def _reasons(verdict: RunVerdict) -> Iterator[str]:
         yield "the final state has another hash than run.json tells"
     if not verdict.table:
         yield "final.csv is not what comes out"
+    for one in verdict.entries[:MOST_ENTRIES]:
+        yield f"{one.file}: {one.entry}: {one.stored!r} stored, {one.now!r} now"
+    if len(verdict.entries) > MOST_ENTRIES:
+        yield f"and {len(verdict.entries) - MOST_ENTRIES} entries more"
     yield from _parting(verdict)
     yield from _told_origins(verdict.origins)
 

@@ -15,6 +15,7 @@ from blocksim.simulation.provenance import ROOM_PREFIX, environment
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import csv_text
 from blocksim.study.places import find_run
+from blocksim.study.verify_entries import EntryDifference, differing_entries
 
 INTERRUPTED = "interrupted"
 SCENARIO = "scenario"  # its hash, beside the entries of `environment`
@@ -42,12 +43,13 @@ class RunVerdict:
     status: tuple[str, str]  # and how the run ended, then and now
     frames: Differences
     origins: tuple[Origin, ...]  # that are not the same as then
+    entries: tuple[EntryDifference, ...] = ()  # of run.json and done.json
 
     @cached_property
     def agrees(self) -> bool:
         """Tell whether the folder is what its scenario gives, to the last bit."""
         is_same = self.state and self.table and self.frames.is_none and self.status[0] == self.status[1]
-        return is_same and not self.changed
+        return is_same and not self.changed and not self.entries
 
     def to_dict(self) -> dict[str, object]:
         """Return it for programs."""
@@ -72,6 +74,7 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = _i
     if again.status == INTERRUPTED:
         message = f"{folder}: stopped before the repetition was complete"
         raise StoppedEarlyError(message)
+    now = origins(summary, stored.scenario)
     return RunVerdict(
         folder,
         changed,
@@ -79,7 +82,8 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = _i
         table=csv_text(again.columns).encode() == (folder / files.FINAL).read_bytes(),
         status=_ends(summary, again.summary),
         frames=differences(stored.frames, again.frames),
-        origins=origins(summary, stored.scenario),
+        origins=now,
+        entries=differing_entries(folder, summary, again.summary, same_code=not tells_of_code(now)),
     )
 
 
@@ -125,6 +129,11 @@ def origins(summary: Summary, scenario: Scenario) -> tuple[Origin, ...]:
     """Return what is not the same now as when a run was made, of all that its run.json tells of."""
     hashes = () if (now := scenario_hash(scenario)) == summary.scenario_hash else ((summary.scenario_hash, now),)
     return (*(Origin(SCENARIO, *pair) for pair in hashes), *changed_origins(summary.environment))
+
+
+def tells_of_code(found: tuple[Origin, ...]) -> bool:
+    """Tell whether the code is among what is not the same: what is named by its hash then has another name."""
+    return any(one.name in {CODE, "blocksim"} or one.name.startswith(ROOM_PREFIX) for one in found)
 
 
 def changed_origins(then: Mapping[str, str]) -> tuple[Origin, ...]:

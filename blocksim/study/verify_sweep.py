@@ -14,6 +14,7 @@ from blocksim.scenario.limited import open_regular
 from blocksim.study.done import Done
 from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.heads import Head, told
+from blocksim.study.manifest import PATTERN, read_entries
 from blocksim.study.many import cases_in, ranges_of
 from blocksim.study.plan import Case, Cases
 from blocksim.study.ranges import Ranges
@@ -22,7 +23,7 @@ from blocksim.study.single import FINISHED
 from blocksim.study.spreadsheet import as_cell
 from blocksim.study.sweep_folder import case_folder, read_origin, read_plan
 from blocksim.study.table import OUTCOME, TABLE
-from blocksim.study.verify_run import Origin, RunVerdict, changed_origins, verify_run
+from blocksim.study.verify_run import Origin, RunVerdict, changed_origins, tells_of_code, verify_run
 
 SAMPLE = 16  # rows, where nobody says how many
 CASE, INSIDE = "case", "inside"
@@ -65,9 +66,10 @@ class SweepVerdict:
 
 
 def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerdict:
-    """Run a sample of the rows of a sweep's table again and compare every cell but the names of the cases.
+    """Run a sample of the rows of a sweep's table again and compare every cell; and the name of every case.
 
-    These names are hashes of the code too. Where the folders of these cases were kept, they are verified as runs.
+    These names are hashes of the code too: the same code has to give them, other code finds those of the manifest.
+    Where the folders of these cases were kept, they are verified as runs.
     Raises InputMissingError, or InvalidInputError where table, plan and manifests do not go together.
     """
     document = read_plan(folder)
@@ -77,7 +79,15 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
     rows = sorted(random.Random(seed).sample(range(len(lines)), min(sample, len(lines))))  # noqa: S311 - no secret
     ends = _ends([cases[numbers[row]] for row in rows])
     ranges = ranges_of(document.build())
-    found: list[CellDifference] = []
+    origins = () if (origin := read_origin(folder)) is None else changed_origins(origin.environment)
+    names = _names(folder)
+    if origin is not None and not tells_of_code(origins):
+        names |= {numbers[row]: cases[numbers[row]].name for row in rows}
+    found = [
+        CellDifference(row + 1, line[0], CASE, line[0], names[numbers[row]])
+        for row, line in enumerate(lines)
+        if line[0] != names.get(numbers[row], line[0])
+    ]
     for row, (case, end) in zip(rows, ends, strict=True):
         stored, now = dict(zip(columns, lines[row], strict=True)), _cells(columns, case, end, ranges)
         found += [
@@ -92,7 +102,7 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
         tuple(found),
         _largest(found, MM),
         _largest(found, DEGREES),
-        () if (origin := read_origin(folder)) is None else changed_origins(origin.environment),
+        origins,
         tuple(verify_run(kept) for row in rows if (kept := case_folder(folder, lines[row][0])) is not None),
     )
 
@@ -113,6 +123,12 @@ def _read_table(path: Path) -> tuple[list[str], list[list[str]]]:
         message = f"{path}:{short}: {len(lines[short - 2])} cells, not {len(head)}"
         raise InvalidInputError(message)
     return head, lines
+
+
+def _names(folder: Path) -> dict[int, str]:
+    """Return the names that the manifests have for cases, by their numbers; the last one of each."""
+    paths = sorted(folder.glob(PATTERN))
+    return {entry.number: entry.case for path in paths for _, entry in read_entries(path)}
 
 
 def _numbers(folder: Path, cases: Cases, count: int) -> Sequence[int]:

@@ -79,6 +79,7 @@ def test_interrupted_run_is_repeated_as_far_as_it_came(blocksim: Command) -> Non
     folder = Path("run")
     altered(folder, "run.json", '"finished"', '"interrupted"')
     altered(folder, "scenario.toml", "end = 0.02", "end = 2.0")
+    (folder / "done.json").unlink()
     signed_again(folder)
     answer = blocksim("verify-run", folder, "--json")
     assert json.loads(answer.out)[0]["frames"]["first"] is None
@@ -126,6 +127,44 @@ def test_first_difference_is_told_with_frame_block_and_quantity(blocksim: Comman
     assert first["stored"] - first["now"] == pytest.approx(2.0)
     assert data["frames"]["largest_mm"] == pytest.approx(2.0)
     assert data["frames"]["largest_deg"] == 0.0
+
+
+def test_every_changed_entry_of_the_summary_is_named(blocksim: Command, copied: Path) -> None:
+    told = json.loads((copied / "run.json").read_text())
+    changed = {
+        "name": "other",
+        "reason": "at rest?",
+        "exit_code": 1,
+        "run": "0" * 12,
+        "scenario_hash": "0" * 12,
+        "steps": told["steps"] + 1,
+        "time_step_s": told["time_step_s"] * (1 + 1e-15),
+        "simulated_time_s": told["simulated_time_s"] * (1 + 1e-15),
+        "warnings": ["other"],
+        "energy_J": {name: value * (1 + 1e-15) + 1e-300 for name, value in told["energy_J"].items()},
+    }
+    (copied / "run.json").write_text(json.dumps({**told, **changed}))
+    altered(copied, "done.json", '"status": "finished"', '"status": "failed"')
+    answer = blocksim("verify-run", copied, "--json")
+    (data,) = json.loads(answer.out)
+    assert (answer.code, data["agrees"], data["changed"]) == (1, False, [])
+    found = {(one["file"], one["entry"]) for one in data["entries"]}
+    energies = {("run.json", f"energy_J.{name}") for name in told["energy_J"]}
+    assert found == {
+        *(("run.json", name) for name in changed if name not in {"energy_J", "warnings"}),
+        *energies,
+        ("run.json", "warnings"),
+        ("done.json", "run"),
+        ("done.json", "status"),
+    }
+
+
+def test_changed_entry_is_told_with_its_file_and_both_values(blocksim: Command, copied: Path) -> None:
+    steps = json.loads((copied / "run.json").read_text())["steps"]
+    altered(copied, "run.json", f'"steps": {steps}', f'"steps": {steps + 1}')
+    answer = blocksim("verify-run", copied)
+    assert answer.code == 1
+    assert f"  run.json: steps: {steps + 1} stored, {steps} now\n" in answer.out
 
 
 def test_other_versions_and_processors_are_told(blocksim: Command, copied: Path) -> None:
@@ -194,6 +233,18 @@ def test_changed_cell_of_a_sweep_is_told(blocksim: Command, copy_of_sweep: Path)
     assert "differs in 1 of the 5 of 5 rows" in answer.out
     assert f"row 4, case {lines[3][0]}, 3.x_mm: {lines[3][place]} stored, " in answer.out
     assert "largest difference: 0.5 mm, 0°" in answer.out
+
+
+def test_changed_name_of_a_case_is_told_in_whatever_row_it_is(blocksim: Command, copy_of_sweep: Path) -> None:
+    path = copy_of_sweep / "sweep.csv"
+    lines = path.read_text().splitlines()
+    name = lines[2].split(",")[0]
+    altered(copy_of_sweep, "sweep.csv", f"\n{name},", f"\n{name[:-1]}{'0' if name[-1] != '0' else '1'},")
+    answer = blocksim("verify-run", copy_of_sweep, "--sample", 1)
+    assert answer.code == 1
+    assert f"row 2, case {name[:-1]}" in answer.out
+    assert f", case: {name[:-1]}" in answer.out
+    assert f" stored, {name} now" in answer.out
 
 
 def test_values_of_a_sweep_are_compared_too(blocksim: Command, copy_of_sweep: Path) -> None:
