@@ -64,9 +64,18 @@ class Part:
                 "total_seconds": self.past.seconds + summary.total_seconds,
                 "resumed_from": self.past.resumed_from,
                 "last_checkpoint": last,
-                "warnings": (*self.resumption.remarks, *summary.warnings),
+                "warnings": (*self.resumption.remarks, *self._altered(), *summary.warnings),
             }
         )
+
+    def _altered(self) -> tuple[str, ...]:
+        """Return what to tell of frames after the checkpoint that have come out otherwise now."""
+        steps = self.recorder.altered
+        if not steps:
+            return ()
+        more = f" and {len(steps) - 1} more" if len(steps) > 1 else ""
+        where = f"{self.folder / files.FRAMES}: the frame of step {steps[0]}{more}"
+        return (f"{where} is not what comes out now: changed since it was recorded",)
 
     def _writer(self, sink: FrameFile, precautions: Precautions) -> CheckpointWriter:
         return CheckpointWriter(

@@ -63,6 +63,7 @@ class Recorder:
         self.steps_per_frame = max(every / step, 1.0)
         self.steps: list[int] = []
         self.digests: list[bytes] = []  # of each frame and all before it
+        self.altered: list[int] = []  # steps of frames of an earlier part that have come out otherwise when repeated
         self.held: list[Frame] = []  # the last ones: all, or one
         self.ledger: tuple[str, ...] = ()
         self.with_contacts = contacts
@@ -106,24 +107,32 @@ class Recorder:
         del self.held[:-1]
 
     def sample(self, scene: "AnyScene") -> None:
-        """Add a frame of the present state, unless this step has one already."""
+        """Add a frame of the present state, unless this step has one already: then look whether that is the same."""
         from blocksim.simulation.schemes import measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
 
         step = int(scene.world.clock[0].steps)
-        if self.steps and self.steps[-1] >= step:
-            return
         row = measured_row(scene)
         motion = np.stack([scene.world.bodies[name][: len(self.placed)] for name in MOTION])
         scheme = scheme_of(scene)
         self.ledger = scheme.ledger
         touching = scheme.contacts(scene, len(self.placed)) if self.with_contacts else None
         frame = Frame(step, motion, row, touching)
+        if self.steps and self.steps[-1] >= step:
+            self._compare(frame)
+            return
         self.steps.append(step)
         self._note_digest(frame)
         if self.sink is not None:
             self.sink.append(frame)
             self.held.clear()
         self.held.append(frame)
+
+    def _compare(self, frame: Frame) -> None:
+        """Note a frame that is not the one that was recorded for its step, if any was."""
+        place = self.count_until(frame.step) - 1
+        before = self.digests[place - 1] if place > 0 else b""
+        if self.steps[place] == frame.step and frame.digest(before) != self.digests[place]:
+            self.altered.append(frame.step)
 
     def frames(self) -> Frames:
         """Return all frames that are held: those so far, or, with a sink, the last one."""

@@ -221,6 +221,17 @@ def test_frame_that_was_changed_before_the_run_goes_on_is_found(tmp_path: Path, 
         simulate_into(scenario, tmp_path, resume=True)
 
 
+def test_changed_frame_after_the_checkpoint_is_told_when_it_is_repeated(begun: Path) -> None:
+    newest(begun).unlink()  # as if it had been killed before it wrote this one
+    with h5py.File(begun / "run.h5", "r+") as file:
+        steps = file["particles/blocks/step"][:]
+        place = int(np.flatnonzero(steps > 500)[0])
+        file["particles/blocks/y"][place, 0] *= 1 + 1e-15
+    resumed = simulate_into(sliding({}), begun, resume=True)
+    (told,) = resumed.summary.warnings
+    assert told.startswith(f"{begun}/run.h5: the frame of step {steps[place]} is not what comes out now")
+
+
 def test_run_without_a_checkpoint_starts_anew_and_says_so(begun: Path, tmp_path: Path) -> None:
     for path in begun.glob("checkpoint.*"):
         path.unlink()
