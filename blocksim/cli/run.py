@@ -17,6 +17,7 @@ from blocksim.simulation import Result
 from blocksim.simulation.claim import claimed
 from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.folder import default_folder, holds_run, unfinished_beside
+from blocksim.simulation.movement import Movement
 from blocksim.simulation.precautions import CHECKPOINT_SECONDS, Precautions
 from blocksim.simulation.resumption import NEW, find_resumption
 from blocksim.simulation.table import rows_of
@@ -150,6 +151,14 @@ def _answer_lines(result: Result) -> list[str]:
     return lines if shown == count else [*lines, f"... and {count - shown} blocks more, see final.csv"]
 
 
+def _moved(found: Movement) -> str:
+    """Return what moved, how far and first."""
+    far = f"{number(found.largest_displacement_mm)} mm (block {found.displaced_block})"
+    turned = f"{number(found.largest_rotation_deg)}° (block {found.rotated_block})"
+    first = f"; first moved: block {found.first_mover} by {found.first_moved_s:.3f} s" if found.first_mover else ""
+    return f"{found.outcome}: largest displacement {far}, rotation {turned}{first}"
+
+
 def _tell_end(result: Result) -> None:
     summary = result.summary
     note(f"{result.name}: {result.status} ({result.reason}) at {summary.simulated_time_s:.3f} s of simulated time")
@@ -157,6 +166,8 @@ def _tell_end(result: Result) -> None:
         f"{summary.steps} steps of {summary.time_step_s:.2e} s in {summary.solver_seconds:.2f} s; "
         f"energy off by {summary.energy_J.relative_residual:.0e} of what was in play"
     )
+    if summary.movement is not None:
+        note(_moved(summary.movement))
     for text in summary.warnings:
         note(f"warning: {text}")
     note("")

@@ -20,12 +20,14 @@ from blocksim.study.executors.ensemble import is_still_running
 from blocksim.study.heads import Head, heads_of
 from blocksim.study.many import SweepResult, kernels_for, sweep
 from blocksim.study.merge import merge as merge_shards
+from blocksim.study.rows import MOVEMENT
 from blocksim.study.shard import WHOLE, Shard
 from blocksim.study.single import FINISHED
 
 MOST_ROWS = 40
 MOST_FAILURES = 5
 NOT_SHOWN = {"case", "reason", "seconds"}
+SHOWN_LAST = MOVEMENT[1:]
 NOT_SHOWN_ENDS = ("rotation_deg", "y_mm", "left_mm", "right_mm")
 
 
@@ -191,6 +193,7 @@ def _ends(key: str) -> list[str]:
 def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
     table = result.table
     told = [name for name in table.columns if name not in NOT_SHOWN and not name.endswith(NOT_SHOWN_ENDS)]
+    told.sort(key=lambda name: name in SHOWN_LAST)
     names = [name for name in told if name in short or name == "inside" or _varies(table[name])]
     rows = [[shown(value) for value in row] for row in table[names].head(MOST_ROWS).itertuples(index=False)]
     fitting = _fitting([short.get(name, name) for name in names], rows)
@@ -205,12 +208,23 @@ def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
     }
     if any(left_out.values()):
         note(f"{result.name} has " + ", ".join(f"{count} {what}" for what, count in left_out.items() if count))
+    _tell_movement(result)
     if result.share_inside is not None:
         note(f"{result.share_inside:.0%} of {len(table)} cases are inside all measured ranges")
     _tell_failures(result, short)
     if result.left:
         note(f"{result.left} cases have not been run; the same command runs them")
     note(f"table: {result.folder / result.name}")
+
+
+def _tell_movement(result: SweepResult) -> None:
+    """Report how often each outcome occurs, and the largest movement of all."""
+    outcome, displacement, turn = MOVEMENT
+    if outcome not in result.table or result.table[outcome].isna().all():  # of an earlier version, or all failed
+        return
+    counts = ", ".join(f"{count} {name}" for name, count in result.table[outcome].value_counts().items())
+    far, turned = result.table[displacement].max(), result.table[turn].max()
+    note(f"{counts}; largest displacement {far:.2f} mm, rotation {turned:.2f}°, from start to end")
 
 
 def _tell_failures(result: SweepResult, short: dict[str, str]) -> None:

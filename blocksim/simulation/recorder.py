@@ -12,6 +12,7 @@ from blocksim.scenario import PlacedBody
 from blocksim.simulation.contacts import Contacts, joined
 from blocksim.simulation.contacts import Rows as ContactRows
 from blocksim.simulation.frames import Frames
+from blocksim.simulation.movement import Watch
 
 if TYPE_CHECKING:
     from blocksim.simulation.schemes import AnyScene
@@ -67,6 +68,7 @@ class Recorder:
         self.held: list[Frame] = []  # the last ones: all, or one
         self.ledger: tuple[str, ...] = ()
         self.with_contacts = contacts
+        self.watch = Watch(self.placed)
 
     def next_step(self, done: int) -> int:
         """Return the next step to record after `done` steps, wherever those end."""
@@ -93,6 +95,8 @@ class Recorder:
         self.ledger = rows.ledger
         self.steps = rows.steps.tolist()
         contacts = [None] * len(self.steps) if rows.contacts is None else rows.contacts.tables()
+        for step, motion in zip(self.steps, rows.motion, strict=True):
+            self.watch.see(motion, step * self.time_step)
         self.held = [Frame(*one) for one in zip(self.steps, rows.motion, rows.measured, contacts, strict=True)]
         self.digests = []
         for frame in self.held:
@@ -113,6 +117,7 @@ class Recorder:
         step = int(scene.world.clock[0].steps)
         row = measured_row(scene)
         motion = np.stack([scene.world.bodies[name][: len(self.placed)] for name in MOTION])
+        self.watch.see(motion, step * self.time_step)
         scheme = scheme_of(scene)
         self.ledger = scheme.ledger
         touching = scheme.contacts(scene, len(self.placed)) if self.with_contacts else None

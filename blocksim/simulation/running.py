@@ -114,7 +114,7 @@ def _bytes_of(path: Path) -> bytes | None:
 
 def _result(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Result:
     frames = recorder.frames()
-    summary = _summary(scenario, ended, seconds)
+    summary = _summary(scenario, ended, seconds).model_copy(update={"movement": recorder.watch.found()})
     return Result(scenario.name, final_columns(frames), summary, scenario, held=frames)
 
 

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ValidationError
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.limited import MEGABYTE, read_limited
 from blocksim.simulation.ledger import EnergyLedger
+from blocksim.simulation.movement import Movement
 
 MOST_BYTES = MEGABYTE
 """Of run.json; a run writes two thousand."""
@@ -34,6 +35,7 @@ class Summary(BaseModel, frozen=True):
     resumed_from: tuple[int, ...] = ()  # steps at which parts of the run after the first one began
     last_checkpoint: int | None = None  # step of the last good one, where the run did not finish
     energy_J: EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
+    movement: Movement | None = None  # None in runs of earlier versions
     warnings: tuple[str, ...]
     environment: dict[str, str]
     sha256: dict[str, str] = {}

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
-from blocksim.scenario import Scenario
+from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation import Result, Summary
 from blocksim.simulation import folder as files
 from blocksim.simulation.provenance import run_hash
@@ -54,7 +54,9 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
         row = _known_row(scenario, folder)
         if row is None:
             result = _run_on(scenario, folder)
-            row = row_of(result.status, result.reason, result.summary.simulated_time_s, result.columns)
+            row = row_of(
+                result.status, result.reason, result.summary.simulated_time_s, result.columns, place_bodies(scenario)
+            )
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         return row_of_error(error)
     return row
@@ -73,7 +75,8 @@ def _known_row(scenario: Scenario, folder: Path) -> Row | None:
     with suppress(BlocksimError):
         summary = read_summary(folder / files.SUMMARY)
         if _has_ended(folder, summary) and summary.run == run_hash(scenario):
-            return row_of(summary.status, summary.reason, summary.simulated_time_s, read_table(folder / files.FINAL))
+            final = read_table(folder / files.FINAL)
+            return row_of(summary.status, summary.reason, summary.simulated_time_s, final, place_bodies(scenario))
     return None
 
 

@@ -19,7 +19,7 @@ from blocksim.study.heads import told
 from blocksim.study.places import FINISHED, SWEEP
 from blocksim.study.plan import Cases
 from blocksim.study.ranges import Ranges
-from blocksim.study.rows import KEPT
+from blocksim.study.rows import KEPT, MOVEMENT
 from blocksim.study.shard import WHOLE, Shard
 from blocksim.study.spreadsheet import as_cell
 
@@ -67,7 +67,7 @@ class SweepTable:
     def _columns(self) -> list[str]:
         verdict = [] if self.ranges is None else ["inside"]
         ends = [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
-        return ["case", *map(str, self.cases.heads), *OUTCOME, *verdict, *ends]
+        return ["case", *map(str, self.cases.heads), *OUTCOME, *verdict, *MOVEMENT, *ends]
 
     def _rows(self) -> Iterator[list[object]]:
         ends = [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
@@ -79,7 +79,7 @@ class SweepTable:
                     row = entry.row
                     outcome = [row.get(name) for name in OUTCOME]
                     values = told(self.cases.heads, settings).values()
-                    cells = [entry.case, *values, *outcome, *self._verdict(row), *map(row.get, ends)]
+                    cells = [entry.case, *values, *outcome, *self._verdict(row), *map(row.get, (*MOVEMENT, *ends))]
                     yield list(map(as_cell, cells))
 
     def _verdict(self, row: dict[str, object]) -> list[object]:

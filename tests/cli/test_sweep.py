@@ -31,6 +31,9 @@ def test_grid_from_the_command_line(blocksim: Command) -> None:
         ("0.3", "0.3"),
     ]
     lines = answer.out.splitlines()
+    assert "4 stands; largest displacement 0.18 mm, rotation 0.33°" in answer.err  # after a hundredth of a second
+    assert {row["outcome"] for row in rows()} == {"stands"}
+    assert all(0.3 < float(row["turn_deg"]) < 0.34 for row in rows())
     assert lines[0].startswith("block_block.kinetic  block_ground.kinetic  inside   2.x_mm   3.x_mm")
     assert "sweep.csv has 2 columns that do not vary" in answer.err
     assert max(map(len, lines)) <= 80
@@ -125,7 +128,7 @@ def test_many_rows_and_columns_are_cut_and_counted(blocksim: Command) -> None:
     lines = answer.out.splitlines()
     assert len(lines) == 2 + 40
     assert max(map(len, lines)) <= 80
-    assert "sweep.csv has 2 more rows, 11 columns that do not vary" in answer.err
+    assert "sweep.csv has 2 more rows, 14 columns that do not vary" in answer.err
 
 
 def test_short_keys_are_the_shortest_ends_that_differ() -> None:

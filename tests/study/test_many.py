@@ -14,6 +14,7 @@ from blocksim.scenario import Document, load_scenario
 from blocksim.study.manifest import Manifest
 from blocksim.study.many import read_sweep, sweep
 from blocksim.study.plan import with_sweep
+from blocksim.study.rows import MOVEMENT
 from blocksim.study.shard import Shard
 from blocksim.study.single import run
 from blocksim.study.sweep_folder import prepare
@@ -43,7 +44,7 @@ def test_row_is_what_a_single_run_gives(nominal: Document, tmp_path: Path) -> No
 def test_columns_are_values_outcome_verdict_and_ends(quick: Document, tmp_path: Path) -> None:
     table = sweep(quick, TWO, out=tmp_path).table
     ends = [f"{block}.{name}" for block in "123" for name in ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")]
-    assert list(table.columns) == ["case", KINETIC, "status", "reason", "seconds", "inside", *ends]
+    assert list(table.columns) == ["case", KINETIC, "status", "reason", "seconds", "inside", *MOVEMENT, *ends]
 
 
 def test_cases_are_drawn_as_the_command_draws_them(quick: Document, tmp_path: Path) -> None:

@@ -88,4 +88,4 @@ def _row_of(member: MemberEnd | MemberFailure) -> Row:
     """Return the row of a member."""
     if isinstance(member, MemberFailure):
         return row_of_error(member.error)
-    return row_of(member.outcome.status, member.outcome.reason, member.seconds, member.columns)
+    return row_of(member.outcome.status, member.outcome.reason, member.seconds, member.columns, member.placed)

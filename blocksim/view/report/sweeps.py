@@ -15,7 +15,7 @@ from blocksim.view.report.subjects import Subject
 
 TABLE = "sweep.csv"
 MOST_BYTES = 200 * MEGABYTE  # of the table
-HEAD, TAIL = ("case",), ("status", "reason", "seconds", "inside")
+HEAD, TAIL = ("case",), ("status", "reason", "seconds", "inside", "outcome", "displacement_mm", "turn_deg")
 NEEDED = {"case", "status"}
 OF_BLOCKS = (".x_mm", ".y_mm", ".rotation_deg", ".left_mm", ".right_mm")
 MOST_VALUES = 400_000  # of blocks in the page; a sweep of 10 000 cases shows 13 blocks

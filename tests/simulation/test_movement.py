@@ -1,0 +1,97 @@
+"""How far blocks have moved, in what way, and which first."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.scenario import load_scenario, place_bodies
+from blocksim.simulation import simulate, simulate_into
+from blocksim.simulation.ensemble import run_ensemble
+from blocksim.simulation.movement import Manner, Watch, from_start_to_end
+from blocksim.simulation.precautions import Precautions
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+FALLING = {"contact.stiffness_scale": 0.001, "time.end": 0.2, "output.every": 0.005}
+PLACED = place_bodies(load_scenario(SCENARIOS / "three_blocks_nominal.toml"))  # 32 mm wide, 50 mm high
+
+
+def frame(**changes: float) -> np.ndarray:
+    """Return a frame in which block 2 is off its start: dx, dy (mm), turn (degrees)."""
+    motion = np.zeros((6, 3))
+    motion[0], motion[1] = [body.x for body in PLACED], [body.y for body in PLACED]
+    motion[:3, 1] += (changes.get("dx", 0.0) / 1e3, changes.get("dy", 0.0) / 1e3, np.radians(changes.get("turn", 0.0)))
+    return motion
+
+
+@pytest.mark.parametrize(
+    ("end", "manner"),
+    [
+        ({"dx": 0.31}, Manner.STANDS),  # a hundredth of 32 mm is 0.32 mm
+        ({"dx": 0.33}, Manner.SLID),
+        ({"turn": 0.5}, Manner.STANDS),  # half a diagonal is 29.7 mm
+        ({"turn": 0.7}, Manner.SLID),
+        ({"turn": -46.0}, Manner.FELL),
+        ({"dy": -15.0}, Manner.SLID),
+        ({"dy": -17.0}, Manner.FELL),
+        ({"dy": 17.0}, Manner.SLID),
+    ],
+)
+def test_manner_follows_from_the_end(end: dict[str, float], manner: Manner) -> None:
+    watch = Watch(PLACED)
+    watch.see(frame(), 0.0)
+    watch.see(frame(**end), 0.1)
+    assert watch.found().outcome is manner
+
+
+def test_block_that_comes_back_has_rocked_and_its_largest_turn_is_kept() -> None:
+    watch = Watch(PLACED)
+    for time, turn in ((0.0, 0.0), (0.1, 0.1), (0.2, 12.0), (0.3, -5.0), (0.4, 0.0)):
+        watch.see(frame(turn=turn), time)
+    found = watch.found()
+    assert (found.outcome, found.rotated_block, found.first_mover, found.first_moved_s) == (
+        "rocked back",
+        "2",
+        "2",
+        0.2,
+    )
+    assert found.largest_rotation_deg == pytest.approx(12.0)
+
+
+def test_fixed_blocks_do_not_move() -> None:
+    fixed = tuple(body._replace(fixed=True) for body in PLACED)
+    watch = Watch(fixed)
+    watch.see(frame(), 0.0)
+    watch.see(frame(dx=100.0), 0.1)
+    assert (watch.found().outcome, watch.found().first_mover) == ("stands", None)
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
+def test_ends_of_a_member_and_of_a_run_tell_the_same(scheme: str) -> None:
+    scenario = load_scenario(SCENARIOS / "three_blocks_nominal.toml", {**FALLING, "time.scheme": scheme})
+    run, (member,) = simulate(scenario), run_ensemble([scenario], threads=1)
+    told = from_start_to_end(place_bodies(scenario), run.columns)
+    assert from_start_to_end(member.placed, member.columns) == told
+    found = run.summary.movement
+    assert found is not None
+    assert (found.outcome, told[0]) == ("fell", "fell")
+    assert found.largest_displacement_mm >= told[1] - 1e-9
+    assert found.first_mover == "3"  # it stands on nothing but its left corner
+    assert 0.0 < (found.first_moved_s or 0.0) < 0.05
+
+
+def test_resumed_run_has_seen_what_came_before(tmp_path: Path) -> None:
+    scenario = load_scenario(SCENARIOS / "three_blocks_nominal.toml", FALLING)
+    whole = simulate(scenario).summary.movement
+    steps: list[int] = []
+
+    def stop(_: object) -> None:
+        steps.append(1)
+        if len(steps) == 20:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simulate_into(scenario, tmp_path / "run", precautions=Precautions(checkpoint_steps=2000), on_progress=stop)
+    resumed = simulate_into(scenario, tmp_path / "run", resume=True).summary
+    assert resumed.resumed_from
+    assert resumed.movement == whole
