@@ -7,6 +7,7 @@ import typer
 
 from blocksim.cli import options
 from blocksim.cli.output import note, replacement
+from blocksim.cli.progress import counting
 from blocksim.simulation.own_files import is_film, refuse_foreign
 from blocksim.study.stored import stored_run
 from blocksim.view.animation import Look, Pace, draw_film, writer_of
@@ -47,7 +48,8 @@ def animate_command(
     support = support_of(stored.scenario)
     older = replacement(film)
     look = Look(width, trails, stored.scenario.name, forces, PAINTS[colour](stored.frames, stored.scenario))
-    count, beyond = draw_film(stored.frames, film, Pace(speed, fps), look, support)
+    with counting("frames", quiet=quiet) as on_picture:
+        count, beyond = draw_film(stored.frames, film, Pace(speed, fps), look, support, on_picture)
     if stored.remark:
         note(stored.remark)
     if not quiet:

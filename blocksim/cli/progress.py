@@ -30,6 +30,47 @@ def watching(*, quiet: bool) -> Iterator[Callable[[Where], None]]:
         yield _plain_lines()
 
 
+@contextmanager
+def counting(what: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
+    """Give a function that shows how many of how many are done; on a terminal the line disappears at the end."""
+    if quiet:
+        yield lambda *_: None
+        return
+    console = Console(stderr=True)
+    if console.is_terminal:
+        with _live_count(console, what) as show:
+            yield show
+    else:
+        yield _plain_count(what)
+
+
+@contextmanager
+def _live_count(console: Console, what: str) -> Iterator[Callable[[int, int], None]]:
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn("{task.completed} of {task.total} {task.description}"),
+        BarColumn(bar_width=None),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task(what, total=1, visible=False)
+        yield lambda done, total: progress.update(task, completed=done, total=total, visible=True)
+
+
+def _plain_count(what: str) -> Callable[[int, int], None]:
+    shown_at = time.monotonic()
+
+    def show(done: int, total: int) -> None:
+        nonlocal shown_at
+        now = time.monotonic()
+        if now - shown_at > PLAIN_SECONDS:
+            shown_at = now
+            note(f"{done} of {total} {what}")
+
+    return show
+
+
 def tell_compilation(kernels: str, *, quiet: bool) -> None:
     """Compile a set of kernels where that is still to be done, and say so: it is no part of a run."""
     if is_compiled(kernels):

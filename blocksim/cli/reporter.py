@@ -2,16 +2,31 @@
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from rich.console import Console
+
 from blocksim.cli.output import note
+from blocksim.cli.progress import counting
 from blocksim.study.heads import Head
 from blocksim.study.rows import Row
 from blocksim.study.single import FINISHED
 
+OnRow = Callable[[int, int, Row], None]
 FEW = 40
 EVERY = 2.0  # s
+
+
+@contextmanager
+def reporting(short: Mapping[str, str], heads: Mapping[str, Head], *, quiet: bool) -> Iterator[OnRow]:
+    """Give what is told every row: a bar on a terminal, lines elsewhere."""
+    if quiet or not Console(stderr=True).is_terminal:
+        yield (lambda *_: None) if quiet else Reporter(short, heads).tell
+        return
+    with counting("cases", quiet=False) as show:
+        yield lambda done, total, _: show(done, total)
 
 
 @dataclass

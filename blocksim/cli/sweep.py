@@ -12,7 +12,7 @@ from blocksim.cli import options
 from blocksim.cli.dry_run import show_estimate
 from blocksim.cli.output import GAP, answer, note, print_json, table_lines, width_of_screen
 from blocksim.cli.progress import tell_compilation
-from blocksim.cli.reporter import Reporter, shown
+from blocksim.cli.reporter import reporting, shown
 from blocksim.cli.vary import with_vary
 from blocksim.errors import ExitCode, StoppedEarlyError
 from blocksim.scenario import Document
@@ -133,15 +133,16 @@ def sweep_command(
         fail_fast=fail_fast,
         retry_failed=retry_failed,
         overwrite=overwrite,
-        on_row=(lambda *_: None) if silent else Reporter(short_keys(document), heads_in(document)).tell,
+        silent=silent,
     )
     _tell(result, as_json=as_json, quiet=quiet)
 
 
-def _sweep(document: Document, **wanted: Any) -> SweepResult:
+def _sweep(document: Document, *, silent: bool, **wanted: Any) -> SweepResult:
     """Run a sweep; stopped early, leave without waiting for a case that takes minutes."""
     try:
-        return sweep(document, **wanted)
+        with reporting(short_keys(document), heads_in(document), quiet=silent) as on_row:
+            return sweep(document, on_row=on_row, **wanted)
     except StoppedEarlyError as error:
         if is_still_running():
             note(str(error))

@@ -9,7 +9,8 @@ shortest side. A scene
     slid         where some block has moved and none has fallen,
     fell         where some block has fallen.
 
-Fixed blocks do not count. A run that `time.end` cuts short is reported as it is then. Ends alone tell all but "rocked
+Fixed blocks do not count. A run that `time.end` cuts short is reported as it is then. Ends
+alone tell all but "rocked back": a sweep keeps no frames, and says "stands" there.
 """
 
 from collections.abc import Sequence

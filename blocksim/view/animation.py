@@ -64,19 +64,26 @@ def draw_film(
     pace: Pace | None = None,
     look: Look | None = None,
     support: Support | None = None,
+    on_picture: Callable[[int, int], None] = lambda *_: None,
 ) -> tuple[int, int]:
-    """Write a run as GIF or MP4; the last picture is held for a while.
+    """Write a run as GIF or MP4; the last frame is held for a while.
 
-    Returns the number of pictures, and of blocks that leave the window. `support` is what the blocks stand on: level
-    ground at rest if it is not given. Raises InvalidInputError for an unknown format, forces that were not stored,
-    nothing to draw or too many pictures, OutputError when the file cannot be written and UnavailableError when what
-    writes MP4 is missing.
+    Returns the number of frames, and of blocks that leave the window. `support` is what the blocks stand on: level
+    ground at rest if it is not given. `on_picture` is called with the numbers of frames drawn and to draw. Raises
+    InvalidInputError for an unknown format, forces that were not stored, nothing to draw or too many frames,
+    OutputError when the file cannot be written and UnavailableError when what writes MP4 is missing.
     """
     path = Path(path)
     write = writer_of(path)
     chosen, seconds = timed(frames, drawable_frames(frames), pace or Pace())
     film = Film(frames, support or Support(), look or Look())
-    write(path, (film.picture(int(frame)) for frame in chosen), seconds)
+
+    def pictures() -> Iterator[Pixels]:
+        for number, frame in enumerate(chosen, start=1):
+            yield film.picture(int(frame))
+            on_picture(number, len(chosen))
+
+    write(path, pictures(), seconds)
     return len(chosen), int((~film.seen).sum())
 
 

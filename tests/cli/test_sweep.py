@@ -33,9 +33,9 @@ def test_grid_from_the_command_line(blocksim: Command) -> None:
     lines = answer.out.splitlines()
     assert "4 stands; largest displacement 0.18 mm, rotation 0.33°" in answer.err  # after a hundredth of a second
     assert {row["outcome"] for row in rows()} == {"stands"}
-    assert all(0.3 < float(row["turn_deg"]) < 0.34 for row in rows())
+    assert all(0.2 < float(row["turn_deg"]) < 0.34 for row in rows())
     assert lines[0].startswith("block_block.kinetic  block_ground.kinetic  inside   2.x_mm   3.x_mm")
-    assert "sweep.csv has 2 columns that do not vary" in answer.err
+    assert "sweep.csv has 2 more columns, 3 columns that do not vary" in answer.err
     assert max(map(len, lines)) <= 80
     assert "4/4 finished: block_block.kinetic = 0.3, block_ground.kinetic = 0.3" in answer.err
     assert answer.err.splitlines()[-1] == "table: out/sweep.csv"

@@ -1,0 +1,52 @@
+"""How far something has come: a bar on a terminal, plain lines elsewhere."""
+
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from blocksim.cli import progress, reporter
+from blocksim.cli.progress import counting
+from blocksim.cli.reporter import reporting
+from tests.cli.conftest import Command
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> StringIO:
+    """Have a terminal in place of standard error."""
+    screen = StringIO()
+    for module in (progress, reporter):
+        monkeypatch.setattr(module, "Console", lambda **_: Console(file=screen, force_terminal=True, width=80))
+    return screen
+
+
+def test_terminal_has_a_bar_for_the_cases_of_a_sweep(terminal: StringIO, capsys: pytest.CaptureFixture[str]) -> None:
+    with reporting({"gravity": "gravity"}, {}, quiet=False) as on_row:
+        on_row(3, 8, {"status": "finished", "gravity": 9.81})
+    assert "3 of 8 cases" in terminal.getvalue()
+    assert capsys.readouterr().err == ""
+
+
+def test_elsewhere_there_are_lines_now_and_then(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = iter([0.0, 1.0, 3.0, 4.0, 6.0])
+    monkeypatch.setattr("blocksim.cli.progress.time.monotonic", lambda: next(now))
+    with counting("pictures", quiet=False) as show:
+        for done in range(1, 5):
+            show(done, 4)
+    assert capsys.readouterr().err == "2 of 4 pictures\n4 of 4 pictures\n"
+
+
+def test_quiet_shows_nothing(terminal: StringIO, capsys: pytest.CaptureFixture[str]) -> None:
+    with counting("pictures", quiet=True) as show, reporting({}, {}, quiet=True) as on_row:
+        show(1, 2)
+        on_row(1, 2, {"status": "finished"})
+    assert (terminal.getvalue(), capsys.readouterr().err) == ("", "")
+
+
+def test_animate_counts_its_pictures_on_a_terminal(blocksim: Command, finished: Path, terminal: StringIO) -> None:
+    answer = blocksim("animate", finished, "--speed", "1", "--fps", "10", "--width", "240")
+    assert answer.code == 0
+    assert " pictures" in terminal.getvalue()
