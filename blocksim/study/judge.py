@@ -80,6 +80,6 @@ def _remarks(scenario: Scenario | None) -> tuple[str, ...]:
     if plan is None or plan.is_sampled:
         return ()
     return (
-        f"mode {plan.mode!r} chooses its members: shares count them, and are no probabilities",
-        "of the outcome; the 95 % limits hold for samples (modes lhs, sobol, normal)",
+        f"mode {plan.mode!r} chooses its members: shares count them, they are no probabilities",
+        "the 95 % limits hold for samples only (modes lhs, sobol, normal)",
     )

@@ -54,10 +54,7 @@ class ForceScale:
     def told(self) -> str:
         """What a person has to know to read the arrows."""
         most = self.longest / self.mm_per_newton
-        return (
-            f"Arrows: contact forces, each on the block that it pushes up; {self.example} long, "
-            f"from {most:.3g} N on they are cut."
-        )
+        return f"Arrows: contact forces, drawn on the upper block; {self.example} long, capped at {most:.3g} N."
 
     @property
     def example(self) -> str:

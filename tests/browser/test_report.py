@@ -195,8 +195,60 @@ def test_cursor_of_the_histories_follows_and_leads(three: tuple[Path, Frames], o
     chart = one.page.locator(".chart svg").first
     box = chart.bounding_box()
     assert box is not None
-    chart.click(position={"x": 52 + 0.5 * (box["width"] - 62), "y": 40})
+    chart.click(position={"x": 58 + 0.5 * (box["width"] - 78), "y": 40})
     assert one.state()["frame"] == pytest.approx(10, abs=1)
+
+
+MEASURED = (213, 94, 0)
+
+
+def test_measured_ranges_stand_below_the_ground_and_at_the_end_of_the_curves(
+    three: tuple[Path, Frames], open_page: Open
+) -> None:
+    one = open_page(three[0])
+    one.page.locator(".chart circle.measured").first.wait_for(state="attached")
+    counts = [chart.locator("circle.measured").count() for chart in one.page.locator(".chart").all()]
+    assert counts == [3, 0, 3, 0]  # x, y, rotation, energies
+    columns = np.nonzero((np.abs(pixels(one) - MEASURED) <= 2).all(axis=-1))[1]
+    scale, (start, _) = one.state()["scale"], one.state()["centres"][0]
+    ends = start + scale * (np.array([16.0, 136.05]) - 16.0)  # block 1 is measured at 16 mm, block 3 up to 136.05
+    assert np.abs([columns.min() + 3.0 - ends[0], columns.max() - ends[1]]).max() < 2.0
+    one.page.locator("[data-option=measured]").uncheck()
+    assert not (np.abs(pixels(one) - MEASURED) <= 2).all(axis=-1).any()
+
+
+def ups_of(one: Opened, chart: int) -> NDArray[np.float64]:
+    """Return how far up the points of the first curve of a chart are (pixels)."""
+    path = one.page.locator(".chart").nth(chart).locator("path").first.get_attribute("d") or ""
+    return np.array([float(point.split(",")[1]) for point in path[1:].split("L")])
+
+
+def test_round_off_looks_flat_and_motion_does_not(tmp_path: Path, open_page: Open) -> None:
+    write_run(tmp_path / "run", count=21)
+    stored = read_stored(tmp_path / "run")
+    assert stored.frames is not None
+    stored.frames.x[:, 0] += 1e-9 * (-1.0) ** np.arange(21)  # m; block 1 stays
+    stored.frames.angle[:] = stored.frames.angle[0] + 1e-12 * np.arange(21)[:, None]
+    write_report([run_subject("part-1", stored)], tmp_path / "report.html", title="flat", version="0")
+    one = open_page(tmp_path / "report.html")
+    one.page.locator(".chart path").first.wait_for(state="attached")
+    one.page.evaluate(f"blocksim.built.get('part-1').histories.remove(1), {PLAYER}.show(0)")
+    one.page.evaluate("blocksim.built.get('part-1').histories.remove(2)")
+    assert np.ptp(ups_of(one, 0)) < 0.5
+    assert np.ptp(ups_of(one, 2)) < 0.5
+    one.page.evaluate("blocksim.built.get('part-1').histories.add(2)")
+    one.page.evaluate("blocksim.built.get('part-1').histories.remove(0)")
+    assert np.ptp(ups_of(one, 0)) > 50.0
+
+
+def test_curves_have_the_colours_of_the_blocks_and_energies_differ(three: tuple[Path, Frames], open_page: Open) -> None:
+    one = open_page(three[0])
+    one.page.locator(".chart path").first.wait_for(state="attached")
+    lines = [chart.locator("path[stroke]").all() for chart in one.page.locator(".chart > svg").all()]
+    strokes = [line.get_attribute("stroke") for line in lines[0]]
+    assert strokes == [f"#{red:02X}{green:02X}{blue:02X}" for red, green, blue in COLOURS]
+    looks = {(line.get_attribute("stroke"), line.get_attribute("stroke-dasharray")) for line in lines[3]}
+    assert len(looks) == len(lines[3]) > 1
 
 
 def test_sweep_is_sorted_filtered_and_its_members_open(swept: Path, open_page: Open) -> None:

@@ -53,6 +53,26 @@ def test_frames_with_places_beyond_all_reach_are_left_out(blocksim: Command, tmp
     assert int(kept) == int(recorded) - 1
 
 
+def test_measured_ranges_of_a_run_are_given_to_player_and_curves(blocksim: Command, tmp_path: Path) -> None:
+    write_run(tmp_path / "run")
+    assert blocksim("report", "run").code == 0
+    rows = data_of(REPORT)["frames"]["measured"]
+    assert {(row["quantity"], row["block"]) for row in rows} == {
+        (one, n) for one in ("x", "rotation") for n in range(3)
+    }
+    assert [row for row in rows if row["quantity"] == "x"][1] == {
+        "block": 1, "quantity": "x", "minimum": 71.69, "mean": pytest.approx(74.41, abs=0.01), "maximum": 78.53,
+    }  # fmt: skip
+
+
+def test_notes_of_a_sweep_are_whole_sentences(blocksim: Command, tmp_path: Path) -> None:
+    write_sweep(tmp_path / "sweep", kept=0)
+    write_experiment(tmp_path / "repeats.csv")
+    assert blocksim("report", "sweep", "--experiment", "repeats.csv").code == 0
+    text = REPORT.read_text(encoding="utf-8")
+    assert "<bdi>of the outcome" not in text
+
+
 def test_several_places_are_parts_of_one_file(blocksim: Command, tmp_path: Path) -> None:
     write_run(tmp_path / "run")
     write_sweep(tmp_path / "sweep", cases=4, kept=2)
@@ -76,7 +96,7 @@ def test_sweep_is_judged_by_the_repeats(blocksim: Command, tmp_path: Path) -> No
     write_experiment(tmp_path / "repeats.csv")
     assert blocksim("report", "sweep", "--experiment", "repeats.csv").code == 0
     text = REPORT.read_text(encoding="utf-8")
-    assert "3 of 6 members (50.0 %) are inside in everything measured" in text
+    assert "3 of 6 members (50.0 %) are within all measured ranges" in text
     assert "[67.00, 69.00]" in text
     assert data_of(REPORT)["measured"] == {"1.x_mm": [67.0, 69.0], "1.rotation_deg": [-95.0, -85.0]}
     (tmp_path / "other.csv").write_text("block,quantity,unit,replicate,value\nnobody,x,mm,1,5.0\n", encoding="utf-8")

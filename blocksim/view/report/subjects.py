@@ -1,7 +1,7 @@
 """What a report is about, as plain values that templates and scripts can use: runs here, sweeps in `sweeps`."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,7 +27,7 @@ LEDGER = {  # name in run.json: what a person reads
     "residual": "residual",
 }
 
-
+DRAWN = ("x", "y", "rotation")  # measured quantities that have a curve
 NO_FORCES = "This run has stored no contacts, so their forces cannot be shown; --set output.contacts=true stores them."
 
 
@@ -56,6 +56,8 @@ def run_subject(
     `parent` is the key of the sweep that it is a member of.
     """
     data, notes, problems = _moving(run, most_bytes)
+    if data is not None:
+        data["measured"] = _measured(data["names"], comparison)
     page = {
         "parent": parent,
         "place": str(run.folder),
@@ -73,6 +75,7 @@ def run_subject(
         "has_player": data is not None,
         "has_particles": bool(data and data["scene"]["particles"]),
         "has_forces": bool(data and data["forces"]),
+        "has_measured": bool(data and data["measured"]),
     }
     return Subject(key, "run", run.name, page, {"kind": "run", "name": run.name, "frames": data})
 
@@ -94,6 +97,17 @@ def _moving(run: StoredRun, most_bytes: int) -> tuple[dict[str, Any] | None, lis
     return {**packed.data, "energy": energy, "scene": scene, "forces": forces}, notes, []
 
 
+def _measured(names: Sequence[str], comparison: Mapping[str, Any] | None) -> list[dict[str, Any]]:
+    """Return mean and range of the repeats (mm or degrees) by the number of the block, for player and curves."""
+    rows = [] if comparison is None else comparison["rows"]
+    numbers = {name: number for number, name in enumerate(names)}
+    return [
+        {"block": numbers[row["block"]], **{key: row[key] for key in ("quantity", "minimum", "mean", "maximum")}}
+        for row in rows
+        if row["block"] in numbers and row["quantity"] in DRAWN and row["mean"] is not None
+    ]
+
+
 def _reason(run: StoredRun) -> str:
     if run.summary is not None:
         return run.summary.reason
@@ -112,15 +126,15 @@ def _summary(run: StoredRun) -> list[tuple[str, str]]:
         ("simulated time", f"{told.simulated_time_s:.4g} s"),
         ("steps", f"{told.steps} of {told.time_step_s:.3g} s"),
         ("solver time", f"{told.solver_seconds:.2f} s on {told.threads} thread{'s' if told.threads > 1 else ''}"),
-        ("energy unaccounted for", _share(told.energy_J.relative_residual)),
+        ("relative energy error", _share(told.energy_J.relative_residual)),
         *(("warning", warning) for warning in told.warnings),
     ]
 
 
 def _share(value: float) -> str:
     if value == 0.0:
-        return "nothing"
-    return f"{value:.1e} of what was in play" if math.isfinite(value) else "not known"
+        return "0"
+    return f"{value:.1e}" if math.isfinite(value) else "not known"
 
 
 def _ledger(run: StoredRun) -> list[tuple[str, str]]:

@@ -12,7 +12,7 @@ class Drawing {
   }
 
   takeColours() {
-    this.colours = Object.fromEntries(["stage", "ground", "edge", "ink", "faint", "link"].map((name) => [name, colour(name)]));
+    this.colours = Object.fromEntries(["stage", "ground", "edge", "ink", "faint", "link", "measured"].map((name) => [name, colour(name)]));
   }
 
   fillOf(block) {
@@ -52,6 +52,7 @@ class Drawing {
     if (options.particles) this.drawParticles(frame);
     if (options.names) this.drawNames(frame);
     if (options.forces) this.drawForces(frame);
+    if (options.measured) this.drawMeasured(frame);
     if (marked >= 0) this.drawMark(frame, marked);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.drawScale(view.scale);
@@ -240,6 +241,42 @@ class Drawing {
     path.moveTo(ex - head * (ux - 0.5 * uy), ey - head * (uy + 0.5 * ux));
     path.lineTo(ex, ey);
     path.lineTo(ex - head * (ux + 0.5 * uy), ey - head * (uy - 0.5 * ux));
+  }
+
+  // Draws mean and range of the measured centres within the ground, and a tick below every centre that was measured.
+  drawMeasured(frame) {
+    const { context, frames, ratio, colours } = this;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.lineWidth = 2;
+    for (const { block, quantity, minimum, mean, maximum } of frames.measured) {
+      if (quantity !== "x") continue;
+      const [left, middle, right] = [minimum, mean, maximum].map((x) => this.belowGround(x));
+      context.strokeStyle = colours.measured;
+      context.fillStyle = colours.measured;
+      context.beginPath();
+      context.moveTo(...left);
+      context.lineTo(...right);
+      for (const [px, py] of [left, right]) {
+        context.moveTo(px, py - 4);
+        context.lineTo(px, py + 4);
+      }
+      context.stroke();
+      context.beginPath();
+      context.arc(...middle, 3, 0, 2 * Math.PI);
+      context.fill();
+      const [px, py] = this.belowGround(frames.x[frame * frames.blocks + block]);
+      context.strokeStyle = colours.ink;
+      context.beginPath();
+      context.moveTo(px, py - 8);
+      context.lineTo(px, py - 3);
+      context.stroke();
+    }
+  }
+
+  // Where a mark for a place along the ground stands (pixels).
+  belowGround(x) {
+    const [px, py] = this.view.toPixels(x, this.frames.groundAt(x));
+    return [px, py + 8];
   }
 
   drawMark(frame, block) {

@@ -3,6 +3,7 @@ class Frames {
   constructor(data) {
     this.names = data.names;
     this.scene = data.scene;
+    this.measured = data.measured ?? [];
     this.sizeX = data.size_x;
     this.sizeY = data.size_y;
     this.startAngle = data.start_angle;
@@ -11,6 +12,18 @@ class Frames {
     this.contactCount = decode(data.contact_count);
     for (const [name, part] of Object.entries(data.channels)) this[name] = decode(part);
     this.forces = data.forces && { ...data.forces, ...Object.fromEntries(["x", "y", "fx", "fy"].map((name) => [name, decode(data.forces[name])])) };
+  }
+
+  // What was measured of one quantity of a block, if anything.
+  measuredOf(quantity, block) { return this.measured.find((row) => row.quantity === quantity && row.block === block); }
+
+  // Height of the ground at rest (mm).
+  groundAt(x) {
+    const { ground } = this.scene;
+    const next = ground.findIndex(([place]) => place > x);
+    if (next < 1) return ground[next < 0 ? ground.length - 1 : 0][1];
+    const [[x0, y0], [x1, y1]] = [ground[next - 1], ground[next]];
+    return y0 + (y1 - y0) * (x - x0) / (x1 - x0 || 1);
   }
 
   get count() { return this.time.length; }

@@ -13,7 +13,7 @@ class Player {
     this.marked = -1;
     this.pinned = false;
     this.timer = 0;
-    this.options = { trails: false, particles: false, forces: false, names: this.frames.blocks <= MOST_NAMES };
+    this.options = { trails: false, particles: false, forces: false, measured: true, names: this.frames.blocks <= MOST_NAMES };
     this.listeners = [];
     this.chosen = [];
     this.wireControls();
