@@ -99,11 +99,10 @@ def chosen_blocks(panels: Sequence[Panel]) -> list[int]:
 
 
 def _look(shown: Sequence[int], block: int) -> dict[str, Any]:
-    """Return colour and marker of a block, its own as in other pictures where no two would look alike."""
-    number = block if max(shown) < len(style.BLOCK_COLOURS) else shown.index(block)
+    """Return the colour of a block, as in other pictures, and a marker that none of the others has."""
     return {
-        "color": style.block_colour(number),
-        "marker": MARKERS[number],
+        "color": style.block_colour(block),
+        "marker": MARKERS[shown.index(block)],
         "markersize": 4.5,
         "markeredgecolor": style.INK,
         "markeredgewidth": 0.4,
