@@ -28,7 +28,7 @@ SIDE, GAP = 0.25, 0.25  # inches, at the left and right end and between columns
 HEAD, TITLE, FOOT = 0.22, 0.30, 0.52  # inches: time above a panel, title of the strip, axis and legend below
 LINE = 0.155  # inches, of each further line of text above a panel or below the strip
 LETTERS_AN_INCH = 15.0  # in a line below the strip
-LEAST_WIDTH, NARROWEST_PANEL, LOWEST_PANEL = 1.6, 1.15, 0.25  # inches, on a page whose size was asked for
+LEAST_WIDTH, NARROWEST_PANEL, LOWEST_PANEL = 1.75, 1.25, 0.25  # inches, on a page whose size was asked for
 POINTS = style.POINTS_PER_INCH
 TICKS = 0.26  # inches, for the numbers under a row of panels
 TALLEST_PANEL = 4.0  # inches
@@ -169,6 +169,8 @@ def plan_on(paper: Paper, extent: Extent, columns: int, panels: int, lines: Line
     scale, columns = max((_scale_on(paper, extent, columns, panels, lines), columns) for columns in range(1, most + 1))
     rows = -(-panels // columns)
     paper.panel(0.0, rows, _others(extent, columns, panels, lines), LOWEST_PANEL)  # refuses a page that is too small
+    narrow = 0.5 * max(NARROWEST_PANEL / scale - extent.width, 0.0)  # so that captions do not run into each other
+    extent = replace(extent, left=extent.left - narrow, right=extent.right + narrow)
     layout = _laid_out(extent, columns, panels, lines, (width, scale))
     spare = paper.size[1] - layout.height
     return replace(layout, height=paper.size[1], head=layout.head + spare / layout.rows)

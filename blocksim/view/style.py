@@ -34,7 +34,8 @@ LINE_WIDTH = 0.8  # points
 
 FONT = ["DejaVu Sans"]
 NARROWEST = 0.25  # width of the narrowest letters over the font size
-PARTS = re.compile(r"[^. _-]*[. _-]+|[^. _-]+")  # what a name may be broken into
+PARTS = re.compile(r"(?:[^. ]|\.(?=\d))+(?: +|\.|$)|[. ]+")  # what a name is broken into; numbers stay whole
+PIECES = re.compile(r"[^_-]*[_-]+|[^_-]+")  # what a part that is too wide is broken into
 MOST_LETTERS = 200  # of a name in lines
 SURE = 0.98  # letters are put on whole pixels
 
@@ -159,16 +160,21 @@ def cut_to(text: str, room: float, size: float, *, bold: bool = False) -> str:
 
 
 def broken(text: str, room: float, size: float = FONT_SIZE, *, bold: bool = False) -> list[str]:
-    """Return a name in lines no wider than `room` (inches), broken after dots, spaces, hyphens and underscores.
+    """Return a name in lines no wider than `room` (inches), broken after dots and spaces.
 
-    A single part that is too wide is cut.
+    A part that is too wide by itself is broken after hyphens and underscores; what is still too wide is cut.
     """
     points = room * POINTS_PER_INCH
+
+    def is_wide(line: str) -> bool:
+        return width_of(line.rstrip(), size, bold=bold) > points
+
     lines = [""]
     for part in PARTS.findall(shortened(text, MOST_LETTERS)):
-        if lines[-1] and width_of(f"{lines[-1]}{part}".rstrip(), size, bold=bold) > points:
-            lines.append("")
-        lines[-1] += part
+        for piece in PIECES.findall(part) if is_wide(part) else [part]:
+            if lines[-1] and is_wide(f"{lines[-1]}{piece}"):
+                lines.append("")
+            lines[-1] += piece
     return [cut_to(line.rstrip(), points / SURE, size, bold=bold) for line in lines]
 
 

@@ -307,12 +307,12 @@ def test_a_scene_is_widened_to_hold_what_was_measured_and_a_tower_s_caption() ->
     assert tower.width == pytest.approx(strip.NARROWEST * 1000.0)
 
 
-@pytest.mark.parametrize("size", [(4.0, 6.0), (10.0, 2.5), (3.0, 12.0)])
+@pytest.mark.parametrize("size", [(4.0, 8.0), (10.0, 3.5), (3.2, 15.0)])
 @pytest.mark.parametrize("count", [2, 11])
 def test_a_page_has_the_size_that_was_asked_for_and_its_panels_lie_in_it(
     picture: list[Figure], tmp_path: Path, size: tuple[float, float], count: int
 ) -> None:
-    draw_strip(toppling(3), tmp_path / "strip.png", count=count, paper=Paper(size))
+    draw_strip(toppling(3), tmp_path / "strip.png", count=count, support=SUPPORTS["moving"], paper=Paper(size))
     assert picture[0].get_size_inches().tolist() == list(size)
     assert len(picture[0].axes) == count
     assert overlapping(picture[0]) == []

@@ -12,6 +12,7 @@ from blocksim.view.style import (
     MEASURED_COLOUR,
     SMALLEST_FONT,
     block_colour,
+    broken,
     cut_to,
     fitting_font,
     save_figure,
@@ -79,3 +80,14 @@ def test_full_disk_leaves_the_older_picture(tmp_path: Path, monkeypatch: pytest.
     ):
         save_figure(figure, tmp_path / "a.png")
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.png": "older"}
+
+
+def test_long_names_are_broken_where_they_read_best_and_no_letter_is_lost() -> None:
+    text = "contact.stiffness_scale = 0.001"
+    wide = width_of(text, 8.0) / 72.0
+    assert broken(text, wide * 1.01) == [text]
+    assert broken(text, 0.8 * wide) == ["contact.stiffness_scale =", "0.001"]
+    assert broken(text, 0.35 * wide) == ["contact.", "stiffness_", "scale =", "0.001"]
+    assert "10.25 mm" in broken("structures.0.overlap − 10.25 mm (µm)", 0.65)
+    assert broken("x" * 100, 0.5)[0].endswith("…")
+    assert broken("", 1.0) == [""]
