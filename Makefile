@@ -11,11 +11,12 @@ PYTHON ?= python3
 # A PYTHON that somebody names is the only one tried; otherwise newer names are, where python3 is too old.
 CANDIDATES := $(PYTHON) $(if $(filter file,$(origin PYTHON)),python3.13 python3.12 python3.11)
 
-# Exact versions and the SHA-256 of every file of them, for all platforms: what blocksim, its developers' tools and the
-# engines to compare with need. The last two name only what they need beside the first, which they include.
+# Exact versions and the SHA-256 of every file of them, for all platforms: what blocksim, its developers' tools, the
+# engines to compare with and VTK need. The last three name only what they need beside the first, which they include.
 CONSTRAINTS := tests/constraints.txt
 DEV_CONSTRAINTS := tests/constraints-dev.txt
 BENCH_CONSTRAINTS := tests/constraints-bench.txt
+VTK_CONSTRAINTS := tests/constraints-paraview-check.txt
 VENV := .venv
 VENV_PYTHON := $(VENV)/bin/python
 BLOCKSIM := $(VENV)/bin/blocksim
@@ -29,12 +30,15 @@ FOLDER := $(shell pwd | cksum | cut -d ' ' -f 1)
 RUN_STAMP := $(VENV)/.installed-run-$(FOLDER)
 DEV_STAMP := $(VENV)/.installed-dev-$(FOLDER)
 BENCH_STAMP := $(VENV)/.installed-bench-$(FOLDER)
-INSTALL_DECIDES := pyproject.toml $(CONSTRAINTS) $(DEV_CONSTRAINTS) $(BENCH_CONSTRAINTS) blocksim/__init__.py
+FULL_STAMP := $(VENV)/.installed-full-$(FOLDER)
+INSTALL_DECIDES := pyproject.toml $(CONSTRAINTS) $(DEV_CONSTRAINTS) $(BENCH_CONSTRAINTS) $(VTK_CONSTRAINTS) \
+    blocksim/__init__.py
 # Without a Python (none yet, or it was upgraded away) the stamps are void.
 VOID := $(if $(realpath $(VENV_PYTHON)),,void)
 
-# Every process compiles or loads the kernels by itself, so more of them gain less and less.
+# Every process loads the kernels by itself, so more of them gain less and less. Compiled they are before that, once.
 ON_ALL_CORES := --numprocesses auto --maxprocesses 4 --dist worksteal
+COMPILE := $(VENV_PYTHON) -m tests.compiled
 
 SCENARIO := scenarios/three_blocks.toml
 DEMO := results/demo
@@ -52,17 +56,24 @@ run: $(RUN_STAMP) ## Let the three blocks collapse and compare with the measurem
 	$(BLOCKSIM) compare $(SCENARIO)
 
 .PHONY: test
-test: $(DEV_STAMP) ## Run the tests (sets up .venv first)
+test: $(DEV_STAMP) ## Run the tests (sets up .venv first); four minutes on two cores, once kernels are compiled
+	@$(COMPILE)
 	$(VENV_PYTHON) -m pytest $(ON_ALL_CORES)
 
 .PHONY: test-long
-test-long: $(DEV_STAMP) ## Full sizes: verification, kills, resumed runs, fuzz, soak, clusters, browser; twenty minutes
-	$(VENV_PYTHON) -m pytest -m long $(ON_ALL_CORES) --ignore tests/browser
+test-long: $(DEV_STAMP) ## Full sizes: verification, kills, resumed runs, fuzz, soak, clusters, browser; half an hour
+	@$(COMPILE)
+	$(VENV_PYTHON) -m pytest -m long $(ON_ALL_CORES) --ignore tests/browser $(LONG)
 	$(VENV_PYTHON) -m pytest -m long tests/browser
 
 .PHONY: test-nojit
 test-nojit: $(DEV_STAMP) ## Run the tests of the kernels as plain Python, without the compiler
 	NUMBA_DISABLE_JIT=1 $(VENV_PYTHON) -m pytest $(ON_ALL_CORES) tests/kernels
+
+.PHONY: faults
+faults: $(DEV_STAMP) ## Put deliberate faults into the code, one at a time: does make test notice every one of them?
+	@$(COMPILE)
+	$(VENV_PYTHON) -m tests.faults.run
 
 .PHONY: verify-table
 verify-table: $(DEV_STAMP) ## Measure all verification cases and write their table into blocksim/verification/README.md
@@ -140,6 +151,9 @@ demo: $(RUN_STAMP) ## Run the three blocks with contact forces; strip, film and 
 .PHONY: setup
 setup: $(DEV_STAMP) ## Create or update .venv, with the tools for developers
 
+.PHONY: setup-full
+setup-full: $(FULL_STAMP) ## As setup, with the engines to compare with and VTK, large: no test is skipped for them
+
 .PHONY: lock
 lock: ## Rewrite the locked versions and hashes: the newest that fit pyproject.toml
 	@folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
@@ -157,9 +171,11 @@ lock: ## Rewrite the locked versions and hashes: the newest that fit pyproject.t
 	known=$$(names "$$folder/run.txt" | sed 's/^/--no-emit-package /'); \
 	resolve pyproject.toml --extra dev -c "$$folder/run.txt" $$known -o "$$folder/dev.txt"; \
 	resolve pyproject.toml --extra bench --extra study -c "$$folder/run.txt" $$known -o "$$folder/bench.txt"; \
+	resolve pyproject.toml --extra paraview-check --extra study -c "$$folder/run.txt" $$known \
+	    -o "$$folder/paraview-check.txt"; \
 	head() { echo "# $$1. Written by: make lock"; }; \
 	{ head "Exact versions, with hashes, of what make run installs"; cat "$$folder/run.txt"; } >$(CONSTRAINTS); \
-	for extra in dev bench; do \
+	for extra in dev bench paraview-check; do \
 	    { head "What the extra $$extra needs beside"; echo "-r constraints.txt"; cat "$$folder/$$extra.txt"; } \
 	        >tests/constraints-$$extra.txt; \
 	done; \
@@ -202,3 +218,10 @@ $(BENCH_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
 	@$(INSTALL_LOCKED) $(BENCH_CONSTRAINTS)
 	@$(INSTALL_BLOCKSIM)
 	@touch $(RUN_STAMP) $@
+
+# One call for all of them: most of its time goes into what they share.
+$(FULL_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
+	@echo "Installing all that tests use into $(VENV) (versions: $(CONSTRAINTS:.txt=*.txt))"
+	@$(INSTALL_LOCKED) $(DEV_CONSTRAINTS) --requirement $(BENCH_CONSTRAINTS) --requirement $(VTK_CONSTRAINTS)
+	@$(INSTALL_BLOCKSIM)
+	@touch $(RUN_STAMP) $(DEV_STAMP) $(BENCH_STAMP) $@

@@ -9,7 +9,12 @@ import pytest
 ROOT = Path(__file__).parents[1]
 LOCKED = sorted((ROOT / "tests").glob("constraints*.txt"))
 ENTRY = re.compile(r"^([a-z0-9][a-z0-9-]*)==([^ ;\\]+)", flags=re.MULTILINE)
-EXTRAS = {"constraints.txt": ("study",), "constraints-dev.txt": ("study", "dev"), "constraints-bench.txt": ("bench",)}
+EXTRAS = {
+    "constraints.txt": ("study",),
+    "constraints-dev.txt": ("study", "dev"),
+    "constraints-bench.txt": ("bench",),
+    "constraints-paraview-check.txt": ("paraview-check",),
+}
 
 
 def normal(name: str) -> str:

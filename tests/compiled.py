@@ -1,0 +1,60 @@
+"""python -m tests.compiled: compile all kernels as tests call them, so that workers find them in the cache.
+
+Workers that start together would each compile the same kernels. Here one process compiles a set of them, and two run at
+a time; where all are in the cache already this takes some seconds.
+"""
+
+import multiprocessing
+import os
+import time
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any
+
+JOBS = 2
+SPH = "sph"
+SETS = ("with-particles", "surface", "nonsmooth", SPH)  # those that take longest first
+
+
+def compile_set(name: str) -> None:
+    """Compile one set of kernels, and what runs ensembles.
+
+    Imports come after the setting that lets Python call every kernel.
+    """
+    os.environ["BLOCKSIM_OPEN_KERNELS"] = "1"  # as tests/conftest.py has it
+    if name == SPH:
+        _use_particles()
+    else:
+        _run_smallest(name)
+
+
+def _run_smallest(name: str) -> None:
+    from blocksim.scenario import scenario_from_mapping  # noqa: PLC0415
+    from blocksim.simulation import run_ensemble  # noqa: PLC0415
+    from blocksim.simulation.compilation import CHANGES, PARTICLES, SMALLEST_SCENE, compile_kernels  # noqa: PLC0415
+
+    compile_kernels(name)
+    if name == PARTICLES:
+        return  # ensembles of those take a minute more, and make test has none
+    change: dict[str, Any] = CHANGES[name]
+    scene = scenario_from_mapping({**SMALLEST_SCENE, **change, "time": {**change.get("time", {}), "end": 1e-4}})
+    run_ensemble([scene, scene])
+
+
+def _use_particles() -> None:
+    from blocksim.kernels.sph.fields import Particles, gradient, interpolate  # noqa: PLC0415
+
+    two = Particles([[0.0, 0.0], [0.1, 0.0]], mass=1.0, density=1000.0, smoothing_length=0.1)
+    interpolate(two, [1.0, 2.0], [[0.05, 0.0]])
+    gradient(two, [1.0, 2.0])
+
+
+def main() -> None:
+    """Compile all sets."""
+    began = time.perf_counter()
+    with ProcessPoolExecutor(JOBS, mp_context=multiprocessing.get_context("spawn")) as pool:
+        list(pool.map(compile_set, SETS))
+    print(f"kernels are in the cache after {time.perf_counter() - began:.0f} s")  # noqa: T201 - for people who wait
+
+
+if __name__ == "__main__":
+    main()
