@@ -7,14 +7,12 @@ time; walls do not fall that fast. A step given by hand is therefore refused onl
 start, or in one substep at that bound.
 """
 
-import itertools
-import math
-
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.world.bounds import Bounds
 from blocksim.world.interactions import Interactions
-from blocksim.world.step import MOST_STEPS, StepError, UncountableStepsError, fastest_fall
+from blocksim.world.speeds import greatest_speed
+from blocksim.world.step import MOST_STEPS, StepError, UncountableStepsError
 
 USUAL_STEP = 1e-3  # s
 SHARE = 0.1  # of the smallest side
@@ -45,24 +43,6 @@ def choose_rigid_step(scenario: Scenario, bounds: Bounds, table: Interactions) -
     if step > limit and not scenario.time.force_step:
         raise StepTooLongError(step, limit, bounds.smallest)
     return step
-
-
-def greatest_speed(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
-    """Return the bound (m/s) of the speed of any point of a block."""
-    tilt = abs(scenario.ground.tilt)
-    pull = scenario.gravity * max(0.0, math.sin(tilt) - least_support_friction(bounds, table) * math.cos(tilt))
-    return math.hypot(bounds.speed, fastest_fall(scenario, bounds)) + pull * scenario.time.end
-
-
-def least_support_friction(bounds: Bounds, table: Interactions) -> float:
-    """Return the least kinetic friction of free blocks with the ground, its pieces and fixed blocks.
-
-    On one another blocks do not slide farther than they are long.
-    """
-    free = {kind.contact_class for kind in bounds.kinds if kind.inverse_mass > 0.0}
-    fixed = {kind.contact_class for kind in bounds.kinds if not kind.inverse_mass > 0.0}
-    pairs = itertools.product({*fixed, *bounds.grounds}, free)
-    return min((table[i][j].kinetic_friction for i, j in pairs), default=math.inf)
 
 
 def longest_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:

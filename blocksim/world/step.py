@@ -1,4 +1,12 @@
-"""The time step that a run takes: as the scenario asks, within what its stiffest contact state admits."""
+"""The time step that a run takes: as the scenario asks, within what its stiffest contact state and its speeds admit.
+
+Contacts are found by the corners that lie in another block at the end of a step. So in one step no block may come far
+into another, let alone through it: at the greatest speed expected it moves by at most a twentieth of the smallest side,
+and by a fifth of the skin of the list of neighbours, which is thinner with particles. Blocks whose impacts stay below
+the usual limit of overlap, a twentieth of that side as well, move by a tenth of that in a step, as an impact takes some
+thirty of them; what this bound shortens are the steps of scenes whose blocks are too fast for their springs. They end
+with exit code 76 where such blocks meet, instead of going on behind one another.
+"""
 
 import math
 from itertools import combinations_with_replacement
@@ -10,9 +18,11 @@ from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Explicit
 from blocksim.world.bounds import Bounds, Kind
 from blocksim.world.interactions import Interactions
+from blocksim.world.speeds import fastest_fall, greatest_speed, support_speed
 from blocksim.world.stable_step import ContactBody, ContactStiffness, Load, stable_step, steepest
 
 MOST_STEPS = 2**53  # beyond that a step number is no exact float
+TRAVEL_SHARE, TRAVEL_SHARE_OF_PARTICLES = 0.05, 0.01  # of the smallest side, that a block may move in a step
 
 
 class StepError(InvalidInputError):
@@ -61,19 +71,19 @@ def expected_load(scenario: Scenario, bounds: Bounds) -> Load:
     return Load(speed, scenario.gravity * bounds.mass)
 
 
-def fastest_fall(scenario: Scenario, bounds: Bounds) -> float:
-    """Return the speed (m/s) at which the highest corner would reach the lowest ground, from rest."""
-    lowest = min((y for _, y in scenario.ground.profile or ()), default=0.0)
-    height = max(0.0, bounds.top - lowest)
-    return math.sqrt(2.0 * scenario.gravity * math.cos(scenario.ground.tilt) * height)
-
-
 class UncountableStepsError(StepError):
     """Step and end do not go together: more steps than can be counted, or none of any length."""
 
     def __init__(self, end: float, step: float) -> None:
         """Say both."""
         super().__init__(f"{end:.4g} s cannot be divided into steps of {step:.4g} s")
+
+
+def step_of_travel(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
+    """Return the longest step (s) in which no block moves far; infinite where nothing moves."""
+    speed = greatest_speed(scenario, bounds, table) + support_speed(scenario)
+    share = TRAVEL_SHARE if scenario.contact.model == "surface" else TRAVEL_SHARE_OF_PARTICLES
+    return share * bounds.smallest / speed if speed > 0.0 else math.inf
 
 
 def choose_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
@@ -85,6 +95,7 @@ def choose_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> floa
         try:
             load = expected_load(scenario, bounds)
             limit = admissible_step(bounds, table, scenario.time.safety, scenario.contact.law, load)
+            limit = min(limit, step_of_travel(scenario, bounds, table))
         except ArithmeticError:  # Python's own powers do not end in infinity
             limit = 0.0
     limit = min(limit, scenario.time.end)

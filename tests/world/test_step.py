@@ -125,3 +125,16 @@ def test_refusals_say_what_is_wrong() -> None:
     assert refusal.value.limit == limit
     with pytest.raises(UncountableStepsError, match="cannot be divided"):
         world_of(FALLING, time={"step": 0.5 / MOST_STEPS, "end": 1.0})
+
+
+@pytest.mark.parametrize("model", ["surface", "kernel", "particles"])
+def test_block_moves_by_a_small_share_of_the_smallest_side_in_a_step(model: str) -> None:
+    """Otherwise it could pass through a thin one between two looks at what touches what."""
+    plate = {"y": 1.0, "x": 1.0, "height": 2e-3, "fixed": True}
+    soft = {"stiffness_scale": 1e-6, "model": model, "particle_spacing": 5e-4}
+    motion = {"kind": "harmonic", "amplitude": 0.1, "frequency": 50.0}
+    tables: dict[str, Any] = {"gravity": 0.0, "contact": soft}
+    share = 0.05 if model == "surface" else 0.01
+    for extra, speed in (({}, 100.0), ({"motion": motion}, 100.0 + 2.0 * np.pi * 50.0 * 0.1)):
+        step = float(world_of({**FALLING, "velocity": [100.0, 0.0]}, plate, **tables, **extra).controls[0].step)
+        assert step * speed == pytest.approx(share * 2e-3, rel=1e-3)
