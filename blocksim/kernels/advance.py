@@ -10,18 +10,19 @@ from blocksim.kernels.arrays import (
     REACHED,
     STATUS,
     TEAM_SIZE,
+    TOO_FAST,
     Record,
     Records,
     World,
 )
-from blocksim.kernels.energy import has_excessive_overlap, weights_power
+from blocksim.kernels.energy import weights_power
 from blocksim.kernels.forces import forces_between, forces_within
 from blocksim.kernels.integrate import kinetic_energy, place_all_corners, renew_rotations, start_all
 from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
 from blocksim.kernels.shares import add_from_before, divide
 from blocksim.kernels.support import book_support, has_motion, is_support_at_rest, move_support
 from blocksim.kernels.team import meet
-from blocksim.kernels.travel import look
+from blocksim.kernels.travel import look, outruns_lists
 
 LOOK, CHECK, MOVE, BOOK = range(4)  # what one thread does for all
 
@@ -52,7 +53,7 @@ def is_supported(bodies: Records, controls: Record) -> bool:
 
 @rare_kernel
 def check(world: World) -> int:
-    """Look whether the run may go on: finite, overlap below its limit, not at rest for the hold time."""
+    """Look whether the run may go on: finite, no pair too deep in one another, not at rest for the hold time."""
     controls = world.controls[0]
     clock = world.clock[0]
     ledger = world.ledger[0]
@@ -62,7 +63,8 @@ def check(world: World) -> int:
     fastest = fastest_point(world.bodies)
     if math.isinf(fastest):
         return NOT_FINITE
-    if has_excessive_overlap(world):
+    if clock.ends_at > 0:
+        clock.ends_at = clock.steps
         return OVERLAP_LIMIT
     rests = fastest < controls.rest_speed and is_supported(world.bodies, controls) and is_support_at_rest(world)
     clock.checks_at_rest = clock.checks_at_rest + 1 if rests else 0
@@ -71,7 +73,9 @@ def check(world: World) -> int:
 
 @rare_kernel
 def look_ahead(world: World) -> int:
-    """Look after the pair list; return PAIRS_FULL where it does not fit, else REACHED."""
+    """Look after the pair list; return PAIRS_FULL where it does not fit, TOO_FAST where none would do, else REACHED."""
+    if outruns_lists(world):
+        return TOO_FAST
     rebuilds = world.clock[0].rebuilds
     if not look(world):
         return PAIRS_FULL
@@ -108,6 +112,23 @@ def exchange_forces(world: World, k: int, step: float) -> None:
 
 
 @rare_kernel
+def note_depth(clock: Record, share: Record) -> None:
+    """Have the run end with the next step if a pair of a share was too deep in this one; where checks are due, at once.
+
+    Bodies that were done early have started the next step by now. All threads that note it in the same step write the
+    same, and none later, as all have met in between.
+    """
+    if share.is_too_deep and clock.ends_at == 0:
+        clock.ends_at = share.steps + 1
+
+
+@kernel
+def has_ended(clock: Record, steps: int) -> bool:
+    """Tell whether the last step of a run that failed is among so many steps."""
+    return 0 < clock.ends_at <= steps
+
+
+@rare_kernel
 def open_call(world: World, k: int, last_step: int) -> None:
     """Get ready for the steps of one call."""
     clock = world.clock[0]
@@ -123,7 +144,8 @@ def open_call(world: World, k: int, last_step: int) -> None:
     share.last_step = last_step
     share.next_check = (clock.steps // every + 1) * every
     share.until = 0
-    share.status = REACHED
+    share.is_too_deep = 0
+    share.status = OVERLAP_LIMIT if has_ended(clock, clock.steps) else REACHED
 
 
 @rare_kernel
@@ -164,7 +186,17 @@ def end_steps(world: World, k: int, step: float) -> bool:
     if share.steps == share.next_check:
         share.next_check += world.controls[0].check_every
         share.status = supervise(world, k, CHECK, step)
+    if has_ended(world.clock[0], share.steps) and share.status != NOT_FINITE:
+        share.status = OVERLAP_LIMIT
     return share.status == REACHED
+
+
+@kernel
+def goes_further(clock: Record, share: Record) -> bool:
+    """Tell whether a thread has another step to do; the last step of a run that failed may be one more than asked."""
+    if share.status != REACHED:
+        return False
+    return share.steps < share.last_step or share.is_started == 0 or share.steps + 1 == clock.ends_at
 
 
 @rare_kernel
@@ -172,20 +204,23 @@ def march(world: World, last_step: int, k: int) -> int:
     """Be thread k of those that step a world until `last_step`, or until something ends the run."""
     open_call(world, k, last_step)
     share = world.shares[k]
+    clock = world.clock[0]
     is_team = world.team[TEAM_SIZE] > 1
-    while share.steps < last_step or share.is_started == 0:
+    while goes_further(clock, share):
         step = world.controls[0].step if share.is_started else 0.0
         if share.steps >= share.until and not begin_steps(world, k, step):
             break
+        if share.steps + 1 == clock.ends_at:
+            share.until = clock.ends_at
         share.steps += share.is_started
         share.is_started = 1
         goes_on = share.steps < share.until
         if is_team:
             exchange_forces(world, k, step)
         forces_within(world, share, step, goes_on)
-        if goes_on:
-            meet(world.team)
-        elif not end_steps(world, k, step):
+        note_depth(clock, share)
+        meet(world.team)
+        if not goes_on and not end_steps(world, k, step):
             break
     return close_call(world, k)
 

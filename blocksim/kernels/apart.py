@@ -29,13 +29,17 @@ def gap_along(axis: int, a: Record, b: Record, dx: float, dy: float) -> float:
 
 
 @rare_kernel
-def choose_axis(pair: Record, a: Record, b: Record, dx: float, dy: float, is_ground: bool) -> None:
-    """Note along which axis two bodies that do not touch are farthest apart; the ground has but its vertical one."""
+def choose_axis(pair: Record, a: Record, b: Record, dx: float, dy: float, is_ground: bool) -> float:
+    """Note along which axis two bodies that do not touch are farthest apart; the ground has but its vertical one.
+
+    Returns the gap (m) along it.
+    """
     best = 1
     for axis in range(0 if is_ground else 4):
         if gap_along(axis, a, b, dx, dy) > gap_along(best, a, b, dx, dy):
             best = axis
     pair.axis = best
+    return gap_along(best, a, b, dx, dy)
 
 
 @kernel

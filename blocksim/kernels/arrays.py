@@ -36,7 +36,7 @@ NO_FACE = -1
 ALL = 15  # bits of all four faces or corners
 
 # status codes that `advance` returns
-REACHED, AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL = range(5)
+REACHED, AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL, TOO_FAST = range(6)
 
 
 def record_type(
@@ -104,7 +104,7 @@ PARTICLE = record_type(
     "share"  # -: tributary length over face length, summed over both faces at a corner that is one particle
 )
 PAIR = record_type(
-    "",
+    "limit",  # m: a deeper overlap ends the run
     indices="a b",  # bodies, sorted
     small="near active "  # number of candidate slots; of contacts
     "idle",  # candidates that are neither in contact nor a twin
@@ -154,7 +154,7 @@ CONTROLS = record_type(
     "step gravity_x gravity_y "  # s, m/s2
     "skin rest_speed "  # m: reach of the pair list beyond contact; m/s
     "motion_x motion_y "  # -: direction of the support's motion, both zero without one
-    "max_overlap "  # m, zero: a share of the smaller side of each pair
+    "max_overlap "  # m, zero: a share of the smallest side of each pair
     "cell_width cell_radius "  # m: of the grid of the broad phase; half diagonal of the largest body in it
     "particle_size smoothing_length support",  # m: diameter; of the SPH kernel; radius beyond which it is zero
     "model law sph_kernel "  # codes
@@ -164,6 +164,7 @@ CLOCK = record_type(
     "",
     "steps checks_at_rest pair_count rebuilds motion_piece "
     "next_look "  # step at which the bodies' travel since the last pair list is looked at again
+    "ends_at "  # step at which the run ends, as two bodies were found too deep in one another; 0: none
     "is_started",  # flag
 )
 LEDGER = record_type("dashpot friction broken to_support travel_work largest_kinetic")  # J
@@ -171,7 +172,8 @@ ACTION = record_type(
     "fx fy torque_a torque_b "  # N, N m: force of a pair on body a and its torque; torque on b is against torque_b
     "dashpot friction broken",  # J: lost in the drift that led here
     indices="pair",  # its number
-    flags="touches is_changed",  # whether it has contacts; whether they have changed
+    flags="touches is_changed "  # whether it has contacts; whether they have changed
+    "is_too_deep",  # whether its bodies lie deeper in one another than they may
 )
 SHARE = on_own_lines(
     record_type(
@@ -186,6 +188,7 @@ SHARE = on_own_lines(
         "first_between last_between "  # those of them whose body b is of another share, among all such
         "next_pair next_between "  # where the evaluation of those is
         "first_task last_task",  # pairs between shares that this thread evaluates
+        flags="is_too_deep",  # whether any pair that it has evaluated is
     )
 )
 # words of World.team, each on a cache line of its own: how many threads take part, have arrived at the meeting under

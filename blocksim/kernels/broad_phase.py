@@ -8,6 +8,7 @@ fly. The list is sorted by both bodies; with that every sum over the pairs of a 
 import math
 
 from blocksim.kernels.arrays import NORMAL, SHEAR, Integers, Record, World
+from blocksim.kernels.depth import overlap_limit
 from blocksim.kernels.geometry import ground_gap, separation
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.models import near_slots
@@ -39,6 +40,7 @@ def add_pair(world: World, count: int, a: int, b: int) -> int:
         pair.a = a
         pair.b = b
         pair.near = near
+        pair.limit = overlap_limit(world.bodies[a], world.bodies[b], world.controls[0].max_overlap)
         pair.active = 0
         pair.twins = 0
         pair.axis = 0

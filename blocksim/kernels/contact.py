@@ -23,6 +23,7 @@ from blocksim.kernels.damping import (
     keep_masses,
     renew_dashpots,
 )
+from blocksim.kernels.depth import is_too_deep
 from blocksim.kernels.friction import clip_to_cone, draw_spring
 from blocksim.kernels.history import change_contacts, keep_places
 from blocksim.kernels.jit import kernel, rare_kernel
@@ -252,6 +253,7 @@ def clear_action(action: Record) -> None:
     action.broken = 0.0
     action.touches = 0
     action.is_changed = 1
+    action.is_too_deep = 0
 
 
 @rare_kernel
@@ -264,6 +266,7 @@ def pair_forces(world: World, p: int, step: float) -> None:
     action = world.action[0]
     clear_action(action)
     count = contact_points(world, p)
+    action.is_too_deep = is_too_deep(world, p, count)
     if count == 0:
         if pair.active > 0:
             change_contacts(world, p, 0, step, action)

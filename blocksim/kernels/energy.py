@@ -8,7 +8,6 @@ from blocksim.kernels.jit import entry_kernel, rare_kernel
 from blocksim.kernels.laws import stored_energy
 from blocksim.kernels.memory import share_before, shear_stiffness_before
 
-OVERLAP_SHARE = 0.05  # of the smallest side of a pair
 LEDGER_ROW = ("kinetic", "potential", "stored_normal", "stored_shear", "dashpot", "friction", "broken", "to_support")
 
 
@@ -90,18 +89,3 @@ def smallest_side(body: Record) -> float:
     """Return the smaller side (m) of a body; infinite for the ground and its pieces, which have none."""
     half = min(body.half_x, body.half_y)
     return 2.0 * half if half > 0.0 and body.faces == ALL else math.inf
-
-
-@rare_kernel
-def has_excessive_overlap(world: World) -> bool:
-    """Tell whether any contact is deeper than the limit given, or else than a share of the pair's smallest side."""
-    given = world.controls[0].max_overlap
-    for p in range(world.clock[0].pair_count):
-        pair = world.pairs[p]
-        if pair.active > 0:
-            side = min(smallest_side(world.bodies[pair.a]), smallest_side(world.bodies[pair.b]))
-            limit = given if given > 0.0 else OVERLAP_SHARE * side
-            for k in range(pair.active):
-                if world.contacts[p, k].depth > limit:
-                    return True
-    return False

@@ -16,6 +16,7 @@ def forces_between(world: World, share: Record, step: float) -> None:
         kind, effect = steady_forces(world, p, step, world.particles)
         if kind == CHANGED:
             pair_forces(world, p, step)
+            share.is_too_deep |= world.action[0].is_too_deep
             world.between[m] = world.action[0]
             world.between[m].pair = p
         else:
@@ -60,6 +61,7 @@ def forces_of_group(world: World, share: Record, end: int, step: float, book: Re
                 friction += effect.friction
             elif kind == CHANGED:
                 changed_forces(world, p, step, book)
+                share.is_too_deep |= world.action[0].is_too_deep
         p += 1
     share.next_pair = p
     book.dashpot += dashpot

@@ -56,8 +56,8 @@ def steady_forces(world: World, p: int, step: float, particles: Records | None) 
         return single(world, p, a, b, dx, dy, step)
     if pair.active == 2:
         return double(world, p, a, b, dx, dy, step)
-    choose_axis(pair, a, b, dx, dy, pair.b == world.bodies.size - 1)
-    return UNTOUCHED, NOTHING
+    gap = choose_axis(pair, a, b, dx, dy, pair.b == world.bodies.size - 1)
+    return UNTOUCHED if gap >= -pair.limit else CHANGED, NOTHING
 
 
 @kernel
@@ -85,7 +85,7 @@ def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
     values = world.interactions[a.contact_class, b.contact_class]
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
     goes_on, spot = follow(contact, a, b, dx, dy, motion, step, pair.normal_left == 0)
-    if not goes_on:
+    if not goes_on or spot.depth > pair.limit:
         return CHANGED, NOTHING
     k = values.normal_stiffness
     spring = k * spot.depth
@@ -148,7 +148,7 @@ def double(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
     goes_1, one = follow(first, a, b, dx, dy, motion, step, pair.normal_left == 0)
     goes_2, two = follow(second, a, b, dx, dy, motion, step, pair.normal_left == 0)
-    if not (goes_1 and goes_2):
+    if not (goes_1 and goes_2) or max(one.depth, two.depth) > pair.limit:
         return CHANGED, NOTHING
     k = values.normal_stiffness
     spring_1 = k * one.depth

@@ -4,12 +4,31 @@ import math
 
 from blocksim.kernels.arrays import Record, World
 from blocksim.kernels.broad_phase import rebuild_pairs
+from blocksim.kernels.energy import smallest_side
 from blocksim.kernels.jit import rare_kernel
 
 PAIR_SHARE = 0.4  # of the skin, that a body may move; two use up 0.8 skins, the rest covers what was not foreseen
 GROWTH = 4.0  # until the next look a body may become this many times as fast as the fastest one is now
 MOST_UNSEEN = 1000  # steps
+WAY_SHARE = 0.25  # of the smallest side, by which two bodies may come nearer in a step
 MOST_UNSEEN_DRIVEN = 8  # steps, where a support moves: how fast it will, nothing here knows
+
+
+@rare_kernel
+def outruns_lists(world: World) -> bool:
+    """Tell whether two bodies could meet in one step that are not listed, or a corner pass through another body.
+
+    Steps by the rules are far shorter (world/step.py), so this happens only with forced ones, and where blocks become
+    many times as fast as was to be expected.
+    """
+    controls = world.controls[0]
+    way = controls.skin
+    fastest = 0.0
+    for i in range(world.bodies.size):
+        body = world.bodies[i]
+        way = min(way, WAY_SHARE * smallest_side(body))
+        fastest = max(fastest, math.sqrt(body.vx**2 + body.vy**2) + body.radius * abs(body.spin))
+    return math.isfinite(fastest) and 2.0 * controls.step * fastest > way
 
 
 @rare_kernel

@@ -1,5 +1,6 @@
 """Which block a failed run failed at: found in the arrays as they were when it stopped."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -10,11 +11,13 @@ from numpy.typing import NDArray
 from blocksim.kernels.arrays import ALL, NOT_FINITE, OVERLAP_LIMIT, World
 from blocksim.kernels.nonsmooth.arrays import TOUCHING
 from blocksim.scenario import PlacedBody
+from blocksim.scenario.overlap import Rectangles, penetration
 from blocksim.simulation.outcome import Outcome
 from blocksim.simulation.recorder import MOTION
 from blocksim.simulation.schemes import AnyScene
 
 GROUND = "the ground"
+WALL = "a wall"
 MILLI = 1e3
 
 
@@ -42,27 +45,51 @@ def _fastest(scene: AnyScene, names: Sequence[str]) -> str:
 
 
 def _deepest(scene: AnyScene, names: Sequence[str]) -> str:
-    one, other, overlap = _overlaps_of_springs(scene) if isinstance(scene, World) else _overlaps_of_rows(scene)
-    limit = 1.0 if scene.world.controls[0].max_overlap > 0.0 else _smallest_sides(scene.world, one, other)
+    world = scene.world
+    one, other, overlap, limit = _overlaps_of_springs(scene) if isinstance(scene, World) else _overlaps_of_rows(scene)
     worst = int(np.nanargmax(overlap / limit))
-    pair = (f"block {names[i]}" if i < len(names) else GROUND for i in (int(one[worst]), int(other[worst])))
-    return f"{' and '.join(pair)} by {MILLI * overlap[worst]:.3g} mm"
+    pair = " and ".join(_name(world, names, int(i[worst])) for i in (one, other))
+    is_capped = limit[worst] < world.controls[0].max_overlap
+    most = f", more than half of a side of {MILLI * 2.0 * limit[worst]:.3g} mm" if is_capped else ""
+    return f"{pair} by {MILLI * overlap[worst]:.3g} mm{most}"
 
 
-Pairs = tuple[NDArray[Any], NDArray[Any], NDArray[np.float64]]  # bodies a and b, m
+def _name(world: World, names: Sequence[str], body: int) -> str:
+    if body < len(names):
+        return f"block {names[body]}"
+    is_wall = body < world.bodies.size - 1 and math.isfinite(world.bodies[-1].y)
+    return WALL if is_wall else GROUND
+
+
+# bodies a and b; overlap in m, what it is judged by
+Pairs = tuple[NDArray[Any], NDArray[Any], NDArray[np.float64], NDArray[np.float64]]
 
 
 def _overlaps_of_springs(world: World) -> Pairs:
     count = int(world.clock[0].pair_count)
     pairs, contacts = world.pairs[:count], world.contacts[:count]
     is_active = np.arange(contacts.shape[1]) < pairs["active"][:, np.newaxis]
-    return pairs["a"], pairs["b"], np.where(is_active, contacts["depth"], 0.0).max(axis=1)
+    deepest = np.where(is_active, contacts["depth"], 0.0).max(axis=1)
+    lost = np.where(deepest > pairs["limit"], 0.0, _penetrations(world, pairs))
+    return pairs["a"], pairs["b"], np.maximum(deepest, lost), pairs["limit"]
+
+
+def _penetrations(world: World, pairs: NDArray[Any]) -> NDArray[np.float64]:
+    """Return how deep (m) the rectangles of pairs overlap, or the block lies below the ground."""
+    bodies = world.bodies
+    rectangles = Rectangles(*(bodies[name] for name in ("x", "y", "half_x", "half_y", "cos", "sin")))
+    is_ground = pairs["b"] == bodies.size - 1
+    below = bodies[-1].y - rectangles.bottom[pairs["a"]]
+    return np.where(is_ground, below, penetration(rectangles.some(pairs["a"]), rectangles.some(pairs["b"])))
 
 
 def _overlaps_of_rows(scene: Any) -> Pairs:
     rows = scene.contacts.rows[: int(scene.contacts.stepping[0].row_count)]
     depth = np.maximum(-rows["gap_one"], -rows["gap_two"])
-    return rows["a"], rows["b"], np.where(rows["reach"] == TOUCHING, depth, 0.0)
+    limit = np.ones(rows.size)
+    if not scene.world.controls[0].max_overlap > 0.0:
+        limit = _smallest_sides(scene.world, rows["a"], rows["b"])
+    return rows["a"], rows["b"], np.where(rows["reach"] == TOUCHING, depth, 0.0), limit
 
 
 def _smallest_sides(world: World, one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.float64]:

@@ -151,8 +151,8 @@ class Contact(Table):
     )
     max_overlap: q.PositiveLength | None = Field(
         default=None,
-        description="overlap that stops the run (default: 5 % of the smallest side of each pair, 50 % where contacts "
-        "are rigid)",
+        description="overlap that stops the run, on springs never more than half of the smallest side of a pair "
+        "(default: 5 % of that side, 50 % where contacts are rigid)",
     )
     skin: q.PositiveLength | None = Field(
         default=None,

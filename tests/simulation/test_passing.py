@@ -1,0 +1,174 @@
+"""No block passes through what it meets: it rebounds as it should, or the run ends with exit code 76 and names both."""
+
+from __future__ import annotations
+
+from math import hypot
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from blocksim.errors import ExitCode
+from blocksim.simulation import run_ensemble, simulate
+from blocksim.verification.scene import scenario_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from blocksim.scenario import Scenario
+    from blocksim.simulation.result import Result
+
+WIDTH, HEIGHT = 0.032, 0.025  # m, of the block that is thrown
+LONG = 0.4  # m, of the plate that it is thrown at
+GAP = 3e-3  # m
+FACE = 0.5  # m, place of the face that it is thrown at
+SPEEDS = (1.0, 8.0, 60.0, 500.0, 1000.0)  # m/s
+SCALES = (1.0, 1e-3, 1e-5)  # of the stiffness
+BODIES = {"fixed": "block 2", "free": "block 2", "wall": "a wall", "ground": "the ground", "profile": "the ground"}
+
+
+def thrown(what: str, speed: float, *, thickness: float = 0.01, **contact: object) -> Scenario:
+    """Throw a block down at a plate of some thickness, at a wall that lies flat, or at the ground; elastic."""
+    face = 0.0 if what == "ground" else FACE
+    radius = 0.5 * (hypot(WIDTH, HEIGHT) if contact.get("angle") else HEIGHT)
+    turned = {key: contact.pop(key) for key in ("angle", "spin") if key in contact}
+    bodies: list[dict[str, object]] = [{"y": face + GAP + radius, "velocity": [0.0, -speed], **turned}]
+    tables: dict[str, Any] = {}
+    if what in {"fixed", "free"}:
+        bodies.append({"y": face - 0.5 * thickness, "width": LONG, "height": thickness, "fixed": what == "fixed"})
+    elif what == "wall":
+        tables["walls"] = [{"from": [-LONG, face], "to": [LONG, face]}]
+    elif what == "profile":
+        tables["ground"] = {"profile": [[-LONG, face], [LONG, face]]}
+    return scene(bodies, 0.1 / speed, contact, **tables)
+
+
+def scene(
+    bodies: Sequence[Mapping[str, object]],
+    end: float,
+    contact: Mapping[str, object],
+    time: Mapping[str, object] | None = None,
+    **tables: Any,
+) -> Scenario:
+    """Return a scenario without gravity and friction."""
+    return scenario_of(
+        bodies,
+        gravity=0.0,
+        friction={"block_block": 0.0, "block_ground": 0.0},
+        contact={"restitution": 1.0, **contact},
+        time={"end": end, "stop_at_rest": False, **(time or {})},
+        output={"every": end / 40},
+        **tables,
+    )
+
+
+def stays_or_says(result: Result, other: str, side: float) -> None:
+    """Check that block 1 has never been below what it met, or that the run has failed and names both."""
+    frames = result.held
+    assert frames is not None
+    obstacle = frames.y[:, 1] if frames.y.shape[1] > 1 else np.full(len(frames.time), side)
+    assert np.all(frames.y[:, 0] > obstacle)
+    if result.status != "finished":
+        assert result.summary.exit_code == ExitCode.NUMERICAL_FAILURE
+        assert f"an overlap exceeds contact.max_overlap (block 1 and {other} by " in result.reason
+
+
+@pytest.mark.parametrize("what", BODIES)
+@pytest.mark.parametrize("scale", SCALES)
+def test_block_rebounds_or_the_run_ends_whatever_its_speed(what: str, scale: float) -> None:
+    """Before, blocks at 50 m/s went through plates of 1 mm, and at 1 km/s through walls, and the run finished."""
+    finished = 0
+    for thickness in (1e-3, 1e-2, 1e-1) if what in {"fixed", "free"} else (1e-2,):
+        for speed in SPEEDS:
+            result = simulate(thrown(what, speed, thickness=thickness, stiffness_scale=scale))
+            stays_or_says(result, BODIES[what], 0.0 if what == "ground" else FACE)
+            if result.status == "finished":
+                share = thickness * LONG / (thickness * LONG + WIDTH * HEIGHT) if what == "free" else 1.0
+                frames = result.held
+                assert frames is not None
+                assert frames.vy[-1, 0] == pytest.approx(speed * (2.0 * share - 1.0), abs=0.01 * speed)
+                finished += 1
+    assert finished > 0 or scale < SCALES[1]
+
+
+@pytest.mark.parametrize("limit", [2e-3, 1.0])
+@pytest.mark.parametrize("what", ["fixed", "free", "wall"])
+def test_limit_of_overlap_that_is_too_large_lets_nothing_through(what: str, limit: float) -> None:
+    for speed, scale, angle in ((20.0, 1e-3, 0.0), (20.0, 1e-3, 0.6), (300.0, 1e-5, 0.0), (300.0, 1e-5, 1.2)):
+        contact = {"max_overlap": limit, "stiffness_scale": scale, "angle": angle}
+        result = simulate(thrown(what, speed, thickness=1e-3, **contact))
+        stays_or_says(result, BODIES[what], FACE - 0.2 * HEIGHT)
+        if what != "wall":  # which has no other side, so that a block may sink into it by half of its own
+            assert "mm, more than half of a side of 1 mm, step " in result.reason
+
+
+@pytest.mark.parametrize("model", ["kernel", "particles"])
+@pytest.mark.parametrize("what", BODIES)
+def test_particles_do_not_lose_one_another(model: str, what: str) -> None:
+    """Deeper than a boundary reaches they would: with the usual limit a row of discs passes through another."""
+    for speed, scale in ((20.0, 1e-3), (1000.0, 1e-5)):
+        contact = {"model": model, "particle_spacing": 1e-3, "stiffness_scale": scale}
+        stays_or_says(simulate(thrown(what, speed, **contact)), BODIES[what], 0.0 if what == "ground" else FACE)
+
+
+@pytest.mark.parametrize("spin", [30.0, 1e3, 1e4])
+@pytest.mark.parametrize("scale", SCALES)
+def test_rod_that_swings_does_not_pass_through_a_plate(spin: float, scale: float) -> None:
+    """Its centre rests; only its end is fast."""
+    rod = {"y": FACE, "width": 0.2, "height": 1e-3, "spin": spin}
+    plate = {"x": 0.09, "y": FACE + 0.01, "width": 0.05, "height": 1e-3, "fixed": True}
+    result = simulate(scene([rod, plate], 0.5 / spin, {"stiffness_scale": scale}))
+    frames = result.held
+    assert frames is not None
+    assert np.max(frames.rotation[:, 0]) < 0.15  # where it meets the plate: 0.1
+    assert result.status == "finished" or "(block 1 and block 2 by " in result.reason
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("frequency", [20.0, 1000.0])
+def test_support_that_is_driven_into_a_block_does_not_pass_through_it(scale: float, frequency: float) -> None:
+    block = {"y": FACE + 0.5 * HEIGHT + GAP}
+    plate = {"y": FACE - 5e-4, "width": LONG, "height": 1e-3, "fixed": True}
+    motion = {"kind": "harmonic", "amplitude": 0.05, "frequency": frequency, "direction": "90 deg"}
+    stays_or_says(
+        simulate(scene([block, plate], 2.0 / frequency, {"stiffness_scale": scale}, motion=motion)), "block 2", FACE
+    )
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_two_blocks_that_meet_head_on_do_not_pass_through_one_another(scale: float) -> None:
+    for speed in SPEEDS:
+        upper = {"y": FACE + 0.02, "velocity": [0.0, -speed]}
+        lower = {"y": FACE - 0.02, "x": 3e-3, "velocity": [0.0, speed]}
+        stays_or_says(simulate(scene([upper, lower], 0.1 / speed, {"stiffness_scale": scale})), "block 2", FACE)
+
+
+@pytest.mark.parametrize("speed", [1.0, 1000.0])
+def test_forced_step_in_which_a_block_could_pass_ends_the_run(speed: float) -> None:
+    bodies = [
+        {"y": FACE + 0.05, "velocity": [0.0, -speed]},
+        {"y": FACE, "width": LONG, "height": 1e-3, "fixed": True},
+    ]
+    result = simulate(scene(bodies, 0.2 / speed, {}, {"step": 1e-3 / speed, "force_step": True}))
+    assert result.summary.exit_code == ExitCode.NUMERICAL_FAILURE
+    assert (
+        f"moves too far in one step for its contacts to be found (the fastest is block 1 with {speed:.3g}"
+        in result.reason
+    )
+
+
+def test_run_ends_at_the_same_step_whatever_its_outputs_and_says_the_same_in_an_ensemble() -> None:
+    """Also where frames are wanted at every step: the overlap is then found at the last step of a compiled call."""
+    soft = {"stiffness_scale": 1e-3}
+    scenario = thrown("fixed", 60.0, **soft)
+    whole = simulate(scenario)
+    step = whole.summary.time_step_s
+    for every in (step, 7.0 * step, 1.0):
+        output = scenario.output.model_copy(update={"every": every})
+        result = simulate(scenario.model_copy(update={"output": output}))
+        assert result.reason == whole.reason
+        assert result.summary.final_state_sha256 == whole.summary.final_state_sha256
+    (end,) = run_ensemble([scenario])
+    assert end.outcome.reason == whole.reason
+    cut = scenario.time.model_copy(update={"end": step * (whole.summary.steps - 1)})  # found at the very last step
+    assert simulate(scenario.model_copy(update={"time": cut})).status == "failed"
