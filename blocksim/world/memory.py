@@ -11,7 +11,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.arrays import BODY, CONTACT, CONTACTS, OPERATOR, PAIR, PARTICLE_CONTACT, POINT
 from blocksim.kernels.lanes import WIDTH
-from blocksim.kernels.nonsmooth.arrays import BEFORE, BOOK, GROUP, KEPT, LINE, PART, ROW, SPOT
+from blocksim.kernels.nonsmooth.arrays import ASIDE, BEFORE, BOOK, GROUP, IMPACT, KEPT, LINE, PART, ROW, SPOT
 from blocksim.world.free_memory import available_bytes, readable
 
 LISTS = 2  # of candidate pairs: the present one and the one being built
@@ -101,8 +101,11 @@ class RigidSize(Size):
     @property
     def world_bytes(self) -> int:
         """As Size."""
-        body = BODY.itemsize + LINE.itemsize + BEFORE.itemsize + SPOT.itemsize + 2 * VALUE + OBJECT_BYTES
-        pair = ROW.itemsize + KEPT.itemsize + -(-GROUP.itemsize // WIDTH) + -(-BOOK.itemsize // (WIDTH * PART))
+        body = (
+            BODY.itemsize + LINE.itemsize + BEFORE.itemsize + IMPACT.itemsize + SPOT.itemsize + 2 * VALUE + OBJECT_BYTES
+        )
+        group = GROUP.itemsize + ASIDE.itemsize
+        pair = ROW.itemsize + KEPT.itemsize + -(-group // WIDTH) + -(-BOOK.itemsize // (WIDTH * PART))
         return self.bodies * body + self.pairs * pair
 
 

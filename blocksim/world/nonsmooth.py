@@ -9,10 +9,12 @@ import numpy as np
 from blocksim.kernels.arrays import CACHE_LINE, Records, World, zeros
 from blocksim.kernels.lanes import WIDTH
 from blocksim.kernels.nonsmooth.arrays import (
+    ASIDE,
     BEFORE,
     BOOK,
     COLOURS,
     GROUP,
+    IMPACT,
     KEPT,
     LINE,
     PART,
@@ -36,7 +38,7 @@ from blocksim.world.stacks import Construction, Refusal, Stack, Stride, built, m
 FREQUENCY = 0.125  # of the soft contact, per substep: w h = 2 pi / 8. Above 0.15 walls spread like a fluid
 DAMPING = 10.0  # damping ratio of the soft contact
 MOST_REACH = 1.5  # of a body, in skins
-SAFE_RESTITUTION = 0.5  # up to which no impact was seen to create energy
+SAFE_RESTITUTION = 0.5  # up to which no impact was seen to create energy, and one that follows from another is weak
 FINE, COARSE = 1e-3, 0.1  # m/s: tolerance of the velocity pass, for few blocks and for a crowd
 CROWD = 100  # blocks
 LINE_WORDS = CACHE_LINE // 8  # so that no two threads write to one cache line
@@ -134,6 +136,7 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
     """Return worlds (one, or a stack) with empty rows, as many as there is room for pairs."""
     *members, bodies = world.bodies.shape
     groups = groups_for(capacity)
+    follows = bool(stepping["is_guarded"].any())
     contacts = Contacts(
         lines=zeros((*members, bodies), LINE),
         before=zeros((*members, bodies), BEFORE),
@@ -142,6 +145,8 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
         ends=numbers((*members, COLOURS + 1), np.int64),
         touches=world.interactions.reshape(*members, -1).view(np.recarray),
         books=zeros((*members, groups // PART + 1), BOOK),
+        impacts=zeros((*members, bodies if follows else 1), IMPACT),
+        asides=zeros((*members, groups if follows else 1), ASIDE),
         residuals=numbers((*members, 2, LINE_WORDS * threads), np.float64),
         stepping=stepping,
     )

@@ -22,6 +22,7 @@ from blocksim.kernels.lanes.functions import (
     is_all,
     lesser,
     load,
+    root,
     select,
     split,
     spread,
@@ -169,9 +170,14 @@ def _store(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     return context.get_dummy_value()
 
 
-def _absolute(builder: Any, x: Any) -> Any:
-    kind = ir.FunctionType(VECTOR, [VECTOR])
-    return builder.call(cgutils.get_or_insert_function(builder.module, kind, "llvm.fabs.v4f64"), [x])
+def _called(name: str, kind: Any) -> Callable[..., Any]:
+    """Return the code that calls a function of the processor with one argument."""
+
+    def call(builder: Any, x: Any) -> Any:
+        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name)
+        return builder.call(function, [x])
+
+    return call
 
 
 def _all(builder: Any, mask: Any) -> Any:
@@ -203,7 +209,9 @@ def _define_all() -> None:
     _define(is_all, types.boolean, _all, (MASK,))
     _define(is_all, types.boolean, lambda _, flag: flag, (types.boolean,))
     _define(operator.neg, LANES, lambda builder, x: builder.fneg(x), (LANES,))
-    _define(abs, LANES, _absolute, (LANES,))
+    _define(abs, LANES, _called("llvm.fabs.v4f64", VECTOR), (LANES,))
+    _define(root, LANES, _called("llvm.sqrt.v4f64", VECTOR), (LANES,))
+    _define(root, types.float64, _called("llvm.sqrt.f64", DOUBLE), (types.float64,))
     _define(spread, LANES, _spread, (types.float64,))
     _two(greater, LANES, _chosen(">"))
     _two(lesser, LANES, _chosen("<"))

@@ -38,6 +38,12 @@ def lesser(x: Lanes, y: Lanes) -> Lanes:
     return select(x < y, x, y)
 
 
+def root(x: Lanes) -> Lanes:
+    """Return the square root in every lane, or of a single number."""
+    found: Any = np.sqrt(x)
+    return found
+
+
 def is_all(mask: Mask) -> bool:
     """Tell whether all flags are set, or a single one."""
     return bool(np.all(mask))

@@ -14,6 +14,7 @@ from blocksim.kernels.nonsmooth.groups import gather, pack_groups, unpack_groups
 from blocksim.kernels.nonsmooth.manifold import Place, are_four_of_blocks, collide, collide_four
 from blocksim.kernels.nonsmooth.motion import place_all
 from blocksim.kernels.nonsmooth.neighbours import look
+from blocksim.kernels.nonsmooth.rounds import forget_struck
 from blocksim.kernels.nonsmooth.substep import bodies_of, kick_share, substep
 from blocksim.kernels.nonsmooth.supports import place_supports
 from blocksim.kernels.nonsmooth.sweeps import part_of
@@ -129,6 +130,9 @@ def do_step(scene: Nonsmooth, k: int) -> int:
     world = scene.world
     contacts = scene.contacts
     size = world.team[TEAM_SIZE]
+    if contacts.stepping[0].is_guarded:
+        first, last = part_of(0, contacts.stepping[0].row_count, k, size)
+        forget_struck(contacts, first, last)
     status = supervise(scene, k, LOOK)
     if status != REACHED:
         return status

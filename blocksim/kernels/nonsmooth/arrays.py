@@ -28,12 +28,14 @@ ROW = record_type(
     "normal_one normal_two shear "  # N s: impulses of the last substep: pushing apart, on body a along the tangent
     "bend shear_bend",  # m/s: what the velocities at the points gain within half a substep, as bodies turn; bends.py
     indices="a b touch",  # bodies; place in the table of interactions
-    flags="reach",  # of the manifold in the step under way: AWAY, OPEN or TOUCHING
+    # of the manifold in the step under way: AWAY, OPEN or TOUCHING; its impulses are those of impacts that are over
+    flags="reach is_struck",
 )
 # four active rows of one colour, field by field; see groups.py
 LANE_FLOATS = (
     "nx ny arm_a arm_b width shear_arm_a shear_arm_b gap_one gap_two normal_one normal_two shear "  # as in ROW
     "bend shear_bend "  # as in ROW
+    "start_one start_two "  # m: gaps when the substep began
     "target_one target_two"  # m/s: least approach that the velocity pass leaves; -FAR where a point does not count
 )
 LANE_INDICES = "a b row"  # bodies; number of the row
@@ -49,6 +51,28 @@ GROUP = on_own_lines(
         ],
         align=True,
     )
+)
+# of a body in a round of impacts; see impacts.py
+IMPACT = on_own_lines(
+    record_type(
+        "vx vy spin "  # m/s, m/s, rad/s: when the round began
+        "share "  # -: of the rebounds of its cluster that it can have without a gain of energy
+        "after_vx after_vy after_spin "  # m/s, m/s, rad/s: with all rebounds
+        "then now "  # J: kinetic energy of the cluster before the round and after it; of roots
+        "least between",  # J: after it without rebounds, and of the difference that rebounds make; of roots
+        counters="root",  # the body that stands for the cluster
+        flags="is_hit",  # anything in the cluster rebounds in the substep
+    )
+)
+# of a group, beside GROUP, while its bodies go through impacts; see impacts.py
+ASIDE_LANES = (
+    "normal_one normal_two shear "  # N s: of clusters that are not hit, and those of all rounds of others
+    "target_one target_two "  # m/s: as GROUP has them, of the velocity pass before; -FAR if not hit
+    "rise_one rise_two "  # m/s: that a rebound gets against gravity after all rounds; -FAR before it is hit
+    "after_one after_two after_shear"  # N s: of a round with all rebounds
+)
+ASIDE = on_own_lines(
+    np.dtype([*((name, np.float64, (WIDTH,)) for name in ASIDE_LANES.split()), ("is_hit", np.uint8)], align=True)
 )
 SPOT = record_type(
     "x y "  # m
@@ -71,13 +95,17 @@ STEPPING = record_type(
     "support_vx support_vy "  # m/s: of the ground and all that is fixed, in the substep under way
     "support_x support_y "  # m: how far they have come
     "listed_x listed_y "  # m: how far they had come when the pair list was made
+    "fall_x fall_y "  # m/s: what a substep of gravity adds to velocities
+    "lag "  # -: of a substep of gravity, what velocities lack when the substep under way begins
     "bend_share "  # -: of the bend of a row, what velocities gain up to the middle of the substep under way
     "bend_time next_bend_time",  # s: times the bend, by how much gaps at its start and end are off
     "substeps "
     "velocity_sweeps "  # at most
     "colours row_count active_count group_count "  # now
     "sweeps "  # of the velocity pass, in all so far
-    "is_guarded",  # flag: restitution is so high that impacts could create energy
+    "is_guarded "  # flag: restitution is so high that impacts go one after the other, in rounds
+    "has_rebounds "  # flag: anything rebounds in the substep under way
+    "has_gain",  # flag: the last round has created energy in a cluster
 )
 BOOK = record_type("impacts friction to_support")  # J: what normal and shear impulses have taken, and given, so far
 
@@ -97,6 +125,8 @@ class Contacts(NamedTuple):
     ends: Integers  # (COLOURS + 1,) where every colour begins among the groups, and where the last one ends
     touches: Records  # (k k,) INTERACTION of all pairs of contact classes, those of the world in one row
     books: Records  # (p / PART + 1,) BOOK
+    impacts: Records  # (n + 1,) IMPACT; one of no use where nothing rebounds that much
+    asides: Records  # (g,) ASIDE; likewise
     residuals: Floats  # (2, 8 t) m/s: the largest change of velocity that each thread found in a sweep, twice
     stepping: Records  # (1,) STEPPING
 

@@ -22,6 +22,8 @@ def member(scenes: Nonsmooth, m: int) -> Nonsmooth:
             contacts.ends[m],
             contacts.touches[m],
             contacts.books[m],
+            contacts.impacts[m],
+            contacts.asides[m],
             contacts.residuals[m],
             contacts.stepping[m],
         ),

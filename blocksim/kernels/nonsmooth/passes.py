@@ -5,18 +5,20 @@ computed anew each time, which is cheaper than to load them. Bodies that are fix
 one colour share nothing that changes.
 """
 
-from blocksim.kernels.arrays import Record
+from blocksim.kernels.arrays import Record, Records
 from blocksim.kernels.friction import friction_coefficient
 from blocksim.kernels.jit import kernel
 from blocksim.kernels.lanes import (
     Lane,
     Lanes,
+    Mask,
     fields_0,
     four,
     greater,
     is_all,
     lesser,
     load,
+    root,
     select,
     split,
     store,
@@ -95,6 +97,8 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     a = bodies_at(contacts, group.a, lane)
     b = bodies_at(contacts, group.b, lane)
     gap_one, gap_two = gaps(group, lane, row, a, b, stepping.bend_time)
+    store(lane, group.start_one, gap_one)
+    store(lane, group.start_two, gap_two)
     slip = slip_of(row, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
     one, mixed, two = masses(row, a, b)
     old_one = load(lane, group.normal_one)
@@ -116,14 +120,38 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
 
 
 @kernel
-def target(impulse: Lanes, gap: Lanes, approach: Lanes, restitution: Lanes, stepping: Record) -> Lanes:
+def pulls(row: Rows, a: Bodies, b: Bodies, stepping: Record) -> Lanes:
+    """Return by how much gravity changes J v of rows in a substep (m/s) as long as nothing touches."""
+    free = select(a.inverse_mass > 0.0, 1.0, 0.0) - select(b.inverse_mass > 0.0, 1.0, 0.0)
+    return free * (row.nx * stepping.fall_x + row.ny * stepping.fall_y)
+
+
+@kernel
+def rebound(approach: Lanes, start: Lanes, pull: Lanes, restitution: Lanes, stepping: Record) -> Lanes:
+    """Return J v (m/s) that leaves a share e^2 of the energy with which a point meets.
+
+    Positions are half a substep ahead of velocities, so that J v is short of half a `pull` both before and after (not
+    at the start of a run: what it lacks there is `lag`). From a gap `start` (m) the point falls on, and the position
+    pass leaves it where it touches:
+
+        t + pull / 2 = e sqrt((u + pull / 2)^2 - 2 (pull / h) start)
+
+    With t = -e u an impact at speed u lost 3 g h / u of its energy, on average, for ever so elastic blocks.
+    """
+    now = approach + stepping.lag * pull
+    square = now * now - 2.0 * stepping.open_bias * pull * greater(start, 0.0)
+    return restitution * root(greater(square, 0.0)) - 0.5 * pull
+
+
+@kernel
+def target(impulse: Lanes, gap: Lanes, rebounds: Mask, after: Lanes, stepping: Record) -> Lanes:
     """Return what J v of a point has to be at least (m/s) after the velocity pass; -FAR where it does not count.
 
-    A gap that is still open must not slow an approach down: it would take a part of it in the substep before the
-    impact, and restitution would vanish for small substeps.
+    `after` is what the approach of a point that rebounds has to become. A gap that is still open must not slow an
+    approach down: it would take a part of it in the substep before the impact, and restitution would vanish for small
+    substeps.
     """
-    rebounds = (approach < -stepping.threshold) & (restitution > 0.0)
-    least = select(rebounds, -restitution * approach, -greater(gap, 0.0) * stepping.open_bias)
+    least = select(rebounds, after, -greater(gap, 0.0) * stepping.open_bias)
     return select((impulse > 0.0) | (gap <= 0.0), least, -FAR)
 
 
@@ -143,10 +171,16 @@ def aim(contacts: Contacts, group: Record, lane: Lane, row: Rows, a: Bodies, b: 
     vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
     vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
     u = slip_of(row, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
-    t_one = target(normal_one, gap_one, u.one, restitution, stepping)
-    t_two = target(normal_two, gap_two, u.two, restitution, stepping)
+    pull = pulls(row, a, b, stepping)
+    after_one = rebound(u.one, load(lane, group.start_one), pull, restitution, stepping)
+    after_two = rebound(u.two, load(lane, group.start_two), pull, restitution, stepping)
+    is_elastic = restitution > 0.0
+    t_one = target(normal_one, gap_one, is_elastic & (u.one < -stepping.threshold), after_one, stepping)
+    t_two = target(normal_two, gap_two, is_elastic & (u.two < -stepping.threshold), after_two, stepping)
     store(lane, group.target_one, t_one)
     store(lane, group.target_two, t_two)
+    if stepping.is_guarded and not is_all(greater(t_one, t_two) <= 0.0):
+        stepping.has_rebounds = 1
     return t_one, t_two
 
 
@@ -246,16 +280,16 @@ def reach(
 
 @kernel
 def taken_by(
-    contacts: Contacts, group: Record, lane: Lane, gx: float, gy: float, hx: float, hy: float
+    contacts: Contacts, then: Records, group: Record, lane: Lane, gx: float, gy: float
 ) -> tuple[Lanes, Lanes, Lanes]:
     """Return what normal and shear impulses of rows have taken from the energy in this substep (J), both twice.
 
     The third is what they have brought into the supports (J).
 
-    An impulse times the mean of the velocities before and after all impulses is the energy that it brings; summed over
-    all rows that is exact, whatever the order in which impulses were found. Velocities live half a substep before
-    positions: the velocity before the impulses has a kick of gravity (`gx`, `gy`, m/s) in it, of which a supported
-    body does not fall. The weight's part in the drift, half of `hx`, `hy` (m/s, a whole kick), is not lost.
+    An impulse times the mean of the velocities before (`then`, fields as in BEFORE) and after all impulses is the
+    energy that it brings; summed over all rows that is exact, whatever the order in which impulses were found. Both
+    velocities together lack (`gx`, `gy`), m/s, of gravity: they live half a substep before positions, but those after
+    a whole kick count without it, as a supported body does not fall.
     """
     normal_one = load(lane, group.normal_one)
     normal_two = load(lane, group.normal_two)
@@ -266,11 +300,11 @@ def taken_by(
     shear = load(lane, group.shear)
     a = bodies_at(contacts, group.a, lane)
     b = bodies_at(contacts, group.b, lane)
-    vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
-    vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
+    vx_a, vy_a, spin_a, _ = fields_0(lane, then, group.a)
+    vx_b, vy_b, spin_b, _ = fields_0(lane, then, group.b)
     free = select(a.inverse_mass > 0.0, 1.0, 0.0) - select(b.inverse_mass > 0.0, 1.0, 0.0)
-    vx = a.vx - b.vx + vx_a - vx_b + free * (gx - hx)
-    vy = a.vy - b.vy + vy_a - vy_b + free * (gy - hy)
+    vx = a.vx - b.vx + vx_a - vx_b + free * gx
+    vy = a.vy - b.vy + vy_a - vy_b + free * gy
     slip = slip_of(row, vx, vy, a.spin + spin_a, b.spin + spin_b)
     along_normal = row.nx * stepping.support_vx + row.ny * stepping.support_vy
     along_tangent = row.nx * stepping.support_vy - row.ny * stepping.support_vx

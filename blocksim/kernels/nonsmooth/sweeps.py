@@ -67,18 +67,18 @@ def velocity_rows(contacts: Contacts, begin: int, end: int) -> float:
 
 
 @kernel
-def book_rows(contacts: Contacts, begin: int, end: int, gx: float, gy: float, hx: float, hy: float) -> None:
-    """Book the rows of some groups."""
+def book_rows(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None:
+    """Book the rows of some groups; (gx, gy), m/s, is what velocities lack of gravity."""
     for m in range(begin, end):
         group = contacts.groups[m]
         book = contacts.books[m // PART]
         if group.count == 1:
-            normal, shear, given = taken_by(contacts, group, 0, gx, gy, hx, hy)
+            normal, shear, given = taken_by(contacts, contacts.before, group, 0, gx, gy)
             book.impacts -= 0.5 * normal
             book.friction -= 0.5 * shear
             book.to_support += given
         else:
-            normals, shears, gifts = taken_by(contacts, group, None, gx, gy, hx, hy)
+            normals, shears, gifts = taken_by(contacts, contacts.before, group, None, gx, gy)
             book.impacts -= 0.5 * total(normals, group.count)
             book.friction -= 0.5 * total(shears, group.count)
             book.to_support += total(gifts, group.count)

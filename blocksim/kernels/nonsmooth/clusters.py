@@ -1,0 +1,146 @@
+"""Clusters: the free bodies that touch one another in a substep, supports apart, and the energy of their impacts.
+
+What is fixed joins nobody, as it moves under no impulse: two blocks on one table do not know of each other.
+"""
+
+import math
+
+from blocksim.kernels.arrays import Record, Records
+from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
+
+ROUND_OFF = 1e-9  # of the kinetic energy of a cluster; impacts are solved no better
+
+
+@rare_kernel
+def root_of(bodies: Records, i: int) -> int:
+    """Return the body that stands for the cluster of body i, so far; shortens the way there."""
+    while bodies[i].root != i:
+        bodies[i].root = bodies[bodies[i].root].root
+        i = bodies[i].root
+    return i
+
+
+@rare_kernel
+def join(bodies: Records, i: int, j: int) -> None:
+    """Make one cluster of two."""
+    i = root_of(bodies, i)
+    j = root_of(bodies, j)
+    bodies[max(i, j)].root = min(i, j)
+
+
+@rare_kernel
+def of_row(contacts: Contacts, group: Record, lane: int) -> Record:
+    """Return the record of a free body of a row."""
+    a = group.a[lane]
+    return contacts.impacts[a if contacts.lines[a].inverse_mass > 0.0 else group.b[lane]]
+
+
+@rare_kernel
+def join_touching(contacts: Contacts, group: Record) -> None:
+    """Join the free bodies of the rows of a group with a point that counts."""
+    lines = contacts.lines
+    for lane in range(group.count):
+        a, b = group.a[lane], group.b[lane]
+        are_free = lines[a].inverse_mass > 0.0 and lines[b].inverse_mass > 0.0
+        if are_free and max(group.target_one[lane], group.target_two[lane]) > -FAR:
+            join(contacts.impacts, a, b)
+
+
+@rare_kernel
+def mark_rebounds(contacts: Contacts, group: Record) -> None:
+    """Mark the clusters of the rows of a group with a point that rebounds."""
+    bodies = contacts.impacts
+    for lane in range(group.count):
+        if max(group.target_one[lane], group.target_two[lane]) > 0.0:
+            bodies[root_of(bodies, of_row(contacts, group, lane).root)].is_hit = 1
+
+
+@rare_kernel
+def find_clusters(contacts: Contacts) -> None:
+    """Join the bodies of all rows with a point that counts, and mark the clusters in which anything rebounds."""
+    bodies = contacts.impacts
+    for i in range(bodies.size):
+        bodies[i].root = i
+        bodies[i].is_hit = 0
+    for m in range(contacts.stepping[0].group_count):
+        join_touching(contacts, contacts.groups[m])
+    for m in range(contacts.stepping[0].group_count):
+        mark_rebounds(contacts, contacts.groups[m])
+    for i in range(bodies.size):
+        bodies[i].root = root_of(bodies, i)
+        bodies[i].is_hit = bodies[bodies[i].root].is_hit
+
+
+@rare_kernel
+def energy(contacts: Contacts, line: Record, vx: float, vy: float, spin: float) -> float:
+    """Return the kinetic energy (J) of a body, seen from the supports: those that move may well bring energy in."""
+    ux = vx - contacts.stepping[0].support_vx
+    uy = vy - contacts.stepping[0].support_vy
+    return 0.5 * ((ux * ux + uy * uy) / line.inverse_mass + spin * spin / line.inverse_inertia)
+
+
+@rare_kernel
+def has_gain(root: Record) -> bool:
+    """Tell whether impacts have created energy in a cluster."""
+    return root.now > root.then * (1.0 + ROUND_OFF)
+
+
+@rare_kernel
+def weigh(contacts: Contacts) -> bool:
+    """Sum up the energies of all clusters before and after a round; tell whether any has gained."""
+    lines = contacts.lines
+    bodies = contacts.impacts
+    for body in bodies:
+        body.then = body.now = 0.0
+    for i in range(bodies.size):
+        body = bodies[i]
+        if body.is_hit and lines[i].inverse_mass > 0.0:
+            root = bodies[body.root]
+            root.then += energy(contacts, lines[i], body.vx, body.vy, body.spin)
+            root.now += energy(contacts, lines[i], lines[i].vx, lines[i].vy, lines[i].spin)
+    gains = False
+    for body in bodies:
+        gains = gains or has_gain(body)
+    return gains
+
+
+@rare_kernel
+def find_shares(contacts: Contacts) -> None:
+    """Find what share of its rebounds leaves every cluster the energy that it had.
+
+    Lines have the velocities without rebounds, `after` those with them. In between energy is a parabola of the share s,
+    K(s) = K_0 + s (K_1 - K_0 - c) + s^2 c with the energy c of their difference.
+    """
+    lines = contacts.lines
+    bodies = contacts.impacts
+    for body in bodies:
+        body.least = body.between = 0.0
+    ux = contacts.stepping[0].support_vx
+    uy = contacts.stepping[0].support_vy
+    for i in range(bodies.size):
+        body = bodies[i]
+        line = lines[i]
+        if body.is_hit and line.inverse_mass > 0.0:
+            root = bodies[body.root]
+            root.least += energy(contacts, line, line.vx, line.vy, line.spin)
+            vx = body.after_vx - line.vx + ux
+            vy = body.after_vy - line.vy + uy
+            root.between += energy(contacts, line, vx, vy, body.after_spin - line.spin)
+    for i in range(bodies.size):
+        body = bodies[i]
+        if body.root == i:
+            body.share = 1.0
+            if has_gain(body):
+                body.share = share_of(body.then - body.least, body.now - body.least, body.between)
+    for body in bodies:
+        body.share = bodies[body.root].share
+
+
+@rare_kernel
+def share_of(room: float, gain: float, between: float) -> float:
+    """Return s in [0, 1] with s (gain - between) + s^2 between = room, all energies (J)."""
+    if room <= 0.0:
+        return 0.0
+    slope = gain - between
+    return min(1.0, 2.0 * room / (slope + math.sqrt(slope * slope + 4.0 * between * room)))

@@ -1,0 +1,163 @@
+"""Impacts one after the other within a substep, for clusters in which anything rebounds.
+
+The velocity pass gives every point that approached before the substep its rebound, and stops the approach of all other
+points: a block that is struck and strikes the next one in the same substep would lose its rebound there. So impacts go
+in rounds, from the velocities before the substep. In each of them all points that approach faster than the threshold
+are hit, with u as it is then:
+
+    0 <= lambda  complementary to  J v + e u >= 0
+
+Points that touched when the substep began and neither approach nor part push back at once (target zero): blocks that
+press on one another are struck as one. All other points wait until they are hit in a round to come. Rounds go on until
+nothing approaches; then gravity and what rests are solved as ever, and points that were hit keep their rebound.
+
+Without friction the energy of a round changes by -(1 - e) / 2 sum(lambda |u|): none is created, and with e = 1 none is
+lost (M. Smith et al., Reflections on simultaneous impact, ACM Trans. Graph. 31 (2012) 106). With friction Newton's
+restitution can create energy (T. R. Kane and D. A. Levinson, Dynamics (1985), section 5.8). A cluster that gains has
+the round solved once more without rebounds, which creates none: with lambda_n t = 0 and friction against the slip that
+is left the change is at most -1/2 lambda A lambda. Of the difference it gets the share that leaves it the energy that
+it had. Both solutions keep all bounds of impulses and approaches, so what lies between does too; the share falls as
+restitution grows, and the rebound stays.
+"""
+
+from blocksim.kernels.arrays import TEAM_SIZE, Integers
+from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.nonsmooth.arrays import Contacts
+from blocksim.kernels.nonsmooth.clusters import find_clusters, find_shares, weigh
+from blocksim.kernels.nonsmooth.iterate import VELOCITY, agree, velocity_pass
+from blocksim.kernels.nonsmooth.rounds import (
+    aim_rest,
+    aim_round,
+    between,
+    blend,
+    book_round,
+    bring_back,
+    leave_out_rebounds,
+    set_aside,
+)
+from blocksim.kernels.nonsmooth.sweeps import part_of
+from blocksim.kernels.team import meet
+
+MOST_ROUNDS = 100  # what approaches then does not rebound
+TOLERANCE = 1e-6  # m/s: of impacts; what they miss is energy
+
+
+@rare_kernel
+def rewind(contacts: Contacts, first: int, last: int) -> None:
+    """Bring the bodies of clusters that are hit back to their velocities before the substep."""
+    for i in range(first, last):
+        if contacts.impacts[i].is_hit:
+            line = contacts.lines[i]
+            before = contacts.before[i]
+            line.vx = before.vx
+            line.vy = before.vy
+            line.spin = before.spin
+
+
+@rare_kernel
+def note(contacts: Contacts, first: int, last: int) -> None:
+    """Keep the velocities at the start of a round; those of supports too."""
+    for i in range(first, last):
+        body = contacts.impacts[i]
+        line = contacts.lines[i]
+        body.vx = line.vx
+        body.vy = line.vy
+        body.spin = line.spin
+
+
+@rare_kernel
+def undo(contacts: Contacts, first: int, last: int) -> None:
+    """Keep the velocities after a round, and go back to its start."""
+    for i in range(first, last):
+        body = contacts.impacts[i]
+        if body.is_hit:
+            line = contacts.lines[i]
+            body.after_vx, line.vx = line.vx, body.vx
+            body.after_vy, line.vy = line.vy, body.vy
+            body.after_spin, line.spin = line.spin, body.spin
+
+
+@rare_kernel
+def blend_bodies(contacts: Contacts, first: int, last: int) -> None:
+    """Give bodies the velocities that belong to the impulses of rounds.blend."""
+    for i in range(first, last):
+        body = contacts.impacts[i]
+        if body.is_hit:
+            line = contacts.lines[i]
+            line.vx = between(line.vx, body.after_vx, body.share)
+            line.vy = between(line.vy, body.after_vy, body.share)
+            line.spin = between(line.spin, body.after_spin, body.share)
+
+
+@rare_kernel
+def resume(contacts: Contacts, first: int, last: int, gx: float, gy: float) -> None:
+    """Let the substep of the bodies of clusters that were hit begin after the last impact, with gravity (m/s)."""
+    for i in range(first, last):
+        if contacts.impacts[i].is_hit:
+            line = contacts.lines[i]
+            before = contacts.before[i]
+            before.vx = line.vx
+            before.vy = line.vy
+            before.spin = line.spin
+            line.vx += gx
+            line.vy += gy
+
+
+@rare_kernel
+def restrain(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int], groups: tuple[int, int]) -> None:
+    """Leave clusters that have gained energy in a round that share of their rebounds with which they do not."""
+    undo(contacts, bodies[0], bodies[1])
+    leave_out_rebounds(contacts, groups[0], groups[1])
+    meet(team)
+    velocity_pass(contacts, team, k, VELOCITY, TOLERANCE)
+    meet(team)
+    if k == 0:
+        find_shares(contacts)
+    meet(team)
+    blend_bodies(contacts, bodies[0], bodies[1])
+    blend(contacts, groups[0], groups[1])
+
+
+@rare_kernel
+def go_round(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int], groups: tuple[int, int]) -> None:
+    """Solve one round that has been aimed."""
+    velocity_pass(contacts, team, k, VELOCITY, TOLERANCE)
+    meet(team)
+    if k == 0:
+        contacts.stepping[0].has_gain = weigh(contacts)
+    meet(team)
+    if contacts.stepping[0].has_gain:
+        restrain(contacts, team, k, bodies, groups)
+        meet(team)
+
+
+@rare_kernel
+def follow_impacts(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int], share: float) -> None:
+    """Let clusters in which anything rebounds go through their impacts one after the other.
+
+    `bodies` are those of thread k, `share` is that of a kick of gravity in this substep.
+    """
+    stepping = contacts.stepping[0]
+    groups = part_of(0, stepping.group_count, k, team[TEAM_SIZE])
+    if k == 0:
+        find_clusters(contacts)
+    meet(team)
+    rewind(contacts, bodies[0], bodies[1])
+    set_aside(contacts, groups[0], groups[1])
+    meet(team)
+    for number in range(MOST_ROUNDS):
+        note(contacts, bodies[0], bodies[1] + (k == team[TEAM_SIZE] - 1))  # the ground, which may move, is the last
+        hits = aim_round(contacts, groups[0], groups[1], number == 0)
+        if agree(contacts, team, k, number, hits) == 0.0:
+            break
+        go_round(contacts, team, k, bodies, groups)
+        lacks = 2.0 * stepping.lag  # once before the round, once after it
+        book_round(contacts, groups[0], groups[1], lacks * stepping.fall_x, lacks * stepping.fall_y)
+        meet(team)
+    resume(contacts, bodies[0], bodies[1], share * stepping.fall_x, share * stepping.fall_y)
+    meet(team)
+    aim_rest(contacts, groups[0], groups[1])
+    meet(team)
+    velocity_pass(contacts, team, k, VELOCITY, min(TOLERANCE, stepping.tolerance))
+    bring_back(contacts, groups[0], groups[1], False)
+    meet(team)

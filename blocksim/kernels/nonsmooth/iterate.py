@@ -1,0 +1,74 @@
+"""Passes over all groups, shared by threads: colour after colour, and again until nothing changes any more."""
+
+import math
+
+from blocksim.kernels.arrays import TEAM_SIZE, Integers
+from blocksim.kernels.jit import kernel
+from blocksim.kernels.nonsmooth.arrays import COLOURS, Contacts
+from blocksim.kernels.nonsmooth.sweeps import (
+    first_velocity_rows,
+    part_of,
+    position_rows,
+    velocity_rows,
+    warm_rows,
+)
+from blocksim.kernels.team import meet
+
+WARM, POSITION, FIRST_VELOCITY, VELOCITY = range(4)
+
+
+@kernel
+def go_through(contacts: Contacts, task: int, begin: int, end: int) -> float:
+    """Do one task for some groups; return the largest change of velocity (m/s) where it is of interest."""
+    if task == WARM:
+        warm_rows(contacts, begin, end)
+    elif task == POSITION:
+        position_rows(contacts, begin, end)
+    elif task == FIRST_VELOCITY:
+        return first_velocity_rows(contacts, begin, end)
+    else:
+        return velocity_rows(contacts, begin, end)
+    return 0.0
+
+
+@kernel
+def sweep(contacts: Contacts, task: int, team: Integers, k: int) -> float:
+    """Do one task for all groups, colour after colour; return the largest change of velocity (m/s) of thread k."""
+    largest = 0.0
+    size = team[TEAM_SIZE]
+    for colour in range(contacts.stepping[0].colours):
+        begin, end = contacts.ends[colour], contacts.ends[colour + 1]
+        if begin < end:
+            first, last = part_of(begin, end, k, 1 if colour == COLOURS - 1 else size)
+            if colour < COLOURS - 1 or k == 0:
+                largest = max(largest, go_through(contacts, task, first, last))
+            meet(team)
+    return largest
+
+
+@kernel
+def agree(contacts: Contacts, team: Integers, k: int, number: int, largest: float) -> float:
+    """Return the largest of what all threads have found; `number` tells one question from the next."""
+    size = team[TEAM_SIZE]
+    if size == 1:
+        return largest
+    slot = number % 2
+    contacts.residuals[slot, 8 * k] = largest
+    meet(team)
+    for other in range(size):
+        largest = max(largest, contacts.residuals[slot, 8 * other])
+    return largest
+
+
+@kernel
+def velocity_pass(contacts: Contacts, team: Integers, k: int, task: int, tolerance: float) -> None:
+    """Sweep until no impulse changes a velocity by more than the tolerance (m/s), or as often as allowed."""
+    stepping = contacts.stepping[0]
+    largest = math.inf
+    sweeps = 0
+    while largest > tolerance and sweeps < stepping.velocity_sweeps:
+        sweeps += 1
+        largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
+        task = VELOCITY
+    if k == 0:
+        stepping.sweeps += sweeps

@@ -1,0 +1,246 @@
+"""What a round of impacts does to the rows of the clusters that are hit; see impacts.py."""
+
+from blocksim.kernels.arrays import Record
+from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.lanes import WIDTH, Lane, Lanes, Mask, fields_0, greater, load, select, store
+from blocksim.kernels.nonsmooth.arrays import FAR, PART, Contacts
+from blocksim.kernels.nonsmooth.clusters import of_row
+from blocksim.kernels.nonsmooth.groups import bodies_at, highest, restitutions, rows_of, total
+from blocksim.kernels.nonsmooth.passes import gaps, pulls, taken_by
+from blocksim.kernels.nonsmooth.slip import slip_of
+
+
+@rare_kernel
+def clear(group: Record) -> None:
+    """Forget the impulses of a group."""
+    none = 0.0 * load(None, group.normal_one)
+    store(None, group.normal_one, none)
+    store(None, group.normal_two, none)
+    store(None, group.shear, none)
+
+
+@rare_kernel
+def set_aside(contacts: Contacts, begin: int, end: int) -> None:
+    """Keep what the velocity pass has found for some groups, and leave all rows out of those to come."""
+    for m in range(begin, end):
+        group = contacts.groups[m]
+        aside = contacts.asides[m]
+        none = 0.0 * load(None, group.normal_one) - FAR
+        store(None, aside.normal_one, load(None, group.normal_one))
+        store(None, aside.normal_two, load(None, group.normal_two))
+        store(None, aside.shear, load(None, group.shear))
+        store(None, aside.target_one, load(None, group.target_one))
+        store(None, aside.target_two, load(None, group.target_two))
+        store(None, aside.rise_one, none)
+        store(None, aside.rise_two, none)
+        aside.is_hit = 0
+        for lane in range(group.count):
+            if of_row(contacts, group, lane).is_hit:
+                aside.is_hit = 1
+        forget_hits(contacts, group, aside)
+        store(None, group.target_one, none)
+        store(None, group.target_two, none)
+        clear(group)
+
+
+@rare_kernel
+def forget_hits(contacts: Contacts, group: Record, aside: Record) -> None:
+    """Begin to sum up the impulses of rows of clusters that are hit; leave the other rows of their group out."""
+    for lane in range(WIDTH if aside.is_hit else 0):
+        if of_row(contacts, group, min(lane, group.count - 1)).is_hit:
+            aside.normal_one[lane] = aside.normal_two[lane] = aside.shear[lane] = 0.0
+        else:
+            aside.target_one[lane] = aside.target_two[lane] = -FAR
+
+
+@rare_kernel
+def aim_point(u: Lanes, start: Lanes, active: Lanes, after: Lanes, bend: Lanes, stepping: Record) -> tuple[Lanes, Mask]:
+    """Return the target (m/s) of a point in the round to come, and whether it is hit and has to reach `after`."""
+    counts = active > -FAR
+    is_hit = counts & (u < -stepping.threshold)
+    rests = counts & (abs(u) <= stepping.threshold) & (start <= stepping.threshold * stepping.substep)
+    return select(is_hit, bend + after, select(rests, bend - greater(u, 0.0), -FAR)), is_hit
+
+
+@rare_kernel
+def least_after(u: Lanes, last: Lanes, pull: Lanes, e: Lanes) -> Lanes:
+    """Return what an approach u (m/s) has to become in a round, so that it is `last` once gravity has added its pull.
+
+    Where gravity pulls back what is missing then is added after all rounds; what is too much could not be taken away.
+    """
+    return select(pull > 0.0, greater(last - pull, 0.0), -e * u)
+
+
+@rare_kernel
+def aim_group(contacts: Contacts, m: int, lane: Lane, is_first: bool) -> Lanes:
+    """Fix what a round has to reach at the points of a group; return 1 for rows that are hit, 0 for others."""
+    stepping = contacts.stepping[0]
+    group = contacts.groups[m]
+    aside = contacts.asides[m]
+    row = rows_of(group, lane)
+    a = bodies_at(contacts, group.a, lane)
+    b = bodies_at(contacts, group.b, lane)
+    u = slip_of(row, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
+    e = restitutions(contacts, group, lane)
+    bend = stepping.bend_share * load(lane, group.bend)
+    pull = pulls(row, a, b, stepping)
+    old_one = load(lane, aside.target_one)
+    old_two = load(lane, aside.target_two)
+    last_one = old_one if is_first else -e * u.one - 0.5 * pull
+    last_two = old_two if is_first else -e * u.two - 0.5 * pull
+    after_one = least_after(u.one, last_one, pull, e)
+    after_two = least_after(u.two, last_two, pull, e)
+    t_one, hit_one = aim_point(u.one, load(lane, group.start_one), old_one, after_one, bend, stepping)
+    t_two, hit_two = aim_point(u.two, load(lane, group.start_two), old_two, after_two, bend, stepping)
+    store(lane, group.target_one, t_one)
+    store(lane, group.target_two, t_two)
+    rise_one = load(lane, aside.rise_one)
+    rise_two = load(lane, aside.rise_two)
+    more_one = select(pull < 0.0, last_one + e * u.one, 0.0)
+    more_two = select(pull < 0.0, last_two + e * u.two, 0.0)
+    store(lane, aside.rise_one, select(hit_one & (rise_one <= -FAR), more_one, rise_one))
+    store(lane, aside.rise_two, select(hit_two & (rise_two <= -FAR), more_two, rise_two))
+    return select(hit_one | hit_two, 1.0 + 0.0 * t_one, 0.0 * t_one)
+
+
+@rare_kernel
+def aim_round(contacts: Contacts, begin: int, end: int, is_first: bool) -> float:
+    """Begin a round for some groups; return 1 where any point is hit, else 0."""
+    hits = 0.0
+    for m in range(begin, end):
+        if contacts.asides[m].is_hit:
+            group = contacts.groups[m]
+            clear(group)
+            if group.count == 1:
+                hits = max(hits, aim_group(contacts, m, 0, is_first))
+            else:
+                hits = max(hits, highest(aim_group(contacts, m, None, is_first)))
+    return hits
+
+
+@rare_kernel
+def leave_out_rebounds(contacts: Contacts, begin: int, end: int) -> None:
+    """Keep the impulses of a round, and begin it again without rebounds."""
+    for m in range(begin, end):
+        aside = contacts.asides[m]
+        if aside.is_hit:
+            group = contacts.groups[m]
+            store(None, aside.after_one, load(None, group.normal_one))
+            store(None, aside.after_two, load(None, group.normal_two))
+            store(None, aside.after_shear, load(None, group.shear))
+            for target in (group.target_one, group.target_two):
+                least = load(None, target)
+                store(None, target, select(least > 0.0, 0.0, least))
+            clear(group)
+
+
+@rare_kernel
+def blend(contacts: Contacts, begin: int, end: int) -> None:
+    """Add the share of their rebounds that clusters can have to the impulses without."""
+    for m in range(begin, end):
+        aside = contacts.asides[m]
+        if aside.is_hit:
+            group = contacts.groups[m]
+            for lane in range(WIDTH):
+                s = of_row(contacts, group, min(lane, group.count - 1)).share
+                group.normal_one[lane] = between(group.normal_one[lane], aside.after_one[lane], s)
+                group.normal_two[lane] = between(group.normal_two[lane], aside.after_two[lane], s)
+                group.shear[lane] = between(group.shear[lane], aside.after_shear[lane], s)
+
+
+@rare_kernel
+def between(x: float, y: float, share: float) -> float:
+    """Return what lies between x and y; exactly y where the share is one."""
+    return y if share >= 1.0 else x + share * (y - x)
+
+
+@rare_kernel
+def book_round(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None:
+    """Book a round for some groups, and sum up its impulses; (gx, gy) as in taken_by."""
+    for m in range(begin, end):
+        aside = contacts.asides[m]
+        if aside.is_hit:
+            group = contacts.groups[m]
+            book = contacts.books[m // PART]
+            if group.count == 1:
+                normal, shear, given = taken_by(contacts, contacts.impacts, group, 0, gx, gy)
+                book.impacts -= 0.5 * normal
+                book.friction -= 0.5 * shear
+                book.to_support += given
+            else:
+                normals, shears, gifts = taken_by(contacts, contacts.impacts, group, None, gx, gy)
+                book.impacts -= 0.5 * total(normals, group.count)
+                book.friction -= 0.5 * total(shears, group.count)
+                book.to_support += total(gifts, group.count)
+            store(None, aside.normal_one, load(None, aside.normal_one) + load(None, group.normal_one))
+            store(None, aside.normal_two, load(None, aside.normal_two) + load(None, group.normal_two))
+            store(None, aside.shear, load(None, aside.shear) + load(None, group.shear))
+
+
+@rare_kernel
+def aim_rest_of(contacts: Contacts, m: int, lane: Lane) -> None:
+    """Fix what the points of a group keep after all impacts: their rebound against gravity, else no approach."""
+    stepping = contacts.stepping[0]
+    group = contacts.groups[m]
+    aside = contacts.asides[m]
+    row = rows_of(group, lane)
+    a = bodies_at(contacts, group.a, lane)
+    b = bodies_at(contacts, group.b, lane)
+    gap_one, gap_two = gaps(group, lane, row, a, b, stepping.next_bend_time)
+    vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
+    vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
+    u = slip_of(row, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
+    bend = stepping.bend_share * load(lane, group.bend)
+    one = kept(u.one, load(lane, aside.rise_one), bend, gap_one, stepping)
+    two = kept(u.two, load(lane, aside.rise_two), bend, gap_two, stepping)
+    store(lane, group.target_one, select(load(lane, aside.target_one) > -FAR, one, -FAR))
+    store(lane, group.target_two, select(load(lane, aside.target_two) > -FAR, two, -FAR))
+
+
+@rare_kernel
+def kept(u: Lanes, rise: Lanes, bend: Lanes, gap: Lanes, stepping: Record) -> Lanes:
+    """Return what a point has to reach at least (m/s) in the velocity pass after all impacts, u after the last one."""
+    least = -greater(gap, 0.0) * stepping.open_bias
+    return select((rise > -FAR) & (u > 0.0), greater(u + rise, 0.0) + bend, least)
+
+
+@rare_kernel
+def aim_rest(contacts: Contacts, begin: int, end: int) -> None:
+    """Begin the velocity pass after all impacts for some groups."""
+    for m in range(begin, end):
+        if contacts.asides[m].is_hit:
+            group = contacts.groups[m]
+            clear(group)
+            if group.count == 1:
+                aim_rest_of(contacts, m, 0)
+            else:
+                aim_rest_of(contacts, m, None)
+
+
+@rare_kernel
+def bring_back(contacts: Contacts, begin: int, end: int, are_hit: bool) -> None:
+    """Give rows of clusters that were not hit their impulses back, or those that were hit the impulses of all rounds.
+
+    Impacts are over, so that no substep begins with their impulses; at the end of a step they are told.
+    """
+    for m in range(begin, end):
+        group = contacts.groups[m]
+        aside = contacts.asides[m]
+        for lane in range(WIDTH):  # copies find the same
+            is_hit = of_row(contacts, group, min(lane, group.count - 1)).is_hit == 1
+            if is_hit == are_hit:
+                if aside.normal_one[lane] + aside.normal_two[lane] > 0.0 and is_hit:
+                    contacts.rows[group.row[lane]].is_struck = 1
+                group.normal_one[lane] += aside.normal_one[lane]
+                group.normal_two[lane] += aside.normal_two[lane]
+                group.shear[lane] += aside.shear[lane]
+
+
+@rare_kernel
+def forget_struck(contacts: Contacts, begin: int, end: int) -> None:
+    """Let some rows begin a step without the impulses of impacts: nothing presses or turns about them any more."""
+    for r in range(begin, end):
+        row = contacts.rows[r]
+        if row.is_struck:
+            row.is_struck = 0
+            row.normal_one = row.normal_two = row.shear = 0.0
