@@ -84,7 +84,8 @@ BODY = joined(
         indices="contact_class",  # index into the interaction table; class 0 is the ground
         small="pairs_now pairs_before",  # pairs in contact in this evaluation and the one before
         flags="pairs_changed "  # flag: those two differ
-        "faces corners "  # bits of those that can touch; pieces of ground have their upper face and its free ends
+        "faces corners "  # bits of those that can touch; pieces of ground have their upper face and its free ends,
+        # and in bits 4 and 5 of corners whether those at the right and left are sharper than a right angle
         "is_moved "  # flag: moves with the support
         "counts",  # flag: forces on it matter, as it is free or moves with the support
     ),

@@ -33,7 +33,8 @@ class PlacedSegment:
 
     `material` is None where it is as the ground. `extends_*`: a neighbour or the ground covers this end, so that
     the piece may reach a little beyond it and no crack opens. `touches_*`: this end is an edge that blocks can land
-    on; where two pieces share an edge, it belongs to the first.
+    on; where two pieces share an edge, it belongs to the first. `sharp_*`: that edge has less than a right angle of
+    solid behind it, or is the end of a wall.
     """
 
     x0: float
@@ -45,6 +46,8 @@ class PlacedSegment:
     extends_end: bool
     touches_start: bool
     touches_end: bool
+    sharp_start: bool = False
+    sharp_end: bool = False
 
     @property
     def length(self) -> float:
@@ -85,18 +88,21 @@ def profile_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
         return ()
     (x_first, y_first), (x_last, y_last) = points[0], points[-1]
     line = _corners([(x_first - ENDLESS, y_first), *points, (x_last + ENDLESS, y_last)])
-    turns = [0.0, *(_turn(a, b, c) for a, b, c in zip(line, line[1:], line[2:], strict=False)), 0.0]
+    joints = list(zip(line, line[1:], line[2:], strict=False))
+    turns = [0.0, *(_turn(*joint) for joint in joints), 0.0]
+    sharp = [*(_is_sharp(*joint) for joint in joints), False]
     return tuple(
         PlacedSegment(
             *one,
             *other,
             material=None,
-            extends_start=turn_before > 0.0,
-            extends_end=turn_after > 0.0,
+            extends_start=before > 0.0,
+            extends_end=after > 0.0,
             touches_start=False,
-            touches_end=turn_after < 0.0,
+            touches_end=after < 0.0,
+            sharp_end=is_sharp,
         )
-        for (one, other), (turn_before, turn_after) in zip(pairwise(line), pairwise(turns), strict=True)
+        for (one, other), (before, after), is_sharp in zip(pairwise(line), pairwise(turns), sharp, strict=True)
     )
 
 
@@ -117,9 +123,16 @@ def _turn(before: Point, joint: Point, after: Point) -> float:
     return -1.0 if abs(sine) <= STRAIGHT and x0 * x1 + y0 * y1 < 0.0 else sine
 
 
+def _is_sharp(before: Point, joint: Point, after: Point) -> bool:
+    """Return True at an edge with less than a right angle of solid behind it."""
+    back = (joint[0] - before[0]) * (after[0] - joint[0]) + (joint[1] - before[1]) * (after[1] - joint[1]) < 0.0
+    return back and _turn(before, joint, after) < 0.0
+
+
 class _End(NamedTuple):
     extends: bool
     touches: bool
+    is_sharp: bool
 
 
 def wall_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
@@ -158,6 +171,8 @@ def _wall(
         extends_end=end.extends,
         touches_start=start.touches,
         touches_end=end.touches,
+        sharp_start=start.is_sharp,
+        sharp_end=end.is_sharp,
     )
 
 
@@ -169,12 +184,13 @@ def _neighbour(points: Floats, end: Point, number: int) -> int | None:
 
 def _joint(before: Wall, after: Wall, *, is_first: bool) -> _End:
     turn = _turn(before.start, before.end, after.end)
-    return _End(extends=turn > STRAIGHT, touches=is_first and turn < -STRAIGHT)
+    is_sharp = is_first and _is_sharp(before.start, before.end, after.end)
+    return _End(extends=turn > STRAIGHT, touches=is_first and turn < -STRAIGHT, is_sharp=is_sharp)
 
 
 def _free_end(*, is_covered: bool) -> _End:
     """Judge an end without a neighbour, covered by the ground or the middle of another wall or not."""
-    return _End(extends=is_covered, touches=not is_covered)
+    return _End(extends=is_covered, touches=not is_covered, is_sharp=not is_covered)
 
 
 def _touches(point: Point, starts: Floats, ends: Floats) -> bool:

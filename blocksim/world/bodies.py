@@ -17,6 +17,7 @@ from blocksim.world.outline import Outline, Outlines
 SLAB_SHARE = 0.25
 UPPER_FACE = 1 << 1  # bits as in kernels/arrays.py
 UPPER_RIGHT, UPPER_LEFT = 1 << 2, 1 << 3
+SHARP_RIGHT, SHARP_LEFT = 1 << 4, 1 << 5
 
 
 def body_records(outlines: Outlines) -> Records:
@@ -88,3 +89,4 @@ def _fill_slab(record: Record, segment: PlacedSegment, thickness: float) -> None
     record.radius = math.hypot(record.half_x, record.half_y)
     record.faces = UPPER_FACE
     record.corners = (UPPER_RIGHT if segment.touches_end else 0) | (UPPER_LEFT if segment.touches_start else 0)
+    record.corners |= (SHARP_RIGHT if segment.sharp_end else 0) | (SHARP_LEFT if segment.sharp_start else 0)

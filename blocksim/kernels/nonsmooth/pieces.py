@@ -1,4 +1,14 @@
-"""Where a block touches the ground: the half-plane, or a piece of it, of which only the upper face counts."""
+"""Where a block touches the ground: the half-plane, or a piece of it, of which only the upper face counts.
+
+A piece is a line with the solid below. Of its face and the four of the block, the one beyond which the other reaches
+least tells how the two meet (separating axes: S. Gottschalk, TR96-024, UNC Chapel Hill (1996)), and all four count,
+whichever way they look: a block beside a step reaches far below the upper face of that step, but it is its side that is
+in touch, and a block on a step reaches as far behind the riser as it is long, but it is its lower face. Where it is a
+face of the block, an end of the piece is what it touches, or nothing: ends at which the ground goes on belong to one of
+the two pieces or are no edges.
+"""
+
+from typing import NamedTuple
 
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import FAR
@@ -9,6 +19,7 @@ from blocksim.kernels.nonsmooth.faces import (
     Points,
     clip,
     face_of,
+    has_point,
     in_frame,
     opposite_edge,
     points_of,
@@ -16,8 +27,18 @@ from blocksim.kernels.nonsmooth.faces import (
 
 TIE = 1e-7  # m: by so much a face of the block has to be better than that of the piece
 FACING = -0.01  # cosine: faces of a block that look more away than that from a piece of ground do not touch its edge
+PARALLEL = -0.99995  # cosine: faces within 0.01 rad of each other meet as faces, if the end of the piece is no edge
 
-UPPER_RIGHT, UPPER_LEFT = 2, 3  # corners
+UPPER_RIGHT, UPPER_LEFT, SHARP_RIGHT, SHARP_LEFT = 2, 3, 4, 5  # bits of corners
+
+
+class Meeting(NamedTuple):
+    """A face of a block, how a piece of ground lies before it, the least gap (m), and how the two faces look."""
+
+    face: Face
+    edge: Edge
+    gap: float
+    cosine: float  # between the outward normals of the two faces
 
 
 @rare_kernel
@@ -31,13 +52,58 @@ def points_on_ground(block: Block, ground: Block, margin: float) -> tuple[Points
 
 @kernel
 def upper_edge(face: Face, piece: Block, corners: int) -> Edge:
-    """Return the upper face of a piece of ground in the frame of a reference face that looks down on it."""
+    """Return the upper face of a piece of ground in the frame of a reference face of a block."""
     x, y = in_frame(face, piece.x - piece.sin * piece.half_y, piece.y + piece.cos * piece.half_y)
     c = (piece.cos * face.ny - piece.sin * face.nx) * piece.half_x
     s = (piece.cos * face.nx + piece.sin * face.ny) * piece.half_x
-    is_left = (corners >> UPPER_RIGHT) & 1 == 1  # seen from above a piece, right is left in its own frame
-    is_right = (corners >> UPPER_LEFT) & 1 == 1
-    return Edge(x + c, y + s, x - c, y - s, is_left, is_right)
+    is_right_end = (corners >> UPPER_RIGHT) & 1 == 1
+    is_left_end = (corners >> UPPER_LEFT) & 1 == 1
+    if c > 0.0:  # seen from behind
+        return Edge(x - c, y - s, x + c, y + s, is_left_end, is_right_end)
+    return Edge(x + c, y + s, x - c, y - s, is_right_end, is_left_end)
+
+
+@kernel
+def meeting_on(block: Block, piece: Block, corners: int, number: int) -> Meeting:
+    """Return how a piece of ground lies before one of the four faces of a block."""
+    sign = 1.0 if number < 2 else -1.0
+    along_x = number % 2 == 0
+    mx = sign * (block.cos if along_x else -block.sin)
+    my = sign * (block.sin if along_x else block.cos)
+    face = face_of(block, mx, my, along_x)
+    edge = upper_edge(face, piece, corners)
+    return Meeting(face, edge, min(edge.left_gap, edge.right_gap), my * piece.cos - mx * piece.sin)
+
+
+@kernel
+def best_meeting(block: Block, piece: Block, corners: int) -> Meeting:
+    """Return how a piece of ground meets the face of a block that it reaches beyond least."""
+    best = meeting_on(block, piece, corners, 0)
+    for number in range(1, 4):
+        other = meeting_on(block, piece, corners, number)
+        if other.gap > best.gap:
+            best = other
+    return best
+
+
+@kernel
+def is_edge(meeting: Meeting) -> bool:
+    """Tell whether the end of a piece of ground that is nearest to the face of a block is an edge that can touch."""
+    edge = meeting.edge
+    return bool(edge.is_left) if edge.left_gap < edge.right_gap else bool(edge.is_right)
+
+
+@kernel
+def touches_edge(meeting: Meeting, corners: int) -> bool:
+    """Tell whether a face of a block looks at the edge at which a piece of ground ends, not at the piece beyond it.
+
+    The upper faces of two pieces that join at a right angle look at right angles; at a sharper edge, and at the end of
+    a wall, blocks come from farther round.
+    """
+    is_left = meeting.edge.left_gap < meeting.edge.right_gap
+    is_right_end = is_left == (meeting.cosine <= 0.0)
+    is_sharp = (corners >> (SHARP_RIGHT if is_right_end else SHARP_LEFT)) & 1 == 1
+    return is_edge(meeting) and (is_sharp or meeting.cosine < FACING)
 
 
 @rare_kernel
@@ -49,25 +115,17 @@ def points_on_piece(block: Block, piece: Block, corners: int, is_first: bool, ma
     """
     face = face_of(piece, -piece.sin, piece.cos, False)
     edge = opposite_edge(face, block)
-    best = min(edge.left_gap, edge.right_gap)
-    is_near = best <= margin
+    gap = min(edge.left_gap, edge.right_gap)
     edge = clip(edge, face.half)
-    is_above = edge.right > edge.left and min(edge.left_gap, edge.right_gap) >= -2.0 * piece.half_y
-    is_of_block = False
-    if is_near and corners != 0:
-        for k in range(4):
-            sign = 1.0 if k < 2 else -1.0
-            along_x = k % 2 == 0
-            mx = sign * (block.cos if along_x else -block.sin)
-            my = sign * (block.sin if along_x else block.cos)
-            if my * piece.cos - mx * piece.sin < FACING:
-                other = face_of(block, mx, my, along_x)
-                up = upper_edge(other, piece, corners)
-                if min(up.left_gap, up.right_gap) > best + TIE:
-                    best = min(up.left_gap, up.right_gap)
-                    face = other
-                    edge = clip(up, other.half)
-                    is_of_block = True
+    is_near = min(edge.left_gap, edge.right_gap) >= -2.0 * piece.half_y
+    meeting = best_meeting(block, piece, corners)
+    is_of_block = meeting.gap > gap + TIE and (is_edge(meeting) or meeting.cosine > PARALLEL)
+    if is_of_block:
+        face = meeting.face
+        edge = clip(meeting.edge, face.half)
+        is_near = touches_edge(meeting, corners) and edge.right >= edge.left
+    else:
+        is_near = is_near and edge.right > edge.left
     a, b = (block, piece) if is_first else (piece, block)
     points = points_of(face, edge, a, b, is_of_block != is_first, margin)
-    return points, is_near and best <= margin and edge.right > edge.left and (is_above or is_of_block)
+    return points, is_near and max(gap, meeting.gap) <= margin and has_point(points)
