@@ -177,6 +177,7 @@ def _sag(rigid: SagDescription | None) -> list[str]:
         return []
     solved = f"each solved to {MILLI * rigid.tolerance:g} mm/s"
     return [
+        f"           {rigid.why}",
         f"           in {rigid.substeps} substeps, {solved}; by hand at most {rigid.longest_step:.1e} s",
         f"sag        {MICRO * rigid.sag:.3g} µm at the top of a column of {rigid.blocks}, with the step squared",
     ]

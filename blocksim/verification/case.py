@@ -15,10 +15,8 @@ if TYPE_CHECKING:
     from blocksim.kernels.arrays import World
 
 
-RIGID_STEP = 1e-4
-"""Step (s) of the non-smooth scheme, which is first order in it, where a case does not say that it needs another."""
 VELOCITY_TOLERANCE = 1e-6
-"""Of the non-smooth scheme (m/s): closed forms know no unsolved impulses."""
+"""Of the non-smooth scheme (m/s) at steps given by hand: studies of the step know no unsolved impulses."""
 
 
 class Verdict(StrEnum):
@@ -62,7 +60,7 @@ class Setting:
     law: str = "linear"
     quick: bool = False  # the case's shortened size, where it has one
     scheme: str = "explicit"
-    rigid_step: float = RIGID_STEP  # s, of the non-smooth scheme; the explicit one finds its own
+    rigid_step: float | None = None  # s, of the non-smooth scheme, without substeps; None for what users get
 
     @property
     def rigid(self) -> bool:
@@ -71,9 +69,11 @@ class Setting:
 
     @property
     def stepping(self) -> dict[str, object]:
-        """Keys of [time] that the scheme needs; contacts are found at every step, as there is but one substep."""
+        """Keys of [time] that the scheme needs; the defaults unless a step is given."""
         if not self.rigid:
             return {}
+        if self.rigid_step is None:
+            return {"scheme": self.scheme}
         steps = {"step": self.rigid_step, "substeps": 1, "velocity_tolerance": VELOCITY_TOLERANCE}
         return {"scheme": self.scheme, **steps}
 
@@ -120,7 +120,6 @@ class Case:
     quick: str = ""  # what the quick size leaves out; empty where there is but one size
     remarks: Mapping[str, str] = field(default_factory=dict)  # model: why it may be outside
     not_for: Mapping[str, str] = field(default_factory=dict)  # scheme: why the case says nothing about it
-    rigid_step: float | None = RIGID_STEP  # s, that the non-smooth scheme needs; None where scenarios have their own
 
 
 def absolute(quantity: str, unit: str, expected: float, measured: float, tolerance: float) -> Row:

@@ -20,15 +20,10 @@ from blocksim.verification import (
 from blocksim.verification.case import Case, Setting
 from blocksim.verification.remarks import NOT_FOR, REMARKS
 
-# Steps (s) of the non-smooth scheme that are shorter than usual. V3: every impact loses a part of h v in height.
-# V16: h u J of the angular momentum is lost. V19, V21: how blocks are numbered or supported may decide in which step a
-# point lifts off. V22: the end of block 3 is a matter of chance for long steps, 128.0 to 128.8 mm. V6: a corner that
-# sticks turns for one step before its arms do; one impact is little work, so that it has the shortest step of all.
-FINE, FINEST = 1e-5, 1e-6
 _CASES = (
     Case("V1", "free flight and free spin", "parabola, constant spin", flight.free_flight),
     Case("V2", "static overlap on the ground", "weight = contact force", resting.static_overlap),
-    Case("V3", "flat drop from 0.1 m, e = 0.5", "Eq 12", flight.bounces, rigid_step=FINE),
+    Case("V3", "flat drop from 0.1 m, e = 0.5", "Eq 12", flight.bounces),
     Case(
         "V4",
         "restitution of flat and corner impacts",
@@ -36,8 +31,8 @@ _CASES = (
         restitution.restitution,
         quick="one particle spacing instead of four",
     ),
-    Case("V5", "corner impact without friction", "impulse and moment", impacts.frictionless_corner, rigid_step=FINEST),
-    Case("V6", "corner impact that sticks", "impulse and moment", impacts.sticking_corner, rigid_step=FINEST),
+    Case("V5", "corner impact without friction", "impulse and moment", impacts.frictionless_corner),
+    Case("V6", "corner impact that sticks", "impulse and moment", impacts.sticking_corner),
     Case("V7", "sliding to a stop on level ground", "Eq 13", sliding.sliding_to_rest),
     Case("V8", "sliding down a slope of 30°", "g (sin a − μ cos a)", sliding.slope),
     Case(
@@ -65,7 +60,7 @@ _CASES = (
         quick="creep over 0.5–1 s instead of 5–10 s, a hundredth of the stiffness",
     ),
     Case("V15", "kinetic energy in 4950 impacts", "no gain", energy.impacts),
-    Case("V16", "two free blocks colliding off-centre", "conservation", impacts.two_blocks, rigid_step=FINE),
+    Case("V16", "two free blocks colliding off-centre", "conservation", impacts.two_blocks),
     Case("V17", "ladder 1:100 at a smooth wall, 60°", "(cot a − t/L)/2", toppling.ladder),
     Case(
         "V18",
@@ -74,17 +69,16 @@ _CASES = (
         dominoes.dominoes,
         quick="gaps 0.2 h and 0.3 h only, a hundredth of the stiffness",
     ),
-    Case("V19", "mirrored, relabelled, moved collapse", "symmetry", symmetry.symmetries, rigid_step=FINE),
+    Case("V19", "mirrored, relabelled, moved collapse", "symmetry", symmetry.symmetries),
     Case("V20", "convergence in step and spacing", "second order", convergence.convergence),
-    Case("V21", "ground as a fixed block", "same motion", symmetry.fixed_block, rigid_step=FINE),
-    Case("V22", "three blocks at rest, e = 0", "ten engines", collapse.at_rest, rigid_step=FINE),
+    Case("V21", "ground as a fixed block", "same motion", symmetry.fixed_block),
+    Case("V22", "three blocks at rest, e = 0", "ten engines", collapse.at_rest),
     Case(
         "V23",
         "energy ledger of every scenario",
         "balance",
         energy.ledgers,
         quick="a hundredth of the stiffness",
-        rigid_step=None,
     ),
     Case("V24", "three blocks before their first impact", "pymunk, Box2D", collapse.before_impact),
 )

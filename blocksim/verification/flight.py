@@ -59,11 +59,12 @@ def observed(fall: Simulation, impacts: int) -> tuple[list[float], list[float]]:
     times: list[float] = []
     apexes = [0.0]
     falling = True
+    poll = max(POLL, fall.step)
     while len(times) <= impacts and fall.time < LONGEST:
-        fall.to_time(fall.time + POLL)
+        fall.to_time(fall.time + poll)
         body = fall.bodies[0]
         if falling and body.vy > 0.0:
-            times.append(fall.time - POLL / 2)
+            times.append(fall.time - poll / 2)
             apexes.append(0.0)
         falling = body.vy < 0.0
         apexes[-1] = max(apexes[-1], float(body.y) - HEIGHT / 2)

@@ -27,7 +27,7 @@ COLUMNS = {  # head of the column: how it is measured
     "`particles`": Setting("particles", quick=True),
 }
 RIGID = "nonsmooth"  # head of the second table's column
-RIGID_HEADS = ("case", "step, ms", "quantity", "expected", "tolerance", "measured")
+RIGID_HEADS = ("case", "quantity", "expected", "tolerance", "measured")
 SETTINGS = {**COLUMNS, RIGID: Setting(scheme="nonsmooth")}
 FIELDS = ("quantity", "unit", "expected", "measured", "tolerance", "relative", "at_least")
 SIGNS = {Verdict.INSIDE: "✓", Verdict.OUTSIDE: "✗"}
@@ -71,11 +71,11 @@ def _rigid_table(stored: Stored) -> Iterator[str]:
 
 
 def _rigid_lines(stored: Stored, case: Case) -> Iterator[str]:
-    name, step = f"{case.id} {case.title}", number(1e3 * case.rigid_step) if case.rigid_step else "own"
+    name = f"{case.id} {case.title}"
     for row in stored_rows(stored, RIGID, case):
         quantity = f"{row.quantity}, {row.unit}" if row.unit else row.quantity
-        yield f"| {' | '.join([name, step, quantity, expected_text(row), tolerance_text(row), _cell(row)])} |"
-        name = step = ""
+        yield f"| {' | '.join([name, quantity, expected_text(row), tolerance_text(row), _cell(row)])} |"
+        name = ""
 
 
 def _case_lines(stored: Stored, case: Case) -> Iterator[str]:

@@ -20,7 +20,7 @@ from blocksim.verification.scene import HEIGHT, WIDTH
 if TYPE_CHECKING:
     from blocksim.verification.case import Setting
 
-POLL = 40  # steps; an impact takes thirty and more
+POLL = 40  # steps; an impact on springs takes thirty and more, a rigid one a part of one
 MOST_STEPS = 4_000_000
 STEPS_BEFORE = 2.0  # of free flight
 GOLDEN = 0.6180339887498949  # its multiples, modulo 1, spread phases evenly over a step
@@ -43,6 +43,7 @@ class Thrower:
         body = {"y": 1.0, "velocity": [0.0, -speed]}
         scene = setting.scene([body], restitution=restitution, gravity=0.0, **values)
         self.speed = speed
+        self.poll = 1 if setting.rigid else POLL
         self.scene = build_scene(scene.scenario())
         self.world = self.scene.world
         self.scheme = scheme_of(self.scene)
@@ -60,7 +61,7 @@ class Thrower:
         body = self.world.bodies[0]
         steps, before = 0, float(body.vy)
         while steps < MOST_STEPS:
-            steps += POLL
+            steps += self.poll
             self.scheme.advance(self.scene, steps)
             self.scheme.measure(self.scene, self.row)
             if self.row[len(self.scheme.ledger)] == 0.0 and body.vy != before:

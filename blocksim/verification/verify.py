@@ -64,16 +64,14 @@ def tolerance_kind(row: Row) -> str:
     return "relative" if row.relative else "absolute"
 
 
-def prepared(case: Case, setting: Setting) -> Setting:
-    """Return the setting as a case wants it: rigid contacts with the case's own step and in full, as that is quick."""
-    if not setting.rigid:
-        return setting
-    return replace(setting, quick=False, rigid_step=case.rigid_step or setting.rigid_step)
+def prepared(setting: Setting) -> Setting:
+    """Return the setting in which a case is run: rigid contacts in full, as that is quick."""
+    return replace(setting, quick=False) if setting.rigid else setting
 
 
 def run_case(case: Case, setting: Setting) -> Outcome:
     """Run one case."""
-    setting = prepared(case, setting)
+    setting = prepared(setting)
     began = time.perf_counter()
     rows = tuple(case.measure(setting))
     return Outcome(case, setting, rows, time.perf_counter() - began)

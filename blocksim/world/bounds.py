@@ -23,6 +23,7 @@ class Bounds(NamedTuple):
     top: float  # m, no corner is higher
     speed: float  # m/s, no point is faster
     mass: float  # kg, of all free ones
+    free: int  # blocks that are not fixed
     kinds: frozenset[Kind]
     grounds: frozenset[int]  # contact classes of the half-plane and its pieces
 
@@ -38,10 +39,11 @@ def bounds_of(bodies: NDArray[np.record], blocks: int) -> list[Bounds]:
     )
     # one by one: the order of a sum must not depend on which other scenes there are
     masses = [float(np.sum(mass[mass > 0.0])) for mass in columns["mass"]]
+    free = np.count_nonzero(columns["mass"] > 0.0, axis=1).tolist()
     kinds = zip(*(all_blocks[name].tolist() for name in Kind._fields), strict=True)
     grounds = bodies["contact_class"][:, blocks:].tolist()
-    rows = zip(smallest.tolist(), top.tolist(), speed.tolist(), masses, kinds, grounds, strict=True)
+    rows = zip(smallest.tolist(), top.tolist(), speed.tolist(), masses, free, kinds, grounds, strict=True)
     return [
-        Bounds(side, height, pace, mass, frozenset(map(Kind, *kind)), frozenset(ground))
-        for side, height, pace, mass, kind, ground in rows
+        Bounds(side, height, pace, mass, count, frozenset(map(Kind, *kind)), frozenset(ground))
+        for side, height, pace, mass, count, kind, ground in rows
     ]

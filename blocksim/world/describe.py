@@ -24,7 +24,7 @@ from blocksim.world.memory import (
     recorded_contacts,
 )
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
-from blocksim.world.rigid_step import longest_step
+from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import column_sag, inverse_mass, point_stiffness
 
 # measured on one core: a step costs about this for every body with its contacts
@@ -69,6 +69,7 @@ class MotionDescription:
 class SagDescription:
     """By how much blocks sink into one another at rest where contacts are rigid, SI; it goes with the step squared."""
 
+    why: str  # of the step
     substeps: int
     tolerance: float  # m/s, of the velocity pass
     longest_step: float  # s, that may be given by hand
@@ -148,10 +149,12 @@ def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, ste
     lowest = min(placed, key=lambda body: body.y)
     blocks = max(1, round((max(body.y for body in placed) + 0.5 * lowest.size_y) / lowest.size_y))
     (bounds,) = bounds_of(world.bodies[np.newaxis], len(placed))
+    table = interactions_of(scenario, contact_classes(scenario, placed))
     return SagDescription(
+        why=reason_of_step(scenario, bounds, table).why,
         substeps=scenario.time.substeps,
         tolerance=velocity_tolerance(scenario.time, len(placed)),
-        longest_step=longest_step(scenario, bounds, interactions_of(scenario, contact_classes(scenario, placed))),
+        longest_step=longest_step(scenario, bounds, table),
         blocks=blocks,
         sag=column_sag(step / scenario.time.substeps, lowest, blocks, scenario.gravity),
     )

@@ -18,11 +18,16 @@ def fastest_fall(scenario: Scenario, bounds: Bounds) -> float:
     return math.sqrt(2.0 * scenario.gravity * math.cos(scenario.ground.tilt) * height)
 
 
+def impact_speed(scenario: Scenario, bounds: Bounds) -> float:
+    """Return the bound (m/s) of the speed of any point of a block that does not slide downhill."""
+    return math.hypot(bounds.speed, fastest_fall(scenario, bounds))
+
+
 def greatest_speed(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
     """Return the bound (m/s) of the speed of any point of a block."""
     tilt = abs(scenario.ground.tilt)
     pull = scenario.gravity * max(0.0, math.sin(tilt) - least_support_friction(bounds, table) * math.cos(tilt))
-    return math.hypot(bounds.speed, fastest_fall(scenario, bounds)) + pull * scenario.time.end
+    return impact_speed(scenario, bounds) + pull * scenario.time.end
 
 
 def least_support_friction(bounds: Bounds, table: Interactions) -> float:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation.schemes import build_scene
-from blocksim.verification.case import RIGID_STEP, Setting
+from blocksim.verification.case import Setting
 from blocksim.verification.scene import Simulation
 from tests.sizes import in_all
 
@@ -25,6 +25,7 @@ EXPLICIT, RIGID = "explicit", "nonsmooth"
 GRAVITY = 9.81
 BEFORE_CHAOS = 0.05  # s: stacks have begun to topple and slide; impacts do not yet multiply round-off
 RIGID_TIME = 0.02  # s
+RIGID_STEP = 1e-4  # s
 ROUND_OFF = 1e-9  # m: what V19 allows before impacts; measured for springs: 2e-11 in 20 random stacks
 NUDGE = 1e-13  # m
 CORNER = 0.03  # m, from the centre of a block
@@ -72,7 +73,7 @@ def for_all(strategy: st.SearchStrategy[Any], examples: int, check: Callable[[An
 def start(stack: Stack, bodies: Sequence[Body], scheme: str, *, gravity: float = GRAVITY) -> Simulation:
     """Start blocks made as those of a stack; impulses are solved to round-off."""
     time = {"velocity_tolerance": 1e-12} if scheme == RIGID else {}
-    return Setting(scheme=scheme).start(
+    return Setting(scheme=scheme, rigid_step=RIGID_STEP).start(
         bodies,
         restitution=stack.restitution,
         friction=stack.friction,

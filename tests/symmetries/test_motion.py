@@ -7,12 +7,12 @@ import pytest
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from blocksim.verification.case import RIGID_STEP
 from tests.symmetries.scenes import (
     BEFORE_CHAOS,
     EXPLICIT,
     GRAVITY,
     RIGID,
+    RIGID_STEP,
     ROUND_OFF,
     Body,
     Stack,

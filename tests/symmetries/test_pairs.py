@@ -9,7 +9,7 @@ import pytest
 from hypothesis import strategies as st
 
 from blocksim.verification.case import Setting
-from tests.symmetries.scenes import EXPLICIT, RIGID, for_all, some
+from tests.symmetries.scenes import EXPLICIT, RIGID, RIGID_STEP, for_all, some
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -165,7 +165,9 @@ def order_matters(pair: Pair, setting: Setting) -> float:
 
 
 @pytest.mark.parametrize(
-    "setting", [*MODELS, Setting(scheme=RIGID)], ids=lambda one: f"{one.model} {one.law} {one.scheme}"
+    "setting",
+    [*MODELS, Setting(scheme=RIGID, rigid_step=RIGID_STEP)],
+    ids=lambda one: f"{one.model} {one.law} {one.scheme}",
 )
 @some(5, 200)
 def test_forces_are_equal_and_opposite_and_know_no_order(setting: Setting, examples: int) -> None:

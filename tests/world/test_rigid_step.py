@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from blocksim.bench.scenes import pushed_wall
-from blocksim.verification.scene import HEIGHT, scenario_of
+from blocksim.bench.scenes import pushed_wall, three_blocks
+from blocksim.scenario.models.stepping import Nonsmooth
+from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
+from blocksim.world.describe import describe
 from blocksim.world.nonsmooth import build_nonsmooth
-from blocksim.world.rigid_step import SHARE, USUAL_STEP, StepTooLongError
+from blocksim.world.rigid_step import FEW, NATURAL, SHARE, USUAL_STEP, StepTooLongError
 from blocksim.world.step import UncountableStepsError
 
 if TYPE_CHECKING:
@@ -26,27 +28,58 @@ def step_of(body: Mapping[str, object], **time: Any) -> float:
     return float(build_nonsmooth(scenario).world.controls[0].step)
 
 
-def test_slow_scenes_take_the_usual_step() -> None:
-    assert step_of(RESTING) == USUAL_STEP
-    assert step_of(RESTING, end=1e-4) == 1e-4
+def wall_step(columns: int, rows: int) -> float:
+    scenario = pushed_wall(columns, rows, time={"scheme": "nonsmooth"})
+    return float(build_nonsmooth(scenario).world.controls[0].step)
 
 
-def test_fast_blocks_shrink_the_automatic_step_to_a_tenth_of_the_smallest_side() -> None:
-    assert step_of({**RESTING, "velocity": [50.0, 0.0]}) == pytest.approx(SHARE * HEIGHT / 50.0, rel=1e-3)
-    high = step_of({"y": 5.0})
-    assert high * sqrt(2.0 * G * 5.0) == pytest.approx(SHARE * HEIGHT, rel=1e-2)
+def test_few_blocks_take_a_share_of_the_time_of_a_fall_over_their_sides_and_crowds_the_usual_step() -> None:
+    natural = NATURAL / FEW * sqrt(HEIGHT / G)
+    assert 0.9 * natural < step_of(RESTING) <= natural
+    assert USUAL_STEP / step_of(RESTING) == pytest.approx(13.0)  # whole, so that outputs fall on ends of steps
+    large = {"y": 100 * HEIGHT / 2, "width": 100 * WIDTH, "height": 100 * HEIGHT}
+    assert 5.0 * natural < step_of(large) <= 10.0 * natural
+    assert build_nonsmooth(three_blocks(time={"scheme": "nonsmooth"})).world.controls[0].step == 0.25 * USUAL_STEP
+    assert wall_step(4, 4) == wall_step(10, 8) == USUAL_STEP
+    assert step_of(RESTING, end=1e-5) == 1e-5
+
+
+def test_fixed_blocks_do_not_count_as_more() -> None:
+    scenario = scenario_of([RESTING, *({"x": 0.1 * i, "y": HEIGHT / 2, "fixed": True} for i in range(1, 20))])
+    time = Nonsmooth(scheme="nonsmooth")
+    step = build_nonsmooth(scenario.model_copy(update={"time": time})).world.controls[0].step
+    assert step == pytest.approx(step_of(RESTING))
+
+
+def test_fast_blocks_shrink_the_automatic_step_to_a_share_of_the_smallest_side() -> None:
+    few = SHARE / FEW
+    assert step_of({**RESTING, "velocity": [50.0, 0.0]}) == pytest.approx(few * HEIGHT / 50.0, rel=1e-3)
+    assert step_of({"y": 50.0}) * sqrt(2.0 * G * 50.0) == pytest.approx(few * HEIGHT, rel=1e-2)
+    assert wall_step(40, 400) * sqrt(2.0 * G * 400 * 0.032) == pytest.approx(SHARE * 0.032, rel=2e-2)
+
+
+def test_check_says_why_a_step_is_as_long_as_it_is() -> None:
+    def why(body: Mapping[str, object], **time: Any) -> str:
+        told = describe(scenario_of([body], time={"scheme": "nonsmooth", **time})).rigid
+        return told.why if told else ""
+
+    assert "L = 25 mm the smallest side" in why(RESTING)
+    assert "at most at 50" in why({**RESTING, "velocity": [50.0, 0.0]})
+    assert why(RESTING, step=1e-4) == "as given"
 
 
 def test_only_slopes_that_friction_does_not_hold_shrink_the_step() -> None:
     friction = {"block_block": 0.5, "block_ground": 0.5}
-    assert step_of(RESTING, ground={"tilt": "20 deg"}, friction=friction, end=10.0) == USUAL_STEP
-    assert step_of(RESTING, ground={"tilt": "40 deg"}, friction=friction, end=10.0) < 0.5 * USUAL_STEP
+    usual = step_of(RESTING)
+    assert step_of(RESTING, ground={"tilt": "20 deg"}, friction=friction, end=10.0) == usual
+    assert step_of(RESTING, ground={"tilt": "40 deg"}, friction=friction, end=100.0) < 0.3 * usual
 
 
 def test_friction_that_matters_is_that_of_what_blocks_can_slide_on_for_long() -> None:
     friction = {"block_block": 0.1, "block_ground": 0.5}
-    values: dict[str, Any] = {"ground": {"tilt": "20 deg"}, "friction": friction, "end": 10.0}
-    assert step_of(RESTING, **values) == USUAL_STEP
+    values: dict[str, Any] = {"ground": {"tilt": "20 deg"}, "friction": friction, "end": 100.0}
+    usual = step_of(RESTING)
+    assert step_of(RESTING, **values) == usual
     plank = {"x": 1.0, "y": HEIGHT / 2, "width": 1.0, "fixed": True}
     tables = {"ground": values["ground"], "friction": friction}
     scenario = scenario_of([RESTING, plank], time={"scheme": "nonsmooth", "end": 10.0}, **tables)
