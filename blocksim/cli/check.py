@@ -179,7 +179,8 @@ def _sag(rigid: SagDescription | None) -> list[str]:
     return [
         f"           {rigid.why}",
         f"           in {rigid.substeps} substeps, {solved}; by hand at most {rigid.longest_step:.1e} s",
-        f"sag        {MICRO * rigid.sag:.3g} µm at the top of a column of {rigid.blocks}, with the step squared",
+        f"sag        {MICRO * rigid.sag:.3g} µm of block {rigid.block} as all stand, with the step squared",
+        *([f"warning: {rigid.warning}"] if rigid.warning else []),
     ]
 
 

@@ -14,7 +14,7 @@ from blocksim.simulation.looks import adds_up, next_look
 from blocksim.simulation.outcome import Outcome
 from blocksim.simulation.pace import Pace
 from blocksim.simulation.recorder import Recorder
-from blocksim.simulation.schemes import AnyScene
+from blocksim.simulation.schemes import AnyScene, measured_row
 from blocksim.simulation.team import ALONE, Team
 
 
@@ -45,13 +45,17 @@ NOBODY = Attendance()
 
 @dataclass(frozen=True)
 class LoopResult:
-    """The world at the end, why it ended, where the energy went, the seconds spent in compiled code and its threads."""
+    """The world at the end, why it ended, where the energy went, the seconds spent in compiled code and its threads.
+
+    `overlap` (m) is the largest one of all contacts at the end.
+    """
 
     world: World
     outcome: Outcome
     ledger: EnergyLedger
     solver_seconds: float
     threads: int
+    overlap: float
 
 
 def last_step_of(end: float, step: float) -> int:
@@ -155,4 +159,5 @@ class _Going:
         ledger = energy_ledger(self.scene, self.start)
         outcome = ends.interrupted(why) if why else outcome_of(self.status, ledger)
         outcome = told(outcome, self.status, self.scene, self.recorder.placed)
-        return LoopResult(self.scene.world, outcome, ledger, self.seconds, self.team.threads)
+        overlap = float(measured_row(self.scene)[-1])
+        return LoopResult(self.scene.world, outcome, ledger, self.seconds, self.team.threads, overlap)

@@ -2,11 +2,12 @@
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
 from blocksim.scenario import Scenario, place_bodies, scenario_hash
+from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import sha256_of, write_text
 from blocksim.simulation.claim import claimed
@@ -27,6 +28,7 @@ from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import csv_text, final_columns
 from blocksim.simulation.team import team_for
 from blocksim.world.memory import is_shorter_than_step
+from blocksim.world.sag import overlap_warning
 
 COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION)
 
@@ -138,19 +140,21 @@ def _summary(scenario: Scenario, ended: LoopResult, seconds: float) -> Summary:
         total_seconds=seconds,
         energy_J=ended.ledger,
         threads=ended.threads,
-        warnings=_warnings(scenario, ended),
+        warnings=tuple(_warnings(scenario, ended)),
         environment=environment(),
     )
 
 
-def _warnings(scenario: Scenario, ended: LoopResult) -> tuple[str, ...]:
-    found = []
+def _warnings(scenario: Scenario, ended: LoopResult) -> Iterator[str]:
     residual, every = ended.ledger.relative_residual, scenario.output.every
     if residual > RESIDUAL_PROMISE:
-        found.append(f"energy is off by {residual:.1e} of the energy in play, more than {RESIDUAL_PROMISE:g}")
+        yield f"energy is off by {residual:.1e} of the energy in play, more than {RESIDUAL_PROMISE:g}"
     if is_shorter_than_step(every, float(ended.world.controls[0].step)):
-        found.append(f"output.every = {every:.3g} s is shorter than a step: a frame at every step")
-    return tuple(found)
+        yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
+    if isinstance(scenario.time, Nonsmooth) and ended.outcome.is_finished:
+        sunk = overlap_warning(ended.overlap, min(min(body.size_x, body.size_y) for body in place_bodies(scenario)))
+        if sunk:
+            yield sunk
 
 
 def _with_checksums(summary: Summary, folder: Path) -> Summary:

@@ -25,7 +25,7 @@ from blocksim.world.memory import (
 )
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
 from blocksim.world.rigid_step import longest_step, reason_of_step
-from blocksim.world.sag import column_sag, inverse_mass, point_stiffness
+from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
 
 # measured on one core: a step costs about this for every body with its contacts
 SECONDS_PER_BODY_AND_STEP = 75e-9
@@ -73,8 +73,10 @@ class SagDescription:
     substeps: int
     tolerance: float  # m/s, of the velocity pass
     longest_step: float  # s, that may be given by hand
-    blocks: int  # in the column: as many of the lowest block as reach to the top of the scene
-    sag: float  # m, of the top of that column
+    sag: float  # m, of the block that sinks most, as all stand at the start
+    block: str  # its name
+    overlap: float  # m, of the contact that gives way most
+    warning: str  # where that is too far
 
 
 @dataclass(frozen=True)
@@ -146,17 +148,18 @@ def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
 def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, step: float) -> SagDescription | None:
     if not isinstance(scenario.time, Nonsmooth):
         return None
-    lowest = min(placed, key=lambda body: body.y)
-    blocks = max(1, round((max(body.y for body in placed) + 0.5 * lowest.size_y) / lowest.size_y))
     (bounds,) = bounds_of(world.bodies[np.newaxis], len(placed))
     table = interactions_of(scenario, contact_classes(scenario, placed))
+    sag = scene_sag(step / scenario.time.substeps, placed, scenario.gravity)
     return SagDescription(
         why=reason_of_step(scenario, bounds, table).why,
         substeps=scenario.time.substeps,
         tolerance=velocity_tolerance(scenario.time, len(placed)),
         longest_step=longest_step(scenario, bounds, table),
-        blocks=blocks,
-        sag=column_sag(step / scenario.time.substeps, lowest, blocks, scenario.gravity),
+        sag=sag.sag,
+        block=sag.block,
+        overlap=sag.overlap,
+        warning=overlap_warning(sag.overlap, bounds.smallest),
     )
 
 

@@ -5,10 +5,16 @@ a spring of w^2 / A, which goes with 1 / h^2. Of two blocks in face contact A = 
 a side as the lever arm r, as far as the point is from the middle.
 """
 
-from collections.abc import Iterable
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 from blocksim.scenario import PlacedBody
+from blocksim.world.loads import loads_at_rest
 from blocksim.world.nonsmooth import soft_contact
+
+WARNING_SHARE = 0.01  # of the smallest side
+MILLI = 1e3
 
 
 def inverse_mass(body: PlacedBody) -> float:
@@ -22,11 +28,51 @@ def point_stiffness(substep: float, blocks: Iterable[PlacedBody]) -> float:
     return soft_contact(substep).frequency ** 2 / total if total > 0.0 else float("inf")
 
 
-def column_sag(substep: float, body: PlacedBody, count: int, gravity: float) -> float:
-    """Return by how much (m) the top of a column of `count` such blocks sinks.
+class Sag(NamedTuple):
+    """How far blocks sink as they stand at the start (m): the one that sinks most, and the contact that gives most."""
 
-    A face shares its load between two points; the ground carries all blocks, the face above it one less, and so on.
+    sag: float
+    block: str
+    overlap: float
+
+
+def scene_sag(substep: float, placed: Sequence[PlacedBody], gravity: float) -> Sag:
+    """Return what the blocks of a scene sink by once they rest on one another; see loads.py.
+
+    The stiffness w^2 / A of a contact goes with the smaller mass of its pair, not with what it carries. So a heavy
+    block on a light one sinks by their ratio further than equal blocks.
     """
-    weight = 0.5 * body.mass * gravity
-    ground, block = point_stiffness(substep, [body]), point_stiffness(substep, [body, body])
-    return weight * (count / ground + 0.5 * count * (count - 1) / block)
+    square = soft_contact(substep).frequency ** 2
+    sunk = [0.0] * len(placed)
+    most = 0.0
+    loads = list(loads_at_rest(placed, gravity))
+    total: defaultdict[int, float] = defaultdict(float)
+    for load in loads:
+        total[load.upper] += load.force
+    for load in reversed(loads):  # from below upwards
+        if load.force > 0.0:
+            lower = None if load.lower is None else placed[load.lower]
+            compliance = _inverse_mass_at(placed[load.upper], load.x) + (
+                _inverse_mass_at(lower, load.x) if lower else 0.0
+            )
+            overlap = load.force * compliance / square
+            below = 0.0 if load.lower is None else sunk[load.lower]
+            sunk[load.upper] += load.force / total[load.upper] * (overlap + below)
+            most = max(most, overlap)
+    deepest = max(range(len(placed)), key=sunk.__getitem__)
+    return Sag(sunk[deepest], placed[deepest].name, most)
+
+
+def _inverse_mass_at(body: PlacedBody, x: float) -> float:
+    """Return A (1/kg) of one block for a vertical force at x (m)."""
+    return 0.0 if body.fixed else 1.0 / body.mass + (x - body.x) ** 2 / body.inertia
+
+
+def overlap_warning(overlap: float, smallest: float) -> str:
+    """Return what is to be said of an overlap (m) at rest, given the smallest side (m); nothing where it is small."""
+    if not overlap > WARNING_SHARE * smallest:
+        return ""
+    return (
+        f"rigid contacts overlap by {MILLI * overlap:.3g} mm at rest, above {WARNING_SHARE:.0%} of the smallest side "
+        f"({MILLI * smallest:.4g} mm): a light block carries a heavy one; overlaps go with time.step squared"
+    )

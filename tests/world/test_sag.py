@@ -7,10 +7,13 @@ from typing import Any
 import pytest
 
 from blocksim.bench.scenes import three_blocks
-from blocksim.scenario import place_bodies
-from blocksim.verification.scene import HEIGHT, Scene
+from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
+from blocksim.simulation.running import simulate
+from blocksim.simulation.schemes import build_scene
+from blocksim.verification.scene import HEIGHT, WIDTH, Scene, Simulation
 from blocksim.world.describe import describe
-from blocksim.world.sag import column_sag, point_stiffness
+from blocksim.world.loads import loads_at_rest
+from blocksim.world.sag import point_stiffness, scene_sag
 
 
 def stack(count: int, **time: Any) -> Scene:
@@ -25,16 +28,77 @@ def test_column_sinks_by_what_is_told(count: int, substeps: int) -> None:
     told = describe(scene.scenario()).rigid
     run = scene.start().to_time(2.0)
     assert told is not None
-    assert told.blocks == count
+    assert (told.block, told.warning) == (str(count), "")
     assert (count - 0.5) * HEIGHT - run.bodies.y[-1] == pytest.approx(told.sag, rel=1e-3)
 
 
+def heavy_on_light(ratio: float) -> Scenario:
+    """Return a block on another that has a share of its mass."""
+    materials = {
+        name: {"density": density, "young_modulus": 1e9, "poisson_ratio": 0.25}
+        for name, density in (("light", 2000.0), ("heavy", 2000.0 * ratio))
+    }
+    return scenario_from_mapping(
+        {
+            "schema": 1,
+            "name": "unlike",
+            "materials": materials,
+            "blocks": {name: {"width": 0.04, "height": 0.025, "length": 0.05, "material": name} for name in materials},
+            "bodies": [{"block": "light", "x": 0.0, "y": 0.0125}, {"block": "heavy", "x": 0.0, "y": 0.0375}],
+            "contact": {"restitution": 0.0},
+            "time": {"scheme": "nonsmooth", "step": 1e-3, "end": 2.0},
+        }
+    )
+
+
+def cube_on_two() -> Scenario:
+    """Return a cube of 1 m on two of 50 mm."""
+    small = {"y": 0.025, "width": 0.05, "height": 0.05}
+    cube = {"y": 0.55, "width": 1.0, "height": 1.0, "length": 1.0}
+    time = {"scheme": "nonsmooth", "step": 1e-3, "end": 10.0}
+    return Scene([{**small, "x": -0.4}, {**small, "x": 0.4}, cube], restitution=0.0, time=time).scenario()
+
+
+@pytest.mark.parametrize(
+    ("scenario", "is_warned"), [(heavy_on_light(100.0), False), (heavy_on_light(1000.0), True), (cube_on_two(), True)]
+)
+def test_heavy_blocks_sink_into_light_ones_by_what_is_told(scenario: Scenario, is_warned: bool) -> None:
+    told = describe(scenario).rigid
+    run = Simulation(build_scene(scenario))
+    heavy = len(run.bodies) - 1
+    before = float(run.bodies.y[heavy])
+    sunk = before - float(run.to_time(2.0).bodies.y[heavy])
+    assert told is not None
+    assert sunk == pytest.approx(told.sag, rel=0.05)
+    assert run.measured()[-1] == pytest.approx(told.overlap, rel=0.1)
+    assert bool(told.warning) is is_warned
+
+
+def test_a_run_that_ends_with_deep_overlaps_says_so_in_its_summary() -> None:
+    calm, sunk = (simulate(heavy_on_light(ratio)).summary.warnings for ratio in (1.0, 1000.0))
+    assert calm == ()
+    assert len(sunk) == 1
+    assert "a light block carries a heavy one" in sunk[0]
+
+
+def test_brick_carries_half_of_each_that_stands_on_two() -> None:
+    """A course of two on one of three: the middle one below has both halves and its own weight."""
+    below = [{"x": i * WIDTH, "y": HEIGHT / 2} for i in (-1, 0, 1)]
+    above = [{"x": i * WIDTH, "y": 1.5 * HEIGHT} for i in (-0.5, 0.5)]
+    placed = place_bodies(Scene([*below, *above]).scenario())
+    on_ground: dict[str, float] = {}
+    for load in loads_at_rest(placed, 1.0 / placed[0].mass):
+        if load.lower is None:
+            on_ground[placed[load.upper].name] = on_ground.get(placed[load.upper].name, 0.0) + load.force
+    assert on_ground == pytest.approx({"1": 1.5, "2": 2.0, "3": 1.5})
+
+
 def test_sag_goes_with_the_square_of_the_substep_and_not_with_the_mass() -> None:
-    one = place_bodies(stack(1).scenario())[0]
-    heavy = one._replace(density=2.0 * one.density)
-    assert column_sag(2e-4, one, 3, 9.81) == pytest.approx(4.0 * column_sag(1e-4, one, 3, 9.81))
+    one, two = place_bodies(stack(2).scenario())
+    heavy = [body._replace(density=2.0 * body.density) for body in (one, two)]
+    assert scene_sag(2e-4, [one, two], 9.81).sag == pytest.approx(4.0 * scene_sag(1e-4, [one, two], 9.81).sag)
     assert point_stiffness(1e-4, [one, one]) == pytest.approx(0.5 * point_stiffness(1e-4, [one]))
-    assert column_sag(1e-4, heavy, 3, 9.81) == pytest.approx(column_sag(1e-4, one, 3, 9.81))
+    assert scene_sag(1e-4, heavy, 9.81).sag == pytest.approx(scene_sag(1e-4, [one, two], 9.81).sag)
 
 
 def test_pairs_are_told_without_springs_and_with_what_they_give_way_by() -> None:
