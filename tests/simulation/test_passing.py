@@ -31,7 +31,7 @@ def thrown(what: str, speed: float, *, thickness: float = 0.01, **contact: objec
     """Throw a block down at a plate of some thickness, at a wall that lies flat, or at the ground; elastic."""
     face = 0.0 if what == "ground" else FACE
     radius = 0.5 * (hypot(WIDTH, HEIGHT) if contact.get("angle") else HEIGHT)
-    turned = {key: contact.pop(key) for key in ("angle", "spin") if key in contact}
+    turned: dict[str, object] = {key: contact.pop(key) for key in ("angle", "spin") if key in contact}
     bodies: list[dict[str, object]] = [{"y": face + GAP + radius, "velocity": [0.0, -speed], **turned}]
     tables: dict[str, Any] = {}
     if what in {"fixed", "free"}:
@@ -107,7 +107,7 @@ def test_limit_of_overlap_that_is_too_large_lets_nothing_through(what: str, limi
 def test_particles_do_not_lose_one_another(model: str, what: str) -> None:
     """Deeper than a boundary reaches they would: with the usual limit a row of discs passes through another."""
     for speed, scale in ((20.0, 1e-3), (1000.0, 1e-5)):
-        contact = {"model": model, "particle_spacing": 1e-3, "stiffness_scale": scale}
+        contact: dict[str, Any] = {"model": model, "particle_spacing": 1e-3, "stiffness_scale": scale}
         stays_or_says(simulate(thrown(what, speed, **contact)), BODIES[what], 0.0 if what == "ground" else FACE)
 
 
@@ -145,7 +145,7 @@ def test_two_blocks_that_meet_head_on_do_not_pass_through_one_another(scale: flo
 
 @pytest.mark.parametrize("speed", [1.0, 1000.0])
 def test_forced_step_in_which_a_block_could_pass_ends_the_run(speed: float) -> None:
-    bodies = [
+    bodies: list[dict[str, object]] = [
         {"y": FACE + 0.05, "velocity": [0.0, -speed]},
         {"y": FACE, "width": LONG, "height": 1e-3, "fixed": True},
     ]
