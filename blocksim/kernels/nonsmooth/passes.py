@@ -11,7 +11,6 @@ from blocksim.kernels.jit import kernel
 from blocksim.kernels.lanes import (
     Lane,
     Lanes,
-    Mask,
     fields_0,
     four,
     greater,
@@ -26,7 +25,7 @@ from blocksim.kernels.lanes import (
 )
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
 from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, kinetic_frictions, restitutions, rows_of, touch_of
-from blocksim.kernels.nonsmooth.slip import Rows, slip_of
+from blocksim.kernels.nonsmooth.slip import Rows, Slip, slip_of
 from blocksim.kernels.nonsmooth.solve import solve_two
 
 
@@ -144,14 +143,12 @@ def rebound(approach: Lanes, start: Lanes, pull: Lanes, restitution: Lanes, step
 
 
 @kernel
-def target(impulse: Lanes, gap: Lanes, rebounds: Mask, after: Lanes, stepping: Record) -> Lanes:
+def target(impulse: Lanes, gap: Lanes, least: Lanes) -> Lanes:
     """Return what J v of a point has to be at least (m/s) after the velocity pass; -FAR where it does not count.
 
-    `after` is what the approach of a point that rebounds has to become. A gap that is still open must not slow an
-    approach down: it would take a part of it in the substep before the impact, and restitution would vanish for small
-    substeps.
+    A gap that is still open must not slow an approach down: it would take a part of it in the substep before the
+    impact, and restitution would vanish for small substeps.
     """
-    least = select(rebounds, after, -greater(gap, 0.0) * stepping.open_bias)
     return select((impulse > 0.0) | (gap <= 0.0), least, -FAR)
 
 
@@ -167,18 +164,39 @@ def aim(contacts: Contacts, group: Record, lane: Lane, row: Rows, a: Bodies, b: 
         store(lane, group.target_one, none)
         store(lane, group.target_two, none)
         return none, none
-    restitution = restitutions(contacts, group, lane)
     vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
     vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
     u = slip_of(row, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
+    t_one = target(normal_one, gap_one, -greater(gap_one, 0.0) * stepping.open_bias)
+    t_two = target(normal_two, gap_two, -greater(gap_two, 0.0) * stepping.open_bias)
+    if not is_all((lesser(u.one, u.two) >= -stepping.threshold) | (greater(t_one, t_two) <= -FAR)):
+        t_one, t_two = with_rebounds(contacts, group, lane, row, a, b, u, t_one, t_two)
+    store(lane, group.target_one, t_one)
+    store(lane, group.target_two, t_two)
+    return t_one, t_two
+
+
+@kernel
+def with_rebounds(
+    contacts: Contacts,
+    group: Record,
+    lane: Lane,
+    row: Rows,
+    a: Bodies,
+    b: Bodies,
+    u: Slip,
+    t_one: Lanes,
+    t_two: Lanes,
+) -> tuple[Lanes, Lanes]:
+    """Return the targets (m/s) of rows with those of points that rebound, which approach with u."""
+    stepping = contacts.stepping[0]
+    restitution = restitutions(contacts, group, lane)
     pull = pulls(row, a, b, stepping)
     after_one = rebound(u.one, load(lane, group.start_one), pull, restitution, stepping)
     after_two = rebound(u.two, load(lane, group.start_two), pull, restitution, stepping)
     is_elastic = restitution > 0.0
-    t_one = target(normal_one, gap_one, is_elastic & (u.one < -stepping.threshold), after_one, stepping)
-    t_two = target(normal_two, gap_two, is_elastic & (u.two < -stepping.threshold), after_two, stepping)
-    store(lane, group.target_one, t_one)
-    store(lane, group.target_two, t_two)
+    t_one = select(is_elastic & (u.one < -stepping.threshold) & (t_one > -FAR), after_one, t_one)
+    t_two = select(is_elastic & (u.two < -stepping.threshold) & (t_two > -FAR), after_two, t_two)
     if stepping.is_guarded and not is_all(greater(t_one, t_two) <= 0.0):
         stepping.has_rebounds = 1
     return t_one, t_two
