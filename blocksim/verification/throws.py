@@ -20,7 +20,7 @@ from blocksim.verification.scene import HEIGHT, WIDTH
 if TYPE_CHECKING:
     from blocksim.verification.case import Setting
 
-POLL = 40  # steps; an impact on springs takes thirty and more, a rigid one a part of one
+POLL = 40  # steps; an impact on springs takes thirty and more; a rigid one a part of one, so that others may follow
 MOST_STEPS = 4_000_000
 STEPS_BEFORE = 2.0  # of free flight
 GOLDEN = 0.6180339887498949  # its multiples, modulo 1, spread phases evenly over a step
@@ -43,7 +43,6 @@ class Thrower:
         body = {"y": 1.0, "velocity": [0.0, -speed]}
         scene = setting.scene([body], restitution=restitution, gravity=0.0, **values)
         self.speed = speed
-        self.poll = 1 if setting.rigid else POLL
         self.scene = build_scene(scene.scenario())
         self.world = self.scene.world
         self.scheme = scheme_of(self.scene)
@@ -55,13 +54,13 @@ class Thrower:
         """Length of a step (s)."""
         return float(self.world.controls[0].step)
 
-    def throw(self, throw: Throw) -> Any:
-        """Throw the block; return its record after the impact, once it touches nothing."""
+    def throw(self, throw: Throw, poll: int = POLL) -> Any:
+        """Throw the block; return its record after the impact, once it touches nothing at the end of `poll` steps."""
         self._place(throw)
         body = self.world.bodies[0]
         steps, before = 0, float(body.vy)
         while steps < MOST_STEPS:
-            steps += self.poll
+            steps += poll
             self.scheme.advance(self.scene, steps)
             self.scheme.measure(self.scene, self.row)
             if self.row[len(self.scheme.ledger)] == 0.0 and body.vy != before:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -33,29 +32,14 @@ from blocksim.world.outline import Outline
 from blocksim.world.parts import SURFACE, Parts
 from blocksim.world.rigid_step import choose_rigid_step
 from blocksim.world.skin import SKIN_SHARE
+from blocksim.world.soft_contact import soft_contact
 from blocksim.world.stacks import Construction, Refusal, Stack, Stride, built, member, only
 
-FREQUENCY = 0.125  # of the soft contact, per substep: w h = 2 pi / 8. Above 0.15 walls spread like a fluid
-DAMPING = 10.0  # damping ratio of the soft contact
 MOST_REACH = 1.5  # of a body, in skins
 SAFE_RESTITUTION = 0.5  # up to which no impact was seen to create energy, and one that follows from another is weak
 FINE, COARSE = 1e-3, 0.1  # m/s: tolerance of the velocity pass, for few blocks and for a crowd
 CROWD = 100  # blocks
 LINE_WORDS = CACHE_LINE // 8  # so that no two threads write to one cache line
-
-
-class SoftContact(NamedTuple):
-    """Feedback of the position pass; see blocksim.kernels.nonsmooth."""
-
-    bias: float  # 1/s: b
-    softness: float  # -: gamma / A
-    frequency: float  # 1/s: w, so that the stiffness at rest is w^2 / A
-
-
-def soft_contact(substep: float) -> SoftContact:
-    """Return the feedback for a substep (s)."""
-    turn = 2.0 * math.pi * FREQUENCY  # w h
-    return SoftContact(turn / substep / (turn + 2.0 * DAMPING), 1.0 / (turn * (turn + 2.0 * DAMPING)), turn / substep)
 
 
 def stepping_of(scenario: Scenario) -> Stepping:

@@ -10,16 +10,20 @@ In a substep h with an impact gravity has its full part before it, and again aft
 speed, rocking that much at the corner. Against speeds of free falls over sides L, sqrt(g L), that is h / sqrt(L/g). A
 few blocks can afford to have it small: a step is at most a share of sqrt(L/g) that grows with their number, so that
 costs are about the same, and that of a crowd is the usual one. A single block of 25 mm takes 1/13 ms, three of 32 mm
-take 1/4 ms. So with the way in a step at the speed of an impact.
+take 1/4 ms; the usual step is divided by whole numbers, so that outputs fall on the ends of steps. So with the way in a
+step at the speed of an impact.
 """
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
-from blocksim.scenario import Scenario
+from blocksim.scenario import Scenario, place_bodies
 from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.world.bounds import Bounds
 from blocksim.world.interactions import Interactions
+from blocksim.world.sag import WARNING_SHARE, scene_sag
+from blocksim.world.soft_contact import soft_contact
 from blocksim.world.speeds import greatest_speed, impact_speed
 from blocksim.world.step import MOST_STEPS, StepError, UncountableStepsError
 
@@ -27,6 +31,8 @@ USUAL_STEP = 1e-3  # s
 SHARE = 0.1  # of the smallest side
 FEW = 13  # free blocks: fewer take shorter steps
 NATURAL = 0.02  # of sqrt(L/g): the step of so many
+CROWD = 100  # free blocks, from which on sagging does not shorten a step
+CALM = 0.9  # of the overlap that is warned of
 MILLI = 1e3
 
 
@@ -76,13 +82,32 @@ def reason_of_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> R
     if bounds.free and scenario.gravity > 0.0:
         share = NATURAL * bounds.free / FEW
         why = f"{share:.2g} √(L/g) for so few blocks, L = {MILLI * bounds.smallest:.4g} mm the smallest side"
-        reasons.append(Reason(_part_of_usual(share * math.sqrt(bounds.smallest / scenario.gravity)), why))
+        parts = max(1, round(USUAL_STEP / (share * math.sqrt(bounds.smallest / scenario.gravity))))
+        reasons.append(Reason(USUAL_STEP / parts, why))
+        reasons += _reasons_of_sag(scenario, bounds)
     return min(reasons, key=lambda reason: reason.step)
 
 
-def _part_of_usual(step: float) -> float:
-    """Return the usual step divided by a whole number so that it is not above a step (s): outputs fall on its ends."""
-    return USUAL_STEP / math.ceil(USUAL_STEP / step) if 0.0 < step < USUAL_STEP else step
+def _reasons_of_sag(scenario: Scenario, bounds: Bounds) -> Iterator[Reason]:
+    """Yield the step in which no contact at rest gives way too far, where light blocks carry heavy ones.
+
+    Most scenes are far from it, which is known from the weight of all; crowds take the usual step all the same.
+    """
+    substeps, allowed = _substeps(scenario), CALM * WARNING_SHARE * bounds.smallest
+    compliance = max(
+        kind.inverse_mass + max(kind.half_x, kind.half_y) ** 2 * kind.inverse_inertia for kind in bounds.kinds
+    )
+    square = soft_contact(USUAL_STEP / substeps).frequency ** 2
+    if bounds.free >= CROWD or not 2.0 * compliance * scenario.gravity * bounds.mass > square * allowed:
+        return
+    overlap = scene_sag(USUAL_STEP / substeps, place_bodies(scenario), scenario.gravity).overlap
+    if overlap > allowed:
+        why = f"no contact gives way by more than {MILLI * allowed:.3g} mm where light blocks carry heavy ones"
+        yield Reason(USUAL_STEP / math.ceil(math.sqrt(overlap / allowed)), why)
+
+
+def _substeps(scenario: Scenario) -> int:
+    return scenario.time.substeps if isinstance(scenario.time, Nonsmooth) else 1
 
 
 def longest_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
@@ -91,6 +116,5 @@ def longest_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> flo
 
 
 def _longest_step(scenario: Scenario, speed: float, bounds: Bounds) -> float:
-    substeps = scenario.time.substeps if isinstance(scenario.time, Nonsmooth) else 1
-    rate = max(bounds.speed, speed / substeps)
+    rate = max(bounds.speed, speed / _substeps(scenario))
     return SHARE * bounds.smallest / rate if rate > 0.0 else scenario.time.end

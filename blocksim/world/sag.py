@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from blocksim.scenario import PlacedBody
 from blocksim.world.loads import loads_at_rest
-from blocksim.world.nonsmooth import soft_contact
+from blocksim.world.soft_contact import soft_contact
 
 WARNING_SHARE = 0.01  # of the smallest side
 MILLI = 1e3

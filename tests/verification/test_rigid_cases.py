@@ -56,8 +56,8 @@ def peaks(width: float, height: float, restitution: float, **time: object) -> ND
     body = {"x": place["x"] / 2, "y": place["y"] / 2, "angle": -tilt, "width": width, "height": height}
     stepping = {"scheme": "nonsmooth", "end": 100.0, **time}
     run = Scene([body], restitution=restitution, ground_friction=5.0, time=stepping).start()
-    poll = 2e-3 * sqrt(height / 9.81)
-    angles = np.array([run.to_time((k + 1) * poll).bodies.angle[0] for k in range(2500)])
+    poll = 3e-3 * sqrt(height / 9.81)
+    angles = np.array([run.to_time((k + 1) * poll).bodies.angle[0] for k in range(4000)])
     turns = np.diff(angles)
     found: NDArray[np.float64] = np.abs(angles[1:-1][turns[1:] * turns[:-1] < 0.0])[:4]
     return found

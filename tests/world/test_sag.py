@@ -81,6 +81,16 @@ def test_a_run_that_ends_with_deep_overlaps_says_so_in_its_summary() -> None:
     assert "a light block carries a heavy one" in sunk[0]
 
 
+@pytest.mark.parametrize("ratio", [1e4, 1e6])
+def test_automatic_step_keeps_light_blocks_from_being_crushed(ratio: float) -> None:
+    unlike = heavy_on_light(ratio)
+    scenario = unlike.model_copy(update={"time": unlike.time.model_copy(update={"step": "auto", "end": 0.1})})
+    told = describe(scenario).rigid
+    assert told is not None
+    assert (told.warning, "light blocks carry heavy ones" in told.why) == ("", True)
+    assert Simulation(build_scene(scenario)).to_time(0.1).measured()[-1] < 0.011 * 0.025
+
+
 def test_brick_carries_half_of_each_that_stands_on_two() -> None:
     """A course of two on one of three: the middle one below has both halves and its own weight."""
     below = [{"x": i * WIDTH, "y": HEIGHT / 2} for i in (-1, 0, 1)]
