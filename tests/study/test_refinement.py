@@ -25,7 +25,8 @@ def rigid(name: str, **values: object) -> Scenario:
 
 def test_step_and_tolerance_are_refined_from_what_the_run_takes() -> None:
     step, tolerance = refinements_of(rigid("slide"))
-    assert (step.key, step.own, step.factor, step.coarser) == ("time.step", 1e-3, 0.5, 2)
+    assert (step.key, step.factor, step.coarser) == ("time.step", 0.5, 2)
+    assert step.own == pytest.approx(1e-3 / 13)  # what "auto" takes for a single block of 25 mm
     assert (tolerance.key, tolerance.own) == ("time.velocity_tolerance", 1e-3)
     assert [tolerance.value(level) for level in (-2, 0, 2)] == pytest.approx([1e-2, 1e-3, 1e-4])
     assert tolerance.at(rigid("slide"), 2).time.velocity_tolerance == pytest.approx(1e-4)  # type: ignore[union-attr]
