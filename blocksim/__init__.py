@@ -9,7 +9,7 @@ True
 
 Scenarios: `load` (a file or dictionaries), `replace` (change keys, validated). Runs: `run`, `open_run`; a result has
 `final`, `frames`, `to_frame()`, `to_xarray()`. Studies: `sweep`, `open_sweep`, `calibrate`, `sensitivity`, `converge`.
-Judging: `compare`. Every function has the options of the command of the same name.
+Judging: `compare`. Looking: `plot`, `animate`, `report`. Functions have the options of the command of the same name.
 """
 
 from importlib import import_module
@@ -22,18 +22,22 @@ if TYPE_CHECKING:
     from blocksim.study.judge import compare
     from blocksim.study.many import sweep
     from blocksim.study.scripting import calibrate, sensitivity
+    from blocksim.study.showing import animate, plot, report
     from blocksim.study.single import open_run, run
     from blocksim.study.table import read_sweep as open_sweep
 
 __version__ = "0.1.0"
 __all__ = [
+    "animate",
     "calibrate",
     "compare",
     "converge",
     "load",
     "open_run",
     "open_sweep",
+    "plot",
     "replace",
+    "report",
     "run",
     "sensitivity",
     "sweep",
@@ -41,13 +45,16 @@ __all__ = [
 
 # found when first asked for, so that `blocksim --help` need not wait for numba and pandas
 _HOMES = {
+    "animate": ("blocksim.study.showing", "animate"),
     "calibrate": ("blocksim.study.scripting", "calibrate"),
     "compare": ("blocksim.study.judge", "compare"),
     "converge": ("blocksim.study.converge", "converge"),
     "load": ("blocksim.scenario", "load_scenario"),
     "open_run": ("blocksim.study.single", "open_run"),
     "open_sweep": ("blocksim.study.table", "read_sweep"),
+    "plot": ("blocksim.study.showing", "plot"),
     "replace": ("blocksim.scenario", "replace_values"),
+    "report": ("blocksim.study.showing", "report"),
     "run": ("blocksim.study.single", "run"),
     "sensitivity": ("blocksim.study.scripting", "sensitivity"),
     "sweep": ("blocksim.study.many", "sweep"),

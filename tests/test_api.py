@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import blocksim
-from blocksim.errors import InvalidInputError, ScenarioError
+from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError
 from blocksim.simulation import Result
 
 ROOT = Path(__file__).parent.parent
@@ -87,6 +87,28 @@ def test_stored_runs_and_sweeps_open_again(tmp_path: Path) -> None:
     swept = blocksim.sweep(blocksim.load(SLIDE, SOFT), {"gravity": [9.7, 9.8]}, out=tmp_path / "sweep", jobs=1)
     assert blocksim.open_sweep(tmp_path / "sweep").table.equals(swept.table)
     assert repr(swept).endswith("2 cases; varied: gravity>")
+
+
+def test_pictures_animations_and_reports_are_made_of_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    kept = blocksim.run(blocksim.load(SLIDE, {**SOFT, "time.end": 0.02}), out="kept")
+    assert blocksim.plot(kept, frames=3).name == "slide.png"
+    assert blocksim.plot("kept", "h.svg", kind="history", panels=["x"]).stat().st_size > 0
+    assert blocksim.animate(kept, width=200, fps=5.0).name == "slide.gif"
+    assert "slide" in blocksim.report(kept).read_text(encoding="utf-8")
+
+
+def test_a_file_of_others_is_not_replaced_by_a_picture(tmp_path: Path) -> None:
+    kept = blocksim.run(blocksim.load(SLIDE, {**SOFT, "time.end": 0.01}), out=tmp_path / "kept")
+    (tmp_path / "thesis.pdf").write_text("mine")
+    with pytest.raises(OutputExistsError, match="already exists"):
+        blocksim.plot(kept, tmp_path / "thesis.pdf")
+    assert (tmp_path / "thesis.pdf").read_text() == "mine"
+
+
+def test_picture_of_a_result_that_was_not_kept_says_what_to_do(slide: Result) -> None:
+    with pytest.raises(InvalidInputError, match="run it with out=FOLDER"):
+        blocksim.plot(slide)
 
 
 def test_sensitivity_takes_a_scenario_and_plain_ranges() -> None:

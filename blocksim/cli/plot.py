@@ -1,37 +1,20 @@
 """blocksim plot: a strip of frames, where the blocks of a sweep end, or which inputs matter."""
 
-from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from blocksim.analysis.experiment import load_table
 from blocksim.cli import options
 from blocksim.cli.output import note
-from blocksim.errors import InvalidInputError
+from blocksim.errors import InputMissingError
 from blocksim.simulation.own_files import is_picture, refuse_foreign
 from blocksim.study.picture import draw_indices, draw_sweep
-from blocksim.study.stored import stored_run
+from blocksim.study.run_picture import RunLook, draw_run, refuse
 from blocksim.study.table import TABLE
-from blocksim.view.curves import Choice
-from blocksim.view.kinds import FINAL, HISTORY, STRIP, kind_named
-from blocksim.view.paint import PAINTS
-from blocksim.view.paper import Paper
-from blocksim.view.support import support_of
-
-MEANINGS = {
-    "--at": "picks frames of a run's strip or final picture",
-    "--frames": "counts the panels of a run's strip",
-    "--panels": "chooses the panels of a run's history",
-    "--block": "chooses the blocks of a run's history",
-    "--relative": "moves a run's history with the ground",
-    "--forces": "shows contacts of a run",
-    "--colour": "colours the blocks of a run",
-}
+from blocksim.view.kinds import STRIP
 
 
 def plot_command(
@@ -101,87 +84,24 @@ def plot_command(
     Example: blocksim plot scenarios/three_blocks.toml --out strip.png
     """
     chosen = options.names_of("--panels", panels), options.names_of("--block", blocks)
-    asked = Asked(_moments(times), frames, *chosen, relative, colour, forces)
+    asked = RunLook(_moments(times), frames, *chosen, relative, colour, forces)
     paper = options.paper_of(size, dots)
     ready = partial(refuse_foreign, is_own=is_picture, overwrite=overwrite)
+    if not run.exists():
+        message = f"{run}: no such run folder, sweep folder, table or scenario file"
+        raise InputMissingError(message)
     if (run / TABLE).is_file():
-        _refuse(asked.of_runs(), f"{run} is a sweep")
+        refuse(asked.of_runs(), f"{run} is a sweep")
         picture = draw_sweep(run, out, experiment, kind, paper, ready=ready)
     elif run.suffix.lower() == ".csv":
-        _refuse(asked.of_runs(), f"{run} is a table")
+        refuse(asked.of_runs(), f"{run} is a table")
         picture = draw_indices(run, out, kind, paper, ready=ready)
     else:
-        picture = _draw_run(run, out, asked, experiment, kind or STRIP, paper, ready)
+        picture, remark = draw_run(run, out, asked, experiment, kind or STRIP, paper, ready=ready)
+        if remark:
+            note(remark)
     if not quiet:
         note(f"picture: {picture}")
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What was asked of the picture of a run."""
-
-    times: tuple[float, ...] | None
-    frames: int | None
-    panels: tuple[str, ...] | None
-    blocks: tuple[str, ...] | None
-    relative: bool
-    colour: str
-    forces: bool
-
-    def of_runs(self) -> list[str]:
-        """Return the options that were given and mean nothing for a sweep."""
-        forces, colour = {"--forces": self.forces}, {"--colour": self.colour != "block"}
-        given = {**self._of_strips(), **self._of_histories(), **forces, **colour}
-        return [option for option, is_given in given.items() if is_given]
-
-    def beside(self, kind: str) -> list[str]:
-        """Return the options that were given and mean nothing for a kind of picture."""
-        meant = {STRIP: self._of_histories(), FINAL: {**self._of_histories(), "--frames": self.frames is not None}}
-        return [option for option, is_given in meant.get(kind, self._of_strips()).items() if is_given]
-
-    def look(self, kind: str) -> dict[str, Any]:
-        """Return what a kind of picture is drawn with."""
-        if kind == HISTORY:
-            return {"choice": Choice(self.panels or (), self.blocks or (), self.relative)}
-        return {"times": self.times, "count": self.frames} if kind == STRIP else {"times": self.times}
-
-    def _of_strips(self) -> dict[str, bool]:
-        return {"--at": self.times is not None, "--frames": self.frames is not None}
-
-    def _of_histories(self) -> dict[str, bool]:
-        return {"--panels": self.panels is not None, "--block": self.blocks is not None, "--relative": self.relative}
-
-
-def _draw_run(
-    run: Path,
-    out: Path | None,
-    asked: Asked,
-    experiment: Path | None,
-    kind: str,
-    paper: Paper,
-    ready: Callable[[Path], None],
-) -> Path:
-    draw = kind_named(kind)
-    _refuse(asked.beside(kind), f"this picture is of the kind {kind}")
-    stored = stored_run(run)
-    scenario = stored.scenario
-    table = experiment or (scenario.experiment.table if scenario.experiment is not None else None)
-    measured = None if table is None else load_table(table)
-    picture = out or Path(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
-    ready(picture)
-    look = {"title": scenario.name, "measured": measured, "support": support_of(scenario), "forces": asked.forces}
-    paint = PAINTS[asked.colour](stored.frames, scenario)
-    draw(stored.frames, picture, **look, **asked.look(kind), paint=paint, paper=paper)
-    if stored.remark:
-        note(stored.remark)
-    return picture
-
-
-def _refuse(given: Sequence[str], what: str) -> None:
-    """Raise InvalidInputError for options that mean nothing for what is drawn."""
-    if given:
-        message = f"{given[0]} {MEANINGS[given[0]]}, but {what}"
-        raise InvalidInputError(message)
 
 
 def _moments(text: str | None) -> tuple[float, ...] | None:

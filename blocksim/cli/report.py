@@ -1,31 +1,16 @@
 """blocksim report: runs and sweeps as one HTML file to look at and to pass on."""
 
-from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from blocksim import __version__
-from blocksim.analysis.compare import compare_final
-from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.cli import options
 from blocksim.cli.output import note
-from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
-from blocksim.scenario import Scenario, load_stored
-from blocksim.simulation import folder as files
+from blocksim.errors import InvalidInputError
 from blocksim.simulation.own_files import is_report, refuse_foreign
-from blocksim.study.judge import compare_sweep
-from blocksim.study.places import find_run
-from blocksim.study.sweep_folder import PLAN, case_folder
-from blocksim.view.report.packing import MOST_BYTES
-from blocksim.view.report.page import write_report
-from blocksim.view.report.stored import StoredRun, read_stored
-from blocksim.view.report.subjects import Subject, run_subject
-from blocksim.view.report.sweeps import TABLE, SweepTable, read_sweep_table, sweep_subject
+from blocksim.study.reporting import MEMBERS, report_on
 
-FINISHED = "finished"
-MEMBERS = 50
 MEGABYTE = 1e6
 
 
@@ -53,117 +38,8 @@ def report_command(
     Example: blocksim report scenarios/three_blocks.toml --out three_blocks.html
     """
     refuse_foreign(out, is_report, overwrite=overwrite)
-    shown: list[Subject] = []
-    problems: list[str] = []
-    for place in places:
-        key = f"part-{len(shown) + 1}"
-        subjects, found = _sweep(key, place, experiment, members) if _is_sweep(place) else _run(key, place, experiment)
-        shown += subjects
-        problems += found
-    size = write_report(shown, out, title=_title(shown), version=__version__)
+    size, problems = report_on(places, out, experiment, members)
     if not quiet:
         note(f"report: {out} ({size / MEGABYTE:.1f} MB)")
     if problems:
         raise InvalidInputError("\n".join([*problems, "the report shows the rest"]))
-
-
-def _title(subjects: Sequence[Subject]) -> str:
-    names = dict.fromkeys(subject.name for subject in subjects if not subject.page.get("parent"))
-    return ", ".join(names) + " – blocksim report"
-
-
-def _is_sweep(place: Path) -> bool:
-    return (place / TABLE).is_file()
-
-
-def _run(key: str, place: Path, experiment: Path | None) -> tuple[list[Subject], tuple[str, ...]]:
-    """Return the run that a place means as a subject, and what is damaged in it."""
-    stored = read_stored(_folder(place))
-    comparison, remarks = _compared(stored, experiment)
-    return [run_subject(key, stored, comparison, remarks)], stored.damage
-
-
-def _folder(place: Path) -> Path:
-    """Return the folder of a run; one that lacks files is taken as it is. Raises what `find_run` raises."""
-    if place.is_dir() and any((place / name).is_file() for name in files.OURS):
-        return place
-    return find_run(place)
-
-
-def _compared(run: StoredRun, experiment: Path | None) -> tuple[dict[str, object] | None, tuple[str, ...]]:
-    """Return the comparison of a finished run, or why there is none though there is a measurement."""
-    try:
-        table = _measured(run.scenario, experiment)
-        if table is None or run.final is None:
-            return None, ()
-        if run.status != FINISHED:
-            return None, ("only a finished run is compared with the measurement",)
-        found = compare_final(run.final, table)
-        return {**found.to_dict(), "experiment": _near(found.source)}, ()
-    except BlocksimError as error:
-        if experiment is not None:
-            raise
-        return None, (str(error),)
-
-
-def _near(path: str) -> str:
-    here = Path.cwd()
-    return str(Path(path).relative_to(here)) if Path(path).is_relative_to(here) else path
-
-
-def _measured(scenario: Scenario | None, experiment: Path | None) -> ExperimentTable | None:
-    named = None if scenario is None or scenario.experiment is None else scenario.experiment.table
-    path = experiment or named
-    return None if path is None else load_table(path)
-
-
-def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[list[Subject], tuple[str, ...]]:
-    """Return a sweep and those of its members that have frames as subjects, and what is damaged in them."""
-    table = read_sweep_table(place)
-    scenario, problems = _plan(place)
-    judged, remarks = _judged(place, scenario, experiment)
-    cases = _kept(table)
-    found = [(case, read_stored(folder)) for case, folder in list(cases.items())[:most]]
-    keys = {case: f"{key}-member-{number}" for number, (case, _) in enumerate(found, start=1)}
-    sweep = sweep_subject(key, table, scenario, keys, [*problems, *remarks], list(cases)[most:], judged=judged)
-    shown = [
-        run_subject(keys[case], run, *_compared(run, experiment), most_bytes=MOST_BYTES // len(found), parent=key)
-        for case, run in found
-    ]
-    return [sweep, *shown], tuple(text for _, run in found for text in run.damage)
-
-
-def _judged(
-    place: Path, scenario: Scenario | None, experiment: Path | None
-) -> tuple[dict[str, object] | None, tuple[str, ...]]:
-    """Return the judgement of a sweep's members, or why there is none though there is a measurement."""
-    if experiment is None and (scenario is None or scenario.experiment is None):
-        return None, ()
-    try:
-        found = compare_sweep(place, experiment)
-        return {**found.to_dict(), "experiment": _near(found.source)}, ()
-    except BlocksimError as error:
-        if experiment is not None and not isinstance(error, UnavailableError):
-            raise
-        return None, (str(error),)
-
-
-def _plan(place: Path) -> tuple[Scenario | None, tuple[str, ...]]:
-    try:
-        return load_stored(place / PLAN), ()
-    except InputMissingError:
-        return None, ()
-    except BlocksimError as error:
-        return None, (str(error),)
-
-
-def _kept(table: SweepTable) -> Mapping[str, Path]:
-    """Return the folders of the members that have frames, by case, in the order of the table."""
-    return dict(_folders(table))
-
-
-def _folders(table: SweepTable) -> Iterator[tuple[str, Path]]:
-    for case in table.column("case"):
-        folder = case_folder(table.folder, case)
-        if folder is not None and (folder / files.FRAMES).is_file():
-            yield case, folder

@@ -1,0 +1,112 @@
+"""Pictures, animations and reports as a Python script asks for them: a place or a result in, the path of a file out."""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from blocksim.errors import InvalidInputError
+from blocksim.simulation import Result
+from blocksim.simulation.own_files import is_film, is_picture, is_report, refuse_foreign
+from blocksim.study.picture import draw_indices, draw_sweep
+from blocksim.study.reporting import report_on
+from blocksim.study.run_picture import RunLook, draw_run
+from blocksim.study.stored import stored_run
+from blocksim.study.table import TABLE, SweepResult
+from blocksim.view.animation import Look, Pace, draw_film
+from blocksim.view.kinds import STRIP
+from blocksim.view.paint import PAINTS
+from blocksim.view.paper import OWN
+from blocksim.view.support import support_of
+
+Place = Path | str | Result | SweepResult
+T = TypeVar("T")
+
+
+def plot(  # noqa: PLR0913 - one argument for each option of the command
+    place: Place,
+    out: Path | str | None = None,
+    *,
+    kind: str | None = None,
+    times: Sequence[float] | None = None,
+    frames: int | None = None,
+    panels: Sequence[str] | None = None,
+    blocks: Sequence[str] | None = None,
+    relative: bool = False,
+    colour: str = "block",
+    forces: bool = False,
+    experiment: Path | str | None = None,
+    overwrite: bool = False,
+) -> Path:
+    """Draw a run (kind strip, final or history), a sweep (lines, map, matrix, histogram) or a table of sensitivities.
+
+    `place` is a result that is kept in a folder, a sweep, or what the command takes. Returns the path of the picture
+    (default: NAME.png in the current folder). Raises InvalidInputError for an unknown kind or format and for a result
+    that was not kept, InputMissingError, OutputExistsError for a file of others unless `overwrite`, OutputError.
+    """
+    where, path = _folder(place), None if out is None else Path(out)
+    table = None if experiment is None else Path(experiment)
+    ready = partial(refuse_foreign, is_own=is_picture, overwrite=overwrite)
+    if (where / TABLE).is_file():
+        return draw_sweep(where, path, table, kind, ready=ready)
+    if where.suffix.lower() == ".csv":
+        return draw_indices(where, path, kind, ready=ready)
+    look = RunLook(_tuple(times), frames, _tuple(panels), _tuple(blocks), relative, colour, forces)
+    return draw_run(where, path, look, table, kind or STRIP, OWN, ready=ready)[0]
+
+
+def animate(  # noqa: PLR0913 - one argument for each option of the command
+    place: Path | str | Result,
+    out: Path | str | None = None,
+    *,
+    speed: float = 0.25,
+    fps: float = 30.0,
+    width: int = 800,
+    trails: bool | None = None,
+    colour: str = "block",
+    forces: bool = False,
+    overwrite: bool = False,
+) -> Path:
+    """Write a run as an animation, GIF or MP4, and return its path (default: NAME.gif in the current folder).
+
+    `speed` is simulated seconds per second, `fps` frames per second, `width` in pixels. Raises as `plot` does, and
+    UnavailableError where nothing can write MP4.
+    """
+    stored = stored_run(_folder(place))
+    path = Path(f"{stored.scenario.name}.gif" if out is None else out)
+    refuse_foreign(path, is_film, overwrite=overwrite)
+    look = Look(width, trails, stored.scenario.name, forces, PAINTS[colour](stored.frames, stored.scenario))
+    draw_film(stored.frames, path, Pace(speed, fps), look, support_of(stored.scenario))
+    return path
+
+
+def report(
+    *places: Place, out: Path | str = "report.html", experiment: Path | str | None = None, overwrite: bool = False
+) -> Path:
+    """Write runs and sweeps into one self-contained HTML file with a player, and return its path.
+
+    Raises as `plot` does, and InvalidInputError, after writing, for what is damaged in them.
+    """
+    path = Path(out)
+    refuse_foreign(path, is_report, overwrite=overwrite)
+    table = None if experiment is None else Path(experiment)
+    _, problems = report_on([_folder(place) for place in places], path, table)
+    if problems:
+        raise InvalidInputError("\n".join(problems))
+    return path
+
+
+def _folder(place: Place) -> Path:
+    """Return where a run or a sweep lies. Raises InvalidInputError for a result that was not kept."""
+    if isinstance(place, SweepResult):
+        return place.folder
+    if not isinstance(place, Result):
+        return Path(place)
+    if place.folder is None:
+        message = f"{place.name}: this result is in memory only; run it with out=FOLDER to keep what pictures need"
+        raise InvalidInputError(message)
+    return place.folder
+
+
+def _tuple(values: Sequence[T] | None) -> tuple[T, ...] | None:
+    return None if values is None else tuple(values)
