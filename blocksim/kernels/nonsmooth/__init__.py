@@ -20,7 +20,7 @@ At rest (J v = 0) that is a spring: s = -gamma lambda / b = -F A / w^2 with the 
 
 Velocity pass: points with an impulse after the position pass, or s <= 0, have 0 <= lambda  complementary to
 J v - t >= 0, with the target t = -e u where the approach u before the substep was faster than a threshold (and what
-gravity does meanwhile: passes.rebound), and -max(s, 0) / h elsewhere. What the position pass adds to velocities moves
+gravity does meanwhile: aims.rebound), and -max(s, 0) / h elsewhere. What the position pass adds to velocities moves
 bodies, but is gone after the velocity pass.
 
 Where restitution is high, impacts of bodies that touch one another go in rounds instead, and create no energy:

@@ -17,15 +17,15 @@ from blocksim.kernels.lanes import (
     is_all,
     lesser,
     load,
-    root,
     select,
     split,
     store,
     write_fields_0,
 )
+from blocksim.kernels.nonsmooth.aims import aim, gaps
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
-from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, kinetic_frictions, restitutions, rows_of, touch_of
-from blocksim.kernels.nonsmooth.slip import Rows, Slip, slip_of
+from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, kinetic_frictions, rows_of, touch_of
+from blocksim.kernels.nonsmooth.slip import Rows, slip_of
 from blocksim.kernels.nonsmooth.solve import solve_two
 
 
@@ -81,14 +81,6 @@ def warm_group(contacts: Contacts, group: Record, lane: Lane) -> None:
 
 
 @kernel
-def gaps(group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies, bend_time: float) -> tuple[Lanes, Lanes]:
-    """Return both gaps (m) as they are now; `bend_time` (s) is that of bends.py now."""
-    slip = slip_of(row, a.dx - b.dx, a.dy - b.dy, a.turned, b.turned)
-    bent = bend_time * load(lane, group.bend)
-    return load(lane, group.gap_one) + slip.one + bent, load(lane, group.gap_two) + slip.two + bent
-
-
-@kernel
 def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     """Solve both normals of rows with soft contacts and gaps that may just close."""
     stepping = contacts.stepping[0]
@@ -116,90 +108,6 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     store(lane, group.normal_two, new_two)
     second = new_two - old_two
     push(contacts, group, lane, row, a, b, new_one - old_one + second, second, 0.0 * second)
-
-
-@kernel
-def pulls(row: Rows, a: Bodies, b: Bodies, stepping: Record) -> Lanes:
-    """Return by how much gravity changes J v of rows in a substep (m/s) as long as nothing touches."""
-    free = select(a.inverse_mass > 0.0, 1.0, 0.0) - select(b.inverse_mass > 0.0, 1.0, 0.0)
-    return free * (row.nx * stepping.fall_x + row.ny * stepping.fall_y)
-
-
-@kernel
-def rebound(approach: Lanes, start: Lanes, pull: Lanes, restitution: Lanes, stepping: Record) -> Lanes:
-    """Return J v (m/s) that leaves a share e^2 of the energy with which a point meets.
-
-    Positions are half a substep ahead of velocities, so that J v is short of half a `pull` both before and after (not
-    at the start of a run: what it lacks there is `lag`). From a gap `start` (m) the point falls on, and the position
-    pass leaves it where it touches:
-
-        t + pull / 2 = e sqrt((u + pull / 2)^2 - 2 (pull / h) start)
-
-    With t = -e u an impact at speed u lost 3 g h / u of its energy, on average, for ever so elastic blocks.
-    """
-    now = approach + stepping.lag * pull
-    square = now * now - 2.0 * stepping.open_bias * pull * greater(start, 0.0)
-    return restitution * root(greater(square, 0.0)) - 0.5 * pull
-
-
-@kernel
-def target(impulse: Lanes, gap: Lanes, least: Lanes) -> Lanes:
-    """Return what J v of a point has to be at least (m/s) after the velocity pass; -FAR where it does not count.
-
-    A gap that is still open must not slow an approach down: it would take a part of it in the substep before the
-    impact, and restitution would vanish for small substeps.
-    """
-    return select((impulse > 0.0) | (gap <= 0.0), least, -FAR)
-
-
-@kernel
-def aim(contacts: Contacts, group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes]:
-    """Fix what the velocity pass has to reach at the points of rows."""
-    stepping = contacts.stepping[0]
-    gap_one, gap_two = gaps(group, lane, row, a, b, stepping.next_bend_time)
-    normal_one = load(lane, group.normal_one)
-    normal_two = load(lane, group.normal_two)
-    if is_all((lesser(gap_one, gap_two) > 0.0) & (greater(normal_one, normal_two) <= 0.0)):
-        none = 0.0 * gap_one - FAR
-        store(lane, group.target_one, none)
-        store(lane, group.target_two, none)
-        return none, none
-    vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
-    vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
-    u = slip_of(row, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
-    t_one = target(normal_one, gap_one, -greater(gap_one, 0.0) * stepping.open_bias)
-    t_two = target(normal_two, gap_two, -greater(gap_two, 0.0) * stepping.open_bias)
-    if not is_all((lesser(u.one, u.two) >= -stepping.threshold) | (greater(t_one, t_two) <= -FAR)):
-        t_one, t_two = with_rebounds(contacts, group, lane, row, a, b, u, t_one, t_two)
-    store(lane, group.target_one, t_one)
-    store(lane, group.target_two, t_two)
-    return t_one, t_two
-
-
-@kernel
-def with_rebounds(
-    contacts: Contacts,
-    group: Record,
-    lane: Lane,
-    row: Rows,
-    a: Bodies,
-    b: Bodies,
-    u: Slip,
-    t_one: Lanes,
-    t_two: Lanes,
-) -> tuple[Lanes, Lanes]:
-    """Return the targets (m/s) of rows with those of points that rebound, which approach with u."""
-    stepping = contacts.stepping[0]
-    restitution = restitutions(contacts, group, lane)
-    pull = pulls(row, a, b, stepping)
-    after_one = rebound(u.one, load(lane, group.start_one), pull, restitution, stepping)
-    after_two = rebound(u.two, load(lane, group.start_two), pull, restitution, stepping)
-    is_elastic = restitution > 0.0
-    t_one = select(is_elastic & (u.one < -stepping.threshold) & (t_one > -FAR), after_one, t_one)
-    t_two = select(is_elastic & (u.two < -stepping.threshold) & (t_two > -FAR), after_two, t_two)
-    if stepping.is_guarded and not is_all(greater(t_one, t_two) <= 0.0):
-        stepping.has_rebounds = 1
-    return t_one, t_two
 
 
 @kernel

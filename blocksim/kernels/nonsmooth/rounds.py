@@ -3,10 +3,11 @@
 from blocksim.kernels.arrays import Record
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.lanes import WIDTH, Lane, Lanes, Mask, fields_0, greater, load, select, store
+from blocksim.kernels.nonsmooth.aims import gaps, pulls
 from blocksim.kernels.nonsmooth.arrays import FAR, PART, Contacts
 from blocksim.kernels.nonsmooth.clusters import of_row
 from blocksim.kernels.nonsmooth.groups import bodies_at, highest, restitutions, rows_of, total
-from blocksim.kernels.nonsmooth.passes import gaps, pulls, taken_by
+from blocksim.kernels.nonsmooth.passes import taken_by
 from blocksim.kernels.nonsmooth.slip import slip_of
 
 
