@@ -29,3 +29,9 @@ def test_frames_do_not_drift_over_a_long_run() -> None:
     recorder = Recorder([], 1e-3, 2.984e-7)
     steps = steps_of(recorder, 7_000_000)
     assert all(abs(step * 2.984e-7 - k * 1e-3) < 2.984e-7 for k, step in enumerate(steps))
+
+
+def test_frames_until_a_step_are_those_up_to_it_and_at_it() -> None:
+    recorder = Recorder((), 1.0, 0.2)
+    recorder.steps = [0, 5, 10]
+    assert [recorder.count_until(step) for step in (0, 4, 5, 9, 10)] == [1, 1, 2, 2, 3]

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 
 from blocksim.scenario import place_bodies
@@ -30,3 +31,14 @@ def test_every_number_comes_back_under_its_name(soft: Shipped, tmp_path: Path) -
     energies = [*back.energy.values(), back.contact_count, back.largest_overlap]
     assert list(back.energy) == list(scheme.ledger)
     np.testing.assert_array_equal(np.stack(energies, axis=1), [frame.measured for frame in written])
+
+
+def test_frames_beyond_what_was_committed_do_not_count(soft: Shipped, tmp_path: Path) -> None:
+    scheme, scenario, path = SCHEMES["explicit"], soft(), tmp_path / "run.h5"
+    with FrameFile(path, place_bodies(scenario), STEP, "schema = 1\n", ledger=scheme.ledger) as file:
+        for step in range(3):
+            file.append(Frame(step, np.zeros((len(MOTION), 3)), np.zeros(len(scheme.measured))))
+    with h5py.File(path, "r+") as stored:
+        stored["n_committed"][()] = 2  # killed after the third was written, before it was announced
+    back = read_frames(path, scenario)
+    assert (back.step.tolist(), back.x.shape) == ([0, 1], (2, 3))
