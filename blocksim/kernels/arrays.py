@@ -113,7 +113,8 @@ PAIR = record_type(
     "axis "  # along which the two were apart when last looked at; 0, 1: x, y of body b, 2, 3: of body a
     "is_between "  # flag: its bodies are of two shares
     "normal_left shear_left "  # steps until the dashpots along normals and tangents are made anew
-    "sticking",  # bits of the points that have a dashpot along the tangent
+    "sticking "  # bits of the points that have a dashpot along the tangent
+    "slides",  # which way its only contact slides: AHEAD, where a moves ahead of b along the tangent, BACK, or not: 0
 )
 CONTACT = record_type(
     "spring depth "  # m: shear spring, overlap
@@ -151,6 +152,7 @@ OPERATOR = record_type(
     "h_one h_mixed h_two",  # m/(s N): half a step times the inverse masses, change of rate per change of force
 )
 NORMAL, SHEAR = 0, 1
+AHEAD, BACK = 1, 2
 CONTROLS = record_type(
     "step gravity_x gravity_y "  # s, m/s2
     "skin rest_speed "  # m: reach of the pair list beyond contact; m/s

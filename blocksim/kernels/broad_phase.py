@@ -46,6 +46,7 @@ def add_pair(world: World, count: int, a: int, b: int) -> int:
         pair.axis = 0
         pair.normal_left = 0
         pair.shear_left = 0
+        pair.slides = 0
     return count + 1 if near > 0 else count
 
 
@@ -184,6 +185,7 @@ def carry_history(world: World, count: int) -> None:
                 new.normal_left = world.pairs[q].normal_left
                 new.shear_left = world.pairs[q].shear_left
                 new.sticking = world.pairs[q].sticking
+                new.slides = world.pairs[q].slides
                 move_contacts(world, q, kept, new.active)
                 kept += 1
     for p in range(count - 1, -1, -1):

@@ -21,13 +21,15 @@ from blocksim.kernels.damping import (
     fill_single,
     keep_dashpots,
     keep_masses,
+    note_slip,
     renew_dashpots,
+    sliding_mass,
 )
 from blocksim.kernels.depth import is_too_deep
 from blocksim.kernels.friction import clip_to_cone, draw_spring
 from blocksim.kernels.history import change_contacts, keep_places
 from blocksim.kernels.jit import kernel, rare_kernel
-from blocksim.kernels.kinematics import mutual_mass, resolve_point, weigh_onset
+from blocksim.kernels.kinematics import coupling, mutual_mass, resolve_point, weigh_onset
 from blocksim.kernels.laws import elastic_force, has_constant_stiffness, tangent_stiffness
 from blocksim.kernels.memory import normal_loss, shear_loss, shear_stiffness_before
 from blocksim.kernels.models import contact_points
@@ -122,6 +124,9 @@ def fill_operator(world: World, p: int, count: int, direction: int, pattern: int
     m_one = mutual_mass(one, one, a, b, direction)
     m_mixed = mutual_mass(one, two, a, b, direction)
     m_two = mutual_mass(two, two, a, b, direction)
+    if direction == NORMAL and pair.slides != 0:
+        values = world.interactions[a.contact_class, b.contact_class]
+        m_one = m_mixed = m_two = sliding_mass(m_one, coupling(one, a, b), values.kinetic_friction, pair.slides)
     keep_masses(operator, half, m_one, m_mixed, m_two)
     if pattern == 1:
         fill_single(operator, 0, ratio, half, m_one, one.stiffness, one.weight)
@@ -169,11 +174,23 @@ def resolve_points(world: World, p: int, count: int, step: float, book: Record) 
 
 
 @rare_kernel
+def foresee_slip(pair: Record, point: Record, values: Record) -> None:
+    """Note whether the only contact of a pair, which has just begun, will slide: whether shear outgrows friction."""
+    drawn = values.shear_ratio * abs(point.slipping)
+    note_slip(pair, drawn > values.kinetic_friction * point.closing, point.slipping)
+
+
+@rare_kernel
 def normal_pass(world: World, p: int, count: int, values: Record, step: float) -> None:
     """Springs and dashpots along the normals."""
     law = world.controls[0].law
     for i in range(count):
         push_spring(world.points[i], world.contacts[p, i], law, values.normal_stiffness)
+    pair = world.pairs[p]
+    if count > 1:
+        pair.slides = 0
+    elif world.points[0].drawn < 1.0:
+        foresee_slip(pair, world.points[0], values)
     if values.normal_damping > 0.0:
         damp(world, p, count, NORMAL, (1 << min(count, 2)) - 1, values.normal_damping, step)
 
@@ -222,6 +239,8 @@ def shear_pass(world: World, p: int, count: int, values: Record, step: float, bo
         point = world.points[i]
         contact = world.contacts[p, i]
         force = clip_to_cone(values, point.force, point.limit, point.normal_force, point.slip_rate)
+        if count == 1 and point.normal_force > 0.0:
+            note_slip(pair, sticking == 0 or force != point.force, force)
         book.dashpot += 0.5 * (point.lost + (force - point.spring_force)) * point.slipping
         contact.shear_force = point.force = force
 

@@ -71,6 +71,13 @@ def weigh_onset(point: Record, law: int) -> None:
 
 
 @rare_kernel
+def coupling(point: Record, a: Record, b: Record) -> float:
+    """Return the inverse mass (1/kg) that couples normal and tangent of a point, by its arms about both centres."""
+    of_a = point.normal_arm_a * point.shear_arm_a * a.inverse_inertia
+    return of_a + point.normal_arm_b * point.shear_arm_b * b.inverse_inertia
+
+
+@rare_kernel
 def mutual_mass(one: Record, two: Record, a: Record, b: Record, direction: int) -> float:
     """Return the inverse mass (1/kg) J M^-1 J^T that two points see of one another, along normals or tangents.
 

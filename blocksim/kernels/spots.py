@@ -7,9 +7,17 @@ is then v + w x r with one v and one w for all points of the pair. Everything is
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import HALF, NORMAL, Record
+from blocksim.kernels.arrays import HALF, NORMAL, SHEAR, Record
 from blocksim.kernels.contact import IMPACT_STEPS, shared_step
-from blocksim.kernels.damping import BOTH, OPERATOR_LIFE, fill_alike, fill_single, keep_dashpots, keep_masses
+from blocksim.kernels.damping import (
+    BOTH,
+    OPERATOR_LIFE,
+    fill_alike,
+    fill_single,
+    keep_dashpots,
+    keep_masses,
+    sliding_mass,
+)
 from blocksim.kernels.geometry import corner_offset
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.models.twins import CONE_TOLERANCE, corner_signs
@@ -133,10 +141,15 @@ def renew_single(
     ratio: float,
     step: float,
     stiffness: float,
+    friction: float,
 ) -> None:
-    """Make the operator of a single contact anew."""
+    """Make the operator of a single contact anew; `friction` counts along the normal of one that slides."""
     arm_a, arm_b = arms(spot, a.x - b.x, a.y - b.y, direction)
     mass = a.inverse_mass + b.inverse_mass + arm_a * arm_a * a.inverse_inertia + arm_b * arm_b * b.inverse_inertia
+    if direction == NORMAL and pair.slides != 0:
+        shear_a, shear_b = arms(spot, a.x - b.x, a.y - b.y, SHEAR)
+        mixed = arm_a * shear_a * a.inverse_inertia + arm_b * shear_b * b.inverse_inertia
+        mass = sliding_mass(mass, mixed, friction, pair.slides)
     half = 0.5 * shared_step(a, b, step)
     keep_masses(operator, half, mass, mass, mass)
     keep_dashpots(pair, direction, 1, OPERATOR_LIFE if half > 0.0 else 0)

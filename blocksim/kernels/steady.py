@@ -10,7 +10,7 @@ from typing import NamedTuple
 from blocksim.kernels.apart import begins_contact, choose_axis, gap_along
 from blocksim.kernels.arrays import ALL, NORMAL, SHEAR, Record, Records, World
 from blocksim.kernels.contact import has_new_neighbours
-from blocksim.kernels.damping import BOTH, are_dashpots_due, damp_one, damp_two, renew_dashpots
+from blocksim.kernels.damping import BOTH, are_dashpots_due, damp_one, damp_two, note_slip, renew_dashpots
 from blocksim.kernels.friction import clip_to_cone, draw_same_spring
 from blocksim.kernels.jit import kernel
 from blocksim.kernels.laws import has_constant_stiffness
@@ -92,7 +92,7 @@ def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
     force = spring
     if values.normal_damping > 0.0:
         if are_dashpots_due(pair, NORMAL):
-            renew_single(operator, pair, a, b, spot, NORMAL, values.normal_damping, step, k)
+            renew_single(operator, pair, a, b, spot, NORMAL, values.normal_damping, step, k, values.kinetic_friction)
         force = damp_one(operator, spring, contact.normal_force, spot.closing_rate)
     normal = max(force, 0.0)
     dashpot = 0.5 * (contact.normal_force - k * contact.depth + (normal - spring)) * spot.closing
@@ -121,9 +121,12 @@ def shear_of_one(
         pair.shear_left = 0
     elif values.shear_damping > 0.0:
         if are_dashpots_due(pair, SHEAR):
-            renew_single(operator, pair, a, b, spot, SHEAR, values.shear_damping, step, k)
-        shear = damp_one(operator, elastic, contact.shear_force, spot.slip_rate)
-        shear = clip_to_cone(values, shear, limit, normal, spot.slip_rate)
+            renew_single(operator, pair, a, b, spot, SHEAR, values.shear_damping, step, k, 0.0)
+        free = damp_one(operator, elastic, contact.shear_force, spot.slip_rate)
+        shear = clip_to_cone(values, free, limit, normal, spot.slip_rate)
+        slides = shear != free
+    if normal > 0.0:
+        note_slip(pair, slides, shear)
     dashpot = 0.5 * (contact.shear_force - k * contact.spring + (shear - elastic)) * spot.slip
     return drawn, shear, dashpot, friction
 
