@@ -141,19 +141,30 @@ def renew_single(
     ratio: float,
     step: float,
     stiffness: float,
-    friction: float,
 ) -> None:
-    """Make the operator of a single contact anew; `friction` counts along the normal of one that slides."""
+    """Make the operator of a single contact anew."""
     arm_a, arm_b = arms(spot, a.x - b.x, a.y - b.y, direction)
     mass = a.inverse_mass + b.inverse_mass + arm_a * arm_a * a.inverse_inertia + arm_b * arm_b * b.inverse_inertia
-    if direction == NORMAL and pair.slides != 0:
-        shear_a, shear_b = arms(spot, a.x - b.x, a.y - b.y, SHEAR)
-        mixed = arm_a * shear_a * a.inverse_inertia + arm_b * shear_b * b.inverse_inertia
-        mass = sliding_mass(mass, mixed, friction, pair.slides)
     half = 0.5 * shared_step(a, b, step)
     keep_masses(operator, half, mass, mass, mass)
     keep_dashpots(pair, direction, 1, OPERATOR_LIFE if half > 0.0 else 0)
     fill_single(operator, 0, ratio, half, mass, stiffness, 1.0)
+
+
+@rare_kernel
+def renew_sliding(
+    operator: Record, pair: Record, a: Record, b: Record, spot: Spot, values: Record, step: float
+) -> None:
+    """Make the operator along the normal of a single contact that slides anew."""
+    arm_a, arm_b = arms(spot, a.x - b.x, a.y - b.y, NORMAL)
+    shear_a, shear_b = arms(spot, a.x - b.x, a.y - b.y, SHEAR)
+    mass = a.inverse_mass + b.inverse_mass + arm_a * arm_a * a.inverse_inertia + arm_b * arm_b * b.inverse_inertia
+    mixed = arm_a * shear_a * a.inverse_inertia + arm_b * shear_b * b.inverse_inertia
+    mass = sliding_mass(mass, mixed, values.kinetic_friction, pair.slides)
+    half = 0.5 * shared_step(a, b, step)
+    keep_masses(operator, half, mass, mass, mass)
+    keep_dashpots(pair, NORMAL, 1, OPERATOR_LIFE if half > 0.0 else 0)
+    fill_single(operator, 0, values.normal_damping, half, mass, values.normal_stiffness, 1.0)
 
 
 @rare_kernel

@@ -15,7 +15,7 @@ from blocksim.kernels.friction import clip_to_cone, draw_same_spring
 from blocksim.kernels.jit import kernel
 from blocksim.kernels.laws import has_constant_stiffness
 from blocksim.kernels.models.twins import is_oblique
-from blocksim.kernels.spots import Spot, follow, relative_motion, renew_double, renew_single
+from blocksim.kernels.spots import Spot, follow, relative_motion, renew_double, renew_single, renew_sliding
 
 CHANGED, UNTOUCHED, TOUCHING = range(3)
 
@@ -92,7 +92,10 @@ def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
     force = spring
     if values.normal_damping > 0.0:
         if are_dashpots_due(pair, NORMAL):
-            renew_single(operator, pair, a, b, spot, NORMAL, values.normal_damping, step, k, values.kinetic_friction)
+            if pair.slides != 0:
+                renew_sliding(operator, pair, a, b, spot, values, step)
+            else:
+                renew_single(operator, pair, a, b, spot, NORMAL, values.normal_damping, step, k)
         force = damp_one(operator, spring, contact.normal_force, spot.closing_rate)
     normal = max(force, 0.0)
     dashpot = 0.5 * (contact.normal_force - k * contact.depth + (normal - spring)) * spot.closing
@@ -121,7 +124,7 @@ def shear_of_one(
         pair.shear_left = 0
     elif values.shear_damping > 0.0:
         if are_dashpots_due(pair, SHEAR):
-            renew_single(operator, pair, a, b, spot, SHEAR, values.shear_damping, step, k, 0.0)
+            renew_single(operator, pair, a, b, spot, SHEAR, values.shear_damping, step, k)
         free = damp_one(operator, elastic, contact.shear_force, spot.slip_rate)
         shear = clip_to_cone(values, free, limit, normal, spot.slip_rate)
         slides = shear != free
