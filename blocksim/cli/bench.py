@@ -14,8 +14,8 @@ from blocksim.bench.measurement import REPEATS, Measurement, Number, Setting
 from blocksim.bench.measurements import chosen
 from blocksim.bench.peers.packages import require_all
 from blocksim.cli import options
+from blocksim.cli.compiling import tell_compilation
 from blocksim.cli.output import answer, note, print_json, table_lines
-from blocksim.cli.progress import tell_compilation
 from blocksim.errors import OutputError
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.own_files import is_bench, is_picture, refuse_foreign

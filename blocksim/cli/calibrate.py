@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from blocksim.cli import options
+from blocksim.cli.compiling import tell_compilation
 from blocksim.cli.output import answer, note, number, print_json, table_lines
-from blocksim.cli.progress import tell_compilation
 from blocksim.cli.vary import read_variations
 from blocksim.errors import ExitCode
 from blocksim.scenario import Document

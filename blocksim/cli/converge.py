@@ -12,8 +12,8 @@ import numpy as np
 import typer
 
 from blocksim.cli import options
+from blocksim.cli.compiling import tell_compilation
 from blocksim.cli.output import answer, note, number, print_json, table_lines
-from blocksim.cli.progress import tell_compilation
 from blocksim.cli.scenario import read_scenario
 from blocksim.errors import ExitCode
 from blocksim.simulation.compilation import kernels_of

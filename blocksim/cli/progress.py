@@ -3,21 +3,21 @@
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from blocksim.cli.collector import loading
 from blocksim.cli.output import note
-from blocksim.kernels import jit
-from blocksim.simulation import Progress as Where
-from blocksim.simulation.compilation import compile_kernels, is_compiled
+
+if TYPE_CHECKING:  # stored results are shown without the solver
+    from blocksim.simulation import Progress as Where
 
 PLAIN_SECONDS = 2.0
 LIVE_SECONDS = 0.1
 
 
 @contextmanager
-def watching(*, quiet: bool) -> Iterator[Callable[[Where], None]]:
+def watching(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
     """Give a function that shows where a run stands; on a terminal the line disappears at the end."""
     if quiet:
         yield lambda _: None
@@ -71,24 +71,8 @@ def _plain_count(what: str) -> Callable[[int, int], None]:
     return show
 
 
-def tell_compilation(kernels: str, *, quiet: bool) -> None:
-    """Compile a set of kernels where that is still to be done, and say so: it is no part of a run."""
-    if is_compiled(kernels):
-        with loading():
-            compile_kernels(kernels)
-        return
-    if quiet:
-        compile_kernels(kernels)
-        return
-    note("Compiling the solver, once after installation (less than a minute) ...")
-    note(f"Compiled in {compile_kernels(kernels):.0f} s.")
-    if not is_compiled(kernels):
-        folder = jit.cache_folder() or jit.cache_root()
-        note(f"{folder}: the compiled solver cannot be kept there; make room, or set BLOCKSIM_CACHE_DIR")
-
-
 @contextmanager
-def _live_line(console: Console) -> Iterator[Callable[[Where], None]]:
+def _live_line(console: Console) -> "Iterator[Callable[[Where], None]]":
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (
@@ -103,7 +87,7 @@ def _live_line(console: Console) -> Iterator[Callable[[Where], None]]:
     shown_at = 0.0
     steps: int | None = None  # when first looked at: a run that goes on has done some before
 
-    def show(where: Where) -> None:
+    def show(where: "Where") -> None:
         nonlocal shown_at, steps
         now = time.monotonic()
         steps = where.steps if steps is None else steps
@@ -121,10 +105,10 @@ def _live_line(console: Console) -> Iterator[Callable[[Where], None]]:
             progress.stop()
 
 
-def _plain_lines() -> Callable[[Where], None]:
+def _plain_lines() -> "Callable[[Where], None]":
     shown_at = time.monotonic()
 
-    def show(where: Where) -> None:
+    def show(where: "Where") -> None:
         nonlocal shown_at
         now = time.monotonic()
         if now - shown_at > PLAIN_SECONDS:

@@ -8,8 +8,9 @@ from pathlib import Path
 import typer
 
 from blocksim.cli import options
+from blocksim.cli.compiling import tell_compilation
 from blocksim.cli.output import answer, note, number, print_json, table_lines
-from blocksim.cli.progress import tell_compilation, watching
+from blocksim.cli.progress import watching
 from blocksim.cli.scenario import read_scenario
 from blocksim.cli.verdict import comparison_table, verdict_lines
 from blocksim.scenario import Scenario

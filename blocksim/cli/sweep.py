@@ -9,9 +9,9 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from blocksim.cli import options
+from blocksim.cli.compiling import tell_compilation
 from blocksim.cli.dry_run import show_estimate
 from blocksim.cli.output import GAP, answer, note, print_json, table_lines, width_of_screen
-from blocksim.cli.progress import tell_compilation
 from blocksim.cli.reporter import reporting, shown
 from blocksim.cli.vary import with_vary
 from blocksim.errors import ExitCode, StoppedEarlyError

@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from blocksim.cli import options
+from blocksim.cli.compiling import tell_compilation
 from blocksim.cli.output import answer, note, print_json, table_lines
-from blocksim.cli.progress import tell_compilation
 from blocksim.errors import ExitCode
 from blocksim.simulation.compilation import kernel_set
 from blocksim.verification.case import Case, Row, Setting, Verdict

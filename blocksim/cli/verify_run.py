@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from blocksim.cli import options
+from blocksim.cli.compiling import tell_compilation
 from blocksim.cli.output import answer, note, print_json
-from blocksim.cli.progress import tell_compilation, watching
+from blocksim.cli.progress import watching
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedEarlyError
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study.judge import is_sweep

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.cli import progress
+from blocksim.cli import compiling
 from blocksim.cli.output import note, number, print_json, table_lines
 
 
@@ -50,9 +50,9 @@ def test_notes_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> No
 def test_compiled_solver_that_cannot_be_kept_is_told(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(progress, "is_compiled", lambda _: False)
-    monkeypatch.setattr(progress, "compile_kernels", lambda _: 30.0)
-    monkeypatch.setattr("blocksim.cli.progress.jit.cache_folder", lambda: Path("/disk/blocksim/0123"))
-    progress.tell_compilation("surface", quiet=False)
+    monkeypatch.setattr(compiling, "is_compiled", lambda _: False)
+    monkeypatch.setattr(compiling, "compile_kernels", lambda _: 30.0)
+    monkeypatch.setattr("blocksim.cli.compiling.jit.cache_folder", lambda: Path("/disk/blocksim/0123"))
+    compiling.tell_compilation("surface", quiet=False)
     told = capsys.readouterr().err.splitlines()
     assert told[-1].startswith("/disk/blocksim/0123: the compiled solver cannot be kept there; make room")

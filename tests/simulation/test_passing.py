@@ -94,7 +94,6 @@ def test_block_rebounds_or_the_run_ends_whatever_its_speed(what: str, scale: flo
 @pytest.mark.parametrize("limit", [2e-3, 1.0])
 @pytest.mark.parametrize("what", ["fixed", "free", "wall"])
 def test_limit_of_overlap_that_is_too_large_lets_nothing_through(what: str, limit: float) -> None:
-    contact: dict[str, Any]
     for speed, scale, angle in ((20.0, 1e-3, 0.0), (20.0, 1e-3, 0.6), (300.0, 1e-5, 0.0), (300.0, 1e-5, 1.2)):
         contact = {"max_overlap": limit, "stiffness_scale": scale, "angle": angle}
         result = simulate(thrown(what, speed, thickness=1e-3, **contact))
@@ -107,7 +106,6 @@ def test_limit_of_overlap_that_is_too_large_lets_nothing_through(what: str, limi
 @pytest.mark.parametrize("what", BODIES)
 def test_particles_do_not_lose_one_another(model: str, what: str) -> None:
     """Deeper than a boundary reaches they would: with the usual limit a row of discs passes through another."""
-    contact: dict[str, Any]
     for speed, scale in ((20.0, 1e-3), (1000.0, 1e-5)):
         contact: dict[str, Any] = {"model": model, "particle_spacing": 1e-3, "stiffness_scale": scale}
         stays_or_says(simulate(thrown(what, speed, **contact)), BODIES[what], 0.0 if what == "ground" else FACE)
