@@ -44,7 +44,7 @@ class Differences:
 
     @property
     def is_none(self) -> bool:
-        """Tell whether all frames have the same bits."""
+        """Return True if all frames have the same bits."""
         return self.first is None and self.frames[0] == self.frames[1]
 
 

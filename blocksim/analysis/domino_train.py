@@ -1,7 +1,7 @@
 """Speed of a domino wave: the collective model of J. M. J. van Leeuwen, Am. J. Phys. 78 (2010) 721-727.
 
 Dominoes of height h and thickness d stand with free gaps s. They turn about their lower front edges, which do not slip;
-faces are frictionless and collisions lose everything: a domino that has struck the next goes on leaning on it. So all
+faces are frictionless and collisions lose everything: a domino that has struck the next continues leaning on it. So all
 fallen dominoes and the foremost one move with one degree of freedom, the foremost one's angle. Between two collisions
 their energy is kept. In a collision the velocities are projected, in the metric of the kinetic energy, on those that
 the new contact allows; impulses between leaning dominoes are what makes the projection.

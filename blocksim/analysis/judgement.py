@@ -28,10 +28,10 @@ class Settings:
     def __post_init__(self) -> None:
         """Raise InvalidInputError for what is no share or no uncertainty."""
         if not 0.0 <= self.threshold <= 1.0:
-            message = f"threshold {self.threshold} is no share from 0 to 1"
+            message = f"threshold {self.threshold} is not a share from 0 to 1"
             raise InvalidInputError(message)
         if not 0.0 <= self.u_num < inf:
-            message = f"u_num {self.u_num} is no uncertainty in mm: a number from 0 up"
+            message = f"u_num {self.u_num} is not an uncertainty in mm: a number from 0 up"
             raise InvalidInputError(message)
 
 

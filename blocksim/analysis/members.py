@@ -74,7 +74,7 @@ class Members:
         return tuple(dict.fromkeys(name.rpartition(".")[0] for name in names if name.endswith(ends)))
 
     def has(self, block: str, quantity: str) -> bool:
-        """Tell whether the table has this quantity of this block."""
+        """Return True if the table has this quantity of this block."""
         return _column(block, quantity) in self.table
 
     def values(self, block: str, quantity: str) -> "NDArray[np.float64]":

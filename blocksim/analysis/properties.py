@@ -74,7 +74,7 @@ def _read_property(row: dict[str, Cell], values: dict[str, float], table: Table)
     factor = unit_factor(row["unit"].text, bounds.unit)
     if factor is None:
         found = f"'{row['unit'].text}'" if row["unit"].text else "nothing"
-        table.problems.append(row["unit"].problem(f"{found} is no unit of {name}, write for example {bounds.unit}"))
+        table.problems.append(row["unit"].problem(f"{found} is not a unit of {name}, write for example {bounds.unit}"))
         return
     try:
         values[name] = _within(row["value"].number() * factor, bounds)

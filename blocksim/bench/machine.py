@@ -24,7 +24,7 @@ class Machine:
 
     @property
     def is_busy(self) -> bool:
-        """Tell whether other processes share the machine, so that times are too long and scatter."""
+        """Return True if other processes share the machine, so that times are too long and scatter."""
         return self.load is not None and self.load > BUSY
 
     def lines(self) -> list[str]:

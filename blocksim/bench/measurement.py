@@ -24,7 +24,7 @@ class Number:
 
     @property
     def median(self) -> float:
-        """The number that is told."""
+        """The number that is reported."""
         return statistics.median(self.samples)
 
     @property
@@ -39,7 +39,7 @@ class Number:
 
     @property
     def is_repeated(self) -> bool:
-        """Tell whether there is a spread at all."""
+        """Return True if there is a spread at all."""
         return len(self.samples) > 1
 
 

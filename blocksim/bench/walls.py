@@ -43,7 +43,7 @@ class Sized(Protocol):
 
 SIZES = (Size(10, 10), Size(40, 25), Size(125, 80), Size(400, 250))
 QUICK_SIZES = (Size(10, 10), Size(25, 16))
-STIFFNESS_SCALE = 1e-4  # long steps, so that blocks move on and pair lists are made anew, as in a whole collapse
+STIFFNESS_SCALE = 1e-4  # long steps, so that blocks move on and pair lists are made again, as in a whole collapse
 STEPS, QUICK_STEPS = 300, 150
 FEWEST_BLOCKS = 3000  # of one sample: smaller walls are advanced several times
 

@@ -1,4 +1,4 @@
-"""blocksim animate: a run as a film."""
+"""blocksim animate: a run as an animation."""
 
 from pathlib import Path
 from typing import Annotated
@@ -17,13 +17,13 @@ from blocksim.view.support import support_of
 
 def animate_command(
     run: options.StoredRunPath,
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Film to write: .gif or .mp4.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Animation to write: .gif or .mp4.")] = None,
     speed: Annotated[
-        float, typer.Option(min=1e-6, max=1e6, metavar="FACTOR", help="Seconds of the run in a second of film.")
+        float, typer.Option(min=1e-6, max=1e6, metavar="FACTOR", help="Simulated seconds per second of the animation.")
     ] = 0.25,
-    fps: Annotated[float, typer.Option(min=0.1, max=240.0, metavar="N", help="Pictures a second, 50 in a GIF.")] = 30.0,
+    fps: Annotated[float, typer.Option(min=0.1, max=240.0, metavar="N", help="Frames per second; 50 in a GIF.")] = 30.0,
     trails: Annotated[
-        bool | None, typer.Option("--trails/--no-trails", help="Ways of the centres (default: up to 30 blocks).")
+        bool | None, typer.Option("--trails/--no-trails", help="Paths of the centres (default: up to 30 blocks).")
     ] = None,
     forces: options.Forces = False,
     colour: options.Colour = "block",
@@ -31,9 +31,9 @@ def animate_command(
     overwrite: options.Replace = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Show a run as a film, GIF or MP4.
+    """Show a run as an animation, GIF or MP4.
 
-    The default is a GIF, NAME.gif, at a quarter of the real speed; the last picture is held for a while. A run that was
+    The default is a GIF, NAME.gif, at a quarter of the real speed; the last frame is held for a while. A run that was
     stopped or killed is shown as far as it came. --forces needs a run that has stored contacts (output.contacts =
     true), MP4 the extra `video` or the system's ffmpeg. The window fits what the blocks occupy; a few that fly far off
     leave it. An older animation of blocksim is replaced; any other file only with --overwrite.
@@ -54,4 +54,4 @@ def animate_command(
         note(stored.remark)
     if not quiet:
         gone = f"; {beyond} of {len(stored.frames.names)} blocks fly out of the window" if beyond else ""
-        note(f"film: {film} ({older}{count} pictures{gone})")
+        note(f"animation: {film} ({older}{count} pictures{gone})")

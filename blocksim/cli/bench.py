@@ -37,7 +37,7 @@ def bench_command(
             "start-up; with --peers three-blocks, three-blocks-e0, wall.",
         ),
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Make everything small; said at the end how.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Run a reduced version; the last lines say how.")] = False,
     repeats: Annotated[int, typer.Option(min=1, metavar="N", help="Samples of each number.")] = REPEATS,
     peers: Annotated[bool, typer.Option("--peers", help="Compare with pymunk and Box2D, with a picture.")] = False,
     out: Annotated[

@@ -36,12 +36,12 @@ def calibrate_command(
             "Default: the distributions of [sweep].",
         ),
     ] = None,
-    trials: Annotated[int, typer.Option(min=1, metavar="N", help="Sets of values that are tried.")] = TRIALS,
-    members: Annotated[int, typer.Option(min=1, metavar="M", help="Runs over the scatter, a trial.")] = MEMBERS,
+    trials: Annotated[int, typer.Option(min=1, metavar="N", help="Number of trials.")] = TRIALS,
+    members: Annotated[int, typer.Option(min=1, metavar="M", help="Runs over the scatter per trial.")] = MEMBERS,
     fresh: Annotated[
         int, typer.Option(min=1, metavar="M", help="Fresh runs that the probability is measured with in the end.")
     ] = FRESH_MEMBERS,
-    seed: Annotated[int, typer.Option(min=0, metavar="S", help="The same seed finds the same.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, metavar="S", help="Random seed.")] = 0,
     experiment: options.ExperimentPath = None,
     settings: options.Settings = None,
     out: Annotated[
@@ -50,7 +50,7 @@ def calibrate_command(
             "--out", metavar="FILE", help="Scenario file to write (default: results/NAME/calibrate-HASH/scenario.toml)."
         ),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the trials that are there.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Resume with the existing trials.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file and the trials there.")] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -59,7 +59,7 @@ def calibrate_command(
 
     What is maximised is the probability that a run is inside all measured ranges (as in compare) while the other inputs
     scatter as stated, not the agreement of one run. Writes the scenario with the fitted values and where they come from
-    in [provenance]. Every trial is kept as it ends; a search that was stopped goes on with --resume. Needs the extra
+    in [provenance]. Every trial is kept as it ends; a search that was stopped continues with --resume. Needs the extra
     blocksim[study]. Exit code 1: nothing inside all ranges was found. The search then goes by the distance to the
     ranges, and the file holds the nearest values. The example takes the scatter from [sweep], as in
     "structures.0.overlap" = { mean = "10 mm", sd = "0.3 mm" }; --scatter "structures.0.overlap=10 mm+-0.3 mm" says the

@@ -36,7 +36,7 @@ def check_command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Validate a scenario and show what it comes to.
+    """Validate a scenario and summarise it.
 
     Prints time step and cost, then masses, inertias, contact parameters and the keys that decided them. Nothing is run;
     with --quiet only mistakes are printed. --resolved writes a scenario file with every value that will be used.
@@ -178,7 +178,7 @@ def _sag(rigid: SagDescription | None) -> list[str]:
     solved = f"each solved to {MILLI * rigid.tolerance:g} mm/s"
     return [
         f"           {rigid.why}",
-        f"           in {rigid.substeps} substeps, {solved}; by hand at most {rigid.longest_step:.1e} s",
+        f"           in {rigid.substeps} substeps, {solved}; manual limit {rigid.longest_step:.1e} s",
         f"sag        {MICRO * rigid.sag:.3g} µm of block {rigid.block} as all stand, with the step squared",
         *([f"warning: {rigid.warning}"] if rigid.warning else []),
     ]

@@ -36,7 +36,8 @@ def compare_command(
     ],
     experiment: options.ExperimentPath = None,
     threshold: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="For sweeps: share of members that must be inside in everything.")
+        float,
+        typer.Option(min=0.0, max=1.0, help="For sweeps: share of members that must be within all measured ranges."),
     ] = THRESHOLD,
     u_num: Annotated[
         float,

@@ -1,4 +1,4 @@
-"""Ctrl-C where no run is going on: while the program is loaded, while a command works, and while the process ends.
+"""Ctrl-C where no run is in progress: while the program is loaded, while a command works, and while the process ends.
 
 Python would raise KeyboardInterrupt wherever it happens to be, and print a traceback from where nobody catches it: in
 the middle of an import, or of leaving.

@@ -91,9 +91,8 @@ def _interval(low: float, high: float, column: Column) -> str:
 
 def _share_line(judgement: Judgement) -> str:
     share, asked = (f"{PERCENT * part:.1f} %" for part in (judgement.share_inside, judgement.settings.threshold))
-    return (
-        f"{judgement.inside_all} of {judgement.members} members ({share}) are inside in everything; asked for: {asked}"
-    )
+    count = f"{judgement.inside_all} of {judgement.members} members ({share})"
+    return f"{count} are within all measured ranges; threshold: {asked}"
 
 
 def _wrapped(texts: tuple[str, ...] | list[str]) -> list[str]:

@@ -77,7 +77,7 @@ def _write(path: Path, text: str) -> None:
     try:
         file = path.open("x", encoding="utf-8")
     except FileExistsError:
-        message = f"{path}: is there already; choose another name"
+        message = f"{path}: already exists; choose another name"
         raise OutputExistsError(message) from None
     except OSError as error:
         message = f"{path}: cannot be created: {error.strerror}"

@@ -125,9 +125,9 @@ OutFolder = Annotated[
 SweepFolder = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results (default: results/NAME/sweep-HASH).")
 ]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Run again and replace what is there.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Run again and replace the existing results.")]
 Replace = Annotated[bool, typer.Option("--overwrite", help="Replace a file that blocksim did not write.")]
-Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped or killed.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Resume a run that was stopped or killed.")]
 CheckpointEvery = Annotated[
     float,
     typer.Option(
@@ -161,7 +161,7 @@ Threads = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the answer as JSON, for programs.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but the answer.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only the answer.")]
 ExperimentPath = Annotated[
     Path | None,
     typer.Option("--experiment", metavar="TABLE", help="Experiment table (CSV) instead of the scenario's own."),

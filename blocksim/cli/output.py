@@ -23,7 +23,7 @@ LONG_TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))  # s
 
 
 def note(text: str) -> None:
-    """Print a line about what is going on, to standard error; where nobody reads it any more, nothing happens."""
+    """Print a line about what is in progress, to standard error; where nobody reads it any more, nothing happens."""
     try:
         print(harmless(text), file=sys.stderr, flush=True)  # noqa: T201 - this is the place for it
     except OSError:

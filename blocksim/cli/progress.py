@@ -78,14 +78,14 @@ def _live_line(console: Console) -> "Iterator[Callable[[Where], None]]":
     columns = (
         TextColumn("{task.completed:.3f} of {task.total:g} s"),
         BarColumn(bar_width=None),
-        TextColumn("{task.fields[speed]} steps/s, energy off by {task.fields[residual]}"),
+        TextColumn("{task.fields[speed]} steps/s, relative energy error {task.fields[residual]}"),
         TimeRemainingColumn(),
     )
     began = time.monotonic()
     progress = Progress(*columns, console=console, transient=True)
     task = progress.add_task("", total=1.0, visible=False, speed="", residual="")
     shown_at = 0.0
-    steps: int | None = None  # when first looked at: a run that goes on has done some before
+    steps: int | None = None  # when first looked at: a run that continues has done some before
 
     def show(where: "Where") -> None:
         nonlocal shown_at, steps
@@ -115,7 +115,7 @@ def _plain_lines() -> "Callable[[Where], None]":
             shown_at = now
             note(
                 f"{where.time:.3f} of at most {where.end:g} s simulated, {where.steps} steps, "
-                f"energy off by {where.relative_residual:.0e}"
+                f"relative energy error {where.relative_residual:.0e}"
             )
 
     return show

@@ -22,7 +22,7 @@ def report_command(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="File to write.")] = Path("report.html"),
     experiment: options.ExperimentPath = None,
     members: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Most members of a sweep to put into the page, in its order.")
+        int, typer.Option(min=0, metavar="N", help="Maximum number of members of a sweep in the page.")
     ] = MEMBERS,
     overwrite: options.Replace = False,
     quiet: options.Quiet = False,
@@ -31,7 +31,7 @@ def report_command(
 
     It has a player, time histories, the comparison with measured repeats, energies and where everything comes from;
     for a sweep the share of its members inside, a table, a map and, where --keep-cases kept their frames, its members.
-    The file loads nothing from anywhere and can be opened from the disk or sent by mail. Many frames are thinned and
+    The file is self-contained and can be opened from the disk or sent by mail. Many frames are thinned and
     rounded; the page says so. A run that was killed or damaged is shown as far as it can be read (exit code 65 where
     something is damaged). An older report is replaced; any other file only with --overwrite.
 

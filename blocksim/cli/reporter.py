@@ -21,7 +21,7 @@ EVERY = 2.0  # s
 
 @contextmanager
 def reporting(short: Mapping[str, str], heads: Mapping[str, Head], *, quiet: bool) -> Iterator[OnRow]:
-    """Give what is told every row: a bar on a terminal, lines elsewhere."""
+    """Give what is reported every row: a bar on a terminal, lines elsewhere."""
     if quiet or not Console(stderr=True).is_terminal:
         yield (lambda *_: None) if quiet else Reporter(short, heads).tell
         return

@@ -46,13 +46,15 @@ def run_command(
     """Simulate a scenario and show where the blocks end.
 
     Where the scenario names an experiment, the measured ranges stand beside. A run that is there already is shown
-    again. Ctrl-C, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1 and --wall-time stop a run so that --resume goes on with it, to the
+    again. Ctrl-C, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1 and --wall-time stop a run so that --resume continues it, to the
     same bits.
 
     Example: blocksim run scenarios/three_blocks.toml --set time.end=0.1
     """
     if resume and overwrite:
-        raise typer.BadParameter("cannot go with --overwrite, which throws away what there is", param_hint="--resume")
+        raise typer.BadParameter(
+            "cannot be combined with --overwrite, which discards existing results", param_hint="--resume"
+        )
     silent = quiet or as_json
     precautions = Precautions(checkpoint_every, checkpoint_steps, checkpoint_time, wall_time)
     with read_scenario(scenario, settings or []) as ready:
@@ -75,7 +77,7 @@ def run_command(
                 on_progress=on_progress,
             )
     if known and not silent:
-        note(f"already there, --overwrite repeats it: {folder}")
+        note(f"already computed; rerun with --overwrite: {folder}")
     with nullcontext() if result.status == FINISHED else suppress(OSError):  # the terminal that is lost, SIGHUP tells
         show_result(result, as_json=as_json, quiet=silent)
     raise typer.Exit(result.summary.exit_code)
@@ -106,7 +108,7 @@ def show_result(result: Result, *, as_json: bool, quiet: bool) -> None:
     else:
         answer("\n".join(_answer_lines(result)))
     if result.status != FINISHED:
-        note(f"{result.name}: {result.status}: {result.reason}; what there is by then is kept in {result.folder}")
+        note(f"{result.name}: {result.status}: {result.reason}; partial results are in {result.folder}")
         note(_way_on(result))
     elif not quiet:
         note(f"results: {result.folder}")
@@ -116,12 +118,12 @@ def _way_on(result: Result) -> str:
     """Return what can be done with a run that did not finish."""
     step = result.summary.last_checkpoint
     if result.status == INTERRUPTED:
-        return f"go on with --resume (checkpoint at step {step})"
-    return "no checkpoint was written by then" if step is None else f"last good checkpoint at step {step}"
+        return f"continue with --resume (checkpoint at step {step})"
+    return "no checkpoint saved" if step is None else f"last good checkpoint at step {step}"
 
 
 def tell_resumption(folder: Path, scenario: Scenario) -> None:
-    """Tell from where a run is going on, and what is left where nothing can.
+    """Tell from where a run is in progress, and what is left where nothing can.
 
     Raises what `find_resumption` raises, and OutputExistsError while another process runs there.
     """
@@ -134,9 +136,7 @@ def tell_resumption(folder: Path, scenario: Scenario) -> None:
         note(f"goes on at step {position.step}, {position.frames} frames are there: {folder}")
     if found is NEW:
         for other in unfinished_beside(folder):
-            note(
-                f"nothing to go on with in {folder}; a run of another scenario or version of the code waits in {other}"
-            )
+            note(f"nothing to resume in {folder}; an unfinished run of another scenario or code version is in {other}")
 
 
 def _answer_lines(result: Result) -> list[str]:
@@ -165,7 +165,7 @@ def _tell_end(result: Result) -> None:
     note(f"{result.name}: {result.status} ({result.reason}) at {summary.simulated_time_s:.3f} s of simulated time")
     note(
         f"{summary.steps} steps of {summary.time_step_s:.2e} s in {summary.solver_seconds:.2f} s; "
-        f"energy off by {summary.energy_J.relative_residual:.0e} of what was in play"
+        f"relative energy error {summary.energy_J.relative_residual:.0e}"
     )
     if summary.movement is not None:
         note(_moved(summary.movement))

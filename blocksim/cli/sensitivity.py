@@ -61,7 +61,7 @@ def sensitivity_command(
             "(default: 128).",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, metavar="S", help="The same seed gives the same runs.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, metavar="S", help="Random seed.")] = 0,
     settings: options.Settings = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="CSV", help="Write all numbers to a table.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table.")] = False,
@@ -110,7 +110,7 @@ def _refuse_present(out: Path | None, *, overwrite: bool) -> None:
         reason = "it is a folder" if out.is_dir() else "there is no such folder"
         raise OutputExistsError(f"{out}: cannot be created: {reason}")
     if out.exists() and not overwrite:
-        raise OutputExistsError(f"{out}: is there already; --overwrite replaces it")
+        raise OutputExistsError(f"{out}: already exists; --overwrite replaces it")
 
 
 def _telling() -> Callable[[int, int], None]:

@@ -66,7 +66,7 @@ def sweep_command(
         typer.Option(help="All combinations, the k-th value of every key, the scenario's table, or random draws."),
     ] = None,
     samples: Annotated[int | None, typer.Option(metavar="N", help="How many cases are drawn (default: 128).")] = None,
-    seed: Annotated[int | None, typer.Option(metavar="S", help="The same seed draws the same (default: 0).")] = None,
+    seed: Annotated[int | None, typer.Option(metavar="S", help="Random seed (default: 0).")] = None,
     settings: options.Settings = None,
     executor: Annotated[
         Executor | None,
@@ -84,7 +84,7 @@ def sweep_command(
     merge: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Run nothing; make sweep.csv from the shards in a folder.")
     ] = None,
-    allow_missing: Annotated[bool, typer.Option("--allow-missing", help="Merge what there is by now.")] = False,
+    allow_missing: Annotated[bool, typer.Option("--allow-missing", help="Merge the cases finished so far.")] = False,
     keep_cases: Annotated[
         bool, typer.Option("--keep-cases", help="Keep a run folder with all frames for every case.")
     ] = False,
@@ -93,7 +93,7 @@ def sweep_command(
     out: options.SweepFolder = None,
     overwrite: options.Overwrite = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Tell count, cost and size; run and write nothing.")
+        bool, typer.Option("--dry-run", help="Print number of cases, cost and size; run and write nothing.")
     ] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -214,7 +214,7 @@ def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
         note(f"{result.share_inside:.0%} of {len(table)} cases are inside all measured ranges")
     _tell_failures(result, short)
     if result.left:
-        note(f"{result.left} cases have not been run; the same command runs them")
+        note(f"{result.left} cases have not been run; rerun the command to finish")
     note(f"table: {result.folder / result.name}")
 
 
@@ -243,7 +243,7 @@ def _tell_failures(result: SweepResult, short: dict[str, str]) -> None:
 
 
 def _varies(values: Iterable[object]) -> bool:
-    """Tell whether a column says anything: all finished, or a block that stays where it is, does not."""
+    """Return True if a column says anything: all finished, or a block that stays where it is, does not."""
     told = [f"{value:.2f}" if isinstance(value, float) else str(value) for value in values]
     return len(told) == 1 or len(set(told)) > 1
 

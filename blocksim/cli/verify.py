@@ -52,7 +52,7 @@ def verify_command(
     model: Annotated[Model, typer.Option(help="Contact model.")] = Model.SURFACE,
     law: Annotated[Law, typer.Option(help="Force law.")] = Law.LINEAR,
     scheme: Annotated[Scheme, typer.Option(help="Stepping: springs or impulses.")] = Scheme.EXPLICIT,
-    quick: Annotated[bool, typer.Option("--quick", help="Shorten the longest cases; said at the end how.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Run a reduced version; the last lines say how.")] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:

@@ -49,7 +49,7 @@ def verify_run_command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Run stored results again and compare the bits.
+    """Run stored results again and check bitwise reproducibility.
 
     Of a run: checksums of all files, final state, every frame of run.h5, final.csv, and what run.json says of steps,
     times, energies and the end. Of a sweep: the name of every case, and every cell of a sample of its rows. Exit code 1

@@ -42,7 +42,7 @@ def fastest_point(bodies: Records) -> float:
 
 @rare_kernel
 def is_supported(bodies: Records, controls: Record) -> bool:
-    """Tell whether every free body touches something, where there is gravity: at the top of its flight none rests."""
+    """Return True if every free body touches something, where there is gravity: at the top of its flight none rests."""
     if controls.gravity_x == 0.0 and controls.gravity_y == 0.0:
         return True
     for i in range(bodies.size - 1):
@@ -53,7 +53,7 @@ def is_supported(bodies: Records, controls: Record) -> bool:
 
 @rare_kernel
 def check(world: World) -> int:
-    """Look whether the run may go on: finite, no pair too deep in one another, not at rest for the hold time."""
+    """Check that the run may continue: finite, no pair too deep in one another, not at rest for the hold time."""
     controls = world.controls[0]
     clock = world.clock[0]
     ledger = world.ledger[0]
@@ -124,7 +124,7 @@ def note_depth(clock: Record, share: Record) -> None:
 
 @kernel
 def has_ended(clock: Record, steps: int) -> bool:
-    """Tell whether the last step of a run that failed is among so many steps."""
+    """Return True if the last step of a run that failed is among so many steps."""
     return 0 < clock.ends_at <= steps
 
 
@@ -161,7 +161,7 @@ def close_call(world: World, k: int) -> int:
 
 @rare_kernel
 def begin_steps(world: World, k: int, step: float) -> bool:
-    """Start a step of `step` (s), and fix up to which one nothing has to be looked at; tell whether the run goes on."""
+    """Start a step of `step` (s), fix up to which one nothing has to be checked, return whether the run continues."""
     share = world.shares[k]
     if share.steps >= world.clock[0].next_look:
         share.status = supervise(world, k, LOOK, step)
@@ -179,7 +179,7 @@ def begin_steps(world: World, k: int, step: float) -> bool:
 
 @rare_kernel
 def end_steps(world: World, k: int, step: float) -> bool:
-    """Look at what has to be looked at after some steps; tell whether the run goes on."""
+    """Look at what has to be looked at after some steps; return whether the run continues."""
     share = world.shares[k]
     if has_motion(world.controls[0]):
         supervise(world, k, BOOK, step)
@@ -193,7 +193,7 @@ def end_steps(world: World, k: int, step: float) -> bool:
 
 @kernel
 def goes_further(clock: Record, share: Record) -> bool:
-    """Tell whether a thread has another step to do; the last step of a run that failed may be one more than asked."""
+    """Return True if a thread has another step to do; the last step of a run that failed may be one more than asked."""
     if share.status != REACHED:
         return False
     return share.steps < share.last_step or share.is_started == 0 or share.steps + 1 == clock.ends_at

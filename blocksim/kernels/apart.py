@@ -44,7 +44,7 @@ def choose_axis(pair: Record, a: Record, b: Record, dx: float, dy: float, is_gro
 
 @kernel
 def begins_contact(world: World, p: int, a: Record, b: Record, dx: float, dy: float) -> bool:
-    """Tell whether a candidate corner that was outside the other body is inside now."""
+    """Return True if a candidate corner that was outside the other body is inside now."""
     pair = world.pairs[p]
     is_ground = pair.b == world.bodies.size - 1
     known = 0
@@ -66,7 +66,7 @@ def begins_contact(world: World, p: int, a: Record, b: Record, dx: float, dy: fl
 
 @kernel
 def is_inside(body: Record, x: float, y: float) -> bool:
-    """Tell whether a place (m, from its centre, world axes) lies inside a body."""
+    """Return True if a place (m, from its centre, world axes) lies inside a body."""
     px = body.cos * x + body.sin * y
     py = body.cos * y - body.sin * x
     return abs(px) <= body.half_x and abs(py) <= body.half_y

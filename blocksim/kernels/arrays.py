@@ -112,7 +112,7 @@ PAIR = record_type(
     flags="twins "  # bits of the slots whose corner is in touch, but marks the same end of a face contact as another
     "axis "  # along which the two were apart when last looked at; 0, 1: x, y of body b, 2, 3: of body a
     "is_between "  # flag: its bodies are of two shares
-    "normal_left shear_left "  # steps until the dashpots along normals and tangents are made anew
+    "normal_left shear_left "  # steps until the dashpots along normals and tangents are made again
     "sticking "  # bits of the points that have a dashpot along the tangent
     "slides",  # which way its only contact slides: AHEAD, where a moves ahead of b along the tangent, BACK, or not: 0
 )

@@ -20,7 +20,7 @@ PRIME_COLUMN, PRIME_ROW = 73856093, 19349663  # M. Teschner et al., Proc. VMV (2
 
 @rare_kernel
 def are_near(body: Record, other: Record, reach: float) -> bool:
-    """Tell whether two bodies, at least one of them free, may be closer than `reach` (m)."""
+    """Return True if two bodies, at least one of them free, may be closer than `reach` (m)."""
     if body.inverse_mass == 0.0 and other.inverse_mass == 0.0:
         return False
     dx = body.x - other.x
@@ -149,7 +149,7 @@ def collect_pairs(world: World) -> int:
 
 @rare_kernel
 def comes_before(one: Record, two: Record) -> bool:
-    """Tell whether a pair comes before another in the order of the list."""
+    """Return True if a pair comes before another in the order of the list."""
     return one.a < two.a or (one.a == two.a and one.b < two.b)
 
 
@@ -208,7 +208,7 @@ def idle_candidates(pair: Record) -> int:
 
 @rare_kernel
 def rebuild_pairs(world: World) -> bool:
-    """Make the pair list anew; return False, with the old list untouched, where it does not fit."""
+    """Make the pair list again; return False, with the old list untouched, where it does not fit."""
     count = collect_pairs(world)
     if count > world.spare_pairs.size:
         return False

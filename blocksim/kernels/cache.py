@@ -4,7 +4,7 @@ numba's own cache trusts its files: a flipped byte of machine code kills the pro
 a power failure, ends every run until somebody removes it. It also keeps a list of files for each function, and two
 processes that add to one at the same time may leave a list that names the code of another version. Here every version
 of a function has a file of its own, named after what it was compiled for and holding that as well. A file that is not
-whole is told of, and what it held is compiled anew and takes its place.
+whole is reported of, and what it held is compiled again and takes its place.
 """
 
 import contextlib

@@ -5,7 +5,7 @@ forces are applied, by the trapezoid rule over the drift between two evaluations
 kicks do.
 
 Here any number of points, in whatever way they were found; steady.py has the same for pairs whose one or two contacts
-go on as they were, which is what nearly all pairs do at nearly all steps.
+continue as they were, which is what nearly all pairs do at nearly all steps.
 """
 
 from blocksim.kernels.arrays import NORMAL, SHEAR, Record, World
@@ -90,7 +90,7 @@ def shared_step(a: Record, b: Record, step: float) -> float:
 
 @kernel
 def has_new_neighbours(a: Record, b: Record) -> bool:
-    """Tell whether the number of pairs on a free body has changed, so that operators made with the old one are void."""
+    """Return True if the number of pairs on a free body has changed, which makes operators of the old one void."""
     return (a.pairs_changed | b.pairs_changed) != 0
 
 
@@ -113,7 +113,7 @@ def damp(world: World, p: int, count: int, direction: int, pattern: int, ratio: 
 
 @rare_kernel
 def fill_operator(world: World, p: int, count: int, direction: int, pattern: int, ratio: float, step: float) -> None:
-    """Make the operator of one or two points anew; a weight of a first step holds for this step only."""
+    """Make the operator of one or two points again; a weight of a first step holds for this step only."""
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]

@@ -143,14 +143,14 @@ def keep_masses(operator: Record, half: float, a: float, b: float, d: float) -> 
 
 @kernel
 def renew_dashpots(pair: Record) -> None:
-    """Have all operators of a pair made anew when they are needed next."""
+    """Have all operators of a pair made again when they are needed next."""
     pair.normal_left = 0
     pair.shear_left = 0
 
 
 @kernel
 def are_dashpots_due(pair: Record, direction: int) -> bool:
-    """Tell whether an operator of a pair has to be made anew before it is used now; if not, count down."""
+    """Return True if an operator of a pair has to be made again before it is used now; if not, count down."""
     left = pair.normal_left if direction == NORMAL else pair.shear_left
     if left == 0:
         return True

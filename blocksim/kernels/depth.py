@@ -49,7 +49,7 @@ def reach_of_contacts(world: World, pair: Record) -> float:
 
 @rare_kernel
 def is_too_deep(world: World, p: int, count: int) -> bool:
-    """Tell whether pair p, whose `count` points have been found, lies too deep in one another."""
+    """Return True if pair p, whose `count` points have been found, lies too deep in one another."""
     pair = world.pairs[p]
     for i in range(count):
         if world.points[i].depth > pair.limit:

@@ -1,4 +1,4 @@
-"""Forces of all pairs of one thread's share; its bodies go on as soon as the last of their pairs is done."""
+"""Forces of all pairs of one thread's share; its bodies continue as soon as the last of their pairs is done."""
 
 from blocksim.kernels.arrays import GROUP, Record, World
 from blocksim.kernels.contact import pair_forces
@@ -32,7 +32,7 @@ def changed_forces(world: World, p: int, step: float, book: Record) -> None:
 
 @kernel
 def finish_group(world: World, first: int, end: int, step: float, goes_on: bool) -> None:
-    """Finish the step of the bodies from `first` to before `end`, and start their next one where the run goes on."""
+    """Finish the step of the bodies from `first` to before `end`, and start their next one where the run continues."""
     for i in range(first, end):
         finish_step(world.bodies[i], world.controls[0], step)
         if goes_on:
@@ -73,7 +73,7 @@ def forces_within(world: World, share: Record, step: float, goes_on: bool) -> No
     """Evaluate the pairs of a share after a drift of `step` (s), and finish the step of its bodies.
 
     A body is complete after the last pair of which it is the first body, since its pairs with bodies before come
-    earlier in the list. So the bodies of a group finish their step, and start the next where the run goes on at once,
+    earlier in the list. So the bodies of a group finish their step, and start the next where the run continues at once,
     while they are still at hand.
     """
     share.next_pair = share.first_pair

@@ -2,7 +2,7 @@
 
 A contact record keeps what a contact remembers from step to step. A contact ends when its corner leaves, or touches
 another face; what its springs hold is then lost and booked. Where two corners pass one another (blocks that become
-exactly aligned), the contact itself goes on under another corner, and its history goes with it.
+exactly aligned), the contact itself continues under another corner, and its history goes with it.
 """
 
 from blocksim.kernels.arrays import Record, Records, World
@@ -45,7 +45,7 @@ def carry_on(world: World, p: int, i: int, count: int) -> None:
 
 @rare_kernel
 def was_in_contact(slot: int, old: Records, count: int) -> bool:
-    """Tell whether a corner had a contact, on whichever face."""
+    """Return True if a corner had a contact, on whichever face."""
     for j in range(count):
         if old[j].slot == slot:
             return True
@@ -56,7 +56,7 @@ def was_in_contact(slot: int, old: Records, count: int) -> bool:
 def take_over(world: World, p: int, i: int, count: int) -> None:
     """Let the corner of point i, new and deeper than it closed, take the place of one of `count` that has ended.
 
-    Their normals must agree: then the contact goes on under another corner.
+    Their normals must agree: then the contact continues under another corner.
     """
     pair = world.pairs[p]
     point = world.points[i]
@@ -99,7 +99,7 @@ def release(world: World, p: int, old: Record, step: float, book: Record) -> Non
 
 @rare_kernel
 def change_contacts(world: World, p: int, count: int, step: float, book: Record) -> None:
-    """Take up a changed set of contacts: pass on, release, weigh first steps, have the operators made anew."""
+    """Take up a changed set of contacts: pass on, release, weigh first steps, have the operators made again."""
     pair = world.pairs[p]
     before = pair.active
     for j in range(before):

@@ -61,7 +61,7 @@ def cache_root() -> Path:
 
 
 def _is_usable(folder: Path) -> bool:
-    """Tell whether files can be kept there, and only by this user: cached code is executed."""
+    """Return True if files can be kept there, and only by this user: cached code is executed."""
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         with tempfile.TemporaryFile(dir=folder):
@@ -88,13 +88,13 @@ def cache_folder() -> Path | None:
 
 
 def is_compiled() -> bool:
-    """Tell whether a compiled time loop of this exact source lies in the cache (or nothing has to be compiled)."""
+    """Return True if a compiled time loop of this exact source lies in the cache (or nothing has to be compiled)."""
     folder = cache_folder()
     return bool(config.DISABLE_JIT) or (folder is not None and any(folder.rglob("advance.advance_in_team-*.nbc")))
 
 
 def is_marked(name: str) -> bool:
-    """Tell whether `mark` has been called with this name for this exact source."""
+    """Return True if `mark` has been called with this name for this exact source."""
     folder = cache_folder()
     return bool(config.DISABLE_JIT) or (folder is not None and (folder / name).is_file())
 
@@ -136,7 +136,7 @@ def plain_type(one: Any) -> Any:
 class _Shared(CPUDispatcher):
     """A function compiled once for all that call it.
 
-    numba would compile it anew for every constant, and every width of integer, that it is called with: nearly half of
+    numba would compile it again for every constant, and every width of integer, that it is called with: nearly half of
     all machine code.
     """
 

@@ -40,7 +40,7 @@ def resolve_point(point: Record, a: Record, b: Record, step: float) -> None:
 
 @rare_kernel
 def has_just_begun(point: Record) -> bool:
-    """Tell whether a point came into contact within the last drift: it is no deeper than it closed, to round-off."""
+    """Return True if a point came into contact within the last drift: it is no deeper than it closed, to round-off."""
     return point.closing > 0.0 and point.depth <= point.closing * (1.0 + ROUND_OFF)
 
 

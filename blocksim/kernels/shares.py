@@ -40,7 +40,7 @@ def pairs_before(world: World, body: int) -> int:
 
 @rare_kernel
 def is_between(world: World, share: Record, pair: Record) -> bool:
-    """Tell whether the second body of a pair of a share is another share's and gets a force."""
+    """Return True if the second body of a pair of a share is another share's and gets a force."""
     return pair.b >= share.last_body and world.bodies[pair.b].counts != 0
 
 

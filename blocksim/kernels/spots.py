@@ -1,4 +1,4 @@
-"""Contacts that go on: where they are, how they move, and their dashpots made anew.
+"""Contacts that continue: where they are, how they move, and their dashpots made again.
 
 Places are taken from the centre of body b, in world axes. The velocity of a point of body a against body b at a place r
 is then v + w x r with one v and one w for all points of the pair. Everything is passed by value and stays in registers.
@@ -35,7 +35,7 @@ class Motion(NamedTuple):
 
 
 class Spot(NamedTuple):
-    """One contact that goes on."""
+    """One contact that continues."""
 
     x: float  # m, from the centre of b
     y: float
@@ -50,7 +50,7 @@ class Spot(NamedTuple):
 
 @kernel
 def admits(owner: Record, corner: int, nx: float, ny: float) -> bool:
-    """Tell whether a corner of `owner` can touch a face of the outward normal (nx, ny); see models/twins.py."""
+    """Return True if a corner of `owner` can touch a face of the outward normal (nx, ny); see models/twins.py."""
     sx, sy = corner_signs(corner)
     along_x = sx * (nx * owner.cos + ny * owner.sin)
     along_y = sy * (ny * owner.cos - nx * owner.sin)
@@ -81,7 +81,7 @@ def relative_motion(a: Record, b: Record, dx: float, dy: float, time: float) -> 
 def follow(
     contact: Record, a: Record, b: Record, dx: float, dy: float, motion: Motion, step: float, turns: bool
 ) -> tuple[bool, Spot]:
-    """Look whether a contact goes on, and where and how.
+    """Check that a contact continues, and where and how.
 
     It does not where its corner has left or has passed the end of the face, where another face is nearer that it can
     touch, or will be within a few steps. Whether the corner can still touch its face at all changes by turning only,
@@ -142,7 +142,7 @@ def renew_single(
     step: float,
     stiffness: float,
 ) -> None:
-    """Make the operator of a single contact anew."""
+    """Make the operator of a single contact again."""
     arm_a, arm_b = arms(spot, a.x - b.x, a.y - b.y, direction)
     mass = a.inverse_mass + b.inverse_mass + arm_a * arm_a * a.inverse_inertia + arm_b * arm_b * b.inverse_inertia
     half = 0.5 * shared_step(a, b, step)
@@ -155,7 +155,7 @@ def renew_single(
 def renew_sliding(
     operator: Record, pair: Record, a: Record, b: Record, spot: Spot, values: Record, step: float
 ) -> None:
-    """Make the operator along the normal of a single contact that slides anew."""
+    """Make the operator along the normal of a single contact that slides again."""
     arm_a, arm_b = arms(spot, a.x - b.x, a.y - b.y, NORMAL)
     shear_a, shear_b = arms(spot, a.x - b.x, a.y - b.y, SHEAR)
     mass = a.inverse_mass + b.inverse_mass + arm_a * arm_a * a.inverse_inertia + arm_b * arm_b * b.inverse_inertia
@@ -181,7 +181,7 @@ def renew_double(
     step: float,
     stiffness: float,
 ) -> None:
-    """Make the operator of two contacts anew, of which those in `pattern` have a dashpot."""
+    """Make the operator of two contacts again, of which those in `pattern` have a dashpot."""
     dx = a.x - b.x
     dy = a.y - b.y
     one_a, one_b = arms(one, dx, dy, direction)

@@ -1,4 +1,4 @@
-"""Pairs whose contacts go on as they were: nearly all pairs at nearly all steps, so all that speed is about.
+"""Pairs whose contacts continue as they were: nearly all pairs at nearly all steps, so all that speed is about.
 
 The same forces as contact.py has, for the `surface` model with the linear law and one or two contacts. Nothing is
 searched, and nothing is written before it is certain that no contact begins, ends or changes. Where that is not so,
@@ -36,7 +36,7 @@ NOTHING = Effect(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @kernel
 def steady_forces(world: World, p: int, step: float, particles: Records | None) -> tuple[int, Effect]:
-    """Return what pair p does if its contacts go on (TOUCHING) or there are none (UNTOUCHED).
+    """Return what pair p does if its contacts continue (TOUCHING) or there are none (UNTOUCHED).
 
     Otherwise (CHANGED) nothing has been written. `step` is the length (s) of the drift that led here. Where `particles`
     is not None no pair is steady.
@@ -62,9 +62,9 @@ def steady_forces(world: World, p: int, step: float, particles: Records | None) 
 
 @kernel
 def is_unsettled(world: World, p: int, a: Record, b: Record, dx: float, dy: float) -> bool:
-    """Tell whether a new contact begins, or the contacts are of a kind that is left to contact.py.
+    """Return True if a new contact begins, or the contacts are of a kind that is left to contact.py.
 
-    Has the dashpots made anew where the number of pairs on a body has changed.
+    Has the dashpots made again where the number of pairs on a body has changed.
     """
     pair = world.pairs[p]
     if pair.twins != 0 and is_oblique(a, b):
@@ -78,7 +78,7 @@ def is_unsettled(world: World, p: int, a: Record, b: Record, dx: float, dy: floa
 
 @kernel
 def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float) -> tuple[int, Effect]:
-    """Return what a pair with one contact does, if it goes on; see steady_forces."""
+    """Return what a pair with one contact does, if it continues; see steady_forces."""
     contact = world.contacts[p, 0]
     pair = world.pairs[p]
     operator = world.operators[p, NORMAL]
@@ -145,7 +145,7 @@ def keep(contact: Record, spring: float, depth: float, normal_force: float, shea
 
 @kernel
 def double(world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float) -> tuple[int, Effect]:
-    """Return what a pair with two contacts does, if both go on; see steady_forces."""
+    """Return what a pair with two contacts does, if both continue; see steady_forces."""
     first = world.contacts[p, 0]
     second = world.contacts[p, 1]
     pair = world.pairs[p]

@@ -6,7 +6,7 @@ from blocksim.kernels.jit import kernel, rare_kernel
 
 @kernel
 def has_motion(controls: Record) -> bool:
-    """Tell whether the support moves at all."""
+    """Return True if the support moves at all."""
     return controls.motion_x != 0.0 or controls.motion_y != 0.0
 
 
@@ -79,7 +79,7 @@ def book_support(world: World, step: float) -> None:
 
 @rare_kernel
 def is_support_at_rest(world: World) -> bool:
-    """Tell whether the motion of the support is over, or there is none."""
+    """Return True if the motion of the support is over, or there is none."""
     last = world.motion[world.motion.size - 1]
     is_constant = last.c1 == 0.0 and last.c2 == 0.0 and last.c3 == 0.0
     return is_constant and world.clock[0].steps * world.controls[0].step >= last.start

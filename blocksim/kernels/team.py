@@ -16,7 +16,7 @@ from blocksim.kernels.arrays import ARRIVED, MEETINGS, TEAM_SIZE, Integers
 from blocksim.kernels.jit import kernel, rare_kernel
 
 WORD_BYTES = 8
-SPINS = 100  # looks at the number of meetings, some 2 us, before the core is offered to others
+SPINS = 100  # examines the number of meetings, some 2 us, before the core is offered to others
 IS_WINDOWS = sys.platform.startswith("win")
 HAS_PAUSE = platform.machine().lower() in ("x86_64", "amd64")
 

@@ -1,4 +1,4 @@
-"""When the pair list has to be made anew: how far bodies have come since it was made, and when to look again."""
+"""When the pair list has to be made again: how far bodies have come since it was made, and when to look again."""
 
 import math
 
@@ -16,7 +16,7 @@ MOST_UNSEEN_DRIVEN = 8  # steps, where a support moves: how fast it will, nothin
 
 @rare_kernel
 def outruns_lists(world: World) -> bool:
-    """Tell whether two bodies could meet in one step that are not listed, or a corner pass through another body.
+    """Return True if two bodies could meet in one step that are not listed, or a corner pass through another body.
 
     Steps by the rules are far shorter (world/step.py), so this happens only with forced ones, and where blocks become
     many times as fast as was to be expected.
@@ -58,7 +58,7 @@ def unseen_steps(world: World, farthest: float, fastest: float) -> int:
 
 @rare_kernel
 def look(world: World) -> bool:
-    """Make the pair list anew if a body has come too far since, and fix the step of the next look.
+    """Make the pair list again if a body has come too far since, and fix the step of the next look.
 
     Returns False where the list does not fit into its arrays; nothing has changed then.
     """

@@ -21,7 +21,7 @@ MAX_TRIED = 100
 MAX_VARIED = 100
 MODES = get_args(Mode)
 ENDS = ("from", "mean", "to")
-"""What a variation that is no list says of its values, in the order in which it is told."""
+"""What a variation that is no list says of its values, in the order in which it is reported."""
 UNVARIED = ("schema", "name", "description", "experiment", "sweep", "provenance")
 
 
@@ -152,4 +152,4 @@ def _provenance(data: Data) -> Iterator[Finding]:
         except ValueError:
             path = ()
         if isinstance(text, str) and not (path and keys.is_known(path, data)):
-            yield Finding(("provenance", key), f"{shown(key)} is no key of this scenario", at="key")
+            yield Finding(("provenance", key), f"{shown(key)} is not a key of this scenario", at="key")

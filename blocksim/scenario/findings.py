@@ -123,7 +123,7 @@ def did_you_mean_or_list(word: str, known: Iterable[object]) -> str:
     """Suggest the known word that may have been meant, or list the first known words."""
     names = [str(name) for name in known]
     listed = ", ".join(names[:MAX_LISTED]) + (", …" if len(names) > MAX_LISTED else "")
-    return did_you_mean(word, names) or (f"there is: {listed}" if names else "there is none")
+    return did_you_mean(word, names) or (f"known: {listed}" if names else "there is none")
 
 
 def similar_word(word: str, known: Iterable[str]) -> str | None:

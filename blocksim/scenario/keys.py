@@ -113,7 +113,7 @@ def field_at(path: Sequence[str | int], data: object) -> FieldInfo | None:
 
 
 def is_known(path: Sequence[str | int], data: object) -> bool:
-    """Tell whether the models have a place for this path (what has a name or number must be in `data`)."""
+    """Return True if the models have a place for this path (what has a name or number must be in `data`)."""
     named = NAMED.get(path[0], 0)
     if named and follow(data, path[:named]) is MISSING:
         return False

@@ -12,7 +12,7 @@ from pathlib import Path
 from blocksim.scenario.limited import IS_LINK
 from blocksim.scenario.quantities import shown
 
-WAY_OUT = "--allow-outside (in Python allow_outside=True) reads it all the same"
+WAY_OUT = "--allow-outside (in Python allow_outside=True) to override"
 
 _is_anywhere = ContextVar("_is_anywhere", default=False)
 _follows_links = ContextVar("_follows_links", default=True)
@@ -29,7 +29,7 @@ class OutOfReachError(ValueError):
 
 
 def is_anywhere() -> bool:
-    """Tell whether scenarios that are read now may name any file."""
+    """Return True if scenarios that are read now may name any file."""
     return _is_anywhere.get()
 
 

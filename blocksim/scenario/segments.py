@@ -194,7 +194,7 @@ def _free_end(*, is_covered: bool) -> _End:
 
 
 def _touches(point: Point, starts: Floats, ends: Floats) -> bool:
-    """Tell whether a point is on any of these walls."""
+    """Return True if a point is on any of these walls."""
     along, beyond = ends - starts, np.array(point) - starts
     share = np.clip(np.sum(beyond * along, axis=1) / np.sum(along * along, axis=1), 0.0, 1.0)
     distance = beyond - share[:, np.newaxis] * along

@@ -26,7 +26,7 @@ MAX_PARTICLES = 1_000_000
 SHORTEST_SHARE = 0.01
 """Least length of a piece of boundary, in smallest sides of the blocks."""
 LEAST_SKIN = 1e-4
-"""Least skin, in smallest sides of the blocks. Below it the list of neighbours is made anew at every step, even where
+"""Least skin, in smallest sides of the blocks. Below it the list of neighbours is made again at every step, even where
 steps are as short as with the full stiffness of a metal: at 1 m/s a block moves 1e-5 of its side in one of them, and a
 list is kept only where 0.4 skins last for a step at four times the speed."""
 ROUND_OFFS = 100

@@ -1,4 +1,4 @@
-"""One checkpoint: everything that a run needs to go on with the same bits, in one file with its checksum.
+"""One checkpoint: everything that a run needs to continue with the same bits, in one file with its checksum.
 
 The file is a line of JSON (the head), then all arrays of the scene as npy data of bytes, then the SHA-256 of all that.
 Nothing in it can be executed when it is read.
@@ -38,7 +38,7 @@ class Position(BaseModel, frozen=True):
     start_energy: float  # J, that of the ledger
     solver_seconds: float  # of wall time, in all parts so far
     total_seconds: float
-    threads: int  # that it ran on; it can go on with any number
+    threads: int  # that it ran on; it can continue with any number
     resumed_from: tuple[int, ...] = ()  # steps at which earlier parts of the run went on
 
 

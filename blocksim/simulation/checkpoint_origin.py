@@ -15,7 +15,7 @@ from blocksim.simulation.provenance import code_hashes, code_version, machine
 COMPILERS = ("numba", "llvmlite", "numpy")
 MOST_NAMED = 6  # differences in a message
 NONE = "none"
-AGAIN = "--overwrite starts anew, --out DIR keeps both"
+AGAIN = "--overwrite starts again, --out DIR keeps both"
 
 
 class Origin(BaseModel, frozen=True):
@@ -38,7 +38,7 @@ def origin_of(scenario: Scenario) -> Origin:
 
 
 def refuse_other(path: Path, old: Origin, new: Origin) -> None:
-    """Raise InvalidInputError, which names what differs, where a run would go on to other bits."""
+    """Raise InvalidInputError, which names what differs, where a run would continue to other bits."""
     refuse_other_scenario(path, old.scenario, new.scenario)
     changed = [*_changed(old.versions, new.versions)]
     if changed:

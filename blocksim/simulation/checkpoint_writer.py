@@ -32,12 +32,12 @@ class Past:
 
     seconds: float = 0.0  # of wall time
     resumed_from: tuple[int, ...] = ()
-    checkpoint: Path | None = None  # from which this part goes on
+    checkpoint: Path | None = None  # from which this part continues
     step: int | None = None  # of that checkpoint
 
     @classmethod
     def of(cls, path: Path, position: Position) -> "Past":
-        """Return the past of a run that goes on from a checkpoint."""
+        """Return the past of a run that continues from a checkpoint."""
         parts = (*position.resumed_from, position.step)
         return cls(position.total_seconds, parts, path, position.step)
 
@@ -52,7 +52,7 @@ class Keeper(Protocol):
         """Return the step after `done` at which the loop has to stop for one."""
 
     def is_due(self, done: int) -> bool:
-        """Tell whether one is to be kept now."""
+        """Return True if one is to be kept now."""
 
     def keep(self, scene: AnyScene, standing: Standing) -> None:
         """Keep one."""
@@ -95,7 +95,7 @@ class CheckpointWriter:
     past: Past = NO_PAST
 
     def __post_init__(self) -> None:
-        """Write nothing yet; the checkpoint that the run goes on from is the last one to be replaced."""
+        """Write nothing yet; the checkpoint that the run continues from is the last one to be replaced."""
         self.paths = sorted((self.folder / name for name in CHECKPOINTS), key=lambda path: path == self.past.checkpoint)
         self.last_step = self.past.step
         self.began = self.written_at = time.monotonic()

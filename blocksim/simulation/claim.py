@@ -35,7 +35,7 @@ def claimed(folder: Path) -> Iterator[None]:
         raise OutputExistsError(message) from error
     try:
         if not takes_lock(handle):
-            message = f"{folder}: a run is going on here; wait for it, or write elsewhere with --out DIR"
+            message = f"{folder}: a run is in progress here; wait for it, or write elsewhere with --out DIR"
             raise OutputExistsError(message)
         yield
     finally:

@@ -74,5 +74,5 @@ def _compile_ensemble(scenes: AnyScene) -> None:
 
 
 def is_compiled(kernels: str = SURFACE) -> bool:
-    """Tell whether a set of kernels lies in the cache (or nothing has to be compiled)."""
+    """Return True if a set of kernels lies in the cache (or nothing has to be compiled)."""
     return jit.is_compiled() if kernels == SURFACE else jit.is_marked(kernels)

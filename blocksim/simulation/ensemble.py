@@ -52,8 +52,8 @@ def run_in_batches(
     """Run scenarios as `run_ensemble` does, at most `most` at a time; yield where those of a batch ended, in order.
 
     Scenarios are taken from where they come from as they are needed, and nothing of a batch is kept. One that cannot be
-    built is a MemberFailure in its place; the others go on. No result depends on which others are in its batch. Raises
-    ValueError for less than one thread or member.
+    built is a MemberFailure in its place; the others continue. No result depends on which others are in its batch.
+    Raises ValueError for less than one thread or member.
     """
     count = os.cpu_count() or 1 if threads is None else threads
     for what, number in (("threads", count), ("members", most)):

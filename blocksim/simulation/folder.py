@@ -20,7 +20,7 @@ FINAL = "final.csv"
 FRAMES = "run.h5"
 SUMMARY = "run.json"
 DONE = "done.json"  # written last: a folder without it is not finished
-CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run goes on, removed when it has finished
+CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run continues, removed when it has finished
 OURS = (SCENARIO, EXPERIMENT, MOTION, FINAL, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
 
 MOST_BYTES = MEGABYTE  # of done.json
@@ -32,12 +32,12 @@ def default_folder(scenario: Scenario) -> Path:
 
 
 def is_finished(folder: Path) -> bool:
-    """Tell whether the folder holds a finished run."""
+    """Return True if the folder holds a finished run."""
     return (folder / DONE).is_file()
 
 
 def holds_run(folder: Path, scenario: Scenario) -> bool:
-    """Tell whether the folder holds a finished run of exactly this scenario and code."""
+    """Return True if the folder holds a finished run of exactly this scenario and code."""
     with contextlib.suppress(BlocksimError, ValueError, KeyError, TypeError, RecursionError):
         done = json.loads(read_limited(folder / DONE, MOST_BYTES))
         return bool(done["run"] == run_hash(scenario))
@@ -56,7 +56,7 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
         if present and not overwrite:
             _refuse_finished(folder)
             message = (
-                f"{folder}: a run that did not finish (stopped or failed) is there; --resume goes on with it, "
+                f"{folder}: a run that did not finish (stopped or failed) is there; --resume continues it, "
                 "--overwrite replaces it, --out DIR writes elsewhere"
             )
             raise OutputExistsError(message)
@@ -68,7 +68,7 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """Raise OutputExistsError unless a run in this folder may go on: nothing but an unfinished run is there."""
+    """Raise OutputExistsError unless a run in this folder may continue: nothing but an unfinished run is there."""
     try:
         present = {path.name for path in folder.iterdir()}
         _refuse_foreign(folder, present)

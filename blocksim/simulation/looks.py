@@ -20,5 +20,5 @@ def next_look(done: int, bodies: int) -> int:
 
 
 def adds_up(ledger: EnergyLedger) -> bool:
-    """Tell whether a run may go on; not so where the residual is no number."""
+    """Return True if a run may continue; not so where the residual is no number."""
     return ledger.relative_residual <= ends.RESIDUAL_LIMIT

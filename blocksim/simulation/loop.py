@@ -36,7 +36,7 @@ class Attendance:
     """Who looks in between two compiled calls."""
 
     on_progress: Watcher = lambda _: None
-    stop: Callable[[], str] = lambda: ""  # why to stop now; nothing as long as the run may go on
+    stop: Callable[[], str] = lambda: ""  # why to stop now; nothing as long as the run may continue
     keeper: Keeper = KEEPS_NOTHING
 
 

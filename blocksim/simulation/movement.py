@@ -89,7 +89,7 @@ def from_start_to_end(placed: Sequence[PlacedBody], final: Columns) -> tuple[Man
 
 
 class Watch:
-    """Follows the frames of a run; it looks at nothing else, and is the same wherever a run was resumed."""
+    """Follows the frames of a run; it examines nothing else, and is the same wherever a run was resumed."""
 
     def __init__(self, placed: Sequence[PlacedBody]) -> None:
         """Take the blocks; the first frame that is seen says where they begin."""

@@ -20,7 +20,7 @@ class Outcome:
 
     @property
     def is_finished(self) -> bool:
-        """Tell whether the run came to its proper end."""
+        """Return True if the run came to its proper end."""
         return self.status == "finished"
 
 
@@ -42,5 +42,5 @@ BY_CODE = {
 
 
 def interrupted(why: str) -> Outcome:
-    """Return what a run comes to that is stopped, and can go on."""
+    """Return what a run comes to that is stopped, and can continue."""
     return Outcome("interrupted", why, ExitCode.STOPPED_EARLY)

@@ -53,7 +53,7 @@ class Part:
 
     @property
     def goes_on(self) -> bool:
-        """Tell whether there is a part before this one."""
+        """Return True if there is a part before this one."""
         return self.resumption.checkpoint is not None
 
     def account(self, summary: Summary) -> Summary:

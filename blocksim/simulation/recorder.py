@@ -36,14 +36,14 @@ class Frame(NamedTuple):
 
 
 class FrameSink(Protocol):
-    """Whatever keeps frames while the run goes on, such as a file."""
+    """Whatever keeps frames while the run continues, such as a file."""
 
     def append(self, frame: Frame) -> None:
         """Keep one frame."""
 
 
 class Recorder:
-    """Frames, growing as the run goes on; with a sink only the last one, so that long runs need no more memory."""
+    """Frames, growing as the run continues; with a sink only the last one, so that long runs need no more memory."""
 
     def __init__(
         self,
@@ -78,7 +78,7 @@ class Recorder:
         return round(number * self.steps_per_frame)
 
     def is_output_time(self, step: int) -> bool:
-        """Tell whether a step is recorded wherever the run ends."""
+        """Return True if a step is recorded wherever the run ends."""
         return step == 0 or self.next_step(step - 1) == step
 
     def count_until(self, step: int) -> int:

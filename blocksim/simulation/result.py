@@ -42,7 +42,7 @@ class Result:
 
     @cached_property
     def final(self) -> "pd.DataFrame":
-        """The final table, a row a block."""
+        """The final table, one row per block."""
         return as_frame(self.columns)
 
     def to_frame(self) -> "pd.DataFrame":

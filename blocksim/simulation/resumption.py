@@ -1,4 +1,4 @@
-"""Where a run that did not finish can go on: the newest whole checkpoint in its folder, and the frames before it."""
+"""Where a run that did not finish can continue: the newest whole checkpoint in its folder, and the frames before it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from blocksim.simulation.checkpoint_origin import origin_of, refuse_other, refus
 from blocksim.simulation.recorder import Recorder, Rows, rows_of_frames
 from blocksim.simulation.stores.hdf5_reader import read_frames
 
-ANEW = "--overwrite starts anew"
+ANEW = "--overwrite starts again"
 STARTS_ANEW = "the run starts anew"
 
 
 @dataclass(frozen=True)
 class Resumption:
-    """Where a run goes on, and what its user ought to know about that."""
+    """Where a run continues, and what its user ought to know about that."""
 
     checkpoint: Stored | None = None  # None: at the start
     remarks: tuple[str, ...] = ()
@@ -31,7 +31,7 @@ NEW = Resumption()
 
 
 def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
-    """Look into a folder for where the run of a scenario can go on.
+    """Look into a folder for where the run of a scenario can continue.
 
     Raises InvalidInputError where another scenario or another version of the code has begun there, with what differs,
     or where no checkpoint is whole; OutputExistsError where the folder holds something else.

@@ -68,11 +68,11 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
 ) -> Result:
     """Run a scenario and keep everything in a folder, frames while it runs, the mark of a finished run last.
 
-    With `resume` it goes on from the newest whole checkpoint there, to the same bits as without the interruption;
-    without any it starts anew. Raises InvalidInputError for checkpoints of another scenario or version of the code,
-    OutputExistsError where the folder is not free, or another run is going on in it, and OutputError where writing
+    With `resume` it continues from the newest whole checkpoint there, to the same bits as without the interruption;
+    without any it starts again. Raises InvalidInputError for checkpoints of another scenario or version of the code,
+    OutputExistsError where the folder is not free, or another run is in progress in it, and OutputError where writing
     fails. A signal (SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1) or the limit of wall time ends it with the status
-    `interrupted`, and what there is by then is kept.
+    `interrupted`, and what was computed until then is kept.
     """
     limit = WallTime(precautions.wall_time)
     compile_kernels(kernels_of(scenario))

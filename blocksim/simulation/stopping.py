@@ -22,7 +22,7 @@ class StopRequests:
         self.is_heard = False
 
     def __call__(self) -> bool:
-        """Tell whether the user has asked to stop."""
+        """Return True if the user has asked to stop."""
         return bool(self.names)
 
     def reason(self) -> str:
@@ -85,5 +85,5 @@ def _handling(numbers: tuple[signal.Signals, ...], handler: Callable[[int, Any],
 
 
 def _gives_way(handler: Any) -> bool:
-    """Tell whether a handler is Python's own, or one that lets others take its place."""
+    """Return True if a handler is Python's own, or one that lets others take its place."""
     return handler in DEFAULT or getattr(handler, "gives_way", False)

@@ -90,7 +90,7 @@ class _Runs:
                     self.rows[place.name] = {**row, "seconds": _solver_seconds(place, row)}
                     self.on_run(labels[place], self.rows[place.name])
         except KeyboardInterrupt:
-            message = f"stopped after {len(self.rows)} runs; the same command does the others"
+            message = f"stopped after {len(self.rows)} runs; rerun the command to finish"
             raise StoppedEarlyError(message) from None
 
     def row(self, scenario: Scenario) -> Row:

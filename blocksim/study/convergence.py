@@ -3,7 +3,7 @@
 The distance between two results is the largest over all blocks of |change of x| and of |change of rotation| times half
 the diagonal, which is how far the turn moves a corner; both in mm. The observed order is Richardson's: with r the
 factor of a refinement, a change of order p shrinks by r^p, so p = log(change before / change) / log(r), taken from the
-coordinate that changes most and given only where it goes on in the same direction by less.
+coordinate that changes most and given only where it continues in the same direction by less.
 
 The outcome of a block flips between two levels where it ends turned by more than 45 degrees, farther away than its
 longest side, or higher or lower by more than half its shortest side (on another block, or on none). A distance between

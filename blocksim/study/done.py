@@ -53,7 +53,7 @@ class Done:
         state[state == ENDED_BADLY] = MISSING
 
     def holds(self, number: int, settings: dict[str, object]) -> bool:
-        """Tell whether a case has a row, and that with these values: other code may have numbered the cases anew."""
+        """Return True if a case has a row, and that with these values: other code may have numbered the cases again."""
         if self.state[number] != MISSING and self.values[number] != int(values_hash(settings), 16):
             self.forget(number)
         return bool(self.state[number] != MISSING)

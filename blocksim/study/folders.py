@@ -44,7 +44,7 @@ def _outcome(future: Future[Row]) -> Row:
     try:
         return future.result()
     except BrokenProcessPool:
-        reason = "a worker process has died (out of memory?); the same command runs this case again"
+        reason = "a worker process has died (out of memory?); rerun the command to repeat this case"
         return {"status": "failed", "reason": reason, "seconds": 0.0}
 
 
@@ -63,7 +63,7 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
 
 
 def _run_on(scenario: Scenario, folder: Path) -> Result:
-    """Run a case from where an interruption has left it; anew, where that cannot be taken up, or there was none."""
+    """Run a case from where an interruption has left it; again, where that cannot be taken up, or there was none."""
     try:
         return run(scenario, out=folder, resume=True)
     except (InvalidInputError, InputMissingError, OutputExistsError):

@@ -118,7 +118,7 @@ def _input(scenario: Scenario, head: Head, column: pd.Series) -> Input:
 
 
 def _is_even(scenario: Scenario, key: str) -> bool:
-    """Tell whether values are drawn from a distribution that is not over decades."""
+    """Return True if values are drawn from a distribution that is not over decades."""
     values = None if scenario.sweep is None else scenario.sweep.vary[key]
     return isinstance(values, Normal) or (isinstance(values, Uniform) and values.scale == "linear")
 

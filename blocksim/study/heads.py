@@ -2,7 +2,7 @@
 
 A column is a number column where every value is one, and has a unit where some value was typed with one; its head is
 then `ground.tilt [deg]`, as in a table of cases. All other values stand as they were given. Tables that were written
-before have the bare key in their heads, and are read all the same.
+before have the bare key in their heads, and are read anyway.
 """
 
 import math

@@ -46,7 +46,7 @@ def compare(
 
 
 def is_sweep(place: Path | str) -> bool:
-    """Tell whether a place is the folder of a sweep."""
+    """Return True if a place is the folder of a sweep."""
     return (Path(place) / TABLE).is_file()
 
 

@@ -63,7 +63,7 @@ class Entry:
 
 
 def _are_parts(number: Any, case: Any, values: Any, row: Any) -> bool:
-    """Tell whether a line holds what a sweep writes, in its types."""
+    """Return True if a line holds what a sweep writes, in its types."""
     is_hash = isinstance(values, str) and re.fullmatch("[0-9a-f]{1,15}", values) is not None
     return type(number) is int and isinstance(case, str) and is_hash and isinstance(row, dict)
 
@@ -120,7 +120,7 @@ class Manifest:
 
 
 def is_in_use(path: Path) -> bool:
-    """Tell whether another process appends to a manifest."""
+    """Return True if another process appends to a manifest."""
     with open_regular(path) as file:
         return not takes_lock(file.fileno())
 

@@ -1,4 +1,4 @@
-"""Many runs of one scenario with some keys varied, with one row a case in sweep.csv.
+"""Many runs of one scenario with some keys varied, with one row per case in sweep.csv.
 
 What has ended is in the manifest, so a sweep that is called again, after a kill too, does only what is missing. The
 table is written from the manifest: it depends neither on the executor nor on the order in which the cases ended.
@@ -65,9 +65,9 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     with a `scheduler`, such as tcp://host:8786); the rows are the same. With a `shard`, only its cases are run, and
     `merge` makes one table of all shards.
 
-    Cases that fail get a row with their status; the others go on, unless `fail_fast`. `retry_failed` runs them again.
-    Raises ScenarioError for a bad scenario, InvalidInputError where nothing is varied, OutputExistsError where the
-    folder is not free, UnavailableError for a scheduler that does not answer, StoppedEarlyError on Ctrl-C.
+    Cases that fail get a row with their status; the others continue, unless `fail_fast`. `retry_failed` runs them
+    again. Raises ScenarioError for a bad scenario, InvalidInputError where nothing is varied, OutputExistsError where
+    the folder is not free, UnavailableError for a scheduler that does not answer, StoppedEarlyError on Ctrl-C.
 
     A script that has processes started needs the guard `if __name__ == "__main__":`, as they import the script.
     """

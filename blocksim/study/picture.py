@@ -28,7 +28,7 @@ TORNADO = "tornado"
 
 
 def draw_convergence(result: "Convergence", scenario: Scenario, path: Path) -> bool:
-    """Draw a panel for each study with enough levels; tell whether there was one.
+    """Draw a panel for each study with enough levels; return whether there was one.
 
     Raises InvalidInputError for an unknown picture format and OutputError when the file cannot be written.
     """

@@ -30,7 +30,7 @@ class Ranges:
         return cls(measured.source, limits)
 
     def hold(self, row: Mapping[str, object]) -> bool:
-        """Tell whether everything measured is inside; a block that a case does not have is not."""
+        """Return True if everything measured is inside; a block that a case does not have is not."""
         values = ((row.get(name), lower, upper) for name, (lower, upper) in self.limits.items())
         return all(isinstance(value, float) and lower <= value <= upper for value, lower, upper in values)
 

@@ -17,7 +17,7 @@ STEP, STIFFNESS, SPACING, TOLERANCE = "step", "stiffness", "spacing", "tolerance
 STUDIES = (STEP, STIFFNESS, SPACING, TOLERANCE)
 PARTICLE_MODELS = frozenset({"particles", "kernel"})
 SOFTEST = 1e-3  # stiffness scale
-DIGITS = 6  # of a level's value, so that the value that is told gives the same run when it is set
+DIGITS = 6  # of a level's value, so that the value that is reported gives the same run when it is set
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def _possible(scenario: Scenario) -> list[Refinement]:
 
 
 def has_particles(scenario: Scenario) -> bool:
-    """Tell whether the contact model looks at the particles on the boundaries."""
+    """Return True if the contact model examines the particles on the boundaries."""
     return scenario.contact.model in PARTICLE_MODELS
 
 
@@ -109,7 +109,7 @@ def _tolerance(scenario: Scenario, time: Nonsmooth) -> Refinement:
 
 
 def _is_safe(scenario: Scenario) -> bool:
-    """Tell whether a scenario's step is admissible."""
+    """Return True if a scenario's step is admissible."""
     try:
         type(scenario.time).model_validate(scenario.time.model_dump())
         build_scene(scenario)

@@ -37,9 +37,9 @@ def run(  # noqa: PLR0913 - what a user can choose for a run
     """Simulate a scenario and return the result; with `out` it is kept in that folder as well.
 
     A folder that holds the finished run of exactly this scenario and code is read instead, unless `overwrite` is
-    given. With `resume` a run that was interrupted there goes on, to the same bits as without the interruption. The
+    given. With `resume` a run that was interrupted there continues, to the same bits as without the interruption. The
     result does not depend on the number of threads, nor on `precautions`, which say when checkpoints are written and
-    after which wall time to stop. Ctrl-C returns what there is by then, with the status `interrupted`. Raises
+    after which wall time to stop. Ctrl-C returns what was computed until then, with the status `interrupted`. Raises
     ScenarioError, InvalidInputError for an experiment table that does not go with the blocks, for more threads than the
     system has or a checkpoint of another scenario or version of the code, OutputExistsError, OutputError; ValueError
     for `resume` with `overwrite` or without `out`.

@@ -1,4 +1,4 @@
-"""A run as it lies on the disk, for pictures and tables: finished, failed, stopped, killed or still going on."""
+"""A run as it lies on the disk, for pictures and tables: finished, failed, stopped, killed or still in progress."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,7 +23,7 @@ class StoredRun:
 
     @cached_property
     def remark(self) -> str:
-        """What somebody who looks at the frames has to know; empty for a finished run."""
+        """What somebody who examines the frames has to know; empty for a finished run."""
         state = _state(self.folder)
         if not state:
             return ""
@@ -43,7 +43,7 @@ def stored_run(place: Path | str) -> StoredRun:
 def _state(folder: Path) -> str:
     """Return what is wrong with a run, in words; nothing for a finished one."""
     if not (folder / files.SUMMARY).is_file():
-        return "this run was killed or is still going on"
+        return "this run was killed or is still running"
     try:
         summary = read_summary(folder / files.SUMMARY)
     except BlocksimError:

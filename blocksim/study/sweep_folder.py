@@ -59,7 +59,7 @@ def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool) -> None
 
 
 def _keep_origin(folder: Path, base: Scenario, tables: Mapping[str, bytes]) -> None:
-    """Write sweep.json where there is none: whoever goes on with a sweep did not begin it; renew its checksums."""
+    """Write sweep.json where there is none: whoever continues with a sweep did not begin it; renew its checksums."""
     known = read_origin(folder)
     sums = {name: hashlib.sha256(content).hexdigest() for name, content in tables.items()}
     if known is None or known.sha256 != sums:

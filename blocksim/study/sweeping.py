@@ -18,7 +18,7 @@ from blocksim.study.table import SweepTable
 from blocksim.study.timings import Timings
 
 MOST_INVALID = 500  # kept in memory before they are written
-AGAIN = "the same command does the others"
+AGAIN = "rerun the command to finish"
 OnRow = Callable[[int, int, Row], None]
 
 
@@ -67,7 +67,7 @@ class Sweeping:
         return len(self.done.state[self.shard.slice])
 
     def _run(self, executor: Run, setting: Setting, *, fail_fast: bool) -> None:
-        # closed here and now: left to the garbage collector, workers would go on
+        # closed here and now: left to the garbage collector, workers would continue
         with closing(executor(self._tasks(), setting)) as batches:
             for batch in batches:
                 has_failed = self._keep_batch(batch)
@@ -90,7 +90,7 @@ class Sweeping:
                 self._keep_invalid()
 
     def _keep_batch(self, batch: Batch) -> bool:
-        """Keep rows, and tell whether one of them is of a case that failed."""
+        """Keep rows, and return whether one of them is of a case that failed."""
         ended = [
             Ended(task.number, task.name, task.settings, row) for task, row in zip(batch.tasks, batch.rows, strict=True)
         ]

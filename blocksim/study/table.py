@@ -1,4 +1,4 @@
-"""sweep.csv: a row a case, in the order of the plan, whatever the order in which the cases ended."""
+"""sweep.csv: one row per case, in the order of the plan, whatever the order in which the cases ended."""
 
 import csv
 import io
@@ -91,7 +91,7 @@ class SweepTable:
 
 @dataclass(frozen=True, repr=False)
 class SweepResult:
-    """The folder of a sweep and its table, a row a case."""
+    """The folder of a sweep and its table, one row per case."""
 
     folder: Path
     name: str = TABLE

@@ -23,7 +23,7 @@ class Range:
         return abs(value - 0.5 * (self.lower + self.upper)) / half
 
     def holds(self, value: float) -> bool:
-        """Tell whether a value is inside, ends included."""
+        """Return True if a value is inside, ends included."""
         return self.lower <= value <= self.upper
 
 
@@ -44,5 +44,5 @@ def values_at(final: Columns, ranges: Sequence[Range]) -> list[float]:
 
 
 def are_inside(values: Sequence[float], ranges: Sequence[Range]) -> bool:
-    """Tell whether all values are inside their ranges."""
+    """Return True if all values are inside their ranges."""
     return all(one.holds(value) for one, value in zip(ranges, values, strict=True))

@@ -16,7 +16,7 @@ class Timings:
     """A table that grows by a line a case: its share (s) of the wall time of the batch that it was run in."""
 
     def __init__(self, path: Path, executor: str) -> None:
-        """Begin, or go on with, a table."""
+        """Begin, or continue with, a table."""
         self.path, self.executor = path, executor
 
     def append(self, cases: Iterable[str], seconds: float, host: str) -> None:
@@ -36,7 +36,7 @@ class Timings:
             raise OutputError(message) from error
 
     def _is_whole(self) -> bool:
-        """Tell whether the last line was not torn by a kill."""
+        """Return True if the last line was not torn by a kill."""
         with self.path.open("rb") as file:
             file.seek(-1, os.SEEK_END)
             return file.read() == b"\n"

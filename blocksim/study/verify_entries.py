@@ -34,7 +34,7 @@ class EntryDifference:
 def differing_entries(folder: Path, then: Summary, now: Summary, *, same_code: bool) -> tuple[EntryDifference, ...]:
     """Return which entries of a run's folder are not those of its repetition; some of them only for the same code.
 
-    The final state and the status are not among them: they are told by themselves.
+    The final state and the status are not among them: they are reported by themselves.
     """
     whole = then.status != INTERRUPTED
     names = (*ALWAYS, *(UNLESS_INTERRUPTED if whole else ()), *(HASHES if same_code else ()))
@@ -65,7 +65,7 @@ def _apart(file: str, entry: str, stored: Any, now: Any) -> Iterator[EntryDiffer
 
 
 def _are_warnings(then: Summary, now: tuple[str, ...]) -> bool:
-    """Tell whether the warnings are those of now, after what was told when the run went on or began anew."""
+    """Return True if the warnings are those of now, after what was reported when the run went on or began again."""
     before = then.warnings[: len(then.warnings) - len(now)]
     is_allowed = bool(then.resumed_from) or all(text.endswith(STARTS_ANEW) for text in before)
     return (*before, *now) == then.warnings and is_allowed

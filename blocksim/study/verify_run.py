@@ -47,7 +47,7 @@ class RunVerdict:
 
     @cached_property
     def agrees(self) -> bool:
-        """Tell whether the folder is what its scenario gives, to the last bit."""
+        """Return True if the folder is what its scenario gives, to the last bit."""
         is_same = self.state and self.table and self.frames.is_none and self.status[0] == self.status[1]
         return is_same and not self.changed and not self.entries
 
@@ -102,7 +102,7 @@ def _changed(folder: Path, summary: Summary) -> tuple[str, ...]:
 
 
 def _read(folder: Path, changed: tuple[str, ...]) -> Result:
-    """Read what the run left; what cannot be read because it was changed is told as such."""
+    """Read what the run left; what cannot be read because it was changed is reported as such."""
     try:
         return read_result(folder)
     except InvalidInputError as error:
@@ -132,7 +132,7 @@ def origins(summary: Summary, scenario: Scenario) -> tuple[Origin, ...]:
 
 
 def tells_of_code(found: tuple[Origin, ...]) -> bool:
-    """Tell whether the code is among what is not the same: what is named by its hash then has another name."""
+    """Return True if the code is among what is not the same: what is named by its hash then has another name."""
     return any(one.name in {CODE, "blocksim"} or one.name.startswith(ROOM_PREFIX) for one in found)
 
 

@@ -56,7 +56,7 @@ class SweepVerdict:
 
     @cached_property
     def agrees(self) -> bool:
-        """Tell whether all rows that were run again have come out as they stand in the table."""
+        """Return True if all rows that were run again have come out as they stand in the table."""
         return not self.cells and all(run.agrees for run in self.runs)
 
     def to_dict(self) -> dict[str, object]:

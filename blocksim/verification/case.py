@@ -64,7 +64,7 @@ class Setting:
 
     @property
     def rigid(self) -> bool:
-        """Tell whether contacts are rigid: impulses instead of springs, Newton's restitution."""
+        """Return True if contacts are rigid: impulses instead of springs, Newton's restitution."""
         return self.scheme == "nonsmooth"
 
     @property
@@ -87,7 +87,7 @@ class Setting:
 
     @property
     def hertzian(self) -> bool:
-        """Tell whether the stiffness of a contact changes with its overlap."""
+        """Return True if the stiffness of a contact changes with its overlap."""
         return self.law == "hertz-mindlin"
 
     def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> Scene:

@@ -1,6 +1,6 @@
 """Run-outs of the three blocks that results/README.md quotes: measured, kept with their command and version.
 
-`python -m blocksim.verification.findings results/README.md` writes the table anew from results/findings.json. With
+`python -m blocksim.verification.findings results/README.md` writes the table again from results/findings.json. With
 `--measure` every run is repeated first: seconds for exact edges, some minutes for boundary particles. The tests repeat
 the quick ones and compare them with what is printed.
 """

@@ -55,7 +55,7 @@ def stacks(offset: float, share: float) -> Iterator[Sequence[Mapping[str, object
 
 
 def outcome(setting: Setting, bodies: Sequence[Mapping[str, object]]) -> bool | None:
-    """Tell whether a stack falls; None where it neither falls nor comes to a stand.
+    """Return True if a stack falls; None where it neither falls nor comes to a stand.
 
     It is loaded gently: at the limit a sudden release tips it, where contacts are soft. What a stack of three gains by
     sinking 1 micrometre, as under Hertz contacts, is thirty times what tips it at 99 % of the limit.

@@ -38,7 +38,7 @@ class Slope:
 
 
 def motion(setting: Setting, slope: Slope) -> tuple[bool, bool]:
-    """Tell whether the block slides, and whether it topples.
+    """Return True if the block slides, and whether it topples.
 
     Sliding is seen while the block has hardly turned: a block that has toppled falls on its side and slides then.
     """
@@ -103,7 +103,7 @@ def ladder(setting: Setting) -> Iterator[Row]:
 
 
 def slips(setting: Setting, friction: float) -> bool:
-    """Tell whether the ladder comes down: the wall stands at x < 0, the foot is to the right."""
+    """Return True if the ladder comes down: the wall stands at x < 0, the foot is to the right."""
     along, across = (cos(LADDER_SLOPE), sin(LADDER_SLOPE)), (sin(LADDER_SLOPE), cos(LADDER_SLOPE))
     rod = {
         "x": (LADDER * along[0] + LADDER_THICKNESS * across[0]) / 2,

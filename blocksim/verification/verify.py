@@ -20,7 +20,7 @@ class Outcome:
 
     @property
     def inside(self) -> bool:
-        """Tell whether every row is inside its tolerance."""
+        """Return True if every row is inside its tolerance."""
         return all(row.verdict == Verdict.INSIDE for row in self.rows)
 
     @property

@@ -1,4 +1,4 @@
-"""A run as a film: which frames to show when, and one picture after the other."""
+"""A run as an animation: which frames to show when, and one picture after the other."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ TRAIL: dict[str, Any] = {"linewidths": 1.0, "alpha": 0.5, "zorder": 2.5}  # belo
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast a film runs: seconds of the run in a second of film, and pictures a second."""
+    """How fast an animation runs: seconds of the run in a second of animation, and pictures a second."""
 
     speed: float = 0.25
     rate: float = 30.0
@@ -49,7 +49,7 @@ class Pace:
 
 @dataclass(frozen=True)
 class Look:
-    """How a film looks: its width in pixels, whether it has the ways of the centres (default: few blocks), forces."""
+    """How an animation looks: width in pixels, paths of the centres (default: for few blocks), forces."""
 
     width: int = 800
     trails: bool | None = None
@@ -92,12 +92,12 @@ def writer_of(path: Path) -> Writer:
     try:
         return WRITERS[path.suffix.lower()]
     except KeyError:
-        message = f"{path}: '{path.suffix}' is no film format, write {' or '.join(WRITERS)}"
+        message = f"{path}: '{path.suffix}' unsupported format; use {' or '.join(WRITERS)}"
         raise InvalidInputError(message) from None
 
 
 def timed(frames: FramesLike, drawable: Indices, pace: Pace) -> tuple[Indices, Floats]:
-    """Return which frame each picture shows and how long (s of film): even in time, the last one held.
+    """Return which frame each picture shows and how long (s of animation): even in time, the last one held.
 
     Every picture shows the frame nearest to its time. Raises InvalidInputError for more pictures than anybody wants.
     """
@@ -105,7 +105,7 @@ def timed(frames: FramesLike, drawable: Indices, pace: Pace) -> tuple[Indices, F
     length = float(recorded[-1] - recorded[0]) / pace.speed
     count = length * pace.rate
     if count > MOST_PICTURES:
-        message = f"the film would have {count:.3g} pictures, at most {MOST_PICTURES}: raise --speed or lower --fps"
+        message = f"the animation would have {count:.3g} frames, at most {MOST_PICTURES}: raise --speed or lower --fps"
         raise InvalidInputError(message)
     wanted = recorded[0] + pace.speed / pace.rate * np.arange(int(count + 1e-9) + 1)
     after = np.searchsorted(recorded, wanted).clip(max=len(recorded) - 1)

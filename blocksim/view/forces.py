@@ -1,4 +1,4 @@
-"""Contact forces as arrows: each at its contact point, on the block that it pushes up, on a scale told beside.
+"""Contact forces as arrows: each at its contact point, on the upper block, on a scale told beside.
 
 A run has few impacts and long rests, and the forces of impacts are many times larger: the scale is that of the forces
 most contacts have most of the time, and arrows beyond twice that are cut.

@@ -1,4 +1,4 @@
-"""GIF: films that every browser and every office program shows."""
+"""GIF: animations that every browser and every office program shows."""
 
 from collections.abc import Iterator
 from io import BytesIO
@@ -31,11 +31,11 @@ def write_gif(path: Path, pictures: Iterator[Pixels], seconds: NDArray[np.float6
     """
     durations = ticks(seconds)
     if durations.min() < SHORTEST:
-        message = f"{path}: a GIF shows at most {1.0 / (SHORTEST * TICK):.0f} pictures a second; lower --fps"
+        message = f"{path}: a GIF shows at most {1.0 / (SHORTEST * TICK):.0f} frames per second; lower --fps"
         raise InvalidInputError(message)
     first = next(pictures)
     if len(seconds) * first[..., 0].size > MOST_BYTES:
-        message = f"{path}: {len(seconds)} pictures are too many for a GIF; write .mp4, raise --speed or lower --width"
+        message = f"{path}: {len(seconds)} frames are too many for a GIF; write .mp4, raise --speed or lower --width"
         raise InvalidInputError(message)
     palette = Palette(first)
     buffer = BytesIO()
@@ -52,13 +52,13 @@ def write_gif(path: Path, pictures: Iterator[Pixels], seconds: NDArray[np.float6
 
 
 def ticks(seconds: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return how many hundredths of a second each picture stays, so that they add up to the length of the film."""
+    """Return how many hundredths of a second each picture stays, so that they add up to the length of the animation."""
     ends = np.round(np.cumsum(seconds) / TICK).astype(np.int64)
     return np.diff(ends, prepend=0)
 
 
 class Palette:
-    """The colours of a film: the most frequent ones of its first picture, unchanged, and shades of these.
+    """The colours of an animation: the most frequent ones of its first picture, unchanged, and shades of these.
 
     All others become the nearest.
     """

@@ -1,4 +1,4 @@
-"""MP4: small films, through the package imageio-ffmpeg or, where that is missing, the system's ffmpeg."""
+"""MP4: small animations, through the package imageio-ffmpeg or, where that is missing, the system's ffmpeg."""
 
 import shutil
 import subprocess
@@ -71,7 +71,7 @@ def _encoder() -> Encode:
 
 
 def _by_package(package: Any, path: Path, pictures: Iterator[Pixels], rate: float, count: int) -> bool:
-    """Encode pictures and tell whether all of them are in the file."""
+    """Encode pictures and return whether all of them are in the file."""
     first = next(pictures)
     size = first.shape[1], first.shape[0]
     settings = {"fps": rate, "quality": QUALITY, "macro_block_size": 2, "output_params": OPTIONS}
@@ -87,7 +87,7 @@ def _by_package(package: Any, path: Path, pictures: Iterator[Pixels], rate: floa
 
 
 def _by_program(program: str, path: Path, pictures: Iterator[Pixels], rate: float, count: int) -> bool:
-    """Encode pictures by the ffmpeg of the system and tell whether it has taken all of them and written its end."""
+    """Encode pictures by the ffmpeg of the system and return whether it has taken all of them and written its end."""
     first = next(pictures)
     size = f"{first.shape[1]}x{first.shape[0]}"
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", repr(rate), "-i", "-"]

@@ -58,7 +58,7 @@ def depth_of(rows: int) -> float:
 
 
 def room_below(extent: Extent, rows: int) -> float:
-    """Return how far the picture goes on below the lowest ground (points)."""
+    """Return how far the picture continues below the lowest ground (points)."""
     depth = depth_of(rows)
     return (depth + RULER_HEIGHT) / float(np.cos(extent.tilt)) if extent.tilt else depth
 

@@ -219,7 +219,7 @@ def scale_of(size: float, unit: str) -> tuple[float, str]:
 
 
 def is_smooth(values: Floats) -> bool:
-    """Tell whether values go up and down so little that a line through them is no invention."""
+    """Return True if values go up and down so little that a line through them is no invention."""
     spread = float(np.ptp(values))
     return spread < STAYS_MM or float(np.abs(np.diff(values)).sum()) <= WAVERING * spread
 

@@ -46,7 +46,7 @@ Entries = dict[str, Floats]
 
 
 def drawn_energies(energy: Entries, chosen: Indices) -> Entries:
-    """Return the energies (J) to draw, by what they are called: all that matter, potential from its least."""
+    """Return the energies (J) to draw, by what they are called: all that matter, potential relative to its minimum."""
     known = {entry for entries in ENERGIES.values() for entry in entries}
     groups = {**ENERGIES, **{name.replace("_", " "): (name,) for name in energy if name not in known}}
     sums = {
@@ -96,7 +96,7 @@ def draw_contacts(axes: "Axes", time: Floats, count: Floats) -> None:
 
 
 def draw_force(axes: "Axes", time: Floats, force: Floats, weight: float) -> None:
-    """Draw the force of the supports beside the weight (N); where it is cut, its largest value is told beside."""
+    """Draw the force of the supports beside the weight (N); where it is cut, its largest value is reported beside."""
     largest, reference = float(force.max(initial=0.0)), weight or float(np.median(force)) or 1.0
     factor, unit = unit_for(reference, "N")
     axes.plot(time, factor * force, color=style.INK, linewidth=0.8)

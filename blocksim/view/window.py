@@ -16,7 +16,10 @@ from blocksim.view.support import Support
 Flags = NDArray[np.bool_]
 MILLIMETRES = 1e3  # per metre
 MARGIN = 0.04  # of the larger side, around everything
-FEW_LEFT_OUT, MANY = 0.05, 20  # share of the blocks that may be left out of a film's window; number of many blocks
+FEW_LEFT_OUT, MANY = (
+    0.05,
+    20,
+)  # share of the blocks that may be left out of an animation's window; number of many blocks
 GAP, WIDE_GAP = 0.2, 1.5  # over the reach of all others: how far off a block has to be, of many and of few
 NEAR = 0.15  # of a side: what of the support is this near is shown as well; at least the largest block's diagonal
 
@@ -87,7 +90,7 @@ def extent_of(
 
 
 def together(frames: FramesLike, chosen: Indices, support: Support | None = None) -> Flags:
-    """Return True for every block that stays with the others, (b,); those that fly far off make a film's window vast.
+    """Return True for every block that stays with the others, (b,); those that fly far off would make a window vast.
 
     Far off is what leaves a gap to the reach of all others, to a side or upwards, of a fifth of their width or height;
     with few blocks, of which each matters, of one and a half times that. At most a twentieth of the blocks are left

@@ -38,7 +38,7 @@ from blocksim.world.skin import choose_skin
 from blocksim.world.stacks import Construction, Refusal, Stack, Stride, built, member, only
 from blocksim.world.step import MOST_STEPS, choose_step
 
-CHECK_INTERVAL = 1e-4  # s of simulated time between looks at rest, overlap and finiteness
+CHECK_INTERVAL = 1e-4  # s of simulated time between examines rest, overlap and finiteness
 CHEAP_CHECKS = 50  # steps between looks, from which on they cost next to nothing; where steps are long, at most for
 LONGEST_CHECK = 1e-3  # s
 LEAST_PAIRS = 16

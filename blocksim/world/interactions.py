@@ -20,7 +20,7 @@ class ContactClass(NamedTuple):
 
     @property
     def is_ground(self) -> bool:
-        """Tell whether these are the ground or walls."""
+        """Return True if these are the ground or walls."""
         return math.isinf(self.depth)
 
 

@@ -91,7 +91,7 @@ def reason_of_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> R
 def _reasons_of_sag(scenario: Scenario, bounds: Bounds) -> Iterator[Reason]:
     """Yield the step in which no contact at rest gives way too far, where light blocks carry heavy ones.
 
-    Most scenes are far from it, which is known from the weight of all; crowds take the usual step all the same.
+    Most scenes are far from it, which is known from the weight of all; crowds take the usual step anyway.
     """
     substeps, allowed = _substeps(scenario), CALM * WARNING_SHARE * bounds.smallest
     compliance = max(

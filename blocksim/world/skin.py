@@ -1,9 +1,9 @@
 """The skin of the list of neighbours: as the scenario asks, or a share of the smallest side.
 
-Bodies no farther apart than the skin are listed, and only listed ones are looked at for contacts. The list is made anew
-before two that are not in it can meet, so that a skin decides how long the list is and how often it is made, and never
-what moves where. Particles need nothing on top: those of the `particles` model lie inside of the block's edge, and
-those of the `kernel` model touch nothing before they are inside the other block, however far the kernel reaches.
+Bodies no farther apart than the skin are listed, and only listed ones are looked at for contacts. The list is made
+again before two that are not in it can meet, so that a skin decides how long the list is and how often it is made, and
+never what moves where. Particles need nothing on top: those of the `particles` model lie inside of the block's edge,
+and those of the `kernel` model touch nothing before they are inside the other block, however far the kernel reaches.
 """
 
 from blocksim.errors import InvalidInputError
@@ -12,7 +12,7 @@ from blocksim.world.bounds import Bounds
 from blocksim.world.step import expected_load
 
 # Shares of the smallest side, measured: in the surface model a body has eight corners to look at, so that a long list
-# costs less than making it anew; with particles a long list holds hundreds of them a pair.
+# costs less than making it again; with particles a long list holds hundreds of them a pair.
 SKIN_SHARE = 0.25
 SKIN_SHARE_OF_PARTICLES = 0.05
 MILLI = 1e3
@@ -45,7 +45,7 @@ def choose_skin(scenario: Scenario, bounds: Bounds, step: float) -> float:
         share = SKIN_SHARE if scenario.contact.model == "surface" else SKIN_SHARE_OF_PARTICLES
         return bounds.smallest * share
     speed = expected_load(scenario, bounds).speed
-    # a list holds for one step at least, even where it is made anew at every one
+    # a list holds for one step at least, even where it is made again at every one
     if given < nearer_in_a_step(speed, step):
         raise SkinTooSmallError(given, speed, step)
     return given

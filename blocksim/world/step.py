@@ -5,7 +5,7 @@ into another, let alone through it: at the greatest speed expected it moves by a
 and by a fifth of the skin of the list of neighbours, which is thinner with particles. Blocks whose impacts stay below
 the usual limit of overlap, a twentieth of that side as well, move by a tenth of that in a step, as an impact takes some
 thirty of them; what this bound shortens are the steps of scenes whose blocks are too fast for their springs. They end
-with exit code 76 where such blocks meet, instead of going on behind one another.
+with exit code 76 where such blocks meet, instead of in progress behind one another.
 """
 
 import math

@@ -116,7 +116,7 @@ def test_a_block_that_the_run_lacks_is_an_error() -> None:
     assert str(caught.value).splitlines()[0] == told
 
 
-def test_a_missing_repeat_is_told_beside_the_verdict(tmp_path: Path) -> None:
+def test_a_missing_repeat_is_reported_beside_the_verdict(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     path.write_text("block,quantity,unit,replicate,value\n1,x,mm,1,5\n1,x,mm,2,\n1,x,mm,3,6\n")
     comparison = compare_final(final_table(x=(5.5,), rotation=(0.0,)), load_table(path))

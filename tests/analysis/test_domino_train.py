@@ -45,8 +45,8 @@ def test_the_first_domino_falls_as_integrated() -> None:
 
 
 def test_a_plastic_strike_on_an_upright_domino_leaves_both_half_of_the_spin() -> None:
-    # edge and face meet at one height and go on together, so both get the same spin; the impulse is horizontal and has
-    # the same arm about both feet, so the sum of the spins is kept
+    # edge and face meet at one height and continue together, so both get the same spin; the impulse is horizontal and
+    # has the same arm about both feet, so the sum of the spins is kept
     assert domino_train._strike(ROW, 1, 3.0) == pytest.approx(1.5)
 
 

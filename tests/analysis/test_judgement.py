@@ -67,7 +67,7 @@ def test_settings_that_mean_nothing_are_refused(wrong: dict[str, float]) -> None
         Settings(**wrong)
 
 
-def test_blocks_that_are_not_measured_or_not_there_are_told() -> None:
+def test_blocks_that_are_not_measured_or_not_there_are_reported() -> None:
     members = members_of({("1", "x"): [1.0, nan], ("2", "x"): [1.0, 1.0]})
     found = judge(members, table_of({("1", "x"): [1, 2]}))
     assert found.messages == (
@@ -84,7 +84,7 @@ def test_one_member_and_one_repeat_are_enough_for_an_answer() -> None:
     assert found.findings["joint"].rows == ()
 
 
-def test_missing_scipy_is_told_with_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_scipy_is_reported_with_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "scipy.special", None)
     with pytest.raises(UnavailableError, match=r"blocksim\[study\]"):
         judged()

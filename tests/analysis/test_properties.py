@@ -49,14 +49,14 @@ BROKEN = {
     "unit": (
         "unit_weight,kg/m^3,26.7\n",
         (
-            "table.csv:2: unit: 'kg/m^3' is no unit of unit_weight, write for example N/m^3\n"
+            "table.csv:2: unit: 'kg/m^3' is not a unit of unit_weight, write for example N/m^3\n"
             "    2 | unit_weight,kg/m^3,26.7\n"
             "      |             ^^^^^^"
         ),
     ),
     "no unit": (
         "width,,32\n",
-        ("table.csv:2: unit: nothing is no unit of width, write for example m\n    2 | width,,32\n      |       ^"),
+        ("table.csv:2: unit: nothing is not a unit of width, write for example m\n    2 | width,,32\n      |       ^"),
     ),
     "number": (
         "width,mm,32mm\n",

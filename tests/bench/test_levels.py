@@ -1,4 +1,4 @@
-"""Settings of one collapse: which are fine enough, and what is told of them."""
+"""Settings of one collapse: which are fine enough, and what is reported of them."""
 
 import numpy as np
 

@@ -64,7 +64,7 @@ def test_the_report_is_json_without_numbers_that_json_lacks() -> None:
 
 
 @pytest.mark.parametrize(("load", "busy"), [(None, False), (0.1, False), (1.7, True)])
-def test_a_busy_machine_is_told(load: float | None, busy: bool) -> None:
+def test_a_busy_machine_is_reported(load: float | None, busy: bool) -> None:
     machine = Machine("P9", 4, "Linux", "3.12", "0.6", "2.0", "1.0", "abc", load)
     assert machine.is_busy == busy
     assert machine.to_dict()["busy"] == busy

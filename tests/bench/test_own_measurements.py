@@ -73,6 +73,6 @@ def test_starts_are_timed_in_processes_of_their_own(tmp_path: Path, monkeypatch:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_start_that_fails_is_told() -> None:
+def test_a_start_that_fails_is_reported() -> None:
     with pytest.raises(StartError, match=r"rnu: exit code 2: .*No such command 'rnu'"):
         startup._seconds(startup.MAIN, "rnu")

@@ -116,7 +116,7 @@ def test_error_is_the_distance_from_the_reference_of_the_same_start(monkeypatch:
     assert [curve.label for curve in found.panel.curves] == ["made up, a", "b"]
 
 
-def test_others_are_told_as_multiples_of_the_non_smooth_scheme_with_and_without_calls(
+def test_others_are_reported_as_multiples_of_the_non_smooth_scheme_with_and_without_calls(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Of made up engines, that are called once a second."""

@@ -26,7 +26,7 @@ def test_a_run_ends_where_the_blocks_rest() -> None:
     assert scene.run(round(2.0 / scene.step)).steps * scene.step < 0.5
 
 
-def test_a_run_that_breaks_off_is_told_and_not_timed() -> None:
+def test_a_run_that_breaks_off_is_reported_and_not_timed() -> None:
     scene = Rerun(three_blocks(contact={**SOFT, "max_overlap": 1e-6}))
     with pytest.raises(RunFailedError, match="overlap"):
         scene.run(1000)

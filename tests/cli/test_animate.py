@@ -1,4 +1,4 @@
-"""blocksim animate: films of finished and killed runs."""
+"""blocksim animate: animations of finished and killed runs."""
 
 import sys
 from pathlib import Path
@@ -11,7 +11,7 @@ from tests.cli.conftest import Command
 QUICK = ("--speed", "1", "--fps", "10", "--width", "240")
 
 
-def test_film_has_the_name_of_the_scenario_and_is_told(blocksim: Command, finished: Path) -> None:
+def test_film_has_the_name_of_the_scenario_and_is_reported(blocksim: Command, finished: Path) -> None:
     answer = blocksim("animate", finished, *QUICK)
     assert (answer.code, answer.out) == (0, "")
     assert answer.err.startswith("film: three_blocks_nominal.gif (")
@@ -26,13 +26,13 @@ def test_killed_run_is_shown_and_told(blocksim: Command, copied: Path) -> None:
     (copied / "run.json").unlink()
     answer = blocksim("animate", copied, *QUICK, "--out", "film.gif")
     assert answer.code == 0
-    assert "this run was killed or is still going on" in answer.err
+    assert "this run was killed or is still running" in answer.err
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
-        (["--out", "film.avi"], 65, "'.avi' is no film format, write .gif or .mp4"),
+        (["--out", "film.avi"], 65, "'.avi' unsupported format; use .gif or .mp4"),
         (["--out", "nix/film.gif", *QUICK], 74, "nix/film.gif: cannot be written"),
         (["--speed", "0.00001"], 65, "raise --speed or lower --fps"),
         (["--fps", "60"], 65, "a GIF shows at most 50 pictures a second"),
@@ -40,14 +40,16 @@ def test_killed_run_is_shown_and_told(blocksim: Command, copied: Path) -> None:
         (["--width", "3"], 2, "--width"),
     ],
 )
-def test_mistakes_are_told(blocksim: Command, finished: Path, arguments: list[str], code: int, told: str) -> None:
+def test_mistakes_are_reported(blocksim: Command, finished: Path, arguments: list[str], code: int, told: str) -> None:
     answer = blocksim("animate", finished, *arguments)
     assert answer.code == code
     assert told in answer.err
     assert {path.name for path in Path().iterdir()} == {"scenarios"}
 
 
-def test_missing_package_for_mp4_is_told(blocksim: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_package_for_mp4_is_reported(
+    blocksim: Command, finished: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setenv("PATH", "")
     answer = blocksim("animate", finished, "--out", "film.mp4")

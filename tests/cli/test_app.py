@@ -56,7 +56,7 @@ def test_version(blocksim: Command) -> None:
         (["schema", "x"], "unexpected extra argument"),
     ],
 )
-def test_wrong_usage_is_told_with_exit_code_2(blocksim: Command, arguments: list[str], told: str) -> None:
+def test_wrong_usage_is_reported_with_exit_code_2(blocksim: Command, arguments: list[str], told: str) -> None:
     answer = blocksim(*arguments)
     assert answer.code == 2
     assert told in answer.err

@@ -70,13 +70,13 @@ def test_a_stop_keeps_what_was_measured(blocksim: Command) -> None:
     assert len(json.loads(Path("bench.json").read_text(encoding="utf-8"))["measurements"]) == 1
 
 
-def test_an_unknown_name_is_told(blocksim: Command) -> None:
+def test_an_unknown_name_is_reported(blocksim: Command) -> None:
     answer = blocksim("bench", "fisrt")
     assert (answer.code, answer.out) == (2, "")
     assert answer.err == ("bench: NAME 'fisrt': no such measurement, did you mean 'first'? There are: first, stop\n")
 
 
-def test_a_place_that_cannot_be_written_is_told_before_anything_is_measured(blocksim: Command) -> None:
+def test_a_place_that_cannot_be_written_is_reported_before_anything_is_measured(blocksim: Command) -> None:
     for out in ("nix/bench.json", "scenarios"):
         answer = blocksim("bench", "stop", "--out", out)
         assert (answer.code, answer.out) == (74, "")

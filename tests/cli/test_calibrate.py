@@ -1,4 +1,4 @@
-"""blocksim calibrate: what it writes, tells and refuses; killed, it goes on."""
+"""blocksim calibrate: what it writes, tells and refuses; killed, it continues."""
 
 import json
 import signal
@@ -52,7 +52,7 @@ def test_friction_of_the_slide_is_found(slide: Slide, blocksim: Command) -> None
     assert "as in Table 1" in fitted.source.text  # the user's comments stay
 
 
-def test_nothing_found_is_1_and_the_nearest_is_told(slide: Slide) -> None:
+def test_nothing_found_is_1_and_the_nearest_is_reported(slide: Slide) -> None:
     few = ("--trials", 20, "--members", 4, "--fresh", 8)
     answer = slide("--fit", f"{FRICTION}=0.4:0.9", *SCATTER, *few, "--out", "fitted.toml")
     assert answer.code == 1
@@ -88,11 +88,11 @@ def test_nothing_is_overwritten_unless_asked(slide: Slide, tmp_path: Path) -> No
     before = (tmp_path / "fitted.toml").read_text()
     again = slide(*few)
     assert (again.code, again.out) == (73, "")
-    assert "fitted.toml: is there already; --overwrite replaces it" in again.err
+    assert "fitted.toml: already exists; --overwrite replaces it" in again.err
     (tmp_path / "fitted.toml").unlink()
     journal = slide(*few)
     assert journal.code == 73
-    assert "--resume goes on with them, --overwrite starts again" in journal.err
+    assert "--resume continues them, --overwrite starts again" in journal.err
     other = slide(*few, "--seed", 1, "--resume")
     assert other.code == 73
     assert "another calibration (seed differ)" in other.err
@@ -105,7 +105,7 @@ def test_nothing_is_overwritten_unless_asked(slide: Slide, tmp_path: Path) -> No
     assert (tmp_path / "fitted.trials.jsonl").read_text() == "trials in the lab, by hand"
 
 
-def test_more_trials_go_on_where_fewer_ended(slide: Slide) -> None:
+def test_more_trials_continue_where_fewer_ended(slide: Slide) -> None:
     many = (*FIT, *SCATTER, "--members", 2, "--fresh", 2)
     assert slide(*many, "--trials", 18, "--out", "one.toml").code == 0
     assert slide(*many, "--trials", 20, "--out", "other.toml").code == 0
@@ -139,7 +139,7 @@ def test_more_trials_go_on_where_fewer_ended(slide: Slide) -> None:
         ((*FIT, *SCATTER, "--trials", 0), 2, "Invalid value"),
     ],
 )
-def test_wrong_wishes_are_told_and_leave_nothing_behind(
+def test_wrong_wishes_are_reported_and_leave_nothing_behind(
     slide: Slide, tmp_path: Path, arguments: tuple[object, ...], code: int, told: str
 ) -> None:
     before = sorted(tmp_path.rglob("*"))
@@ -150,7 +150,7 @@ def test_wrong_wishes_are_told_and_leave_nothing_behind(
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_scenario_without_an_experiment_is_told(blocksim: Command) -> None:
+def test_scenario_without_an_experiment_is_reported(blocksim: Command) -> None:
     answer = blocksim("calibrate", "scenarios/slide.toml", *FIT, *SCATTER)
     assert answer.code == 66
     assert "names no experiment; give a table with --experiment" in answer.err
@@ -201,6 +201,6 @@ def test_stopped_killed_and_resumed_it_finds_the_same(slide: Slide, process: Pro
         assert not (tmp_path / "cut.toml").exists()
         if number == signal.SIGTERM:
             assert running.returncode == 75
-            assert "of 22 trials; --resume does the others" in told
+            assert "of 22 trials; --resume runs the others" in told
     assert slide(*many, "--out", "cut.toml", "--resume", "--quiet").code == 0
     assert (tmp_path / "cut.toml").read_text() == (tmp_path / "whole.toml").read_text()

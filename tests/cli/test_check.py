@@ -29,7 +29,7 @@ def test_resolved_values_can_be_loaded_again(blocksim: Command, tmp_path: Path) 
     assert blocksim("check", "again.toml", "--quiet").code == 0
 
 
-def test_blocks_of_two_depths_are_told_apart(blocksim: Command, tmp_path: Path) -> None:
+def test_blocks_of_two_depths_are_reported_apart(blocksim: Command, tmp_path: Path) -> None:
     text = (tmp_path / "scenarios" / "slide.toml").read_text()
     other = '\n[blocks.slab]\nwidth = 0.1\nheight = 0.02\nlength = 0.2\nmaterial = "aluminium"\n'
     (tmp_path / "two.toml").write_text(text + other + '[[bodies]]\nblock = "slab"\nx = 1.0\ny = 0.01\n')
@@ -70,7 +70,7 @@ def two_materials(tmp_path: Path) -> str:
     return "two.toml"
 
 
-def test_the_keys_that_decided_are_told_with_their_pairs(blocksim: Command, two_materials: str) -> None:
+def test_the_keys_that_decided_are_reported_with_their_pairs(blocksim: Command, two_materials: str) -> None:
     answer = blocksim("check", two_materials)
     told = answer.out[answer.out.index("set by") : answer.out.index("where no key")]
     assert told == TOLD.lstrip("\n")
@@ -120,14 +120,14 @@ def test_json_has_the_rule_of_every_cell(blocksim: Command, two_materials: str) 
         ("contact.model=particles", "of one contact point (the particles of a face share 2 K)"),
     ],
 )
-def test_law_and_model_are_told(blocksim: Command, setting: str, told: str) -> None:
+def test_law_and_model_are_reported(blocksim: Command, setting: str, told: str) -> None:
     assert told in blocksim("check", "scenarios/three_blocks_nominal.toml", "--set", setting).out
 
 
 SHAKEN = '[motion]\nkind = "harmonic"\namplitude = "10 mm"\nfrequency = "2 Hz"\nduration = "1.5 s"\n'
 
 
-def test_the_motion_of_the_supports_is_told(blocksim: Command, tmp_path: Path) -> None:
+def test_the_motion_of_the_supports_is_reported(blocksim: Command, tmp_path: Path) -> None:
     text = (tmp_path / "scenarios" / "slide.toml").read_text()
     (tmp_path / "shaken.toml").write_text(text.replace('end = "0.5 s"', 'end = "2 s"') + SHAKEN)
     answer = blocksim("check", "shaken.toml")
@@ -146,7 +146,7 @@ def test_json_has_masses_pairs_and_cost(blocksim: Command) -> None:
     assert data["scenario"]["contact"]["stiffness_scale"] == 1.0
 
 
-def test_step_that_is_too_large_is_told_where_it_stands(blocksim: Command, tmp_path: Path) -> None:
+def test_step_that_is_too_large_is_reported_where_it_stands(blocksim: Command, tmp_path: Path) -> None:
     text = (tmp_path / "scenarios" / "slide.toml").read_text()
     (tmp_path / "big.toml").write_text(text.replace("[time]\n", '[time]\nstep = "1 ms"\n'))
     answer = blocksim("check", "big.toml")
@@ -155,7 +155,7 @@ def test_step_that_is_too_large_is_told_where_it_stands(blocksim: Command, tmp_p
     assert '| step = "1 ms"' in answer.err
 
 
-def test_skin_is_told_as_it_follows_from_the_blocks_or_as_it_is_given(blocksim: Command) -> None:
+def test_skin_is_reported_as_it_follows_from_the_blocks_or_as_it_is_given(blocksim: Command) -> None:
     usual = blocksim("check", "scenarios/three_blocks_nominal.toml")
     assert "neighbours listed up to 8 mm apart\n" in usual.out  # a quarter of 32 mm
     given = ("check", "scenarios/three_blocks_nominal.toml", "--set", "contact.skin=0.25 mm")
@@ -163,7 +163,7 @@ def test_skin_is_told_as_it_follows_from_the_blocks_or_as_it_is_given(blocksim: 
     assert json.loads(blocksim(*given, "--json").out)["skin"] == 2.5e-4
 
 
-def test_skin_that_a_step_outruns_is_told_where_it_stands(blocksim: Command, tmp_path: Path) -> None:
+def test_skin_that_a_step_outruns_is_reported_where_it_stands(blocksim: Command, tmp_path: Path) -> None:
     text = (tmp_path / "scenarios" / "slide.toml").read_text()
     (tmp_path / "thin.toml").write_text(text.replace("[contact]\n", '[contact]\nskin = "5 um"\n'))
     assert blocksim("check", "thin.toml", "--set", "contact.stiffness_scale=1", "--quiet").code == 0
@@ -180,7 +180,7 @@ def tables_of(out: str) -> list[str]:
     return lines
 
 
-def test_a_crowd_of_blocks_is_told_by_kinds_in_80_columns(blocksim: Command, tmp_path: Path) -> None:
+def test_a_crowd_of_blocks_is_reported_by_kinds_in_80_columns(blocksim: Command, tmp_path: Path) -> None:
     text = (tmp_path / "scenarios" / "wall.toml").read_text()
     plate = '\n[blocks.plate]\nwidth = 3\nheight = 0.02\nlength = 0.1\nmaterial = "aluminium"\n'
     above = '[[bodies]]\nblock = "plate"\nx = "1 m"\ny = "2 m"\nfixed = true\n'
@@ -204,7 +204,7 @@ def test_the_rarest_of_many_kinds_are_only_counted(blocksim: Command, tmp_path: 
     assert "... and 3 more kinds" in lines
 
 
-def test_cost_is_told_in_units_that_people_read(blocksim: Command) -> None:
+def test_cost_is_reported_in_units_that_people_read(blocksim: Command) -> None:
     lines = blocksim("check", "scenarios/wall.toml", "--set", "time.end=10000", "--set", "output.every=1").out
     assert re.search(
         r"^solving    at most about [0-9.]{3,5} (h|days) on one core, less if it stops at rest$", lines, re.MULTILINE

@@ -76,7 +76,7 @@ def test_other_table_can_be_given(blocksim: Command, finished: Path, tmp_path: P
         (["copied", "--experiment", "scenarios/tower.toml"], 65, "scenarios/tower.toml:"),
     ],
 )
-def test_wrong_places_are_told(
+def test_wrong_places_are_reported(
     blocksim: Command, copied: Path, tmp_path: Path, arguments: list[str], code: int, told: str
 ) -> None:
     assert copied.is_dir()
@@ -88,7 +88,9 @@ def test_wrong_places_are_told(
 
 @pytest.mark.parametrize("name", ["run.json", "final.csv", "scenario.toml", "experiment.csv"])
 @pytest.mark.parametrize("content", [None, b"", b"rubbish", b"\x00\xff\xfe"])
-def test_damaged_run_is_told_with_its_file(blocksim: Command, copied: Path, name: str, content: bytes | None) -> None:
+def test_damaged_run_is_reported_with_its_file(
+    blocksim: Command, copied: Path, name: str, content: bytes | None
+) -> None:
     if content is None:
         (copied / name).unlink()
     else:
@@ -115,7 +117,7 @@ def test_sweep_is_judged_by_its_share_inside(blocksim: Command) -> None:
     answer = blocksim("compare", "out", "--threshold", 0.6)
     assert answer.code == 1
     last = answer.out.splitlines()[-1]
-    assert last == "1 of 2 members (50.0 %) are inside in everything; asked for: 60.0 %"
+    assert last == "1 of 2 members (50.0 %) are within all measured ranges; threshold: 60.0 %"
     assert ": failed: " in answer.out
     assert json.loads(blocksim("compare", "out", "--json").out)[0]["share_inside"] == 0.5
     assert "1 of 2 members" in blocksim("compare", "out", "--experiment", TABLE).out

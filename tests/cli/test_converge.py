@@ -99,7 +99,7 @@ def test_failing_scenario_is_76_and_draws_nothing(blocksim: Command) -> None:
         (["--set", "time.stap=1"], 65, "did you mean 'step'?"),
     ],
 )
-def test_mistakes_are_told_before_anything_runs(
+def test_mistakes_are_reported_before_anything_runs(
     blocksim: Command, arguments: list[object], code: int, told: str
 ) -> None:
     answer = blocksim(*SLIDE, *arguments)
@@ -121,4 +121,4 @@ def test_ctrl_c_ends_all_runs_with_75(process: Process, tmp_path: Path, jobs: in
     running.send_signal(signal.SIGINT)
     out, err = running.communicate(timeout=60.0)
     assert (running.returncode, out) == (75, "")
-    assert err == "stopped after 0 runs; the same command does the others\n"
+    assert err == "stopped after 0 runs; rerun the command to finish\n"

@@ -9,7 +9,7 @@ PLAN = ("sweep", "scenarios/three_blocks_nominal.toml", *SOFT, "--jobs", 2, "--d
 KINETIC = "friction.block_block.kinetic"
 
 
-def test_cost_is_told_and_nothing_written(blocksim: Command, tmp_path: Path) -> None:
+def test_cost_is_reported_and_nothing_written(blocksim: Command, tmp_path: Path) -> None:
     before = sorted(tmp_path.rglob("*"))
     answer = blocksim(*PLAN, "--vary", f"{KINETIC}=0.1:0.3:50", "--vary", "time.end=1:2:20")
     assert (answer.code, answer.err) == (0, "")
@@ -42,7 +42,7 @@ def test_models_of_particles_cost_what_was_measured(blocksim: Command) -> None:
     assert 12.0 < seconds("particles") / surface < 40.0
 
 
-def test_cases_that_cannot_be_simulated_are_told_of(blocksim: Command) -> None:
+def test_cases_that_cannot_be_simulated_are_reported_of(blocksim: Command) -> None:
     answer = blocksim(*PLAN, "--vary", f"{KINETIC}=0.2,0.9")
     assert answer.code == 0
     assert "1 of these 2 cannot be simulated; the first: " in answer.out

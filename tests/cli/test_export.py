@@ -32,17 +32,17 @@ def test_killed_run_is_exported_and_told(blocksim: Command, copied: Path) -> Non
     (copied / "run.json").unlink()
     answer = blocksim("export", copied, "--out", "frames.csv")
     assert answer.code == 0
-    assert "this run was killed or is still going on" in answer.err
+    assert "this run was killed or is still running" in answer.err
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
-        (["--format", "xlsx"], 65, "--format xlsx: no such format, choose csv or vtkhdf"),
+        (["--format", "xlsx"], 65, "--format xlsx: unsupported format; use csv or vtkhdf"),
         (["--out", "nix/frames.csv"], 74, "nix/frames.csv: cannot be written"),
     ],
 )
-def test_mistakes_are_told(blocksim: Command, finished: Path, arguments: list[str], code: int, told: str) -> None:
+def test_mistakes_are_reported(blocksim: Command, finished: Path, arguments: list[str], code: int, told: str) -> None:
     answer = blocksim("export", finished, *arguments)
     assert answer.code == code
     assert told in answer.err
@@ -58,7 +58,7 @@ def test_files_of_the_run_are_not_replaced(blocksim: Command, copied: Path) -> N
 
 
 @pytest.mark.parametrize("content", [None, b"", b"rubbish" * 100])
-def test_damaged_frames_are_told(blocksim: Command, copied: Path, content: bytes | None) -> None:
+def test_damaged_frames_are_reported(blocksim: Command, copied: Path, content: bytes | None) -> None:
     (copied / "run.h5").unlink()
     if content is not None:
         (copied / "run.h5").write_bytes(content)

@@ -43,7 +43,7 @@ def test_error_becomes_a_line_and_its_exit_code(
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
-def test_shortage_that_a_library_wraps_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_shortage_that_a_library_wraps_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     error = RuntimeError("cannot compile")
     error.__cause__ = MemoryError()
     assert exit_code_of(error) == ExitCode.INPUT_OUTPUT
@@ -55,7 +55,7 @@ def test_error_that_is_no_shortage_stays_what_it_is() -> None:
         raise ZeroDivisionError
 
 
-def test_current_folder_that_is_gone_is_told(
+def test_current_folder_that_is_gone_is_reported(
     blocksim: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "gone").mkdir()
@@ -89,7 +89,7 @@ def test_internal_error_on_a_full_disk_is_still_told(
     "arguments",
     [("export", LONG), ("report", LONG), ("compare", LONG), ("plot", LONG), ("animate", LONG), ("check", LONG)],
 )
-def test_names_that_are_too_long_are_told_in_a_line(blocksim: Command, arguments: tuple[str, ...]) -> None:
+def test_names_that_are_too_long_are_reported_in_a_line(blocksim: Command, arguments: tuple[str, ...]) -> None:
     answer = blocksim(*arguments)
     assert answer.code in {66, 74}
     assert "File name too long" in answer.err

@@ -74,7 +74,7 @@ def test_a_pipe_is_refused_and_not_waited_for(blocksim: Command, finished: Path,
     assert answer.out == ""
 
 
-def test_a_pipe_of_the_shell_is_told_how_to_be_read(blocksim: Command) -> None:
+def test_a_pipe_of_the_shell_is_reported_how_to_be_read(blocksim: Command) -> None:
     reading, writing = os.pipe()
     os.write(writing, b"schema = 1\n")
     answer = blocksim("check", f"/dev/fd/{reading}")

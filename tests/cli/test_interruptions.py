@@ -1,4 +1,4 @@
-"""Runs that are killed, stopped, or run out of disk, as real processes; and how they go on."""
+"""Runs that are killed, stopped, or run out of disk, as real processes; and how they continue."""
 
 import json
 import shutil
@@ -53,7 +53,7 @@ def assert_same(folder: Path, whole: Path) -> None:
 
 
 def kill_again_and_again(process: Process, folder: Path, kills: int, most: float) -> int:
-    """Kill a run that goes on and on; look at its folder each time; return how many times it was killed."""
+    """Kill a run that continues and on; look at its folder each time; return how many times it was killed."""
     moments = np.random.default_rng(kills)
     killed = 0
     while killed < kills and not (folder / "done.json").exists():
@@ -91,7 +91,7 @@ def frames_in(folder: Path) -> int:
 
 
 @pytest.mark.long
-def test_killed_run_goes_on_to_the_same_bits(process: Process, tmp_path: Path, whole: Path) -> None:
+def test_killed_run_continues_to_the_same_bits(process: Process, tmp_path: Path, whole: Path) -> None:
     folder = tmp_path / "out"
     assert kill_again_and_again(process, folder, 3, 1.2) >= 1
     running = process(*LONG, "--out", "out", "--resume")
@@ -119,7 +119,7 @@ def test_hundred_kills_lose_nothing(process: Process, tmp_path: Path, whole: Pat
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, *OTHERS])
-def test_stopped_run_goes_on_to_the_same_bits(
+def test_stopped_run_continues_to_the_same_bits(
     process: Process, tmp_path: Path, whole: Path, number: signal.Signals
 ) -> None:
     running = process(*LONG, "--out", "out")
@@ -131,7 +131,7 @@ def test_stopped_run_goes_on_to_the_same_bits(
     assert time.monotonic() - sent < 10.0
     assert running.returncode == 75
     assert f"stopped by {number.name}" in err
-    assert "go on with --resume (checkpoint at step " in err
+    assert "continue with --resume (checkpoint at step " in err
     step = told(tmp_path / "out")["steps"]
     running = process(*LONG, "--out", "out", "--resume")
     running.communicate(timeout=PATIENCE)
@@ -155,7 +155,7 @@ def test_second_signal_stops_while_a_checkpoint_is_being_written(process: Proces
     assert committed(tmp_path / "out" / "run.h5") > 0
 
 
-def test_wall_time_stops_and_resume_tells_where_it_goes_on(blocksim: Command, tmp_path: Path, whole: Path) -> None:
+def test_wall_time_stops_and_resume_tells_where_it_continues(blocksim: Command, tmp_path: Path, whole: Path) -> None:
     stopped = blocksim(*LONG, "--out", "out", "--wall-time", "0.3 s")
     assert stopped.code == 75
     assert "interrupted: wall-time limit of 0.3 s reached" in stopped.err
@@ -166,20 +166,20 @@ def test_wall_time_stops_and_resume_tells_where_it_goes_on(blocksim: Command, tm
     assert again.err.startswith(f"goes on at step {step}, ")
     assert_same(tmp_path / "out", whole)
     shown = blocksim(*LONG[:-1], "--out", "out", "--resume")
-    assert shown.err.startswith("already there, --overwrite repeats it")
+    assert shown.err.startswith("already computed; rerun with --overwrite")
 
 
-def test_run_of_other_code_or_values_that_waits_is_told(blocksim: Command) -> None:
+def test_run_of_other_code_or_values_that_waits_is_reported(blocksim: Command) -> None:
     stopped = blocksim(*LONG, "--wall-time", "0.2 s")
     assert stopped.code == 75
     other = ("run", NOMINAL, *SOFT, "--set", "time.end=0.01")
     answer = blocksim(*other, "--resume")
     assert answer.code == 0
-    assert "a run of another scenario or version of the code waits in results/three_blocks_nominal/" in answer.err
+    assert "an unfinished run of another scenario or code version is in results/three_blocks_nominal/" in answer.err
 
 
 @pytest.mark.parametrize("executor", ["ensemble", "processes"])
-def test_sweep_around_a_case_that_blows_up_goes_on(blocksim: Command, tmp_path: Path, executor: str) -> None:
+def test_sweep_around_a_case_that_blows_up_continues(blocksim: Command, tmp_path: Path, executor: str) -> None:
     forced = ("--set", "time.force_step=true", "--set", "contact.max_overlap=1", "--vary", "time.step=1e-6,5e-4,2e-6")
     shorter = ("--set", "time.end=0.01", "--jobs", "1", "--executor", executor)
     answer = blocksim("sweep", NOMINAL, *SOFT, *forced, *shorter, "--out", "out")
@@ -207,7 +207,7 @@ def test_mistakes_of_usage_are_2(blocksim: Command, tmp_path: Path, arguments: l
     assert not (tmp_path / "results").exists()
 
 
-def test_results_that_cannot_fit_are_told_before_the_start(blocksim: Command, tmp_path: Path) -> None:
+def test_results_that_cannot_fit_are_reported_before_the_start(blocksim: Command, tmp_path: Path) -> None:
     answer = blocksim("run", NOMINAL, "--set", "output.every=1e-9", "--set", "time.end=1e6", "--out", "out")
     assert answer.code == 74
     assert "out: the results may take " in answer.err

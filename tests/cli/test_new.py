@@ -69,7 +69,7 @@ def test_a_file_that_is_there_stays_as_it_is(blocksim: Command) -> None:
     Path("mine.toml").write_text("precious")
     answer = blocksim("new", "stack", "mine.toml")
     assert (answer.code, answer.out) == (73, "")
-    assert answer.err == "mine.toml: is there already; choose another name\n"
+    assert answer.err == "mine.toml: already exists; choose another name\n"
     assert Path("mine.toml").read_text() == "precious"
 
 
@@ -83,7 +83,7 @@ def test_a_file_that_is_there_stays_as_it_is(blocksim: Command) -> None:
         (("stack", "no/where"), 73, "no/where.toml: cannot be created: No such file or directory"),
     ],
 )
-def test_wrong_arguments_are_told(
+def test_wrong_arguments_are_reported(
     blocksim: Command, tmp_path: Path, arguments: tuple[str, str], code: int, told: str
 ) -> None:
     before = sorted(tmp_path.rglob("*"))

@@ -47,7 +47,7 @@ def test_notes_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> No
     assert capsys.readouterr().err == "0.1:x:3 [bold] é\n"
 
 
-def test_compiled_solver_that_cannot_be_kept_is_told(
+def test_compiled_solver_that_cannot_be_kept_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(compiling, "is_compiled", lambda _: False)

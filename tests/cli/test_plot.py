@@ -67,7 +67,7 @@ def test_killed_run_is_drawn_and_told(blocksim: Command, copied: Path) -> None:
         (copied / name).unlink()
     answer = blocksim("plot", copied, "--kind", "final")
     assert answer.code == 0
-    assert f"{copied}: this run was killed or is still going on; its " in answer.err
+    assert f"{copied}: this run was killed or is still running; its " in answer.err
 
 
 def test_failed_run_can_be_drawn(blocksim: Command) -> None:
@@ -110,7 +110,7 @@ def test_the_folder_alone_tells_what_the_blocks_stand_on(blocksim: Command) -> N
         (["--experiment", "nix.csv"], 66, "nix.csv: no such file"),
     ],
 )
-def test_mistakes_are_told(blocksim: Command, finished: Path, arguments: list[str], code: int, told: str) -> None:
+def test_mistakes_are_reported(blocksim: Command, finished: Path, arguments: list[str], code: int, told: str) -> None:
     answer = blocksim("plot", finished, *arguments)
     assert answer.code == code
     assert told in answer.err
@@ -118,7 +118,7 @@ def test_mistakes_are_told(blocksim: Command, finished: Path, arguments: list[st
 
 
 @pytest.mark.parametrize("content", [None, b"", b"rubbish" * 100])
-def test_damaged_frames_are_told(blocksim: Command, copied: Path, content: bytes | None) -> None:
+def test_damaged_frames_are_reported(blocksim: Command, copied: Path, content: bytes | None) -> None:
     (copied / "run.h5").unlink()
     if content is not None:
         (copied / "run.h5").write_bytes(content)
@@ -164,7 +164,7 @@ def test_sweep_gets_the_picture_that_is_asked_for(blocksim: Command) -> None:
         (["--times", "0,0.01"], "--at picks frames of a run's strip or final picture, but swept is a sweep"),
     ],
 )
-def test_sweep_that_cannot_be_drawn_is_told(blocksim: Command, arguments: list[str], told: str) -> None:
+def test_sweep_that_cannot_be_drawn_is_reported(blocksim: Command, arguments: list[str], told: str) -> None:
     vary = [part for key in ("gravity", "time.rest_speed", "time.rest_hold") for part in ("--vary", f"{key}=1,2")]
     assert blocksim(*SWEEP, *vary).code == 0
     answer = blocksim("plot", "swept", *arguments)

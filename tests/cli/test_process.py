@@ -38,7 +38,7 @@ def test_stopped_run_is_75_and_keeps_its_frames(process: Process, tmp_path: Path
     out, err = running.communicate(timeout=PATIENCE)
     assert running.returncode == 75
     assert "Traceback" not in out + err
-    assert f"interrupted: stopped by {number.name}; what there is by then is kept in out\ngo on with --resume" in err
+    assert f"interrupted: stopped by {number.name}; partial results are in out\ncontinue with --resume" in err
     assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "interrupted"
     assert not (tmp_path / "out" / "done.json").exists()
     frames = read_frames(tmp_path / "out" / "run.h5", load_scenario(tmp_path / "out" / "scenario.toml"))
@@ -151,7 +151,7 @@ def test_stopped_sweep_is_75_and_ends_its_workers(process: Process, tmp_path: Pa
     os.killpg(running.pid, signal.SIGHUP)  # to all, as when a terminal is lost
     _, err = running.communicate(timeout=PATIENCE)  # returns when the workers, too, have let go of the pipes
     assert running.returncode == 75
-    assert err == "stopped with 1 of 3 cases done; the same command does the others\n"
+    assert err == "stopped with 1 of 3 cases done; rerun the command to finish\n"
     assert (tmp_path / "out" / "sweep.csv").read_text().count("\n") == 2
 
 

@@ -157,7 +157,7 @@ def test_run_that_was_killed_is_played_as_far_as_it_came(blocksim: Command, tmp_
         (["broken"], 65, "no columns case and status"),
     ],
 )
-def test_mistakes_are_told(blocksim: Command, tmp_path: Path, arguments: list[str], code: int, told: str) -> None:
+def test_mistakes_are_reported(blocksim: Command, tmp_path: Path, arguments: list[str], code: int, told: str) -> None:
     write_run(tmp_path / "run", count=3)
     (tmp_path / "empty").mkdir()
     (tmp_path / "empty" / "run.h5").write_bytes(b"")

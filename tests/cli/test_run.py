@@ -35,7 +35,7 @@ def test_finished_run_is_shown_again(blocksim: Command) -> None:
     first, second = blocksim(*RUN), blocksim(*RUN)
     assert second.code == 0
     assert second.out == first.out
-    assert second.err.startswith("already there, --overwrite repeats it: results/three_blocks_nominal/")
+    assert second.err.startswith("already computed; rerun with --overwrite: results/three_blocks_nominal/")
     assert "already there" not in blocksim(*RUN, "--overwrite").err
 
 
@@ -56,14 +56,14 @@ def test_json_is_all_there_is(blocksim: Command) -> None:
         assert Path(data["folder"], "done.json").is_file()
 
 
-def test_failed_run_is_told_kept_and_76(blocksim: Command) -> None:
+def test_failed_run_is_reported_kept_and_76(blocksim: Command) -> None:
     for flag in ("--quiet", "--json"):
         answer = blocksim(*RUN, "--set", "contact.max_overlap=1e-9", "--out", "out", "--overwrite", flag)
         assert answer.code == 76
         assert re.fullmatch(
             r"three_blocks_nominal: failed: an overlap exceeds contact\.max_overlap "
             r"\(block \d and (block \d|the ground) by [\d.e-]+ mm, step \d+\); "
-            r"what there is by then is kept in out\nno checkpoint was written by then\n",
+            r"partial results are in out\nno checkpoint saved\n",
             answer.err,
         )
     assert json.loads(Path("out/run.json").read_text())["status"] == "failed"
@@ -87,7 +87,7 @@ def test_failed_run_is_told_kept_and_76(blocksim: Command) -> None:
         ([*RUN, "--out", "foreign", "--overwrite"], 73, "holds files that are not a blocksim run (thesis.tex)"),
     ],
 )
-def test_mistakes_are_told_and_leave_nothing_behind(
+def test_mistakes_are_reported_and_leave_nothing_behind(
     blocksim: Command, tmp_path: Path, arguments: list[str], code: int, told: str
 ) -> None:
     (tmp_path / "broken.toml").write_text("schema = 2\n")
@@ -101,7 +101,7 @@ def test_mistakes_are_told_and_leave_nothing_behind(
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_experiment_of_other_blocks_is_told_before_the_run(blocksim: Command, tmp_path: Path) -> None:
+def test_experiment_of_other_blocks_is_reported_before_the_run(blocksim: Command, tmp_path: Path) -> None:
     shutil.copytree(SCENARIOS, tmp_path / "mine")
     table = tmp_path / "mine" / "experiments" / "three_blocks.csv"
     table.write_text(table.read_text().replace("\n3,", "\n4,"))
@@ -119,7 +119,7 @@ def test_damaged_copy_of_the_scenario_is_written_anew(blocksim: Command, copied:
 
 
 @pytest.mark.parametrize("name", ["run.json", "final.csv", "run.h5"])
-def test_damaged_finished_run_is_told_and_can_be_repeated(blocksim: Command, copied: Path, name: str) -> None:
+def test_damaged_finished_run_is_reported_and_can_be_repeated(blocksim: Command, copied: Path, name: str) -> None:
     whole = (copied / name).read_bytes()
     (copied / name).write_bytes(whole[: min(5000, len(whole) // 2)])
     answer = blocksim(*RUN, "--out", copied)
@@ -156,7 +156,7 @@ def test_experiment_taken_out_of_the_scenario_is_compared_no_more(blocksim: Comm
     "setting",
     ["time.end=1e30", "time.step=1e-18", "contact.stiffness_scale=1e30", "time.safety=1e-18"],
 )
-def test_steps_that_cannot_be_counted_are_told(blocksim: Command, setting: str) -> None:
+def test_steps_that_cannot_be_counted_are_reported(blocksim: Command, setting: str) -> None:
     answer = blocksim("check", "scenarios/three_blocks.toml", "--set", setting)
     assert answer.code == 65
     assert "cannot be divided into steps" in answer.err
@@ -226,11 +226,11 @@ def test_folder_of_a_run_that_is_going_on_is_left_alone(
     with claimed(tmp_path / "out"):
         answer = blocksim("run", "scenarios/three_blocks_nominal.toml", *SOFT, "--out", "out", *how)
     assert answer.code == 73
-    assert answer.err == "out: a run is going on here; wait for it, or write elsewhere with --out DIR\n"
+    assert answer.err == "out: a run is in progress here; wait for it, or write elsewhere with --out DIR\n"
     assert not any((tmp_path / "out").iterdir())
 
 
-def test_largest_movement_outcome_and_first_mover_are_told(blocksim: Command) -> None:
+def test_largest_movement_outcome_and_first_mover_are_reported(blocksim: Command) -> None:
     answer = blocksim("run", "scenarios/slide.toml", *SOFT, "--out", "slid")
     assert "slid: largest displacement 33." in answer.err
     assert "(block block); first moved: block block by 0.001 s" in answer.err  # 0.5 m/s past a hundredth of 25 mm

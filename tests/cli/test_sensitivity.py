@@ -66,7 +66,7 @@ def test_distributions_of_the_scenario_are_the_default(blocksim: Command, tmp_pa
         ((*VARY, "--method", "fast"), 2, "Invalid value"),
     ],
 )
-def test_wrong_wishes_are_told_and_leave_nothing_behind(
+def test_wrong_wishes_are_reported_and_leave_nothing_behind(
     blocksim: Command, tmp_path: Path, arguments: tuple[object, ...], code: int, told: str
 ) -> None:
     before = sorted(tmp_path.rglob("*"))

@@ -70,7 +70,7 @@ def test_json_and_quiet_tell_nothing_else(blocksim: Command) -> None:
     assert (quiet.code, quiet.err, len(quiet.out.splitlines())) == (77, "", 4)
 
 
-def test_failed_case_is_77_and_its_reason_is_told(blocksim: Command) -> None:
+def test_failed_case_is_77_and_its_reason_is_reported(blocksim: Command) -> None:
     answer = blocksim(*SHORT, "--vary", "contact.max_overlap=1e-3,1e-9")
     assert answer.code == 77
     assert "1 of 2 cases did not finish; the first: an overlap exceeds contact.max_overlap" in answer.err
@@ -114,7 +114,7 @@ def test_wrong_variation_is_65_and_leaves_nothing_behind(
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_nothing_to_vary_is_told(blocksim: Command) -> None:
+def test_nothing_to_vary_is_reported(blocksim: Command) -> None:
     answer = blocksim(*SHORT)
     assert answer.code == 65
     assert "nothing to vary: give --vary KEY=VALUES" in answer.err
@@ -144,7 +144,7 @@ def test_short_keys_are_the_shortest_ends_that_differ() -> None:
     ]
 
 
-def test_key_given_twice_is_told(blocksim: Command) -> None:
+def test_key_given_twice_is_reported(blocksim: Command) -> None:
     answer = blocksim(*SHORT, "--vary", "gravity=1,2", "--vary", "gravity=3,4")
     assert answer.code == 65
     assert answer.err == "--vary gravity: given twice; list all its values once\n"
@@ -158,7 +158,7 @@ def test_failures_are_listed_up_to_a_few(blocksim: Command) -> None:
     assert "  and 3 more; --retry-failed runs them again" in answer.err
 
 
-def test_many_cases_are_told_in_few_lines(blocksim: Command) -> None:
+def test_many_cases_are_reported_in_few_lines(blocksim: Command) -> None:
     answer = blocksim(*RIGID, "--vary", f"{KINETIC}=0.1:0.3:60")
     assert answer.code == 0
     assert "60/60 cases, " in answer.err
@@ -190,7 +190,7 @@ def test_shards_are_merged_and_missing_ones_named(blocksim: Command) -> None:
         (("--jobs", "0"), 2, "--jobs"),
     ],
 )
-def test_options_that_do_not_go_together_are_told(
+def test_options_that_do_not_go_together_are_reported(
     blocksim: Command, tmp_path: Path, options: tuple[str, ...], code: int, told: str
 ) -> None:
     before = sorted(tmp_path.rglob("*"))
@@ -222,7 +222,7 @@ def test_samples_from_the_command_line(blocksim: Command) -> None:
     ]
 
 
-def test_mistakes_in_sampling_options_are_told_together(blocksim: Command) -> None:
+def test_mistakes_in_sampling_options_are_reported_together(blocksim: Command) -> None:
     answer = blocksim(*SHORT, *SAMPLED, "--vary", "time.end=1 s+-1 mm", "--samples", 0, "--seed", -1)
     assert (answer.code, answer.out) == (65, "")
     assert "--samples: 0 is not a whole number from 1 to 1000000" in answer.err

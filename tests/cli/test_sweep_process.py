@@ -1,4 +1,4 @@
-"""A sweep that is killed goes on where it was; a sweep that is stopped stops at once."""
+"""A sweep that is killed continues where it was; a sweep that is stopped stops at once."""
 
 import json
 import random
@@ -36,7 +36,7 @@ def finish(running: Running) -> None:
 
 
 def check_kills(start: Sweep, folder: Path, count: int, shares: Iterable[float], *options: object) -> None:
-    """Kill a sweep at moments given as shares of its duration; go on, and compare with the one that was left alone."""
+    """Kill a sweep at moments given as shares of its duration; resume, and compare with the one left alone."""
     began = time.monotonic()
     finish(start("whole", count))
     duration = time.monotonic() - began
@@ -56,12 +56,12 @@ def check_kills(start: Sweep, folder: Path, count: int, shares: Iterable[float],
 
 
 @pytest.mark.long
-def test_killed_sweep_goes_on_to_the_same_table(start: Sweep, tmp_path: Path) -> None:
+def test_killed_sweep_continues_to_the_same_table(start: Sweep, tmp_path: Path) -> None:
     check_kills(start, tmp_path, 150, (0.6, 0.9))
 
 
 @pytest.mark.long
-def test_sweep_killed_at_20_moments_goes_on_to_the_same_table(start: Sweep, tmp_path: Path) -> None:
+def test_sweep_killed_at_20_moments_continues_to_the_same_table(start: Sweep, tmp_path: Path) -> None:
     moments = random.Random(6)  # noqa: S311 - no secret
     check_kills(start, tmp_path, 500, [moments.random() for _ in range(in_all(20))])
 
@@ -82,7 +82,7 @@ def test_endless_case_is_given_up_at_once(process: Process, tmp_path: Path, numb
     _, err = running.communicate(timeout=PATIENCE)
     assert time.monotonic() - began < 5.0  # most of it is waiting for a busy machine
     assert running.returncode == 75
-    assert err == "stopped with 0 of 2 cases done; the same command does the others\n"
+    assert err == "stopped with 0 of 2 cases done; rerun the command to finish\n"
     assert (tmp_path / "out" / "sweep.csv").read_text().count("\n") == 1
 
 
@@ -125,7 +125,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.long
-def test_scheduler_that_dies_in_the_middle_is_told_in_one_line(start: Sweep, tmp_path: Path) -> None:
+def test_scheduler_that_dies_in_the_middle_is_reported_in_one_line(start: Sweep, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     script = tmp_path / "cluster.py"
     script.write_text(CLUSTER)
@@ -138,7 +138,7 @@ def test_scheduler_that_dies_in_the_middle_is_told_in_one_line(start: Sweep, tmp
         wait_for(tmp_path / "swept" / "timings.csv", running)  # written after the first rows
         cluster.kill()
         _, err = running.communicate(timeout=PATIENCE)
-    assert err == f"the Dask scheduler at {address} has gone; the same command does the other cases\n"
+    assert err == f"the Dask scheduler at {address} has gone; rerun the command to finish\n"
     assert running.returncode == 69
     assert 0 < len(list(read_entries(tmp_path / "swept" / "manifest.jsonl"))) < 20_000
     assert (tmp_path / "swept" / "sweep.csv").exists()

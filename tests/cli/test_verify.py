@@ -87,7 +87,7 @@ def test_a_stop_keeps_what_was_measured(blocksim: Command, monkeypatch: pytest.M
     assert "stopped" in answer.err
 
 
-def test_an_unknown_case_is_told(blocksim: Command) -> None:
+def test_an_unknown_case_is_reported(blocksim: Command) -> None:
     answer = blocksim("verify", "V2", "V99")
     assert answer.code == 65
     assert answer.err == "V99: no such case; there are V1 to V24\n"

@@ -111,7 +111,7 @@ def test_other_scenario_is_found_though_its_checksum_fits(blocksim: Command, cop
     assert "since then scenario: " in answer.out
 
 
-def test_first_difference_is_told_with_frame_block_and_quantity(blocksim: Command, copied: Path) -> None:
+def test_first_difference_is_reported_with_frame_block_and_quantity(blocksim: Command, copied: Path) -> None:
     with h5py.File(copied / "run.h5", "r+") as file:
         x = file["particles/blocks/x"]
         time = file["particles/blocks/time"][7]
@@ -159,7 +159,7 @@ def test_every_changed_entry_of_the_summary_is_named(blocksim: Command, copied: 
     }
 
 
-def test_changed_entry_is_told_with_its_file_and_both_values(blocksim: Command, copied: Path) -> None:
+def test_changed_entry_is_reported_with_its_file_and_both_values(blocksim: Command, copied: Path) -> None:
     steps = json.loads((copied / "run.json").read_text())["steps"]
     altered(copied, "run.json", f'"steps": {steps}', f'"steps": {steps + 1}')
     answer = blocksim("verify-run", copied)
@@ -167,7 +167,7 @@ def test_changed_entry_is_told_with_its_file_and_both_values(blocksim: Command, 
     assert f"  run.json: steps: {steps + 1} stored, {steps} now\n" in answer.out
 
 
-def test_other_versions_and_processors_are_told(blocksim: Command, copied: Path) -> None:
+def test_other_versions_and_processors_are_reported(blocksim: Command, copied: Path) -> None:
     told = json.loads((copied / "run.json").read_text())
     told["environment"] |= {"numba": "0.1", "code_kernels": "old", "cpu_features": "avx9"}
     told["final_state_sha256"] = "other"
@@ -180,7 +180,7 @@ def test_other_versions_and_processors_are_told(blocksim: Command, copied: Path)
     assert "command" not in answer.out
 
 
-def test_same_bits_in_spite_of_another_version_are_told_beside(blocksim: Command, copied: Path) -> None:
+def test_same_bits_in_spite_of_another_version_are_reported_beside(blocksim: Command, copied: Path) -> None:
     altered(copied, "run.json", '"numba": "', '"numba": "0.')
     answer = blocksim("verify-run", copied)
     assert (answer.code, answer.out.count("\n")) == (0, 1)
@@ -188,7 +188,7 @@ def test_same_bits_in_spite_of_another_version_are_told_beside(blocksim: Command
 
 
 @pytest.mark.parametrize("name", ["scenario.toml", "run.json", "run.h5", "final.csv"])
-def test_damaged_file_is_told_with_exit_code_65(blocksim: Command, copied: Path, name: str) -> None:
+def test_damaged_file_is_reported_with_exit_code_65(blocksim: Command, copied: Path, name: str) -> None:
     (copied / name).write_bytes(b"\x89HDF rubbish")
     answer = blocksim("verify-run", copied)
     assert answer.code == 65
@@ -204,7 +204,7 @@ def test_one_damaged_folder_does_not_hide_the_others(blocksim: Command, finished
     assert answer.out.splitlines()[1].startswith(f"{finished}: the same bits")
 
 
-def test_place_without_a_run_is_told(blocksim: Command) -> None:
+def test_place_without_a_run_is_reported(blocksim: Command) -> None:
     answer = blocksim("verify-run", "nowhere")
     assert (answer.code, answer.out) == (66, "nowhere: missing\n")
 
@@ -222,7 +222,7 @@ def test_rows_of_a_sweep_come_out_again(blocksim: Command, swept: Path) -> None:
     assert len(some[0]["checked"]) == 2
 
 
-def test_changed_cell_of_a_sweep_is_told(blocksim: Command, copy_of_sweep: Path) -> None:
+def test_changed_cell_of_a_sweep_is_reported(blocksim: Command, copy_of_sweep: Path) -> None:
     path = copy_of_sweep / "sweep.csv"
     head, *lines = csv.reader(path.read_text().splitlines())
     place = head.index("3.x_mm")
@@ -235,7 +235,7 @@ def test_changed_cell_of_a_sweep_is_told(blocksim: Command, copy_of_sweep: Path)
     assert "largest difference: 0.5 mm, 0°" in answer.out
 
 
-def test_changed_name_of_a_case_is_told_in_whatever_row_it_is(blocksim: Command, copy_of_sweep: Path) -> None:
+def test_changed_name_of_a_case_is_reported_in_whatever_row_it_is(blocksim: Command, copy_of_sweep: Path) -> None:
     path = copy_of_sweep / "sweep.csv"
     lines = path.read_text().splitlines()
     name = lines[2].split(",")[0]

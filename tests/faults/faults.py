@@ -2,7 +2,7 @@
 
 They are data, in the TOML files beside this one. The file on the disk stays as it is: the fault is put in while the
 module is imported, in a process of its own. A kernel is interpreted while it has a fault, which takes seconds, where
-compiling it anew would take a minute.
+compiling it again would take a minute.
 """
 
 import tomllib
@@ -36,12 +36,12 @@ class Fault:
 
     @property
     def is_interpreted(self) -> bool:
-        """Tell whether its tests run without the compiler."""
+        """Return True if its tests run without the compiler."""
         return self.file.startswith(KERNELS)
 
     @property
     def is_stale(self) -> bool:
-        """Tell whether it can no longer be put in."""
+        """Return True if it can no longer be put in."""
         path = ROOT / self.file
         return not path.is_file() or path.read_text(encoding="utf-8").count(self.text) != 1
 

@@ -19,7 +19,7 @@ MOST_BYTES = 10**9
 COLLECTED = 10  # commands between two collections of garbage
 ADDRESSES = 8 << 30  # bytes of address space, so that nothing takes the machine's memory; libraries map some of it
 KERNEL = Path("/proc/self")  # where Linux tells what a process has taken
-FORGET = "5"  # what it takes for: from here on, count the most memory anew
+FORGET = "5"  # what it takes for: from here on, count the most memory again
 START = "from tests.fuzz.child import serve; serve()"
 
 

@@ -43,7 +43,7 @@ def finished_run(child: Child, folder: Path, scenario: Path) -> Run:
 
 
 def _left_open(folder: Path) -> bytes:
-    """Return the frames of a run as they lie on the disk while it goes on, which is how a kill leaves them."""
+    """Return the frames of a run as they lie on the disk while it continues, which is how a kill leaves them."""
     scenario = load_scenario(folder / "scenario.toml")
     frames = read_frames(folder / "run.h5", scenario)
     motion = np.stack([frames.x, frames.y, frames.angle, frames.vx, frames.vy, frames.spin], axis=1)

@@ -62,7 +62,7 @@ def _try(child: Child, run: Run, usual: dict[tuple[str, ...], float], data: st.D
 
 @settings(max_examples=QUICK)
 @given(data=st.data())
-def test_damaged_results_are_told_in_a_line(
+def test_damaged_results_are_reported_in_a_line(
     child: Child, run: Run, usual: dict[tuple[str, ...], float], data: st.DataObject
 ) -> None:
     _try(child, run, usual, data)

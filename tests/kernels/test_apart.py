@@ -105,7 +105,7 @@ def test_contact_begins_where_a_corner_that_is_neither_known_nor_a_twin_is_insid
 
 
 def is_over(slot: int, shift: float) -> bool:
-    """Tell whether a corner at the joint of a block, shifted by so much, and the one below lies inside the other."""
+    """Return True if a corner at the joint of a block, shifted by so much, and the one below lies inside the other."""
     is_left = slot in {0, 7}
     assume(abs(shift) > 1e-9)
     return (shift > 0.0) == (is_left == (slot < 4))

@@ -50,7 +50,7 @@ def files(folder: Path) -> list[Path]:
 
 
 @pytest.mark.parametrize("damage", DAMAGE)
-def test_damaged_file_is_told_compiled_anew_and_whole_again(
+def test_damaged_file_is_reported_compiled_anew_and_whole_again(
     kept: Path, damage: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     assert double()(1.5) == 3.0

@@ -97,7 +97,7 @@ def test_pairs_between_shares_touch_no_body_and_no_book_until_they_are_added(mov
             pair_forces(apart, action.pair, step_of(world))
         else:
             keep(apart.action[0], effect, kind == TOUCHING)
-            apart.action[0].broken = action.broken  # means nothing where contacts go on
+            apart.action[0].broken = action.broken  # means nothing where contacts continue
         expected = bits(apart.action)
         found = {name: action[name].tobytes() for name in expected}
         assert found | {"pair": b""} == expected | {"pair": b""}
@@ -130,7 +130,7 @@ def test_every_group_of_bodies_has_the_losses_of_its_pairs_in_its_own_book(movin
 
 
 @pytest.mark.parametrize("goes_on", [False, True])
-def test_bodies_of_a_group_and_no_others_finish_their_step_and_start_the_next_where_the_run_goes_on(
+def test_bodies_of_a_group_and_no_others_finish_their_step_and_start_the_next_where_the_run_continues(
     moving: Callable[[str], World], *, goes_on: bool
 ) -> None:
     world = moving("wall")

@@ -123,9 +123,9 @@ def test_grid_finds_the_pairs_that_looking_at_all_of_them_finds(
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_bodies_in_one_bucket_are_told_apart_and_listed_once(seed: int) -> None:
+def test_bodies_in_one_bucket_are_reported_apart_and_listed_once(seed: int) -> None:
     world = heap(seed, up_to(3.0), 0.3)
-    world = world._replace(heads=np.zeros(1, dtype=np.uint32))  # nine looks at everything
+    world = world._replace(heads=np.zeros(1, dtype=np.uint32))  # nine examines everything
     assert found_neighbours(world) == expected_neighbours(world)
 
 

@@ -97,7 +97,7 @@ OF_B = (6, LOWER)
         ([], [ONE, TWO], [0, 0], []),
     ],
 )
-def test_contact_goes_on_only_with_the_same_corner_on_the_same_face(
+def test_contact_continues_only_with_the_same_corner_on_the_same_face(
     pose: Pose, before: list[Contact], now: list[Contact], expected: list[int], broken: list[int]
 ) -> None:
     world = stacked(pose, *before)
@@ -181,7 +181,7 @@ def test_broken_contact_books_its_shear_springs_and_forgets_everything(start: St
     assert np.abs(touching.spring).max() < 0.01 * np.abs(springs).min()
 
 
-def test_friction_goes_on_where_corners_pass_one_another(start: Start, paper_block: PaperBlock) -> None:
+def test_friction_continues_where_corners_pass_one_another(start: Start, paper_block: PaperBlock) -> None:
     # a block slides over another of the same width: where they are aligned, the corner of the one takes the place
     # of the corner of the other at both ends
     below = {"y": 0.5 * paper_block.height, "fixed": True}

@@ -147,7 +147,7 @@ def test_without_any_writable_folder_kernels_are_compiled_and_not_kept(
 
 
 @pytest.mark.usefixtures("fresh_folder_choice", "compiler")
-def test_user_is_told_whether_kernels_have_to_be_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_user_is_reported_whether_kernels_have_to_be_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(tmp_path))
     assert not jit.is_compiled()
     below = tmp_path / f"{jit.source_hash()}-open" / "kernels"

@@ -1,4 +1,4 @@
-"""Contacts that go on, against the general way to find places, motions and inverse masses of points."""
+"""Contacts that continue, against the general way to find places, motions and inverse masses of points."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def moving(pose: Pose, seed: int, angle: float, shift: float) -> World:
 
 
 def spots_of(world: World) -> tuple[list[bool], list[Spot]]:
-    """Return whether the contacts of the points found go on, and the spots."""
+    """Return whether the contacts of the points found continue, and the spots."""
     a, b = world.bodies[:2]
     count = contact_points(world, 0)
     world.contacts[0].slot[:count], world.contacts[0].face[:count] = (

@@ -1,4 +1,4 @@
-"""Pairs whose contacts go on: the same forces as in contact.py, taken by nearly all pairs, and by none that changes."""
+"""Persistent contacts: the same forces as in contact.py, taken by nearly all pairs and by none that changes."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def take_generally(world: World, p: int, step: float) -> None:
 
 
 def take_steadily(world: World, p: int, step: float) -> bool:
-    """Evaluate a pair in the steady way and add what it does; tell whether that goes."""
+    """Evaluate a pair in the steady way and add what it does; return whether that goes."""
     kind, effect = steady_forces(world, p, step, world.particles)
     if kind != CHANGED:
         keep(world.action[0], effect, kind == TOUCHING)
@@ -177,7 +177,7 @@ def test_nearly_all_pairs_of_a_lasting_scene_are_steady(start: Start, situation:
 
 
 def is_untouched(world: World, before: World) -> bool:
-    """Tell whether nothing has changed that lasts, nor the work space of contact.py."""
+    """Return True if nothing has changed that lasts, nor the work space of contact.py."""
     return all(
         np.array_equal(getattr(world, name), getattr(before, name))
         for name in ("bodies", "pairs", "contacts", "candidates", "operators", "ledger", "points", "action")
@@ -207,7 +207,7 @@ def assert_changed(world: World) -> None:
     assert is_untouched(world, before)
 
 
-def test_contacts_that_go_on_are_steady(pose: Pose) -> None:
+def test_contacts_that_continue_are_steady(pose: Pose) -> None:
     for world in (on_ground(pose), on_block(pose, 0.003)):
         assert steady_forces(world, 0, STEP, world.particles)[0] == TOUCHING
 

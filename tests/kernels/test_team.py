@@ -138,7 +138,7 @@ def test_number_of_threads_may_change_from_call_to_call(by_one: ByOne) -> None:
 
 
 @pytest.mark.parametrize("size", [2, 4])
-def test_one_thread_goes_on_alone_with_a_world_that_a_team_has_left(by_one: ByOne, size: int) -> None:
+def test_one_thread_continues_alone_with_a_world_that_a_team_has_left(by_one: ByOne, size: int) -> None:
     worlds, steps = crew(copy.deepcopy(by_one("wall", 0.8)), size), SCENES["wall"][1]
     together(worlds, round(0.9 * steps))
     assert worlds[0].pairs.is_between.any()
@@ -197,7 +197,7 @@ def test_full_list_sends_all_threads_back_before_anything_has_moved() -> None:
     assert bits(worlds[0].ledger) == bits(untouched.ledger)
 
 
-def test_list_that_runs_full_on_the_way_is_given_room_and_the_team_goes_on(by_one: ByOne) -> None:
+def test_list_that_runs_full_on_the_way_is_given_room_and_the_team_continues(by_one: ByOne) -> None:
     steps, grown = round(0.2 * SCENES["wall"][1]), 0
     worlds = crew(cramped(), 3)
     while together(worlds, steps) == PAIRS_FULL:

@@ -141,7 +141,7 @@ bad.toml:24: sweep."pairs.steel.ground.friction.kinetic".1: -0.2 is too small; a
     "provenance of no pair": (
         '\n[provenance]\n"pairs.steel.ground.friction" = "measured"\n',
         """
-bad.toml:21: provenance."pairs.steel.ground.friction": "pairs.steel.ground.friction" is no key of this scenario
+bad.toml:21: provenance."pairs.steel.ground.friction": "pairs.steel.ground.friction" is not a key of this scenario
    21 | "pairs.steel.ground.friction" = "measured"
       | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
 """,

@@ -74,7 +74,7 @@ bad.toml:17: structures.0.block: unknown block "stone", there is: brick
         'kind = "stack"',
         'kind = "cathedral"',
         """
-bad.toml:16: structures.0.kind: "cathedral" is no kind of structure, use \
+bad.toml:16: structures.0.kind: "cathedral" unknown structure kind; choose \
 "staircase", "stack", "wall", "pyramid", "dominoes" or "grid"
    16 | kind = "cathedral"
       |        ^^^^^^^^^^^

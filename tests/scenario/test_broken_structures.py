@@ -85,7 +85,7 @@ bad.toml:20: structures.0.holes.0.0: 0 is not a whole number from 1 to 100000
     "hole without a column": (
         WALL + "holes = [[1]]\n",
         """
-bad.toml:20: structures.0.holes.0: a list is no place for a hole; write [row, column], counted from 1 at the lower left
+bad.toml:20: structures.0.holes.0: a list is not a hole; write [row, column], counted from 1 at the lower left
    20 | holes = [[1]]
       |          ^^^
 """,
@@ -93,10 +93,10 @@ bad.toml:20: structures.0.holes.0: a list is no place for a hole; write [row, co
     "one hole without its list": (
         WALL + "holes = [1, 2]\n",
         """
-bad.toml:20: structures.0.holes.0: 1 is no place for a hole; write [row, column], counted from 1 at the lower left
+bad.toml:20: structures.0.holes.0: 1 is not a hole; write [row, column], counted from 1 at the lower left
    20 | holes = [1, 2]
       |          ^
-bad.toml:20: structures.0.holes.1: 2 is no place for a hole; write [row, column], counted from 1 at the lower left
+bad.toml:20: structures.0.holes.1: 2 is not a hole; write [row, column], counted from 1 at the lower left
    20 | holes = [1, 2]
       |             ^
 """,

@@ -110,7 +110,7 @@ bad.toml:21: sweep."time.end": the list of values is empty
         None,
         '\n[sweep]\n"time.end" = 2\n',
         """
-bad.toml:21: sweep."time.end": 2 is no variation; write a list or { from, to, count }, and the key in quotes
+bad.toml:21: sweep."time.end": 2 is not a variation; write a list or { from, to, count }, and the key in quotes
    21 | "time.end" = 2
       |              ^
 """,
@@ -119,7 +119,7 @@ bad.toml:21: sweep."time.end": 2 is no variation; write a list or { from, to, co
         None,
         "\n[sweep]\ntime.end = [1, 2]\n",
         """
-bad.toml:21: sweep.time: a table is no variation; write a list or { from, to, count }, and the key in quotes
+bad.toml:21: sweep.time: a table is not a variation; write a list or { from, to, count }, and the key in quotes
    21 | time.end = [1, 2]
       |            ^^^^^^
 """,
@@ -240,7 +240,7 @@ bad.toml:24: sweep."time.end": mode "table" takes keys and values from its table
         None,
         '\n[provenance]\n"friction.blok" = "measured"\n',
         """
-bad.toml:21: provenance."friction.blok": "friction.blok" is no key of this scenario
+bad.toml:21: provenance."friction.blok": "friction.blok" is not a key of this scenario
    21 | "friction.blok" = "measured"
       | ^^^^^^^^^^^^^^^
 """,

@@ -119,7 +119,7 @@ bad.toml:21: friction.block_ground: -0.1 is too small; a plain number of at leas
         None,
         "\n[friction]\nblock_ground = true\n",
         """
-bad.toml:21: friction.block_ground: true is no friction; write a number, an angle, or { static, kinetic }
+bad.toml:21: friction.block_ground: true is not a friction; write a number, an angle, or { static, kinetic }
    21 | block_ground = true
       |                ^^^^
 """,
@@ -137,7 +137,7 @@ bad.toml:21: contact.restitution: 1.5 is too large; a plain number of at least 0
         None,
         '\n[contact]\nrestitution = "high"\n',
         """
-bad.toml:21: contact.restitution: "high" is no restitution; write a number or { block_block, block_ground }
+bad.toml:21: contact.restitution: "high" is not a restitution; write a number or { block_block, block_ground }
    21 | restitution = "high"
       |               ^^^^^^
 """,
@@ -182,7 +182,7 @@ bad.toml:21: time.stop_at_rest: 1 is neither true nor false
         None,
         '\n[time]\nstep = "fast"\n',
         """
-bad.toml:21: time.step: "fast" is no time step; use "auto" or a time above 0 such as "2 s"
+bad.toml:21: time.step: "fast" is not a time step; use "auto" or a time above 0 such as "2 s"
    21 | step = "fast"
       |        ^^^^^^
 """,

@@ -33,7 +33,7 @@ def test_a_file_of_holes_is_refused_without_reading_it(tmp_path: Path) -> None:
         read_limited(tmp_path / "huge", 1_000_000)
 
 
-def test_what_is_missing_is_told_so(tmp_path: Path) -> None:
+def test_what_is_missing_is_reported_so(tmp_path: Path) -> None:
     for name in ("nothing", "x" * 300, "a\0b"):
         with pytest.raises(InputMissingError):
             read_limited(tmp_path / name, 10)

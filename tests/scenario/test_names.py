@@ -42,7 +42,7 @@ def test_results_lie_in_a_folder_of_the_name_below_results(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [*HOSTILE, *FINE])
-def test_editors_are_told_the_same(name: str) -> None:
+def test_editors_are_reported_the_same(name: str) -> None:
     pattern = json_schema()["properties"]["name"]["pattern"]
     found = re.search(pattern.replace("$", r"\Z"), name)  # the $ of JSON Schema allows no line feed behind it
     assert bool(found) == (name in FINE)

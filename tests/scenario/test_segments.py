@@ -132,7 +132,7 @@ def test_a_free_wall_has_two_edges() -> None:
         ([(0, 0), (3, 0), (3, 2)], (3, 1)),
     ],
 )
-def test_a_wall_goes_on_where_the_ground_covers_its_end(profile: list[Point] | None, foot: Point) -> None:
+def test_a_wall_continues_where_the_ground_covers_its_end(profile: list[Point] | None, foot: Point) -> None:
     up = place_segments(scenario(profile, [wall(foot, (4, 5))]))[-1]
     down = place_segments(scenario(profile, [wall((4, 5), foot)]))[-1]
     assert (extends(up), touches(up)) == ((True, False), (False, True))
@@ -144,7 +144,7 @@ def test_a_wall_above_the_ground_does_not_go_on() -> None:
     assert extends(piece) == (False, False)
 
 
-def test_a_wall_goes_on_where_it_ends_on_another() -> None:
+def test_a_wall_continues_where_it_ends_on_another() -> None:
     shelf, post = place_segments(scenario(walls=[wall((0, 2), (4, 2)), wall((3, 2), (3, 4))]))
     assert (extends(shelf), touches(shelf)) == ((False, False), (True, True))
     assert (extends(post), touches(post)) == ((True, False), (False, True))

@@ -51,7 +51,7 @@ def test_two_are_kept_by_turns_after_the_frames(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["checkpoint.0", "checkpoint.1"])
-def test_the_one_that_a_run_goes_on_from_is_replaced_last(tmp_path: Path, name: str) -> None:
+def test_the_one_that_a_run_continues_from_is_replaced_last(tmp_path: Path, name: str) -> None:
     past = Past(resumed_from=(7,), checkpoint=tmp_path / name, step=7)
     writer = CheckpointWriter(tmp_path, origin_of(SCENARIO), Frames(tmp_path), past=past)
     writer.keep(build_scene(SCENARIO), at(10))

@@ -31,7 +31,7 @@ def test_no_run_writes_where_another_one_does(tmp_path: Path, resume: bool, over
     scenario = sliding(MODELS["surface-linear"], end=0.002)
     interrupted_at(scenario, tmp_path, [50])
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    with claimed(tmp_path), pytest.raises(OutputExistsError, match="a run is going on here"):
+    with claimed(tmp_path), pytest.raises(OutputExistsError, match="a run is in progress here"):
         simulate_into(scenario, tmp_path, resume=resume, overwrite=overwrite)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
     assert simulate_into(scenario, tmp_path, resume=True).summary.resumed_from == (50,)

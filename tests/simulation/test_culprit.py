@@ -59,7 +59,7 @@ def test_scene_that_blows_up_stops_and_names_step_block_and_checkpoint(soft: Shi
 
 
 @pytest.mark.usefixtures("forced")
-def test_run_that_failed_fails_again_where_it_goes_on(soft: Shipped, tmp_path: Path) -> None:
+def test_run_that_failed_fails_again_where_it_continues(soft: Shipped, tmp_path: Path) -> None:
     often = Precautions(checkpoint_steps=1)
     first = simulate_into(soft(output__every=1.0), tmp_path / "run", precautions=often)
     again = simulate_into(soft(output__every=1.0), tmp_path / "run", resume=True)

@@ -1,4 +1,4 @@
-"""A run that has no room on the disk is refused before it writes anything; both sizes are told."""
+"""A run that has no room on the disk is refused before it writes anything; both sizes are reported."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_estimate_is_no_less_than_what_a_run_leaves(tmp_path: Path) -> None:
     assert 0.5 * needed < (tmp_path / "run" / "run.h5").stat().st_size < 1.3 * needed
 
 
-def test_too_small_a_disk_is_told_with_both_sizes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_small_a_disk_is_reported_with_both_sizes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Path] = []
 
     def usage(place: Path) -> SimpleNamespace:

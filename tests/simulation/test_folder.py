@@ -106,7 +106,7 @@ def test_scenario_written_by_a_person_is_never_removed(tmp_path: Path) -> None:
     assert names(tmp_path) == {"scenario.toml"}
 
 
-def test_file_in_the_place_of_the_folder_is_told(tmp_path: Path) -> None:
+def test_file_in_the_place_of_the_folder_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputExistsError, match="cannot be created"):
         prepare_folder(tmp_path / "file", overwrite=True)

@@ -1,4 +1,4 @@
-"""Folders for results that cannot be made: what is in the way is told, and nothing is touched."""
+"""Folders for results that cannot be made: what is in the way is reported, and nothing is touched."""
 
 import subprocess
 from collections.abc import Iterator
@@ -50,7 +50,7 @@ def test_a_link_to_a_folder_is_followed(tmp_path: Path) -> None:
     assert (tmp_path / "elsewhere" / "run").is_dir()
 
 
-def test_a_name_that_is_too_long_is_told(tmp_path: Path) -> None:
+def test_a_name_that_is_too_long_is_reported(tmp_path: Path) -> None:
     with pytest.raises(OutputExistsError, match="cannot be created: File name too long"):
         make_folder(tmp_path / ("x" * 300))
 
@@ -66,7 +66,7 @@ def test_what_a_run_replaces_is_a_link_and_not_what_it_leads_to(tmp_path: Path) 
     assert list(folder.iterdir()) == []
 
 
-def test_a_read_only_file_system_is_told(read_only: Path) -> None:
+def test_a_read_only_file_system_is_reported(read_only: Path) -> None:
     with pytest.raises(OutputExistsError, match="run: cannot be created: Read-only file system"):
         make_folder(read_only / "run")
     make_folder(read_only)

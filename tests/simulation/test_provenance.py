@@ -17,7 +17,7 @@ from tests.simulation.conftest import Shipped
 NEW = ("llvmlite", "cpu", "cpu_features", "code_kernels", "code_scenario", "code_simulation", "code_world")
 
 
-def test_rooms_are_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rooms_are_reported_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     before = provenance.code_hashes()
     assert set(before) == set(provenance.ROOMS)
     assert len(set(before.values())) == len(before)

@@ -1,4 +1,4 @@
-"""A run that is interrupted and goes on leaves the bits of one that is not, or says why it cannot."""
+"""A run that is interrupted and continues leaves the bits of one that is not, or says why it cannot."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_resumed_run_has_the_bits_of_a_continuous_one(tmp_path: Path, name: str)
 
 @pytest.mark.usefixtures("two_threads")
 @pytest.mark.parametrize("name", ["surface-linear", "nonsmooth"])
-def test_run_goes_on_with_another_number_of_threads(tmp_path: Path, name: str) -> None:
+def test_run_continues_with_another_number_of_threads(tmp_path: Path, name: str) -> None:
     scenario = sliding(MODELS[name], end=0.01)
     whole = simulate_into(scenario, tmp_path / "whole")
     for threads, then in ((1, 2), (2, 1), (2, 2)):
@@ -171,11 +171,11 @@ def test_damaged_checkpoint_falls_back_to_the_older_one_and_says_so(begun: Path,
     assert_same(simulate_into(sliding({}), tmp_path / "whole"), resumed)
 
 
-def test_nothing_goes_on_where_no_checkpoint_is_whole(begun: Path) -> None:
+def test_nothing_continues_where_no_checkpoint_is_whole(begun: Path) -> None:
     for path in begun.glob("checkpoint.*"):
         path.write_bytes(path.read_bytes()[:-1])
     before = {path.name: path.read_bytes() for path in begun.iterdir()}
-    with pytest.raises(InvalidInputError, match="no checkpoint is whole; --overwrite starts anew"):
+    with pytest.raises(InvalidInputError, match="no checkpoint is whole; --overwrite starts again"):
         simulate_into(sliding({}), begun, resume=True)
     assert {path.name: path.read_bytes() for path in begun.iterdir()} == before
 
@@ -211,7 +211,7 @@ def test_missing_frames_are_no_ground_to_go_on(begun: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("name", ["particles/blocks/vy", "observables/friction", "contacts/normal_force"])
-def test_frame_that_was_changed_before_the_run_goes_on_is_found(tmp_path: Path, name: str) -> None:
+def test_frame_that_was_changed_before_the_run_continues_is_found(tmp_path: Path, name: str) -> None:
     scenario = sliding({"output": {"contacts": True}}, end=0.02)
     interrupted_at(scenario, tmp_path, [1000])
     with h5py.File(tmp_path / "run.h5", "r+") as file:
@@ -221,7 +221,7 @@ def test_frame_that_was_changed_before_the_run_goes_on_is_found(tmp_path: Path, 
         simulate_into(scenario, tmp_path, resume=True)
 
 
-def test_changed_frame_after_the_checkpoint_is_told_when_it_is_repeated(begun: Path) -> None:
+def test_changed_frame_after_the_checkpoint_is_reported_when_it_is_repeated(begun: Path) -> None:
     newest(begun).unlink()  # as if it had been killed before it wrote this one
     with h5py.File(begun / "run.h5", "r+") as file:
         steps = file["particles/blocks/step"][:]
@@ -238,7 +238,7 @@ def test_run_without_a_checkpoint_starts_anew_and_says_so(begun: Path, tmp_path:
     again = simulate_into(sliding({}), begun, resume=True)
     assert again.status == "finished"
     assert again.summary.resumed_from == ()
-    assert again.summary.warnings == (f"{begun}: no checkpoint was written, the run starts anew",)
+    assert again.summary.warnings == (f"{begun}: no checkpoint saved; the run starts again",)
     nothing = simulate_into(sliding({}), tmp_path / "nothing", resume=True)
     assert nothing.summary.warnings == ()
     assert_same(again, nothing)
@@ -266,7 +266,7 @@ def test_times_of_all_parts_are_summed_and_told(begun: Path) -> None:
     assert resumed.reason == "end of simulated time"
 
 
-def test_nothing_half_written_is_left_by_a_run_that_goes_on(begun: Path) -> None:
+def test_nothing_half_written_is_left_by_a_run_that_continues(begun: Path) -> None:
     (begun / ".checkpoint.0.abcd_123.0").write_bytes(b"half")
     (begun / ".run.h5.new").write_bytes(b"half")
     simulate_into(sliding({}), begun, resume=True)

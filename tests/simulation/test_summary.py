@@ -11,7 +11,7 @@ from blocksim.simulation import Result
 from blocksim.simulation.summary import read_summary
 
 
-def test_missing_summary_is_told(tmp_path: Path) -> None:
+def test_missing_summary_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputMissingError, match=r"run\.json: no such file"):
         read_summary(tmp_path / "run.json")
 

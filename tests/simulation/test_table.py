@@ -74,6 +74,6 @@ def test_rubbish_is_refused(tmp_path: Path, text: str) -> None:
         read_table(tmp_path / "final.csv")
 
 
-def test_missing_table_is_told(tmp_path: Path) -> None:
+def test_missing_table_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputMissingError, match="no such file"):
         read_table(tmp_path / "final.csv")

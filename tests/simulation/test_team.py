@@ -45,14 +45,14 @@ def alone() -> World:
 def test_threads_do_not_change_a_bit_of_a_collapse_nor_of_its_ledger(alone: World, threads: int) -> None:
     with Team(threads) as together:
         world, status = build_world(wall()), 0
-        for last in (0, 7, STEPS // 2, STEPS):  # a team goes on where it stopped
+        for last in (0, 7, STEPS // 2, STEPS):  # a team continues where it stopped
             world, status = together.advance(world, last)
     assert status == 0
     assert world.clock[0].rebuilds > 5
     assert same_bits(world, alone)
 
 
-def test_team_makes_room_for_more_pairs_and_goes_on(alone: World, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_team_makes_room_for_more_pairs_and_continues(alone: World, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(build, "PAIRS_PER_BODY", 1)
     world = build_world(wall())
     capacity = world.pairs.size

@@ -193,7 +193,7 @@ def test_more_levels_run_only_what_is_missing(slide: Scenario, tmp_path: Path, m
     assert converge(slide, studies=["step"], out=tmp_path, levels=9) == before
 
 
-def test_refining_goes_on_until_the_tolerance_is_met(slide: Scenario, tmp_path: Path) -> None:
+def test_refining_continues_until_the_tolerance_is_met(slide: Scenario, tmp_path: Path) -> None:
     few = converge(slide, studies=["stiffness"], out=tmp_path, tolerance_mm=1e-6, levels=2).studies[0]
     more = converge(slide, studies=["stiffness"], out=tmp_path, tolerance_mm=1e-6, levels=6).studies[0]
     assert few.verdict is Verdict.NOT_YET
@@ -220,7 +220,7 @@ def test_interrupt_stops_the_study(slide: Scenario, tmp_path: Path) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(StoppedEarlyError, match="stopped after 1 runs; the same command does the others"):
+    with pytest.raises(StoppedEarlyError, match="stopped after 1 runs; rerun the command to finish"):
         converge(slide, out=tmp_path, on_run=interrupt)
 
 

@@ -26,7 +26,7 @@ def test_dead_worker_fails_its_case_and_says_what_to_do() -> None:
 
 
 @pytest.mark.parametrize("lost", [None, "run.h5", "checkpoint.0"])
-def test_interrupted_case_goes_on_where_it_can(nominal: Document, tmp_path: Path, lost: str | None) -> None:
+def test_interrupted_case_continues_where_it_can(nominal: Document, tmp_path: Path, lost: str | None) -> None:
     scenario = nominal.with_values({"time.end": 0.01}).build()
     whole = run_case(scenario, tmp_path / "whole")
     stopped = run(scenario, out=tmp_path / "case", precautions=Precautions(wall_time=0.0))

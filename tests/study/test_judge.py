@@ -60,7 +60,7 @@ def test_table_alone_needs_an_experiment(swept: SweepResult, tmp_path: Path) -> 
     assert compare_sweep(tmp_path, PAPER).members == 2
 
 
-def test_damaged_table_is_told(tmp_path: Path) -> None:
+def test_damaged_table_is_reported(tmp_path: Path) -> None:
     pd.DataFrame({"case": ["a"], "status": ["finished"], "1.x_mm": ["wide"]}).to_csv(
         tmp_path / "sweep.csv", index=False
     )

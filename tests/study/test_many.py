@@ -1,4 +1,4 @@
-"""A sweep keeps one row a case, repeats nothing, and goes on where a case fails."""
+"""A sweep keeps one row per case, repeats nothing, and continues where a case fails."""
 
 import json
 import os
@@ -261,7 +261,7 @@ def test_ctrl_c_keeps_the_rows_so_far_and_the_next_call_does_the_rest(quick: Doc
         if done == 2:
             os.kill(os.getpid(), signal.SIGINT)
 
-    with pytest.raises(StoppedEarlyError, match="of 120 cases done; the same command does the others"):
+    with pytest.raises(StoppedEarlyError, match="of 120 cases done; rerun the command to finish"):
         sweep(quick, vary, jobs=1, out=tmp_path / "cut", on_row=press_ctrl_c)
     some = len(read_sweep(tmp_path / "cut").table)
     assert 2 <= some < 120
@@ -296,7 +296,7 @@ def test_rubbish_for_a_sweep_table_is_refused(tmp_path: Path, text: str) -> None
         read_sweep(tmp_path)
 
 
-def test_missing_sweep_table_is_told(tmp_path: Path) -> None:
+def test_missing_sweep_table_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputMissingError, match="no such file"):
         read_sweep(tmp_path)
 

@@ -34,7 +34,7 @@ def test_sweep_does_what_shards_have_left(quick: Document, tmp_path: Path) -> No
     assert (tmp_path / "two" / "sweep.csv").read_bytes() == (tmp_path / "one" / "sweep.csv").read_bytes()
 
 
-def test_what_is_no_sweep_is_told(tmp_path: Path) -> None:
+def test_what_is_no_sweep_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputMissingError, match=r"no sweep is there \(no sweep.toml\)"):
         merge(tmp_path)
 
@@ -53,7 +53,7 @@ def test_case_that_was_retried_elsewhere_counts_as_finished(quick: Document, tmp
 
 
 @pytest.mark.parametrize("text", ["", "1", "2/2", "-1/2", "0/0", "a/b", "0/1/2", "1.0/2"])
-def test_wrong_shard_is_told(text: str) -> None:
+def test_wrong_shard_is_reported(text: str) -> None:
     with pytest.raises(InvalidInputError, match="write I/N with I from 0 to N - 1"):
         Shard.parse(text)
 

@@ -1,4 +1,4 @@
-"""Which values go together, and that mistakes are told before anything runs."""
+"""Which values go together, and that mistakes are reported before anything runs."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -60,7 +60,9 @@ def test_lists_of_different_lengths_are_refused(nominal: Document) -> None:
         ({SCALE: {"from": 1.0, "to": 2.0, "count": 1}}, "count 1 is not a whole number from 2"),
     ],
 )
-def test_wrong_key_or_value_is_told_where_it_was_given(nominal: Document, vary: dict[str, Values], told: str) -> None:
+def test_wrong_key_or_value_is_reported_where_it_was_given(
+    nominal: Document, vary: dict[str, Values], told: str
+) -> None:
     key = next(iter(vary))
     with pytest.raises(ScenarioError, match=told) as caught:
         with_sweep(nominal, vary, labels={key: f"{key}=typed"}).build()
@@ -167,13 +169,15 @@ def test_a_distribution_that_leaves_the_possible_values_is_refused_before_anythi
         ({"structures.0.overlap": {"from": "1 s", "to": "2 s", "count": 2}}, "grid", '"1 s" is a time; a length'),
     ],
 )
-def test_impossible_distributions_are_told(nominal: Document, vary: dict[str, Values], mode: str, told: str) -> None:
+def test_impossible_distributions_are_reported(
+    nominal: Document, vary: dict[str, Values], mode: str, told: str
+) -> None:
     with pytest.raises(ScenarioError) as caught:
         with_sweep(nominal, vary, mode).build()
     assert told in str(caught.value)
 
 
-def test_mistakes_of_a_sampled_sweep_are_told_together(nominal: Document) -> None:
+def test_mistakes_of_a_sampled_sweep_are_reported_together(nominal: Document) -> None:
     vary: dict[str, Values] = {SCALE: {"from": 2, "to": 1}, KINETIC: {"mean": 1, "sd": 0}, "seeds": [1]}
     with pytest.raises(ScenarioError) as caught:
         with_sweep(nominal, vary, "lhs", samples=0, seed=-1).build()

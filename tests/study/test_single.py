@@ -60,7 +60,7 @@ def test_overwrite_runs_again(copy: Path, scenario: Scenario) -> None:
     assert (copy / "run.json").stat().st_mtime_ns > before
 
 
-def test_table_that_does_not_fit_the_blocks_is_told_before_the_run(scenario: Scenario, tmp_path: Path) -> None:
+def test_table_that_does_not_fit_the_blocks_is_reported_before_the_run(scenario: Scenario, tmp_path: Path) -> None:
     table = tmp_path / "table.csv"
     table.write_text("block,quantity,unit,replicate,value\n4,x,mm,1,5.0\n")
     assert scenario.experiment is not None
@@ -141,7 +141,7 @@ def test_folder_that_holds_a_sweep_only_names_the_sweep(tmp_path: Path) -> None:
         find_run(tmp_path)
 
 
-def test_folder_without_a_run_is_told(tmp_path: Path) -> None:
+def test_folder_without_a_run_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputMissingError, match="no finished run in this folder"):
         find_run(tmp_path)
     with pytest.raises(InputMissingError, match="no such run folder or scenario file"):

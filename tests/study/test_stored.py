@@ -28,7 +28,7 @@ def test_a_finished_run_needs_no_remark(folder: Path) -> None:
     assert len(stored.frames) == 5
 
 
-def test_what_did_not_finish_is_told(folder: Path) -> None:
+def test_what_did_not_finish_is_reported(folder: Path) -> None:
     summary = json.loads((folder / "run.json").read_text())
     for status, told in (("failed", "this run has failed (why)"), ("interrupted", "this run was interrupted (why)")):
         (folder / "run.json").write_text(json.dumps({**summary, "status": status, "reason": "why"}))
@@ -36,10 +36,10 @@ def test_what_did_not_finish_is_told(folder: Path) -> None:
     (folder / "run.json").write_text("{")
     assert "run.json of this run is damaged" in stored_run(folder).remark
     (folder / "run.json").unlink()
-    assert "this run was killed or is still going on" in stored_run(folder).remark
+    assert "this run was killed or is still running" in stored_run(folder).remark
 
 
-def test_missing_and_damaged_frames_are_told(folder: Path) -> None:
+def test_missing_and_damaged_frames_are_reported(folder: Path) -> None:
     (folder / "run.h5").write_bytes((folder / "run.h5").read_bytes()[:2000])
     with pytest.raises(InvalidInputError, match=r"run\.h5: not a"):
         stored_run(folder)

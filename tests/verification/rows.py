@@ -20,7 +20,7 @@ def missed(outcome: Outcome) -> list[Row]:
 
 
 def same_kind(kept: Row, now: Row) -> bool:
-    """Tell whether two rows expect the same number to the same tolerance."""
+    """Return True if two rows expect the same number to the same tolerance."""
     told = (kept.quantity, kept.unit, kept.relative, kept.at_least)
     numbers = pytest.approx([now.expected, now.tolerance], rel=1e-6)
     return told == (now.quantity, now.unit, now.relative, now.at_least) and [kept.expected, kept.tolerance] == numbers

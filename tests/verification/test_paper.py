@@ -69,6 +69,6 @@ def test_a_slide_follows_equation_13() -> None:
     assert law.expected[0] == pytest.approx(500.0)
 
 
-def test_a_run_that_does_not_finish_is_told(tmp_path: Path) -> None:
+def test_a_run_that_does_not_finish_is_reported(tmp_path: Path) -> None:
     with pytest.raises(BlocksimError, match=r"three_blocks\.toml: the run has failed"):
         write_paper(tmp_path, SCENARIOS, {**SOFT, "contact.max_overlap": 1e-9})

@@ -50,7 +50,7 @@ def test_third_apex_of_a_drop_is_within_a_percent_at_the_default_step() -> None:
 
 
 def peaks(width: float, height: float, restitution: float, **time: object) -> NDArray[np.float64]:
-    """Return how far (rad) a block turns that is let go on one corner, each time that it turns back."""
+    """Return how far (rad) a block turns that is let continue one corner, each time that it turns back."""
     tilt = 0.5 * atan2(width, height)
     place = {"x": -cos(tilt) * width + sin(tilt) * height, "y": sin(tilt) * width + cos(tilt) * height}
     body = {"x": place["x"] / 2, "y": place["y"] / 2, "angle": -tilt, "width": width, "height": height}

@@ -1,4 +1,4 @@
-"""Films: frames chosen by time, the last one held, blocks where they were recorded, and clear refusals."""
+"""Animations: frames chosen by time, the last one held, blocks where they were recorded, and clear refusals."""
 
 import sys
 from collections.abc import Iterator
@@ -168,7 +168,7 @@ def test_mp4_can_be_read_back(tmp_path: Path) -> None:
 
 
 class Stopping:
-    """Stands for imageio-ffmpeg on a disk that becomes full: in the middle, or only when the film is closed."""
+    """Stands for imageio-ffmpeg on a disk that becomes full: in the middle, or only when the animation is closed."""
 
     def __init__(self, *, in_the_middle: bool) -> None:
         self.in_the_middle = in_the_middle
@@ -261,8 +261,8 @@ def test_missing_package_names_the_extra(tmp_path: Path, monkeypatch: pytest.Mon
     assert list(tmp_path.iterdir()) == []
 
 
-def test_trouble_is_told(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match=r"'.avi' is no film format, write .gif or .mp4"):
+def test_trouble_is_reported(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"'.avi' unsupported format; use .gif or .mp4"):
         draw_film(toppling(1), tmp_path / "film.avi")
     with pytest.raises(InvalidInputError, match="at most 10000: raise --speed or lower --fps"):
         draw_film(toppling(1), tmp_path / "film.gif", Pace(1e-6, 30.0))

@@ -139,7 +139,7 @@ def test_a_table_that_measures_other_blocks_is_no_trouble(caught: list[Figure]) 
     assert "measured" not in "".join(text for text, _ in boxes_of(caught[0]))
 
 
-def test_trouble_is_told(tmp_path: Path) -> None:
+def test_trouble_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="no picture format"):
         draw_final(toppling(1), tmp_path / "final.bmp")
     with pytest.raises(OutputError, match="cannot be written"):

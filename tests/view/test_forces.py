@@ -1,4 +1,4 @@
-"""Arrows of contact forces: where, how long, on which block, and what is told of them."""
+"""Arrows of contact forces: where, how long, on which block, and what is reported of them."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -96,7 +96,7 @@ def test_history_of_a_run_without_contacts_has_five_panels(caught: list[Figure])
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_missing_contacts_are_told_with_what_to_do(tmp_path: Path, kind: str) -> None:
+def test_missing_contacts_are_reported_with_what_to_do(tmp_path: Path, kind: str) -> None:
     with pytest.raises(InvalidInputError, match=r"stored no contacts.* --set output\.contacts=true"):
         KINDS[kind](toppling(3), tmp_path / "picture.png", forces=True)
     assert list(tmp_path.iterdir()) == []

@@ -53,7 +53,7 @@ def wall(
 
 
 def is_solid(drawn: Canvas, x: float, y: float) -> bool:
-    """Tell whether a point (mm, scene) is filled."""
+    """Return True if a point (mm, scene) is filled."""
     patches = [artist for artist in drawn.axes.patches if isinstance(artist, PathPatch)]
     return any(patch.get_path().contains_point((x, y)) for patch in patches)
 

@@ -78,7 +78,7 @@ def test_energies_are_grouped_and_small_ones_left_out() -> None:
 
 
 @pytest.mark.parametrize(("most", "unit"), [(2e3, "kJ"), (1.0, "J"), (0.1, "mJ"), (1e-5, "µJ"), (0.0, "µJ")])
-def test_energies_are_told_in_a_unit_that_fits(most: float, unit: str) -> None:
+def test_energies_are_reported_in_a_unit_that_fits(most: float, unit: str) -> None:
     assert unit_for(most, "J")[1] == unit
 
 

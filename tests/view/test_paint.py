@@ -65,6 +65,6 @@ def test_blocks_that_never_move_have_colours_too(name: str) -> None:
     assert all(len(fill) == 7 for fill in fills)
 
 
-def test_classes_of_a_map_are_told_apart_in_grey() -> None:
+def test_classes_of_a_map_are_reported_apart_in_grey() -> None:
     shades = sorted(style.brightness(colour) for colour in CLASS_COLOURS)
     assert min(np.diff(shades)) > 0.12

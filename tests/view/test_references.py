@@ -70,7 +70,7 @@ def shrink(path: Path) -> None:
 
 
 def differ(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """Tell whether two pictures are not the same to the eye."""
+    """Return True if two pictures are not the same to the eye."""
     if one.shape != other.shape:
         return True
     off = np.abs(one - other)

@@ -110,7 +110,7 @@ def test_near_walls_are_shown_and_far_ones_are_not() -> None:
     near = window(block, Support(walls=(wall(0.15, 0.0, 0.15, 100.0),)))
     far = window(block, Support(walls=(wall(3.0, 0.0, 3.0, 100.0),)))
     assert 150.0 < near.right < 200.0
-    assert 50.0 < near.top < 250.0  # no more of a high wall than shows that it goes on
+    assert 50.0 < near.top < 250.0  # no more of a high wall than shows that it continues
     assert far == window(block)
 
 

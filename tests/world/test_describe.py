@@ -11,7 +11,7 @@ from blocksim.world.describe import describe
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 
-def test_the_step_that_is_told_is_the_one_that_is_taken() -> None:
+def test_the_step_that_is_reported_is_the_one_that_is_taken() -> None:
     scenario = load_scenario(SCENARIOS / "three_blocks.toml")
     told = describe(scenario)
     assert told.step == build_world(scenario).controls[0].step
@@ -23,14 +23,14 @@ def test_frames_closer_than_any_step_are_as_many_as_steps() -> None:
     assert told.frames == told.steps + 1
 
 
-def test_ground_and_block_pairs_are_told_with_their_own_friction_and_restitution() -> None:
+def test_ground_and_block_pairs_are_reported_with_their_own_friction_and_restitution() -> None:
     scenario = load_scenario(SCENARIOS / "three_blocks.toml", ["contact.restitution.block_ground=0.1"])
     ground, block = describe(scenario).pairs
     assert (ground.static_friction, ground.kinetic_friction, ground.restitution) == (0.38, 0.3284, 0.1)
     assert (block.static_friction, block.kinetic_friction, block.restitution) == (0.31, 0.1974, 0.3025)
 
 
-def test_stiffness_is_told_in_the_unit_of_the_law() -> None:
+def test_stiffness_is_reported_in_the_unit_of_the_law() -> None:
     shipped = SCENARIOS / "three_blocks.toml"
     linear, hertz = (describe(load_scenario(shipped, [f"contact.law={law}"])) for law in ("linear", "hertz-mindlin"))
     assert {pair.stiffness_unit for pair in linear.pairs} == {"N/m"}

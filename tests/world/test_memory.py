@@ -1,4 +1,4 @@
-"""What a run needs is told from the arrays that it will have; what there is from files as Linux writes them."""
+"""What a run needs is reported from the arrays that it will have; what there is from files as Linux writes them."""
 
 from collections.abc import Mapping
 from dataclasses import replace

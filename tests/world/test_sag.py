@@ -23,7 +23,7 @@ def stack(count: int, **time: Any) -> Scene:
 
 
 @pytest.mark.parametrize(("count", "substeps"), [(1, 4), (5, 1), (5, 4)])
-def test_column_sinks_by_what_is_told(count: int, substeps: int) -> None:
+def test_column_sinks_by_what_is_reported(count: int, substeps: int) -> None:
     scene = stack(count, substeps=substeps)
     told = describe(scene.scenario()).rigid
     run = scene.start().to_time(2.0)
@@ -62,7 +62,7 @@ def cube_on_two() -> Scenario:
 @pytest.mark.parametrize(
     ("scenario", "is_warned"), [(heavy_on_light(100.0), False), (heavy_on_light(1000.0), True), (cube_on_two(), True)]
 )
-def test_heavy_blocks_sink_into_light_ones_by_what_is_told(scenario: Scenario, is_warned: bool) -> None:
+def test_heavy_blocks_sink_into_light_ones_by_what_is_reported(scenario: Scenario, is_warned: bool) -> None:
     told = describe(scenario).rigid
     run = Simulation(build_scene(scenario))
     heavy = len(run.bodies) - 1
@@ -111,7 +111,7 @@ def test_sag_goes_with_the_square_of_the_substep_and_not_with_the_mass() -> None
     assert scene_sag(1e-4, heavy, 9.81).sag == pytest.approx(scene_sag(1e-4, [one, two], 9.81).sag)
 
 
-def test_pairs_are_told_without_springs_and_with_what_they_give_way_by() -> None:
+def test_pairs_are_reported_without_springs_and_with_what_they_give_way_by() -> None:
     ground, block = describe(three_blocks(time={"scheme": "nonsmooth"})).pairs
     for pair in (ground, block):
         assert pair.normal_damping_ratio is pair.shear_damping_ratio is pair.shear_stiffness_ratio is None

@@ -129,7 +129,7 @@ def test_refusals_say_what_is_wrong() -> None:
 
 @pytest.mark.parametrize("model", ["surface", "kernel", "particles"])
 def test_block_moves_by_a_small_share_of_the_smallest_side_in_a_step(model: str) -> None:
-    """Otherwise it could pass through a thin one between two looks at what touches what."""
+    """Otherwise it could pass through a thin one between two examines what touches what."""
     plate = {"y": 1.0, "x": 1.0, "height": 2e-3, "fixed": True}
     soft = {"stiffness_scale": 1e-6, "model": model, "particle_spacing": 5e-4}
     motion = {"kind": "harmonic", "amplitude": 0.1, "frequency": 50.0}

@@ -48,7 +48,7 @@ def _share(count: int, total: int) -> Row:
 
 
 def _has_range(pair: Pair) -> bool:
-    """Tell whether the limits are those of the repeats, and no tolerance about them."""
+    """Return True if the limits are those of the repeats, and no tolerance about them."""
     return pair.limits == (pair.measured.minimum, pair.measured.maximum)
 
 

@@ -45,7 +45,7 @@ def root(x: Lanes) -> Lanes:
 
 
 def is_all(mask: Mask) -> bool:
-    """Tell whether all flags are set, or a single one."""
+    """Return True if all flags are set, or a single one."""
     return bool(np.all(mask))
 
 

@@ -46,5 +46,5 @@ def dashpot_weight(law: int, begin: float, end: float, at: float) -> float:
 
 @kernel
 def has_constant_stiffness(law: int) -> bool:
-    """Tell whether the slope of the normal force is the same at every overlap."""
+    """Return True if the slope of the normal force is the same at every overlap."""
     return law == LINEAR

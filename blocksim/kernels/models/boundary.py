@@ -61,7 +61,7 @@ def last_within(along: float, width: float, spacing: float, last: int) -> int:
 
 @rare_kernel
 def is_particle_near(owner: Record, particle: Record, touched: Record, reach: float) -> bool:
-    """Tell whether a particle of `owner` lies inside the rectangle `touched` grown by `reach` (m) on every side."""
+    """Return True if a particle of `owner` lies inside the rectangle `touched` grown by `reach` (m) on every side."""
     x0, y0, c, s = relative_pose(owner, touched)
     px = x0 + c * particle.x - s * particle.y
     py = y0 + s * particle.x + c * particle.y

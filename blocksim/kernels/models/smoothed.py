@@ -128,7 +128,7 @@ def smoothed_overlap(sums: Record) -> float:
 
 @rare_kernel
 def resolve_particle(owner: Record, particle: Record, touched: Record, world: World, point: Record) -> bool:
-    """Fill place, normal (out of `touched`), overlap and share of one particle; tell whether it is in contact."""
+    """Fill place, normal (out of `touched`), overlap and share of one particle; return whether it is in contact."""
     point.x, point.y = to_world(owner, particle.x, particle.y)
     dx = point.x - touched.x
     dy = point.y - touched.y

@@ -19,7 +19,7 @@ UPPER_FACE = 1  # of a piece of ground, the only one that counts
 
 @kernel
 def opens(face: int, sx: float, sy: float, c: float, s: float) -> bool:
-    """Tell whether a corner (sx, sy = +-1) of a body turned by (c, s) against another can touch that one's face."""
+    """Return True if a corner (sx, sy = +-1) of a body turned by (c, s) against another can touch that one's face."""
     if face == 0:
         return -sx * c >= -CONE_TOLERANCE and sy * s >= -CONE_TOLERANCE
     if face == 1:

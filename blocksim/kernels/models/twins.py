@@ -30,7 +30,7 @@ def outward_along(body: Record, corner: int, tx: float, ty: float) -> float:
 
 @rare_kernel
 def same_end(of_a: Record, of_b: Record, a: Record, b: Record) -> bool:
-    """Tell whether a corner of a and a corner of b (both points) mark the same end of one face contact."""
+    """Return True if a corner of a and a corner of b (both points) mark the same end of one face contact."""
     if of_a.nx * of_b.nx + of_a.ny * of_b.ny < PARALLEL:
         return False
     end_a = outward_along(a, of_a.slot, -of_a.ny, of_a.nx)
@@ -40,7 +40,7 @@ def same_end(of_a: Record, of_b: Record, a: Record, b: Record) -> bool:
 
 @rare_kernel
 def is_oblique(a: Record, b: Record) -> bool:
-    """Tell whether no face of a is nearly parallel to a face of b, so that they touch in one point at most."""
+    """Return True if no face of a is nearly parallel to a face of b, so that they touch in one point at most."""
     c = abs(a.cos * b.cos + a.sin * b.sin)
     s = abs(a.sin * b.cos - a.cos * b.sin)
     return min(c, s) > CONE_TOLERANCE
@@ -48,7 +48,7 @@ def is_oblique(a: Record, b: Record) -> bool:
 
 @rare_kernel
 def coincide(one: Record, two: Record) -> bool:
-    """Tell whether two corners meet: they are about as near to one another as they are deep."""
+    """Return True if two corners meet: they are about as near to one another as they are deep."""
     dx = one.x - two.x
     dy = one.y - two.y
     reach = CLOSE * max(one.depth, two.depth)
@@ -57,7 +57,7 @@ def coincide(one: Record, two: Record) -> bool:
 
 @rare_kernel
 def was_touching(slot: int, contacts: Records, count: int) -> bool:
-    """Tell whether a corner is among the first `count` contacts."""
+    """Return True if a corner is among the first `count` contacts."""
     for j in range(count):
         if contacts[j].slot == slot:
             return True

@@ -26,7 +26,7 @@ LOOK, GATHER, CHECK = range(3)  # what one thread does for all
 
 @kernel
 def is_supported(scene: Nonsmooth) -> bool:
-    """Tell whether every free body has a contact that presses, where there is gravity."""
+    """Return True if every free body has a contact that presses, where there is gravity."""
     world = scene.world
     controls = world.controls[0]
     if controls.gravity_x == 0.0 and controls.gravity_y == 0.0:
@@ -46,7 +46,7 @@ def is_supported(scene: Nonsmooth) -> bool:
 
 @kernel
 def check(scene: Nonsmooth) -> int:
-    """Look whether the run may go on: finite, not at rest for the hold time."""
+    """Check that the run may continue: finite, not at rest for the hold time."""
     world = scene.world
     controls = world.controls[0]
     clock = world.clock[0]

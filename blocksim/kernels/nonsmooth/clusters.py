@@ -82,13 +82,13 @@ def energy(contacts: Contacts, line: Record, vx: float, vy: float, spin: float) 
 
 @rare_kernel
 def has_gain(root: Record) -> bool:
-    """Tell whether impacts have created energy in a cluster."""
+    """Return True if impacts have created energy in a cluster."""
     return root.now > root.then * (1.0 + ROUND_OFF)
 
 
 @rare_kernel
 def weigh(contacts: Contacts) -> bool:
-    """Sum up the energies of all clusters before and after a round; tell whether any has gained."""
+    """Sum up the energies of all clusters before and after a round; return whether any has gained."""
     lines = contacts.lines
     bodies = contacts.impacts
     for body in bodies:

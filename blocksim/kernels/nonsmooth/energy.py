@@ -71,7 +71,7 @@ def contact_points(scene: Nonsmooth) -> tuple[int, float]:
 
 @rare_kernel
 def has_excessive_overlap(scene: Nonsmooth) -> bool:
-    """Tell whether an overlap exceeds the limit given, or a share of the smallest side of its pair."""
+    """Return True if an overlap exceeds the limit given, or a share of the smallest side of its pair."""
     given = scene.world.controls[0].max_overlap
     bodies = scene.world.bodies
     for r in range(scene.contacts.stepping[0].row_count):

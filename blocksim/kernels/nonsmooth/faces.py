@@ -1,4 +1,4 @@
-"""Faces of rectangles: which one looks at a body, what of the other body's face lies over it, and the points there.
+"""Faces of rectangles: which one examines a body, what of the other body's face lies over it, and the points there.
 
 One face is the reference: its line carries both points, and its normal is theirs. The opposite face of the other body
 is clipped to its length.
@@ -29,7 +29,7 @@ class Face(NamedTuple):
 class Edge(NamedTuple):
     """The two ends of the other body's face in the frame of a reference face: along it to the right, and above it (m).
 
-    The first is the left one. `is_left`, `is_right` tell whether the ends themselves can touch.
+    The first is the left one. `is_left`, `is_right` return whether the ends themselves can touch.
     """
 
     left: Lanes
@@ -164,7 +164,7 @@ def points_of(face: Face, edge: Edge, a: Block, b: Block, is_of_b: Mask, margin:
 
 @kernel
 def has_point(points: Points) -> Mask:
-    """Tell whether a manifold has a point."""
+    """Return True if a manifold has a point."""
     return lesser(points.gap_one, points.gap_two) < FAR
 
 

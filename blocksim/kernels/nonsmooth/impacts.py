@@ -8,8 +8,8 @@ are hit, with u as it is then:
     0 <= lambda  complementary to  J v + e u >= 0
 
 Points that touched when the substep began and neither approach nor part push back at once (target zero): blocks that
-press on one another are struck as one. All other points wait until they are hit in a round to come. Rounds go on until
-nothing approaches; then gravity and what rests are solved as ever, and points that were hit keep their rebound.
+press on one another are struck as one. All other points wait until they are hit in a round to come. Rounds continue
+until nothing approaches; then gravity and what rests are solved as ever, and points that were hit keep their rebound.
 
 Without friction the energy of a round changes by -(1 - e) / 2 sum(lambda |u|): none is created, and with e = 1 none is
 lost (M. Smith et al., Reflections on simultaneous impact, ACM Trans. Graph. 31 (2012) 106). With friction Newton's

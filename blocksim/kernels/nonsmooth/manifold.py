@@ -82,7 +82,7 @@ def write_points(row: Record, points: Points, motion: Motion) -> None:
 
 @kernel
 def passes_edge(best: Lanes, other: Lanes, a: Block, b: Block) -> Mask:
-    """Tell whether two faces at a distance `best` (m) overlap so little that the blocks meet at other faces.
+    """Return True if two faces at a distance `best` (m) overlap so little that the blocks meet at other faces.
 
     `other` is the distance (m) along the other axis, which is negative by what they overlap. A block that slides over
     the flush joint of two others would else be stopped by the side of the second, as it sinks in by a little.
@@ -138,7 +138,7 @@ def points_of_blocks(a: Block, b: Block, margin: float) -> tuple[Points, Mask]:
 
 @kernel
 def reach_of(row: Record) -> int:
-    """Tell whether a row within the margin has a point that touches or pressed in the last substep."""
+    """Return True if a row within the margin has a point that touches or pressed in the last substep."""
     is_touching = min(row.gap_one, row.gap_two) <= 0.0 or row.normal_one > 0.0 or row.normal_two > 0.0
     return TOUCHING if is_touching else OPEN
 
@@ -198,7 +198,7 @@ def write_four(rows: Records, places: tuple[int, int, int, int], points: Points,
 
 @kernel
 def are_four_of_blocks(rows: Records, first: int, bodies: Records) -> bool:
-    """Tell whether four pairs, from row `first` on, are of blocks only, not of pieces of ground or the ground."""
+    """Return True if four pairs, from row `first` on, are of blocks only, not of pieces of ground or the ground."""
     for r in range(first, first + WIDTH):
         row = rows[r]
         if row.b == bodies.size - 1 or bodies[row.a].faces != ALL or bodies[row.b].faces != ALL:

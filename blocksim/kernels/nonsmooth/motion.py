@@ -68,7 +68,7 @@ def drift_all(lines: Records, first: int, last: int, h: float) -> None:
 
 @kernel
 def is_in_flight(line: Record, before: Record, kx: float, ky: float) -> bool:
-    """Tell whether nothing but the last kick (m/s) has changed a velocity in the last substep."""
+    """Return True if nothing but the last kick (m/s) has changed a velocity in the last substep."""
     off = abs(line.vx - before.vx - kx) + abs(line.vy - before.vy - ky)
     return off <= IN_FLIGHT * (abs(kx) + abs(ky))
 

@@ -1,8 +1,8 @@
-"""The pair list: when it has to be made anew, and who is in it.
+"""The pair list: when it has to be made again, and who is in it.
 
 Every body looks for neighbours within its reach: farther where it is faster, so that a few that fly do not have the
-list of all made anew at every step. A pair is listed where two reaches meet, and the list is good until a body has used
-up its own, less what it may move in the step to come.
+list of all made again at every step. A pair is listed where two reaches meet, and the list is good until a body has
+used up its own, less what it may move in the step to come.
 
 Bodies that all move alike come no nearer to each other, and over level ground only their way down counts. So travel is
 measured against the mean motion along x, unless something fixed stands in its way: then against that of the supports,
@@ -20,7 +20,7 @@ from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.colours import colour_pairs, keep_impulses, most_groups, place_rows
 from blocksim.kernels.support import has_motion
 
-STEPS = 16.0  # that a body should be able to go on before its reach is used up
+STEPS = 16.0  # that a body should be able to continue before its reach is used up
 MOST_MARGIN = 0.5  # of the least reach of two bodies
 
 
@@ -66,7 +66,7 @@ def corner_speed(body: Record, frame: Frame) -> float:
 
 @kernel
 def look(scene: Nonsmooth) -> bool:
-    """Fix the margin of the step to come, and make the pair list anew if bodies have come too far.
+    """Fix the margin of the step to come, and make the pair list again if bodies have come too far.
 
     Returns False where the list does not fit into its arrays; nothing has changed then.
     """
@@ -121,7 +121,7 @@ def add(scene: Nonsmooth, count: int, i: int, j: int) -> int:
 
 @kernel
 def are_near(scene: Nonsmooth, i: int, j: int) -> bool:
-    """Tell whether the reaches of two bodies meet, at least one of them free."""
+    """Return True if the reaches of two bodies meet, at least one of them free."""
     one = scene.spots[i]
     two = scene.spots[j]
     dx = one.x - two.x
@@ -189,7 +189,7 @@ def list_pairs(scene: Nonsmooth) -> int:
 
 @rare_kernel
 def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
-    """Make the pair list anew; return False, with the rows untouched, where it does not fit."""
+    """Make the pair list again; return False, with the rows untouched, where it does not fit."""
     note_places(scene, frame)
     count = list_pairs(scene)
     if count > scene.kept.size:

@@ -1,8 +1,8 @@
 """What a substep does to the rows, four at a time: warm start, position pass, velocity pass, books.
 
 Formulas: __init__.py. Velocities are read, changed by all impulses of a row and written back; effective masses are
-computed anew each time, which is cheaper than to load them. Bodies that are fixed are never written to, so that rows of
-one colour share nothing that changes.
+computed again each time, which is cheaper than to load them. Bodies that are fixed are never written to, so that rows
+of one colour share nothing that changes.
 """
 
 from blocksim.kernels.arrays import Record, Records

@@ -4,8 +4,8 @@ A piece is a line with the solid below. Of its face and the four of the block, t
 least tells how the two meet (separating axes: S. Gottschalk, TR96-024, UNC Chapel Hill (1996)), and all four count,
 whichever way they look: a block beside a step reaches far below the upper face of that step, but it is its side that is
 in touch, and a block on a step reaches as far behind the riser as it is long, but it is its lower face. Where it is a
-face of the block, an end of the piece is what it touches, or nothing: ends at which the ground goes on belong to one of
-the two pieces or are no edges.
+face of the block, an end of the piece is what it touches, or nothing: ends at which the ground continues belong to one
+of the two pieces or are no edges.
 """
 
 from typing import NamedTuple
@@ -88,14 +88,14 @@ def best_meeting(block: Block, piece: Block, corners: int) -> Meeting:
 
 @kernel
 def is_edge(meeting: Meeting) -> bool:
-    """Tell whether the end of a piece of ground that is nearest to the face of a block is an edge that can touch."""
+    """Return True if the end of a piece of ground that is nearest to the face of a block is an edge that can touch."""
     edge = meeting.edge
     return bool(edge.is_left) if edge.left_gap < edge.right_gap else bool(edge.is_right)
 
 
 @kernel
 def touches_edge(meeting: Meeting, corners: int) -> bool:
-    """Tell whether a face of a block looks at the edge at which a piece of ground ends, not at the piece beyond it.
+    """Return True if a face of a block examines the edge at which a piece of ground ends, not at the piece beyond it.
 
     The upper faces of two pieces that join at a right angle look at right angles; at a sharper edge, and at the end of
     a wall, blocks come from farther round.

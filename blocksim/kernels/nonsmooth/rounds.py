@@ -222,7 +222,7 @@ def aim_rest(contacts: Contacts, begin: int, end: int) -> None:
 def bring_back(contacts: Contacts, begin: int, end: int, are_hit: bool) -> None:
     """Give rows of clusters that were not hit their impulses back, or those that were hit the impulses of all rounds.
 
-    Impacts are over, so that no substep begins with their impulses; at the end of a step they are told.
+    Impacts are over, so that no substep begins with their impulses; at the end of a step they are reported.
     """
     for m in range(begin, end):
         group = contacts.groups[m]

@@ -53,7 +53,7 @@ class PairFriction(Table):
             return value
         if isinstance(value, int | float | str) and not isinstance(value, bool):
             return {"static": value}
-        message = f"{q.shown(value)} is no friction; write a number, an angle, or {{ static, kinetic }}"
+        message = f"{q.shown(value)} is not a friction; write a number, an angle, or {{ static, kinetic }}"
         raise q.invalid(message)
 
     @model_validator(mode="after")
@@ -98,7 +98,7 @@ class Restitution(Table):
             return {"block_block": value, "block_ground": value}
         if isinstance(value, Mapping | Restitution):
             return value
-        message = f"{q.shown(value)} is no restitution; write a number or {{ block_block, block_ground }}"
+        message = f"{q.shown(value)} is not a restitution; write a number or {{ block_block, block_ground }}"
         raise q.invalid(message)
 
     @classmethod

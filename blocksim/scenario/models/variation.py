@@ -117,7 +117,7 @@ def read_any(value: object) -> Variation:
 
 def _levels(value: object, tables: str) -> tuple[Any, ...]:
     if not isinstance(value, list | tuple):
-        message = f"{q.shown(value)} is no variation; write a list or {tables}, and the key in quotes"
+        message = f"{q.shown(value)} is not a variation; write a list or {tables}, and the key in quotes"
         raise q.invalid(message)
     if not value:
         message = "the list of values is empty"
@@ -135,7 +135,9 @@ def _refuse_distribution(value: Mapping[str, Any]) -> None:
 def _refuse_slips(value: Mapping[str, Any], known: tuple[str, ...], needed: tuple[str, ...]) -> None:
     """Refuse keys that a variation does not have, and tell which are missing."""
     if not set(value) & set(known):
-        message = f"{q.shown(value)} is no variation; write a list or {{ {', '.join(needed)} }}, and the key in quotes"
+        message = (
+            f"{q.shown(value)} is not a variation; write a list or {{ {', '.join(needed)} }}, and the key in quotes"
+        )
         raise q.invalid(message)
     for key in value:
         if key not in known:

@@ -19,7 +19,7 @@ PLACE = 2  # numbers that say where a hole is
 
 def _hole(value: object) -> object:
     if not isinstance(value, list | tuple) or len(value) != PLACE:
-        message = f"{q.shown(value)} is no place for a hole; write [row, column], counted from 1 at the lower left"
+        message = f"{q.shown(value)} is not a hole; write [row, column], counted from 1 at the lower left"
         raise q.invalid(message)
     return value
 

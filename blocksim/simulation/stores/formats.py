@@ -32,6 +32,6 @@ FORMATS: dict[str, Format] = {
 def format_named(name: str) -> Format:
     """Return what writes files of a format. Raises InvalidInputError for an unknown one."""
     if name not in FORMATS:
-        message = f"--format {name}: no such format, choose {' or '.join(FORMATS)}"
+        message = f"--format {name}: unsupported format; use {' or '.join(FORMATS)}"
         raise InvalidInputError(message)
     return FORMATS[name]

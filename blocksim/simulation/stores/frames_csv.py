@@ -1,4 +1,4 @@
-"""All frames of a run as one tidy CSV table: a row a frame and block, units in the heads."""
+"""All frames of a run as one tidy CSV table: one row per frame and block, units in the heads."""
 
 import csv
 import math

@@ -1,4 +1,4 @@
-"""Opens run.h5 for reading: of a finished run, of one that was killed, and of one that is still going on.
+"""Opens run.h5 for reading: of a finished run, of one that was killed, and of one that is still in progress.
 
 A file whose writer has not closed it says so in its superblock, and HDF5 opens such a file in SWMR mode only, in which
 it tries for ever to read what is damaged. So it is shown to HDF5 as if it were closed: with the marks of the writer
@@ -44,7 +44,7 @@ def opened(path: Path) -> Iterator[Any]:
 
 
 def is_left_open(path: Path) -> bool:
-    """Tell whether a file has a writer who has not closed it: a run that goes on, or was killed."""
+    """Return True if a file has a writer who has not closed it: a run that continues, or was killed."""
     try:
         head = read_head(path, SUPERBLOCK.size)
     except BlocksimError:

@@ -1,4 +1,4 @@
-"""Reads run.h5: of a finished run, of one that was killed, and of one that is still going on."""
+"""Reads run.h5: of a finished run, of one that was killed, and of one that is still in progress."""
 
 import math
 import time
@@ -25,7 +25,7 @@ def read_frames(path: Path, scenario: Scenario) -> Frames:
     """Return the committed frames of a run file; `scenario` is the one that lies beside it.
 
     Raises InputMissingError, or InvalidInputError when the file is not one of ours, damaged or still empty. What a run
-    that goes on writes at this moment may look like damage, so a file without an end is tried a few times.
+    that continues writes at this moment may look like damage, so a file without an end is tried a few times.
     """
     placed = place_bodies(scenario)
     for pause in PAUSES:

@@ -49,7 +49,7 @@ def group(file: Any, name: str) -> Any:
 
 
 def has(file: Any, name: str) -> bool:
-    """Tell whether there is a member or a link of this name, which is not followed."""
+    """Return True if there is a member or a link of this name, which is not followed."""
     return bool(file.id.links.exists(name.encode()))
 
 

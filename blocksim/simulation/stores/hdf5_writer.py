@@ -122,7 +122,7 @@ class FrameFile:
         data_set.attrs["unit"] = unit
 
     def _reserve(self, size: int) -> None:
-        """Make sure of the space on the disk, and of what HDF5 adds: after a write that fails it cannot go on."""
+        """Make sure of the space on the disk, and of what HDF5 adds: after a write that fails it cannot continue."""
         if hasattr(os, "posix_fallocate"):
             os.posix_fallocate(self.file.id.get_vfd_handle(), self.file.id.get_filesize(), size + RESERVE)
 
@@ -186,7 +186,7 @@ class FrameFile:
             raise OutputError(message) from error
 
     def close(self) -> None:
-        """Commit, close the file normally, wait for the disk. Raises OutputError, unless trouble was told already."""
+        """Commit, close the file normally, wait for the disk. Raises OutputError, once."""
         if self.is_broken:
             with contextlib.suppress(OSError, RuntimeError):
                 self.file.close()

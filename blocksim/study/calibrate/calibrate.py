@@ -58,8 +58,8 @@ def calibrate(  # noqa: PLR0913 - one argument for each option of the command
     """Look for the best values in `trials` trials, measure how probable agreement is with them, write a scenario file.
 
     The file is `out` (default: results/NAME/calibrate-HASH/scenario.toml); beside it every trial is kept as it ends, in
-    FILE.trials.jsonl. `resume` goes on with trials that are there, `overwrite` replaces them and the file. `on_trial`
-    is told every new trial, the best so far, and how many are to be made. Raises OutputExistsError, OutputError,
+    FILE.trials.jsonl. `resume` continues with trials that are there, `overwrite` replaces them and the file. `on_trial`
+    is reported every new trial, the best so far, and how many are to be made. Raises OutputExistsError, OutputError,
     UnavailableError without the extra `study`, and StoppedEarlyError on Ctrl-C.
     """
     path = out or files.RESULTS / plan.base.name / f"calibrate-{plan.name()}" / WRITTEN
@@ -81,9 +81,9 @@ def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None
     if path.is_dir():
         raise OutputExistsError(f"{path}: this is a folder; name a file")
     if path.exists() and not overwrite:
-        raise OutputExistsError(f"{path}: is there already; --overwrite replaces it, --out FILE writes elsewhere")
+        raise OutputExistsError(f"{path}: already exists; --overwrite replaces it, --out FILE writes elsewhere")
     if journal.exists() and journal.stat().st_size and not (resume or overwrite):
-        message = f"{journal}: trials of a calibration are there; --resume goes on with them, --overwrite starts again"
+        message = f"{journal}: trials of a calibration are there; --resume continues them, --overwrite starts again"
         raise OutputExistsError(message)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -109,7 +109,7 @@ def _searched(plan: Plan, journal: Path, trials: int, on_trial: OnTrial) -> Tria
                 if trial.number > done:
                     on_trial(trial, best, trials)
         except KeyboardInterrupt:
-            message = f"stopped after {len(finished_trials(study))} of {trials} trials; --resume does the others"
+            message = f"stopped after {len(finished_trials(study))} of {trials} trials; --resume runs the others"
             raise StoppedEarlyError(message) from None
     if best is None:
         raise InvalidInputError("at least one trial is needed")

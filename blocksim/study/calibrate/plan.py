@@ -48,7 +48,7 @@ class Plan:
         return ranges_of(self.table)
 
     def fingerprint(self) -> dict[str, object]:
-        """Return all that decides a trial, to tell whether trials in a journal belong to this plan."""
+        """Return all that decides a trial, to return whether trials in a journal belong to this plan."""
         return {
             "scenario": scenario_hash(self.base),
             "priors": [str((one.key, one.low, one.high, one.unit, one.log)) for one in self.priors],
@@ -82,7 +82,7 @@ def read_plan(
     if not fit.tables:
         raise InvalidInputError(NO_FIT)
     if experiment is not None:
-        load_table(experiment)  # so that its mistakes are told of the option
+        load_table(experiment)  # so that its mistakes are reported of the option
         document = document.with_values({TABLE: said_by_hand(TABLE, str(experiment.absolute()))})
     fits = varied(document, fit, FIT, MODE)
     scattered = _scattered(document, scatter)

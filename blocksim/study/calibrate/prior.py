@@ -9,7 +9,7 @@ from blocksim.scenario.models.variation import Uniform
 from blocksim.scenario.units import parse_unit
 
 STEPS = 1000  # as fine as this part of the prior are the values that are tried
-AT_BOUND = 0.01  # of the prior's width: nearer to a bound, a value is told to lie at it
+AT_BOUND = 0.01  # of the prior's width: nearer to a bound, a value is reported to lie at it
 _UNIT = re.compile(r"\s*[-+]?[0-9._]+(?:[eE][-+]?[0-9]+)?\s*(.*?)\s*", re.DOTALL)
 
 
@@ -42,7 +42,7 @@ class Prior:
         return float(str(value).split(" ", maxsplit=1)[0])
 
     def lies_at_bound(self, value: object) -> bool:
-        """Tell whether a value is within a hundredth of the prior's width of one of its ends."""
+        """Return True if a value is within a hundredth of the prior's width of one of its ends."""
         ends, number = (self.low, self.high), self.number(value)
         if self.log:
             ends, number = (log(self.low), log(self.high)), log(number)

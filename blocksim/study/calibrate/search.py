@@ -1,4 +1,4 @@
-"""The search for the best values: trials kept in a journal, so that a search that was stopped goes on.
+"""The search for the best values: trials kept in a journal, so that a search that was stopped continues.
 
 Trials come one after the other. The first ones are points of a scrambled Sobol sequence over the priors, the others are
 suggested by a tree-structured Parzen estimator (J. Bergstra et al., NIPS 24 (2011) 2546-2554; optuna's, multivariate)

@@ -116,7 +116,7 @@ def toml_value(value: object) -> str:
 
 
 def _says(text: str, scenario: Scenario, folder: Path) -> bool:
-    """Tell whether a text, read in a folder, gives exactly this scenario."""
+    """Return True if a text, read in a folder, gives exactly this scenario."""
     with suppress(BlocksimError):
         found = replace(Document.parse(text, folder=folder), allow_outside=True).build()
         beside = [one.model_copy(update={"motion": None}) for one in (found, scenario)]  # the hash has its content

@@ -25,7 +25,7 @@ GATHERING = 1.0  # s until the rows of a batch that has ended are here
 AHEAD = 2  # batches a thread of a worker
 POLL = 0.1  # s
 TALKERS = {"asyncio", "dask", "distributed", "tornado"}
-COUNT_EVERY = 2.0  # s between two looks at how many workers there are
+COUNT_EVERY = 2.0  # s between two examines how many workers there are
 
 
 def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
@@ -35,7 +35,7 @@ def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None,
 
 
 def check(setting: Setting) -> None:
-    """Look whether the scheduler answers, before anything is written. Raises what `connected` raises."""
+    """Check that the scheduler answers, before anything is written. Raises what `connected` raises."""
     with connected(setting.scheduler or ""):
         pass
 
@@ -48,7 +48,9 @@ def connected(address: str) -> Iterator[Any]:
         try:
             client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
         except Exception as error:  # noqa: BLE001 - whatever answers there, or does not, is no scheduler
-            message = f"no Dask scheduler answers at {address} ({type(error).__name__}); start one, or mend --scheduler"
+            message = (
+                f"no Dask scheduler answers at {address} ({type(error).__name__}); start one or correct --scheduler"
+            )
             raise UnavailableError(message) from None
         try:
             yield client
@@ -59,7 +61,7 @@ def connected(address: str) -> Iterator[Any]:
 
 @contextmanager
 def silence() -> Iterator[None]:
-    """Keep the loggers of Dask, and of what it is made of, quiet: a lost scheduler is told in one line, by us.
+    """Keep the loggers of Dask, and of what it is made of, quiet: a lost scheduler is reported in one line, by us.
 
     Each of them has a level and a handler of its own, so that none can be silenced through its parent.
     """
@@ -146,7 +148,7 @@ class Submission:
             self._scheduler_has_gone()
 
     def _scheduler_has_gone(self) -> NoReturn:
-        message = f"the Dask scheduler at {self.setting.scheduler} has gone; the same command does the other cases"
+        message = f"the Dask scheduler at {self.setting.scheduler} has gone; rerun the command to finish"
         raise UnavailableError(message)
 
 

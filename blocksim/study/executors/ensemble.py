@@ -67,7 +67,7 @@ class Running:
 
 
 def is_still_running() -> bool:
-    """Tell whether steps are under way that nobody waits for any more; they cannot be stopped but with the process."""
+    """Return True if steps are under way that nobody waits for; only the end of the process stops them."""
     return any(thread.name == THREAD for thread in threading.enumerate())
 
 

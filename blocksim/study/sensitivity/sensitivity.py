@@ -44,7 +44,7 @@ class Indices:
 
     @property
     def varies(self) -> bool:
-        """Tell whether there is a variation to be explained."""
+        """Return True if there is a variation to be explained."""
         return bool(self.numbers)
 
 

@@ -70,7 +70,7 @@ def frame_indices(frames: Frames, most_bytes: int = MOST_BYTES) -> Indices:
 
 
 def pack_forces(frames: Frames, kept: Indices, tilt: float) -> dict[str, Any] | None:
-    """Return the contacts of some frames: places (mm) and forces (N), each on the block that it pushes up.
+    """Return the contacts of some frames: places (mm) and forces (N), each on the upper block.
 
     `ends` counts contacts up to and with each frame; `scale` is mm for a newton, and `longest` (mm) where arrows are
     cut. None where no contacts were stored.

@@ -89,7 +89,7 @@ class FoundSweep:
 
     @property
     def outcomes(self) -> list[tuple[int, ...] | None]:
-        """The class of every case: turns of the blocks rounded to quarters (degrees), None where it did not finish."""
+        """The class of every case: final rotations rounded to quarter turns (degrees), None where it did not finish."""
         with np.errstate(invalid="ignore"):
             turns = np.where(self.finished[:, None], np.round(self.rotation_deg / QUARTER), 0.0) * QUARTER
         return [tuple(int(turn) for turn in row) if ok else None for row, ok in zip(turns, self.finished, strict=True)]

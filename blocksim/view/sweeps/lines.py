@@ -34,7 +34,7 @@ def refusal(sweep: FoundSweep) -> str:
 
 
 def suits(sweep: FoundSweep) -> bool:
-    """Tell whether inputs go together, or a column for each value of the second one is not too much."""
+    """Return True if inputs go together, or a column for each value of the second one is not too much."""
     if refusal(sweep) or (sweep.is_sampled and len(sweep.inputs) > 1):
         return False
     _, other = _axis_and_other(sweep)

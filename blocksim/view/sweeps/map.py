@@ -94,7 +94,7 @@ class _Map:
 
 
 def suits(sweep: FoundSweep) -> bool:
-    """Tell whether two inputs can be axes and the others, at most one, columns."""
+    """Return True if two inputs can be axes and the others, at most one, columns."""
     axes = _axes_of(sweep)
     if refusal(sweep):
         return False

@@ -60,7 +60,7 @@ def refusal(sweep: FoundSweep) -> str:
 
 
 def suits(sweep: FoundSweep) -> bool:
-    """Tell whether there are inputs to set against each other."""
+    """Return True if there are inputs to set against each other."""
     return len(sweep.inputs) > 1
 
 

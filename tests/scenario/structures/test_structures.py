@@ -98,7 +98,9 @@ SHAPES = {
 
 @pytest.mark.parametrize(("kind", "keys"), [(kind, keys) for kind, (keys, _) in SHAPES.items()])
 @pytest.mark.parametrize(("left", "bottom"), [(0.0, 0.1), (-0.3, -0.025)])
-def test_a_structure_stands_where_it_is_told(kind: str, keys: Mapping[str, object], left: float, bottom: float) -> None:
+def test_a_structure_stands_where_it_is_reported(
+    kind: str, keys: Mapping[str, object], left: float, bottom: float
+) -> None:
     here = KINDS[kind].model_validate({"kind": kind, "block": "brick", **keys})
     there = here.model_copy(update={"left": left, "bottom": bottom})
     for pose, moved in zip(here.place(BRICK), there.place(BRICK), strict=True):

@@ -30,7 +30,7 @@ def test_every_contact_has_a_row_with_the_names_of_its_bodies(tmp_path: Path) ->
     assert float(found[0]["overlap_mm"]) == pytest.approx(1e-3)
 
 
-def test_trouble_is_told_and_leaves_nothing(tmp_path: Path) -> None:
+def test_trouble_is_reported_and_leaves_nothing(tmp_path: Path) -> None:
     contacts = Contacts(np.zeros(1, dtype=np.int64), empty_rows(0))
     with pytest.raises(OutputError, match="cannot be written: No such file"):
         write_contacts_csv(tmp_path / "none" / "contacts.csv", toppling(1, steps=1), contacts)

@@ -8,5 +8,5 @@ from blocksim.simulation.stores.formats import FORMATS, format_named
 
 def test_formats_are_found_and_misspelt_ones_told() -> None:
     assert [format_named(name) for name in FORMATS] == list(FORMATS.values())
-    with pytest.raises(InvalidInputError, match="--format vtkhfd: no such format, choose csv or vtkhdf"):
+    with pytest.raises(InvalidInputError, match="--format vtkhfd: unsupported format; use csv or vtkhdf"):
         format_named("vtkhfd")

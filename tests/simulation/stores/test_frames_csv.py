@@ -54,7 +54,7 @@ def test_hostile_names_come_back_as_they_are(tmp_path: Path) -> None:
     assert tuple(row["block"] for row in rows_of(tmp_path / "frames.csv", frames)) == HOSTILE
 
 
-def test_trouble_is_told_and_leaves_nothing(tmp_path: Path) -> None:
+def test_trouble_is_reported_and_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot be written: No such file"):
         write_csv(tmp_path / "none" / "frames.csv", toppling(1))
     (tmp_path / "folder.csv").mkdir()

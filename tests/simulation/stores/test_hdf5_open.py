@@ -62,7 +62,7 @@ def test_a_file_that_was_not_closed_gives_all_committed_frames(killed: Path, sce
     assert killed.read_bytes() == before, "reading has changed the file"
 
 
-def test_damage_in_a_file_that_was_not_closed_is_told_at_once(killed: Path, scenario: Scenario) -> None:
+def test_damage_in_a_file_that_was_not_closed_is_reported_at_once(killed: Path, scenario: Scenario) -> None:
     content = bytearray(killed.read_bytes())  # HDF5 in SWMR mode reads structures with a wrong checksum for ever
     content[60:200] = bytes(140)
     killed.write_bytes(content)

@@ -118,7 +118,7 @@ def test_file_without_a_frame_says_so(soft: Shipped, tmp_path: Path) -> None:
         read_frames(tmp_path / "run.h5", scenario)
 
 
-def test_missing_file_is_told(soft: Shipped, tmp_path: Path) -> None:
+def test_missing_file_is_reported(soft: Shipped, tmp_path: Path) -> None:
     with pytest.raises(InputMissingError, match="no such file"):
         read_frames(tmp_path / "run.h5", soft())
 
@@ -142,6 +142,6 @@ def test_full_disk_is_one_message_and_the_file_stays_readable(
     assert len(read_frames(tmp_path / "run.h5", soft())) == 4
 
 
-def test_folder_that_cannot_be_written_is_told(soft: Shipped, tmp_path: Path) -> None:
+def test_folder_that_cannot_be_written_is_reported(soft: Shipped, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="No such file or directory"):
         open_file(tmp_path / "nowhere" / "run.h5", soft)

@@ -137,7 +137,7 @@ def test_frames_that_are_not_finite_are_left_out(tmp_path: Path) -> None:
         write_vtkhdf(tmp_path / "other.vtkhdf", frames, LEVEL)
 
 
-def test_full_disk_is_told_and_leaves_the_older_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_is_reported_and_leaves_the_older_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def no_room(*_: object) -> int:
         raise OSError(errno.ENOSPC, "No space left on device")
 

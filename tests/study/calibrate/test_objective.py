@@ -57,13 +57,13 @@ def test_guidance_tells_ensembles_without_a_hit_apart() -> None:
     assert near.value > far.value
 
 
-def test_failed_members_count_as_outside_and_are_told() -> None:
+def test_failed_members_count_as_outside_and_are_reported() -> None:
     score = score_of([member(12.0), Member(None, "overlap"), member(math.nan)], RANGES)
     assert (score.members, score.inside, score.failed) == (3, 1, 2)
     assert score.share_inside == pytest.approx(1 / 3)
 
 
-def test_each_quantity_is_told_by_itself() -> None:
+def test_each_quantity_is_reported_by_itself() -> None:
     members = [member(12.0, 0.0), member(20.0), member(22.0), Member(None, "overlap")]
     x, rotation = hits_of(members, RANGES)
     assert (x.median, x.share_inside) == (20.0, 0.25)

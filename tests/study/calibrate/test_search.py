@@ -63,7 +63,7 @@ def test_same_seed_finds_the_same_and_another_seed_something_else(tmp_path: Path
 
 
 @pytest.mark.parametrize("killed_after", [0, 3, FIRST, FIRST + 1, FIRST + 6])
-def test_search_that_died_goes_on_as_if_it_had_not(tmp_path: Path, killed_after: int) -> None:
+def test_search_that_died_continues_as_if_it_had_not(tmp_path: Path, killed_after: int) -> None:
     expected = made(tmp_path / "whole", FIRST + 8)
     with pytest.raises(KilledError):
         made(tmp_path / "cut", FIRST + 8, evaluate=dies_after(killed_after))

@@ -82,7 +82,7 @@ def test_stopped_executor_begins_no_batch(quick: Document, name: str) -> None:
     assert len(made) <= 1
 
 
-def test_unreachable_scheduler_is_told_before_anything_is_written(quick: Document, tmp_path: Path) -> None:
+def test_unreachable_scheduler_is_reported_before_anything_is_written(quick: Document, tmp_path: Path) -> None:
     with pytest.raises(UnavailableError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1 "):
         sweep(quick, {KINETIC: [0.1]}, out=tmp_path / "out", scheduler="tcp://127.0.0.1:1")
     assert list(tmp_path.iterdir()) == []

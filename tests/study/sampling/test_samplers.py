@@ -50,7 +50,7 @@ def test_the_first_two_sobol_dimensions_are_a_net(nominal: Document, seed: int) 
         assert len({(x, y) for x, y in cells}) == 64
 
 
-def test_unbalanced_numbers_of_sobol_points_are_told(nominal: Document) -> None:
+def test_unbalanced_numbers_of_sobol_points_are_reported(nominal: Document) -> None:
     assert remarks(sweep_of(nominal, "sobol", {SCALE: UNIT}, samples=100)) == [
         "100 Sobol points are not balanced; 64 or 128 are"
     ]

@@ -95,7 +95,7 @@ def test_mistakes_are_shown_where_they_are(document: Document, text: str, messag
     assert message in found
 
 
-def test_mistakes_in_a_table_are_told_together(document: Document) -> None:
+def test_mistakes_in_a_table_are_reported_together(document: Document) -> None:
     _, found = told(document, "contact.restitution,time.end [mm],graviti\n2,1,1\n0.1,1,1\n3,1,1\n")
     assert found.count("samples.csv:") == 5
 
@@ -106,6 +106,6 @@ def test_a_wrong_number_far_down_is_found(document: Document, monkeypatch: pytes
     assert "samples.csv:401: contact.restitution: 1.5 is too large" in found
 
 
-def test_a_missing_table_is_told_at_its_key(document: Document) -> None:
+def test_a_missing_table_is_reported_at_its_key(document: Document) -> None:
     with pytest.raises(BlocksimError, match=r'sweep.table: "samples.csv": no such file'):
         with_sweep(document, None)

@@ -37,7 +37,7 @@ def test_equal_values_can_be_rounded(monkeypatch: pytest.MonkeyPatch) -> None:
     assert error == 0.0
 
 
-def test_too_many_frames_are_thinned_and_that_is_told(tmp_path: Path) -> None:
+def test_too_many_frames_are_thinned_and_that_is_reported(tmp_path: Path) -> None:
     frames = write_run(tmp_path / "run", count=41)
     packed = pack_frames(frames, most_bytes=5 * 3 * 6 * 4)
     assert (packed.kept, packed.recorded) == (5, 41)

@@ -28,6 +28,6 @@ def test_blocks_that_stay_are_not_worth_drawing() -> None:
     assert made_up((Input("gravity", "", np.arange(4.0)),)).moving == [1]
 
 
-def test_values_are_told_with_their_units_and_words_as_they_are() -> None:
+def test_values_are_reported_with_their_units_and_words_as_they_are() -> None:
     assert Input("gravity", "m/s^2", np.array([9.81])).told(9.81) == "9.81 m/s^2"
     assert Input("time.scheme", "", np.array([0.0, 1.0]), ("explicit", "nonsmooth")).told(1.0) == "nonsmooth"

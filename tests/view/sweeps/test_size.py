@@ -68,7 +68,7 @@ def test_a_page_that_is_too_small_is_refused(caught: list[Figure], kind: str) ->
     assert caught == []
 
 
-def test_values_are_told_in_the_unit_in_which_they_are_best_read() -> None:
+def test_values_are_reported_in_the_unit_in_which_they_are_best_read() -> None:
     told = Input("structures.0.overlap", "m", np.array([0.009, 0.01]))
     assert told.told(0.009) == "9 mm"
     assert Input("ground.tilt", "rad", np.array([0.1])).told(np.radians(-5.0)) == "−5 °"

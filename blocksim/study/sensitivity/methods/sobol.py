@@ -20,7 +20,7 @@ RESAMPLES = 500
 def _points(keys: int, blocks: int, seed: int) -> Floats:
     sample = loaded("SALib.sample.sobol", PURPOSE).sample
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # no power of two: less even, and right all the same
+        warnings.simplefilter("ignore", UserWarning)  # no power of two: less even, and right anyway
         points = sample(unit_cube(keys), blocks, calc_second_order=False, seed=seed)
     return np.asarray(points, dtype=np.float64)
 
