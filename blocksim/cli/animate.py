@@ -54,4 +54,4 @@ def animate_command(
         note(stored.remark)
     if not quiet:
         gone = f"; {beyond} of {len(stored.frames.names)} blocks fly out of the window" if beyond else ""
-        note(f"animation: {film} ({older}{count} pictures{gone})")
+        note(f"animation: {film} ({older}{count} frames{gone})")

@@ -4,6 +4,7 @@ Python would raise KeyboardInterrupt wherever it happens to be, and print a trac
 the middle of an import, or of leaving.
 """
 
+import atexit
 import os
 import signal
 from collections.abc import Iterator
@@ -35,6 +36,8 @@ def take_interrupts() -> None:
     with suppress(ValueError):  # not the main thread, which alone hears signals
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, Interrupts())
+            # Python's end would bring the system's handler back, and with it another exit code; what is ignored stays
+            atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager

@@ -135,7 +135,8 @@ class Document:
 
     def problem(self, finding: Finding) -> Problem:
         """Show a finding where it can be mended: in a value set from outside, or else in the text."""
-        override = next((o for o in reversed(self.overrides) if self._is_cause(o, finding)), None)
+        causes = (self._is_cause, self._began_its_table)
+        override = next((o for is_it in causes for o in reversed(self.overrides) if is_it(o, finding)), None)
         if override is not None:
             return override_problem(override, finding.path, finding.message, finding.at)
         return self.source.problem(finding.path, finding.message, finding.at)
@@ -145,9 +146,12 @@ class Document:
         inside = found[: len(path)] == path
         on_the_way = path[: len(found)] == found and found not in self.source.places
         beside = finding.relation and path[:-1] == found[:-1]
-        table = found[:-1]
-        in_new_table = bool(table) and table not in self.source.places and path[: len(table)] == table
-        return inside or (bool(found) and on_the_way) or beside or in_new_table
+        return inside or (bool(found) and on_the_way) or beside
+
+    def _began_its_table(self, override: Override, finding: Finding) -> bool:
+        """Return True if the table in which something is missing is not in the text but was begun from outside."""
+        table = finding.path[:-1]
+        return bool(table) and table not in self.source.places and override.path[: len(table)] == table
 
 
 def _pair(key: str, value: object) -> Pair:

@@ -59,8 +59,8 @@ def _finding(entry: ErrorDetails, data: object) -> Finding:
             return Finding((*path, "kind"), f"this key is missing: {_kinds(path)} is needed", at="key")
         case "union_tag_invalid":
             kind = follow(data, (*path, "kind"))
-            hint = did_you_mean(str(kind), KINDS_IN[path[0]]) or f"use {_kinds(path)}"
-            return Finding((*path, "kind"), f"{shown(kind)} is no kind of {str(path[0]).removesuffix('s')}, {hint}")
+            hint = did_you_mean(str(kind), KINDS_IN[path[0]]) or f"choose {_kinds(path)}"
+            return Finding((*path, "kind"), f"unknown {str(path[0]).removesuffix('s')} kind {shown(kind)}; {hint}")
         case "extra_forbidden":
             return _unknown_key(path, data)
         case "blocksim":

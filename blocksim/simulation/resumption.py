@@ -16,7 +16,7 @@ from blocksim.simulation.recorder import Recorder, Rows, rows_of_frames
 from blocksim.simulation.stores.hdf5_reader import read_frames
 
 ANEW = "--overwrite starts again"
-STARTS_ANEW = "the run starts anew"
+STARTS_ANEW = "the run starts again"
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
     paths = [folder / name for name in files.CHECKPOINTS if (folder / name).is_file()]
     if not paths:
         _refuse_other_start(folder, scenario)
-        return Resumption(remarks=(f"{folder}: no checkpoint was written, {STARTS_ANEW}",))
+        return Resumption(remarks=(f"{folder}: no checkpoint saved; {STARTS_ANEW}",))
     return _newest_good(paths, scenario)
 
 

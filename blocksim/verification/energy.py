@@ -27,7 +27,7 @@ PHASES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a step, at which an impact begins
 ROUND_OFF = 1e-12
 RIGID_LEDGER_TOLERANCE = 1e-11  # what impulses take is known to round-off
 LEDGER_TOLERANCE = 1e-3
-SOFT = 0.01  # stiffness scale of the quick size, and of crowds
+SOFT = 0.01  # stiffness scale of the quick size; crowds keep their own
 CROWD = 100  # blocks; scenes of more on springs are run for their first moments only
 CROWD_END = 0.05  # s
 CROWD_END_PARTICLES = 0.002  # s, for the models with boundary particles, which take fifty times as long
@@ -73,7 +73,22 @@ def ledgers(setting: Setting) -> Iterator[Row]:
         if not setting.rigid and load_scenario(path).time.scheme != setting.scheme:
             continue
         tolerance = RIGID_LEDGER_TOLERANCE if setting.rigid else LEDGER_TOLERANCE
-        yield absolute(path.stem, "", 0.0, worst_residual(setting, path), tolerance)
+        yield absolute(_name(setting, path), "", 0.0, worst_residual(setting, path), tolerance)
+
+
+def _name(setting: Setting, path: Path) -> str:
+    """Return the name of a scenario, and how much of it is run where that is not all."""
+    if setting.rigid or not _is_crowd(Document.read(path)):
+        return path.stem
+    return f"{path.stem}, first moments"
+
+
+def _is_crowd(document: Document) -> bool:
+    return len(place_bodies(document.build())) > CROWD
+
+
+def _crowd_end(setting: Setting) -> float:
+    return CROWD_END if setting.model == "surface" else CROWD_END_PARTICLES
 
 
 def asked_of(setting: Setting) -> dict[str, object]:
@@ -102,11 +117,11 @@ def worst_residual(setting: Setting, path: Path) -> float:
     """
     overrides = asked_of(setting)
     document = Document.read(path)
-    is_crowd = len(place_bodies(document.build())) > CROWD
-    if setting.quick or is_crowd:
+    is_crowd = _is_crowd(document)
+    if setting.quick and not is_crowd:
         overrides["contact.stiffness_scale"] = SOFT
     if is_crowd and not setting.rigid:
-        overrides["time.end"] = CROWD_END if setting.model == "surface" else CROWD_END_PARTICLES
+        overrides["time.end"] = _crowd_end(setting)
     scenario = (without_springs(document) if setting.rigid else document).with_values(overrides).build()
     run = Simulation(build_scene(scenario))
     outputs = round(scenario.time.end / scenario.output.every)

@@ -23,8 +23,8 @@ STORE = Path("results") / "verify.json"  # below the current folder
 COLUMNS = {  # head of the column: how it is measured
     "linear": Setting(),
     "Hertz–Mindlin": Setting(law="hertz-mindlin"),
-    "`kernel`": Setting("kernel", quick=True),
-    "`particles`": Setting("particles", quick=True),
+    "`kernel`, quick": Setting("kernel", quick=True),
+    "`particles`, quick": Setting("particles", quick=True),
 }
 RIGID = "nonsmooth"  # head of the second table's column
 RIGID_HEADS = ("case", "quantity", "expected", "tolerance", "measured")

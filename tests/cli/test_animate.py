@@ -14,7 +14,7 @@ QUICK = ("--speed", "1", "--fps", "10", "--width", "240")
 def test_film_has_the_name_of_the_scenario_and_is_reported(blocksim: Command, finished: Path) -> None:
     answer = blocksim("animate", finished, *QUICK)
     assert (answer.code, answer.out) == (0, "")
-    assert answer.err.startswith("film: three_blocks_nominal.gif (")
+    assert answer.err.startswith("animation: three_blocks_nominal.gif (")
     with GifImageFile("three_blocks_nominal.gif") as film:
         assert film.width == 240
         assert film.n_frames >= 3
@@ -35,7 +35,7 @@ def test_killed_run_is_shown_and_told(blocksim: Command, copied: Path) -> None:
         (["--out", "film.avi"], 65, "'.avi' unsupported format; use .gif or .mp4"),
         (["--out", "nix/film.gif", *QUICK], 74, "nix/film.gif: cannot be written"),
         (["--speed", "0.00001"], 65, "raise --speed or lower --fps"),
-        (["--fps", "60"], 65, "a GIF shows at most 50 pictures a second"),
+        (["--fps", "60"], 65, "a GIF shows at most 50 frames per second"),
         (["--speed", "0"], 2, "--speed"),
         (["--width", "3"], 2, "--width"),
     ],

@@ -187,5 +187,5 @@ def test_no_cell_of_a_table_begins_a_formula(blocksim: Command) -> None:
     with Path("swept/sweep.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert {row["ground.material"] for row in rows} == {f"'{formula}", "aluminium"}
-    assert {row["ground.tilt"] for row in rows} == {"-1 deg", "0 deg"}
+    assert {row["ground.tilt [deg]"] for row in rows} == {"-1.0", "0.0"}
     assert blocksim("verify-run", "swept").code == 0

@@ -192,7 +192,7 @@ def test_sweep_around_a_case_that_blows_up_continues(blocksim: Command, tmp_path
 @pytest.mark.parametrize(
     ("arguments", "what"),
     [
-        (["--resume", "--overwrite"], "--resume: cannot go with --overwrite"),
+        (["--resume", "--overwrite"], "--resume: cannot be combined with --overwrite"),
         (["--wall-time", "3"], 'the unit is missing, write it as in "2 s"'),
         (["--wall-time", "0 s"], "is too small; a time above 0"),
         (["--checkpoint-time", "3 mm"], "is a length"),

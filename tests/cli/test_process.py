@@ -172,5 +172,5 @@ def test_terminal_shows_progress_on_one_line_and_clears_it(process: Process) -> 
     text = shown.decode()
     assert running.returncode == 0
     assert "of 4 s " in text
-    assert "steps/s, energy off by " in text
+    assert "steps/s, relative energy error " in text
     assert "…" not in text

@@ -49,4 +49,4 @@ def test_quiet_shows_nothing(terminal: StringIO, capsys: pytest.CaptureFixture[s
 def test_animate_counts_its_pictures_on_a_terminal(blocksim: Command, finished: Path, terminal: StringIO) -> None:
     answer = blocksim("animate", finished, "--speed", "1", "--fps", "10", "--width", "240")
     assert answer.code == 0
-    assert " pictures" in terminal.getvalue()
+    assert " frames" in terminal.getvalue()

@@ -19,7 +19,7 @@ bad.toml:20: motion.kind: this key is missing: "harmonic" or "table" is needed
     "misspelt kind": (
         '\n[motion]\nkind = "harmonik"\namplitude = "10 mm"\nfrequency = "2 Hz"\n',
         """
-bad.toml:21: motion.kind: "harmonik" is no kind of motion, did you mean 'harmonic'?
+bad.toml:21: motion.kind: unknown motion kind "harmonik"; did you mean 'harmonic'?
    21 | kind = "harmonik"
       |        ^^^^^^^^^^
 """,
@@ -27,7 +27,7 @@ bad.toml:21: motion.kind: "harmonik" is no kind of motion, did you mean 'harmoni
     "unknown kind": (
         '\n[motion]\nkind = "sine"\namplitude = "10 mm"\nfrequency = "2 Hz"\n',
         """
-bad.toml:21: motion.kind: "sine" is no kind of motion, use "harmonic" or "table"
+bad.toml:21: motion.kind: unknown motion kind "sine"; choose "harmonic" or "table"
    21 | kind = "sine"
       |        ^^^^^^
 """,

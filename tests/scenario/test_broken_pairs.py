@@ -26,7 +26,7 @@ bad.toml:20: pairs.steel.grond: unknown material "grond", did you mean 'ground'?
     "material like no other": (
         "\n[pairs.steel.concrete]\nfriction = 0.2\n",
         """
-bad.toml:20: pairs.steel.concrete: unknown material "concrete", there is: steel, ground
+bad.toml:20: pairs.steel.concrete: unknown material "concrete", known: steel, ground
    20 | [pairs.steel.concrete]
       |  ^^^^^^^^^^^^^^^^^^^^
 """,

@@ -56,7 +56,7 @@ bad.toml:13: blocks.brick.material: unknown material "steal", did you mean 'stee
         None,
         '\n[ground]\nmaterial = "granite"\n',
         """
-bad.toml:21: ground.material: unknown material "granite", there is: steel
+bad.toml:21: ground.material: unknown material "granite", known: steel
    21 | material = "granite"
       |            ^^^^^^^^^
 """,
@@ -65,7 +65,7 @@ bad.toml:21: ground.material: unknown material "granite", there is: steel
         'block = "brick"',
         'block = "stone"',
         """
-bad.toml:17: structures.0.block: unknown block "stone", there is: brick
+bad.toml:17: structures.0.block: unknown block "stone", known: brick
    17 | block = "stone"
       |         ^^^^^^^
 """,
@@ -74,7 +74,7 @@ bad.toml:17: structures.0.block: unknown block "stone", there is: brick
         'kind = "stack"',
         'kind = "cathedral"',
         """
-bad.toml:16: structures.0.kind: "cathedral" unknown structure kind; choose \
+bad.toml:16: structures.0.kind: unknown structure kind "cathedral"; choose \
 "staircase", "stack", "wall", "pyramid", "dominoes" or "grid"
    16 | kind = "cathedral"
       |        ^^^^^^^^^^^
@@ -84,7 +84,7 @@ bad.toml:16: structures.0.kind: "cathedral" unknown structure kind; choose \
         'kind = "stack"',
         'kind = "stak"',
         """
-bad.toml:16: structures.0.kind: "stak" is no kind of structure, did you mean 'stack'?
+bad.toml:16: structures.0.kind: unknown structure kind "stak"; did you mean 'stack'?
    16 | kind = "stak"
       |        ^^^^^^
 """,

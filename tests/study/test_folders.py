@@ -22,7 +22,7 @@ def test_dead_worker_fails_its_case_and_says_what_to_do() -> None:
     future.set_exception(BrokenProcessPool())
     row = _outcome(future)
     assert row["status"] == "failed"
-    assert "runs this case again" in str(row["reason"])
+    assert "rerun the command to repeat this case" in str(row["reason"])
 
 
 @pytest.mark.parametrize("lost", [None, "run.h5", "checkpoint.0"])

@@ -266,7 +266,7 @@ def test_trouble_is_reported(tmp_path: Path) -> None:
         draw_film(toppling(1), tmp_path / "film.avi")
     with pytest.raises(InvalidInputError, match="at most 10000: raise --speed or lower --fps"):
         draw_film(toppling(1), tmp_path / "film.gif", Pace(1e-6, 30.0))
-    with pytest.raises(InvalidInputError, match="at most 50 pictures a second"):
+    with pytest.raises(InvalidInputError, match="at most 50 frames per second"):
         draw_film(toppling(1), tmp_path / "film.gif", Pace(1.0, 60.0), SMALL)
     with pytest.raises(OutputError, match="cannot be written: No such file"):
         draw_film(toppling(1), tmp_path / "none" / "film.gif", FAST, SMALL)
