@@ -86,6 +86,19 @@ def test_blocks_that_touch_at_rest_are_struck_as_one(single: Callable[..., Simul
     assert run.bodies.vx == pytest.approx([-0.6, 0.4, 0.4, 0.4, 0.4], abs=2e-3)
 
 
+def test_contacts_report_the_impulses_of_all_rounds(single: Callable[..., Simulation]) -> None:
+    run = single(row(1e-4), restitution=1.0, gravity=0.0, substeps=1, **SMOOTH)
+    before = run.bodies.vx.copy()
+    run.to_step(1)
+    rows = run.scene.contacts.rows[: run.scene.contacts.stepping[0].row_count]
+    impulses = rows["nx"] * (rows["normal_one"] + rows["normal_two"])
+    assert np.count_nonzero(impulses) == 3  # one after the other, within this substep
+    gained = np.zeros(len(before) + 1)  # of momentum (kg m/s); the ground is the last
+    np.add.at(gained, rows["a"], impulses)
+    np.add.at(gained, rows["b"], -impulses)
+    assert gained[:-1] == pytest.approx(run.bodies.mass * (run.bodies.vx - before), abs=1e-12)
+
+
 def thrown(random: np.random.Generator) -> dict[str, Any]:
     """Return a block that is about to meet the ground with a corner."""
     angle = float(random.uniform(-1.5, 1.5))
