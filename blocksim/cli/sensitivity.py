@@ -2,8 +2,6 @@
 
 import csv
 import io
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -14,6 +12,7 @@ import typer
 from blocksim.cli import options
 from blocksim.cli.compiling import tell_compilation
 from blocksim.cli.output import answer, note, number, print_json, table_lines
+from blocksim.cli.progress import counting
 from blocksim.cli.vary import read_variations
 from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Sweep
@@ -27,7 +26,6 @@ from blocksim.study.variation import varied
 VARY = "--vary"
 MODE = "sobol"
 DIGITS = 3
-TOLD_SECONDS = 2.0
 SIGNS = {"deg": "°", INDICATOR: ""}
 NOTHING = "nothing to vary: give --vary KEY=FROM:TO, or a [sweep] table with distributions"
 
@@ -82,8 +80,8 @@ def sensitivity_command(
     plan = _plan(document, vary or [])
     bare = replace(document, data={key: value for key, value in document.data.items() if key != "sweep"})
     tell_compilation(kernels_of(bare.build()), quiet=silent)
-    telling: Callable[[int, int], None] = (lambda *_: None) if silent else _telling()
-    found = sensitivity(bare, plan, METHODS[method.value], samples=samples, seed=seed, on_member=telling)
+    with counting("runs", quiet=silent) as on_member:
+        found = sensitivity(bare, plan, METHODS[method.value], samples=samples, seed=seed, on_member=on_member)
     if out is not None:
         write_text(out, _csv(found))
     if as_json:
@@ -111,19 +109,6 @@ def _refuse_present(out: Path | None, *, overwrite: bool) -> None:
         raise OutputExistsError(f"{out}: cannot be created: {reason}")
     if out.exists() and not overwrite:
         raise OutputExistsError(f"{out}: already exists; --overwrite replaces it")
-
-
-def _telling() -> Callable[[int, int], None]:
-    told_at = time.monotonic()
-
-    def tell(done: int, total: int) -> None:
-        nonlocal told_at
-        now = time.monotonic()
-        if now - told_at > TOLD_SECONDS:
-            told_at = now
-            note(f"{done}/{total} runs")
-
-    return tell
 
 
 def _lines(found: Sensitivity) -> list[str]:
