@@ -8,7 +8,10 @@ import pytest
 
 from blocksim.kernels.advance import check
 from blocksim.kernels.arrays import AT_REST, OVERLAP_LIMIT, REACHED
+from blocksim.kernels.broad_phase import rebuild_pairs
+from blocksim.kernels.contact import pair_forces
 from blocksim.kernels.energy import contact_summary
+from blocksim.kernels.integrate import renew_rotations
 from blocksim.verification.scene import HEIGHT
 
 if TYPE_CHECKING:
@@ -53,9 +56,22 @@ def touching(pose: Pose, *, depth: float, spring: float = 0.0) -> World:
 
 @pytest.mark.parametrize("small", [0, 1])
 def test_smaller_block_of_a_pair_limits_the_overlap(pose: Pose, small: int) -> None:
+    overlaps = {0.02: False, 0.03: True, 0.07: True}  # of a height; twentieths of the smallest side: 0.025
+    for share, is_too_deep in overlaps.items():
+        world = pose((0.0, 1.0, 0.0), (0.0, 1.0 + (0.75 - share) * HEIGHT, 0.0))
+        body = world.bodies[small]
+        body.half_x = body.half_y = 0.25 * HEIGHT
+        renew_rotations(world.bodies)
+        assert rebuild_pairs(world)
+        pair_forces(world, 0, 0.0)
+        assert world.pairs[0].active == 2
+        assert world.action[0].is_too_deep == is_too_deep
+
+
+def test_overlap_that_a_step_has_noted_ends_the_run_at_the_check(pose: Pose) -> None:
     world = touching(pose, depth=0.04 * HEIGHT)
     assert check(world) == REACHED
-    world.bodies[small].half_x = world.bodies[small].half_y = 0.25 * HEIGHT
+    world.clock[0].ends_at = 1
     assert check(world) == OVERLAP_LIMIT
 
 

@@ -203,6 +203,7 @@ def fill_list(world: World, pairs: list[tuple[int, int]], random: np.random.Gene
         pair.twins = random.integers(0, 256) if pair.active else 0
         pair.axis = random.integers(0, 4)
         pair.normal_left, pair.shear_left, pair.sticking = random.integers(0, 17, 3)
+        pair.slides = random.integers(0, 3)
         for contact in world.contacts[p, : pair.active]:
             for name in contact.dtype.names:
                 contact[name] = random.integers(1, 10**6)
@@ -217,7 +218,7 @@ def remembered(world: World, pairs: Records, count: int) -> dict[tuple[int, int]
         (int(pair.a), int(pair.b)): (
             int(pair.axis),
             int(pair.twins),
-            (int(pair.normal_left), int(pair.shear_left), int(pair.sticking)),
+            (int(pair.normal_left), int(pair.shear_left), int(pair.sticking), int(pair.slides)),
             world.contacts[p, : pair.active].tobytes(),
             world.operators[p].tobytes(),
         )
@@ -239,7 +240,7 @@ def test_every_pair_keeps_its_own_history_wherever_it_moves_in_the_list(
     for spare, (a, b) in zip(world.spare_pairs, new, strict=False):
         spare.a, spare.b = a, b
         spare.near, spare.active, spare.twins, spare.axis = HALF, 0, 0, 0
-        spare.normal_left = spare.shear_left = 0
+        spare.normal_left = spare.shear_left = spare.slides = 0
     carry_history(world, len(new))
     after = remembered(world, world.spare_pairs, len(new))
     assert after == {pair: history for pair, history in before.items() if pair in set(new)}

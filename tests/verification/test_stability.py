@@ -104,7 +104,9 @@ def squeezed(start: Start, block: PaperBlock, e: float, product: float | None) -
 
     lid = {"y": 1.5 * block.height, "width": 0.05, "fixed": True}
     time = {} if product is None else {"step": product / (damping_ratio(e) * w), "force_step": True}
-    scene = start([{"y": 0.5 * block.height}, lid], restitution=e, gravity=0.0, time=time, change=press)
+    bodies = [{"y": 0.5 * block.height}, lid]
+    far = {"max_overlap": 0.5 * block.height}  # what is unstable swings far
+    scene = start(bodies, restitution=e, gravity=0.0, time=time, contact=far, change=press)
     return scene, w
 
 
