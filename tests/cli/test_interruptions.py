@@ -259,7 +259,7 @@ def test_disk_that_fills_is_74_and_keeps_what_was_there(process: Process, small_
         ("a.vtkhdf", ("export", "--format", "vtkhdf")),
         ("a.csv", ("export", "--format", "csv")),
         ("a.png", ("plot", "--times", ",".join(str(0.01 * number) for number in range(40)))),
-        ("a.gif", ("animate", "--width", "2000", "--speed", "4", "--fps", "10")),
+        ("a.gif", ("animate", "--quiet", "--width", "2000", "--speed", "4", "--fps", "10")),
     ],
 )
 def test_full_disk_leaves_the_older_picture_or_export(
