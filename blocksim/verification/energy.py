@@ -126,8 +126,9 @@ def worst_residual(setting: Setting, path: Path) -> float:
     is_crowd = _is_crowd(document)
     if setting.quick and not is_crowd:
         overrides["contact.stiffness_scale"] = SOFT
-    elif _gives_way(setting, document.build(), is_crowd=is_crowd):
-        overrides["contact.stiffness_scale"] = STIFFER * document.build().contact.stiffness_scale
+    if _gives_way(setting, document.build(), is_crowd=is_crowd):
+        own = overrides.get("contact.stiffness_scale", document.build().contact.stiffness_scale)
+        overrides["contact.stiffness_scale"] = STIFFER * float(str(own))
     if is_crowd and not setting.rigid:
         overrides["time.end"] = _crowd_end(setting)
     scenario = (without_springs(document) if setting.rigid else document).with_values(overrides).build()
