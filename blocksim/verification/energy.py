@@ -79,7 +79,7 @@ def ledgers(setting: Setting) -> Iterator[Row]:
 
 def _name(setting: Setting, path: Path) -> str:
     """Return the name of a scenario, and how much of it is run where that is not all."""
-    if setting.rigid or not _is_crowd(Document.read(path)):
+    if setting.rigid or not _is_crowd(load_scenario(path)):
         return path.stem
     return f"{path.stem}, first moments"
 
@@ -89,8 +89,8 @@ def _gives_way(setting: Setting, scenario: Scenario, *, is_crowd: bool) -> bool:
     return setting.law != Setting().law and (is_crowd or scenario.contact.model != Setting().model)
 
 
-def _is_crowd(document: Document) -> bool:
-    return len(place_bodies(document.build())) > CROWD
+def _is_crowd(scenario: Scenario) -> bool:
+    return len(place_bodies(scenario)) > CROWD
 
 
 def _crowd_end(setting: Setting) -> float:
@@ -123,12 +123,13 @@ def worst_residual(setting: Setting, path: Path) -> float:
     """
     overrides = asked_of(setting)
     document = Document.read(path)
-    is_crowd = _is_crowd(document)
+    own = document.build()
+    is_crowd = _is_crowd(own)
     if setting.quick and not is_crowd:
         overrides["contact.stiffness_scale"] = SOFT
-    if _gives_way(setting, document.build(), is_crowd=is_crowd):
-        own = overrides.get("contact.stiffness_scale", document.build().contact.stiffness_scale)
-        overrides["contact.stiffness_scale"] = STIFFER * float(str(own))
+    if _gives_way(setting, own, is_crowd=is_crowd):
+        usual = overrides.get("contact.stiffness_scale", own.contact.stiffness_scale)
+        overrides["contact.stiffness_scale"] = STIFFER * float(str(usual))
     if is_crowd and not setting.rigid:
         overrides["time.end"] = _crowd_end(setting)
     scenario = (without_springs(document) if setting.rigid else document).with_values(overrides).build()
