@@ -3,6 +3,7 @@
 import doctest
 import pydoc
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -109,6 +110,13 @@ def test_a_file_of_others_is_not_replaced_by_a_picture(tmp_path: Path) -> None:
 def test_picture_of_a_result_that_was_not_kept_says_what_to_do(slide: Result) -> None:
     with pytest.raises(InvalidInputError, match="run it with out=FOLDER"):
         blocksim.plot(slide)
+
+
+@pytest.mark.parametrize("draw", [blocksim.plot, blocksim.animate])
+def test_an_unknown_colour_is_an_error_with_the_choices(tmp_path: Path, draw: Callable[..., Path]) -> None:
+    kept = blocksim.run(blocksim.load(SLIDE, {**SOFT, "time.end": 0.01}), out=tmp_path / "kept")
+    with pytest.raises(InvalidInputError, match="unknown colour 'red'; choose block, material, speed, turn"):
+        draw(kept, tmp_path / "a.gif" if draw is blocksim.animate else tmp_path / "a.png", colour="red")
 
 
 def test_sensitivity_takes_a_scenario_and_plain_ranges() -> None:

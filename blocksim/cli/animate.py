@@ -11,7 +11,7 @@ from blocksim.cli.progress import counting
 from blocksim.simulation.own_files import is_film, refuse_foreign
 from blocksim.study.stored import stored_run
 from blocksim.view.animation import Look, Pace, draw_film, writer_of
-from blocksim.view.paint import PAINTS
+from blocksim.view.paint import paint_named
 from blocksim.view.support import support_of
 
 
@@ -47,7 +47,7 @@ def animate_command(
     refuse_foreign(film, is_film, overwrite=overwrite)
     support = support_of(stored.scenario)
     older = replacement(film)
-    look = Look(width, trails, stored.scenario.name, forces, PAINTS[colour](stored.frames, stored.scenario))
+    look = Look(width, trails, stored.scenario.name, forces, paint_named(colour, stored.frames, stored.scenario))
     with counting("frames", quiet=quiet) as on_picture:
         count, beyond = draw_film(stored.frames, film, Pace(speed, fps), look, support, on_picture)
     if stored.remark:

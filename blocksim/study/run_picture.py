@@ -10,7 +10,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.study.stored import stored_run
 from blocksim.view.curves import Choice
 from blocksim.view.kinds import FINAL, HISTORY, STRIP, kind_named
-from blocksim.view.paint import PAINTS
+from blocksim.view.paint import paint_named
 from blocksim.view.paper import Paper
 from blocksim.view.support import support_of
 
@@ -85,7 +85,7 @@ def draw_run(  # noqa: PLR0913 - what a picture is made of
     picture = out or Path(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
     ready(picture)
     look = {"title": scenario.name, "measured": measured, "support": support_of(scenario), "forces": asked.forces}
-    paint = PAINTS[asked.colour](stored.frames, scenario)
+    paint = paint_named(asked.colour, stored.frames, scenario)
     draw(stored.frames, picture, **look, **asked.arguments(kind), paint=paint, paper=paper)
     return picture, stored.remark
 

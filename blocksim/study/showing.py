@@ -15,7 +15,7 @@ from blocksim.study.stored import stored_run
 from blocksim.study.table import TABLE, SweepResult
 from blocksim.view.animation import Look, Pace, draw_film
 from blocksim.view.kinds import STRIP
-from blocksim.view.paint import PAINTS
+from blocksim.view.paint import paint_named
 from blocksim.view.paper import OWN
 from blocksim.view.support import support_of
 
@@ -75,7 +75,7 @@ def animate(  # noqa: PLR0913 - one argument for each option of the command
     stored = stored_run(_folder(place))
     path = Path(f"{stored.scenario.name}.gif" if out is None else out)
     refuse_foreign(path, is_film, overwrite=overwrite)
-    look = Look(width, trails, stored.scenario.name, forces, PAINTS[colour](stored.frames, stored.scenario))
+    look = Look(width, trails, stored.scenario.name, forces, paint_named(colour, stored.frames, stored.scenario))
     draw_film(stored.frames, path, Pace(speed, fps), look, support_of(stored.scenario))
     return path
 

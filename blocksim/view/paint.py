@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.view import style
 from blocksim.view.moments import Floats, FramesLike, drawable_frames
@@ -126,6 +127,14 @@ PAINTS: dict[str, Callable[[Any, Scenario], Paint]] = {
     "speed": lambda frames, _: by_speed(frames),
     "turn": lambda frames, _: by_turn(frames),
 }
+
+
+def paint_named(name: str, frames: Any, scenario: Scenario) -> Paint:
+    """Return the colours of a run by what they mean. Raises InvalidInputError for an unknown meaning."""
+    if name not in PAINTS:
+        message = f"unknown colour {name!r}; choose {', '.join(PAINTS)}"
+        raise InvalidInputError(message)
+    return PAINTS[name](frames, scenario)
 
 
 def draw_key(figure: "Figure", paint: Paint, left: float, bottom: float) -> None:
