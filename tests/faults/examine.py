@@ -21,19 +21,31 @@ PATIENCE = 200.0  # s of processor time: a fault may let a loop never end
 PRINTED = 3000  # characters
 
 
+class Failed:
+    """Collects the names of the tests that fail: a plugin of pytest, as what it prints differs from CI to terminal."""
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Keep the name of a test of which any phase failed."""
+        if report.failed:
+            self.names.append(report.nodeid)
+
+
 def examine(fault: Fault) -> Finding:
     """Return what the named tests say about a fault."""
     if fault.is_stale:
         return Finding(fault, Verdict.STALE)
     _put_in(fault)
-    code, printed = run_tests(fault.tests, interpreted=fault.is_interpreted)
+    failed = Failed()
+    code, printed = run_tests(fault.tests, failed, interpreted=fault.is_interpreted)
     seconds = time.process_time()
     if code == pytest.ExitCode.OK:
         return Finding(fault, Verdict.MISSED, "", seconds, printed)
-    failed = [line.removeprefix("FAILED ").partition(" - ")[0] for line in printed.splitlines() if line[:6] == "FAILED"]
-    if code != pytest.ExitCode.TESTS_FAILED or not failed:
+    if code != pytest.ExitCode.TESTS_FAILED or not failed.names:
         return Finding(fault, Verdict.BROKEN, "", seconds, printed)
-    return Finding(fault, Verdict.CAUGHT, failed[-1], seconds)
+    return Finding(fault, Verdict.CAUGHT, failed.names[-1], seconds)
 
 
 def _put_in(fault: Fault) -> None:
@@ -47,7 +59,7 @@ def _put_in(fault: Fault) -> None:
     __import__("sitecustomize")
 
 
-def run_tests(tests: tuple[str, ...], *, interpreted: bool) -> tuple[int, str]:
+def run_tests(tests: tuple[str, ...], *plugins: object, interpreted: bool) -> tuple[int, str]:
     """Run tests in this process, which nothing of blocksim has been imported into; return its exit code and words."""
     os.environ["NUMBA_DISABLE_JIT"] = str(int(interpreted))
     numba.config.DISABLE_JIT = int(interpreted)  # type: ignore[attr-defined]  # numba was imported long ago
@@ -58,7 +70,7 @@ def run_tests(tests: tuple[str, ...], *, interpreted: bool) -> tuple[int, str]:
         with redirect_stdout(file), redirect_stderr(file):
             signal.setitimer(signal.ITIMER_PROF, PATIENCE)
             try:
-                code = int(pytest.main([*OPTIONS, *tests]))
+                code = int(pytest.main([*OPTIONS, *tests], plugins=[*plugins]))
             except TimeoutError as error:  # while no test ran
                 return pytest.ExitCode.INTERNAL_ERROR, str(error)
             finally:
