@@ -11,6 +11,7 @@ from blocksim.kernels.arrays import (
     STATUS,
     TEAM_SIZE,
     TOO_FAST,
+    Integers,
     Record,
     Records,
     World,
@@ -200,12 +201,14 @@ def goes_further(clock: Record, share: Record) -> bool:
 
 
 @rare_kernel
-def march(world: World, last_step: int, k: int) -> int:
-    """Be thread k of those that step a world until `last_step`, or until something ends the run."""
+def march(world: World, last_step: int, k: int, team: Integers | None) -> int:
+    """Be thread k of those that step a world until `last_step`, or until something ends the run.
+
+    Without a `team`, which is world.team, what threads exchange is not compiled: a first run is for one thread.
+    """
     open_call(world, k, last_step)
     share = world.shares[k]
     clock = world.clock[0]
-    is_team = world.team[TEAM_SIZE] > 1
     while goes_further(clock, share):
         step = world.controls[0].step if share.is_started else 0.0
         if share.steps >= share.until and not begin_steps(world, k, step):
@@ -215,7 +218,7 @@ def march(world: World, last_step: int, k: int) -> int:
         share.steps += share.is_started
         share.is_started = 1
         goes_on = share.steps < share.until
-        if is_team:
+        if team is not None:
             exchange_forces(world, k, step)
         forces_within(world, share, step, goes_on)
         note_depth(clock, share)
@@ -229,7 +232,13 @@ def march(world: World, last_step: int, k: int) -> int:
 def march_alone(world: World, last_step: int) -> int:
     """Step a world with one thread; see advance."""
     world.team[TEAM_SIZE] = 1
-    return march(world, last_step, 0)
+    return march(world, last_step, 0, None)
+
+
+@entry_kernel
+def advance_alone(world: World, last_step: int) -> int:
+    """Step a world with one thread; see advance."""
+    return march_alone(world, last_step)
 
 
 @entry_kernel
@@ -238,7 +247,7 @@ def advance_in_team(world: World, last_step: int, k: int) -> int:
 
     Every thread comes with work space of its own (points, matrices, before, action) and shares all other arrays.
     """
-    return march(world, last_step, k)
+    return march(world, last_step, k, world.team)
 
 
 def advance(world: World, last_step: int) -> int:
@@ -249,5 +258,4 @@ def advance(world: World, last_step: int) -> int:
     depend on where outputs interrupt it. PAIRS_FULL returns before anything has moved: give the lists more room and
     call again.
     """
-    world.team[TEAM_SIZE] = 1
-    return int(advance_in_team(world, last_step, 0))
+    return int(advance_alone(world, last_step))

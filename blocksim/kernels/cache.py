@@ -18,15 +18,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from numba.core import compiler, serialize
+from numba.core import serialize
 from numba.core.caching import FunctionCache
+
+from blocksim.kernels.compiler import rebuilt
 
 DIGEST_BYTES = hashlib.sha256().digest_size
 NAME_DIGITS = 16
 SUFFIX = ".nbc"
 
-compile_result: Any = compiler.CompileResult  # these come without type hints
-dumps: Any = serialize.dumps
+dumps: Any = serialize.dumps  # comes without type hints
 
 log = logging.getLogger("blocksim")  # a line on standard error, unless somebody wants it elsewhere
 
@@ -63,7 +64,7 @@ class KernelCache(FunctionCache):
         if not self._enabled or content is None:
             return None
         found, parts = pickle.loads(content)  # noqa: S301 - our own, by its checksum, in a folder of this user
-        return compile_result._rebuild(target_context, *parts) if found == key else None  # noqa: SLF001 - as numba does
+        return rebuilt(target_context, parts) if found == key else None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled version; where there is no room, do nothing."""

@@ -22,6 +22,7 @@ from numba import types as numba_types
 from numba.core.registry import CPUDispatcher
 
 from blocksim.kernels.cache import KernelCache
+from blocksim.kernels.compiler import InnerCompiler
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -90,7 +91,7 @@ def cache_folder() -> Path | None:
 def is_compiled() -> bool:
     """Return True if a compiled time loop of this exact source lies in the cache (or nothing has to be compiled)."""
     folder = cache_folder()
-    return bool(config.DISABLE_JIT) or (folder is not None and any(folder.rglob("advance.advance_in_team-*.nbc")))
+    return bool(config.DISABLE_JIT) or (folder is not None and any(folder.rglob("advance.advance_alone-*.nbc")))
 
 
 def is_marked(name: str) -> bool:
@@ -159,7 +160,9 @@ def _inner(function: Function, **options: object) -> Function:
     """Compile a function that Python does not call, unless all are open."""
     if config.DISABLE_JIT:
         return function
-    compiled: Any = _compiled(function, no_cpython_wrapper=not IS_OPEN, **options)
+    if not IS_OPEN:
+        options = {**options, "no_cpython_wrapper": True, "pipeline_class": InnerCompiler}
+    compiled: Any = _compiled(function, **options)
     compiled.__class__ = _Shared if IS_OPEN else _Inner
     inner: Function = compiled
     return inner

@@ -152,7 +152,7 @@ def test_user_is_reported_whether_kernels_have_to_be_compiled(tmp_path: Path, mo
     assert not jit.is_compiled()
     below = tmp_path / f"{jit.source_hash()}-open" / "kernels"
     below.mkdir(parents=True)
-    (below / "advance.advance_in_team-1.py311.1.nbc").touch()
+    (below / "advance.advance_alone-1.py311.1.nbc").touch()
     assert jit.is_compiled()
 
 
