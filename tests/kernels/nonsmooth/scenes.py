@@ -1,20 +1,135 @@
-"""Scenarios with rigid contacts, from those with springs."""
+"""Scenarios with rigid contacts, from those with springs, and single steps of blocks in any poses.
+
+SI units, angles in rad.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from blocksim.scenario.models.stepping import Nonsmooth
+import numpy as np
+
+from blocksim.kernels.arrays import TEAM_SIZE
+from blocksim.kernels.integrate import renew_rotations
+from blocksim.kernels.nonsmooth.advance import collide_rows, load_lines
+from blocksim.kernels.nonsmooth.groups import gather, pack_groups
+from blocksim.kernels.nonsmooth.neighbours import look
+from blocksim.kernels.nonsmooth.substep import substep
+from blocksim.scenario.models.stepping import Nonsmooth as Stepping
+from blocksim.simulation.schemes import build_scene
+from blocksim.verification.scene import HEIGHT, WIDTH, Scene
+from blocksim.world.nonsmooth import with_more_rows
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from blocksim.kernels.arrays import Records
+    from blocksim.kernels.nonsmooth.arrays import Nonsmooth
     from blocksim.scenario import Scenario
 
 STEP = 1e-3  # s, unless a test says otherwise
 ENDLESS = 1e3  # s: tests step as far as they want
+NAMES = ("x", "y", "angle", "vx", "vy", "spin")
 
 
 def rigid(scenario: Scenario, **stepping: Any) -> Scenario:
     """Return a scenario with rigid contacts; keywords are keys of [time]."""
     kept = {"stop_at_rest": scenario.time.stop_at_rest, "end": scenario.time.end}
-    time = Nonsmooth(**{"scheme": "nonsmooth", "step": STEP, "force_step": True, **kept, **stepping})
+    time = Stepping(**{"scheme": "nonsmooth", "step": STEP, "force_step": True, **kept, **stepping})
     return scenario.model_copy(update={"time": time})
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block in any pose, with its velocities."""
+
+    x: float = 0.0
+    y: float = 0.0
+    angle: float = 0.0
+    vx: float = 0.0
+    vy: float = 0.0
+    spin: float = 0.0
+    width: float = WIDTH
+    height: float = HEIGHT
+    fixed: bool = False
+
+
+def posed(blocks: Sequence[Block], **values: Any) -> Nonsmooth:
+    """Return blocks in any poses, overlapping ones too, before their first step; keywords of [time] go there."""
+    stepping = {name: values.pop(name) for name in list(values) if name in Stepping.model_fields}
+    apart = [
+        {"x": 3.0 * i, "y": 2.0, "width": one.width, "height": one.height, "fixed": one.fixed}
+        for i, one in enumerate(blocks)
+    ]
+    scene: Any = build_scene(rigid(Scene(apart, **values).scenario(), end=ENDLESS, **stepping))
+    place(scene, blocks)
+    load_lines(scene)
+    scene.world.clock[0].is_started = 1
+    scene.world.team[TEAM_SIZE] = 1
+    return scene  # type: ignore[no-any-return]
+
+
+def place(scene: Nonsmooth, blocks: Sequence[Block]) -> None:
+    """Put the blocks of a scene elsewhere, with their velocities."""
+    for body, block in zip(scene.world.bodies, blocks, strict=False):
+        for name in NAMES:
+            body[name] = getattr(block, name)
+    renew_rotations(scene.world.bodies)
+
+
+def listed(scene: Nonsmooth) -> Nonsmooth:
+    """Return a scene with the pairs of its bodies as they are now, in arrays large enough."""
+    while not look(scene):
+        scene = with_more_rows(scene)
+    return scene
+
+
+def collided(scene: Nonsmooth) -> Nonsmooth:
+    """Return a scene with the manifolds of its pairs, packed in groups."""
+    scene = listed(scene)
+    collide_rows(scene, 0, int(scene.contacts.stepping[0].row_count))
+    gather(scene.contacts, scene.begins)
+    pack_groups(scene.contacts, 0, int(scene.contacts.stepping[0].group_count))
+    return scene
+
+
+def after_substep(blocks: Sequence[Block], *, is_first: bool = False, **values: Any) -> Nonsmooth:
+    """Return blocks after the first substep of a step; the impulses are in the groups, velocities in the lines."""
+    scene = collided(posed(blocks, **values))
+    substep(scene, 0, 0, is_first)
+    return scene
+
+
+def pairs_of(scene: Nonsmooth) -> set[tuple[int, int]]:
+    """Return the bodies of all listed pairs."""
+    rows = listed_rows(scene)
+    return set(zip(rows.a.tolist(), rows.b.tolist(), strict=True))
+
+
+def listed_rows(scene: Nonsmooth) -> Any:
+    """Return the rows there are."""
+    return scene.contacts.rows[: scene.contacts.stepping[0].row_count]
+
+
+def velocities(lines: Records) -> NDArray[np.float64]:
+    """Return vx, vy and spin of all records, a row each."""
+    return np.array([lines[name] for name in ("vx", "vy", "spin")]).T.copy()
+
+
+def pile(random: np.random.Generator, columns: int, rows: int, rate: float = 0.3) -> list[Block]:
+    """Return blocks in columns on the ground that nearly touch or overlap a little, and move at random (m/s)."""
+    return [
+        Block(
+            1.01 * WIDTH * i + float(random.uniform(-3e-4, 3e-4)),
+            HEIGHT * (j + 0.5) + float(random.uniform(-2e-5, 4e-5)),
+            float(random.uniform(-2e-3, 2e-3)),
+            rate * float(random.normal()),
+            rate * float(random.normal()),
+            5.0 * rate * float(random.normal()),
+        )
+        for j in range(rows)
+        for i in range(columns)
+    ]

@@ -1,0 +1,194 @@
+"""What the kernels of rigid contacts have to find, worked out in NumPy another way: geometry, and dense matrices."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import nnls
+
+from blocksim.kernels.geometry import separation
+from blocksim.kernels.nonsmooth.arrays import FAR
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from blocksim.kernels.arrays import Record
+    from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+    from tests.kernels.conftest import MakeBody
+
+    Vector = NDArray[np.float64]
+
+SIGNS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+
+
+class Side(NamedTuple):
+    """A face of a rectangle: outward normal and both ends."""
+
+    normal: Vector
+    begin: Vector
+    end: Vector
+
+
+class Meeting(NamedTuple):
+    """How two rectangles meet: normal from b to a, places of the points on the reference face and their gaps (m).
+
+    Points are sorted along the tangent; there is none where the rectangles are farther apart than the margin.
+    """
+
+    normal: Vector
+    places: Vector
+    gaps: Vector
+    is_of_b: bool
+
+
+def corners(body: Record) -> Vector:
+    """Return the corners (4, 2) of a body, counter-clockwise, from its angle."""
+    c, s = np.cos(body.angle), np.sin(body.angle)
+    return np.asarray(SIGNS * (body.half_x, body.half_y) @ np.array([[c, s], [-s, c]]) + (body.x, body.y))
+
+
+def sides(body: Record) -> list[Side]:
+    """Return the four faces of a body."""
+    ends = corners(body)
+    found = []
+    for begin, end in zip(ends, np.roll(ends, -1, axis=0), strict=True):
+        along = (end - begin) / np.linalg.norm(end - begin)
+        found.append(Side(np.array([along[1], -along[0]]), begin, end))
+    return found
+
+
+def beyond(side: Side, body: Record) -> float:
+    """Return how far (m) a body is beyond a face, all of it; negative where it reaches below."""
+    return float(((corners(body) - side.begin) @ side.normal).min())
+
+
+def apart(a: Record, b: Record) -> float:
+    """Return the largest gap (m) of two bodies along any face normal."""
+    return max(*(beyond(side, a) for side in sides(b)), *(beyond(side, b) for side in sides(a)))
+
+
+def clipped(side: Side, other: Side) -> list[Vector]:
+    """Return the ends of what of another face lies over a face, cut by the lines at its two ends."""
+    along = (side.end - side.begin) / np.linalg.norm(side.end - side.begin)
+    ends = [other.begin, other.end]
+    for place, sign in ((side.begin, 1.0), (side.end, -1.0)):
+        heights = [sign * float((end - place) @ along) for end in ends]
+        if max(heights) <= 0.0:
+            return []
+        if min(heights) < 0.0:
+            cut = ends[0] + (ends[1] - ends[0]) * heights[0] / (heights[0] - heights[1])
+            ends = [end if height >= 0.0 else cut for end, height in zip(ends, heights, strict=True)]
+    return ends
+
+
+def meeting(a: Record, b: Record, margin: float) -> Meeting:
+    """Return how two rectangles meet: the face beyond which the other reaches least, and what lies over it."""
+    of_b, side_b = max(((beyond(side, a), k) for k, side in enumerate(sides(b))), default=(0.0, 0))
+    of_a, side_a = max(((beyond(side, b), k) for k, side in enumerate(sides(a))), default=(0.0, 0))
+    is_of_b = of_b >= of_a
+    side = sides(b)[side_b] if is_of_b else sides(a)[side_a]
+    opposite = min(sides(a if is_of_b else b), key=lambda one: float(one.normal @ side.normal))
+    normal = side.normal if is_of_b else -side.normal
+    ends = clipped(side, opposite)
+    gaps = [float((end - side.begin) @ side.normal) for end in ends]
+    near = [(end - gap * side.normal, gap) for end, gap in zip(ends, gaps, strict=True) if gap <= margin]
+    near.sort(key=lambda point: float(point[0] @ np.array([-normal[1], normal[0]])))
+    return Meeting(normal, np.array([p for p, _ in near]), np.array([gap for _, gap in near]), is_of_b)
+
+
+def places_of(row: Record, body: Record, *, of_a: bool) -> Vector:
+    """Return the places (2, 2) of both points of a row, from its arms about one of its bodies."""
+    n = np.array([row.nx, row.ny])
+    t = np.array([-row.ny, row.nx])
+    arm, shear_arm = (row.arm_a, row.shear_arm_a) if of_a else (row.arm_b, row.shear_arm_b)
+    one = (body.x, body.y) + shear_arm * n - arm * t  # arm = r x n = -r t, shear arm = r x t = r n
+    return np.array([one, one + row.width * t])
+
+
+def brought_near(make_body: MakeBody, b: Record, sides_of_a: Vector, angle: float, way: float, gap: float) -> Record:
+    """Return a body with a gap (m) to b, negative for an overlap, in the direction `way` (rad) from it."""
+    near, far = 0.0, 0.1
+    while True:
+        distance = (near + far) / 2
+        place = b.x + distance * np.cos(way), b.y + distance * np.sin(way)
+        a = make_body(*place, angle, width=sides_of_a[0], height=sides_of_a[1])
+        if far - near < 1e-7:
+            return a
+        near, far = (near, distance) if separation(a, b) > gap else (distance, far)
+
+
+class Dense(NamedTuple):
+    """All points and rows of the groups of a scene, with matrices over all velocities (vx, vy, spin of every body)."""
+
+    normals: Vector  # (2 r, 3 n) J of the points, two a row
+    tangents: Vector  # (r, 3 n)
+    inverse_mass: Vector  # (3 n,) diagonal
+    impulses: Vector  # (2 r,) N s
+    shears: Vector  # (r,) N s
+    targets: Vector  # (2 r,) m/s: what J v has to reach at least
+    friction: Vector  # (r,) kinetic coefficients
+    gaps: Vector  # (2 r,) m, when the step began
+    starts: Vector  # (2 r,) m, when the substep began
+
+    @property
+    def counts(self) -> Any:
+        """Which points the velocity pass looks at."""
+        return self.targets > -FAR / 2
+
+    def pushed(self) -> Vector:
+        """Return what all impulses together change velocities by."""
+        return np.asarray(self.inverse_mass * (self.normals.T @ self.impulses + self.tangents.T @ self.shears))
+
+
+def jacobian(n: Vector, r_a: Vector, r_b: Vector, a: int, b: int, bodies: int) -> Vector:
+    """Return what all velocities are multiplied by to get that of a at r_a against b at r_b, along a direction."""
+    line = np.zeros(3 * bodies)
+    line[3 * a : 3 * a + 3] = n[0], n[1], r_a[0] * n[1] - r_a[1] * n[0]
+    line[3 * b : 3 * b + 3] = -n[0], -n[1], -(r_b[0] * n[1] - r_b[1] * n[0])
+    return line
+
+
+def dense(scene: Nonsmooth) -> Dense:
+    """Return the matrices of the packed groups of a scene; its bodies have not been placed since they were made."""
+    contacts, bodies = scene.contacts, scene.world.bodies
+    points, tangents, rows, starts, targets, impulses, shears = [], [], [], [], [], [], []
+    for group in contacts.groups[: contacts.stepping[0].group_count]:
+        for k in range(group["count"]):
+            row = contacts.rows[group.row[k]]
+            rows.append(row)
+            n, t = np.array([row.nx, row.ny]), np.array([-row.ny, row.nx])
+            a, b = bodies[row.a], bodies[row.b]
+            of_a, of_b = (place - (a.x, a.y) for place in places_of(row, a, of_a=True)), places_of(row, b, of_a=False)
+            ends = [(r_a, place - (b.x, b.y)) for r_a, place in zip(of_a, of_b, strict=True)]
+            points += [jacobian(n, r_a, r_b, row.a, row.b, bodies.size) for r_a, r_b in ends]
+            tangents.append(jacobian(t, *ends[0], row.a, row.b, bodies.size))
+            impulses += [group.normal_one[k], group.normal_two[k]]
+            starts += [group.start_one[k], group.start_two[k]]
+            targets += [group.target_one[k], group.target_two[k]]
+            shears.append(group.shear[k])
+    lines = contacts.lines
+    inverse = np.array([lines.inverse_mass, lines.inverse_mass, lines.inverse_inertia]).T.ravel()
+    touches = contacts.touches[[int(row.touch) for row in rows]]
+    gaps = [gap for row in rows for gap in (row.gap_one, row.gap_two)]
+    columns = (impulses, shears, targets, touches["kinetic_friction"], gaps, starts)
+    return Dense(np.array(points), np.array(tangents), inverse, *(np.array(one) for one in columns))
+
+
+def least_change(start: Vector, constraints: Vector, least: Vector, inverse_mass: Vector) -> Vector:
+    """Return the velocities with J v >= least that differ least from `start`, in kinetic energy.
+
+    That is Gauss's principle for impulses without friction. Solved as least distance programming (C. L. Lawson and
+    R. J. Hanson, Solving Least Squares Problems (1974), chapter 23): min |x| with G x >= h, x = M^(1/2) (v - start).
+    """
+    g = constraints * np.sqrt(inverse_mass)
+    h = least - constraints @ start
+    if h.max() <= 0.0:
+        return start.copy()
+    scale = float(np.abs(h).max())
+    matrix = np.vstack([g.T, h / scale])
+    wanted = np.zeros(len(matrix))
+    wanted[-1] = 1.0
+    found, _ = nnls(matrix, wanted, maxiter=10000)
+    rest = wanted - matrix @ found
+    return np.asarray(start + np.sqrt(inverse_mass) * scale * -rest[:-1] / rest[-1])

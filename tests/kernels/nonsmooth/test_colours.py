@@ -1,0 +1,115 @@
+"""Colours of the pair list, and impulses carried from one list to the next."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, TOUCHING
+from blocksim.kernels.nonsmooth.colours import most_groups
+from blocksim.kernels.nonsmooth.groups import gather
+from blocksim.kernels.nonsmooth.neighbours import frame_of_supports, rebuild
+from tests.kernels.nonsmooth.scenes import Block, listed, listed_rows, pairs_of, place, posed
+
+if TYPE_CHECKING:
+    from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+
+
+def crowd(seed: int, count: int = 30) -> list[Block]:
+    """Return blocks that overlap one another all over, some of them fixed."""
+    random = np.random.default_rng(seed)
+    places = random.uniform(0.0, 0.12, (count, 2))
+    return [Block(x, y, random.uniform(-4.0, 4.0), fixed=i % 7 == 3) for i, (x, y) in enumerate(places)]
+
+
+def comb() -> list[Block]:
+    """Return a beam with more blocks on it than there are colours."""
+    teeth = [Block(0.006 * i, 0.03, width=0.005, height=0.02) for i in range(COLOURS + 6)]
+    return [Block(0.2, 0.0125, width=0.5), *teeth]
+
+
+def of_colours(scene: Nonsmooth) -> list[list[tuple[int, int]]]:
+    """Return the pairs of every colour that there is."""
+    rows = listed_rows(scene)
+    used = int(scene.contacts.stepping[0].colours)
+    assert scene.begins[0] == 0
+    assert np.all(scene.begins[used:] == rows.size)
+    return [
+        list(zip(rows.a[i:j].tolist(), rows.b[i:j].tolist(), strict=True))
+        for i, j in pairwise(scene.begins[: used + 1])
+    ]
+
+
+def free_bodies(scene: Nonsmooth, pairs: list[tuple[int, int]]) -> list[int]:
+    return [i for pair in pairs for i in pair if scene.contacts.lines.inverse_mass[i] > 0.0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_two_pairs_of_a_colour_share_a_free_body_and_all_have_one(seed: int) -> None:
+    scene = listed(posed(crowd(seed)))
+    colours = of_colours(scene)
+    assert len(colours) > 6
+    for pairs in colours:
+        free = free_bodies(scene, pairs)
+        assert pairs
+        assert len(set(free)) == len(free)
+    everything = [pair for pairs in colours for pair in pairs]
+    assert len(set(everything)) == len(everything) == listed_rows(scene).size
+    meets = np.bincount(free_bodies(scene, everything))
+    assert meets.max() <= len(colours) <= 2 * meets.max() - 1  # of a greedy colouring
+
+
+def test_fixed_bodies_and_the_ground_take_no_colour() -> None:
+    scene = listed(posed([Block(0.04 * i, 0.0125) for i in range(9)]))
+    assert [len(pairs) for pairs in of_colours(scene)] == [9]
+
+
+def test_pairs_beyond_the_last_colour_are_solved_one_by_one() -> None:
+    scene = listed(posed(comb()))
+    colours = of_colours(scene)
+    assert len(colours) == COLOURS
+    for pairs in colours[:-1]:
+        free = free_bodies(scene, pairs)
+        assert len(set(free)) == len(free)
+    assert sum(0 in pair for pair in colours[-1]) > 1  # they all push the beam
+    rows: Any = listed_rows(scene)
+    rows.reach = TOUCHING
+    gather(scene.contacts, scene.begins)
+    first, last = scene.contacts.ends[COLOURS - 1 : COLOURS + 1]
+    assert last - first == len(colours[-1])
+    assert np.all(scene.contacts.groups["count"][first:last] == 1)
+    assert last == most_groups(scene) <= scene.contacts.groups.size
+
+
+def test_rows_know_how_the_materials_of_their_bodies_touch() -> None:
+    scene = listed(posed(crowd(0), friction=0.25, ground_friction=0.75))
+    for row in listed_rows(scene):
+        expected = 0.75 if row.b == scene.world.bodies.size - 1 else 0.25
+        assert scene.contacts.touches[row.touch].kinetic_friction == expected
+
+
+def test_impulses_go_with_their_pair_into_the_next_list() -> None:
+    scene = listed(posed(crowd(1)))
+    rows: Any = listed_rows(scene)
+    names = ("nx", "ny", "normal_one", "normal_two", "shear")
+    random = np.random.default_rng(0)
+    for name in names:
+        rows[name] = random.uniform(1.0, 2.0, rows.size)
+    rows["reach"] = np.where(np.arange(rows.size) % 3 == 0, AWAY, TOUCHING)
+    kept = {(int(row.a), int(row.b)): [row[name] for name in names] for row in rows if row.reach != AWAY}
+    before = pairs_of(scene)
+    moved = [Block(one.x + 0.01 * (i % 3), one.y, one.angle) for i, one in enumerate(crowd(1))]
+    place(scene, moved)
+    assert rebuild(scene, frame_of_supports(scene))
+    after = listed_rows(scene)
+    assert before - pairs_of(scene)
+    assert pairs_of(scene) - before
+    carried = 0
+    for row in after:
+        expected = kept.get((int(row.a), int(row.b)))
+        assert [row[name] for name in names] == (expected or [0.0] * 5)
+        carried += expected is not None
+    assert carried > 20

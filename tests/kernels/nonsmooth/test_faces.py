@@ -1,0 +1,96 @@
+"""Faces, edges and points of the manifold, piece by piece, and the ground below a block."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blocksim.kernels.arrays import zeros
+from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, LINE, ROW
+from blocksim.kernels.nonsmooth.faces import Block, Edge, Face, block_ahead, block_of, clip, face_towards, in_frame
+from blocksim.kernels.nonsmooth.manifold import Place, collide
+from tests.kernels.nonsmooth.references import corners, places_of
+
+if TYPE_CHECKING:
+    from blocksim.kernels.arrays import Record
+    from tests.kernels.conftest import MakeBody
+
+angles = st.floats(-4.0, 4.0)
+places = st.floats(-0.05, 0.05)
+
+
+@given(angle=angles, x=places, y=places, along_x=st.booleans())
+def test_face_towards_a_place_is_the_one_on_its_side(
+    make_body: MakeBody, angle: float, x: float, y: float, along_x: bool
+) -> None:
+    body = make_body(0.1, -0.3, angle, width=0.03, height=0.02)
+    face = face_towards(block_of(body), x, y, along_x)
+    sign = 1.0 if (x if along_x else y) >= 0.0 else -1.0
+    turned = angle if along_x else angle + math.pi / 2
+    assert (face.nx, face.ny) == pytest.approx((sign * math.cos(turned), sign * math.sin(turned)), abs=1e-12)
+    assert (face.distance, face.half) == ((0.015, 0.01) if along_x else (0.01, 0.015))
+
+
+@given(angle=angles, right=places, above=places)
+def test_frame_of_a_face_counts_to_the_right_and_from_the_face_on(angle: float, right: float, above: float) -> None:
+    """Seen from inside the body, looking out, the right is at hand where the normal has turned clockwise."""
+    n = np.array([math.cos(angle), math.sin(angle)])
+    face = Face(float(n[0]), float(n[1]), 0.2, 0.1, 0.015, 0.01)
+    x, y = (0.2, 0.1) + (0.015 + above) * n + right * np.array([n[1], -n[0]])
+    assert in_frame(face, float(x), float(y)) == pytest.approx((right, above), abs=1e-15)
+
+
+@given(left=places, width=st.floats(1e-4, 0.1), gap=places, rise=places, half=st.floats(0.005, 0.05))
+def test_clipped_edge_stays_on_its_line_and_over_the_face(
+    left: float, width: float, gap: float, rise: float, half: float
+) -> None:
+    cut = clip(Edge(left, gap, left + width, gap + rise, False, False), half)
+    if left >= half or left + width <= -half:
+        assert cut.left >= cut.right or math.isclose(cut.left, cut.right)
+        return
+    assert (cut.left, cut.right) == (max(left, -half), min(left + width, half))
+    for place, height in ((cut.left, cut.left_gap), (cut.right, cut.right_gap)):
+        assert height == pytest.approx(gap + rise * (place - left) / width, abs=1e-12)
+    assert (bool(cut.is_left), bool(cut.is_right)) == (left < -half, left + width > half)  # ends of the face can touch
+
+
+def test_block_ahead_turns_to_third_order_in_the_angle() -> None:
+    block = Block(0.1, 0.2, math.cos(0.4), math.sin(0.4), 0.016, 0.0125)
+    errors = []
+    for ahead in (2e-3, 1e-3):
+        moved = block_ahead(block, 0.5, -0.7, 30.0, ahead)
+        assert (moved.x, moved.y) == pytest.approx((0.1 + 0.5 * ahead, 0.2 - 0.7 * ahead), abs=1e-15)
+        angle = 0.4 + 30.0 * ahead
+        errors.append(math.hypot(moved.cos - math.cos(angle), moved.sin - math.sin(angle)))
+    assert 0.0 < errors[1] < 0.13 * errors[0] < 0.13 * 0.06**3
+
+
+def on_ground(body: Record, ground: Record, margin: float) -> Record:
+    row, lines = zeros(1, ROW)[0], zeros(2, LINE)
+    collide(row, body, ground, lines[0], lines[1], Place(margin, 0.0, 0.0, True))
+    return row
+
+
+@given(angle=angles, height=st.floats(-2e-3, 2e-3), level=places)
+def test_ground_is_met_by_all_corners_within_the_margin(
+    make_body: MakeBody, angle: float, height: float, level: float
+) -> None:
+    margin = 1.5e-3
+    body, ground = make_body(0.3, 0.0, angle), make_body(7.0, level, mass=1.0)
+    body.y = level + height - corners(body)[:, 1].min()
+    near = [corner for corner in corners(body).tolist() if corner[1] - level <= margin]
+    near.sort(reverse=True)  # along the tangent of an upward normal, which points to the left
+    row = on_ground(body, ground, margin)
+    assert bool(row.reach == AWAY) is (not near)
+    if not near:
+        return
+    assert (row.nx, row.ny) == (0.0, 1.0)
+    gaps = np.array([row.gap_one, row.gap_two])
+    assert gaps[gaps < FAR] == pytest.approx([y - level for _, y in near], abs=1e-12)
+    found = places_of(row, body, of_a=True)[gaps < FAR]
+    assert found == pytest.approx(np.array([(x, level) for x, _ in near]), abs=1e-12)
