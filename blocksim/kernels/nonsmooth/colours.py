@@ -21,6 +21,12 @@ def lowest_free(used: int) -> int:
     return colour
 
 
+@rare_kernel
+def bit_of(colour: int) -> int:
+    """Return the bit of a colour; none for the last one, which anybody can have (and which would be the sign)."""
+    return ONE << colour if colour < COLOURS - 1 else 0
+
+
 @kernel
 def forget(one: Record) -> None:
     """Set what a row keeps from step to step to zero."""
@@ -79,9 +85,9 @@ def colour_pairs(scene: Nonsmooth, count: int) -> None:
         free_b = lines[pair.b].inverse_mass > 0.0
         colour = lowest_free((used[pair.a] if free_a else 0) | (used[pair.b] if free_b else 0))
         if free_a:
-            used[pair.a] |= ONE << colour
+            used[pair.a] |= bit_of(colour)
         if free_b:
-            used[pair.b] |= ONE << colour
+            used[pair.b] |= bit_of(colour)
         pair.colour = colour
         scene.begins[colour + 1] += 1
         last = max(last, colour + 1)

@@ -1,0 +1,101 @@
+"""What the velocity pass aims at: Newton's restitution where blocks meet, no approach where they touch."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from blocksim.kernels.nonsmooth.arrays import FAR
+from tests.kernels.nonsmooth.references import dense
+from tests.kernels.nonsmooth.scenes import Block, after_substep, velocities
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from blocksim.verification.scene import Simulation
+
+G = 9.81
+H = 1e-3  # s, a substep
+HALF = 0.0125  # m, of a height
+SMOOTH: dict[str, Any] = {"friction": 0.0, "ground_friction": 0.0, "substeps": 1, "velocity_tolerance": 1e-11}
+RESTITUTIONS = [0.0, 0.2, 0.5, 0.8, 1.0]
+
+
+def lowest(angle: float) -> float:
+    """Return how far (m) the lowest corner is below the centre."""
+    return math.sin(abs(angle)) * 0.016 + math.cos(angle) * HALF
+
+
+@pytest.mark.parametrize("restitution", RESTITUTIONS)
+@pytest.mark.parametrize("angle", [0.0, 0.3, -1.0])
+def test_impact_reverses_the_approach_of_the_point_by_its_restitution(restitution: float, angle: float) -> None:
+    """Without gravity exactly: flat, or on a corner, in the plane of the ground or that of a fixed block."""
+    for floor in ([], [Block(0.0, -HALF + 0.5, width=0.2, fixed=True)]):
+        level = 0.5 if floor else 0.0
+        block = Block(0.004, level + lowest(angle) + 1e-5, angle, 0.3, -0.9, 4.0 * (angle != 0.0))
+        scene = after_substep([block, *floor], restitution=restitution, gravity=0.0, **SMOOTH)
+        all_of = dense(scene)
+        after = all_of.normals @ velocities(scene.contacts.lines).ravel()
+        before = all_of.normals @ velocities(scene.contacts.before).ravel()
+        if restitution > 0.5:  # impacts go in rounds: their velocities before are no longer kept
+            before = all_of.normals @ np.array([[0.3, -0.9, block.spin], *[[0.0] * 3] * (1 + len(floor))]).ravel()
+        is_met = all_of.gaps < FAR / 2
+        assert after[is_met] == pytest.approx(-restitution * before[is_met], abs=1e-9)
+        assert before[is_met].max() < -0.5
+
+
+@pytest.mark.parametrize("restitution", RESTITUTIONS)
+def test_two_free_blocks_part_with_their_restitution(restitution: float) -> None:
+    blocks = [Block(0.0, 1.0, vy=0.4, vx=0.1), Block(0.0, 1.0 + 2 * HALF + 1e-5, vy=-0.6, width=0.02, vx=-0.3)]
+    scene = after_substep(blocks, restitution=restitution, gravity=0.0, **SMOOTH)
+    one, two = velocities(scene.contacts.lines)[:2]
+    assert two[1] - one[1] == pytest.approx(restitution, abs=1e-9)
+    assert [one[0], two[0]] == pytest.approx([0.1, -0.3], abs=1e-12)
+
+
+@pytest.mark.parametrize(("rate", "rebounds"), [(0.019, False), (0.021, True)])
+def test_slower_impacts_than_the_threshold_do_not_rebound(rate: float, rebounds: bool) -> None:
+    block = Block(0.0, HALF - 1e-7, vy=-rate)
+    scene = after_substep([block], restitution=0.5, gravity=0.0, restitution_threshold=0.02, **SMOOTH)
+    assert velocities(scene.contacts.lines)[0, 1] == pytest.approx(0.5 * rate if rebounds else 0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+def test_gap_that_does_not_close_in_the_substep_takes_nothing_from_an_approach(restitution: float) -> None:
+    block = Block(0.0, HALF + 1.1e-3, vy=-1.0)
+    scene = after_substep([block], restitution=restitution, gravity=0.0, **SMOOTH)
+    assert velocities(scene.contacts.lines)[0].tolist() == [0.0, -1.0, 0.0]
+
+
+@pytest.mark.parametrize("restitution", [0.4, 0.8])
+@pytest.mark.parametrize("share", [0.1, 0.6])
+def test_rebound_from_a_fall_has_the_share_of_energy_that_restitution_leaves(
+    single: Callable[..., Simulation], restitution: float, share: float
+) -> None:
+    """Wherever within a substep the block meets the ground: apexes are h e^2, of a fall from h."""
+    height = 0.05 + share * H * math.sqrt(2 * G * 0.05)
+    run = single([{"y": HALF + height}], restitution=restitution, step=H, substeps=1)
+    time = math.sqrt(2 * height / G) * (1.0 + restitution)
+    steps = round(time / run.step)
+    run.to_step(steps)
+    body = run.bodies[0]
+    apex = body.y - HALF + 0.5 * body.vy * body.vy / G
+    assert apex == pytest.approx(restitution**2 * height, abs=3e-3 * height)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.2])
+def test_block_in_touch_neither_sinks_nor_slides_nor_is_lifted_by_the_velocity_pass(tilt: float) -> None:
+    """Its weight is taken up whole, overlap or not; what the position pass adds is gone again."""
+    for overlap in (0.0, 1e-5, 1e-4):
+        values: dict[str, Any] = {"restitution": 0.0, "tilt": tilt, "substeps": 1, "velocity_tolerance": 1e-11}
+        scene = after_substep([Block(0.0, HALF - overlap)], **values)
+        assert np.abs(velocities(scene.contacts.lines)[0, :2]).max() < 1e-9
+
+
+@pytest.mark.parametrize("restitution", [0.4, 0.9])
+def test_row_that_parts_already_is_left_alone(restitution: float) -> None:
+    scene = after_substep([Block(0.0, HALF - 1e-6, vy=0.5)], restitution=restitution, gravity=0.0, **SMOOTH)
+    assert velocities(scene.contacts.lines)[0].tolist() == pytest.approx([0.0, 0.5, 0.0], abs=1e-12)
