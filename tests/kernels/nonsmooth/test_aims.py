@@ -70,6 +70,29 @@ def test_gap_that_does_not_close_in_the_substep_takes_nothing_from_an_approach(r
     assert velocities(scene.contacts.lines)[0].tolist() == [0.0, -1.0, 0.0]
 
 
+def test_point_that_parts_beside_one_that_meets_is_not_made_to_rebound() -> None:
+    """A heel comes down while the toe is lifted, out of an overlap: the blow takes from that, and nothing gives."""
+    block = Block(0.0, HALF - 1e-3, vx=0.2, vy=-0.25, spin=-45.0)
+    scene = after_substep([block], restitution=0.4, gravity=0.0, **SMOOTH)
+    all_of = dense(scene)
+    before, after = (all_of.normals @ velocities(one).ravel() for one in (scene.contacts.before, scene.contacts.lines))
+    heel, toe = np.argmin(before), np.argmax(before)
+    assert before[toe] > 0.3
+    assert after[heel] == pytest.approx(-0.4 * before[heel], abs=1e-9)
+    assert all_of.impulses[toe] == 0.0
+    assert velocities(scene.contacts.lines)[0, 0] == pytest.approx(0.2, abs=1e-12)
+
+
+def test_point_that_is_still_open_beside_one_in_touch_is_not_slowed_down() -> None:
+    """A block turns about one corner; the other will meet the ground in the next substep, and not in this one."""
+    angle, x = 0.02, 0.016 * math.cos(0.02) - HALF * math.sin(0.02)
+    spin = -angle / (1.5 * H)
+    block = Block(0.0, lowest(angle) - 1e-9, angle, lowest(angle) * -spin, x * spin, spin)
+    scene = after_substep([block], restitution=0.0, gravity=0.0, **SMOOTH)
+    assert dense(scene).gaps.max() < FAR / 2  # both are looked at
+    assert velocities(scene.contacts.lines)[0].tolist() == pytest.approx([block.vx, block.vy, spin], abs=1e-6)
+
+
 @pytest.mark.parametrize("restitution", [0.4, 0.8])
 @pytest.mark.parametrize("share", [0.1, 0.6])
 def test_rebound_from_a_fall_has_the_share_of_energy_that_restitution_leaves(
@@ -84,6 +107,14 @@ def test_rebound_from_a_fall_has_the_share_of_energy_that_restitution_leaves(
     body = run.bodies[0]
     apex = body.y - HALF + 0.5 * body.vy * body.vy / G
     assert apex == pytest.approx(restitution**2 * height, abs=3e-3 * height)
+
+
+@pytest.mark.parametrize("restitution", [0.4, 0.9])
+def test_blocks_that_meet_side_by_side_in_flight_fall_on(single: Callable[..., Simulation], restitution: float) -> None:
+    blocks = [{"x": -0.02, "y": 1.0, "velocity": [1.0, 0.0]}, {"x": 0.02, "y": 1.0, "velocity": [-1.0, 0.0]}]
+    run = single(blocks, restitution=restitution, friction=0.0).to_step(20)
+    assert run.bodies.y == pytest.approx([1.0 - 0.5 * G * 0.02**2] * 2, abs=1e-9)
+    assert run.bodies.vx == pytest.approx([-restitution, restitution], abs=1e-6)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.2])

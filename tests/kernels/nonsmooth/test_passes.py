@@ -96,6 +96,38 @@ def test_friction_stops_all_slip_or_resists_it_with_all_it_has(
     assert np.any(pressed & is_at_limit)
 
 
+def two_blocks(seed: int) -> list[Block]:
+    """Return two blocks in flight that meet with two points of a face."""
+    vx, spin, other = np.random.default_rng(seed).normal(size=3) * (1.0, 8.0, 8.0)
+    return [Block(0.0, 1.0, 1e-3, vx, 0.3, spin), Block(0.007, 1.025, -1e-3, 0.0, -0.9, other)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_one_contact_is_solved_exactly_at_once(seed: int) -> None:
+    """Both normals in the first sweep, and friction to the slip that they leave: effective masses are right."""
+    once = {**EXACT, "velocity_sweeps": 1, "gravity": 0.0}
+    scene = after_substep(two_blocks(seed), **SMOOTH, **once)
+    all_of, free = dense(scene), velocities(scene.contacts.before).ravel()
+    expected = least_change(free, all_of.normals, all_of.targets, all_of.inverse_mass)
+    assert velocities(scene.contacts.lines).ravel() == pytest.approx(expected, abs=1e-10)
+    scene = after_substep(two_blocks(seed), friction=100.0, **once)
+    all_of = dense(scene)
+    _, slip = slips(scene, all_of)
+    assert slip == pytest.approx([0.0], abs=1e-12)
+    assert np.all(all_of.shears != 0.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_friction_is_within_the_cone_after_any_sweep(seed: int, size: tuple[int, int]) -> None:
+    blocks = pile(np.random.default_rng(seed), *size)
+    for sweeps in (1, 2, 3):
+        scene = after_substep(blocks, friction=0.3, ground_friction=0.3, **{**EXACT, "velocity_sweeps": sweeps})
+        all_of = dense(scene)
+        limit = 0.3 * all_of.impulses.reshape(-1, 2).sum(axis=1)
+        assert np.all(np.abs(all_of.shears) <= limit * (1.0 + 1e-12))
+        assert np.any(all_of.shears != 0.0)
+
+
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("is_first", [True, False])
 def test_velocities_change_by_gravity_and_by_the_impulses_that_are_kept(
