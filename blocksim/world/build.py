@@ -63,7 +63,7 @@ def build_worlds(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
 
 def _choose(outline: Outline, bounds: Bounds) -> Stride:
     step = choose_step(outline.scenario, bounds, outline.interactions)
-    return Stride(step, choose_skin(outline.scenario, bounds, step))
+    return Stride(step, choose_skin(outline.scenario, bounds, outline.interactions, step))
 
 
 def _size(parts: Parts) -> SceneSize:

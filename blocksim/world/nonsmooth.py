@@ -31,7 +31,7 @@ from blocksim.world.memory import RigidSize, refuse_if_too_large
 from blocksim.world.outline import Outline
 from blocksim.world.parts import SURFACE, Parts
 from blocksim.world.rigid_step import choose_rigid_step
-from blocksim.world.skin import SKIN_SHARE
+from blocksim.world.skin import choose_skin
 from blocksim.world.soft_contact import soft_contact
 from blocksim.world.stacks import Construction, Refusal, Stack, Stride, built, member, only
 
@@ -60,8 +60,8 @@ def velocity_tolerance(time: Stepping, blocks: int) -> float:
 def build_nonsmooth(scenario: Scenario) -> Nonsmooth:
     """Return a world at time zero with all that stepping it without springs needs.
 
-    Raises SceneTooLargeError when there is not enough memory for it, and StepTooLongError when the scenario asks for
-    an inadmissible step without forcing it.
+    Raises SceneTooLargeError when there is not enough memory for it, StepTooLongError when the scenario asks for an
+    inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
     """
     scene: Nonsmooth = member(only(build_nonsmooths([scenario])).scenes, 0)
     return scene
@@ -76,7 +76,7 @@ def _choose(outline: Outline, bounds: Bounds) -> Stride:
     scenario = outline.scenario
     stepping_of(scenario)
     step = choose_rigid_step(scenario, bounds, outline.interactions)
-    return Stride(step, bounds.smallest * SKIN_SHARE if scenario.contact.skin is None else scenario.contact.skin)
+    return Stride(step, choose_skin(scenario, bounds, outline.interactions, step))
 
 
 def _size(parts: Parts) -> RigidSize:
