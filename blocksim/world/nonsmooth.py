@@ -36,7 +36,7 @@ from blocksim.world.soft_contact import soft_contact
 from blocksim.world.stacks import Construction, Refusal, Stack, Stride, built, member, only
 
 MOST_REACH = 1.5  # of a body, in skins
-SAFE_RESTITUTION = 0.5  # up to which no impact was seen to create energy, and one that follows from another is weak
+WEAK_RESTITUTION = 0.5  # up to which a crowd has the impacts of a substep all at once
 FINE, COARSE = 1e-3, 0.1  # m/s: tolerance of the velocity pass, for few blocks and for a crowd
 CROWD = 100  # blocks
 LINE_WORDS = CACHE_LINE // 8  # so that no two threads write to one cache line
@@ -55,6 +55,18 @@ def velocity_tolerance(time: Stepping, blocks: int) -> float:
     if time.velocity_tolerance is not None:
         return time.velocity_tolerance
     return FINE if blocks < CROWD else COARSE
+
+
+def has_impacts_in_rounds(restitution: float, blocks: int) -> bool:
+    """Return whether impacts that follow from one another within a substep do so, given the greatest restitution.
+
+    Few blocks have one law, whatever their restitution. In a crowd that moves in touch something rebounds in nearly
+    every substep, and to follow it costs a hundred times as much as the rest of the step: a wall of 1000 blocks takes
+    18 s instead of 0.2 s for 0.3 s. Up to WEAK_RESTITUTION, where no impact was seen to create energy, a crowd has all
+    impacts of a substep at once: those that are struck in it strike what they meet without a rebound. That is another
+    law only where two impacts fall into one substep, so that the two meet as steps become shorter.
+    """
+    return restitution > (0.0 if blocks < CROWD else WEAK_RESTITUTION)
 
 
 def build_nonsmooth(scenario: Scenario) -> Nonsmooth:
@@ -101,6 +113,7 @@ def _stepping(outline: Outline, stride: Stride) -> dict[str, float]:
     time = stepping_of(outline.scenario)
     substep = stride.step / time.substeps
     soft = soft_contact(substep)
+    restitution = max(touch.restitution for row in outline.interactions for touch in row)
     return {
         "substep": substep,
         "closed_bias": soft.bias,
@@ -110,7 +123,7 @@ def _stepping(outline: Outline, stride: Stride) -> dict[str, float]:
         "tolerance": velocity_tolerance(time, len(outline.placed)),
         "substeps": time.substeps,
         "velocity_sweeps": time.velocity_sweeps,
-        "is_guarded": max(touch.restitution for row in outline.interactions for touch in row) > SAFE_RESTITUTION,
+        "is_guarded": has_impacts_in_rounds(restitution, len(outline.placed)),
         "least_reach": 0.5 * stride.skin,
         "most_reach": MOST_REACH * stride.skin,
     }

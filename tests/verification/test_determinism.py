@@ -123,7 +123,7 @@ def test_a_crowd_moves_the_same_to_the_last_bit_with_any_reach(contact: dict[str
 
 def test_skin_of_the_scenario_does_not_change_a_bit_of_a_collapse(start_shipped: Callable[..., Simulation]) -> None:
     ends, rebuilds = [], []
-    skins: list[dict[str, str]] = [{}, {"contact__skin": "0.1 mm"}, {"contact__skin": "32 mm"}]
+    skins: list[dict[str, str]] = [{}, {"contact__skin": "0.2 mm"}, {"contact__skin": "32 mm"}]
     for skin in skins:
         scene = start_shipped("three_blocks_nominal", contact__stiffness_scale=3e-4, **skin).to_time(0.3)
         assert scene.status == REACHED
