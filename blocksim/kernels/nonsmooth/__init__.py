@@ -23,7 +23,8 @@ J v - t >= 0, with the target t = -e u where the approach u before the substep w
 gravity does meanwhile: aims.rebound), and -max(s, 0) / h elsewhere. What the position pass adds to velocities moves
 bodies, but is gone after the velocity pass.
 
-Where restitution is high, impacts of bodies that touch one another go in rounds instead, and create no energy:
+Impacts of bodies that touch one another go in rounds instead (in crowds only where restitution is high; see
+world/nonsmooth.py), and create no energy:
 impacts.py, clusters.py, rounds.py.
 
 Gravity kicks half a substep at first and whole ones then: velocities live half a substep before positions (leap-frog).

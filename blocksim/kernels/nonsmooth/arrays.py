@@ -56,12 +56,17 @@ GROUP = on_own_lines(
 IMPACT = on_own_lines(
     record_type(
         "vx vy spin "  # m/s, m/s, rad/s: when the round began
-        "share "  # -: of the rebounds of its cluster that it can have without a gain of energy
-        "after_vx after_vy after_spin "  # m/s, m/s, rad/s: with all rebounds
-        "then now "  # J: kinetic energy of the cluster before the round and after it; of roots
-        "least between",  # J: after it without rebounds, and of the difference that rebounds make; of roots
+        "after_vx after_vy after_spin "  # m/s, m/s, rad/s: with all rebounds; then of the last solution that gains
+        "low_vx low_vy low_spin "  # m/s, m/s, rad/s: of the last solution that does not gain energy; see restraint.py
+        "share "  # -: of rebounds, that is tried; at last, of the way from the lower solution to the higher one
+        "low high "  # -: shares of rebounds of both solutions; this and the following of roots
+        "then now "  # J: kinetic energy of the cluster before the round, and after it or as last tried
+        "least most "  # J: of both solutions
+        "between "  # J: of their difference
+        "stale",  # -: what the solution that stays counts for
         counters="root",  # the body that stands for the cluster
-        flags="is_hit",  # anything in the cluster rebounds in the substep
+        # anything in the cluster rebounds in the substep; its share is sought for; what its last solution is kept as
+        flags="is_hit is_open side",
     )
 )
 # of a group, beside GROUP, while its bodies go through impacts; see impacts.py
@@ -69,7 +74,9 @@ ASIDE_LANES = (
     "normal_one normal_two shear "  # N s: of clusters that are not hit, and those of all rounds of others
     "target_one target_two "  # m/s: as GROUP has them, of the velocity pass before; -FAR if not hit
     "rise_one rise_two "  # m/s: that a rebound gets against gravity after all rounds; -FAR before it is hit
-    "after_one after_two after_shear"  # N s: of a round with all rebounds
+    "all_one all_two "  # m/s: targets of a round with all rebounds
+    "after_one after_two after_shear "  # N s: of the solutions of restraint.py, as in IMPACT
+    "low_one low_two low_shear"
 )
 ASIDE = on_own_lines(
     np.dtype([*((name, np.float64, (WIDTH,)) for name in ASIDE_LANES.split()), ("is_hit", np.uint8)], align=True)
@@ -103,7 +110,7 @@ STEPPING = record_type(
     "velocity_sweeps "  # at most
     "colours row_count active_count group_count "  # now
     "sweeps "  # of the velocity pass, in all so far
-    "is_guarded "  # flag: restitution is so high that impacts go one after the other, in rounds
+    "is_guarded "  # flag: impacts go one after the other, in rounds
     "has_rebounds "  # flag: anything rebounds in the substep under way
     "has_gain",  # flag: the last round has created energy in a cluster
 )

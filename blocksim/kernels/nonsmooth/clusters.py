@@ -3,8 +3,6 @@
 What is fixed joins nobody, as it moves under no impulse: two blocks on one table do not know of each other.
 """
 
-import math
-
 from blocksim.kernels.arrays import Record, Records
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
@@ -103,44 +101,3 @@ def weigh(contacts: Contacts) -> bool:
     for body in bodies:
         gains = gains or has_gain(body)
     return gains
-
-
-@rare_kernel
-def find_shares(contacts: Contacts) -> None:
-    """Find what share of its rebounds leaves every cluster the energy that it had.
-
-    Lines have the velocities without rebounds, `after` those with them. In between energy is a parabola of the share s,
-    K(s) = K_0 + s (K_1 - K_0 - c) + s^2 c with the energy c of their difference.
-    """
-    lines = contacts.lines
-    bodies = contacts.impacts
-    for body in bodies:
-        body.least = body.between = 0.0
-    ux = contacts.stepping[0].support_vx
-    uy = contacts.stepping[0].support_vy
-    for i in range(bodies.size):
-        body = bodies[i]
-        line = lines[i]
-        if body.is_hit and line.inverse_mass > 0.0:
-            root = bodies[body.root]
-            root.least += energy(contacts, line, line.vx, line.vy, line.spin)
-            vx = body.after_vx - line.vx + ux
-            vy = body.after_vy - line.vy + uy
-            root.between += energy(contacts, line, vx, vy, body.after_spin - line.spin)
-    for i in range(bodies.size):
-        body = bodies[i]
-        if body.root == i:
-            body.share = 1.0
-            if has_gain(body):
-                body.share = share_of(body.then - body.least, body.now - body.least, body.between)
-    for body in bodies:
-        body.share = bodies[body.root].share
-
-
-@rare_kernel
-def share_of(room: float, gain: float, between: float) -> float:
-    """Return s in [0, 1] with s (gain - between) + s^2 between = room, all energies (J)."""
-    if room <= 0.0:
-        return 0.0
-    slope = gain - between
-    return min(1.0, 2.0 * room / (slope + math.sqrt(slope * slope + 4.0 * between * room)))

@@ -13,33 +13,41 @@ until nothing approaches; then gravity and what rests are solved as ever, and po
 
 Without friction the energy of a round changes by -(1 - e) / 2 sum(lambda |u|): none is created, and with e = 1 none is
 lost (M. Smith et al., Reflections on simultaneous impact, ACM Trans. Graph. 31 (2012) 106). With friction Newton's
-restitution can create energy (T. R. Kane and D. A. Levinson, Dynamics (1985), section 5.8). A cluster that gains has
-the round solved once more without rebounds, which creates none: with lambda_n t = 0 and friction against the slip that
-is left the change is at most -1/2 lambda A lambda. Of the difference it gets the share that leaves it the energy that
-it had. Both solutions keep all bounds of impulses and approaches, so what lies between does too; the share falls as
-restitution grows, and the rebound stays.
+restitution can create energy (T. R. Kane and D. A. Levinson, Dynamics (1985), section 5.8). Without rebounds a round
+creates none: with lambda_n t = 0 and friction against the slip that is left the change is at most
+-1/2 lambda A lambda. A cluster that gains has the round solved again with the share of its rebounds that leaves it the
+energy that it had: restraint.py.
 """
 
-from blocksim.kernels.arrays import TEAM_SIZE, Integers
+from blocksim.kernels.arrays import TEAM_SIZE, Integers, Record
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.nonsmooth.arrays import Contacts
-from blocksim.kernels.nonsmooth.clusters import find_clusters, find_shares, weigh
+from blocksim.kernels.nonsmooth.clusters import find_clusters, weigh
 from blocksim.kernels.nonsmooth.iterate import VELOCITY, agree, velocity_pass
-from blocksim.kernels.nonsmooth.rounds import (
-    aim_rest,
-    aim_round,
-    between,
-    blend,
-    book_round,
-    bring_back,
-    leave_out_rebounds,
-    set_aside,
+from blocksim.kernels.nonsmooth.restraint import (
+    aim_share,
+    begin_search,
+    judge,
+    keep_all,
+    keep_bodies,
+    keep_rows,
+    settle_bodies,
+    settle_rows,
 )
+from blocksim.kernels.nonsmooth.rounds import aim_rest, aim_round, book_round, bring_back, set_aside
 from blocksim.kernels.nonsmooth.sweeps import part_of
 from blocksim.kernels.team import meet
 
 MOST_ROUNDS = 100  # what approaches then does not rebound
-TOLERANCE = 1e-6  # m/s: of impacts; what they miss is energy
+MOST_TRIES = 30  # shares of rebounds; what energy is left then is made up between the last two
+# of impacts, what they miss is energy: at most so many m/s, and such a share of the tolerance of the velocity pass
+TOLERANCE, TOLERANCE_SHARE = 1e-6, 1e-7
+
+
+@rare_kernel
+def tolerance_of(stepping: Record) -> float:
+    """Return to what (m/s) a round of impacts is solved."""
+    return min(TOLERANCE, TOLERANCE_SHARE * stepping.tolerance)
 
 
 @rare_kernel
@@ -78,18 +86,6 @@ def undo(contacts: Contacts, first: int, last: int) -> None:
 
 
 @rare_kernel
-def blend_bodies(contacts: Contacts, first: int, last: int) -> None:
-    """Give bodies the velocities that belong to the impulses of rounds.blend."""
-    for i in range(first, last):
-        body = contacts.impacts[i]
-        if body.is_hit:
-            line = contacts.lines[i]
-            line.vx = between(line.vx, body.after_vx, body.share)
-            line.vy = between(line.vy, body.after_vy, body.share)
-            line.spin = between(line.spin, body.after_spin, body.share)
-
-
-@rare_kernel
 def resume(contacts: Contacts, first: int, last: int, gx: float, gy: float) -> None:
     """Let the substep of the bodies of clusters that were hit begin after the last impact, with gravity (m/s)."""
     for i in range(first, last):
@@ -106,22 +102,34 @@ def resume(contacts: Contacts, first: int, last: int, gx: float, gy: float) -> N
 @rare_kernel
 def restrain(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int], groups: tuple[int, int]) -> None:
     """Leave clusters that have gained energy in a round that share of their rebounds with which they do not."""
+    stepping = contacts.stepping[0]
+    keep_all(contacts, groups[0], groups[1])
     undo(contacts, bodies[0], bodies[1])
-    leave_out_rebounds(contacts, groups[0], groups[1])
-    meet(team)
-    velocity_pass(contacts, team, k, VELOCITY, TOLERANCE)
     meet(team)
     if k == 0:
-        find_shares(contacts)
+        begin_search(contacts)
     meet(team)
-    blend_bodies(contacts, bodies[0], bodies[1])
-    blend(contacts, groups[0], groups[1])
+    for number in range(MOST_TRIES):
+        aim_share(contacts, groups[0], groups[1])
+        meet(team)
+        velocity_pass(contacts, team, k, VELOCITY, tolerance_of(stepping))
+        meet(team)
+        if k == 0:
+            stepping.has_gain = judge(contacts, number == MOST_TRIES - 1)
+        meet(team)
+        keep_rows(contacts, groups[0], groups[1])
+        keep_bodies(contacts, bodies[0], bodies[1])
+        meet(team)
+        if not stepping.has_gain:
+            break
+    settle_rows(contacts, groups[0], groups[1])
+    settle_bodies(contacts, bodies[0], bodies[1])
 
 
 @rare_kernel
 def go_round(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int], groups: tuple[int, int]) -> None:
     """Solve one round that has been aimed."""
-    velocity_pass(contacts, team, k, VELOCITY, TOLERANCE)
+    velocity_pass(contacts, team, k, VELOCITY, tolerance_of(contacts.stepping[0]))
     meet(team)
     if k == 0:
         contacts.stepping[0].has_gain = weigh(contacts)
@@ -158,6 +166,6 @@ def follow_impacts(contacts: Contacts, team: Integers, k: int, bodies: tuple[int
     meet(team)
     aim_rest(contacts, groups[0], groups[1])
     meet(team)
-    velocity_pass(contacts, team, k, VELOCITY, min(TOLERANCE, stepping.tolerance))
+    velocity_pass(contacts, team, k, VELOCITY, tolerance_of(stepping))
     bring_back(contacts, groups[0], groups[1], False)
     meet(team)

@@ -120,42 +120,6 @@ def aim_round(contacts: Contacts, begin: int, end: int, is_first: bool) -> float
 
 
 @rare_kernel
-def leave_out_rebounds(contacts: Contacts, begin: int, end: int) -> None:
-    """Keep the impulses of a round, and begin it again without rebounds."""
-    for m in range(begin, end):
-        aside = contacts.asides[m]
-        if aside.is_hit:
-            group = contacts.groups[m]
-            store(None, aside.after_one, load(None, group.normal_one))
-            store(None, aside.after_two, load(None, group.normal_two))
-            store(None, aside.after_shear, load(None, group.shear))
-            for target in (group.target_one, group.target_two):
-                least = load(None, target)
-                store(None, target, select(least > 0.0, 0.0, least))
-            clear(group)
-
-
-@rare_kernel
-def blend(contacts: Contacts, begin: int, end: int) -> None:
-    """Add the share of their rebounds that clusters can have to the impulses without."""
-    for m in range(begin, end):
-        aside = contacts.asides[m]
-        if aside.is_hit:
-            group = contacts.groups[m]
-            for lane in range(WIDTH):
-                s = of_row(contacts, group, min(lane, group.count - 1)).share
-                group.normal_one[lane] = between(group.normal_one[lane], aside.after_one[lane], s)
-                group.normal_two[lane] = between(group.normal_two[lane], aside.after_two[lane], s)
-                group.shear[lane] = between(group.shear[lane], aside.after_shear[lane], s)
-
-
-@rare_kernel
-def between(x: float, y: float, share: float) -> float:
-    """Return what lies between x and y; exactly y where the share is one."""
-    return y if share >= 1.0 else x + share * (y - x)
-
-
-@rare_kernel
 def book_round(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None:
     """Book a round for some groups, and sum up its impulses; (gx, gy) as in taken_by."""
     for m in range(begin, end):

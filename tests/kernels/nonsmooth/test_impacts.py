@@ -141,9 +141,9 @@ def test_rebound_that_would_gain_energy_keeps_it_and_grows_with_restitution(
         elastic = first_impact(single([body], restitution=1.0, **values))
         assert elastic[1] < 1e-9
         if abs(elastic[1]) < 1e-9:
-            found = [first_impact(single([body], restitution=e, **values)) for e in (0.5, 0.6, 0.8, 0.94, 0.95)]
+            found = [first_impact(single([body], restitution=e, **values)) for e in (0.1, 0.3, 0.5, 0.7, 0.8, 0.9)]
             for (slower, _), (faster, _) in pairwise([*found, elastic]):
-                assert faster > slower - 1e-3  # m/s, of 1; halved rebounds fell by 0.4
+                assert faster > slower - 1e-12  # m/s, of 1; a share of two solutions with a bend between fell by 2e-4
             restrained += 1
     assert restrained > 0  # the throws are such that Newton's law alone would create energy
 
