@@ -6,8 +6,11 @@ side in it. That speed is a bound, a fall of the highest corner to the lowest gr
 time; walls do not fall that fast. A step given by hand is therefore refused only where blocks go farther from the
 start, or in one substep at that bound.
 
-In a substep h with an impact gravity has its full part before it, and again after it: a rebound loses about g h of its
-speed, rocking that much at the corner. Against speeds of free falls over sides L, sqrt(g L), that is h / sqrt(L/g). A
+A block that meets something in a substep h stays there until it ends, and has not yet moved with its new velocity: it
+is behind by what the impact adds to velocity and spin times h/2 on average, and gravity changes its speed by g h
+meanwhile. Every impact passes that on to the next: a squat block that hops on its corners (32 x 50 mm, restitution 0.8)
+has its second peak off by 6 % and its fourth by 19 %, 0.3 and 0.6 % of the tilt it starts from, in proportion to h
+whatever the step. Against speeds of free falls over sides L, sqrt(g L), that is h / sqrt(L/g). A
 few blocks can afford to have it small: a step is at most a share of sqrt(L/g) that grows with their number, so that
 costs are about the same, and that of a crowd is the usual one. A single block of 25 mm takes 1/13 ms, three of 32 mm
 take 1/4 ms; the usual step is divided by whole numbers, so that outputs fall on the ends of steps. So with the way in a

@@ -71,6 +71,16 @@ def test_rocking_peaks_are_within_a_percent_at_the_default_step(width: float, he
     assert usual == pytest.approx(fine, rel=0.01)
 
 
+def test_peaks_of_a_block_that_hops_are_within_a_percent_of_its_first_tilt_and_err_with_the_substep() -> None:
+    width, height = 0.032, 0.05
+    fine = peaks(width, height, 0.8, step=5e-6)
+    tilt = 0.5 * atan2(width, height)
+    assert peaks(width, height, 0.8) == pytest.approx(fine, abs=0.01 * tilt)
+    steps = {1: 2e-5, 4: 8e-5}  # s, in so many substeps of the same length
+    errors = [peaks(width, height, 0.8, step=step, substeps=count) - fine for count, step in steps.items()]
+    assert errors[0] == pytest.approx(errors[1], rel=0.5)  # steps differ by a factor of four
+
+
 def test_what_is_about_springs_is_left_out_and_says_why() -> None:
     assert [case.id for case in CASES if case not in APPLY] == ["V2", "V20"]
     assert all(len(reason) > 20 for reason in left_out(SETTING.scheme))
