@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.arrays import ALL, NOT_FINITE, OVERLAP_LIMIT, World
+from blocksim.kernels.depth import MIDDLE, ROWS_APART
+from blocksim.kernels.models import KERNEL, SURFACE
 from blocksim.kernels.nonsmooth.arrays import TOUCHING
 from blocksim.scenario import PlacedBody
 from blocksim.scenario.overlap import Rectangles, penetration
@@ -28,7 +30,8 @@ def told(outcome: Outcome, code: int, scene: AnyScene, placed: Sequence[PlacedBo
     names = [body.name for body in placed]
     with np.errstate(all="ignore"):  # what is not finite is just what is looked for
         who = _FINDERS.get(code, _fastest)(scene, names)
-    return replace(outcome, reason=f"{outcome.reason} ({who}, step {int(scene.world.clock[0].steps)})")
+        reason = _lost_particles(scene) if code == OVERLAP_LIMIT else ""
+    return replace(outcome, reason=f"{reason or outcome.reason} ({who}, step {int(scene.world.clock[0].steps)})")
 
 
 def _not_finite(scene: AnyScene, names: Sequence[str]) -> str:
@@ -54,6 +57,27 @@ def _deepest(scene: AnyScene, names: Sequence[str]) -> str:
     return f"{pair} by {MILLI * overlap[worst]:.3g} mm{most}"
 
 
+def _lost_particles(scene: AnyScene) -> str:
+    """Return what limits the deepest overlap where that is how far particles reach; nothing where it is not."""
+    if not isinstance(scene, World) or scene.controls[0].model == SURFACE:
+        return ""
+    _, _, overlap, limit = _overlaps_of_springs(scene)
+    worst = int(np.nanargmax(overlap / limit))
+    reach = _reach(scene)
+    if limit[worst] != reach:
+        return ""
+    what = (
+        "the reach of the kernel" if scene.controls[0].model == KERNEL else f"{ROWS_APART:g} contact.particle_spacing"
+    )
+    return f"an overlap exceeds {what}, {MILLI * reach:.3g} mm, beyond which particles lose one another"
+
+
+def _reach(world: World) -> float:
+    """Return how deep (m) the particles of boundaries may lie in one another; see blocksim.kernels.depth."""
+    controls = world.controls[0]
+    return float(controls.support if controls.model == KERNEL else ROWS_APART * controls.particle_size)
+
+
 def _name(world: World, names: Sequence[str], body: int) -> str:
     if body < len(names):
         return f"block {names[body]}"
@@ -70,8 +94,13 @@ def _overlaps_of_springs(world: World) -> Pairs:
     pairs, contacts = world.pairs[:count], world.contacts[:count]
     is_active = np.arange(contacts.shape[1]) < pairs["active"][:, np.newaxis]
     deepest = np.where(is_active, contacts["depth"], 0.0).max(axis=1)
-    lost = np.where(deepest > pairs["limit"], 0.0, _penetrations(world, pairs))
-    return pairs["a"], pairs["b"], np.maximum(deepest, lost), pairs["limit"]
+    is_pressed = deepest > pairs["limit"]
+    lost = np.where(is_pressed, 0.0, _penetrations(world, pairs))
+    limit = pairs["limit"]
+    if world.controls[0].model != SURFACE:
+        middle = MIDDLE * _smallest_sides(world, pairs["a"], pairs["b"])
+        limit = np.where(is_pressed, limit, np.minimum(_reach(world), middle))
+    return pairs["a"], pairs["b"], np.maximum(deepest, lost), limit
 
 
 def _penetrations(world: World, pairs: NDArray[Any]) -> NDArray[np.float64]:
