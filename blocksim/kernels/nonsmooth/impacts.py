@@ -40,14 +40,14 @@ from blocksim.kernels.team import meet
 
 MOST_ROUNDS = 100  # what approaches then does not rebound
 MOST_TRIES = 30  # shares of rebounds; what energy is left then is made up between the last two
-# of impacts, what they miss is energy: at most so many m/s, and such a share of the tolerance of the velocity pass
-TOLERANCE, TOLERANCE_SHARE = 1e-6, 1e-7
+# of impacts, what they miss is energy: such a share of the tolerance of the velocity pass, between these (m/s)
+TOLERANCE_SHARE, LEAST_TOLERANCE, MOST_TOLERANCE = 1e-7, 1e-10, 1e-6
 
 
 @rare_kernel
 def tolerance_of(stepping: Record) -> float:
     """Return to what (m/s) a round of impacts is solved."""
-    return min(TOLERANCE, TOLERANCE_SHARE * stepping.tolerance)
+    return max(LEAST_TOLERANCE, min(MOST_TOLERANCE, TOLERANCE_SHARE * stepping.tolerance))
 
 
 @rare_kernel
@@ -166,6 +166,6 @@ def follow_impacts(contacts: Contacts, team: Integers, k: int, bodies: tuple[int
     meet(team)
     aim_rest(contacts, groups[0], groups[1])
     meet(team)
-    velocity_pass(contacts, team, k, VELOCITY, tolerance_of(stepping))
+    velocity_pass(contacts, team, k, VELOCITY, min(tolerance_of(stepping), stepping.tolerance))
     bring_back(contacts, groups[0], groups[1], False)
     meet(team)

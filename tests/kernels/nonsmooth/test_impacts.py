@@ -176,6 +176,14 @@ def test_crowd_with_friction_never_gains_energy(
     assert pace > 1 or kinetic[-1] < 0.9 * kinetic[0]
 
 
+def test_impacts_are_not_solved_beyond_round_off_where_the_velocity_pass_is(single: Callable[..., Simulation]) -> None:
+    """They were solved to a share of its tolerance, below what velocities can hold, by as many sweeps as allowed."""
+    values: dict[str, Any] = {"restitution": 0.9, "friction": 0.4, "ground_friction": 0.4, "gravity": 9.81}
+    runs = [single(box(16, 0.2), velocity_tolerance=tolerance, **values).to_time(0.1) for tolerance in (1e-3, 1e-12)]
+    usual, fine = (int(run.scene.contacts.stepping[0].sweeps) for run in runs)
+    assert 1000 < usual < fine < 3 * usual
+
+
 def test_friction_takes_from_a_block_that_slides_on_another(single: Callable[..., Simulation]) -> None:
     blocks = [{"y": ON_GROUND, "width": 0.2}, {"y": 3 * ON_GROUND, "velocity": [0.5, 0.0]}]
     run = single(blocks, restitution=0.9, ground_friction=0.05)
