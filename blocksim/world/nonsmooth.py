@@ -36,7 +36,7 @@ from blocksim.world.soft_contact import soft_contact
 from blocksim.world.stacks import Construction, Refusal, Stack, Stride, built, member, only
 
 MOST_REACH = 1.5  # of a body, in skins
-WEAK_RESTITUTION = 0.5  # up to which a crowd has the impacts of a substep all at once
+WEAK_RESTITUTION = 0.5  # up to which the impacts of a substep happen all at once
 FINE, COARSE = 1e-3, 0.1  # m/s: tolerance of the velocity pass, for few blocks and for a crowd
 CROWD = 100  # blocks
 LINE_WORDS = CACHE_LINE // 8  # so that no two threads write to one cache line
@@ -57,16 +57,17 @@ def velocity_tolerance(time: Stepping, blocks: int) -> float:
     return FINE if blocks < CROWD else COARSE
 
 
-def has_impacts_in_rounds(restitution: float, blocks: int) -> bool:
-    """Return whether impacts that follow from one another within a substep do so, given the greatest restitution.
+def has_impacts_in_rounds(restitution: float) -> bool:
+    """Return True if impacts of one substep follow from one another, given the greatest restitution of the scene.
 
-    Few blocks have one law, whatever their restitution. In a crowd that moves in touch something rebounds in nearly
-    every substep, and to follow it costs a hundred times as much as the rest of the step: a wall of 1000 blocks takes
-    18 s instead of 0.2 s for 0.3 s. Up to WEAK_RESTITUTION, where no impact was seen to create energy, a crowd has all
-    impacts of a substep at once: those that are struck in it strike what they meet without a rebound. That is another
-    law only where two impacts fall into one substep, so that the two meet as steps become shorter.
+    Up to WEAK_RESTITUTION, where no impact was seen to create energy, all impacts of a substep happen at once, and what
+    is struck in it strikes what it meets without a rebound of its own. The two are one law as steps become shorter, as
+    they differ only where two impacts fall into one substep. Rounds from any restitution on were tried: walls of 30 to
+    99 blocks take 1.6 to 4 times as long and one of 1000 a hundred times, as in blocks that move in touch something
+    rebounds in nearly every substep; and a squat block that rocks, whose impacts of one corner after the other fall
+    into one substep, misses its fourth peak by 4.2 % at 0.5 instead of 0.7 %.
     """
-    return restitution > (0.0 if blocks < CROWD else WEAK_RESTITUTION)
+    return restitution > WEAK_RESTITUTION
 
 
 def build_nonsmooth(scenario: Scenario) -> Nonsmooth:
@@ -123,7 +124,7 @@ def _stepping(outline: Outline, stride: Stride) -> dict[str, float]:
         "tolerance": velocity_tolerance(time, len(outline.placed)),
         "substeps": time.substeps,
         "velocity_sweeps": time.velocity_sweeps,
-        "is_guarded": has_impacts_in_rounds(restitution, len(outline.placed)),
+        "is_guarded": has_impacts_in_rounds(restitution),
         "least_reach": 0.5 * stride.skin,
         "most_reach": MOST_REACH * stride.skin,
     }
