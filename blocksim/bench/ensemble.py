@@ -14,7 +14,7 @@ from blocksim.bench.stepping import Stepping
 from blocksim.scenario.structures.base import draws
 from blocksim.simulation.ensemble import Ensemble, run_ensemble
 from blocksim.simulation.schemes import build_stacks
-from blocksim.world.stacks import only
+from blocksim.world.scenes import only
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

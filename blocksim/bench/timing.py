@@ -10,8 +10,8 @@ import numpy as np
 from blocksim.errors import BlocksimError, ExitCode
 from blocksim.simulation.outcome import BY_CODE
 from blocksim.simulation.schemes import build_scene
-from blocksim.simulation.stacking import arrays_of
 from blocksim.simulation.team import ALONE, Team
+from blocksim.world.scenes import arrays_of
 
 if TYPE_CHECKING:
     from blocksim.kernels.arrays import World

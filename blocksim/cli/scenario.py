@@ -7,8 +7,7 @@ from pathlib import Path
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.findings import Finding
-from blocksim.world.skin import SkinTooSmallError
-from blocksim.world.step import StepError
+from blocksim.world.step import SkinTooSmallError, StepError
 
 
 @contextmanager

@@ -21,8 +21,8 @@ from blocksim.kernels.arrays import zeros
 from blocksim.simulation.atomic import writing
 from blocksim.simulation.checkpoint_origin import Origin
 from blocksim.simulation.schemes import AnyScene
-from blocksim.simulation.stacking import arrays_of
 from blocksim.world.free_memory import available_bytes, readable
+from blocksim.world.scenes import arrays_of
 
 FORMAT: Literal["blocksim checkpoint 1"] = "blocksim checkpoint 1"
 COPIES = 3  # of the content, while it is read: the file, its arrays, the scene

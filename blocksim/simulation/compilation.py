@@ -10,7 +10,7 @@ from blocksim.kernels import jit
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.simulation.schemes import AnyScene, build_scene, measured_row, scheme_of
 from blocksim.simulation.team import ALONE
-from blocksim.world.stacks import stack_of_one
+from blocksim.world.scenes import stack_of_one
 
 SURFACE, PARTICLES, RIGID = "surface", "with-particles", "nonsmooth"  # sets of machine code
 CHANGES: dict[str, dict[str, object]] = {  # in the smallest scene, so that it needs them

@@ -8,9 +8,9 @@ from blocksim.scenario import Scenario
 from blocksim.simulation.folder import CHECKPOINTS
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import AnyScene
-from blocksim.simulation.stacking import arrays_of
 from blocksim.world.free_memory import readable
 from blocksim.world.memory import file_bytes, output_count, recorded_contacts
+from blocksim.world.scenes import arrays_of
 
 CHECKPOINT_FILES = len(CHECKPOINTS) + 1  # the last one while it is written
 

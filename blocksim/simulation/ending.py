@@ -17,7 +17,7 @@ from blocksim.simulation.outcome import Outcome
 from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
 from blocksim.simulation.schemes import AnyScene, scheme_of
 from blocksim.simulation.table import COLUMNS, Columns, as_frame, final_values
-from blocksim.world.stacks import member
+from blocksim.world.scenes import member
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -21,7 +21,7 @@ from blocksim.simulation.looks import adds_up, next_look
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import AnyScene, build_stacks, measured_row, scheme_of
 from blocksim.simulation.team import ALONE
-from blocksim.world.stacks import Refusal, Stack, member, stack_of_one
+from blocksim.world.scenes import Refusal, Stack, member, stack_of_one
 
 BATCH = 256  # members in memory at the same time
 MOST_BODIES = 16_384  # of all members of a batch

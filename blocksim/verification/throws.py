@@ -14,8 +14,8 @@ import numpy as np
 
 from blocksim.analysis import closed_forms as forms
 from blocksim.simulation.schemes import build_scene, scheme_of
-from blocksim.simulation.stacking import arrays_of
 from blocksim.verification.scene import HEIGHT, WIDTH
+from blocksim.world.scenes import arrays_of
 
 if TYPE_CHECKING:
     from blocksim.verification.case import Setting

@@ -1,16 +1,21 @@
-"""Records of all bodies at time zero: blocks, then pieces of ground and walls, the half-plane last."""
+"""What a scenario places where, and the records of all bodies at time zero.
+
+Blocks come first, then pieces of ground and walls, the half-plane last. The prescribed motion of the supports is a
+cubic polynomial of displacement for every stretch of time.
+"""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.arrays import ALL, BODY, Record, Records, zeros
-from blocksim.scenario import PlacedSegment
-from blocksim.world.interactions import ContactClass
-from blocksim.world.outline import Outline, Outlines
+from blocksim.kernels.arrays import ALL, BODY, MOTION_PIECE, MOVED, Record, Records, zeros
+from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments
+from blocksim.scenario.motion import motion_direction, motion_pieces
+from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
 
 # A piece of ground is a slab of which only the upper face counts; its thickness is a share of the smallest side of all
 # blocks: more than any overlap, less than a ledge that is worth modelling.
@@ -18,6 +23,35 @@ SLAB_SHARE = 0.25
 UPPER_FACE = 1 << 1  # bits as in kernels/arrays.py
 UPPER_RIGHT, UPPER_LEFT = 1 << 2, 1 << 3
 SHARP_RIGHT, SHARP_LEFT = 1 << 4, 1 << 5
+
+
+class Outline(NamedTuple):
+    """What a scenario places where, before there are arrays: it decides how large they are."""
+
+    scenario: Scenario
+    placed: tuple[PlacedBody, ...]
+    segments: tuple[PlacedSegment, ...]
+    classes: tuple[ContactClass, ...]
+    interactions: Interactions
+    motion: Records  # (m,) MOTION_PIECE
+
+    @property
+    def shape(self) -> tuple[str, int, int, int, int]:
+        """What scenes must have in common to be built together."""
+        model = self.scenario.contact.model
+        return model, len(self.placed), len(self.segments), len(self.classes), self.motion.size
+
+
+Outlines = Sequence[Outline]
+"""Those of several scenes; where arrays are made of them, of one shape."""
+
+
+def outline_of(scenario: Scenario) -> Outline:
+    """Return the outline of a scenario."""
+    placed = place_bodies(scenario)
+    classes = contact_classes(scenario, placed)
+    interactions = interactions_of(scenario, classes)
+    return Outline(scenario, placed, place_segments(scenario), classes, interactions, motion_records(scenario))
 
 
 def body_records(outlines: Outlines) -> Records:
@@ -90,3 +124,35 @@ def _fill_slab(record: Record, segment: PlacedSegment, thickness: float) -> None
     record.faces = UPPER_FACE
     record.corners = (UPPER_RIGHT if segment.touches_end else 0) | (UPPER_LEFT if segment.touches_start else 0)
     record.corners |= (SHARP_RIGHT if segment.sharp_end else 0) | (SHARP_LEFT if segment.sharp_start else 0)
+
+
+STANDSTILL = zeros(1, MOTION_PIECE)
+
+
+def support_direction(scenario: Scenario) -> tuple[float, float]:
+    """Return the direction (unit vector) of the support's motion; zero where it does not move."""
+    return (0.0, 0.0) if scenario.motion is None else motion_direction(scenario)
+
+
+def moved_records(bodies: Records) -> Records:
+    """Return where all bodies (..., n + 1) that move with the support start; in every scene there are equally many."""
+    is_moved = bodies["is_moved"] != 0
+    numbers = np.nonzero(is_moved)[-1].reshape(*is_moved.shape[:-1], -1)
+    records = zeros(numbers.shape, MOVED)
+    records["body"] = numbers
+    for name in ("x", "y"):
+        records[name] = np.take_along_axis(bodies[name], numbers, -1)
+    return records
+
+
+def motion_records(scenario: Scenario) -> Records:
+    """Return the pieces of the displacement over time; where a motion ends before the run, the last one is constant."""
+    if scenario.motion is None:
+        return STANDSTILL
+    pieces = motion_pieces(scenario)
+    count = len(pieces.coefficients)
+    records = zeros(max(1, count), MOTION_PIECE)
+    records["start"][:count] = pieces.times[:-1]
+    for k, name in enumerate(("c0", "c1", "c2", "c3")):
+        records[name][:count] = pieces.coefficients[:, k]
+    return records

@@ -1,7 +1,7 @@
 """Build the flat arrays of a scene from a scenario."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -28,15 +28,12 @@ from blocksim.kernels.laws import LAW_CODES
 from blocksim.kernels.models import MODEL_CODES
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import Scenario
+from blocksim.world.bodies import Outline, moved_records, support_direction
 from blocksim.world.bounds import Bounds
 from blocksim.world.interactions import interaction_tables
 from blocksim.world.memory import SceneSize, refuse_if_too_large
-from blocksim.world.motion import moved_records, support_direction
-from blocksim.world.outline import Outline
-from blocksim.world.parts import Parts, joined
-from blocksim.world.skin import choose_skin
-from blocksim.world.stacks import Construction, Refusal, Stack, Stride, built, member, only
-from blocksim.world.step import MOST_STEPS, choose_step
+from blocksim.world.scenes import Construction, Parts, Stride, build_one, joined
+from blocksim.world.step import MOST_STEPS, choose_skin, choose_step
 
 CHECK_INTERVAL = 1e-4  # s of simulated time between examines rest, overlap and finiteness
 CHEAP_CHECKS = 50  # steps between looks, from which on they cost next to nothing; where steps are long, at most for
@@ -52,13 +49,8 @@ def build_world(scenario: Scenario) -> World:
     Raises SceneTooLargeError when there is not enough memory for it, StepTooLargeError when the scenario asks for an
     inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
     """
-    world: World = member(only(build_worlds([scenario])).scenes, 0)
+    world: World = build_one(scenario, EXPLICIT).scene
     return world
-
-
-def build_worlds(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
-    """Build many worlds at time zero, those of one shape together."""
-    return built(scenarios, EXPLICIT)
 
 
 def _choose(outline: Outline, bounds: Bounds) -> Stride:

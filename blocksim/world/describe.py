@@ -10,10 +10,10 @@ from blocksim.kernels.arrays import Record, World
 from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, place_bodies
 from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
-from blocksim.world.boundary import particle_count
+from blocksim.world.bodies import outline_of
 from blocksim.world.bounds import bounds_of
 from blocksim.world.build import build_world
-from blocksim.world.interactions import ContactClass, contact_classes, interactions_of, pair_of
+from blocksim.world.interactions import ContactClass, contact_classes, pair_of
 from blocksim.world.memory import (
     PROCESS_BYTES,
     RigidSize,
@@ -24,6 +24,7 @@ from blocksim.world.memory import (
     recorded_contacts,
 )
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
+from blocksim.world.particles import particle_count
 from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
 
@@ -149,13 +150,13 @@ def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, ste
     if not isinstance(scenario.time, Nonsmooth):
         return None
     (bounds,) = bounds_of(world.bodies[np.newaxis], len(placed))
-    table = interactions_of(scenario, contact_classes(scenario, placed))
+    outline = outline_of(scenario)
     sag = scene_sag(step / scenario.time.substeps, placed, scenario.gravity)
     return SagDescription(
-        why=reason_of_step(scenario, bounds, table).why,
+        why=reason_of_step(outline, bounds).why,
         substeps=scenario.time.substeps,
         tolerance=velocity_tolerance(scenario.time, len(placed)),
-        longest_step=longest_step(scenario, bounds, table),
+        longest_step=longest_step(outline, bounds),
         sag=sag.sag,
         block=sag.block,
         overlap=sag.overlap,

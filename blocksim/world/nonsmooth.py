@@ -1,7 +1,7 @@
 """Build what the non-smooth scheme needs from a scenario, beside the world that both schemes share."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -25,15 +25,14 @@ from blocksim.kernels.nonsmooth.arrays import (
 )
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Nonsmooth as Stepping
+from blocksim.world.bodies import Outline
 from blocksim.world.bounds import Bounds
 from blocksim.world.build import GROWTH, empty_controls, first_capacity, numbers, without_lists
 from blocksim.world.memory import RigidSize, refuse_if_too_large
-from blocksim.world.outline import Outline
-from blocksim.world.parts import SURFACE, Parts
 from blocksim.world.rigid_step import choose_rigid_step
-from blocksim.world.skin import choose_skin
-from blocksim.world.soft_contact import soft_contact
-from blocksim.world.stacks import Construction, Refusal, Stack, Stride, built, member, only
+from blocksim.world.sag import soft_contact
+from blocksim.world.scenes import SURFACE, Construction, Parts, Stride, build_one
+from blocksim.world.step import choose_skin
 
 MOST_REACH = 1.5  # of a body, in skins
 WEAK_RESTITUTION = 0.5  # up to which the impacts of a substep happen all at once
@@ -76,19 +75,14 @@ def build_nonsmooth(scenario: Scenario) -> Nonsmooth:
     Raises SceneTooLargeError when there is not enough memory for it, StepTooLongError when the scenario asks for an
     inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
     """
-    scene: Nonsmooth = member(only(build_nonsmooths([scenario])).scenes, 0)
+    scene: Nonsmooth = build_one(scenario, NONSMOOTH).scene
     return scene
-
-
-def build_nonsmooths(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
-    """Build many such scenes at time zero, those of one shape together."""
-    return built(scenarios, NONSMOOTH)
 
 
 def _choose(outline: Outline, bounds: Bounds) -> Stride:
     scenario = outline.scenario
     stepping_of(scenario)
-    step = choose_rigid_step(scenario, bounds, outline.interactions)
+    step = choose_rigid_step(outline, bounds)
     return Stride(step, choose_skin(scenario, bounds, outline.interactions, step))
 
 

@@ -1,11 +1,12 @@
 """Boundary particles of all bodies, as the contact models `particles` and `kernel` want them."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.arrays import ALL, PARTICLE, SLOTS, Record, Records, zeros
 from blocksim.kernels.models.particles import PER_PARTICLE
-from blocksim.world.boundary import division
 
 CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 NORMALS = ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))
@@ -91,6 +92,17 @@ def slots_of_a_pair(bodies: Records, model: str) -> int:
     """Return how many contact slots the pair of the two largest bodies needs."""
     most = int(bodies["particle_count"].max())
     return {"surface": SLOTS, "kernel": 2 * most, "particles": PER_PARTICLE * most}[model]
+
+
+def particle_count(size_x: float, size_y: float, spacing: float) -> int:
+    """Return how many particles stand around a rectangle of the given sides (m), corners once."""
+    return 2 * (division(size_x, spacing) + division(size_y, spacing))
+
+
+def division(side: float, spacing: float) -> int:
+    """Return the number of equal intervals, none longer than `spacing`, that a side (both m) is divided into."""
+    # a quotient that round-off lifted just over an integer must not add a particle
+    return max(1, math.ceil(side / spacing * (1.0 - 1e-12)))
 
 
 def _rows(body: Record) -> list[tuple[int, tuple[float, float], int]]:

@@ -21,13 +21,11 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from blocksim.scenario import Scenario, place_bodies
+from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Nonsmooth
-from blocksim.world.bounds import Bounds
-from blocksim.world.interactions import Interactions
-from blocksim.world.sag import WARNING_SHARE, scene_sag
-from blocksim.world.soft_contact import soft_contact
-from blocksim.world.speeds import greatest_speed, impact_speed
+from blocksim.world.bodies import Outline
+from blocksim.world.bounds import Bounds, greatest_speed, impact_speed
+from blocksim.world.sag import WARNING_SHARE, scene_sag, soft_contact
 from blocksim.world.step import MOST_STEPS, StepError, UncountableStepsError
 
 USUAL_STEP = 1e-3  # s
@@ -59,10 +57,11 @@ class Reason(NamedTuple):
     why: str
 
 
-def choose_rigid_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
+def choose_rigid_step(outline: Outline, bounds: Bounds) -> float:
     """Return the step (s) the run will take; raises StepError."""
-    step, end = reason_of_step(scenario, bounds, table).step, scenario.time.end
-    limit = longest_step(scenario, bounds, table)
+    scenario = outline.scenario
+    step, end = reason_of_step(outline, bounds).step, scenario.time.end
+    limit = longest_step(outline, bounds)
     if not step > 0.0 or end / step > MOST_STEPS:
         raise UncountableStepsError(end, step)
     if step > limit and not scenario.time.force_step:
@@ -70,13 +69,14 @@ def choose_rigid_step(scenario: Scenario, bounds: Bounds, table: Interactions) -
     return step
 
 
-def reason_of_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> Reason:
+def reason_of_step(outline: Outline, bounds: Bounds) -> Reason:
     """Return the step that a scenario gives or that is chosen for it, admissible or not."""
+    scenario = outline.scenario
     if scenario.time.step != "auto":
         return Reason(scenario.time.step, "as given")
     few = min(1.0, bounds.free / FEW) if bounds.free else 1.0
     reasons = [Reason(USUAL_STEP, "the usual step"), Reason(scenario.time.end, "the whole time")]
-    speeds = ((few, impact_speed(scenario, bounds)), (1.0, greatest_speed(scenario, bounds, table)))
+    speeds = ((few, impact_speed(scenario, bounds)), (1.0, greatest_speed(scenario, bounds, outline.interactions)))
     for share, speed in speeds:
         if speed > 0.0:
             way = SHARE * share * bounds.smallest
@@ -87,15 +87,16 @@ def reason_of_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> R
         why = f"{share:.2g} √(L/g) for so few blocks, L = {MILLI * bounds.smallest:.4g} mm the smallest side"
         parts = max(1, round(USUAL_STEP / (share * math.sqrt(bounds.smallest / scenario.gravity))))
         reasons.append(Reason(USUAL_STEP / parts, why))
-        reasons += _reasons_of_sag(scenario, bounds)
+        reasons += _reasons_of_sag(outline, bounds)
     return min(reasons, key=lambda reason: reason.step)
 
 
-def _reasons_of_sag(scenario: Scenario, bounds: Bounds) -> Iterator[Reason]:
+def _reasons_of_sag(outline: Outline, bounds: Bounds) -> Iterator[Reason]:
     """Yield the step in which no contact at rest gives way too far, where light blocks carry heavy ones.
 
     Most scenes are far from it, which is known from the weight of all; crowds take the usual step anyway.
     """
+    scenario = outline.scenario
     substeps, allowed = _substeps(scenario), CALM * WARNING_SHARE * bounds.smallest
     compliance = max(
         kind.inverse_mass + max(kind.half_x, kind.half_y) ** 2 * kind.inverse_inertia for kind in bounds.kinds
@@ -103,7 +104,7 @@ def _reasons_of_sag(scenario: Scenario, bounds: Bounds) -> Iterator[Reason]:
     square = soft_contact(USUAL_STEP / substeps).frequency ** 2
     if bounds.free >= CROWD or not 2.0 * compliance * scenario.gravity * bounds.mass > square * allowed:
         return
-    overlap = scene_sag(USUAL_STEP / substeps, place_bodies(scenario), scenario.gravity).overlap
+    overlap = scene_sag(USUAL_STEP / substeps, outline.placed, scenario.gravity).overlap
     if overlap > allowed:
         why = f"no contact gives way by more than {MILLI * allowed:.3g} mm where light blocks carry heavy ones"
         yield Reason(USUAL_STEP / math.ceil(math.sqrt(overlap / allowed)), why)
@@ -113,11 +114,9 @@ def _substeps(scenario: Scenario) -> int:
     return scenario.time.substeps if isinstance(scenario.time, Nonsmooth) else 1
 
 
-def longest_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
+def longest_step(outline: Outline, bounds: Bounds) -> float:
     """Return the longest step (s) that may be given by hand."""
-    return _longest_step(scenario, greatest_speed(scenario, bounds, table), bounds)
-
-
-def _longest_step(scenario: Scenario, speed: float, bounds: Bounds) -> float:
+    scenario = outline.scenario
+    speed = greatest_speed(scenario, bounds, outline.interactions)
     rate = max(bounds.speed, speed / _substeps(scenario))
     return SHARE * bounds.smallest / rate if rate > 0.0 else scenario.time.end

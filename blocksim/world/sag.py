@@ -1,20 +1,36 @@
 """What rigid contacts give way by at rest: the position pass holds blocks apart like springs, stiffer for small steps.
 
 At rest s = -F A / w^2 for a contact point that carries F, A = J M^-1 J^T, w = 2 pi f / h (blocksim.kernels.nonsmooth):
-a spring of w^2 / A, which goes with 1 / h^2. Of two blocks in face contact A = sum of 1/m + r^2/I over both, with half
+a spring of w^2 / A, proportional to 1 / h^2. Of two blocks in face contact A = sum of 1/m + r^2/I over both, with half
 a side as the lever arm r, as far as the point is from the middle.
 """
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from blocksim.scenario import PlacedBody
 from blocksim.world.loads import loads_at_rest
-from blocksim.world.soft_contact import soft_contact
 
+FREQUENCY = 0.125  # of the soft contact, per substep: w h = 2 pi / 8. Above 0.15 walls spread like a fluid
+DAMPING = 10.0  # damping ratio of the soft contact
 WARNING_SHARE = 0.01  # of the smallest side
 MILLI = 1e3
+
+
+class SoftContact(NamedTuple):
+    """Feedback of the position pass; see blocksim.kernels.nonsmooth."""
+
+    bias: float  # 1/s: b
+    softness: float  # -: gamma / A
+    frequency: float  # 1/s: w, so that the stiffness at rest is w^2 / A
+
+
+def soft_contact(substep: float) -> SoftContact:
+    """Return the feedback for a substep (s)."""
+    turn = 2.0 * math.pi * FREQUENCY  # w h
+    return SoftContact(turn / substep / (turn + 2.0 * DAMPING), 1.0 / (turn * (turn + 2.0 * DAMPING)), turn / substep)
 
 
 def inverse_mass(body: PlacedBody) -> float:

@@ -1,11 +1,19 @@
-"""The time step that a run takes: as the scenario asks, within what its stiffest contact state and its speeds admit.
+"""Time step and skin of the explicit scheme: as the scenario asks, or chosen.
+
+The step stays within what the stiffest contact state (stable_step.py) and the speeds of a scene admit.
 
 Contacts are found by the corners that lie in another block at the end of a step. So in one step no block may come far
 into another, let alone through it: at the greatest speed expected it moves by at most a twentieth of the smallest side,
 and by a fifth of the skin of the list of neighbours, which is thinner with particles. Blocks whose impacts stay below
 the usual limit of overlap, a twentieth of that side as well, move by a tenth of that in a step, as an impact takes some
 thirty of them; what this bound shortens are the steps of scenes whose blocks are too fast for their springs. They end
-with exit code 76 where such blocks meet, instead of in progress behind one another.
+with exit code 76 where such blocks meet, instead of passing through one another.
+
+Bodies no farther apart than the skin are listed as neighbours, and only listed ones are examined for contacts. The list
+is made again before two that are not in it can meet, so that a skin decides how long the list is and how often it is
+made, and never what moves where. Particles need nothing on top: those of the `particles` model lie inside the block's
+edge, and those of the `kernel` model touch nothing before they are inside the other block, however far the kernel
+reaches.
 """
 
 import math
@@ -15,14 +23,19 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
-from blocksim.scenario.models.stepping import Explicit
-from blocksim.world.bounds import Bounds, Kind
+from blocksim.scenario.models.stepping import Explicit, Nonsmooth
+from blocksim.world.bounds import Bounds, Kind, fastest_fall, greatest_speed, support_speed
 from blocksim.world.interactions import Interactions
-from blocksim.world.speeds import fastest_fall, greatest_speed, support_speed
 from blocksim.world.stable_step import ContactBody, ContactStiffness, Load, stable_step, steepest
 
 MOST_STEPS = 2**53  # beyond that a step number is no exact float
 TRAVEL_SHARE, TRAVEL_SHARE_OF_PARTICLES = 0.05, 0.01  # of the smallest side, that a block may move in a step
+# Shares of the smallest side, measured: in the surface model a body has eight corners to examine, so that a long list
+# costs less than making it again; with particles a long list holds hundreds of them a pair.
+SKIN_SHARE, SKIN_SHARE_OF_PARTICLES = 0.25, 0.05
+RESERVE = 2.5  # times the speed expected: blocks that are struck are faster; the automatic step leaves as much
+ROUND_UP = 1.0005  # so that four digits of a number are not less than it
+MILLI = 1e3
 
 
 class StepError(InvalidInputError):
@@ -38,6 +51,27 @@ class StepTooLargeError(StepError):
         super().__init__(
             f"{step:.4g} s is above the largest safe step {limit:.4g} s; "
             'use step = "auto", or force_step = true to take it all the same'
+        )
+
+
+class UncountableStepsError(StepError):
+    """Step and end do not go together: more steps than can be counted, or none of any length."""
+
+    def __init__(self, end: float, step: float) -> None:
+        """Say both."""
+        super().__init__(f"{end:.4g} s cannot be divided into steps of {step:.4g} s")
+
+
+class SkinTooSmallError(InvalidInputError):
+    """Two blocks at `speed` (m/s) come too near in a `step` (s) for the skin (m) given by hand; `least` in m."""
+
+    def __init__(self, skin: float, least: float, speed: float, step: float) -> None:
+        """Say by how much, and the least skin."""
+        self.least = least
+        super().__init__(
+            f"{MILLI * skin:.4g} mm is too small for this time step: two blocks that meet at {speed:.4g} m/s each come "
+            f"{MILLI * nearer_in_a_step(speed, step):.4g} mm nearer in {step:.4g} s, and the contact could be missed; "
+            f"at least {MILLI * ROUND_UP * least:.4g} mm is needed. Leave skin out for the default"
         )
 
 
@@ -71,14 +105,6 @@ def expected_load(scenario: Scenario, bounds: Bounds) -> Load:
     return Load(speed, scenario.gravity * bounds.mass)
 
 
-class UncountableStepsError(StepError):
-    """Step and end do not go together: more steps than can be counted, or none of any length."""
-
-    def __init__(self, end: float, step: float) -> None:
-        """Say both."""
-        super().__init__(f"{end:.4g} s cannot be divided into steps of {step:.4g} s")
-
-
 def step_of_travel(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
     """Return the longest step (s) in which no block moves far; infinite where nothing moves."""
     speed = greatest_speed(scenario, bounds, table) + support_speed(scenario)
@@ -106,3 +132,32 @@ def choose_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> floa
     if step > limit and not scenario.time.force_step:
         raise StepTooLargeError(step, limit)
     return step
+
+
+def nearer_in_a_step(speed: float, step: float) -> float:
+    """Return how much nearer (m) two bodies come in a step (s) that meet at this speed (m/s) each."""
+    return 2.0 * speed * step
+
+
+def choose_skin(scenario: Scenario, bounds: Bounds, table: Interactions, step: float) -> float:
+    """Return the skin (m) the run will have, given the step (s).
+
+    Raises SkinTooSmallError. Only for a skin given by hand: in a step by the rules two blocks come nearer by at most
+    0.4 of the default. With springs a block that outruns the list ends the run, so that there is a reserve. Rigid
+    contacts are found late then, and all blocks look ahead as far as they move in a step: that is enough.
+    """
+    given = scenario.contact.skin
+    if given is None:
+        share = SKIN_SHARE_OF_PARTICLES if _has_particles(scenario) else SKIN_SHARE
+        return bounds.smallest * share
+    speed = greatest_speed(scenario, bounds, table) + support_speed(scenario)
+    reserve = 1.0 if isinstance(scenario.time, Nonsmooth) else RESERVE
+    # a list holds for one step at least, even where it is made again at every one
+    least = reserve * nearer_in_a_step(speed, step)
+    if given < least:
+        raise SkinTooSmallError(given, least, speed, step)
+    return given
+
+
+def _has_particles(scenario: Scenario) -> bool:
+    return scenario.contact.model != "surface" and not isinstance(scenario.time, Nonsmooth)

@@ -14,8 +14,8 @@ from blocksim.kernels.arrays import CACHE_LINE
 from blocksim.simulation.checkpoint import DIGEST_BYTES, Position, read_checkpoint, restored, write_checkpoint
 from blocksim.simulation.checkpoint_origin import origin_of
 from blocksim.simulation.schemes import build_scene
-from blocksim.simulation.stacking import arrays_of
 from blocksim.simulation.team import ALONE
+from blocksim.world.scenes import arrays_of
 from tests.simulation.sliding import MODELS, sliding
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from blocksim.simulation.precautions import Precautions
 from blocksim.simulation.provenance import code_hashes
 from blocksim.simulation.resumption import find_resumption
 from blocksim.simulation.schemes import build_scene
-from blocksim.simulation.stacking import arrays_of
 from blocksim.simulation.team import Team
+from blocksim.world.scenes import arrays_of
 from tests.simulation.sliding import MODELS, assert_same, interrupted_at, sliding
 from tests.sizes import in_all
 

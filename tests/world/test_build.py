@@ -35,8 +35,8 @@ from blocksim.world.build import (
 )
 from blocksim.world.interactions import contact_classes, interactions_of
 from blocksim.world.memory import SceneTooLargeError
-from blocksim.world.parts import LARGE_RATIO, MOST_LARGE, cell_radius
 from blocksim.world.restitution import damping_ratio
+from blocksim.world.scenes import LARGE_RATIO, MOST_LARGE, cell_radius
 from blocksim.world.stable_step import Load
 from blocksim.world.step import StepTooLargeError, admissible_step
 

@@ -10,8 +10,8 @@ import pytest
 
 from blocksim.kernels.support import acceleration, displacement, piece_at
 from blocksim.verification.scene import scenario_of
+from blocksim.world.bodies import motion_records, moved_records, support_direction
 from blocksim.world.build import build_world
-from blocksim.world.motion import motion_records, moved_records, support_direction
 
 if TYPE_CHECKING:
     from blocksim.scenario import Scenario

@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.verification.scene import scenario_of
-from blocksim.world.boundary import particle_count
 from blocksim.world.build import build_world
-from blocksim.world.particles import slots_of_a_pair
+from blocksim.world.particles import particle_count, slots_of_a_pair
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -53,6 +52,11 @@ def test_kernel_particles_lie_on_the_edge_and_share_every_face(width: float, hei
         assert np.diff(along).max() <= spacing * (1.0 + 1e-9)
         assert along[-1] - along[0] == pytest.approx(height if normal[1] == 0.0 else width, rel=1e-12)
     assert particles.size == particle_count(width, height, spacing) + 4  # corners belong to two faces
+
+
+def test_round_off_in_the_division_adds_no_particle() -> None:
+    assert particle_count(0.3, 0.3, 0.1) == 12  # 0.3/0.1 is just below 3, 0.1 * 3 just above 0.3
+    assert particle_count(0.032, 0.025, 1e-3) == 2 * (32 + 25)
 
 
 @given(width=sides, height=sides, spacing=spacings)

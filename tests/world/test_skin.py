@@ -11,7 +11,7 @@ from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.verification.scene import Simulation
 from blocksim.world import build_world
 from blocksim.world.nonsmooth import build_nonsmooth
-from blocksim.world.skin import SkinTooSmallError
+from blocksim.world.step import SkinTooSmallError
 
 W, H, D = 0.032, 0.025, 0.05
 FALL = 0.2  # m, from the highest point of a block to the ground

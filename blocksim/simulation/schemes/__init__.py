@@ -9,8 +9,8 @@ from blocksim.scenario import Scenario
 from blocksim.simulation.schemes.explicit import EXPLICIT
 from blocksim.simulation.schemes.nonsmooth import NONSMOOTH
 from blocksim.simulation.schemes.scheme import AnyScene, Scene, Scheme
-from blocksim.world.parts import alike
-from blocksim.world.stacks import Refusal, Stack, member, only
+from blocksim.world import scenes
+from blocksim.world.scenes import Refusal, Stack, alike, build_one
 
 SCHEMES = {scheme.name: scheme for scheme in (EXPLICIT, NONSMOOTH)}
 """Scheme as written in a scenario, and what it does."""
@@ -28,15 +28,16 @@ def scheme_of(scene: AnyScene) -> Scheme:
 
 def build_scene(scenario: Scenario) -> AnyScene:
     """Return the scene of a scenario at time zero. Raises what the scheme raises for a scenario that it cannot run."""
-    scene: AnyScene = member(only(build_stacks([scenario])).scenes, 0)
+    scene: AnyScene = build_one(scenario, scheme_named(scenario).construction).scene
     return scene
 
 
 def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
     """Build the scenes of scenarios at time zero, those of one scheme and shape together."""
     for places in alike([scenario.time.scheme for scenario in scenarios]):
-        scheme = scheme_named(scenarios[places[0]])
-        yield from (one.numbered(places) for one in scheme.build([scenarios[i] for i in places]))
+        construction = scheme_named(scenarios[places[0]]).construction
+        stacks = scenes.build_stacks([scenarios[i] for i in places], construction)
+        yield from (one.numbered(places) for one in stacks)
 
 
 def measured_row(scene: AnyScene) -> NDArray[np.float64]:

@@ -6,7 +6,8 @@ from blocksim.kernels.energy import LEDGER_ROW, measure
 from blocksim.kernels.ensemble import advance_members
 from blocksim.simulation.schemes.explicit_contacts import explicit_contacts
 from blocksim.simulation.schemes.scheme import Scheme
-from blocksim.world.build import build_worlds, with_more_room, with_threads
+from blocksim.world.build import EXPLICIT as CONSTRUCTION
+from blocksim.world.build import with_more_room, with_threads
 
 WORK_SPACE = ("points", "matrices", "before", "action")
 
@@ -21,7 +22,7 @@ EXPLICIT = Scheme(
     scene_type=World,
     ledger=LEDGER_ROW,
     least_bodies=100,
-    build=build_worlds,
+    construction=CONSTRUCTION,
     advance=advance,
     advance_in_team=advance_in_team,
     advance_members=advance_members,

@@ -6,14 +6,15 @@ from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER, measure_nonsmoot
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
 from blocksim.simulation.schemes.nonsmooth_contacts import nonsmooth_contacts
 from blocksim.simulation.schemes.scheme import Scheme
-from blocksim.world.nonsmooth import build_nonsmooths, threads_of, with_more_rows, with_more_threads
+from blocksim.world.nonsmooth import NONSMOOTH as CONSTRUCTION
+from blocksim.world.nonsmooth import threads_of, with_more_rows, with_more_threads
 
 NONSMOOTH = Scheme(
     name="nonsmooth",
     scene_type=Nonsmooth,
     ledger=NONSMOOTH_LEDGER,
     least_bodies=100,  # two threads on 100 blocks gain nothing, on 200 they are 1.2 to 1.4 times as fast
-    build=build_nonsmooths,
+    construction=CONSTRUCTION,
     advance=advance_nonsmooth,
     advance_in_team=advance_nonsmooth_in_team,
     advance_members=advance_nonsmooth_members,

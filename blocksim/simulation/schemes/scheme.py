@@ -1,14 +1,13 @@
 """What a stepping scheme is to the rest of the simulation."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from blocksim.kernels.arrays import World
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-from blocksim.scenario import Scenario
 from blocksim.simulation.contacts import Rows
-from blocksim.world.stacks import Refusal, Stack
+from blocksim.world.scenes import Construction
 
 AnyScene = World | Nonsmooth
 """The arrays of a scene under way; `world` are those that all schemes share."""
@@ -29,7 +28,7 @@ class Scheme:
     scene_type: type
     ledger: tuple[str, ...]  # energies (J) that are measured
     least_bodies: int  # a thread; with fewer, threads wait for one another longer than they work
-    build: Callable[[Sequence[Scenario]], Iterator[Stack | Refusal]]  # at time zero, those of one shape together
+    construction: Construction  # of its scenes at time zero
     advance: Callable[[Any, int], int]  # to a step with one thread: status code
     advance_in_team: Callable[[Any, int, int], int]  # the same as thread k of several
     advance_members: Callable[..., None]  # of stacked scenes: members, last steps, first rows (output), codes (output)

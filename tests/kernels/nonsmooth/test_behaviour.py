@@ -16,8 +16,8 @@ from blocksim.kernels.nonsmooth.advance import advance_nonsmooth_in_team
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
 from blocksim.kernels.nonsmooth.solve import solve_two
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
-from blocksim.world.nonsmooth import build_nonsmooth, build_nonsmooths, with_more_threads
-from blocksim.world.stacks import only
+from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth, with_more_threads
+from blocksim.world.scenes import build_stacks, only
 from tests.kernels.nonsmooth.scenes import rigid
 
 if TYPE_CHECKING:
@@ -211,7 +211,7 @@ def test_same_bits_for_any_number_of_threads_and_calls(
 def test_members_of_an_ensemble_have_the_same_bits(begin: Callable[..., Any]) -> None:
     scenarios = [three_blocks({"restitution": e}) for e in (0.0, 0.1)]
     alone = [begin(scenario).to_step(400) for scenario in scenarios]
-    scenes = only(build_nonsmooths([rigid(scenario) for scenario in scenarios])).scenes
+    scenes = only(build_stacks([rigid(scenario) for scenario in scenarios], NONSMOOTH)).scenes
     codes, starts = np.zeros(2, dtype=np.int64), np.zeros((2, 8))
     advance_nonsmooth_members(scenes, np.arange(2), np.full(2, 400), starts, codes)
     for m in range(2):

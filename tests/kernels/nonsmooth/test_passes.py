@@ -15,7 +15,7 @@ from blocksim.kernels.nonsmooth.iterate import POSITION, WARM, sweep
 from blocksim.kernels.nonsmooth.motion import kick_all
 from blocksim.kernels.nonsmooth.passes import shear_limit
 from blocksim.kernels.nonsmooth.substep import substep
-from blocksim.world.soft_contact import soft_contact
+from blocksim.world.sag import soft_contact
 from tests.kernels.nonsmooth.references import Dense, dense, least_change
 from tests.kernels.nonsmooth.scenes import Block, after_substep, collided, pile, posed, velocities
 

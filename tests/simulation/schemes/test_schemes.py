@@ -13,11 +13,10 @@ from blocksim.scenario.models import stepping
 from blocksim.simulation import read_result, run_ensemble, simulate, simulate_into
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.schemes import SCHEMES, build_scene, build_stacks, measured_row, scheme_of
-from blocksim.simulation.stacking import arrays_of
 from blocksim.simulation.team import ALONE, Team
 from blocksim.world import build
 from blocksim.world.nonsmooth import build_nonsmooth
-from blocksim.world.stacks import Stack, member, only
+from blocksim.world.scenes import Stack, arrays_of, member, only
 
 if TYPE_CHECKING:
     from pathlib import Path

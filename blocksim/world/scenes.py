@@ -1,0 +1,281 @@
+"""From a scenario to the arrays of its scene at time zero.
+
+Blocks are placed, step and skin chosen, bodies divided for the broad phase, the size checked, the arrays assembled.
+`build_one` does that for one scenario, `build_stacks` for many at once, field by field over all members, as most of
+what building costs does not depend on their number. So all arrays have the members along their first axis, and
+`build_one` takes the only member of a stack.
+"""
+
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.errors import BlocksimError
+from blocksim.kernels.arrays import SLOTS, Records, zeros
+from blocksim.scenario import PlacedBody, Scenario
+from blocksim.world.bodies import Outline, Outlines, body_records, outline_of
+from blocksim.world.bounds import Bounds, bounds_of
+from blocksim.world.memory import Size, refuse_if_too_large
+from blocksim.world.particles import place_particles, slots_of_a_pair
+
+MOST_BYTES = 1 << 26  # of a stack of more than one scene
+MOST_LARGE = 64  # bodies that are looked at one by one, outside the grid of the broad phase
+LARGE_RATIO = 4.0  # over the smallest body; nothing is large below that
+SURFACE = "surface"  # the model without particles
+Floats = NDArray[np.float64]
+
+
+class Stride(NamedTuple):
+    """What was chosen for one scene."""
+
+    step: float  # s
+    skin: float  # m
+
+
+class Parts(NamedTuple):
+    """What m scenes of one shape consist of, whatever the scheme."""
+
+    outlines: Outlines
+    bodies: Records  # (m, n + 1) BODY
+    cell_radius: Floats  # (m,) m
+    particles: Records | None  # (m, q) PARTICLE
+    slots: int  # of a pair
+
+    @property
+    def is_large(self) -> NDArray[np.bool_]:
+        """Which bodies (m, n) stay out of the grid; equally many in each scene."""
+        return _is_large(self.bodies, self.cell_radius)
+
+    def chosen(self, numbers: Sequence[int]) -> "Parts":
+        """Return the parts of some of the scenes."""
+        if len(numbers) == len(self.outlines):
+            return self
+        return Parts(
+            [self.outlines[k] for k in numbers],
+            some(self.bodies, numbers),
+            self.cell_radius[list(numbers)],
+            None if self.particles is None else some(self.particles, numbers),
+            self.slots,
+        )
+
+
+@dataclass(frozen=True)
+class Construction:
+    """What a scheme does of its own where scenes are built."""
+
+    choose: Callable[[Outline, Bounds], Stride]  # raises BlocksimError
+    model: Callable[[Outline], str]  # of contacts, as the scheme's arrays have it
+    size: Callable[[Parts], Size]  # of one of these scenes
+    assemble: Callable[[Parts, Sequence[Stride]], Any]
+
+
+class Built(NamedTuple):
+    """One scene at time zero, and its blocks as they were placed."""
+
+    placed: tuple[PlacedBody, ...]
+    scene: Any  # of the scheme's type
+
+
+class Stack(NamedTuple):
+    """Scenes that were built together."""
+
+    numbers: list[int]  # which of the scenarios they are of
+    placed: list[tuple[PlacedBody, ...]]
+    scenes: Any  # of the scheme's type
+
+    def numbered(self, numbers: Sequence[int]) -> "Stack":
+        """Return the same for scenarios with other numbers."""
+        return self._replace(numbers=[numbers[i] for i in self.numbers])
+
+
+class Refusal(NamedTuple):
+    """A scenario that cannot be built."""
+
+    number: int
+    error: BlocksimError
+
+    def numbered(self, numbers: Sequence[int]) -> "Refusal":
+        """Return the same for scenarios with other numbers."""
+        return self._replace(number=numbers[self.number])
+
+
+def build_one(scenario: Scenario, construction: Construction) -> Built:
+    """Build the scene of one scenario. Raises what refuses its step, its skin or its size."""
+    outline = outline_of(scenario)
+    with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused
+        bodies = body_records([outline])
+        (bounds,) = bounds_of(bodies, len(outline.placed))
+        stride = construction.choose(outline, bounds)
+    ((_, parts),) = _divided([outline], bodies, construction.model(outline))
+    refuse_if_too_large(construction.size(parts))
+    return Built(outline.placed, member(construction.assemble(parts, [stride]), 0))
+
+
+def build_stacks(scenarios: Sequence[Scenario], construction: Construction) -> Iterator[Stack | Refusal]:
+    """Build scenarios of one scheme; those of one shape come in as few stacks as memory allows.
+
+    A scenario whose step, skin or size is refused does not keep the others from being built.
+    """
+    outlines = [outline_of(scenario) for scenario in scenarios]
+    for numbers in alike([outline.shape for outline in outlines]):
+        yield from _group(numbers, [outlines[i] for i in numbers], construction)
+
+
+def _group(numbers: Sequence[int], outlines: Outlines, construction: Construction) -> Iterator[Stack | Refusal]:
+    """Build scenes of one outline."""
+    bodies, chosen = _choose(outlines, construction)
+    good = [k for k, one in enumerate(chosen) if isinstance(one, Stride)]
+    yield from (Refusal(numbers[k], one) for k, one in enumerate(chosen) if isinstance(one, BlocksimError))
+    strides = [one for one in chosen if isinstance(one, Stride)]
+    model = construction.model(outlines[0])
+    for same, parts in _divided([outlines[k] for k in good], some(bodies, good), model):
+        yield from _stacks([numbers[good[k]] for k in same], parts, [strides[k] for k in same], construction)
+
+
+def _choose(outlines: Outlines, construction: Construction) -> tuple[Records, list[Stride | BlocksimError]]:
+    """Return the bodies, and what is chosen for every scene or why nothing can be."""
+    chosen: list[Stride | BlocksimError] = []
+    with np.errstate(all="ignore"):  # as in `build_one`
+        bodies = body_records(outlines)
+        for outline, bounds in zip(outlines, bounds_of(bodies, len(outlines[0].placed)), strict=True):
+            try:
+                chosen.append(construction.choose(outline, bounds))
+            except BlocksimError as error:
+                chosen.append(error)
+    return bodies, chosen
+
+
+def _stacks(
+    numbers: list[int], parts: Parts, strides: list[Stride], construction: Construction
+) -> Iterator[Stack | Refusal]:
+    """Build scenes of one shape, as many at a time as have room."""
+    size = construction.size(parts)
+    count = max(1, MOST_BYTES // size.world_bytes)
+    for first in range(0, len(numbers), count):
+        places = range(first, min(first + count, len(numbers)))
+        names = [numbers[k] for k in places]
+        try:
+            refuse_if_too_large(size)
+        except BlocksimError as error:
+            yield from (Refusal(number, error) for number in names)
+        else:
+            chosen = parts.chosen(places)
+            placed = [outline.placed for outline in chosen.outlines]
+            yield Stack(names, placed, construction.assemble(chosen, [strides[k] for k in places]))
+
+
+class _Boundary(NamedTuple):
+    """What the bodies of one scene touch others with."""
+
+    particles: Records | None
+    slots: int  # of a pair
+
+
+def _divided(outlines: Outlines, bodies: Records, model: str) -> Iterator[tuple[list[int], Parts]]:
+    """Yield the parts of scenes of one outline, all those of one shape together, and which they are.
+
+    What decides the shape by now: how many bodies are large, how many move with the support, how many particles.
+    """
+    if not outlines:
+        return
+    radius = cell_radius(bodies)
+    boundaries = _boundaries(outlines, bodies, model)
+    counts = zip(
+        np.count_nonzero(_is_large(bodies, radius), axis=1),
+        np.count_nonzero(bodies["is_moved"], axis=1),
+        ((one.slots, None if one.particles is None else one.particles.size) for one in boundaries),
+        strict=True,
+    )
+    parts = Parts(outlines, bodies, radius, None, SLOTS)
+    for same in alike(list(counts)):
+        one = parts.chosen(same)._replace(slots=boundaries[same[0]].slots)
+        particles = [found for k in same if (found := boundaries[k].particles) is not None]
+        yield same, one._replace(particles=joined(particles)) if particles else one
+
+
+def _boundaries(outlines: Outlines, bodies: Records, model: str) -> list[_Boundary]:
+    """Return boundaries; fills the fields of the bodies that are about particles."""
+    if model == SURFACE:
+        return [_Boundary(None, SLOTS)] * len(outlines)
+    return [
+        _Boundary(place_particles(one, model, outline.scenario.contact.particle_spacing), slots_of_a_pair(one, model))
+        for one, outline in zip(bodies, outlines, strict=True)
+    ]
+
+
+def cell_radius(bodies: Records) -> Floats:
+    """Return the half diagonal (m) of the largest of the bodies (..., n + 1) in the grid.
+
+    In it are all but a few pieces of ground and planks.
+    """
+    radii = np.sort(bodies["radius"][..., :-1], axis=-1)
+    few = min(MOST_LARGE, radii.shape[-1] // 8)
+    count = np.count_nonzero(radii <= LARGE_RATIO * radii[..., :1], axis=-1)
+    smaller = np.take_along_axis(radii, np.asarray(count)[..., np.newaxis] - 1, axis=-1)[..., 0]
+    radius: Floats = np.maximum(radii[..., -1 - few], smaller)
+    return radius
+
+
+def _is_large(bodies: Records, radius: Floats) -> NDArray[np.bool_]:
+    is_large: NDArray[np.bool_] = bodies["radius"][:, :-1] > radius[:, np.newaxis]
+    return is_large
+
+
+def alike(keys: Sequence[Hashable]) -> list[list[int]]:
+    """Return the places of equal keys, in the order in which each comes first."""
+    places: dict[Hashable, list[int]] = {}
+    for place, key in enumerate(keys):
+        places.setdefault(key, []).append(place)
+    return list(places.values())
+
+
+def joined(records: Sequence[Records]) -> Records:
+    """Return records (k,) of m scenes as one array (m, k)."""
+    whole = zeros((len(records), records[0].size), records[0].dtype)
+    plain = whole.view(np.ndarray)
+    for m, one in enumerate(records):
+        plain[m] = one
+    return whole
+
+
+def some(records: Records, numbers: Sequence[int]) -> Records:
+    """Return the records of some of the scenes (m, ...), from a cache line on; all of them as they are."""
+    if len(numbers) == len(records):
+        return records
+    chosen = zeros((len(numbers), *records.shape[1:]), records.dtype)
+    chosen[...] = records[list(numbers)]
+    return chosen
+
+
+def only(stacks: Iterable[Stack | Refusal]) -> Stack:
+    """Return the one stack that was built. Raises what refused it."""
+    (one,) = stacks
+    if isinstance(one, Refusal):
+        raise one.error
+    return one
+
+
+def member(scenes: Any, m: int) -> Any:
+    """Return one scene of a stack; it shares the memory."""
+    return _each(scenes, lambda array: array[m])
+
+
+def stack_of_one(scene: Any) -> Any:
+    """Return a scene as a stack; it shares the memory."""
+    return _each(scene, lambda array: array[np.newaxis])
+
+
+def arrays_of(scene: Any) -> list[NDArray[Any]]:
+    """Return all arrays of a scene, or of a stack of scenes."""
+    if isinstance(scene, np.ndarray):
+        return [scene]
+    return [] if scene is None else [array for part in scene for array in arrays_of(part)]
+
+
+def _each(scene: Any, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Any:
+    if isinstance(scene, np.ndarray):
+        return change(scene)
+    return None if scene is None else type(scene)(*(_each(part, change) for part in scene))
