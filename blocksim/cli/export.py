@@ -10,7 +10,7 @@ from blocksim.cli.output import note, replacement
 from blocksim.errors import OutputExistsError
 from blocksim.simulation import folder as files
 from blocksim.simulation.own_files import is_table, refuse_foreign
-from blocksim.simulation.stores.contacts_csv import COLUMNS as CONTACT_COLUMNS
+from blocksim.simulation.stores.csv_tables import CONTACT_COLUMNS
 from blocksim.simulation.stores.formats import format_named
 from blocksim.study.stored import stored_run
 

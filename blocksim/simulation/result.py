@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, load_stored, place_bodies
 from blocksim.simulation import folder as files
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.frames import Frames, data_set, tidy_table
 from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import Columns, as_frame, read_table
-from blocksim.simulation.tidy import data_set, tidy_table
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,15 +1,70 @@
-"""Springs and dashpots, small explicit steps."""
+"""Springs and dashpots, small explicit steps; contacts as a table of the forces of springs and dashpots now."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.kernels.advance import advance, advance_in_team
-from blocksim.kernels.arrays import World
+from blocksim.kernels.arrays import HALF, World
 from blocksim.kernels.energy import LEDGER_ROW, measure
 from blocksim.kernels.ensemble import advance_members
-from blocksim.simulation.schemes.explicit_contacts import explicit_contacts
+from blocksim.simulation.contacts import SUPPORT, UNITS, Rows, empty_rows
 from blocksim.simulation.schemes.scheme import Scheme
 from blocksim.world.build import EXPLICIT as CONSTRUCTION
 from blocksim.world.build import with_more_room, with_threads
 
 WORK_SPACE = ("points", "matrices", "before", "action")
+Indices = NDArray[np.intp]
+SIDES_X, SIDES_Y = (-1.0, 1.0, 1.0, -1.0), (-1.0, -1.0, 1.0, 1.0)  # of the corners, counter-clockwise from lower left
+
+
+def explicit_contacts(world: World, blocks: int) -> Rows:
+    """Return all contacts in the order of pairs and slots; bodies from number `blocks` on are ground and walls."""
+    pairs = world.pairs[: int(world.clock[0].pair_count)]
+    pair, place = np.nonzero(np.arange(world.contacts.shape[1]) < pairs["active"][:, None])
+    contacts = world.contacts[pair, place]
+    a, b = pairs["a"][pair].astype(np.intp), pairs["b"][pair].astype(np.intp)
+    rows = empty_rows(len(contacts))
+    rows["body_a"], rows["body_b"] = a, np.where(b < blocks, b, SUPPORT)
+    places = (
+        _kept_places(contacts) if "nx" in (contacts.dtype.names or ()) else _places_of_corners(world, contacts, a, b)
+    )
+    for name, values in zip(list(UNITS)[:4], places, strict=True):
+        rows[name] = values
+    rows["overlap"] = contacts["depth"]
+    rows["normal_force"] = contacts["normal_force"]
+    rows["shear_force"] = -contacts["shear_force"]  # kept as the resistance to slip of a along the tangent
+    return rows
+
+
+def _kept_places(contacts: Any) -> list[Any]:
+    """Return place (m) and normal of contacts of particles, which keep them."""
+    return [contacts[name] for name in ("x", "y", "nx", "ny")]
+
+
+def _places_of_corners(world: World, contacts: Any, a: Indices, b: Indices) -> list[Any]:
+    """Return place (m) and normal of contacts of corners, as the kernels find them again."""
+    slot, face = contacts["slot"], contacts["face"]
+    is_of_a = slot < HALF
+    owner = world.bodies[np.where(is_of_a, a, b)]
+    touched = world.bodies[np.where(is_of_a, b, a)]
+    px = np.choose(slot % HALF, SIDES_X) * owner["half_x"]
+    py = np.choose(slot % HALF, SIDES_Y) * owner["half_y"]
+    cosine, sine = owner["cos"], owner["sin"]
+    outward = np.where(is_of_a, 1.0, -1.0)  # from b to a, whichever of the two is touched
+    nx, ny = _face_normal(face, touched["cos"], touched["sin"])
+    return [
+        owner["x"] + cosine * px - sine * py,
+        owner["y"] + sine * px + cosine * py,
+        outward * nx,
+        outward * ny,
+    ]
+
+
+def _face_normal(face: Any, cosine: Any, sine: Any) -> tuple[Any, Any]:
+    """Return the outward normals of faces 0: +x, 1: +y, 2: -x, 3: -y of bodies turned by these."""
+    return np.choose(face, [cosine, -sine, -cosine, sine]), np.choose(face, [sine, cosine, -sine, -cosine])
 
 
 def with_own_work_space(world: World) -> World:

@@ -9,22 +9,21 @@ from blocksim.scenario import Scenario
 from blocksim.simulation.contacts import Contacts
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.own_files import IsOwn, is_table, is_vtkhdf
-from blocksim.simulation.stores.contacts_csv import write_contacts_csv
-from blocksim.simulation.stores.frames_csv import COLUMNS, write_csv
+from blocksim.simulation.stores.csv_tables import FRAME_COLUMNS, write_contacts_csv, write_frames_csv
 from blocksim.simulation.stores.vtkhdf import write_vtkhdf
 
 
 class Format(NamedTuple):
-    """How a format is written, both functions return how many frames or contacts there are in the file; and known."""
+    """How a format is written and recognised; both writers return the number of frames or contacts in the file."""
 
     write: Callable[[Path, Frames, Scenario], int]
     is_own: IsOwn
     write_contacts: Callable[[Path, Frames, Contacts], int] | None = None  # into a file of their own
 
 
-# A format is one file and one line here.
+# A format is one entry here.
 FORMATS: dict[str, Format] = {
-    "csv": Format(lambda path, frames, _: write_csv(path, frames), is_table(*COLUMNS), write_contacts_csv),
+    "csv": Format(lambda path, frames, _: write_frames_csv(path, frames), is_table(*FRAME_COLUMNS), write_contacts_csv),
     "vtkhdf": Format(write_vtkhdf, is_vtkhdf),
 }
 

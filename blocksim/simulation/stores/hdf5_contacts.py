@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from blocksim.simulation.contacts import BODIES, CONTACT_ROW, SUPPORT, UNITS, Contacts, Rows, empty_rows
-from blocksim.simulation.stores import hdf5_safety as safety
+from blocksim.simulation.stores import hdf5_open as safety
 
 GROUP = "contacts"
 ENDS = f"{GROUP}/end"

@@ -14,7 +14,7 @@ from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
 from blocksim.simulation.stores import hdf5_layout as layout
-from blocksim.simulation.stores import hdf5_safety as safety
+from blocksim.simulation.stores import hdf5_open as safety
 from blocksim.simulation.stores.hdf5_contacts import read_contacts
 from blocksim.simulation.stores.hdf5_open import DAMAGE, is_left_open, opened
 

@@ -1,0 +1,83 @@
+"""Frames and contacts of a run as tidy CSV tables: a row per frame and block, or per frame and contact.
+
+Units are in the heads, lengths in mm. All numbers can be read back to the last bit; what is not finite is an empty cell.
+"""
+
+import csv
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from blocksim.simulation.atomic import replacing
+from blocksim.simulation.contacts import BODIES, Contacts
+from blocksim.simulation.frames import Frames
+
+FRAME_COLUMNS = ("time_s", "block", "x_mm", "y_mm", "rotation_deg", "vx_mm_s", "vy_mm_s", "spin_deg_s")
+LENGTHS = {"x_mm": "x", "y_mm": "y", "overlap_mm": "overlap"}
+PLAIN = {
+    "normal_x": "normal_x",
+    "normal_y": "normal_y",
+    "normal_force_N": "normal_force",
+    "shear_force_N": "shear_force",
+}
+CONTACT_COLUMNS = ("time_s", *BODIES, *LENGTHS, *PLAIN)
+MILLI = 1e3
+NOBODY = ""
+"""Name of what is no block: the ground, or a wall."""
+Row = list[float | str]
+
+
+def write_frames_csv(path: Path, frames: Frames) -> int:
+    """Write all frames and return their number.
+
+    Rotation is the angle turned since the start, not wrapped. Raises OutputError, and leaves an older file as it was
+    then.
+    """
+    _write(path, FRAME_COLUMNS, (row for frame in range(len(frames)) for row in _frame_rows(frames, frame)))
+    return len(frames)
+
+
+def write_contacts_csv(path: Path, frames: Frames, contacts: Contacts) -> int:
+    """Write all contacts and return their number.
+
+    Bodies are named as in the table of frames; the cell of the ground or a wall is empty. Raises OutputError, and
+    leaves an older file as it was then.
+    """
+    rows = (row for frame in range(len(contacts)) for row in _contact_rows(frames, contacts, frame))
+    _write(path, CONTACT_COLUMNS, rows)
+    return len(contacts.rows)
+
+
+def _write(path: Path, columns: Sequence[str], rows: Iterable[Row]) -> None:
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+
+
+def _frame_rows(frames: Frames, frame: int) -> Iterator[Row]:
+    """Yield the rows of one frame, one per block."""
+    time = float(frames.time[frame])
+    columns = (
+        MILLI * frames.x[frame],
+        MILLI * frames.y[frame],
+        np.degrees(frames.rotation[frame]),
+        MILLI * frames.vx[frame],
+        MILLI * frames.vy[frame],
+        np.degrees(frames.spin[frame]),
+    )
+    for name, *values in zip(frames.names, *(column.tolist() for column in columns), strict=True):
+        yield [time, name, *(value if math.isfinite(value) else "" for value in values)]
+
+
+def _contact_rows(frames: Frames, contacts: Contacts, frame: int) -> Iterator[Row]:
+    """Yield the rows of one frame, one per contact."""
+    rows = contacts.at(frame)
+    time = float(frames.time[frame])
+    names = np.array([*frames.names, NOBODY], dtype=object)  # the support has number -1
+    bodies = (names[rows[name]] for name in BODIES)
+    columns = [*(MILLI * rows[name] for name in LENGTHS.values()), *(rows[name] for name in PLAIN.values())]
+    for one, other, *values in zip(*bodies, *(column.tolist() for column in columns), strict=True):
+        yield [time, one, other, *(value if math.isfinite(value) else "" for value in values)]
