@@ -15,11 +15,10 @@ from blocksim.cli.scenario import read_scenario
 from blocksim.cli.verdict import comparison_table, verdict_lines
 from blocksim.scenario import Scenario
 from blocksim.simulation import Result
-from blocksim.simulation.claim import claimed
+from blocksim.simulation.checkpoint_policy import CHECKPOINT_SECONDS, CheckpointPolicy
 from blocksim.simulation.compilation import kernels_of
-from blocksim.simulation.folder import default_folder, holds_run, unfinished_beside
+from blocksim.simulation.folder import default_folder, folder_lock, holds_run, unfinished_beside
 from blocksim.simulation.movement import Movement
-from blocksim.simulation.precautions import CHECKPOINT_SECONDS, Precautions
 from blocksim.simulation.resumption import NEW, find_resumption
 from blocksim.simulation.table import rows_of
 from blocksim.study.single import FINISHED, check_experiment, compare, run
@@ -56,7 +55,7 @@ def run_command(
             "cannot be combined with --overwrite, which discards existing results", param_hint="--resume"
         )
     silent = quiet or as_json
-    precautions = Precautions(checkpoint_every, checkpoint_steps, checkpoint_time, wall_time)
+    precautions = CheckpointPolicy(checkpoint_every, checkpoint_steps, checkpoint_time, wall_time)
     with read_scenario(scenario, settings or []) as ready:
         folder = out or default_folder(ready)
         known = not overwrite and holds_run(folder, ready)
@@ -127,7 +126,7 @@ def tell_resumption(folder: Path, scenario: Scenario) -> None:
 
     Raises what `find_resumption` raises, and OutputExistsError while another process runs there.
     """
-    with claimed(folder) if folder.is_dir() else nullcontext():
+    with folder_lock(folder) if folder.is_dir() else nullcontext():
         found = find_resumption(folder, scenario)
     for remark in found.remarks:
         note(remark)

@@ -4,8 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from blocksim.simulation.ending import MemberEnd, MemberFailure
-    from blocksim.simulation.ensemble import run_ensemble, run_in_batches
+    from blocksim.simulation.ensemble import MemberEnd, MemberFailure, run_ensemble, run_in_batches
     from blocksim.simulation.frames import Frames
     from blocksim.simulation.loop import Progress, Watcher
     from blocksim.simulation.result import Result, read_result
@@ -31,8 +30,8 @@ __all__ = [
 # found when first asked for, so that stored results can be read without waiting for numba and the kernels
 _HOMES = {
     "Frames": "frames",
-    "MemberEnd": "ending",
-    "MemberFailure": "ending",
+    "MemberEnd": "ensemble",
+    "MemberFailure": "ensemble",
     "Progress": "loop",
     "Result": "result",
     "Summary": "summary",

@@ -1,13 +1,14 @@
 """One checkpoint: everything that a run needs to continue with the same bits, in one file with its checksum.
 
-The file is a line of JSON (the head), then all arrays of the scene as npy data of bytes, then the SHA-256 of all that.
-Nothing in it can be executed when it is read.
+The file is a line of JSON (the head: where the run stood and what decides its bits), then all arrays of the scene as
+npy data of bytes, then the SHA-256 of all that. Nothing in it can be executed when it is read.
 """
 
 import hashlib
 import io
 import math
 from collections.abc import Iterator
+from importlib import metadata
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, NamedTuple
 
@@ -18,8 +19,10 @@ from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.arrays import zeros
+from blocksim.scenario import Scenario
+from blocksim.scenario.resolved import deciding_values
 from blocksim.simulation.atomic import writing
-from blocksim.simulation.checkpoint_origin import Origin
+from blocksim.simulation.provenance import code_hashes, code_version, machine
 from blocksim.simulation.schemes import AnyScene
 from blocksim.world.free_memory import available_bytes, readable
 from blocksim.world.scenes import arrays_of
@@ -27,6 +30,7 @@ from blocksim.world.scenes import arrays_of
 FORMAT: Literal["blocksim checkpoint 1"] = "blocksim checkpoint 1"
 COPIES = 3  # of the content, while it is read: the file, its arrays, the scene
 DIGEST_BYTES = hashlib.sha256().digest_size
+COMPILERS = ("numba", "llvmlite", "numpy")
 
 
 class Position(BaseModel, frozen=True):
@@ -39,7 +43,16 @@ class Position(BaseModel, frozen=True):
     solver_seconds: float  # of wall time, in all parts so far
     total_seconds: float
     threads: int  # that it ran on; it can continue with any number
-    resumed_from: tuple[int, ...] = ()  # steps at which earlier parts of the run went on
+    resumed_from: tuple[int, ...] = ()  # steps at which earlier parts of the run were resumed
+
+
+class Origin(BaseModel, frozen=True):
+    """All that decides the bits of a run, taken apart so that differences can be named."""
+
+    scenario: dict[str, Any]  # as blocksim.scenario.resolved.deciding_values
+    versions: dict[str, str]  # of blocksim and of what compiles it
+    rooms: dict[str, str]  # hash of every folder of code that decides bits
+    machine: str  # processor and system: the last digit of a sine may depend on them
 
 
 class ArrayType(NamedTuple):
@@ -71,6 +84,16 @@ class Stored(NamedTuple):
         return self.head.position
 
 
+def origin_of(scenario: Scenario) -> Origin:
+    """Return what a run of a scenario comes from, here and now."""
+    return Origin(
+        scenario=deciding_values(scenario),
+        versions={"blocksim": code_version(), **{name: metadata.version(name) for name in COMPILERS}},
+        rooms=code_hashes(),
+        machine=machine(),
+    )
+
+
 def write_checkpoint(path: Path, scene: AnyScene, position: Position, origin: Origin) -> None:
     """Write a checkpoint, which takes the place of an older one when it is on the disk. Raises OutputError."""
     arrays = arrays_of(scene)
@@ -90,7 +113,7 @@ def read_checkpoint(path: Path) -> Stored:
         content = _content(path)
         body, digest = content[:-DIGEST_BYTES], content[-DIGEST_BYTES:]
         if hashlib.sha256(body).digest() != digest:
-            raise ValueError("its checksum is not that of its content")  # noqa: TRY301 - told as all other damage
+            raise ValueError("its checksum is not that of its content")  # noqa: TRY301 - reported as all other damage
         head, arrays = _parts(body)
     except (OSError, ValueError, MemoryError, ValidationError) as error:  # memory: of an array of a forged size
         reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error

@@ -7,25 +7,79 @@ from a run of its own.
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
 from blocksim.kernels.arrays import PAIRS_FULL, REACHED
-from blocksim.scenario import Scenario
+from blocksim.scenario import PlacedBody, Scenario
 from blocksim.simulation.compilation import compile_kernels, kernels_of
-from blocksim.simulation.ending import Closing, MemberEnd, MemberFailure
-from blocksim.simulation.ledger import energy_ledger, start_energy
-from blocksim.simulation.looks import adds_up, next_look
-from blocksim.simulation.loop import last_step_of
+from blocksim.simulation.frames import Frames
+from blocksim.simulation.ledger import (
+    EnergyLedger,
+    InPlay,
+    adds_up,
+    energy_ledger,
+    ledger_of,
+    next_energy_check,
+    start_energy,
+)
+from blocksim.simulation.loop import last_step_of, outcome_of
+from blocksim.simulation.outcome import Outcome, diagnosed
+from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
 from blocksim.simulation.schemes import AnyScene, build_stacks, measured_row, scheme_of
+from blocksim.simulation.table import COLUMNS, Columns, as_frame, final_values
 from blocksim.simulation.team import ALONE
 from blocksim.world.scenes import Refusal, Stack, member, stack_of_one
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 BATCH = 256  # members in memory at the same time
 MOST_BODIES = 16_384  # of all members of a batch
 CHUNK = 4  # members at most that a thread takes at a time: few enough that all threads end together
+
+Placed = tuple[PlacedBody, ...]
+
+
+@dataclass(frozen=True)
+class MemberEnd:
+    """Where one member ended and how."""
+
+    outcome: Outcome
+    ledger: EnergyLedger
+    seconds: float  # simulated
+    columns: Columns  # the final table, as `final.csv` has it
+    placed: Placed = field(repr=False)
+    time_step: float  # s
+    rows: Rows = field(repr=False)  # one: the last
+
+    @cached_property
+    def frames(self) -> Frames:
+        """One: the last."""
+        return frames_from_rows(self.placed, self.time_step, self.rows)
+
+    @property
+    def final(self) -> "pd.DataFrame":
+        """The final table for people who know pandas."""
+        return as_frame(self.columns)
+
+
+@dataclass(frozen=True)
+class MemberFailure:
+    """A member that could not be built, or for whose contacts there was no room."""
+
+    error: BlocksimError
+
+    @property
+    def outcome(self) -> Outcome:
+        """The same words and code as where it had been run by itself."""
+        return Outcome("failed", str(self.error), self.error.exit_code)
+
 
 Ended = MemberEnd | MemberFailure
 
@@ -125,7 +179,7 @@ class Ensemble:
         rows, stops = self.starts, np.zeros_like(self.codes)
         done = 0
         while members.size:
-            done = next_look(done, self.bodies)
+            done = next_energy_check(done, self.bodies)
             np.minimum(self.last_steps, done, out=stops)
             self.scheme.advance_members(self.scenes, members, stops, rows, self.codes)
             rows = np.zeros_like(self.starts)  # what is measured at the start of a later call
@@ -169,6 +223,50 @@ class Ensemble:
         """Advance one scene from look to look, as `_advance` does; return it and its status code."""
         code, done = REACHED, -1
         while code == REACHED and done < last and (done < 0 or adds_up(energy_ledger(scene, start))):
-            done = next_look(int(scene.world.clock[0].steps), self.bodies)
+            done = next_energy_check(int(scene.world.clock[0].steps), self.bodies)
             scene, code = ALONE.advance(scene, min(done, last))
         return scene, code
+
+
+class Closing:
+    """The last states of a stack of scenes."""
+
+    def __init__(self, scenes: AnyScene, placed: list[Placed], measured: NDArray[np.float64]) -> None:
+        """Take what is measured (m, e + 2) in the scenes as they are now, as the scheme's `measured`."""
+        world, blocks = scenes.world, len(placed[0])
+        self.names = scheme_of(scenes).ledger
+        self.scenes, self.placed = scenes, placed
+        self.measured = measured
+        self.motion = np.stack([world.bodies[name][:, :blocks] for name in MOTION], axis=1)  # (m, 6, b)
+        self.steps: NDArray[np.int64] = world.clock["steps"].copy()  # (m, 1)
+        self.time_steps: list[float] = world.controls["step"][:, 0].tolist()
+        book = world.ledger[:, 0]
+        moved = (book["largest_kinetic"] + book["travel_work"]).tolist()
+        masses = [float(np.sum(mass)) for mass in world.bodies["mass"]]  # one by one: the order decides on a digit
+        self.in_play = [*map(InPlay, masses, moved)]
+        self.columns = final_values(self.motion, _shapes(placed)).tolist()
+
+    def end(self, m: int, start: float, code: int) -> MemberEnd:
+        """Return the end of one member, given its energy (J) at the start and the status code that it came to."""
+        ledger = ledger_of(self.names, self.measured[m], start, self.in_play[m])
+        names = [body.name for body in self.placed[m]]
+        some = slice(m, m + 1)
+        outcome = outcome_of(code, ledger)
+        if not outcome.is_finished:
+            outcome = diagnosed(outcome, code, member(self.scenes, m), self.placed[m])
+        return MemberEnd(
+            outcome=outcome,
+            ledger=ledger,
+            seconds=int(self.steps[m, 0]) * self.time_steps[m],
+            columns=dict(zip(COLUMNS, (names, *self.columns[m]), strict=True)),
+            placed=self.placed[m],
+            time_step=self.time_steps[m],
+            rows=Rows(self.steps[m], self.motion[some], self.measured[some], self.names),
+        )
+
+
+def _shapes(placed: list[Placed]) -> NDArray[np.float64]:
+    """Return sides and angles (m, 3, b) as placed."""
+    bodies = ((one.size_x, one.size_y, one.angle) for member in placed for one in member)
+    values = np.array([*bodies]).reshape(len(placed), -1, 3)
+    return values.swapaxes(1, 2)

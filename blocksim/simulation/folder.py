@@ -1,29 +1,61 @@
-"""The folder of one run: where it lies, what state it is in, how its files are named."""
+"""The folder of one run: where it lies, how its files are named, what state it is in, and who may write into it.
+
+No more than one run at a time writes into a folder, and nothing that a run has not written is removed from it.
+"""
 
 import contextlib
+import fcntl
 import json
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from blocksim.errors import BlocksimError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario
 from blocksim.scenario.limited import MEGABYTE, read_limited
-from blocksim.simulation.output_folder import make_folder
 from blocksim.simulation.provenance import run_hash
-from blocksim.simulation.written import RUN_KINDS, is_leftover, is_written
+from blocksim.simulation.result_files import (
+    CHECKPOINTS,
+    DONE,
+    EXPERIMENT,
+    FINAL,
+    FRAMES,
+    MOTION,
+    OURS,
+    RUN_KINDS,
+    SCENARIO,
+    SUMMARY,
+    is_leftover,
+    is_written,
+)
 
 RESULTS = Path("results")
-SCENARIO = "scenario.toml"  # resolved; written first
-EXPERIMENT = "experiment.csv"  # copy of the table that the scenario names
-MOTION = "motion.csv"  # copy of the table of the support's motion
-FINAL = "final.csv"
-FRAMES = "run.h5"
-SUMMARY = "run.json"
-DONE = "done.json"  # written last: a folder without it is not finished
-CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run continues, removed when it has finished
-OURS = (SCENARIO, EXPERIMENT, MOTION, FINAL, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
-
 MOST_BYTES = MEGABYTE  # of done.json
+
+__all__ = [
+    "CHECKPOINTS",
+    "DONE",
+    "EXPERIMENT",
+    "FINAL",
+    "FRAMES",
+    "MOTION",
+    "OURS",
+    "RESULTS",
+    "SCENARIO",
+    "SUMMARY",
+    "check_folder",
+    "clear_remains",
+    "default_folder",
+    "folder_lock",
+    "holds_run",
+    "is_finished",
+    "make_folder",
+    "newest_finished",
+    "prepare_folder",
+    "remove_run",
+    "takes_lock",
+    "unfinished_beside",
+]
 
 
 def default_folder(scenario: Scenario) -> Path:
@@ -42,6 +74,31 @@ def holds_run(folder: Path, scenario: Scenario) -> bool:
         done = json.loads(read_limited(folder / DONE, MOST_BYTES))
         return bool(done["run"] == run_hash(scenario))
     return False
+
+
+def make_folder(folder: Path) -> None:
+    """Create a folder and those around it, where they are missing; links to folders are followed.
+
+    Raises OutputExistsError where something that is no folder is in the way, or none can be created there.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        message = f"{folder}: cannot be created: {_what_is_in_the_way(folder) or error.strerror or error}"
+        raise OutputExistsError(message) from error
+
+
+def _what_is_in_the_way(folder: Path) -> str:
+    """Return which part of a path is no folder and what it is instead, or nothing."""
+    try:
+        for place in (folder, *folder.parents):
+            if place.is_symlink() and not place.exists():
+                return f"{place} is a link that leads nowhere"
+            if place.exists() and not place.is_dir():
+                return f"{place} is a file, not a folder"
+    except OSError:  # a name that is too long, which the system reports
+        pass
+    return ""
 
 
 def prepare_folder(folder: Path, *, overwrite: bool) -> None:
@@ -76,6 +133,38 @@ def check_folder(folder: Path) -> None:
     except OSError as error:
         message = f"{folder}: cannot be read: {error.strerror}"
         raise OutputExistsError(message) from error
+
+
+def takes_lock(handle: int) -> bool:
+    """Take the lock of an open file or folder; False where another process has it.
+
+    The lock goes with the process, however that ends. File systems that know no locks let everybody have it.
+    """
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+@contextlib.contextmanager
+def folder_lock(folder: Path) -> Iterator[None]:
+    """Make a folder, where it is missing, and keep other runs out of it. Raises OutputExistsError where one has it."""
+    make_folder(folder)
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        message = f"{folder}: cannot be opened: {error.strerror}"
+        raise OutputExistsError(message) from error
+    try:
+        if not takes_lock(handle):
+            message = f"{folder}: a run is in progress here; wait for it, or write elsewhere with --out DIR"
+            raise OutputExistsError(message)
+        yield
+    finally:
+        os.close(handle)
 
 
 def clear_remains(folder: Path, names: Iterable[str]) -> None:

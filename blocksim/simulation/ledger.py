@@ -1,4 +1,8 @@
-"""The energy ledger of a run: where the energy went, and how much of it is unaccounted for."""
+"""The energy ledger of a run: where the energy went, and how much of it is unaccounted for.
+
+At some steps a run checks whether its energy adds up, so that one that blows up ends soon. They follow from the scene
+alone: where outputs, checkpoints and signals interrupt a run must not decide where it fails.
+"""
 
 import math
 from collections.abc import Sequence
@@ -13,6 +17,11 @@ if TYPE_CHECKING:
 
 SMALLEST_HEIGHT = 1e-3  # m; the energy in play is at least that of lifting everything by this much
 STANDARD_GRAVITY = 9.81
+RESIDUAL_LIMIT = 0.05  # of the energy in play; a run beyond this has no meaning
+RESIDUAL_PROMISE = 1e-3  # of the energy in play; beyond this a warning is due
+FIRST_CHECK = 1000  # steps
+RARER = 4  # times as many steps between two checks as before ...
+BODY_STEPS = 200_000  # ... until they cost less than a hundredth of the steps between them
 
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]  # JSON has no NaN
 
@@ -86,3 +95,16 @@ def ledger_of(names: Sequence[str], row: NDArray[np.float64], start: float, in_p
     driven = in_play.moved + abs(entries["to_support"])
     weight = in_play.mass * STANDARD_GRAVITY
     return EnergyLedger(**entries, start=start, in_play=max(driven, weight * SMALLEST_HEIGHT))
+
+
+def next_energy_check(done: int, bodies: int) -> int:
+    """Return the first step after `done` at which the energy is checked, in a scene of so many bodies."""
+    period = FIRST_CHECK
+    while period <= done and period * bodies < BODY_STEPS:
+        period *= RARER
+    return (done // period + 1) * period
+
+
+def adds_up(ledger: EnergyLedger) -> bool:
+    """Return True if a run may continue; not so where the residual is no number."""
+    return ledger.relative_residual <= RESIDUAL_LIMIT

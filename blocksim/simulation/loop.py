@@ -7,15 +7,16 @@ from dataclasses import dataclass
 from blocksim.kernels.arrays import REACHED, World
 from blocksim.simulation import outcome as ends
 from blocksim.simulation.checkpoint import Position
-from blocksim.simulation.checkpoint_writer import KEEPS_NOTHING, Keeper, Standing
-from blocksim.simulation.culprit import told
-from blocksim.simulation.ledger import EnergyLedger, energy_ledger, start_energy
-from blocksim.simulation.looks import adds_up, next_look
-from blocksim.simulation.outcome import Outcome
-from blocksim.simulation.pace import Pace
+from blocksim.simulation.checkpoint_policy import KEEPS_NOTHING, Keeper, Standing
+from blocksim.simulation.ledger import EnergyLedger, adds_up, energy_ledger, next_energy_check, start_energy
+from blocksim.simulation.outcome import Outcome, diagnosed
 from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.schemes import AnyScene, measured_row
 from blocksim.simulation.team import ALONE, Team
+
+CALL_SECONDS = 0.05
+BODY_STEPS_AT_FIRST = 100_000  # ten milliseconds or so; particles and rigid contacts take longer
+MOST_GROWTH = 4  # from one call to the next: the first steps of a scene may be quick, as nothing touches
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,20 @@ def run_loop(
     return going.result(why)
 
 
+class Pace:
+    """Steps of a call, from what earlier calls took. It decides no bits, as those do not depend on where calls end."""
+
+    def __init__(self, bodies: int) -> None:
+        """Begin with few for so many bodies."""
+        self.steps = max(1, BODY_STEPS_AT_FIRST // bodies)
+
+    def learn(self, steps: int, seconds: float) -> None:
+        """Take account of a call of so many steps and seconds."""
+        if steps > 0:
+            fitting = CALL_SECONDS * steps / max(seconds, 1e-9)
+            self.steps = max(1, int(min(fitting, MOST_GROWTH * max(steps, self.steps))))
+
+
 class _Going:
     """A run under way."""
 
@@ -131,7 +146,7 @@ class _Going:
     def _go_to(self, wanted: int) -> None:
         """Advance towards a step at which a frame is wanted, as far as one call goes."""
         done, before = self.done, self.seconds
-        look = next_look(done, self.bodies)
+        look = next_energy_check(done, self.bodies)
         self._advance(min(wanted, look, done + self.pace.steps, self.keeper.next_step(done)))
         self.pace.learn(self.done - done, self.seconds - before)
         if self.done == wanted:
@@ -158,6 +173,6 @@ class _Going:
         self.recorder.sample(self.scene)  # wherever it ended
         ledger = energy_ledger(self.scene, self.start)
         outcome = ends.interrupted(why) if why else outcome_of(self.status, ledger)
-        outcome = told(outcome, self.status, self.scene, self.recorder.placed)
+        outcome = diagnosed(outcome, self.status, self.scene, self.recorder.placed)
         overlap = float(measured_row(self.scene)[-1])
         return LoopResult(self.scene.world, outcome, ledger, self.seconds, self.team.threads, overlap)

@@ -1,13 +1,31 @@
-"""How a run can end, in words and exit codes."""
+"""How a run can end, in words and exit codes, and the diagnosis of one that failed: the step and the block.
 
-from dataclasses import dataclass
-from typing import Literal
+The block is found in the arrays as they were when the run stopped.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.errors import ExitCode
 from blocksim.kernels import arrays
+from blocksim.kernels.arrays import ALL, NOT_FINITE, OVERLAP_LIMIT, World
+from blocksim.kernels.depth import MIDDLE, ROWS_APART
+from blocksim.kernels.models import KERNEL, SURFACE
+from blocksim.kernels.nonsmooth.arrays import TOUCHING
+from blocksim.scenario import PlacedBody
+from blocksim.scenario.overlap import Rectangles, penetration
+from blocksim.simulation.ledger import RESIDUAL_LIMIT
+from blocksim.simulation.recorder import MOTION
+from blocksim.simulation.schemes import AnyScene
 
-RESIDUAL_LIMIT = 0.05  # of the energy in play; a run beyond this has no meaning
-RESIDUAL_PROMISE = 1e-3  # of the energy in play; beyond this a warning is due
+GROUND = "the ground"
+WALL = "a wall"
+MILLI = 1e3
 
 
 @dataclass(frozen=True)
@@ -44,3 +62,111 @@ BY_CODE = {
 def interrupted(why: str) -> Outcome:
     """Return what a run comes to that is stopped, and can continue."""
     return Outcome("interrupted", why, ExitCode.STOPPED_EARLY)
+
+
+def diagnosed(outcome: Outcome, code: int, scene: AnyScene, placed: Sequence[PlacedBody]) -> Outcome:
+    """Return the outcome of a run that failed with the step and the block in its reason; of others as it is."""
+    if outcome.status != "failed":
+        return outcome
+    names = [body.name for body in placed]
+    with np.errstate(all="ignore"):  # not finite numbers are what is searched for
+        who = _FINDERS.get(code, _fastest)(scene, names)
+        reason = _lost_particles(scene) if code == OVERLAP_LIMIT else ""
+    return replace(outcome, reason=f"{reason or outcome.reason} ({who}, step {int(scene.world.clock[0].steps)})")
+
+
+def _not_finite(scene: AnyScene, names: Sequence[str]) -> str:
+    bodies = scene.world.bodies[: len(names)]
+    lost = ~np.all([np.isfinite(bodies[name]) for name in MOTION], axis=0)
+    return f"block {names[int(np.argmax(lost))]}" if lost.any() else _fastest(scene, names)
+
+
+def _fastest(scene: AnyScene, names: Sequence[str]) -> str:
+    bodies = scene.world.bodies[: len(names)]
+    speed = np.hypot(bodies["vx"], bodies["vy"])
+    fastest = int(np.argmax(speed))
+    return f"the fastest is block {names[fastest]} with {speed[fastest]:.3g} m/s"
+
+
+def _deepest(scene: AnyScene, names: Sequence[str]) -> str:
+    world = scene.world
+    one, other, overlap, limit = _overlaps_of_springs(scene) if isinstance(scene, World) else _overlaps_of_rows(scene)
+    worst = int(np.nanargmax(overlap / limit))
+    pair = " and ".join(_name(world, names, int(i[worst])) for i in (one, other))
+    is_capped = limit[worst] < world.controls[0].max_overlap
+    most = f", more than half of a side of {MILLI * 2.0 * limit[worst]:.3g} mm" if is_capped else ""
+    return f"{pair} by {MILLI * overlap[worst]:.3g} mm{most}"
+
+
+def _lost_particles(scene: AnyScene) -> str:
+    """Return what limits the deepest overlap where that is how far particles reach; nothing where it is not."""
+    if not isinstance(scene, World) or scene.controls[0].model == SURFACE:
+        return ""
+    _, _, overlap, limit = _overlaps_of_springs(scene)
+    worst = int(np.nanargmax(overlap / limit))
+    reach = _reach(scene)
+    if limit[worst] != reach:
+        return ""
+    what = (
+        "the reach of the kernel" if scene.controls[0].model == KERNEL else f"{ROWS_APART:g} contact.particle_spacing"
+    )
+    return f"an overlap exceeds {what}, {MILLI * reach:.3g} mm, beyond which particles lose one another"
+
+
+def _reach(world: World) -> float:
+    """Return how deep (m) the particles of boundaries may lie in one another; see blocksim.kernels.depth."""
+    controls = world.controls[0]
+    return float(controls.support if controls.model == KERNEL else ROWS_APART * controls.particle_size)
+
+
+def _name(world: World, names: Sequence[str], body: int) -> str:
+    if body < len(names):
+        return f"block {names[body]}"
+    is_wall = body < world.bodies.size - 1 and math.isfinite(world.bodies[-1].y)
+    return WALL if is_wall else GROUND
+
+
+# bodies a and b; overlap in m, what it is judged by
+Pairs = tuple[NDArray[Any], NDArray[Any], NDArray[np.float64], NDArray[np.float64]]
+
+
+def _overlaps_of_springs(world: World) -> Pairs:
+    count = int(world.clock[0].pair_count)
+    pairs, contacts = world.pairs[:count], world.contacts[:count]
+    is_active = np.arange(contacts.shape[1]) < pairs["active"][:, np.newaxis]
+    deepest = np.where(is_active, contacts["depth"], 0.0).max(axis=1)
+    is_pressed = deepest > pairs["limit"]
+    lost = np.where(is_pressed, 0.0, _penetrations(world, pairs))
+    limit = pairs["limit"]
+    if world.controls[0].model != SURFACE:
+        middle = MIDDLE * _smallest_sides(world, pairs["a"], pairs["b"])
+        limit = np.where(is_pressed, limit, np.minimum(_reach(world), middle))
+    return pairs["a"], pairs["b"], np.maximum(deepest, lost), limit
+
+
+def _penetrations(world: World, pairs: NDArray[Any]) -> NDArray[np.float64]:
+    """Return how deep (m) the rectangles of pairs overlap, or the block lies below the ground."""
+    bodies = world.bodies
+    rectangles = Rectangles(*(bodies[name] for name in ("x", "y", "half_x", "half_y", "cos", "sin")))
+    is_ground = pairs["b"] == bodies.size - 1
+    below = bodies[-1].y - rectangles.bottom[pairs["a"]]
+    return np.where(is_ground, below, penetration(rectangles.some(pairs["a"]), rectangles.some(pairs["b"])))
+
+
+def _overlaps_of_rows(scene: Any) -> Pairs:
+    rows = scene.contacts.rows[: int(scene.contacts.stepping[0].row_count)]
+    depth = np.maximum(-rows["gap_one"], -rows["gap_two"])
+    limit = np.ones(rows.size)
+    if not scene.world.controls[0].max_overlap > 0.0:
+        limit = _smallest_sides(scene.world, rows["a"], rows["b"])
+    return rows["a"], rows["b"], np.where(rows["reach"] == TOUCHING, depth, 0.0), limit
+
+
+def _smallest_sides(world: World, one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.float64]:
+    half = np.minimum(world.bodies["half_x"], world.bodies["half_y"])
+    side = np.where((half > 0.0) & (world.bodies["faces"] == ALL), 2.0 * half, np.inf)
+    smallest: NDArray[np.float64] = np.minimum(side[one], side[other])
+    return smallest
+
+
+_FINDERS = {NOT_FINITE: _not_finite, OVERLAP_LIMIT: _deepest}

@@ -1,8 +1,12 @@
-"""Where a run that did not finish can continue: the newest whole checkpoint in its folder, and the frames before it."""
+"""Where a run that did not finish can continue: the newest whole checkpoint in its folder, and the frames before it.
 
-from collections.abc import Iterator
+What would continue to other bits is refused, with the keys, versions or folders of code that differ.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,18 +14,20 @@ from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario.resolved import deciding_values
 from blocksim.simulation import folder as files
-from blocksim.simulation.checkpoint import Stored, read_checkpoint
-from blocksim.simulation.checkpoint_origin import origin_of, refuse_other, refuse_other_scenario
+from blocksim.simulation.checkpoint import Origin, Stored, origin_of, read_checkpoint
 from blocksim.simulation.recorder import Recorder, Rows, rows_of_frames
 from blocksim.simulation.stores.hdf5_reader import read_frames
 
-ANEW = "--overwrite starts again"
+MOST_NAMED = 6  # differences in a message
+NONE = "none"
+REMEDY = "--overwrite starts again"
+REMEDIES = f"{REMEDY}, --out DIR keeps both"
 STARTS_ANEW = "the run starts again"
 
 
 @dataclass(frozen=True)
 class Resumption:
-    """Where a run continues, and what its user ought to know about that."""
+    """Where a run continues, and what its user should know about that."""
 
     checkpoint: Stored | None = None  # None: at the start
     remarks: tuple[str, ...] = ()
@@ -31,7 +37,7 @@ NEW = Resumption()
 
 
 def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
-    """Look into a folder for where the run of a scenario can continue.
+    """Return where the run of a scenario can continue in a folder.
 
     Raises InvalidInputError where another scenario or another version of the code has begun there, with what differs,
     or where no checkpoint is whole; OutputExistsError where the folder holds something else.
@@ -66,12 +72,12 @@ def check_frames(stored: Stored, recorder: Recorder) -> None:
     if count != position.frames:
         raise InvalidInputError(
             f"{path}: holds {count} of the {position.frames} frames before step {position.step}, at which "
-            f"{stored.path.name} goes on; {ANEW}"
+            f"{stored.path.name} goes on; {REMEDY}"
         )
     if recorder.digest_until(position.step) != position.frames_sha256:
         raise InvalidInputError(
             f"{path}: changed since the run was interrupted: the {count} frames before step {position.step} do not "
-            f"have the SHA-256 that {stored.path.name} has of them; {ANEW}"
+            f"have the SHA-256 that {stored.path.name} has of them; {REMEDY}"
         )
 
 
@@ -80,7 +86,7 @@ def _newest_good(paths: list[Path], scenario: Scenario) -> Resumption:
     remarks: list[str] = []
     whole = sorted(_whole(paths, remarks), key=lambda stored: stored.position.step)
     if not whole:
-        raise InvalidInputError("\n".join([*remarks, f"{paths[0].parent}: no checkpoint is whole; {ANEW}"]))
+        raise InvalidInputError("\n".join([*remarks, f"{paths[0].parent}: no checkpoint is whole; {REMEDY}"]))
     newest, origin = whole[-1], origin_of(scenario)
     refuse_other(newest.path, newest.head.origin, origin)
     if remarks:
@@ -107,3 +113,51 @@ def _refuse_other_start(folder: Path, scenario: Scenario) -> None:
     except BlocksimError:  # killed before it was written, or damaged: there is nothing in this folder to lose
         return
     refuse_other_scenario(path, deciding_values(begun), deciding_values(scenario))
+
+
+def refuse_other(path: Path, old: Origin, new: Origin) -> None:
+    """Raise InvalidInputError, which names what differs, where a run would continue to other bits."""
+    refuse_other_scenario(path, old.scenario, new.scenario)
+    changed = [*_changed(old.versions, new.versions)]
+    if changed:
+        raise InvalidInputError(f"{path}: of another version of the code: {_listed(changed)}; {REMEDIES}")
+    rooms = [room for room in new.rooms if old.rooms.get(room) != new.rooms[room]]
+    if rooms:
+        where = _listed([f"blocksim/{room}" for room in rooms])
+        raise InvalidInputError(f"{path}: of another version of the code: it differs in {where}; {REMEDIES}")
+
+
+def refuse_other_scenario(path: Path, old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
+    """Raise InvalidInputError, which names the keys, where two scenarios differ in what decides the motion."""
+    changed = [*_changed(dict(_flat(old)), dict(_flat(new)))]
+    if changed:
+        raise InvalidInputError(f"{path}: of another scenario: {_listed(changed)}; {REMEDIES}")
+
+
+def _flat(data: object, key: str = "") -> Iterator[tuple[str, object]]:
+    """Yield all values with their keys, as --set names them."""
+    entries: Sequence[tuple[object, object]] = ()
+    if isinstance(data, Mapping):
+        entries = [*data.items()]
+    elif isinstance(data, list | tuple):
+        entries = [*enumerate(data)]
+    else:
+        yield key, data
+    for name, value in entries:
+        yield from _flat(value, f"{key}.{name}" if key else str(name))
+
+
+def _changed(old: Mapping[str, object], new: Mapping[str, object]) -> Iterator[str]:
+    for key in dict.fromkeys([*old, *new]):
+        before, after = old.get(key), new.get(key)
+        if before != after:
+            yield f"{key} {_shown(before)} -> {_shown(after)}"
+
+
+def _shown(value: object) -> str:
+    return NONE if value is None else str(value)
+
+
+def _listed(changed: Sequence[str]) -> str:
+    more = len(changed) - MOST_NAMED
+    return ", ".join(changed[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -1,40 +1,116 @@
 """Run one scenario: build the world, step it, keep what it did."""
 
 import json
+import shutil
 import time
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
+from blocksim.errors import OutputError
 from blocksim.scenario import Scenario, place_bodies, scenario_hash
 from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import sha256_of, write_text
-from blocksim.simulation.claim import claimed
+from blocksim.simulation.checkpoint import origin_of, restored
+from blocksim.simulation.checkpoint_policy import DEFAULTS, NO_PAST, CheckpointPolicy, CheckpointWriter, Past
 from blocksim.simulation.compilation import compile_kernels, kernels_of
-from blocksim.simulation.copies import keep_scenario, read_tables
-from blocksim.simulation.disk import refuse_full_disk
-from blocksim.simulation.loop import Attendance, LoopResult, Progress, Watcher, run_loop
-from blocksim.simulation.outcome import RESIDUAL_PROMISE
-from blocksim.simulation.part import Part
-from blocksim.simulation.precautions import DEFAULTS, Precautions
+from blocksim.simulation.folder import CHECKPOINTS, folder_lock
+from blocksim.simulation.ledger import RESIDUAL_PROMISE
+from blocksim.simulation.loop import Attendance, LoopResult, Progress, Watcher, last_step_of, run_loop
 from blocksim.simulation.provenance import environment, run_hash, state_hash
 from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.result import Result
-from blocksim.simulation.resumption import NEW, find_resumption
-from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.result_files import keep_scenario, read_tables
+from blocksim.simulation.resumption import NEW, Resumption, check_frames, find_resumption, kept_rows
+from blocksim.simulation.schemes import AnyScene, build_scene, scheme_named
 from blocksim.simulation.stopping import WallTime, stop_requests
+from blocksim.simulation.stores.hdf5_writer import FrameFile
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import csv_text, final_columns
-from blocksim.simulation.team import team_for
-from blocksim.world.memory import is_shorter_than_step
+from blocksim.simulation.team import Team, team_for
+from blocksim.world.free_memory import readable
+from blocksim.world.memory import file_bytes, is_shorter_than_step, output_count, recorded_contacts
 from blocksim.world.sag import overlap_warning
+from blocksim.world.scenes import arrays_of
 
+CHECKPOINT_FILES = len(CHECKPOINTS) + 1  # the last one while it is written
 COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION)
 
 
 def _ignore(_: Progress) -> None:
     pass
+
+
+class Part:
+    """What goes into the folder of a run while it runs: frames and checkpoints."""
+
+    def __init__(self, scenario: Scenario, folder: Path, built: AnyScene, resumption: Resumption) -> None:
+        """Take the scene at time zero and go to the checkpoint, if there is one.
+
+        Nothing is written yet. Raises InvalidInputError where the checkpoint or the frames before it do not fit.
+        """
+        self.scenario, self.folder, self.resumption = scenario, folder, resumption
+        self.placed = place_bodies(scenario)
+        stored = resumption.checkpoint
+        self.scene = built if stored is None else restored(stored, built)
+        self.step = float(self.scene.world.controls[0].step)
+        self.recorder = Recorder(self.placed, scenario.output.every, self.step, contacts=scenario.output.contacts)
+        self.past = NO_PAST
+        if stored is not None:
+            self.past = Past.of(stored.path, stored.position)
+            self.recorder.take_over(kept_rows(folder, scenario, self.recorder))
+            check_frames(stored, self.recorder)
+
+    def run(self, toml: str, precautions: CheckpointPolicy, team: Team, attendance: Attendance) -> LoopResult:
+        """Run to the end or an interruption; the file of the frames says `toml`. Raises OutputError."""
+        path, names, kept = self.folder / files.FRAMES, scheme_named(self.scenario).ledger, self.recorder.held
+        contacts = self.scenario.output.contacts
+        with FrameFile(path, self.placed, self.step, toml, ledger=names, kept=kept, contacts=contacts) as sink:
+            self.recorder.pour_into(sink)
+            files.clear_remains(self.folder, (files.FINAL, files.SUMMARY))  # they tell of the part before
+            self.writer = self._writer(sink, precautions)
+            watched = Attendance(attendance.on_progress, attendance.stop, self.writer)
+            since = self.resumption.checkpoint and self.resumption.checkpoint.position
+            return run_loop(
+                self.scene, self.recorder, self.scenario.time.end, team=team, attendance=watched, since=since
+            )
+
+    @property
+    def goes_on(self) -> bool:
+        """Return True if there is a part before this one."""
+        return self.resumption.checkpoint is not None
+
+    def account(self, summary: Summary) -> Summary:
+        """Return the summary of this part as that of the whole run."""
+        last = None if summary.status == "finished" else self.writer.last_step
+        return summary.model_copy(
+            update={
+                "total_seconds": self.past.seconds + summary.total_seconds,
+                "resumed_from": self.past.resumed_from,
+                "last_checkpoint": last,
+                "warnings": (*self.resumption.remarks, *self._altered(), *summary.warnings),
+            }
+        )
+
+    def _altered(self) -> tuple[str, ...]:
+        """Return what to tell of frames after the checkpoint that have come out otherwise now."""
+        steps = self.recorder.altered
+        if not steps:
+            return ()
+        more = f" and {len(steps) - 1} more" if len(steps) > 1 else ""
+        where = f"{self.folder / files.FRAMES}: the frame of step {steps[0]}{more}"
+        return (f"{where} is not what comes out now: changed since it was recorded",)
+
+    def _writer(self, sink: FrameFile, precautions: CheckpointPolicy) -> CheckpointWriter:
+        return CheckpointWriter(
+            self.folder,
+            origin_of(self.scenario),
+            sink,
+            precautions.periods(self.step),
+            precautions.checkpoint_seconds,
+            self.past,
+        )
 
 
 def simulate(
@@ -63,7 +139,7 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
     overwrite: bool = False,
     resume: bool = False,
     threads: int = 1,
-    precautions: Precautions = DEFAULTS,
+    precautions: CheckpointPolicy = DEFAULTS,
     on_progress: Watcher = _ignore,
 ) -> Result:
     """Run a scenario and keep everything in a folder, frames while it runs, the mark of a finished run last.
@@ -80,7 +156,7 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
     built = build_scene(scenario)
     refuse_full_disk(folder, scenario, built)
     tables = read_tables(scenario)
-    with claimed(folder):
+    with folder_lock(folder):
         part = Part(scenario, folder, built, find_resumption(folder, scenario) if resume else NEW)
         toml = _made_ready(part, tables, overwrite=overwrite or resume)
         with stop_requests() as requests, team_for(part.scene, threads) as team:
@@ -170,3 +246,24 @@ def _keep_result(result: Result, summary: Summary, folder: Path) -> Result:
         write_text(folder / files.DONE, json.dumps({"run": summary.run, "status": summary.status}) + "\n")
         files.clear_remains(folder, files.CHECKPOINTS)
     return Result(result.name, result.columns, summary, result.scenario, folder)
+
+
+def refuse_full_disk(folder: Path, scenario: Scenario, scene: AnyScene) -> None:
+    """Raise OutputError where a run may leave more than there is room for on the disk of a folder (yet to be made)."""
+    needed = bytes_needed(scenario, scene)
+    place = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+    free = shutil.disk_usage(place).free
+    if needed > free:
+        raise OutputError(
+            f"{folder}: the results may take {readable(needed)} and {readable(free)} are free on that disk; write "
+            "elsewhere with --out DIR, or fewer frames (output.every, time.end)"
+        )
+
+
+def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
+    """Return the bytes that the frames of a run and its checkpoints take at most."""
+    steps = last_step_of(scenario.time.end, float(scene.world.controls[0].step))
+    frames = output_count(steps, scenario.time.end, scenario.output.every) + 2  # the first, and wherever it ends
+    bodies, particles = scene.world.bodies.size - 1, scene.world.particles
+    contacts = recorded_contacts(bodies, 0 if particles is None else particles.size) if scenario.output.contacts else 0
+    return file_bytes(bodies, frames, contacts) + CHECKPOINT_FILES * sum(array.nbytes for array in arrays_of(scene))

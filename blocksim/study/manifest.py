@@ -19,7 +19,7 @@ from typing import Any, Self
 
 from blocksim.errors import OutputError, OutputExistsError
 from blocksim.scenario.limited import open_regular
-from blocksim.simulation.claim import takes_lock
+from blocksim.simulation.folder import takes_lock
 from blocksim.study.rows import Row
 
 NAME = "manifest.jsonl"

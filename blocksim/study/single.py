@@ -9,7 +9,7 @@ from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, Source, load_scenario, load_stored, place_bodies
 from blocksim.simulation import Progress, Result, Watcher, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation import folder as files
-from blocksim.simulation.precautions import DEFAULTS, Precautions
+from blocksim.simulation.checkpoint_policy import DEFAULTS, CheckpointPolicy
 from blocksim.simulation.result import read_final
 from blocksim.simulation.summary import read_summary
 from blocksim.simulation.table import COLUMNS
@@ -31,7 +31,7 @@ def run(  # noqa: PLR0913 - what a user can choose for a run
     overwrite: bool = False,
     resume: bool = False,
     threads: int = 1,
-    precautions: Precautions = DEFAULTS,
+    precautions: CheckpointPolicy = DEFAULTS,
     on_progress: Watcher = _ignore,
 ) -> Result:
     """Simulate a scenario and return the result; with `out` it is kept in that folder as well.

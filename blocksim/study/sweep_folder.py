@@ -13,11 +13,19 @@ from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsEr
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.limited import MEGABYTE, read_head, read_limited
 from blocksim.simulation.atomic import write_text
-from blocksim.simulation.copies import keep_scenario, read_tables, refuse_foreign_copies
-from blocksim.simulation.folder import remove_run
-from blocksim.simulation.output_folder import make_folder
+from blocksim.simulation.folder import make_folder, remove_run
 from blocksim.simulation.provenance import environment
-from blocksim.simulation.written import Kind, begins, grows_from, is_leftover, is_resolved, is_written
+from blocksim.simulation.result_files import (
+    Kind,
+    begins,
+    grows_from,
+    is_leftover,
+    is_resolved,
+    is_written,
+    keep_scenario,
+    read_tables,
+    refuse_foreign_copies,
+)
 from blocksim.study.manifest import is_in_use
 
 PLAN = "sweep.toml"

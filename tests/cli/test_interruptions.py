@@ -140,7 +140,7 @@ def test_stopped_run_continues_to_the_same_bits(
 
 
 def test_second_signal_stops_while_a_checkpoint_is_being_written(process: Process, tmp_path: Path) -> None:
-    slow = "import blocksim.simulation.checkpoint_writer as w, time; w.write_checkpoint = lambda *_: time.sleep(600)"
+    slow = "import blocksim.simulation.checkpoint_policy as w, time; w.write_checkpoint = lambda *_: time.sleep(600)"
     running = process(*LONG, "--out", "out", before=slow)
     wait_for(tmp_path / "out" / "run.h5", running)
     time.sleep(0.5)

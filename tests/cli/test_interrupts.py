@@ -44,7 +44,7 @@ def test_ctrl_c_during_the_last_moments_keeps_the_exit_code_of_the_command(proce
 
 def test_three_times_ctrl_c_prints_no_traceback(process: Process, tmp_path: Path) -> None:
     slow = (
-        "import blocksim.simulation.part as p, time\n"
+        "import blocksim.simulation.running as p, time\n"
         "close = p.FrameFile.__exit__\n"
         "p.FrameFile.__exit__ = lambda *a: (time.sleep(600), close(*a))"  # as a slow disk
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.simulation.claim import claimed
+from blocksim.simulation.folder import folder_lock
 from tests.cli.conftest import SCENARIOS, SOFT, Command
 
 RUN = ("run", "scenarios/three_blocks_nominal.toml", *SOFT)
@@ -223,7 +223,7 @@ def test_folder_of_a_run_that_is_going_on_is_left_alone(
     blocksim: Command, tmp_path: Path, how: tuple[str, ...]
 ) -> None:
     (tmp_path / "out").mkdir()
-    with claimed(tmp_path / "out"):
+    with folder_lock(tmp_path / "out"):
         answer = blocksim("run", "scenarios/three_blocks_nominal.toml", *SOFT, "--out", "out", *how)
     assert answer.code == 73
     assert answer.err == "out: a run is in progress here; wait for it, or write elsewhere with --out DIR\n"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation import read_result, simulate_into
-from blocksim.simulation.precautions import Precautions
+from blocksim.simulation.checkpoint_policy import CheckpointPolicy
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -61,7 +61,7 @@ def interrupted_at(scenario: Scenario, folder: Path, steps: Iterable[int], threa
             if where.steps >= step:
                 os.kill(os.getpid(), signal.SIGTERM)
 
-        often = Precautions(checkpoint_steps=step)  # so that a call ends at that step
+        often = CheckpointPolicy(checkpoint_steps=step)  # so that a call ends at that step
         part = simulate_into(scenario, folder, resume=number > 0, threads=threads, precautions=often, on_progress=stop)
         assert part.status == "interrupted", part.reason
         assert part.summary.last_checkpoint == part.summary.steps

@@ -11,8 +11,14 @@ import pytest
 
 from blocksim.errors import InvalidInputError, OutputError
 from blocksim.kernels.arrays import CACHE_LINE
-from blocksim.simulation.checkpoint import DIGEST_BYTES, Position, read_checkpoint, restored, write_checkpoint
-from blocksim.simulation.checkpoint_origin import origin_of
+from blocksim.simulation.checkpoint import (
+    DIGEST_BYTES,
+    Position,
+    origin_of,
+    read_checkpoint,
+    restored,
+    write_checkpoint,
+)
 from blocksim.simulation.schemes import build_scene
 from blocksim.simulation.team import ALONE
 from blocksim.world.scenes import arrays_of

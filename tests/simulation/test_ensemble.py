@@ -10,8 +10,7 @@ from blocksim.bench.scenes import pushed_wall
 from blocksim.errors import ExitCode
 from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import ensemble, simulate
-from blocksim.simulation.ending import MemberEnd, MemberFailure
-from blocksim.simulation.ensemble import Ended, Ensemble, run_ensemble, run_in_batches
+from blocksim.simulation.ensemble import Ended, Ensemble, MemberEnd, MemberFailure, run_ensemble, run_in_batches
 from blocksim.simulation.schemes import build_stacks
 from blocksim.world import build, memory, scenes
 from blocksim.world.memory import SceneSize, SceneTooLargeError

@@ -1,17 +1,36 @@
 """Nothing that a run has not written is ever removed."""
 
+from __future__ import annotations
+
 import os
 import re
 import shutil
+import subprocess
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
-from blocksim.errors import OutputExistsError
-from blocksim.simulation import Result, renew_copies
-from blocksim.simulation.folder import clear_remains, default_folder, holds_run, newest_finished, prepare_folder
-from blocksim.simulation.written import RUN_KINDS
+from blocksim.errors import OutputError, OutputExistsError
+from blocksim.simulation import Result, renew_copies, simulate_into
+from blocksim.simulation.atomic import write_text
+from blocksim.simulation.folder import (
+    clear_remains,
+    default_folder,
+    folder_lock,
+    holds_run,
+    make_folder,
+    newest_finished,
+    prepare_folder,
+)
+from blocksim.simulation.result_files import RUN_KINDS
+from blocksim.simulation.table import COLUMNS, csv_text
 from tests.simulation.conftest import SCENARIOS, Shipped
+from tests.simulation.sliding import MODELS, interrupted_at, sliding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 @pytest.fixture
@@ -139,3 +158,98 @@ def test_what_changes_the_result_changes_the_default_folder(soft: Shipped) -> No
     assert len(same) == 1
     assert default_folder(soft(contact__restitution=0.21)) not in same
     assert default_folder(soft()).parent == Path("results/three_blocks_nominal")
+
+
+@pytest.fixture
+def read_only(tmp_path: Path) -> Iterator[Path]:
+    """Mount a read-only file system; a superuser, who may mount, is not kept out by permissions."""
+    place = tmp_path / "read_only"
+    place.mkdir()
+    try:
+        subprocess.run(["mount", "-t", "tmpfs", "-o", "ro", "tmpfs", place], check=True, capture_output=True)  # noqa: S607
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("nothing can be mounted here")
+    yield place
+    subprocess.run(["umount", place], check=True)  # noqa: S607
+
+
+def test_a_link_that_leads_nowhere_is_in_the_way(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    for folder in (tmp_path / "link", tmp_path / "link" / "run"):
+        with pytest.raises(OutputExistsError, match="link is a link that leads nowhere"):
+            prepare_folder(folder, overwrite=True)
+    assert not (tmp_path / "nowhere").exists()
+
+
+def test_a_file_is_in_the_way(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine", encoding="utf-8")
+    (tmp_path / "link").symlink_to("file")
+    for folder in (tmp_path / "file", tmp_path / "link", tmp_path / "file" / "run"):
+        with pytest.raises(OutputExistsError, match="is a file, not a folder"):
+            prepare_folder(folder, overwrite=True)
+    assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_link_to_a_folder_is_followed(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "link").symlink_to("elsewhere")
+    make_folder(tmp_path / "link" / "run")
+    assert (tmp_path / "elsewhere" / "run").is_dir()
+
+
+def test_a_name_that_is_too_long_is_reported(tmp_path: Path) -> None:
+    with pytest.raises(OutputExistsError, match="cannot be created: File name too long"):
+        make_folder(tmp_path / ("x" * 300))
+
+
+def test_what_a_run_replaces_is_a_link_and_not_what_it_leads_to(tmp_path: Path) -> None:
+    (tmp_path / "theirs.csv").write_text("theirs", encoding="utf-8")
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / "final.csv").symlink_to(tmp_path / "theirs.csv")
+    write_text(folder / "final.csv", csv_text({name: [] for name in COLUMNS}))
+    prepare_folder(folder, overwrite=True)
+    assert (tmp_path / "theirs.csv").read_text(encoding="utf-8") == "theirs"
+    assert list(folder.iterdir()) == []
+
+
+def test_a_read_only_file_system_is_reported(read_only: Path) -> None:
+    with pytest.raises(OutputExistsError, match="run: cannot be created: Read-only file system"):
+        make_folder(read_only / "run")
+    make_folder(read_only)
+    with pytest.raises(OutputError, match="x: cannot be written: Read-only file system"):
+        write_text(read_only / "x", "text")
+
+
+HOLD = """
+import sys
+from pathlib import Path
+from blocksim.simulation.folder import folder_lock
+with folder_lock(Path(sys.argv[1])):
+    print("folder_lock", flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize(("resume", "overwrite"), [(False, False), (True, False), (False, True)])
+def test_no_run_writes_where_another_one_does(tmp_path: Path, resume: bool, overwrite: bool) -> None:
+    scenario = sliding(MODELS["surface-linear"], end=0.002)
+    interrupted_at(scenario, tmp_path, [50])
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    with folder_lock(tmp_path), pytest.raises(OutputExistsError, match="a run is in progress here"):
+        simulate_into(scenario, tmp_path, resume=resume, overwrite=overwrite)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    assert simulate_into(scenario, tmp_path, resume=True).summary.resumed_from == (50,)
+
+
+def test_folder_is_free_again_when_whoever_had_it_was_killed(tmp_path: Path) -> None:
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", HOLD, str(tmp_path)], stdin=pipe, stdout=pipe) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == b"folder_lock\n"
+        with pytest.raises(OutputExistsError), folder_lock(tmp_path):
+            pass
+        other.kill()
+        other.wait()
+        with folder_lock(tmp_path):
+            pass

@@ -6,6 +6,7 @@ import pytest
 
 from blocksim.scenario import load_scenario, place_bodies
 from blocksim.simulation import loop, simulate
+from blocksim.simulation.loop import CALL_SECONDS, MOST_GROWTH, Pace
 from blocksim.simulation.recorder import Recorder
 from blocksim.world.build import build_world
 from tests.simulation.conftest import Shipped
@@ -39,7 +40,7 @@ def test_last_step_is_the_nearest_and_at_least_one(end: float, step: float, last
 
 
 def test_loss_of_energy_fails_a_run(soft: Shipped, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("blocksim.simulation.outcome.RESIDUAL_LIMIT", 1e-30)
+    monkeypatch.setattr("blocksim.simulation.ledger.RESIDUAL_LIMIT", 1e-30)
     scenario = soft(time__end=0.25)
     world = build_world(scenario)
     recorder = Recorder(place_bodies(scenario), 1e-2, float(world.controls[0].step))
@@ -52,3 +53,22 @@ def test_body_that_hangs_in_the_air_does_not_rest_however_slowly_it_falls() -> N
     shipped = Path(__file__).parents[2] / "scenarios" / "bounce.toml"
     slow = {"gravity": 0.001, "time.stop_at_rest": True, "time.end": 0.08, "contact.stiffness_scale": 0.001}
     assert simulate(load_scenario(shipped, slow)).reason == "end of simulated time"
+
+
+@pytest.mark.parametrize("seconds_a_step", [1e-7, 1e-4, 0.5])
+def test_calls_come_to_last_as_long_as_wanted(seconds_a_step: float) -> None:
+    pace = Pace(bodies=4)
+    for _ in range(20):
+        pace.learn(pace.steps, pace.steps * seconds_a_step)
+    assert pace.steps * seconds_a_step == pytest.approx(max(CALL_SECONDS, seconds_a_step), rel=0.01)
+
+
+def test_quick_first_steps_do_not_make_a_call_endless() -> None:
+    pace = Pace(bodies=4)
+    before = pace.steps
+    pace.learn(1, 0.0)
+    assert pace.steps <= MOST_GROWTH * before
+
+
+def test_there_is_always_a_step_to_take() -> None:
+    assert Pace(bodies=10**9).steps == 1

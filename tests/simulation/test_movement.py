@@ -7,9 +7,9 @@ import pytest
 
 from blocksim.scenario import load_scenario, place_bodies
 from blocksim.simulation import simulate, simulate_into
+from blocksim.simulation.checkpoint_policy import CheckpointPolicy
 from blocksim.simulation.ensemble import run_ensemble
 from blocksim.simulation.movement import Manner, Watch, from_start_to_end
-from blocksim.simulation.precautions import Precautions
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 FALLING = {"contact.stiffness_scale": 0.001, "time.end": 0.2, "output.every": 0.005}
@@ -91,7 +91,7 @@ def test_resumed_run_has_seen_what_came_before(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        simulate_into(scenario, tmp_path / "run", precautions=Precautions(checkpoint_steps=2000), on_progress=stop)
+        simulate_into(scenario, tmp_path / "run", precautions=CheckpointPolicy(checkpoint_steps=2000), on_progress=stop)
     resumed = simulate_into(scenario, tmp_path / "run", resume=True).summary
     assert resumed.resumed_from
     assert resumed.movement == whole

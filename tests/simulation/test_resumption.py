@@ -14,7 +14,7 @@ from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.scenario import load_scenario
 from blocksim.simulation import simulate_into
 from blocksim.simulation.checkpoint import read_checkpoint
-from blocksim.simulation.precautions import Precautions
+from blocksim.simulation.checkpoint_policy import CheckpointPolicy
 from blocksim.simulation.provenance import code_hashes
 from blocksim.simulation.resumption import find_resumption
 from blocksim.simulation.schemes import build_scene
@@ -120,7 +120,7 @@ def test_frames_after_the_checkpoint_are_kept_once_and_that_of_the_interruption_
 
 def interrupted_at_once(scenario: Scenario, folder: Path, step: int) -> list[int]:
     """Go on with a run until a step."""
-    part = simulate_into(scenario, folder, resume=True, precautions=Precautions(wall_time=1e-9))
+    part = simulate_into(scenario, folder, resume=True, precautions=CheckpointPolicy(wall_time=1e-9))
     assert part.summary.steps < step
     return [part.summary.steps]
 
@@ -138,7 +138,7 @@ def test_contacts_of_all_frames_are_kept_once(tmp_path: Path, name: str) -> None
 
 def test_checkpoints_threads_and_outputs_change_no_bit(tmp_path: Path) -> None:
     scenario = sliding({}, end=0.02)
-    often = Precautions(checkpoint_steps=7, checkpoint_time=1e-4, checkpoint_seconds=1e-3)
+    often = CheckpointPolicy(checkpoint_steps=7, checkpoint_time=1e-4, checkpoint_seconds=1e-3)
     one = simulate_into(scenario, tmp_path / "one")
     other = simulate_into(scenario, tmp_path / "other", precautions=often)
     assert_same(one, other)
@@ -192,7 +192,7 @@ def test_other_scenario_is_refused_with_the_keys(begun: Path) -> None:
 
 
 def test_other_code_is_refused_with_what_differs(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    origin = "blocksim.simulation.checkpoint_origin"
+    origin = "blocksim.simulation.checkpoint"
     other = {**code_hashes(), "kernels": "new", "world": "new"}
     monkeypatch.setattr(f"{origin}.code_hashes", lambda: other)
     with pytest.raises(InvalidInputError, match="it differs in blocksim/kernels, blocksim/world; --overwrite"):

@@ -1,22 +1,32 @@
 """A run from scenario to folder: what it keeps, and that nothing but the scenario decides its bits."""
 
+from __future__ import annotations
+
 import hashlib
 import json
 import os
 import signal
 from datetime import datetime
 from itertools import pairwise
-from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from blocksim.errors import InputMissingError, OutputExistsError
+from blocksim.errors import InputMissingError, OutputError, OutputExistsError
 from blocksim.scenario import load_scenario
 from blocksim.simulation import Progress, Result, read_result, simulate, simulate_into
+from blocksim.simulation.running import bytes_needed
+from blocksim.simulation.schemes import build_scene
 from blocksim.world.step import StepTooLargeError
-from tests.simulation.conftest import Shipped
+from tests.simulation.sliding import sliding
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tests.simulation.conftest import Shipped
 
 FILES = {"scenario.toml", "experiment.csv", "final.csv", "run.h5", "run.json", "done.json"}
 
@@ -170,3 +180,25 @@ def test_progress_comes_to_the_end(soft: Shipped) -> None:
     assert seen[-1].time == pytest.approx(0.02, abs=1e-5)
     assert seen[-1].end == 0.02
     assert all(a.steps < b.steps for a, b in pairwise(seen))
+
+
+def test_estimate_is_no_less_than_what_a_run_leaves(tmp_path: Path) -> None:
+    scenario = sliding({}, end=0.05, every=1e-5)
+    simulate_into(scenario, tmp_path / "run")
+    needed = bytes_needed(scenario, build_scene(scenario))
+    assert 0.5 * needed < (tmp_path / "run" / "run.h5").stat().st_size < 1.3 * needed
+
+
+def test_too_small_a_disk_is_reported_with_both_sizes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Path] = []
+
+    def usage(place: Path) -> SimpleNamespace:
+        asked.append(place)
+        return SimpleNamespace(free=1_000_000)
+
+    monkeypatch.setattr("shutil.disk_usage", usage)
+    scenario = sliding({}, end=0.05, every=1e-7)
+    with pytest.raises(OutputError, match=r"the results may take 1\.84 MB and 1 MB are free on that disk"):
+        simulate_into(scenario, tmp_path / "not" / "yet")
+    assert asked == [tmp_path]
+    assert list(tmp_path.iterdir()) == []

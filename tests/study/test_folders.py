@@ -11,7 +11,7 @@ import pytest
 
 from blocksim.scenario import Document
 from blocksim.simulation import folder as files
-from blocksim.simulation.precautions import Precautions
+from blocksim.simulation.checkpoint_policy import CheckpointPolicy
 from blocksim.simulation.summary import read_summary
 from blocksim.study.folders import _outcome, run_all, run_case
 from blocksim.study.single import run
@@ -29,7 +29,7 @@ def test_dead_worker_fails_its_case_and_says_what_to_do() -> None:
 def test_interrupted_case_continues_where_it_can(nominal: Document, tmp_path: Path, lost: str | None) -> None:
     scenario = nominal.with_values({"time.end": 0.01}).build()
     whole = run_case(scenario, tmp_path / "whole")
-    stopped = run(scenario, out=tmp_path / "case", precautions=Precautions(wall_time=0.0))
+    stopped = run(scenario, out=tmp_path / "case", precautions=CheckpointPolicy(wall_time=0.0))
     assert stopped.status == "interrupted"
     if lost is not None:
         (tmp_path / "case" / lost).unlink()

@@ -1,6 +1,6 @@
 """Frames and contacts of a run as tidy CSV tables: a row per frame and block, or per frame and contact.
 
-Units are in the heads, lengths in mm. All numbers can be read back to the last bit; what is not finite is an empty cell.
+Units are in the heads, lengths in mm. Numbers can be read back to the last bit; what is not finite is an empty cell.
 """
 
 import csv

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from blocksim.scenario import Scenario, load_scenario, place_bodies
 from blocksim.simulation import folder as files
 from blocksim.simulation.contacts import SUPPORT, Rows, empty_rows
-from blocksim.simulation.copies import keep_scenario, read_tables
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.ledger import EnergyLedger
 from blocksim.simulation.recorder import Frame
+from blocksim.simulation.result_files import keep_scenario, read_tables
 from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 from blocksim.simulation.summary import Summary

@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from blocksim.simulation.checkpoint import read_checkpoint
-from blocksim.simulation.checkpoint_origin import origin_of
-from blocksim.simulation.checkpoint_writer import NEVER, CheckpointWriter, Past, Standing
-from blocksim.simulation.precautions import Precautions
+from blocksim.simulation.checkpoint import origin_of, read_checkpoint
+from blocksim.simulation.checkpoint_policy import NEVER, CheckpointPolicy, CheckpointWriter, Past, Standing
 from blocksim.simulation.schemes import build_scene
 from tests.simulation.sliding import sliding
 
@@ -61,7 +59,7 @@ def test_the_one_that_a_run_continues_from_is_replaced_last(tmp_path: Path, name
 
 
 def test_steps_and_simulated_time_are_due_at_their_multiples(tmp_path: Path) -> None:
-    periods = Precautions(checkpoint_steps=10, checkpoint_time=1.4).periods(0.1)
+    periods = CheckpointPolicy(checkpoint_steps=10, checkpoint_time=1.4).periods(0.1)
     writer = CheckpointWriter(tmp_path, origin_of(SCENARIO), Frames(tmp_path), periods)
     assert periods == (10, 14)
     assert [writer.next_step(done) for done in (0, 9, 10, 14, 20)] == [10, 10, 14, 20, 28]

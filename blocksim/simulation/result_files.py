@@ -1,9 +1,12 @@
-"""Which files of a result folder blocksim wrote: known by name and content together, never by the name alone.
+"""The files of a result folder: their names, which of them blocksim wrote, and copies of the tables of a scenario.
 
-A folder may hold files that a person put beside the results, or in their place. Only what is recognised here may be
-removed or replaced without being named on the command line. Folders of version 0.1 keep no list of their files, so the
-content decides: the head of a file, as what comes after may be damaged. An empty file of one of the names, or one of
-zeros, as a power failure leaves them, holds nothing that could be lost.
+Files are known by name and content together, never by the name alone, as a folder may hold files that a person put
+beside the results, or in their place. Only what is recognised here may be removed or replaced without being named on
+the command line. Folders of version 0.1 keep no list of their files, so the content decides: the head of a file, as
+what comes after may be damaged. An empty file of one of the names, or one of zeros, as a power failure leaves them,
+holds nothing that could be lost.
+
+Copies of the files that a scenario names are kept beside its resolved form, so that the folder can move.
 """
 
 import json
@@ -11,14 +14,25 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from blocksim.errors import BlocksimError
+from blocksim.errors import BlocksimError, OutputExistsError
+from blocksim.scenario import Scenario, motion_table_content, scenario_to_toml
 from blocksim.scenario.limited import MEGABYTE, read_head, read_limited
 from blocksim.scenario.resolved import HEADER
-from blocksim.simulation.atomic import sha256_of
+from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
 from blocksim.simulation.table import COLUMNS
 
+SCENARIO = "scenario.toml"  # resolved; written first
+EXPERIMENT = "experiment.csv"  # copy of the table that the scenario names
+MOTION = "motion.csv"  # copy of the table of the support's motion
+FINAL = "final.csv"
+FRAMES = "run.h5"
+SUMMARY = "run.json"
+DONE = "done.json"  # written last: a folder without it is not finished
+CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run continues, removed when it has finished
+OURS = (SCENARIO, EXPERIMENT, MOTION, FINAL, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
 HEAD_BYTES = 4096
 MOST_BYTES = 10 * MEGABYTE  # of a scenario or a summary
+TABLE_BYTES = MEGABYTE  # of a table of an experiment, which is not read if larger
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 FRAME_MARKS = (b"h5md", b"n_committed")  # names in the root group, which libver latest keeps at the start of the file
 RESOLVED = HEADER.encode()
@@ -57,18 +71,16 @@ def holds(*marks: bytes) -> Kind:
     return lambda head: all(mark in head for mark in marks)
 
 
-SCENARIO = "scenario.toml"
 RUN_KINDS: Mapping[str, Kind] = {
     SCENARIO: begins(RESOLVED),
-    "final.csv": has_header(COLUMNS),
-    "run.h5": is_frames,
-    "run.json": holds(b'{\n  "name": "', b'"status": "', b'"scenario_hash": "'),
-    "done.json": begins(b'{"run": "'),
-    "checkpoint.0": begins(CHECKPOINT),
-    "checkpoint.1": begins(CHECKPOINT),
+    FINAL: has_header(COLUMNS),
+    FRAMES: is_frames,
+    SUMMARY: holds(b'{\n  "name": "', b'"status": "', b'"scenario_hash": "'),
+    DONE: begins(b'{"run": "'),
+    **dict.fromkeys(CHECKPOINTS, begins(CHECKPOINT)),
 }
 """The files of a run but the copies of tables, whose content is a person's: see `copies`."""
-COPIES = ("experiment.csv", "motion.csv")
+COPIES = (EXPERIMENT, MOTION)
 
 
 def is_written(path: Path, kinds: Mapping[str, Kind], plan: str = SCENARIO) -> bool:
@@ -143,3 +155,66 @@ def is_resolved(plan: Path) -> bool:
 
 def _is_plain_file(path: Path) -> bool:
     return path.is_file() and not path.is_symlink()
+
+
+def read_tables(scenario: Scenario) -> dict[str, bytes]:
+    """Return the tables that a scenario names, by the name of their copies.
+
+    To be called before a folder is emptied: they may lie in there, where a run is repeated. Raises as `read_limited`.
+    """
+    tables = {}
+    if scenario.experiment is not None:
+        tables[EXPERIMENT] = read_limited(scenario.experiment.table, TABLE_BYTES, links=True)
+    motion = motion_table_content(scenario)
+    return tables if motion is None else {**tables, MOTION: motion}
+
+
+def keep_scenario(
+    scenario: Scenario, tables: Mapping[str, bytes], folder: Path, plan: str = SCENARIO, head: str = ""
+) -> str:
+    """Write the resolved scenario with a head, and copies of its tables beside it; return the text (TOML).
+
+    Copies that are not needed any more go. Raises OutputExistsError, before anything is written, where a file of
+    somebody else is in the place of one of them, and OutputError.
+    """
+    before = copies(folder, plan)
+    refuse_foreign_copies(tables, folder, plan)
+    if _is_there(folder / plan) and not is_resolved(folder / plan):
+        raise _foreign(folder / plan)
+    text = head + resolved_beside(scenario, tables)
+    write_text(folder / plan, text)
+    for name, content in tables.items():
+        write_bytes(folder / name, content)
+    for name in before - tables.keys():
+        (folder / name).unlink(missing_ok=True)
+    return text
+
+
+def refuse_foreign_copies(tables: Mapping[str, bytes], folder: Path, plan: str = SCENARIO) -> None:
+    """Raise OutputExistsError where a table of somebody else has the name of a copy, and another content."""
+    ours = copies(folder, plan)
+    for name, content in tables.items():
+        path = folder / name
+        if _is_there(path) and not (name in ours or _holds(path, content)):
+            raise _foreign(path)
+
+
+def _is_there(path: Path) -> bool:
+    return path.exists() or path.is_symlink()
+
+
+def _holds(path: Path, content: bytes) -> bool:
+    try:
+        return read_limited(path, len(content)) == content
+    except BlocksimError:
+        return False
+
+
+def _foreign(path: Path) -> OutputExistsError:
+    return OutputExistsError(f"{path}: not as blocksim wrote it; move it away, or write elsewhere with --out DIR")
+
+
+def resolved_beside(scenario: Scenario, tables: Mapping[str, bytes]) -> str:
+    """Return the resolved scenario (TOML) that refers to the copies beside it."""
+    names = {name: name if name in tables else None for name in (EXPERIMENT, MOTION)}
+    return scenario_to_toml(scenario, experiment_table=names[EXPERIMENT], motion_table=names[MOTION])

@@ -1,4 +1,7 @@
-"""When a run writes its checkpoints, and where: two files by turns, so that a whole one is always there."""
+"""When a run writes its checkpoints and when it stops by itself, none of which changes its bits.
+
+Checkpoints are written into two files by turns, so that a whole one is always there.
+"""
 
 import sys
 import time
@@ -6,13 +9,33 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from blocksim.simulation.checkpoint import Position, write_checkpoint
-from blocksim.simulation.checkpoint_origin import Origin
+from blocksim.simulation.checkpoint import Origin, Position, write_checkpoint
 from blocksim.simulation.folder import CHECKPOINTS
-from blocksim.simulation.precautions import CHECKPOINT_SECONDS
 from blocksim.simulation.schemes import AnyScene
 
+CHECKPOINT_SECONDS = 60.0
 NEVER = sys.maxsize  # steps
+
+
+@dataclass(frozen=True)
+class CheckpointPolicy:
+    """When a run writes checkpoints, and after which wall time it stops by itself.
+
+    Checkpoints are written at whatever comes first. A run that is stopped writes one anyway.
+    """
+
+    checkpoint_seconds: float = CHECKPOINT_SECONDS  # of wall time between two
+    checkpoint_steps: int | None = None  # between two
+    checkpoint_time: float | None = None  # s of simulated time between two
+    wall_time: float | None = None  # s after which the run stops, as a signal would stop it
+
+    def periods(self, step: float) -> tuple[int, ...]:
+        """Return the numbers of steps (s) after which checkpoints are due."""
+        simulated = None if self.checkpoint_time is None else max(1, round(self.checkpoint_time / step))
+        return tuple(period for period in (self.checkpoint_steps, simulated) if period is not None)
+
+
+DEFAULTS = CheckpointPolicy()
 
 
 class Standing(NamedTuple):

@@ -13,9 +13,8 @@ from blocksim.kernels.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED
 from blocksim.scenario import place_bodies
 from blocksim.simulation import run_ensemble, running, simulate, simulate_into
 from blocksim.simulation.checkpoint import read_checkpoint
-from blocksim.simulation.culprit import told
-from blocksim.simulation.outcome import BY_CODE, RESIDUAL, interrupted
-from blocksim.simulation.precautions import Precautions
+from blocksim.simulation.checkpoint_policy import CheckpointPolicy
+from blocksim.simulation.outcome import BY_CODE, RESIDUAL, diagnosed, interrupted
 from blocksim.simulation.schemes import build_scene
 from tests.simulation.sliding import sliding
 
@@ -43,7 +42,7 @@ def forced(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("forced")
 def test_scene_that_blows_up_stops_and_names_step_block_and_checkpoint(soft: Shipped, tmp_path: Path) -> None:
-    often = Precautions(checkpoint_steps=1)
+    often = CheckpointPolicy(checkpoint_steps=1)
     result = simulate_into(soft(output__every=1.0), tmp_path / "run", precautions=often)
     assert (result.status, result.summary.exit_code) == ("failed", ExitCode.NUMERICAL_FAILURE)
     assert 0 < result.summary.steps <= 1000
@@ -60,7 +59,7 @@ def test_scene_that_blows_up_stops_and_names_step_block_and_checkpoint(soft: Shi
 
 @pytest.mark.usefixtures("forced")
 def test_run_that_failed_fails_again_where_it_continues(soft: Shipped, tmp_path: Path) -> None:
-    often = Precautions(checkpoint_steps=1)
+    often = CheckpointPolicy(checkpoint_steps=1)
     first = simulate_into(soft(output__every=1.0), tmp_path / "run", precautions=often)
     again = simulate_into(soft(output__every=1.0), tmp_path / "run", resume=True)
     assert again.reason == first.reason
@@ -80,20 +79,20 @@ def test_block_that_is_not_finite_is_named() -> None:
     scenario = sliding({})
     scene, placed = build_scene(scenario), place_bodies(scenario)
     scene.world.bodies[1].vy = np.nan
-    assert told(BY_CODE[NOT_FINITE], NOT_FINITE, scene, placed).reason.endswith("(block above, step 0)")
+    assert diagnosed(BY_CODE[NOT_FINITE], NOT_FINITE, scene, placed).reason.endswith("(block above, step 0)")
 
 
 def test_lost_energy_names_the_fastest_block() -> None:
     scenario = sliding({})
     scene, placed = build_scene(scenario), place_bodies(scenario)
-    reason = told(RESIDUAL, REACHED, scene, placed).reason
+    reason = diagnosed(RESIDUAL, REACHED, scene, placed).reason
     assert reason.endswith("(the fastest is block above with 1 m/s, step 0)")
 
 
 def test_runs_that_did_not_fail_keep_their_words() -> None:
     scenario = sliding({})
     for outcome in (BY_CODE[REACHED], interrupted("stopped by SIGTERM")):
-        assert told(outcome, OVERLAP_LIMIT, build_scene(scenario), place_bodies(scenario)) == outcome
+        assert diagnosed(outcome, OVERLAP_LIMIT, build_scene(scenario), place_bodies(scenario)) == outcome
 
 
 def test_member_of_an_ensemble_says_the_same_as_a_run_of_its_own() -> None:
