@@ -81,36 +81,38 @@ def _live_line(console: Console) -> "Iterator[Callable[[Where], None]]":
         TextColumn("{task.fields[speed]} steps/s, relative energy error {task.fields[residual]}"),
         TimeRemainingColumn(),
     )
-    began = time.monotonic()
     progress = Progress(*columns, console=console, transient=True)
     task = progress.add_task("", total=1.0, visible=False, speed="", residual="")
-    shown_at = 0.0
-    steps: int | None = None  # when first looked at: a run that continues has done some before
+    began = shown_at = 0.0
+    steps: int | None = None  # when first shown: compiling comes before, and a resumed run has done some
 
     def show(where: "Where") -> None:
-        nonlocal shown_at, steps
+        nonlocal began, shown_at, steps
         now = time.monotonic()
-        steps = where.steps if steps is None else steps
+        if steps is None:
+            began, steps = now, where.steps
+            progress.start()
         if now - shown_at > LIVE_SECONDS:
             shown_at = now
             speed = f"{(where.steps - steps) / max(now - began, 1e-9):.1e}"
             residual = f"{where.relative_residual:.0e}"
             progress.update(task, completed=where.time, total=where.end, visible=True, speed=speed, residual=residual)
 
-    progress.start()
     try:
         yield show
     finally:
-        with suppress(OSError):  # the terminal has gone, and so has its line
-            progress.stop()
+        if steps is not None:
+            with suppress(OSError):  # the terminal has gone, and so has its line
+                progress.stop()
 
 
 def _plain_lines() -> "Callable[[Where], None]":
-    shown_at = time.monotonic()
+    shown_at: float | None = None
 
     def show(where: "Where") -> None:
         nonlocal shown_at
         now = time.monotonic()
+        shown_at = now if shown_at is None else shown_at
         if now - shown_at > PLAIN_SECONDS:
             shown_at = now
             note(

@@ -3,7 +3,6 @@
 import os
 from contextlib import nullcontext, suppress
 from itertools import islice
-from pathlib import Path
 
 import typer
 
@@ -13,15 +12,13 @@ from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.progress import watching
 from blocksim.cli.scenario import read_scenario
 from blocksim.cli.verdict import comparison_table, verdict_lines
-from blocksim.scenario import Scenario
 from blocksim.simulation import Result
 from blocksim.simulation.checkpoint_policy import CHECKPOINT_SECONDS, CheckpointPolicy
-from blocksim.simulation.compilation import kernels_of
-from blocksim.simulation.folder import default_folder, folder_lock, holds_run, unfinished_beside
+from blocksim.simulation.folder import default_folder
 from blocksim.simulation.movement import Movement
-from blocksim.simulation.resumption import NEW, find_resumption
+from blocksim.simulation.running import Listener
 from blocksim.simulation.table import rows_of
-from blocksim.study.single import FINISHED, check_experiment, compare, run
+from blocksim.study.single import FINISHED, compare, run
 
 MOST_ROWS = 40  # of the final table on the screen; of a longer one the first are shown
 FIRST_ROWS = 10
@@ -56,27 +53,23 @@ def run_command(
         )
     silent = quiet or as_json
     precautions = CheckpointPolicy(checkpoint_every, checkpoint_steps, checkpoint_time, wall_time)
-    with read_scenario(scenario, settings or []) as ready:
-        folder = out or default_folder(ready)
-        known = not overwrite and holds_run(folder, ready)
-        if not known:
-            check_experiment(ready)
-            warn_of_threads(threads)
-            if resume and not silent:
-                tell_resumption(folder, ready)
-            tell_compilation(kernels_of(ready), quiet=silent)
-        with watching(quiet=silent or known) as on_progress:
-            result = run(
-                ready,
-                out=folder,
-                overwrite=overwrite,
-                resume=resume,
-                threads=threads,
-                precautions=precautions,
-                on_progress=on_progress,
-            )
-    if known and not silent:
-        note(f"already computed; rerun with --overwrite: {folder}")
+
+    def start(kernels: str) -> None:
+        warn_of_threads(threads)
+        tell_compilation(kernels, quiet=silent)
+
+    listener = Listener(on_start=start) if silent else Listener(note, start)
+    with read_scenario(scenario, settings or []) as ready, watching(quiet=silent) as on_progress:
+        result = run(
+            ready,
+            out=out or default_folder(ready),
+            overwrite=overwrite,
+            resume=resume,
+            threads=threads,
+            precautions=precautions,
+            on_progress=on_progress,
+            listener=listener,
+        )
     with nullcontext() if result.status == FINISHED else suppress(OSError):  # the terminal that is lost, SIGHUP tells
         show_result(result, as_json=as_json, quiet=silent)
     raise typer.Exit(result.summary.exit_code)
@@ -119,23 +112,6 @@ def _way_on(result: Result) -> str:
     if result.status == INTERRUPTED:
         return f"continue with --resume (checkpoint at step {step})"
     return "no checkpoint saved" if step is None else f"last good checkpoint at step {step}"
-
-
-def tell_resumption(folder: Path, scenario: Scenario) -> None:
-    """Tell from where a run is in progress, and what is left where nothing can.
-
-    Raises what `find_resumption` raises, and OutputExistsError while another process runs there.
-    """
-    with folder_lock(folder) if folder.is_dir() else nullcontext():
-        found = find_resumption(folder, scenario)
-    for remark in found.remarks:
-        note(remark)
-    if found.checkpoint is not None:
-        position = found.checkpoint.position
-        note(f"goes on at step {position.step}, {position.frames} frames are there: {folder}")
-    if found is NEW:
-        for other in unfinished_beside(folder):
-            note(f"nothing to resume in {folder}; an unfinished run of another scenario or code version is in {other}")
 
 
 def _answer_lines(result: Result) -> list[str]:

@@ -16,7 +16,7 @@ from blocksim.scenario.resolved import deciding_values
 from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint import Origin, Stored, origin_of, read_checkpoint
 from blocksim.simulation.recorder import Recorder, Rows, rows_of_frames
-from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.stores.hdf5_reader import read_placed
 
 MOST_NAMED = 6  # differences in a message
 NONE = "none"
@@ -52,13 +52,24 @@ def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
     return _newest_good(paths, scenario)
 
 
-def kept_rows(folder: Path, scenario: Scenario, recorder: Recorder) -> Rows:
+def remarks_on(found: Resumption, folder: Path) -> Iterator[str]:
+    """Yield what the user of a run that is to be resumed should know, a line each."""
+    yield from found.remarks
+    if found.checkpoint is not None:
+        position = found.checkpoint.position
+        yield f"resuming at step {position.step} ({position.frames} frames recorded): {folder}"
+    if found is NEW:
+        for other in files.unfinished_beside(folder):
+            yield f"nothing to resume in {folder}; an unfinished run of another scenario or code version is in {other}"
+
+
+def kept_rows(folder: Path, recorder: Recorder) -> Rows:
     """Return the frames at output times that an earlier part of a run has left. Raises what reading them raises.
 
     Frames after the checkpoint are among them, as the run would only repeat them; that of the moment at which it was
     stopped is not.
     """
-    rows = rows_of_frames(read_frames(folder / files.FRAMES, scenario))
+    rows = rows_of_frames(read_placed(folder / files.FRAMES, recorder.placed))
     return rows.chosen(np.array([recorder.is_output_time(step) for step in rows.steps.tolist()]))
 
 

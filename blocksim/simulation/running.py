@@ -1,14 +1,19 @@
-"""Run one scenario: build the world, step it, keep what it did."""
+"""Run one scenario: build the scene, step it, keep what it did.
+
+`simulate` does so in memory, `simulate_into` in a folder, with checkpoints.
+"""
 
 import json
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from blocksim.errors import OutputError
-from blocksim.scenario import Scenario, place_bodies, scenario_hash
+from blocksim.scenario import PlacedBody, Scenario, scenario_hash
 from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import sha256_of, write_text
@@ -17,13 +22,13 @@ from blocksim.simulation.checkpoint_policy import DEFAULTS, NO_PAST, CheckpointP
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.folder import CHECKPOINTS, folder_lock
 from blocksim.simulation.ledger import RESIDUAL_PROMISE
-from blocksim.simulation.loop import Attendance, LoopResult, Progress, Watcher, last_step_of, run_loop
+from blocksim.simulation.loop import Attendance, LoopResult, Watcher, last_step_of, run_loop
 from blocksim.simulation.provenance import environment, run_hash, state_hash
 from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.result import Result
 from blocksim.simulation.result_files import keep_scenario, read_tables
-from blocksim.simulation.resumption import NEW, Resumption, check_frames, find_resumption, kept_rows
-from blocksim.simulation.schemes import AnyScene, build_scene, scheme_named
+from blocksim.simulation.resumption import NEW, Resumption, check_frames, find_resumption, kept_rows, remarks_on
+from blocksim.simulation.schemes import AnyScene, build, scheme_named
 from blocksim.simulation.stopping import WallTime, stop_requests
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 from blocksim.simulation.summary import Summary, read_summary
@@ -32,54 +37,146 @@ from blocksim.simulation.team import Team, team_for
 from blocksim.world.free_memory import readable
 from blocksim.world.memory import file_bytes, is_shorter_than_step, output_count, recorded_contacts
 from blocksim.world.sag import overlap_warning
-from blocksim.world.scenes import arrays_of
+from blocksim.world.scenes import Built, arrays_of
 
 CHECKPOINT_FILES = len(CHECKPOINTS) + 1  # the last one while it is written
 COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION)
 
 
-def _ignore(_: Progress) -> None:
+def _ignore(_: object) -> None:
     pass
+
+
+@dataclass(frozen=True)
+class Listener:
+    """What is called before the first step of a run; nothing by default."""
+
+    on_remark: Callable[[str], None] = _ignore  # a line: a run already computed, or resumed and where
+    on_start: Callable[[str], None] = _ignore  # the set of kernels, which is compiled next
+
+
+SILENT = Listener()
+
+
+def simulate(
+    scenario: Scenario, *, threads: int = 1, on_progress: Watcher = _ignore, wall_time: float | None = None
+) -> Result:
+    """Run a scenario in memory, without writing anything. A signal or the limit of wall time (s) interrupts it.
+
+    The result does not depend on the number of threads; small scenes do not use them all.
+    """
+    limit, began = WallTime(wall_time), time.perf_counter()
+    built = build(scenario)
+    began += _compiled(kernels_of(scenario))
+    recorder = _recorder(scenario, built)
+    with _attended(built.scene, threads, limit, on_progress) as (team, attendance):
+        ended = run_loop(built.scene, recorder, scenario.time.end, team=team, attendance=attendance)
+    return _result(scenario, recorder, ended, time.perf_counter() - began)
+
+
+def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
+    scenario: Scenario,
+    folder: Path,
+    *,
+    overwrite: bool = False,
+    resume: bool = False,
+    threads: int = 1,
+    precautions: CheckpointPolicy = DEFAULTS,
+    on_progress: Watcher = _ignore,
+    listener: Listener = SILENT,
+) -> Result:
+    """Run a scenario and keep everything in a folder, frames while it runs, the mark of a finished run last.
+
+    With `resume` it continues from the newest whole checkpoint there, to the same bits as without the interruption;
+    without any it starts again. Raises InvalidInputError for checkpoints of another scenario or version of the code,
+    OutputExistsError where the folder is not free, or another run is in progress in it, and OutputError where writing
+    fails. A signal (SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1) or the limit of wall time ends it with the status
+    `interrupted`, and what was computed until then is kept.
+    """
+    began = time.perf_counter()
+    built = build(scenario)
+    refuse_full_disk(folder, scenario, built.scene)
+    tables = read_tables(scenario)
+    with folder_lock(folder):
+        resumption = _resumption(folder, scenario, listener) if resume else NEW
+        began += _compiled(kernels_of(scenario), listener)
+        limit = WallTime(precautions.wall_time)
+        part = Part(scenario, folder, built, resumption)
+        toml = part.prepare(tables, overwrite=overwrite or resume)
+        with _attended(part.scene, threads, limit, on_progress) as (team, attendance):
+            ended = part.run(toml, precautions, team, attendance)
+            result = _result(scenario, part.recorder, ended, time.perf_counter() - began)
+            return _keep_result(result, part.account(result.summary), folder)
+
+
+def _compiled(kernels: str, listener: Listener = SILENT) -> float:
+    """Compile what a run needs and return the seconds it took, which are no part of the run. Raises OutputError."""
+    began = time.perf_counter()
+    listener.on_start(kernels)
+    compile_kernels(kernels)
+    return time.perf_counter() - began
+
+
+def _resumption(folder: Path, scenario: Scenario, listener: Listener) -> Resumption:
+    """Return where a run can continue, and report it. Raises what `find_resumption` raises."""
+    resumption = find_resumption(folder, scenario)
+    for remark in remarks_on(resumption, folder):
+        listener.on_remark(remark)
+    return resumption
+
+
+@contextmanager
+def _attended(
+    scene: AnyScene, threads: int, limit: WallTime, on_progress: Watcher
+) -> Iterator[tuple[Team, Attendance]]:
+    """Give the threads of a run, and what stops it: a signal, or the limit of wall time."""
+    with stop_requests() as requests, team_for(scene, threads) as team:
+        yield team, Attendance(on_progress, lambda: requests.reason() or limit.reason())
+
+
+def _recorder(scenario: Scenario, built: Built) -> Recorder:
+    step, output = float(built.scene.world.controls[0].step), scenario.output
+    return Recorder(built.placed, output.every, step, contacts=output.contacts)
 
 
 class Part:
     """What goes into the folder of a run while it runs: frames and checkpoints."""
 
-    def __init__(self, scenario: Scenario, folder: Path, built: AnyScene, resumption: Resumption) -> None:
+    def __init__(self, scenario: Scenario, folder: Path, built: Built, resumption: Resumption) -> None:
         """Take the scene at time zero and go to the checkpoint, if there is one.
 
         Nothing is written yet. Raises InvalidInputError where the checkpoint or the frames before it do not fit.
         """
         self.scenario, self.folder, self.resumption = scenario, folder, resumption
-        self.placed = place_bodies(scenario)
         stored = resumption.checkpoint
-        self.scene = built if stored is None else restored(stored, built)
-        self.step = float(self.scene.world.controls[0].step)
-        self.recorder = Recorder(self.placed, scenario.output.every, self.step, contacts=scenario.output.contacts)
+        self.scene = built.scene if stored is None else restored(stored, built.scene)
+        self.recorder = _recorder(scenario, built)
+        self.step = self.recorder.time_step
         self.past = NO_PAST
         if stored is not None:
             self.past = Past.of(stored.path, stored.position)
-            self.recorder.take_over(kept_rows(folder, scenario, self.recorder))
+            self.recorder.take_over(kept_rows(folder, self.recorder))
             check_frames(stored, self.recorder)
+
+    def prepare(self, tables: Mapping[str, bytes], *, overwrite: bool) -> str:
+        """Make the folder ready for this part; return the resolved scenario. Raises OutputExistsError, OutputError."""
+        if self.resumption.checkpoint is None:
+            files.prepare_folder(self.folder, overwrite=overwrite)
+        return keep_scenario(self.scenario, tables, self.folder)
 
     def run(self, toml: str, precautions: CheckpointPolicy, team: Team, attendance: Attendance) -> LoopResult:
         """Run to the end or an interruption; the file of the frames says `toml`. Raises OutputError."""
         path, names, kept = self.folder / files.FRAMES, scheme_named(self.scenario).ledger, self.recorder.held
         contacts = self.scenario.output.contacts
-        with FrameFile(path, self.placed, self.step, toml, ledger=names, kept=kept, contacts=contacts) as sink:
+        with FrameFile(path, self.recorder.placed, self.step, toml, ledger=names, kept=kept, contacts=contacts) as sink:
             self.recorder.pour_into(sink)
-            files.clear_remains(self.folder, (files.FINAL, files.SUMMARY))  # they tell of the part before
+            files.clear_remains(self.folder, (files.FINAL, files.SUMMARY))  # of the part before
             self.writer = self._writer(sink, precautions)
             watched = Attendance(attendance.on_progress, attendance.stop, self.writer)
             since = self.resumption.checkpoint and self.resumption.checkpoint.position
             return run_loop(
                 self.scene, self.recorder, self.scenario.time.end, team=team, attendance=watched, since=since
             )
-
-    @property
-    def goes_on(self) -> bool:
-        """Return True if there is a part before this one."""
-        return self.resumption.checkpoint is not None
 
     def account(self, summary: Summary) -> Summary:
         """Return the summary of this part as that of the whole run."""
@@ -94,7 +191,7 @@ class Part:
         )
 
     def _altered(self) -> tuple[str, ...]:
-        """Return what to tell of frames after the checkpoint that have come out otherwise now."""
+        """Return a warning of frames after the checkpoint that have come out otherwise now."""
         steps = self.recorder.altered
         if not steps:
             return ()
@@ -111,66 +208,6 @@ class Part:
             precautions.checkpoint_seconds,
             self.past,
         )
-
-
-def simulate(
-    scenario: Scenario, *, threads: int = 1, on_progress: Watcher = _ignore, wall_time: float | None = None
-) -> Result:
-    """Run a scenario in memory, without writing anything. A signal or the limit of wall time (s) interrupts it.
-
-    The result does not depend on the number of threads; small scenes do not use them all.
-    """
-    limit = WallTime(wall_time)
-    compile_kernels(kernels_of(scenario))
-    began = time.perf_counter()
-    scene = build_scene(scenario)
-    step, output = float(scene.world.controls[0].step), scenario.output
-    recorder = Recorder(place_bodies(scenario), output.every, step, contacts=output.contacts)
-    with stop_requests() as requests, team_for(scene, threads) as team:
-        attendance = Attendance(on_progress, lambda: requests.reason() or limit.reason())
-        ended = run_loop(scene, recorder, scenario.time.end, team=team, attendance=attendance)
-    return _result(scenario, recorder, ended, time.perf_counter() - began)
-
-
-def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
-    scenario: Scenario,
-    folder: Path,
-    *,
-    overwrite: bool = False,
-    resume: bool = False,
-    threads: int = 1,
-    precautions: CheckpointPolicy = DEFAULTS,
-    on_progress: Watcher = _ignore,
-) -> Result:
-    """Run a scenario and keep everything in a folder, frames while it runs, the mark of a finished run last.
-
-    With `resume` it continues from the newest whole checkpoint there, to the same bits as without the interruption;
-    without any it starts again. Raises InvalidInputError for checkpoints of another scenario or version of the code,
-    OutputExistsError where the folder is not free, or another run is in progress in it, and OutputError where writing
-    fails. A signal (SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1) or the limit of wall time ends it with the status
-    `interrupted`, and what was computed until then is kept.
-    """
-    limit = WallTime(precautions.wall_time)
-    compile_kernels(kernels_of(scenario))
-    began = time.perf_counter()
-    built = build_scene(scenario)
-    refuse_full_disk(folder, scenario, built)
-    tables = read_tables(scenario)
-    with folder_lock(folder):
-        part = Part(scenario, folder, built, find_resumption(folder, scenario) if resume else NEW)
-        toml = _made_ready(part, tables, overwrite=overwrite or resume)
-        with stop_requests() as requests, team_for(part.scene, threads) as team:
-            attendance = Attendance(on_progress, lambda: requests.reason() or limit.reason())
-            ended = part.run(toml, precautions, team, attendance)
-            result = _result(scenario, part.recorder, ended, time.perf_counter() - began)
-            return _keep_result(result, part.account(result.summary), folder)
-
-
-def _made_ready(part: Part, tables: Mapping[str, bytes], *, overwrite: bool) -> str:
-    """Make the folder of a run ready for this part of it; return the resolved scenario."""
-    if not part.goes_on:
-        files.prepare_folder(part.folder, overwrite=overwrite)
-    return keep_scenario(part.scenario, tables, part.folder)
 
 
 def renew_copies(scenario: Scenario, folder: Path) -> None:
@@ -192,11 +229,11 @@ def _bytes_of(path: Path) -> bytes | None:
 
 def _result(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Result:
     frames = recorder.frames()
-    summary = _summary(scenario, ended, seconds).model_copy(update={"movement": recorder.watch.found()})
+    summary = _summary(scenario, recorder, ended, seconds)
     return Result(scenario.name, final_columns(frames), summary, scenario, held=frames)
 
 
-def _summary(scenario: Scenario, ended: LoopResult, seconds: float) -> Summary:
+def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Summary:
     step = float(ended.world.controls[0].step)
     steps = int(ended.world.clock[0].steps)
     return Summary(
@@ -216,19 +253,20 @@ def _summary(scenario: Scenario, ended: LoopResult, seconds: float) -> Summary:
         total_seconds=seconds,
         energy_J=ended.ledger,
         threads=ended.threads,
-        warnings=tuple(_warnings(scenario, ended)),
+        movement=recorder.watch.found(),
+        warnings=tuple(_warnings(scenario, recorder.placed, ended)),
         environment=environment(),
     )
 
 
-def _warnings(scenario: Scenario, ended: LoopResult) -> Iterator[str]:
+def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResult) -> Iterator[str]:
     residual, every = ended.ledger.relative_residual, scenario.output.every
     if residual > RESIDUAL_PROMISE:
         yield f"energy is off by {residual:.1e} of the energy in play, more than {RESIDUAL_PROMISE:g}"
     if is_shorter_than_step(every, float(ended.world.controls[0].step)):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     if isinstance(scenario.time, Nonsmooth) and ended.outcome.is_finished:
-        sunk = overlap_warning(ended.overlap, min(min(body.size_x, body.size_y) for body in place_bodies(scenario)))
+        sunk = overlap_warning(ended.overlap, min(min(body.size_x, body.size_y) for body in placed))
         if sunk:
             yield sunk
 

@@ -11,6 +11,7 @@ from blocksim.simulation import Progress, Result, Watcher, read_result, renew_co
 from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint_policy import DEFAULTS, CheckpointPolicy
 from blocksim.simulation.result import read_final
+from blocksim.simulation.running import SILENT, Listener
 from blocksim.simulation.summary import read_summary
 from blocksim.simulation.table import COLUMNS
 from blocksim.study.places import FINISHED as FINISHED  # noqa: PLC0414 - their old home, for those who look there
@@ -33,16 +34,17 @@ def run(  # noqa: PLR0913 - what a user can choose for a run
     threads: int = 1,
     precautions: CheckpointPolicy = DEFAULTS,
     on_progress: Watcher = _ignore,
+    listener: Listener = SILENT,
 ) -> Result:
     """Simulate a scenario and return the result; with `out` it is kept in that folder as well.
 
     A folder that holds the finished run of exactly this scenario and code is read instead, unless `overwrite` is
     given. With `resume` a run that was interrupted there continues, to the same bits as without the interruption. The
     result does not depend on the number of threads, nor on `precautions`, which say when checkpoints are written and
-    after which wall time to stop. Ctrl-C returns what was computed until then, with the status `interrupted`. Raises
-    ScenarioError, InvalidInputError for an experiment table that does not go with the blocks, for more threads than the
-    system has or a checkpoint of another scenario or version of the code, OutputExistsError, OutputError; ValueError
-    for `resume` with `overwrite` or without `out`.
+    after which wall time to stop. `listener` hears what happens before the first step. Ctrl-C returns what was computed
+    until then, with the status `interrupted`. Raises ScenarioError, InvalidInputError for an experiment table that does
+    not go with the blocks, for more threads than the system has or a checkpoint of another scenario or version of the
+    code, OutputExistsError, OutputError; ValueError for `resume` with `overwrite` or without `out`.
     """
     if resume and (overwrite or out is None):
         raise ValueError("a run is resumed where it was kept: resume needs out, and cannot go with overwrite")
@@ -54,7 +56,9 @@ def run(  # noqa: PLR0913 - what a user can choose for a run
     folder = Path(out)
     if not overwrite and files.holds_run(folder, scenario):
         renew_copies(scenario, folder)
-        return read_result(folder)
+        result = read_result(folder)
+        listener.on_remark(f"already computed; rerun with --overwrite: {folder}")
+        return result
     return simulate_into(
         scenario,
         folder,
@@ -63,6 +67,7 @@ def run(  # noqa: PLR0913 - what a user can choose for a run
         threads=threads,
         precautions=precautions,
         on_progress=on_progress,
+        listener=listener,
     )
 
 

@@ -163,7 +163,7 @@ def test_wall_time_stops_and_resume_tells_where_it_continues(blocksim: Command, 
     assert blocksim(*LONG, "--out", "out").code == 73
     again = blocksim(*LONG[:-1], "--out", "out", "--resume")
     assert again.code == 0
-    assert again.err.startswith(f"goes on at step {step}, ")
+    assert again.err.startswith(f"resuming at step {step} (")
     assert_same(tmp_path / "out", whole)
     shown = blocksim(*LONG[:-1], "--out", "out", "--resume")
     assert shown.err.startswith("already computed; rerun with --overwrite")

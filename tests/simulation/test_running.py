@@ -16,9 +16,10 @@ import pandas as pd
 import pytest
 
 from blocksim.errors import InputMissingError, OutputError, OutputExistsError
-from blocksim.scenario import load_scenario
+from blocksim.scenario import Scenario, load_scenario, placement
 from blocksim.simulation import Progress, Result, read_result, simulate, simulate_into
-from blocksim.simulation.running import bytes_needed
+from blocksim.simulation.compilation import compile_kernels
+from blocksim.simulation.running import Listener, bytes_needed
 from blocksim.simulation.schemes import build_scene
 from blocksim.world.step import StepTooLargeError
 from tests.simulation.sliding import sliding
@@ -202,3 +203,29 @@ def test_too_small_a_disk_is_reported_with_both_sizes(tmp_path: Path, monkeypatc
         simulate_into(scenario, tmp_path / "not" / "yet")
     assert asked == [tmp_path]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_blocks_are_placed_once_from_loading_to_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    times: list[str] = []
+    place = placement._placed
+
+    def counted(scenario: Scenario) -> placement._Placement:
+        times.append(scenario.name)
+        return place(scenario)
+
+    monkeypatch.setattr(placement, "_placed", counted)
+    compile_kernels.cache_clear()  # the scene that is compiled with is placed on the way
+    simulate_into(sliding({"time": {"scheme": "nonsmooth"}}, end=0.01), tmp_path / "run")
+    assert times.count("sliding") == 1
+    assert times.count("compile") == 1
+
+
+def test_a_run_that_cannot_be_built_is_refused_before_it_compiles(soft: Shipped, tmp_path: Path) -> None:
+    started: list[str] = []
+    listener = Listener(on_start=started.append)
+    with pytest.raises(StepTooLargeError):
+        simulate_into(soft(time__step=1.0, time__end=2.0), tmp_path / "run", listener=listener)
+    assert started == []
+    assert not (tmp_path / "run").exists()
+    simulate_into(soft(time__end=1e-4), tmp_path / "run", listener=listener)
+    assert started == ["surface"]

@@ -10,7 +10,7 @@ from blocksim.simulation.schemes.explicit import EXPLICIT
 from blocksim.simulation.schemes.nonsmooth import NONSMOOTH
 from blocksim.simulation.schemes.scheme import AnyScene, Scene, Scheme
 from blocksim.world import scenes
-from blocksim.world.scenes import Refusal, Stack, alike, build_one
+from blocksim.world.scenes import Built, Refusal, Stack, alike, build_one
 
 SCHEMES = {scheme.name: scheme for scheme in (EXPLICIT, NONSMOOTH)}
 """Scheme as written in a scenario, and what it does."""
@@ -28,8 +28,13 @@ def scheme_of(scene: AnyScene) -> Scheme:
 
 def build_scene(scenario: Scenario) -> AnyScene:
     """Return the scene of a scenario at time zero. Raises what the scheme raises for a scenario that it cannot run."""
-    scene: AnyScene = build_one(scenario, scheme_named(scenario).construction).scene
+    scene: AnyScene = build(scenario).scene
     return scene
+
+
+def build(scenario: Scenario) -> Built:
+    """Return the same scene with the blocks as they were placed."""
+    return build_one(scenario, scheme_named(scenario).construction)
 
 
 def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
@@ -53,6 +58,7 @@ __all__ = [
     "AnyScene",
     "Scene",
     "Scheme",
+    "build",
     "build_scene",
     "build_stacks",
     "measured_row",

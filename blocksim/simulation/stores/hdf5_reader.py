@@ -27,7 +27,11 @@ def read_frames(path: Path, scenario: Scenario) -> Frames:
     Raises InputMissingError, or InvalidInputError when the file is not one of ours, damaged or still empty. What a run
     that continues writes at this moment may look like damage, so a file without an end is tried a few times.
     """
-    placed = place_bodies(scenario)
+    return read_placed(path, place_bodies(scenario))
+
+
+def read_placed(path: Path, placed: Sequence[PlacedBody]) -> Frames:
+    """Return the committed frames of a run file of blocks that were placed so. Raises as `read_frames`."""
     for pause in PAUSES:
         try:
             return _frames(path, placed)
