@@ -151,7 +151,11 @@ def takes_lock(handle: int) -> bool:
 
 @contextlib.contextmanager
 def folder_lock(folder: Path) -> Iterator[None]:
-    """Make a folder, where it is missing, and keep other runs out of it. Raises OutputExistsError where one has it."""
+    """Make a folder, where it is missing, and keep other runs out of it. Raises OutputExistsError where one has it.
+
+    What was made goes again where nothing was written: Ctrl-C while the solver is compiled leaves no trace.
+    """
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]  # the innermost first
     make_folder(folder)
     try:
         handle = os.open(folder, os.O_RDONLY)
@@ -162,7 +166,12 @@ def folder_lock(folder: Path) -> Iterator[None]:
         if not takes_lock(handle):
             message = f"{folder}: a run is in progress here; wait for it, or write elsewhere with --out DIR"
             raise OutputExistsError(message)
-        yield
+        try:
+            yield
+        finally:
+            with contextlib.suppress(OSError):  # not empty
+                for place in missing:
+                    place.rmdir()
     finally:
         os.close(handle)
 

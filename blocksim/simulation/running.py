@@ -8,7 +8,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -172,7 +172,7 @@ class Part:
             self.recorder.pour_into(sink)
             files.clear_remains(self.folder, (files.FINAL, files.SUMMARY))  # of the part before
             self.writer = self._writer(sink, precautions)
-            watched = Attendance(attendance.on_progress, attendance.stop, self.writer)
+            watched = replace(attendance, keeper=self.writer)
             since = self.resumption.checkpoint and self.resumption.checkpoint.position
             return run_loop(
                 self.scene, self.recorder, self.scenario.time.end, team=team, attendance=watched, since=since

@@ -229,3 +229,13 @@ def test_a_run_that_cannot_be_built_is_refused_before_it_compiles(soft: Shipped,
     assert not (tmp_path / "run").exists()
     simulate_into(soft(time__end=1e-4), tmp_path / "run", listener=listener)
     assert started == ["surface"]
+
+
+def test_stopping_while_the_solver_is_compiled_leaves_no_folder(soft: Shipped, tmp_path: Path) -> None:
+    def stop(_: str) -> None:
+        assert (tmp_path / "results" / "run").is_dir()  # locked by now
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simulate_into(soft(time__end=1e-4), tmp_path / "results" / "run", listener=Listener(on_start=stop))
+    assert list(tmp_path.iterdir()) == []
