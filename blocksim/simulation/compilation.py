@@ -1,4 +1,4 @@
-"""Compiling the kernels, apart from running them, so that a user can be told which is which."""
+"""Compiling the kernels, apart from running them, so that users see which of them takes the time."""
 
 import functools
 import time

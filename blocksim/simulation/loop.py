@@ -1,4 +1,4 @@
-"""The one time loop: compiled code runs until the recorder wants a frame, or somebody wants to look in."""
+"""The one time loop: compiled code runs until a frame, an energy check or a checkpoint is due."""
 
 import time
 from collections.abc import Callable
@@ -34,7 +34,7 @@ Watcher = Callable[[Progress], None]
 
 @dataclass(frozen=True)
 class Attendance:
-    """Who looks in between two compiled calls."""
+    """What is called between two compiled calls."""
 
     on_progress: Watcher = lambda _: None
     stop: Callable[[], str] = lambda: ""  # why to stop now; nothing as long as the run may continue
@@ -94,7 +94,10 @@ def run_loop(
 
 
 class Pace:
-    """Steps of a call, from what earlier calls took. It decides no bits, as those do not depend on where calls end."""
+    """How many steps a compiled call may take, so that signals and limits take effect soon and progress is shown.
+
+    It follows from what earlier calls took, and decides no bits, as those do not depend on where calls end.
+    """
 
     def __init__(self, bodies: int) -> None:
         """Begin with few for so many bodies."""
@@ -169,7 +172,7 @@ class _Going:
         self.keeper.keep(self.scene, Standing(done, *frames, self.start, self.seconds, self.team.threads))
 
     def result(self, why: str) -> LoopResult:
-        """Record where the run ended, and tell what it came to."""
+        """Record where the run ended, and return its outcome."""
         self.recorder.sample(self.scene)  # wherever it ended
         ledger = energy_ledger(self.scene, self.start)
         outcome = ends.interrupted(why) if why else outcome_of(self.status, ledger)

@@ -1,4 +1,4 @@
-"""Pictures, animations, reports and exports of blocksim, told from files of others by the mark that each of them bears.
+"""Pictures, animations, reports and exports of blocksim, distinguished from files of others by the mark each bears.
 
 Only those are replaced without being asked for. The marks are where each format keeps who made a file: PNG `Software`,
 SVG and PDF `Creator`, a comment in GIF and MP4, `generator` in HTML, the heads of a table, groups of VTKHDF.

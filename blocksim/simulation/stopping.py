@@ -14,7 +14,7 @@ DEFAULT = (signal.default_int_handler, signal.SIG_DFL)  # what is ignored, as un
 
 
 class StopRequests:
-    """The signals that have come: looked at between steps, so that none is torn."""
+    """The signals that have come: checked between steps, so that no step is interrupted."""
 
     def __init__(self) -> None:
         """Know of none yet."""
@@ -39,7 +39,7 @@ class StopRequests:
 
 @contextmanager
 def stop_requests() -> Iterator[StopRequests]:
-    """Give what tells whether the user has asked to stop."""
+    """Give the requests to stop that come meanwhile."""
     requests = StopRequests()
     with _handling(SIGNALS, requests.hear):
         yield requests

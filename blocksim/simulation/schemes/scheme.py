@@ -33,7 +33,7 @@ class Scheme:
     advance_in_team: Callable[[Any, int, int], int]  # the same as thread k of several
     advance_members: Callable[..., None]  # of stacked scenes: members, last steps, first rows (output), codes (output)
     with_more_room: Callable[[Any], Any]  # for pairs
-    with_threads: Callable[[Any, int], Any]  # with room for what they tell one another
+    with_threads: Callable[[Any, int], Any]  # with room for what they exchange
     threads_of: Callable[[Any], int]  # for how many threads there is such room
     for_another_thread: Callable[[Any], Any]  # the same scene with work space of its own
     contacts: Callable[[Any, int], Rows]  # of a scene with so many blocks

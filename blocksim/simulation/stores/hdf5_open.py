@@ -51,7 +51,7 @@ def opened(path: Path) -> Iterator[Any]:
             with h5py.File(path if head is None else AsClosed(raw, head), "r") as file:
                 yield file
     except DAMAGE as error:
-        message = f"{path}: not a readable HDF5 file: {told(error)}"
+        message = f"{path}: not a readable HDF5 file: {short_cause(error)}"
         raise InvalidInputError(message) from error
 
 
@@ -208,7 +208,7 @@ def refuse_too_many(path: Path, sets: dict[str, Any], rows: int, what: str = "fr
         )
 
 
-def told(error: BaseException) -> str:
-    """Return what HDF5 says, on one short line."""
+def short_cause(error: BaseException) -> str:
+    """Return the message of HDF5 as one short line."""
     text = " ".join(str(error).split())
     return text if len(text) <= SHOWN else f"{text[:SHOWN]} ..."

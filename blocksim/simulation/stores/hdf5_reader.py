@@ -47,7 +47,7 @@ def _frames(path: Path, placed: Sequence[PlacedBody]) -> Frames:
         try:
             time_step, rows = _read(path, file, len(placed))
         except DAMAGE as error:
-            message = f"{path}: not a complete run file: {safety.told(error)}"
+            message = f"{path}: not a complete run file: {safety.short_cause(error)}"
             raise InvalidInputError(message) from error
     return frames_from_rows(placed, time_step, rows)
 
