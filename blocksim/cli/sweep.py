@@ -26,8 +26,10 @@ from blocksim.study.single import FINISHED
 
 MOST_ROWS = 40
 MOST_FAILURES = 5
+MOST_MOVERS = 3
 NOT_SHOWN = {"case", "reason", "seconds"}
-SHOWN_LAST = MOVEMENT[1:]
+OUTCOME, MOVER, MOVED, DISPLACEMENT, TURN = MOVEMENT
+SHOWN_LAST = (DISPLACEMENT, TURN, MOVER, MOVED)
 NOT_SHOWN_ENDS = ("rotation_deg", "y_mm", "left_mm", "right_mm")
 
 
@@ -193,8 +195,10 @@ def _ends(key: str) -> list[str]:
 
 def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
     table = result.table
-    told = [name for name in table.columns if name not in NOT_SHOWN and not name.endswith(NOT_SHOWN_ENDS)]
-    told.sort(key=lambda name: name in SHOWN_LAST)
+    told = [
+        name for name in table.columns if name not in (*NOT_SHOWN, *SHOWN_LAST) and not name.endswith(NOT_SHOWN_ENDS)
+    ]
+    told += [name for name in SHOWN_LAST if name in table]
     names = [name for name in told if name in short or name == "inside" or _varies(table[name])]
     rows = [[shown(value) for value in row] for row in table[names].head(MOST_ROWS).itertuples(index=False)]
     fitting = _fitting([short.get(name, name) for name in names], rows)
@@ -202,13 +206,10 @@ def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
     answer("\n".join(table_lines(heads, [row[:fitting] for row in rows], left=0)))
     if quiet:
         return
-    left_out = {
-        "more rows": len(table) - len(rows),
-        "more columns": len(names) - fitting,
-        "columns that do not vary": len(told) - len(names),
-    }
-    if any(left_out.values()):
-        note(f"{result.name} has " + ", ".join(f"{count} {what}" for what, count in left_out.items() if count))
+    counts = {"row": len(table) - len(rows), "column": len(names) - fitting, "constant column": len(told) - len(names)}
+    left_out = [f"{count} {what}{'' if count == 1 else 's'}" for what, count in counts.items() if count]
+    if left_out:
+        note(f"not shown: {', '.join(left_out)}")
     _tell_movement(result)
     if result.share_inside is not None:
         note(f"{result.share_inside:.0%} of {len(table)} cases are inside all measured ranges")
@@ -220,12 +221,17 @@ def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
 
 def _tell_movement(result: SweepResult) -> None:
     """Report how often each outcome occurs, and the largest movement of all."""
-    outcome, displacement, turn = MOVEMENT
-    if outcome not in result.table or result.table[outcome].isna().all():  # of an earlier version, or all failed
+    table = result.table
+    if OUTCOME not in table or table[OUTCOME].isna().all():  # of an earlier version, or all failed
         return
-    counts = ", ".join(f"{count} {name}" for name, count in result.table[outcome].value_counts().items())
-    far, turned = result.table[displacement].max(), result.table[turn].max()
+    counts = ", ".join(f"{count} {name}" for name, count in table[OUTCOME].value_counts().items())
+    far, turned = table[DISPLACEMENT].max(), table[TURN].max()
     note(f"{counts}; largest displacement {far:.2f} mm, rotation {turned:.2f}°, from start to end")
+    if MOVER in table and table[MOVER].notna().any():
+        movers = table[MOVER].value_counts()
+        first = ", ".join(f"block {name} in {count}" for name, count in movers.head(MOST_MOVERS).items())
+        more = f", {len(movers) - MOST_MOVERS} others" if len(movers) > MOST_MOVERS else ""
+        note(f"first moved: {first}{more} of {len(table)} cases")
 
 
 def _tell_failures(result: SweepResult, short: dict[str, str]) -> None:

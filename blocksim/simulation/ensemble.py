@@ -1,7 +1,7 @@
 """Many runs of scenes of one shape, advanced together in compiled code: the engine of large sweeps.
 
-No process is started and nothing is recorded on the way; only where everything ended comes back, with the same bits as
-from a run of its own.
+No process is started and nothing is recorded on the way; only where everything ended and what moved first comes back,
+with the same bits as from a run of its own.
 """
 
 import os
@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,9 @@ from blocksim.simulation.ledger import (
     start_energy,
 )
 from blocksim.simulation.loop import last_step_of, outcome_of
+from blocksim.simulation.movement import FirstMove, FirstMoves
 from blocksim.simulation.outcome import Outcome, diagnosed
-from blocksim.simulation.recorder import MOTION, Rows, frames_from_rows
+from blocksim.simulation.recorder import MOTION, POSITION, Rows, frames_from_rows, next_frame, steps_per_frame
 from blocksim.simulation.schemes import AnyScene, build_stacks, measured_row, scheme_of
 from blocksim.simulation.table import COLUMNS, Columns, as_frame, final_values
 from blocksim.simulation.team import ALONE
@@ -57,6 +58,7 @@ class MemberEnd:
     placed: Placed = field(repr=False)
     time_step: float  # s
     rows: Rows = field(repr=False)  # one: the last
+    first_move: FirstMove | None = None
 
     @cached_property
     def frames(self) -> Frames:
@@ -151,6 +153,14 @@ def _run_batch(scenarios: Sequence[Scenario], pool: ThreadPoolExecutor, threads:
     return [ends[i] for i in range(len(scenarios))]
 
 
+class Stop(NamedTuple):
+    """A step at which compiled code returns: its number, and what is looked at there."""
+
+    step: int
+    is_look: bool  # at the energy
+    is_frame: bool  # at what has moved
+
+
 class Ensemble:
     """Scenes of one scheme and shape, stacked, to be advanced together once."""
 
@@ -165,6 +175,9 @@ class Ensemble:
         self.last_steps = np.array([*map(last_step_of, ends, self.time_steps)], dtype=np.int64)
         self.starts = np.zeros((len(ends), len(self.scheme.measured)))
         self.codes = np.zeros(len(ends), dtype=np.int64)
+        every = [scenarios[number].output.every for number in stack.numbers]
+        self.periods = [*map(steps_per_frame, every, self.time_steps)]
+        self.moves = FirstMoves(self.placed, self._positions(self.scenes, slice(None)))
 
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
@@ -175,16 +188,42 @@ class Ensemble:
         list(pool.map(self._advance, (np.arange(i, min(i + chunk, count)) for i in range(0, count, chunk))))
 
     def _advance(self, members: NDArray[np.int64]) -> None:
-        """Advance some members from look to look, without those whose energy does not add up any more."""
-        rows, stops = self.starts, np.zeros_like(self.codes)
-        done = 0
+        """Advance some members from stop to stop, without those whose energy does not add up any more."""
+        rows, later = self.starts, np.zeros_like(self.starts)  # later calls measure nothing that is needed
+        done = np.zeros_like(self.codes)
         while members.size:
-            done = next_energy_check(done, self.bodies)
-            np.minimum(self.last_steps, done, out=stops)
-            self.scheme.advance_members(self.scenes, members, stops, rows, self.codes)
-            rows = np.zeros_like(self.starts)  # what is measured at the start of a later call
-            members = members[(self.codes[members] == REACHED) & (self.last_steps[members] > done)]
-            members = members[[self._adds_up(m) for m in members.tolist()]]
+            stops = {m: self._next_stop(m, int(done[m])) for m in members.tolist()}
+            done[members] = [stop.step for stop in stops.values()]
+            self.scheme.advance_members(self.scenes, members, done, rows, self.codes)
+            rows = later
+            going = [self._continues(m, stop) for m, stop in stops.items()]
+            self._see([m for (m, stop), goes in zip(stops.items(), going, strict=True) if stop.is_frame or not goes])
+            members = members[going]
+
+    def _next_stop(self, m: int, done: int) -> Stop:
+        """Return where a member stops next; frames count only until something has moved."""
+        look, last = next_energy_check(done, self.bodies), int(self.last_steps[m])
+        frame = last if self.moves.found[m] else next_frame(done, self.periods[m])
+        step = min(look, frame, last)
+        return Stop(step, step == look, step == frame)
+
+    def _continues(self, m: int, stop: Stop) -> bool:
+        """Return True if a member that has stopped is neither at its end nor lost."""
+        is_under_way = self.codes[m] == REACHED and stop.step < self.last_steps[m]
+        return bool(is_under_way) and (not stop.is_look or self._adds_up(m))
+
+    def _see(self, members: list[int]) -> None:
+        """Note which members have moved; not of those whose list of pairs is full, which continue alone."""
+        which = [m for m in members if self.moves.found[m] is None and self.codes[m] != PAIRS_FULL]
+        if which:
+            steps = self.scenes.world.clock["steps"][which, 0].tolist()
+            times = [step * self.time_steps[m] for m, step in zip(which, steps, strict=True)]
+            self.moves.see(which, self._positions(self.scenes, which), times)
+
+    def _positions(self, scenes: AnyScene, which: list[int] | slice) -> NDArray[np.float64]:
+        """Return x, y (m) and angle (rad) of the blocks of some scenes of a stack, (k, 3, b)."""
+        bodies = scenes.world.bodies
+        return np.stack([bodies[name][which, : len(self.placed[0])] for name in POSITION], axis=1)
 
     def _adds_up(self, m: int) -> bool:
         return adds_up(energy_ledger(member(self.scenes, m), self._start(m)))
@@ -197,7 +236,9 @@ class Ensemble:
         """Return where the members ended, in order."""
         closing = Closing(self.scenes, self.placed, self._measured())
         return [
-            self._run_alone(m, self._start(m)) if code == PAIRS_FULL else closing.end(m, self._start(m), code)
+            self._run_alone(m, self._start(m))
+            if code == PAIRS_FULL
+            else closing.end(m, self._start(m), code, self.moves.found[m])
             for m, code in enumerate(self.codes.tolist())
         ]
 
@@ -214,18 +255,24 @@ class Ensemble:
             if not scene.world.clock[0].is_started:
                 scene, _ = ALONE.advance(self.scheme.with_more_room(scene), 0)
                 start = start_energy(scene)
-            scene, code = self._finish(scene, start, int(self.last_steps[m]))
+            scene, code = self._finish(m, scene, start)
         except BlocksimError as error:
             return MemberFailure(error)
-        return Closing(stack_of_one(scene), placed, measured_row(scene)[np.newaxis]).end(0, start, code)
+        closing = Closing(stack_of_one(scene), placed, measured_row(scene)[np.newaxis])
+        return closing.end(0, start, code, self.moves.found[m])
 
-    def _finish(self, scene: AnyScene, start: float, last: int) -> tuple[AnyScene, int]:
-        """Advance one scene from look to look, as `_advance` does; return it and its status code."""
-        code, done = REACHED, -1
-        while code == REACHED and done < last and (done < 0 or adds_up(energy_ledger(scene, start))):
-            done = next_energy_check(int(scene.world.clock[0].steps), self.bodies)
-            scene, code = ALONE.advance(scene, min(done, last))
-        return scene, code
+    def _finish(self, m: int, scene: AnyScene, start: float) -> tuple[AnyScene, int]:
+        """Advance one scene from stop to stop, as `_advance` does; return it and its status code."""
+        while True:
+            stop = self._next_stop(m, int(scene.world.clock[0].steps))
+            scene, code = ALONE.advance(scene, stop.step)
+            is_under_way = code == REACHED and stop.step < self.last_steps[m]
+            continues = is_under_way and (not stop.is_look or adds_up(energy_ledger(scene, start)))
+            if stop.is_frame or not continues:
+                time = int(scene.world.clock[0].steps) * self.time_steps[m]
+                self.moves.see([m], self._positions(stack_of_one(scene), slice(None)), [time])
+            if not continues:
+                return scene, code
 
 
 class Closing:
@@ -246,8 +293,8 @@ class Closing:
         self.in_play = [*map(InPlay, masses, moved)]
         self.columns = final_values(self.motion, _shapes(placed)).tolist()
 
-    def end(self, m: int, start: float, code: int) -> MemberEnd:
-        """Return the end of one member, given its energy (J) at the start and the status code that it came to."""
+    def end(self, m: int, start: float, code: int, first_move: FirstMove | None) -> MemberEnd:
+        """Return the end of one member: energy (J) at the start, status code that it came to, what moved first."""
         ledger = ledger_of(self.names, self.measured[m], start, self.in_play[m])
         names = [body.name for body in self.placed[m]]
         some = slice(m, m + 1)
@@ -262,6 +309,7 @@ class Closing:
             placed=self.placed[m],
             time_step=self.time_steps[m],
             rows=Rows(self.steps[m], self.motion[some], self.measured[some], self.names),
+            first_move=first_move,
         )
 
 

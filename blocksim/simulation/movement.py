@@ -9,8 +9,9 @@ shortest side. A scene
     slid         where some block has moved and none has fallen,
     fell         where some block has fallen.
 
-Fixed blocks do not count. A run that `time.end` cuts short is reported as it is then. Ends
-alone tell all but "rocked back": a sweep keeps no frames, and says "stands" there.
+Fixed blocks do not count. A run that `time.end` cuts short is reported as it is then. The first mover is the block that
+has moved in the first frame in which any has (the farthest of several); members of ensembles keep no frames, but are
+looked at when those would be recorded, until one block has moved.
 """
 
 from collections.abc import Sequence
@@ -39,6 +40,13 @@ class Manner(StrEnum):
     FELL = "fell"
 
 
+class FirstMove(NamedTuple):
+    """Which block moved first, and the time (s) of the first frame in which it had moved."""
+
+    block: str
+    time: float
+
+
 class Movement(BaseModel, frozen=True):
     """The entries of run.json about movement, in frames and at the end; blocks by name."""
 
@@ -50,13 +58,29 @@ class Movement(BaseModel, frozen=True):
     first_mover: str | None = None
     first_moved_s: float | None = None  # time of the first frame in which it had moved
 
+    @property
+    def first_move(self) -> FirstMove | None:
+        """Both entries together."""
+        if self.first_mover is None or self.first_moved_s is None:
+            return None
+        return FirstMove(self.first_mover, self.first_moved_s)
+
 
 class _Shapes(NamedTuple):
-    """Sides of b blocks, m; where they began, (3, b): x, y (m), angle (rad)."""
+    """Lengths of b blocks (m), and which can move; of m scenes (m, b)."""
 
     shortest: Floats
     reach: Floats  # half a diagonal
     is_free: NDArray[np.bool_]
+
+    def split(self, count: int) -> "_Shapes":
+        """Return those of so many scenes, which are here one after the other."""
+        shape = (count, -1)
+        return _Shapes(self.shortest.reshape(shape), self.reach.reshape(shape), self.is_free.reshape(shape))
+
+    def chosen(self, scenes: list[int]) -> "_Shapes":
+        """Return those of some scenes."""
+        return _Shapes(self.shortest[scenes], self.reach[scenes], self.is_free[scenes])
 
 
 def _shapes_of(placed: Sequence[PlacedBody]) -> _Shapes:
@@ -66,7 +90,7 @@ def _shapes_of(placed: Sequence[PlacedBody]) -> _Shapes:
 
 
 def _shares(shapes: _Shapes, way: Floats, turn: Floats) -> Floats:
-    """Return how far (b,) blocks are from their start, in ways that count as moved."""
+    """Return how far blocks, (b,) or (m, b), are from their start, in units of the threshold: above 1 is moved."""
     shares = np.fmax(way, turn * shapes.reach) / (MOVED_SHARE * shapes.shortest)
     return np.where(shapes.is_free, np.nan_to_num(shares, nan=np.inf), 0.0)
 
@@ -78,14 +102,43 @@ def _manner(shapes: _Shapes, way: Floats, drop: Floats, turn: Floats) -> Manner:
     return Manner.SLID if (_shares(shapes, way, turn) > 1.0).any() else Manner.STANDS
 
 
-def from_start_to_end(placed: Sequence[PlacedBody], final: Columns) -> tuple[Manner, float, float]:
-    """Return manner, largest displacement of a centre (mm) and largest rotation (degrees), of a final table alone."""
+def from_start_to_end(
+    placed: Sequence[PlacedBody], final: Columns, first: FirstMove | None
+) -> tuple[Manner, float, float]:
+    """Return manner, largest displacement of a centre (mm) and largest rotation (degrees), of a final table.
+
+    `first` is the first move on the way, if there was any: it distinguishes what rocked back from what stands.
+    """
     shapes = _shapes_of(placed)
     dx = np.array(final["x_mm"]) / MILLI - [body.x for body in placed]
     dy = np.array(final["y_mm"]) / MILLI - [body.y for body in placed]
     turn = np.abs(np.array(final["rotation_deg"]))
     way = np.hypot(dx, dy)
-    return _manner(shapes, way, -dy, np.radians(turn)), float(MILLI * way.max()), float(turn.max())
+    manner = _with_way_there(_manner(shapes, way, -dy, np.radians(turn)), first)
+    return manner, float(MILLI * way.max()), float(turn.max())
+
+
+def _with_way_there(manner: Manner, first: FirstMove | None) -> Manner:
+    """Return the manner of an end, given what moved before it."""
+    return Manner.ROCKED if manner is Manner.STANDS and first is not None else manner
+
+
+class FirstMoves:
+    """The first moves in m scenes with the same number b of blocks, advanced together."""
+
+    def __init__(self, placed: Sequence[Sequence[PlacedBody]], start: Floats) -> None:
+        """Take the blocks of every scene and where they begin, (m, 3, b): x, y (m), angle (rad)."""
+        self.placed, self.start = placed, start
+        self.shapes = _shapes_of([body for bodies in placed for body in bodies]).split(len(placed))
+        self.found: list[FirstMove | None] = [None] * len(placed)
+
+    def see(self, scenes: list[int], position: Floats, times: list[float]) -> None:
+        """Examine some scenes, at positions (k, 3, b) and times (s); those that have moved before stay as they are."""
+        dx, dy, angle = (position - self.start[scenes]).swapaxes(0, 1)
+        shares = _shares(self.shapes.chosen(scenes), np.hypot(dx, dy), np.abs(angle))
+        for m, block, share, time in zip(scenes, shares.argmax(axis=1), shares.max(axis=1), times, strict=True):
+            if share > 1.0 and self.found[m] is None:
+                self.found[m] = FirstMove(self.placed[m][block].name, time)
 
 
 class Watch:
@@ -96,7 +149,7 @@ class Watch:
         self.placed, self.shapes = placed, _shapes_of(placed)
         self.start: Floats | None = None
         self.way, self.turn = np.zeros(len(placed)), np.zeros(len(placed))  # largest so far: m, rad
-        self.first: tuple[str, float] | None = None
+        self.first: FirstMove | None = None
         self.manner = Manner.STANDS  # in the last frame
 
     def see(self, motion: Floats, time: float) -> None:
@@ -110,18 +163,17 @@ class Watch:
         if self.first is None:
             shares = _shares(self.shapes, way, turn)
             most = int(np.argmax(shares))
-            self.first = (self.placed[most].name, time) if shares[most] > 1.0 else None
+            self.first = FirstMove(self.placed[most].name, time) if shares[most] > 1.0 else None
 
     def found(self) -> Movement:
         """Return what was seen."""
         far, turned = int(np.argmax(self.way)), int(np.argmax(self.turn))
-        rocked = self.manner is Manner.STANDS and self.first is not None
         return Movement(
-            outcome=Manner.ROCKED if rocked else self.manner,
+            outcome=_with_way_there(self.manner, self.first),
             largest_displacement_mm=float(MILLI * self.way[far]),
             displaced_block=self.placed[far].name,
             largest_rotation_deg=float(np.degrees(self.turn[turned])),
             rotated_block=self.placed[turned].name,
-            first_mover=None if self.first is None else self.first[0],
-            first_moved_s=None if self.first is None else self.first[1],
+            first_mover=None if self.first is None else self.first.block,
+            first_moved_s=None if self.first is None else self.first.time,
         )

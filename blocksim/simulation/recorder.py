@@ -17,7 +17,8 @@ from blocksim.simulation.movement import Watch
 if TYPE_CHECKING:
     from blocksim.simulation.schemes import AnyScene
 
-MOTION = ("x", "y", "angle", "vx", "vy", "spin")
+POSITION = ("x", "y", "angle")
+MOTION = (*POSITION, "vx", "vy", "spin")
 
 
 class Frame(NamedTuple):
@@ -42,6 +43,19 @@ class FrameSink(Protocol):
         """Keep one frame."""
 
 
+def steps_per_frame(every: float, step: float) -> float:
+    """Return the number of steps (s) between two frames that are wanted `every` seconds; at least one, not rounded."""
+    return max(every / step, 1.0)
+
+
+def next_frame(done: int, period: float) -> int:
+    """Return the next step to record after `done` steps, given `steps_per_frame`."""
+    number = int(done / period)
+    while round(number * period) <= done:
+        number += 1
+    return round(number * period)
+
+
 class Recorder:
     """Frames, growing as the run continues; with a sink only the last one, so that long runs need no more memory."""
 
@@ -61,7 +75,7 @@ class Recorder:
         self.placed = tuple(placed)
         self.time_step = step
         self.sink = sink
-        self.steps_per_frame = max(every / step, 1.0)
+        self.steps_per_frame = steps_per_frame(every, step)
         self.steps: list[int] = []
         self.digests: list[bytes] = []  # of each frame and all before it
         self.altered: list[int] = []  # steps of frames of an earlier part that have come out otherwise when repeated
@@ -72,10 +86,7 @@ class Recorder:
 
     def next_step(self, done: int) -> int:
         """Return the next step to record after `done` steps, wherever those end."""
-        number = int(done / self.steps_per_frame)
-        while round(number * self.steps_per_frame) <= done:
-            number += 1
-        return round(number * self.steps_per_frame)
+        return next_frame(done, self.steps_per_frame)
 
     def is_output_time(self, step: int) -> bool:
         """Return True if a step is recorded wherever the run ends."""

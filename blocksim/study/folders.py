@@ -14,7 +14,7 @@ from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.summary import read_summary
 from blocksim.simulation.table import read_table
 from blocksim.study.executors.pool import pool_of
-from blocksim.study.rows import Row, row_of, row_of_error
+from blocksim.study.rows import Course, Row, row_of, row_of_error
 from blocksim.study.single import FINISHED, run
 
 INTERRUPTED = "interrupted"
@@ -54,9 +54,7 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
         row = _known_row(scenario, folder)
         if row is None:
             result = _run_on(scenario, folder)
-            row = row_of(
-                result.status, result.reason, result.summary.simulated_time_s, result.columns, place_bodies(scenario)
-            )
+            row = row_of(_course(result.summary), result.columns, place_bodies(scenario))
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         return row_of_error(error)
     return row
@@ -76,8 +74,13 @@ def _known_row(scenario: Scenario, folder: Path) -> Row | None:
         summary = read_summary(folder / files.SUMMARY)
         if _has_ended(folder, summary) and summary.run == run_hash(scenario):
             final = read_table(folder / files.FINAL)
-            return row_of(summary.status, summary.reason, summary.simulated_time_s, final, place_bodies(scenario))
+            return row_of(_course(summary), final, place_bodies(scenario))
     return None
+
+
+def _course(summary: Summary) -> Course:
+    first = None if summary.movement is None else summary.movement.first_move
+    return Course(summary.status, summary.reason, summary.simulated_time_s, first)
 
 
 def _has_ended(folder: Path, summary: Summary) -> bool:

@@ -1,27 +1,35 @@
 """What a sweep keeps of a case: one row, the same from whatever ran it."""
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 from blocksim.errors import BlocksimError
 from blocksim.scenario import PlacedBody
-from blocksim.simulation.movement import from_start_to_end
+from blocksim.simulation.movement import FirstMove, from_start_to_end
 from blocksim.simulation.table import Columns
 
 Row = dict[str, object]
 X = ".x_mm"
-MOVEMENT = ("outcome", "displacement_mm", "turn_deg")  # from start to end: largest of all blocks
+MOVEMENT = ("outcome", "first_mover", "first_moved_s", "displacement_mm", "turn_deg")
+"""As in run.json, but displacement and rotation are the largest of all blocks from start to end."""
 KEPT = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")  # of the final table, for every block
 
 
-def row_of(status: str, reason: str, seconds: float, final: Columns, placed: Sequence[PlacedBody]) -> Row:
-    """Return the row of a case that was run.
+class Course(NamedTuple):
+    """How a case that was run has gone; `seconds` are simulated, so they are the same on every machine."""
 
-    `seconds` is the time (s) that was simulated until it ended: it is the same on every machine, other than the time
-    that the simulation took. `placed` are the blocks at the start.
-    """
-    row: Row = {"status": status, "reason": reason, "seconds": seconds}
-    manner, displacement, rotation = from_start_to_end(placed, final)
-    row |= dict(zip(MOVEMENT, (manner.value, displacement, rotation), strict=True))
+    status: str
+    reason: str
+    seconds: float
+    first_move: FirstMove | None
+
+
+def row_of(course: Course, final: Columns, placed: Sequence[PlacedBody]) -> Row:
+    """Return the row of a case that was run; `placed` are the blocks at the start."""
+    row: Row = {"status": course.status, "reason": course.reason, "seconds": course.seconds}
+    manner, displacement, rotation = from_start_to_end(placed, final, course.first_move)
+    mover, moved = course.first_move or (None, None)
+    row |= dict(zip(MOVEMENT, (manner.value, mover, moved, displacement, rotation), strict=True))
     for block, *values in zip(final["block"], *(final[name] for name in KEPT), strict=True):
         row |= {f"{block}.{name}": value for name, value in zip(KEPT, values, strict=True)}
     return row

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TABLE = SWEEP
-TEXT_COLUMNS = {"case": str, "status": str, "reason": str}
+TEXT_COLUMNS = {"case": str, "status": str, "reason": str, "first_mover": str}
 MOST_BYTES = 2000 * MEGABYTE
 """Of sweep.csv: a million cases of a hundred blocks do not fit into most memories."""
 OUTCOME = ("status", "reason", "seconds")

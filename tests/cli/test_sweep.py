@@ -35,7 +35,7 @@ def test_grid_from_the_command_line(blocksim: Command) -> None:
     assert {row["outcome"] for row in rows()} == {"stands"}
     assert all(0.2 < float(row["turn_deg"]) < 0.34 for row in rows())
     assert lines[0].startswith("block_block.kinetic  block_ground.kinetic  inside   2.x_mm   3.x_mm")
-    assert "sweep.csv has 2 more columns, 3 columns that do not vary" in answer.err
+    assert "not shown: 2 columns, 5 constant columns\n" in answer.err
     assert max(map(len, lines)) <= 80
     assert "4/4 finished: block_block.kinetic = 0.3, block_ground.kinetic = 0.3" in answer.err
     assert answer.err.splitlines()[-1] == "table: out/sweep.csv"
@@ -128,7 +128,7 @@ def test_many_rows_and_columns_are_cut_and_counted(blocksim: Command) -> None:
     lines = answer.out.splitlines()
     assert len(lines) == 2 + 40
     assert max(map(len, lines)) <= 80
-    assert "sweep.csv has 2 more rows, 14 columns that do not vary" in answer.err
+    assert "not shown: 2 rows, 16 constant columns\n" in answer.err
 
 
 def test_short_keys_are_the_shortest_ends_that_differ() -> None:

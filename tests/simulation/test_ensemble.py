@@ -35,6 +35,8 @@ def assert_same(end: MemberEnd, scenario: Scenario) -> None:
     assert alone.final.equals(end.final)
     assert alone.summary.energy_J == end.ledger
     assert alone.columns == end.columns
+    assert alone.summary.movement is not None
+    assert alone.summary.movement.first_move == end.first_move
     assert (alone.summary.status, alone.summary.reason) == (end.outcome.status, end.outcome.reason)
     assert alone.summary.simulated_time_s == end.seconds == end.frames.time[-1]
     assert np.array_equal(alone.frames.x[-1:], end.frames.x)
@@ -139,6 +141,8 @@ def test_a_pair_list_that_fills_up_on_the_way_changes_no_bit(scheme: str, monkey
     for end, single in zip(run_ensemble(scenarios), alone, strict=True):
         assert end.columns == single.columns
         assert end.ledger == single.summary.energy_J
+        assert single.summary.movement is not None
+        assert end.first_move == single.summary.movement.first_move
 
 
 def test_members_that_cannot_be_built_fail_in_their_place_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,6 +24,18 @@ KINETIC = "friction.block_block.kinetic"
 END = "time.end"
 OVERLAP = "contact.max_overlap"
 TWO = {KINETIC: [0.2, 0.25]}
+ROCKING = {
+    "schema": 1,
+    "name": "rocking",
+    "materials": {"stone": {"unit_weight": 26700.0, "young_modulus": 69e9, "poisson_ratio": 0.3}},
+    "blocks": {"slab": {"width": 0.02, "height": 0.06, "length": 0.05, "material": "stone"}},
+    "bodies": [{"block": "slab", "x": 0.0, "y": 0.03, "spin": 0.0}],
+    "contact": {"stiffness_scale": 0.001, "restitution": 0.0},
+    "friction": {"block_block": 0.6, "block_ground": 0.6},
+    "output": {"every": 0.01},
+    "time": {"end": 0.4},
+}
+"""A block of 20 mm by 60 mm that falls back where it starts to turn at 6 rad/s."""
 
 
 def lines(folder: Path) -> list[str]:
@@ -39,6 +51,20 @@ def test_row_is_what_a_single_run_gives(nominal: Document, tmp_path: Path) -> No
     assert row["seconds"] == single.summary.simulated_time_s
     assert row["reason"] == single.reason
     assert not row["inside"]
+    movement = single.summary.movement
+    assert movement is not None
+    assert (row["outcome"], row["first_mover"]) == (movement.outcome, movement.first_mover) == ("fell", "3")
+    assert row["first_moved_s"] == movement.first_moved_s
+
+
+@pytest.mark.parametrize("keep_cases", [False, True])
+def test_rows_distinguish_what_rocked_back_from_what_stands(keep_cases: bool, tmp_path: Path) -> None:
+    spins = {"bodies.0.spin": [0.0, 6.0]}
+    table = sweep(ROCKING, spins, out=tmp_path, jobs=1, keep_cases=keep_cases).table
+    assert table["outcome"].tolist() == ["stands", "rocked back"]  # both end where they began
+    assert table["first_mover"].isna().tolist() == [True, False]
+    assert table["first_mover"][1] == "1"
+    assert table["first_moved_s"][1] == pytest.approx(0.01, abs=1e-5)  # the first frame
 
 
 def test_columns_are_values_outcome_verdict_and_ends(quick: Document, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from blocksim.scenario import Scenario
 from blocksim.simulation import MemberEnd, MemberFailure, run_in_batches
 from blocksim.study.executors.batches import BatchSize, take
 from blocksim.study.executors.task import Batch, Setting, Task, needs_nothing
-from blocksim.study.rows import Row, row_of, row_of_error
+from blocksim.study.rows import Course, Row, row_of, row_of_error
 
 PATIENCE = 0.7  # s that a batch has to end once the user wants to stop
 POLL = 0.05  # s
@@ -88,4 +88,5 @@ def _row_of(member: MemberEnd | MemberFailure) -> Row:
     """Return the row of a member."""
     if isinstance(member, MemberFailure):
         return row_of_error(member.error)
-    return row_of(member.outcome.status, member.outcome.reason, member.seconds, member.columns, member.placed)
+    course = Course(member.outcome.status, member.outcome.reason, member.seconds, member.first_move)
+    return row_of(course, member.columns, member.placed)
