@@ -20,6 +20,7 @@ from blocksim.study.ranges import Ranges
 from blocksim.study.rows import blocks_in
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.table import TABLE, read_sweep
+from blocksim.view.series import Typed
 from blocksim.view.sweeps.found import QUARTER, FoundSweep, Input, Measured
 
 Floats = NDArray[np.float64]
@@ -111,7 +112,9 @@ def _input(scenario: Scenario, head: Head, column: pd.Series) -> Input:
     if not all(number is None or abs(number) <= LARGEST for number in numbers):
         raise InvalidInputError(f"{TABLE}: the column {key} holds what is no number, or too large a one")
     if all(number is not None for number in numbers):
-        return Input(key, _unit(scenario, key), np.array(numbers, dtype=np.float64), is_even=_is_even(scenario, key))
+        typed = Typed(head.unit, head.si(1.0)) if head.unit else None
+        values = np.array(numbers, dtype=np.float64)
+        return Input(key, _unit(scenario, key), values, is_even=_is_even(scenario, key), typed=typed)
     words = [q.shown(value).strip('"') for value in column]
     levels = tuple(dict.fromkeys(words))
     return Input(key, "", np.array([levels.index(word) for word in words], dtype=np.float64), levels)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +31,17 @@ LEAST_SPAN_MM = 1.0  # of an axis, so that round-off does not look like scatter
 DECADES = 30.0  # largest over smallest value from which an axis is logarithmic
 NARROW = 1e-2  # span over middle below which an axis shows distances from the middle
 WAVERING = 1.6  # way up and down over range, above which points are not joined
+LEAST_READABLE = 0.01  # in the typed unit: smaller distances from the middle have a prefix of SI instead
 PREFIXED = ("m", "s", "Pa")
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 Floats = NDArray[np.float64]
+
+
+class Typed(NamedTuple):
+    """The unit in which the user has typed values of a key, and what one of it is in SI."""
+
+    unit: str
+    worth: float
 
 
 class SeriesLike(Protocol):
@@ -77,10 +85,12 @@ def draw_series(  # noqa: PLR0913 - what is drawn, and where
     title: str | None = None,
     measured: Mapping[str, tuple[float, float]] | None = None,
     *,
+    typed: Typed | None = None,
     paper: Paper = OWN,
 ) -> None:
     """Draw final x over a key, given with its SI unit, and write PNG, SVG or PDF; the same input gives the same bytes.
 
+    The axis has the `typed` unit, or where there is none that in which the values are best read.
     `measured` gives smallest and largest measured x (mm) of some blocks. Raises InvalidInputError for an unknown
     picture format and OutputError when the file cannot be written.
     """
@@ -88,7 +98,8 @@ def draw_series(  # noqa: PLR0913 - what is drawn, and where
     style.picture_suffix(path)
     drawn = list(series)[:MOST_COLUMNS]
     rows = [(block, blocks[block]) for block in moving_blocks(drawn)]
-    page = _page(drawn, rows, key, paper)
+    axis = value_axis(np.concatenate([one.values for one in drawn]), *key, typed=typed)
+    page = _page(drawn, rows, axis, paper)
     count = len(drawn)
     texts = _legend(len(rows), len(blocks), len(series) - count, is_measured=bool(measured))
     notes = wrap(texts, max(1, int(LETTERS_AN_INCH * page.width)))
@@ -126,13 +137,12 @@ class _Page:
     height: float = 0.0
 
 
-def _page(series: Sequence[SeriesLike], rows: Sequence[tuple[int, str]], key: tuple[str, str], paper: Paper) -> _Page:
+def _page(series: Sequence[SeriesLike], rows: Sequence[tuple[int, str]], axis: ValueAxis, paper: Paper) -> _Page:
     """Return the page, but for the heights that depend on how many lines stand below all."""
     count = len(series)
     sides = LEFT + RIGHT + (count - 1) * COLUMN_GAP
     width = paper.width(WIDTH, sides + count * NARROWEST)
     panel = (width - sides) / count
-    axis = value_axis(np.concatenate([one.values for one in series]), *key)
     label = tuple(style.broken(axis.label, width - LEFT - RIGHT))
     headings = tuple(tuple(style.broken(one.label, panel, bold=True)) for one in series)
     captions = captions_of(series, rows, panel * style.POINTS_PER_INCH)
@@ -189,24 +199,29 @@ def most_moving(spread: Floats) -> list[int]:
     return sorted((moving or candidates)[:MOST_ROWS])
 
 
-def value_axis(values: Floats, key: str, unit: str, *, is_even: bool = False) -> ValueAxis:
+def value_axis(values: Floats, key: str, unit: str, *, is_even: bool = False, typed: Typed | None = None) -> ValueAxis:
     """Return how to show values of a key: over decades (not if spread evenly), around their middle, or as they are."""
     low, high = float(values.min()), float(values.max())
+    factor, shown = scale_of(max(abs(low), abs(high)), unit, typed)
     if low > 0.0 and high >= DECADES * low and not is_even:
-        return ValueAxis(f"{key} ({unit})" if unit else key, 0.0, 1.0, is_log=True)
+        factor, shown = (1.0, unit) if typed is None else (factor, shown)
+        return ValueAxis(f"{key}{_bracketed(shown)}", 0.0, factor, is_log=True)
     middle = float(np.median(np.unique(values)))
     if 0.0 < high - low < NARROW * abs(middle):
-        factor, told = scale_of(max(high - middle, middle - low), unit)
-        other, around = scale_of(abs(middle), unit)
+        half = max(high - middle, middle - low)
+        other, around = scale_of(abs(middle), unit, typed)
+        is_readable = typed is not None and half / typed.worth >= LEAST_READABLE
+        factor, shown = scale_of(half, unit, typed if is_readable else None)
         return ValueAxis(
-            f"{key} − {middle * other:.9g}{_spaced(around)}{_bracketed(told)}", middle, factor, is_log=False
+            f"{key} − {middle * other:.9g}{_spaced(around)}{_bracketed(shown)}", middle, factor, is_log=False
         )
-    factor, told = scale_of(max(abs(low), abs(high)), unit)
-    return ValueAxis(f"{key}{_bracketed(told)}", 0.0, factor, is_log=False)
+    return ValueAxis(f"{key}{_bracketed(shown)}", 0.0, factor, is_log=False)
 
 
-def scale_of(size: float, unit: str) -> tuple[float, str]:
-    """Return the factor and the unit with which values of this size are best read."""
+def scale_of(size: float, unit: str, typed: Typed | None = None) -> tuple[float, str]:
+    """Return factor and unit for values in SI: as typed, else as values of this size are best read."""
+    if typed is not None:
+        return 1.0 / typed.worth, typed.unit
     if unit == "rad":
         return 180.0 / np.pi, "°"
     power = 3 * int(np.floor(np.log10(size) / 3.0)) if size > 0.0 else 0
@@ -299,7 +314,8 @@ def captions_of(
 def _extent(x: Floats) -> tuple[str, str]:
     """Return where a block ends in all runs of a series, in more and in fewer words."""
     apart = f"{np.ptp(x):.2f} mm apart"
-    return f"{x.min():.2f} to {x.max():.2f} mm, {apart}", apart
+    ends = [f"{end:.2f}".replace("-0.00", "0.00").replace("-", "−") for end in (x.min(), x.max())]
+    return f"{' to '.join(ends)} mm, {apart}", apart
 
 
 def _legend(rows: int, blocks: int, more_series: int, *, is_measured: bool) -> str:

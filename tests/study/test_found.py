@@ -1,4 +1,4 @@
-"""A sweep read back from its stored table, as pictures need it: no case is run here."""
+"""A sweep read back from its stored table, as pictures need it."""
 
 from pathlib import Path
 
@@ -8,6 +8,8 @@ import pytest
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Document
 from blocksim.study.found import read_found
+from blocksim.study.many import sweep
+from blocksim.study.picture import draw_sweep
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.sweep_folder import prepare
 from blocksim.view.sweeps.found import FoundSweep
@@ -37,6 +39,22 @@ def test_values_are_in_si_with_the_unit_of_their_key(nominal: Document, tmp_path
     (overlap,) = found.inputs
     assert (overlap.key, overlap.unit) == ("structures.0.overlap", "m")
     assert overlap.values.tolist() == [0.011, 0.009, 0.01]
+
+
+def test_values_keep_the_unit_that_was_typed(quick: Document, tmp_path: Path) -> None:
+    vary: dict[str, Values] = {"structures.0.overlap": ["0.9 cm", "1 cm"], "ground.tilt": ["0.01 rad", "0.02 rad"]}
+    folder = sweep(quick, vary, out=tmp_path).folder
+    overlap, tilt = read_found(folder).inputs
+    assert [(one.unit, one.typed and one.typed.unit) for one in (overlap, tilt)] == [("m", "cm"), ("rad", "rad")]
+    assert overlap.told(0.009) == "0.9 cm"
+    draw_sweep(folder, tmp_path / "map.svg", kind="map")
+    drawn = (tmp_path / "map.svg").read_text()
+    assert "<!-- structures.0.overlap (cm) -->" in drawn
+    assert "<!-- ground.tilt (rad) -->" in drawn
+    draw_sweep(folder, tmp_path / "lines.svg", kind="lines")
+    drawn = (tmp_path / "lines.svg").read_text()
+    assert "<!-- structures.0.overlap (cm) -->" in drawn
+    assert "<!-- ground.tilt = 0.01 rad -->" in drawn
 
 
 def test_words_become_levels_and_keys_keep_the_order_of_the_table(nominal: Document, tmp_path: Path) -> None:

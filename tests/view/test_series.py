@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
-from blocksim.view.series import MOST_ROWS, draw_series, is_smooth, moving_blocks, value_axis
+from blocksim.view.series import MOST_ROWS, Typed, draw_series, is_smooth, moving_blocks, value_axis
 from tests.view.made_up import HOSTILE, boxes_of, overlapping
 
 Floats = NDArray[np.float64]
@@ -74,6 +74,21 @@ def test_axis_shows_values_so_that_they_can_be_read(
     axis = value_axis(np.array(values), "key", unit)
     assert (axis.label, axis.is_log) == (label, is_log)
     assert axis.shown(np.array(values)).tolist() == pytest.approx(shown, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("values", "typed", "label", "shown"),
+    [
+        ([0.09, 0.1, 0.12], Typed("cm", 0.01), "key (cm)", [9.0, 10.0, 12.0]),
+        ([0.1, 3.1], Typed("mm", 0.001), "key (mm)", [100.0, 3100.0]),  # over decades
+        ([0.9995, 1.0, 1.0005], Typed("cm", 0.01), "key − 100 cm (cm)", [-0.05, 0.0, 0.05]),
+        ([0.0099995, 0.01, 0.0100005], Typed("mm", 0.001), "key − 10 mm (nm)", [-500.0, 0.0, 500.0]),
+    ],
+)
+def test_axis_keeps_the_typed_unit(values: list[float], typed: Typed, label: str, shown: list[float]) -> None:
+    axis = value_axis(np.array(values), "key", "m", typed=typed)
+    assert axis.label == label
+    assert axis.shown(np.array(values)).tolist() == pytest.approx(shown)
 
 
 def test_only_smooth_series_are_joined() -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.view.series import most_moving, scale_of
+from blocksim.view.series import Typed, most_moving, scale_of
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -23,6 +23,7 @@ class Input:
     values: Floats  # (n,)
     levels: tuple[str, ...] = ()
     is_even: bool = False  # drawn from a range without regard to decades
+    typed: Typed | None = None  # the unit that the user has typed, if any
 
     @property
     def is_number(self) -> bool:
@@ -35,10 +36,10 @@ class Input:
         return len(np.unique(self.values))
 
     def told(self, value: float) -> str:
-        """Return a value as it stands in a label, in the unit in which it is best read."""
+        """Return a value as it stands in a label, in the typed unit or else that in which all are best read."""
         if self.levels:
             return self.levels[int(value)]
-        factor, unit = scale_of(abs(value), self.unit) if self.unit else (1.0, "")
+        factor, unit = scale_of(np.abs(self.values).max(), self.unit, self.typed) if self.unit else (1.0, "")
         return f"{value * factor:.6g}{' ' if unit else ''}{unit}".replace("-", "−")
 
 

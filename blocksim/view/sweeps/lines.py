@@ -46,7 +46,8 @@ def draw(sweep: FoundSweep, path: Path, paper: Paper = OWN) -> None:
     axis, _ = _axis_and_other(sweep)
     ranges = {block: ends for block in sweep.blocks if (ends := sweep.measured.range_of(block)) is not None}
     key = axis.key, axis.unit
-    draw_series(list(series_of(sweep)), sweep.blocks, key, path, title=sweep.title, measured=ranges, paper=paper)
+    series = list(series_of(sweep))
+    draw_series(series, sweep.blocks, key, path, sweep.title, ranges, typed=axis.typed, paper=paper)
 
 
 def series_of(sweep: FoundSweep) -> Iterator[Series]:

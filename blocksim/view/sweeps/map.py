@@ -145,7 +145,7 @@ def _map_of(sweep: FoundSweep, paper: Paper) -> _Map:
         name = others[0].key.rpartition(".")[2]
         values = np.unique(others[0].values)
         columns = [(f"{name} = {others[0].told(value)}", others[0].values == value) for value in values]
-    shown = tuple(value_axis(one.values, one.key, one.unit, is_even=one.is_even) for one in axes)
+    shown = tuple(value_axis(one.values, one.key, one.unit, is_even=one.is_even, typed=one.typed) for one in axes)
     return _Map(sweep, x, y, tuple(columns), sweep.moving[-MOST_BLOCKS:], (shown[0], shown[1]), paper)
 
 

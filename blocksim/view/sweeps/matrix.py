@@ -147,7 +147,7 @@ def _of_input(one: Input, name: str) -> Variable:
         room = LONGEST_LEVEL * style.POINTS_PER_INCH
         levels = tuple(style.cut_to(level, room, SMALL_FONT) for level in one.levels)
         return Variable(_in_lines(name), one.values + spread, (-0.5, len(levels) - 0.5), levels=levels)
-    axis = value_axis(one.values, name, one.unit, is_even=one.is_even)
+    axis = value_axis(one.values, name, one.unit, is_even=one.is_even, typed=one.typed)
     values = axis.shown(one.values)
     return Variable(_in_lines(axis.label), values, _around(values, axis), is_log=axis.is_log)
 
