@@ -20,7 +20,8 @@ from blocksim.errors import OutputError
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.own_files import is_bench, is_picture, refuse_foreign
 from blocksim.verification.verify import number
-from blocksim.view.work_precision import draw_work_precision
+from blocksim.view.paper import OWN, Paper
+from blocksim.view.work_precision import draw_work_precision, refuse_small_page
 
 COLUMNS = ("quantity", "unit", "median", "smallest", "largest")
 PICTURE = Path("work_precision.png")
@@ -43,6 +44,8 @@ def bench_command(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Write everything as JSON; the picture goes beside it.")
     ] = None,
+    size: options.Size = None,
+    dots: options.Dots = None,
     overwrite: options.Replace = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -55,9 +58,13 @@ def bench_command(
     Example: blocksim bench walls --out bench.json
     """
     silent = quiet or as_json
+    paper = options.paper_of(size, dots)
+    if not peers and paper != OWN:
+        raise typer.BadParameter("--size and --dpi are for the picture that --peers draws")
     wanted = chosen(names or [], peers=peers)
     if peers:
         require_all()
+        refuse_small_page(len(wanted), paper)
     _refuse_present(out, peers=peers, overwrite=overwrite)
     machine = this_machine()
     tell_compilation("surface", quiet=silent)
@@ -66,7 +73,7 @@ def bench_command(
         outcomes.extend(_run(wanted, Setting(quick, repeats), quiet=silent))
     finally:  # also when stopped: minutes of measuring are not to be lost, and the list has what came before
         if outcomes:
-            _show(machine, outcomes, out, as_json=as_json, quiet=silent)
+            _show(machine, outcomes, out, paper, as_json=as_json, quiet=silent)
 
 
 def _refuse_present(out: Path | None, *, peers: bool, overwrite: bool) -> None:
@@ -92,11 +99,13 @@ def _run(measurements: Sequence[Measurement], setting: Setting, *, quiet: bool) 
         yield run_measurement(measurement, setting)
 
 
-def _show(machine: Machine, outcomes: list[Outcome], out: Path | None, *, as_json: bool, quiet: bool) -> None:
+def _show(
+    machine: Machine, outcomes: list[Outcome], out: Path | None, paper: Paper, *, as_json: bool, quiet: bool
+) -> None:
     data = report(machine, outcomes)
     if out is not None:
         write_text(out, json.dumps(data, indent=2) + "\n")
-    picture = _draw(outcomes, _picture(out))
+    picture = _draw(outcomes, _picture(out), paper)
     if as_json:
         print_json(data)
     else:
@@ -108,11 +117,11 @@ def _show(machine: Machine, outcomes: list[Outcome], out: Path | None, *, as_jso
                 note(f"written: {path}")
 
 
-def _draw(outcomes: list[Outcome], path: Path) -> Path | None:
+def _draw(outcomes: list[Outcome], path: Path, paper: Paper) -> Path | None:
     panels = [outcome.findings.panel for outcome in outcomes if outcome.findings.panel is not None]
     if not panels:
         return None
-    draw_work_precision(panels, path, title="Accuracy for computing time, each engine against itself")
+    draw_work_precision(panels, path, title="Accuracy for computing time, each engine against itself", paper=paper)
     return path
 
 

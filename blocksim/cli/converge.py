@@ -22,8 +22,9 @@ from blocksim.simulation.own_files import is_picture, refuse_foreign
 from blocksim.study.converge import FEWEST_LEVELS, LEVELS, TOLERANCE_MM, converge
 from blocksim.study.convergence import Convergence, Joint, Level, Study, Verdict
 from blocksim.study.picture import draw_convergence
-from blocksim.study.refinement import SPACING, STEP, STIFFNESS, TOLERANCE
+from blocksim.study.refinement import SPACING, STEP, STIFFNESS, TOLERANCE, refinements_of
 from blocksim.study.rows import Row
+from blocksim.view.levels import refuse_small_page
 from blocksim.view.style import picture_suffix
 
 MOST_BLOCKS = 3
@@ -58,6 +59,8 @@ def converge_command(
         typer.Option("--out", metavar="FILE", help="Picture: .png, .svg or .pdf (default: results/NAME/converge.png)."),
     ] = None,
     picture: Annotated[bool, typer.Option(help="Draw a picture.")] = True,
+    size: options.Size = None,
+    dots: options.Dots = None,
     overwrite: options.Replace = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -73,21 +76,24 @@ def converge_command(
     Example: blocksim converge scenarios/three_blocks_nominal.toml
     """
     silent = quiet or as_json
+    paper = options.paper_of(size, dots)
+    chosen = None if study is None else [one.value for one in study]
     with read_scenario(scenario, settings or []) as ready:
         path = out or RESULTS / ready.name / "converge.png"
         picture_suffix(path)
         if picture:
+            refuse_small_page(len(refinements_of(ready, chosen)), paper)
             refuse_foreign(path, is_picture, overwrite=overwrite)
         tell_compilation(kernels_of(ready), quiet=silent)
         result = converge(
             ready,
             tolerance_mm=tolerance,
             levels=levels,
-            studies=None if study is None else [one.value for one in study],
+            studies=chosen,
             jobs=jobs,
             on_run=(lambda *_: None) if silent else _tell_run,
         )
-        drawn = path if picture and draw_convergence(result, ready, path) else None
+        drawn = path if picture and draw_convergence(result, ready, path, paper) else None
     if as_json:
         print_json(_data(result, drawn))
     else:

@@ -27,10 +27,11 @@ FEWEST_LEVELS = 2  # to show a distance
 TORNADO = "tornado"
 
 
-def draw_convergence(result: "Convergence", scenario: Scenario, path: Path) -> bool:
+def draw_convergence(result: "Convergence", scenario: Scenario, path: Path, paper: Paper = OWN) -> bool:
     """Draw a panel for each study with enough levels; return whether there was one.
 
-    Raises InvalidInputError for an unknown picture format and OutputError when the file cannot be written.
+    Raises InvalidInputError for an unknown picture format or too small a page, and OutputError when the file cannot be
+    written.
     """
     panels = [
         _panel(result, study)
@@ -39,7 +40,7 @@ def draw_convergence(result: "Convergence", scenario: Scenario, path: Path) -> b
     ]
     if panels:
         widths = {block: high - low for block, (low, high) in _measured_ranges(scenario).items()}
-        draw_levels(panels, path, title=f"{result.name}: distance from the finest level", measured=widths)
+        draw_levels(panels, path, title=f"{result.name}: distance from the finest level", measured=widths, paper=paper)
     return bool(panels)
 
 

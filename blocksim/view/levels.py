@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.view import style
+from blocksim.view.paper import OWN, Paper
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 PANEL_WIDTH, PANEL_HEIGHT = 3.3, 2.7  # inches
 LEFT, RIGHT, HEAD, FOOT, GAP = 0.72, 1.05, 0.80, 0.50, 0.35  # inches
+NARROWEST, LOWEST = 1.7, 0.8  # inches, of a panel on a page whose size was asked for
 LINE = 0.14  # inches, of one row of text above a panel
 LEGEND_ROW, LEGEND_ENTRY = 0.18, 1.55  # inches: height of a row of the legend, width of an entry
 LEGEND_NAME = 0.42  # inches, for the name of a block in an entry
@@ -23,7 +25,8 @@ DEPTH = 1e-3  # of the tolerance, or of the farthest level where that is less: w
 MARKERS = "osD^vP"
 MOST_BLOCKS = 4
 LARGEST: dict[str, Any] = {"color": style.INK, "linewidth": 2.5, "alpha": 0.25}
-MOST_NUMBERS = 6  # below one axis
+NUMBER_ROOM = 0.5  # inches, for a number below an axis
+DISTANCE, SHORT_DISTANCE = "distance from the finest level (mm)", "distance (mm)"
 Floats = NDArray[np.float64]
 
 
@@ -43,13 +46,29 @@ class Panel:
     recommended: float | None
 
 
+@dataclass(frozen=True)
+class _Page:
+    """Inches."""
+
+    width: float
+    height: float
+    panel: float  # width of a panel
+    row: float  # its height
+    foot: float
+    columns: int  # of the legend
+
+
 def draw_levels(
-    panels: Sequence[Panel], path: Path | str, title: str | None = None, measured: Mapping[str, float] | None = None
+    panels: Sequence[Panel],
+    path: Path | str,
+    title: str | None = None,
+    measured: Mapping[str, float] | None = None,
+    paper: Paper = OWN,
 ) -> None:
     """Draw the panels side by side and write them as PNG, SVG or PDF; the same input gives the same bytes.
 
     `measured` gives the width of the measured range (mm) of some blocks. Raises InvalidInputError for an unknown
-    picture format and OutputError when the file cannot be written.
+    picture format or too small a page, and OutputError when the file cannot be written.
     """
     path = Path(path)
     style.picture_suffix(path)
@@ -58,26 +77,39 @@ def draw_levels(
     repeats = [widths[panels[0].blocks[block]] for block in shown if widths.get(panels[0].blocks[block], 0.0) > 0.0]
     least = min(repeats, default=None)
     low, high = limits_of(panels, [] if least is None else [least])
-    width = LEFT + len(panels) * PANEL_WIDTH + (len(panels) - 1) * GAP + RIGHT
-    columns = int(width / LEGEND_ENTRY)
-    foot = FOOT + LEGEND_ROW * -(-(len(shown) + 1) // columns)
-    height = HEAD + PANEL_HEIGHT + foot
-    with style.styled_figure(width, height) as figure:
+    page = _page(len(panels), len(shown), paper)
+    with style.styled_figure(page.width, page.height, paper.dots) as figure:
+        size = page.panel / page.width, page.row / page.height
         for index, panel in enumerate(panels):
-            left = LEFT + index * (PANEL_WIDTH + GAP)
-            axes = figure.add_axes((left / width, foot / height, PANEL_WIDTH / width, PANEL_HEIGHT / height))
+            left = LEFT + index * (page.panel + GAP)
+            axes = figure.add_axes((left / page.width, page.foot / page.height, *size))
             axes.set_yscale("log")
             axes.set_ylim(low, high)
-            _draw_panel(axes, panel, shown)
+            _draw_panel(axes, panel, shown, page.panel)
             _draw_limits(axes, panel.tolerance_mm, least, named=index == len(panels) - 1)
             axes.tick_params(axis="y", which="both", labelleft=index == 0)
-        figure.axes[0].set_ylabel("distance from the finest level (mm)")
+        has_room = style.width_of(DISTANCE, style.FONT_SIZE) <= page.row * style.POINTS_PER_INCH
+        figure.axes[0].set_ylabel(DISTANCE if has_room else SHORT_DISTANCE)
         if title:
-            top = 1.0 - 0.06 / height
-            title = style.cut_to(title, (width - 0.24) * style.POINTS_PER_INCH, style.TITLE_SIZE)
-            figure.suptitle(title, x=0.12 / width, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE)
-        figure.legend(handles=_legend(panels[0].blocks, shown), loc="lower left", ncols=columns, frameon=False)
+            top = 1.0 - 0.06 / page.height
+            title = style.cut_to(title, (page.width - 0.24) * style.POINTS_PER_INCH, style.TITLE_SIZE)
+            figure.suptitle(title, x=0.12 / page.width, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE)
+        figure.legend(handles=_legend(panels[0].blocks, shown), loc="lower left", ncols=page.columns, frameon=False)
         style.save_figure(figure, path)
+
+
+def refuse_small_page(panels: int, paper: Paper) -> None:
+    """Raise InvalidInputError where so many panels have no room, whatever their blocks."""
+    _page(panels, MOST_BLOCKS, paper)
+
+
+def _page(panels: int, blocks: int, paper: Paper) -> _Page:
+    sides = LEFT + (panels - 1) * GAP + RIGHT
+    width = paper.width(sides + panels * PANEL_WIDTH, sides + panels * NARROWEST)
+    columns = int(width / LEGEND_ENTRY)
+    foot = FOOT + LEGEND_ROW * -(-(blocks + 1) // columns)
+    row = paper.panel(PANEL_HEIGHT, 1, HEAD + foot, LOWEST)
+    return _Page(width, paper.height(HEAD + row + foot), (width - sides) / panels, row, foot, columns)
 
 
 def limits_of(panels: Sequence[Panel], others: Sequence[float]) -> tuple[float, float]:
@@ -110,7 +142,7 @@ def _look(shown: Sequence[int], block: int) -> dict[str, Any]:
     }
 
 
-def _draw_panel(axes: "Axes", panel: Panel, shown: Sequence[int]) -> None:
+def _draw_panel(axes: "Axes", panel: Panel, shown: Sequence[int], width: float) -> None:
     low, _ = axes.get_ylim()
     coarser = panel.values[:-1]  # the finest level is what the others are measured from
     axes.set_xscale("log")
@@ -119,20 +151,24 @@ def _draw_panel(axes: "Axes", panel: Panel, shown: Sequence[int]) -> None:
         off = np.maximum(panel.off_mm[:-1, block], low)
         axes.plot(coarser, off, **_look(shown, block), clip_on=False, zorder=3)
     _mark_values(axes, panel)
-    _number_axes(axes, panel)
+    _number_axes(axes, panel, int(width / NUMBER_ROOM))
     axes.spines[["right", "top"]].set_visible(False)
-    axes.set_xlabel(f"{panel.key}, finer to the right", labelpad=2.0)
-    axes.set_title(f"{panel.title}: {panel.verdict}", loc="left", pad=4.0 + 2.0 * LINE * style.POINTS_PER_INCH)
+    room = width * style.POINTS_PER_INCH
+    label = f"{panel.key}, finer to the right"
+    has_room = style.width_of(label, style.FONT_SIZE) <= style.SURE * room
+    axes.set_xlabel(label if has_room else style.cut_to(panel.key, room, style.FONT_SIZE), labelpad=2.0)
+    title = style.cut_to(f"{panel.title}: {panel.verdict}", room, style.FONT_SIZE)
+    axes.set_title(title, loc="left", pad=4.0 + 2.0 * LINE * style.POINTS_PER_INCH)
 
 
-def _number_axes(axes: "Axes", panel: Panel) -> None:
-    """Write numbers below the levels, below every second one where they are many, always below the scenario's own."""
+def _number_axes(axes: "Axes", panel: Panel, most: int) -> None:
+    """Write numbers below the levels, below every n-th one where they are many, always below the scenario's own."""
     from matplotlib.ticker import FuncFormatter, NullLocator  # noqa: PLC0415 - see style
 
     first, last = float(panel.values[0]), float(panel.values[-1])
     margin = (last / first) ** 0.04
     axes.set_xlim(first / margin, last * margin)
-    apart = 1 if len(panel.values) <= MOST_NUMBERS else 2
+    apart = -(-len(panel.values) // most)
     start = int(np.argmin(np.abs(panel.values - panel.own))) % apart
     axes.set_xticks(panel.values[start::apart], [f"{value:.3g}" for value in panel.values[start::apart]])
     axes.xaxis.set_minor_locator(NullLocator())

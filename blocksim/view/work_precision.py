@@ -9,13 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.view import style
+from blocksim.view.paper import OWN, Paper
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 PANEL_WIDTH, PANEL_HEIGHT = 3.6, 2.9  # inches
 LEFT, RIGHT, HEAD, FOOT, GAP = 0.62, 0.15, 0.62, 0.48, 0.72  # inches
-LEGEND_ROW = 0.17  # inches
+NARROWEST, LOWEST = 1.9, 0.9  # inches, of a panel on a page whose size was asked for
+LEGEND_ROW, LEGEND_ENTRY = 0.17, 1.8  # inches: height of a row of the legend, width of an entry
+MOST_CURVES = 9  # for which a page is refused before anything is measured
 MARKERS = "os^D"
 DASHES = ("-", (0, (4, 2)), (0, (1, 1.5)))
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")  # as in style, the well visible ones
@@ -47,31 +50,59 @@ class Panel:
     meaning: str = ""  # what is written at that line
 
 
-def draw_work_precision(panels: Sequence[Panel], path: Path | str, title: str | None = None) -> None:
+@dataclass(frozen=True)
+class _Page:
+    """Inches."""
+
+    width: float
+    height: float
+    panel: float  # width of a panel
+    row: float  # its height
+    foot: float
+    columns: int  # of a legend
+
+
+def draw_work_precision(
+    panels: Sequence[Panel], path: Path | str, title: str | None = None, paper: Paper = OWN
+) -> None:
     """Draw the panels side by side and write them as PNG, SVG or PDF; the same input gives the same bytes.
 
-    Raises InvalidInputError for an unknown picture format and OutputError when the file cannot be written.
+    Raises InvalidInputError for an unknown picture format or too small a page, and OutputError when the file cannot be
+    written.
     """
     path = Path(path)
     style.picture_suffix(path)
     groups = tuple(dict.fromkeys(curve.group for panel in panels for curve in panel.curves))
-    rows = max(len(panel.curves) for panel in panels)
-    foot = FOOT + LEGEND_ROW * -(-rows // 2)
-    width = LEFT + len(panels) * PANEL_WIDTH + (len(panels) - 1) * GAP + RIGHT
-    height = HEAD + PANEL_HEIGHT + foot
-    with style.styled_figure(width, height) as figure:
+    page = _page(len(panels), max(len(panel.curves) for panel in panels), paper)
+    with style.styled_figure(page.width, page.height, paper.dots) as figure:
+        size = page.panel / page.width, page.row / page.height
         for index, panel in enumerate(panels):
-            left = LEFT + index * (PANEL_WIDTH + GAP)
-            axes = figure.add_axes((left / width, foot / height, PANEL_WIDTH / width, PANEL_HEIGHT / height))
+            left = LEFT + index * (page.panel + GAP)
+            axes = figure.add_axes((left / page.width, page.foot / page.height, *size))
             _draw_panel(axes, panel, groups)
-            anchor = (left / width, 0.04 / height)
+            anchor = (left / page.width, 0.04 / page.height)
             handles = axes.get_legend_handles_labels()
-            figure.legend(*handles, loc="lower left", bbox_to_anchor=anchor, ncols=2, frameon=False)
+            figure.legend(*handles, loc="lower left", bbox_to_anchor=anchor, ncols=page.columns, frameon=False)
         if title:
-            figure.suptitle(
-                title, x=0.12 / width, y=1.0 - 0.06 / height, ha="left", va="top", fontsize=style.TITLE_SIZE
-            )
+            place = {"x": 0.12 / page.width, "y": 1.0 - 0.06 / page.height}
+            title = style.cut_to(title, (page.width - 0.24) * style.POINTS_PER_INCH, style.TITLE_SIZE)
+            figure.suptitle(title, **place, ha="left", va="top", fontsize=style.TITLE_SIZE)
         style.save_figure(figure, path)
+
+
+def refuse_small_page(panels: int, paper: Paper) -> None:
+    """Raise InvalidInputError where so many panels have no room for their curves."""
+    _page(panels, MOST_CURVES, paper)
+
+
+def _page(panels: int, curves: int, paper: Paper) -> _Page:
+    sides = LEFT + (panels - 1) * GAP + RIGHT
+    width = paper.width(sides + panels * PANEL_WIDTH, sides + panels * NARROWEST)
+    panel = (width - sides) / panels
+    columns = int((panel + GAP) / LEGEND_ENTRY)
+    foot = FOOT + LEGEND_ROW * -(-curves // columns)
+    row = paper.panel(PANEL_HEIGHT, 1, HEAD + foot, LOWEST)
+    return _Page(width, paper.height(HEAD + row + foot), panel, row, foot, columns)
 
 
 def floor_of(panel: Panel) -> float:

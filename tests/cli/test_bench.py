@@ -1,6 +1,7 @@
 """blocksim bench: the table on a screen, for programs, its file, and wrong usage."""
 
 import json
+import struct
 import sys
 from pathlib import Path
 
@@ -111,3 +112,13 @@ def test_peers_draw_a_picture_beside_the_file(blocksim: Command, monkeypatch: py
     answer = blocksim("bench", "--peers", "drawn", "--out", "peers.json")
     assert "written: peers.png" in answer.err
     assert Path("peers.png").stat().st_size > 0
+    small = blocksim("bench", "--peers", "drawn", "--out", "small.json", "--size", "30x30mm")
+    assert (small.code, small.out) == (65, "")  # nothing was measured
+    assert blocksim("bench", "--peers", "drawn", "--size", "400x300px", "--dpi", 80).code == 0
+    assert struct.unpack(">II", Path("work_precision.png").read_bytes()[16:24]) == (400, 300)
+
+
+def test_size_of_a_picture_that_is_not_drawn_is_refused(blocksim: Command) -> None:
+    answer = blocksim("bench", "walls", "--dpi", 80)
+    assert (answer.code, answer.out) == (2, "")
+    assert "--peers" in answer.err

@@ -2,6 +2,7 @@
 
 import json
 import signal
+import struct
 import time
 from pathlib import Path
 
@@ -28,6 +29,15 @@ def test_tables_verdicts_recommendation_and_picture(blocksim: Command) -> None:
     assert "time.safety = 0.1: finished (at rest)" in answer.err
     assert answer.err.splitlines()[-1] == "picture: results/slide/converge.png"
     assert Path("results/slide/converge.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_picture_has_the_size_and_resolution_that_were_asked_for(blocksim: Command) -> None:
+    step = (*SLIDE, "--study", "step", "-q")
+    assert blocksim(*step, "--size", "20x20mm").err.startswith("--size 20x20 mm is too small for this picture")
+    assert not Path("results/slide").exists()  # refused before anything is run
+    assert blocksim(*step, "--size", "500x400px", "--dpi", 80).code == 0
+    head = Path("results/slide/converge.png").read_bytes()[:24]
+    assert struct.unpack(">II", head[16:]) == (500, 400)
 
 
 def test_recommended_command_can_be_run(blocksim: Command) -> None:

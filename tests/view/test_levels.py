@@ -9,7 +9,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError, OutputError
-from blocksim.view.levels import MOST_BLOCKS, Panel, chosen_blocks, draw_levels, limits_of
+from blocksim.view.levels import MOST_BLOCKS, Panel, chosen_blocks, draw_levels, limits_of, refuse_small_page
+from blocksim.view.paper import Paper
 from tests.view.made_up import HOSTILE, overlapping
 
 
@@ -83,3 +84,21 @@ def test_long_and_hostile_names_cover_nothing(caught: list[Figure], name: str, c
     named = replace(panel(), blocks=("b0", name, "b2"))
     draw_levels([named] * count, "levels.png", title=name, measured={name: 7.0})
     assert overlapping(caught[0]) == []
+
+
+@pytest.mark.parametrize(("count", "inches"), [(1, (3.5, 2.5)), (3, (8.0, 3.0)), (2, (12.0, 9.0))])
+def test_page_has_the_size_that_was_asked_for(caught: list[Figure], count: int, inches: tuple[float, float]) -> None:
+    long = replace(panel(3, 9), title="velocity tolerance", key="time.velocity_tolerance", verdict="not yet converged")
+    draw_levels([long] * count, "levels.png", title="slide", measured={"b1": 7.0}, paper=Paper(inches, 100.0))
+    (figure,) = caught
+    assert (tuple(figure.get_size_inches()), figure.dpi) == (inches, 100.0)
+    assert overlapping(figure) == []
+    assert all(axes.get_position().width * inches[0] > 1.6 for axes in figure.axes)
+
+
+def test_page_without_room_is_refused_before_anything_is_drawn(caught: list[Figure]) -> None:
+    with pytest.raises(InvalidInputError, match=r"too small for this picture: at least \d+ mm wide"):
+        draw_levels([panel()] * 3, "levels.png", paper=Paper((4.0, 4.0)))
+    with pytest.raises(InvalidInputError, match=r"at least \d+ mm high"):
+        refuse_small_page(1, Paper((4.0, 1.0)))
+    assert caught == []

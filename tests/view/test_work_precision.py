@@ -5,9 +5,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError, OutputError
-from blocksim.view.work_precision import SMALLEST_SHARE, Curve, Panel, draw_work_precision, floor_of
+from blocksim.view.paper import Paper
+from blocksim.view.work_precision import (
+    SMALLEST_SHARE,
+    Curve,
+    Panel,
+    draw_work_precision,
+    floor_of,
+    refuse_small_page,
+)
+from tests.view.made_up import overlapping
 
 
 def curve(label: str, group: str, factor: float = 1.0) -> Curve:
@@ -53,3 +63,12 @@ def test_wrong_files_are_refused(tmp_path: Path) -> None:
         draw_work_precision([PANEL], tmp_path / "work.bmp")
     with pytest.raises(OutputError, match="cannot be written"):
         draw_work_precision([PANEL], tmp_path / "nix" / "work.png")
+
+
+def test_page_has_the_size_that_was_asked_for(caught: list[Figure]) -> None:
+    draw_work_precision([PANEL, PANEL], "work.png", title="engines " * 30, paper=Paper((6.0, 2.6), 100.0))
+    (figure,) = caught
+    assert (tuple(figure.get_size_inches()), figure.dpi) == ((6.0, 2.6), 100.0)
+    assert overlapping(figure) == []
+    with pytest.raises(InvalidInputError, match="too small for this picture"):
+        refuse_small_page(3, Paper((6.0, 2.5)))
