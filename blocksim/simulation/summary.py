@@ -7,6 +7,8 @@ from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.limited import MEGABYTE, read_limited
+from blocksim.simulation import folder as files
+from blocksim.simulation.atomic import sha256_of
 from blocksim.simulation.ledger import EnergyLedger
 from blocksim.simulation.movement import Movement
 
@@ -54,3 +56,17 @@ def read_summary(path: Path) -> Summary:
         place = ".".join(map(str, first["loc"]))
         message = f"{path}: not the summary of a run: {place + ': ' if place else ''}{first['msg']}"
         raise InvalidInputError(message) from None
+
+
+def changed_files(folder: Path, summary: Summary) -> tuple[str, ...]:
+    """Return the files of a run that do not have the checksums that run.json has for them."""
+    return tuple(
+        name
+        for name, digest in summary.sha256.items()
+        if not (folder / Path(name).name).is_file() or sha256_of(folder / Path(name).name) != digest
+    )
+
+
+def changed_results(folder: Path, summary: Summary) -> tuple[str, ...]:
+    """Return which of frames and final table are not as the run has written them; the other files may be renewed."""
+    return tuple(name for name in changed_files(folder, summary) if name in {files.FRAMES, files.FINAL})

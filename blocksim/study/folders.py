@@ -11,7 +11,7 @@ from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation import Result, Summary
 from blocksim.simulation import folder as files
 from blocksim.simulation.provenance import run_hash
-from blocksim.simulation.summary import read_summary
+from blocksim.simulation.summary import changed_results, read_summary
 from blocksim.simulation.table import read_table
 from blocksim.study.executors.pool import pool_of
 from blocksim.study.rows import Course, Row, row_of, row_of_error
@@ -72,7 +72,8 @@ def _known_row(scenario: Scenario, folder: Path) -> Row | None:
     """Return the row of a case that came to its end before, well or not; None where it has to be run."""
     with suppress(BlocksimError):
         summary = read_summary(folder / files.SUMMARY)
-        if _has_ended(folder, summary) and summary.run == run_hash(scenario):
+        is_same = summary.run == run_hash(scenario)
+        if is_same and _has_ended(folder, summary) and not changed_results(folder, summary):
             final = read_table(folder / files.FINAL)
             return row_of(_course(summary), final, place_bodies(scenario))
     return None

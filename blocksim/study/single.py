@@ -12,7 +12,7 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint_policy import DEFAULTS, CheckpointPolicy
 from blocksim.simulation.result import read_final
 from blocksim.simulation.running import SILENT, Listener
-from blocksim.simulation.summary import read_summary
+from blocksim.simulation.summary import changed_results, read_summary
 from blocksim.simulation.table import COLUMNS
 from blocksim.study.places import FINISHED as FINISHED  # noqa: PLC0414 - their old home, for those who look there
 from blocksim.study.places import find_run as find_run  # noqa: PLC0414
@@ -43,8 +43,9 @@ def run(  # noqa: PLR0913 - what a user can choose for a run
     result does not depend on the number of threads, nor on `precautions`, which say when checkpoints are written and
     after which wall time to stop. `listener` hears what happens before the first step. Ctrl-C returns what was computed
     until then, with the status `interrupted`. Raises ScenarioError, InvalidInputError for an experiment table that does
-    not go with the blocks, for more threads than the system has or a checkpoint of another scenario or version of the
-    code, OutputExistsError, OutputError; ValueError for `resume` with `overwrite` or without `out`.
+    not go with the blocks, for more threads than the system has, for a checkpoint of another scenario or version of the
+    code and for results that have been changed or cut since, OutputExistsError, OutputError; ValueError for `resume`
+    with `overwrite` or without `out`.
     """
     if resume and (overwrite or out is None):
         raise ValueError("a run is resumed where it was kept: resume needs out, and cannot go with overwrite")
@@ -55,6 +56,7 @@ def run(  # noqa: PLR0913 - what a user can choose for a run
         return simulate(scenario, threads=threads, on_progress=on_progress, wall_time=precautions.wall_time)
     folder = Path(out)
     if not overwrite and files.holds_run(folder, scenario):
+        _refuse_changed(folder)
         renew_copies(scenario, folder)
         result = read_result(folder)
         listener.on_remark(f"already computed; rerun with --overwrite: {folder}")
@@ -69,6 +71,15 @@ def run(  # noqa: PLR0913 - what a user can choose for a run
         on_progress=on_progress,
         listener=listener,
     )
+
+
+def _refuse_changed(folder: Path) -> None:
+    """Raise InvalidInputError where frames or final table are not those that the run has written."""
+    changed = changed_results(folder, read_summary(folder / files.SUMMARY))
+    if changed:
+        name = changed[0]
+        what = "does not have the checksum in run.json" if (folder / name).is_file() else "no such file"
+        raise InvalidInputError(f"{folder / name}: {what}: changed since the run; rerun with --overwrite")
 
 
 def check_experiment(scenario: Scenario) -> None:

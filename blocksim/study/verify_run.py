@@ -10,9 +10,8 @@ from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, load_stored, scenario_hash
 from blocksim.simulation import Progress, Result, Watcher, read_result, simulate
 from blocksim.simulation import folder as files
-from blocksim.simulation.atomic import sha256_of
 from blocksim.simulation.provenance import ROOM_PREFIX, environment
-from blocksim.simulation.summary import Summary, read_summary
+from blocksim.simulation.summary import Summary, changed_files, read_summary
 from blocksim.simulation.table import csv_text
 from blocksim.study.places import find_run
 from blocksim.study.verify_entries import EntryDifference, differing_entries
@@ -68,7 +67,7 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = _i
     """
     folder = find_run(place)
     summary = read_summary(folder / files.SUMMARY)
-    changed = _changed(folder, summary)
+    changed = changed_files(folder, summary)
     stored = _read(folder, changed)
     again = simulate(_as_far(stored.scenario, summary), threads=threads, on_progress=on_progress)
     if again.status == INTERRUPTED:
@@ -90,15 +89,6 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = _i
 def scenario_of(place: Path | str) -> Scenario:
     """Return the scenario of a stored run. Raises what `find_run` and loading it raise."""
     return load_stored(find_run(place) / files.SCENARIO)
-
-
-def _changed(folder: Path, summary: Summary) -> tuple[str, ...]:
-    """Return the files that do not have the checksums that run.json has for them."""
-    return tuple(
-        name
-        for name, digest in summary.sha256.items()
-        if not (folder / Path(name).name).is_file() or sha256_of(folder / Path(name).name) != digest
-    )
 
 
 def _read(folder: Path, changed: tuple[str, ...]) -> Result:

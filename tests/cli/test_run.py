@@ -1,6 +1,7 @@
 """blocksim run: answers, notes and exit codes."""
 
 import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -36,7 +37,23 @@ def test_finished_run_is_shown_again(blocksim: Command) -> None:
     assert second.code == 0
     assert second.out == first.out
     assert second.err.startswith("already computed; rerun with --overwrite: results/three_blocks_nominal/")
-    assert "already there" not in blocksim(*RUN, "--overwrite").err
+    assert "already computed" not in blocksim(*RUN, "--overwrite").err
+
+
+@pytest.mark.parametrize("name", ["run.h5", "final.csv"])
+@pytest.mark.parametrize("resume", [(), ("--resume",)])
+def test_finished_run_that_was_cut_is_no_result(blocksim: Command, name: str, resume: tuple[str, ...]) -> None:
+    slide = ("run", "scenarios/slide.toml", "--set", "contact.stiffness_scale=0.01", "--out", "out", "--quiet")
+    assert blocksim(*slide).code == 0
+    path = Path("out") / name
+    os.truncate(path, path.stat().st_size // 2)
+    answer = blocksim(*slide, *resume)
+    assert (answer.code, answer.out) == (65, "")
+    assert (
+        answer.err == f"{path}: does not have the checksum in run.json: changed since the run; rerun with --overwrite\n"
+    )
+    assert blocksim(*slide, "--overwrite").code == 0
+    assert blocksim(*slide).code == 0
 
 
 def test_quiet_prints_nothing_but_the_answer(blocksim: Command) -> None:

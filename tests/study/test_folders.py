@@ -40,6 +40,15 @@ def test_interrupted_case_continues_where_it_can(nominal: Document, tmp_path: Pa
     assert ends[0] == ends[1]
 
 
+def test_finished_case_whose_frames_were_cut_is_run_again(nominal: Document, tmp_path: Path) -> None:
+    scenario = nominal.with_values({"time.end": 0.01}).build()
+    row = run_case(scenario, tmp_path)
+    frames = (tmp_path / files.FRAMES).read_bytes()
+    os.truncate(tmp_path / files.FRAMES, len(frames) // 2)
+    assert run_case(scenario, tmp_path) == row
+    assert (tmp_path / files.FRAMES).read_bytes() == frames
+
+
 def test_ctrl_c_ends_the_workers_at_once(nominal: Document, tmp_path: Path) -> None:
     quick = nominal.with_values({"time.end": 0.01}).build()
     endless = nominal.with_values({"time.end": 1e5, "time.stop_at_rest": False}).build()
