@@ -16,8 +16,8 @@ LOOKED_AT = 32
 """Cases that are built to estimate all of them."""
 SMALL_FILES = 12_000
 """Bytes of the files beside run.h5 in the folder of a case."""
-ROW, ROW_OF_BLOCK = 300, 230
-"""Bytes of a case in manifest and table, and more for each block; three blocks and two keys take 1 kB."""
+ROW, ROW_OF_BLOCK = 570, 230
+"""Bytes of a case in manifest and table, and more for each block; three blocks and three keys take 1.25 kB."""
 
 
 @dataclass(frozen=True)

@@ -267,7 +267,7 @@ def _notes(found: _Map) -> list[str]:
     drawn = {found.x.key, found.y.key}
     hidden = [one for one in found.sweep.inputs if one.key not in drawn and len(found.columns) == 1]
     if hidden:
-        texts.append(f"{len(hidden)} more inputs vary.")
+        texts.append(f"{len(hidden)} other input{' varies' if len(hidden) == 1 else 's vary'}.")
     return texts
 
 

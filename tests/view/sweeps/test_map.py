@@ -43,7 +43,7 @@ def test_map_without_measurements_outlines_nothing(tmp_path: Path) -> None:
 def test_map_of_samples_says_that_other_inputs_vary_too(tmp_path: Path) -> None:
     text = texts_of(made_up(samples(4)[:4], "sobol"), tmp_path)
     assert "One dot: one run." in text
-    assert "2 more" in text
+    assert "2 other inputs" in text
 
 
 def test_numbers_stand_in_the_cells_of_their_inputs() -> None:
