@@ -18,13 +18,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from blocksim.scenario import load_scenario as load
     from blocksim.scenario import replace_values as replace
+    from blocksim.study.api import animate, calibrate, plot, report, sensitivity
+    from blocksim.study.compare import compare
     from blocksim.study.converge import converge
-    from blocksim.study.judge import compare
-    from blocksim.study.many import sweep
-    from blocksim.study.scripting import calibrate, sensitivity
-    from blocksim.study.showing import animate, plot, report
-    from blocksim.study.single import open_run, run
-    from blocksim.study.table import read_sweep as open_sweep
+    from blocksim.study.run import open_run, run
+    from blocksim.study.sweep import sweep
+    from blocksim.study.sweep_table import read_sweep as open_sweep
 
 __version__ = "0.1.0"
 __all__ = [
@@ -45,19 +44,19 @@ __all__ = [
 
 # found when first asked for, so that `blocksim --help` need not wait for numba and pandas
 _HOMES = {
-    "animate": ("blocksim.study.showing", "animate"),
-    "calibrate": ("blocksim.study.scripting", "calibrate"),
-    "compare": ("blocksim.study.judge", "compare"),
+    "animate": ("blocksim.study.api", "animate"),
+    "calibrate": ("blocksim.study.api", "calibrate"),
+    "compare": ("blocksim.study.compare", "compare"),
     "converge": ("blocksim.study.converge", "converge"),
     "load": ("blocksim.scenario", "load_scenario"),
-    "open_run": ("blocksim.study.single", "open_run"),
-    "open_sweep": ("blocksim.study.table", "read_sweep"),
-    "plot": ("blocksim.study.showing", "plot"),
+    "open_run": ("blocksim.study.run", "open_run"),
+    "open_sweep": ("blocksim.study.sweep_table", "read_sweep"),
+    "plot": ("blocksim.study.api", "plot"),
     "replace": ("blocksim.scenario", "replace_values"),
-    "report": ("blocksim.study.showing", "report"),
-    "run": ("blocksim.study.single", "run"),
-    "sensitivity": ("blocksim.study.scripting", "sensitivity"),
-    "sweep": ("blocksim.study.many", "sweep"),
+    "report": ("blocksim.study.api", "report"),
+    "run": ("blocksim.study.run", "run"),
+    "sensitivity": ("blocksim.study.api", "sensitivity"),
+    "sweep": ("blocksim.study.sweep", "sweep"),
 }
 
 

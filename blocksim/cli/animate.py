@@ -9,7 +9,7 @@ from blocksim.cli import options
 from blocksim.cli.output import note, replacement
 from blocksim.cli.progress import counting
 from blocksim.simulation.own_files import is_film, refuse_foreign
-from blocksim.study.stored import stored_run
+from blocksim.study.stored_run import stored_run
 from blocksim.view.animation import Look, Pace, draw_film, writer_of
 from blocksim.view.paint import paint_named
 from blocksim.view.support import support_of

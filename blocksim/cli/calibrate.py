@@ -14,9 +14,9 @@ from blocksim.cli.vary import read_variations
 from blocksim.errors import ExitCode
 from blocksim.scenario import Document
 from blocksim.simulation.compilation import kernels_of
-from blocksim.study.calibrate.calibrate import FRESH_MEMBERS, MEMBERS, TRIALS, Fit, calibrate
-from blocksim.study.calibrate.plan import FIT, SCATTER, read_plan
-from blocksim.study.calibrate.search import Trial
+from blocksim.study.calibrate import FRESH_MEMBERS, MEMBERS, TRIALS, Fit, calibrate
+from blocksim.study.calibrate_plan import FIT, SCATTER, read_plan
+from blocksim.study.calibrate_search import Trial
 
 COLUMNS = ("key", "prior", "fitted")
 TOLD_SECONDS = 2.0

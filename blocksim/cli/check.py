@@ -13,7 +13,7 @@ from blocksim.cli.output import GAP, answer, duration, note, number, print_json,
 from blocksim.cli.scenario import read_scenario
 from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
-from blocksim.study.single import check_experiment
+from blocksim.study.rows import check_experiment
 from blocksim.world.describe import Description, MotionDescription, PairDescription, SagDescription, describe
 from blocksim.world.free_memory import readable
 from blocksim.world.memory import PROCESS_BYTES

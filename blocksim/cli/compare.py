@@ -13,8 +13,8 @@ from blocksim.cli.judgement import judgement_lines, meanings
 from blocksim.cli.output import answer, print_json
 from blocksim.cli.verdict import comparison_table, verdict_lines
 from blocksim.errors import ExitCode
-from blocksim.study.judge import compare_sweep, is_sweep
-from blocksim.study.single import compare, find_run
+from blocksim.study.compare import compare_run, compare_sweep, is_sweep
+from blocksim.study.stored_run import find_run
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def _judge_sweep(place: Path, experiment: Path | None, settings: Settings) -> Ju
 
 def _judge_run(place: Path, experiment: Path | None) -> Judged:
     folder = find_run(place)
-    comparison = compare(folder, experiment)
+    comparison = compare_run(folder, experiment)
     head = f"{folder} against {_near(comparison.source)}:"
     lines = (*comparison_table(comparison), *verdict_lines(comparison))
     return Judged(head, lines, {"run": str(folder), **comparison.to_dict()}, comparison.inside)

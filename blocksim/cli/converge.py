@@ -19,10 +19,19 @@ from blocksim.errors import ExitCode
 from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.folder import RESULTS
 from blocksim.simulation.own_files import is_picture, refuse_foreign
-from blocksim.study.converge import FEWEST_LEVELS, LEVELS, TOLERANCE_MM, converge
+from blocksim.study.converge import (
+    FEWEST_LEVELS,
+    LEVELS,
+    SPACING,
+    STEP,
+    STIFFNESS,
+    TOLERANCE,
+    TOLERANCE_MM,
+    converge,
+    refinements_of,
+)
 from blocksim.study.convergence import Convergence, Joint, Level, Study, Verdict
-from blocksim.study.picture import draw_convergence
-from blocksim.study.refinement import SPACING, STEP, STIFFNESS, TOLERANCE, refinements_of
+from blocksim.study.pictures import draw_convergence
 from blocksim.study.rows import Row
 from blocksim.view.levels import refuse_small_page
 from blocksim.view.style import picture_suffix

@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 from blocksim.cli.output import answer, duration, note, print_json
 from blocksim.scenario import Document
-from blocksim.study.estimate import Estimate, estimate
+from blocksim.study.plan import Estimate, estimate
 from blocksim.world.free_memory import readable
 
 

@@ -12,7 +12,7 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.own_files import is_table, refuse_foreign
 from blocksim.simulation.stores.csv_tables import CONTACT_COLUMNS
 from blocksim.simulation.stores.formats import format_named
-from blocksim.study.stored import stored_run
+from blocksim.study.stored_run import stored_run
 
 
 def export_command(

@@ -11,9 +11,8 @@ from blocksim.cli import options
 from blocksim.cli.output import note
 from blocksim.errors import InputMissingError
 from blocksim.simulation.own_files import is_picture, refuse_foreign
-from blocksim.study.picture import draw_indices, draw_sweep
-from blocksim.study.run_picture import RunLook, draw_run, refuse
-from blocksim.study.table import TABLE
+from blocksim.study.pictures import RunLook, draw_indices, draw_run, draw_sweep, refuse
+from blocksim.study.sweep_table import TABLE
 from blocksim.view.kinds import STRIP
 
 

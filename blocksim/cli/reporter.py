@@ -10,9 +10,8 @@ from rich.console import Console
 
 from blocksim.cli.output import note
 from blocksim.cli.progress import counting
-from blocksim.study.heads import Head
-from blocksim.study.rows import Row
-from blocksim.study.single import FINISHED
+from blocksim.study.rows import Head, Row
+from blocksim.study.stored_run import FINISHED
 
 OnRow = Callable[[int, int, Row], None]
 FEW = 40

@@ -18,7 +18,9 @@ from blocksim.simulation.folder import default_folder
 from blocksim.simulation.movement import Movement
 from blocksim.simulation.running import Listener
 from blocksim.simulation.table import rows_of
-from blocksim.study.single import FINISHED, compare, run
+from blocksim.study.compare import compare_run
+from blocksim.study.run import run
+from blocksim.study.stored_run import FINISHED
 
 MOST_ROWS = 40  # of the final table on the screen; of a longer one the first are shown
 FIRST_ROWS = 10
@@ -117,7 +119,7 @@ def _way_on(result: Result) -> str:
 def _answer_lines(result: Result) -> list[str]:
     """Return the lines of the final table; of a crowd the first ones, as all are in the run's folder."""
     if result.experiment is not None and result.status == FINISHED:
-        comparison = compare(result)
+        comparison = compare_run(result)
         return [*comparison_table(comparison), *verdict_lines(comparison)]
     blocks, *values = (result.columns[name] for name in ("block", "x_mm", "y_mm", "rotation_deg"))
     count = len(blocks)

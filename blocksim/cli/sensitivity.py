@@ -18,10 +18,9 @@ from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Sweep
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.compilation import kernels_of
-from blocksim.study.sensitivity.methods import METHODS
-from blocksim.study.sensitivity.outputs import INDICATOR
-from blocksim.study.sensitivity.sensitivity import Indices, Sensitivity, sensitivity
-from blocksim.study.variation import varied
+from blocksim.study.plan import varied
+from blocksim.study.sensitivity import INDICATOR, Indices, Sensitivity, sensitivity
+from blocksim.study.sensitivity_methods import METHODS
 
 VARY = "--vary"
 MODE = "sobol"

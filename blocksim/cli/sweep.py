@@ -17,12 +17,12 @@ from blocksim.cli.vary import with_vary
 from blocksim.errors import ExitCode, StoppedEarlyError
 from blocksim.scenario import Document
 from blocksim.study.executors.ensemble import is_still_running
-from blocksim.study.heads import Head, heads_of
-from blocksim.study.many import SweepResult, kernels_for, sweep
-from blocksim.study.merge import merge as merge_shards
-from blocksim.study.rows import MOVEMENT
-from blocksim.study.shard import WHOLE, Shard
-from blocksim.study.single import FINISHED
+from blocksim.study.progress import WHOLE, Shard
+from blocksim.study.rows import MOVEMENT, Head, heads_of
+from blocksim.study.stored_run import FINISHED
+from blocksim.study.sweep import kernels_for, sweep
+from blocksim.study.sweep import merge as merge_shards
+from blocksim.study.sweep_table import SweepResult
 
 MOST_ROWS = 40
 MOST_FAILURES = 5

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from blocksim.errors import Problem, ScenarioError
 from blocksim.scenario import Document
 from blocksim.scenario.overrides import UnfitOverrideError, parse_value
-from blocksim.study.plan import Values, with_sweep
-from blocksim.study.variation import Variations
+from blocksim.study.plan import Values, Variations, with_sweep
 
 ENDS = ("from", "to", "count")
 LEAST_ENDS = 2

@@ -20,16 +20,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import Scenario, place_bodies
-from blocksim.study.refinement import Refinement
 from blocksim.study.rows import Row
-from blocksim.study.single import FINISHED
+from blocksim.study.stored_run import FINISHED
 
+DIGITS = 6  # of a level's value, so that the value that is reported gives the same run when it is set
 ROUND_OFF_MM = 1e-6  # a smaller change says nothing about the order
 SHRINKING = 0.75  # a change is at most this part of the one before it where changes shrink
 MILLI = 1e3
 ANOTHER_FACE_DEG = 45.0  # turned by more, a block ends on another of its sides
 NO_COORDINATES = np.zeros(0)
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """One setting: `value * factor` is the next finer level of a value; `coarser` levels go the other way."""
+
+    study: str
+    title: str
+    key: str
+    own: float
+    factor: float
+    coarser: int
+
+    def value(self, level: int) -> float:
+        """Return the value at a level, the scenario's own to the last bit."""
+        return self.own if level == 0 else float(f"{self.own * self.factor**level:.{DIGITS}g}")
+
+    def at(self, scenario: Scenario, level: int) -> Scenario:
+        """Return the scenario at a level, everything else as it was."""
+        return with_setting(scenario, self.key, self.value(level))
+
+
+def with_setting(scenario: Scenario, key: str, value: float) -> Scenario:
+    """Return the scenario with a key `table.name` set."""
+    table, name = key.split(".")
+    changed = getattr(scenario, table).model_copy(update={name: value})
+    return scenario.model_copy(update={table: changed})
 
 
 class Verdict(StrEnum):

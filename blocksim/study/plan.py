@@ -1,9 +1,12 @@
-"""What a sweep varies, and the scenario of each of its cases."""
+"""What a sweep varies, the scenario of each of its cases, and what they will cost."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import overload
+from statistics import fmean
+from typing import TYPE_CHECKING, overload
+
+import numpy as np
 
 from blocksim.errors import BlocksimError, InvalidInputError, ScenarioError
 from blocksim.scenario import Document, Scenario, Sweep
@@ -14,15 +17,23 @@ from blocksim.scenario.models.variation import Normal, written
 from blocksim.scenario.overrides import Override, frozen, with_value
 from blocksim.scenario.quantities import shown
 from blocksim.simulation.provenance import run_hash
-from blocksim.study.heads import Head, heads_of
-from blocksim.study.sampling.design import Design, Settings
-from blocksim.study.sampling.modes import design_of
-from blocksim.study.sampling.table import read_columns, refuse_wrong_values
+from blocksim.study.design import Design, Settings, read_columns, refuse_wrong_values
+from blocksim.study.rows import Head, check_experiment, heads_of
+from blocksim.study.sampling import design_of, remarks
+
+if TYPE_CHECKING:
+    from blocksim.world.describe import Description
 
 MOST_CASES = 1_000_000
 MOST_LOOKED_AT = 1_000
 """Cases that are built in search of one that can be simulated, before anything runs."""
 Values = Iterable[object] | Mapping[str, object]  # a list, { from, to, count }, { from, to } or { mean, sd }
+LOOKED_AT = 32
+"""Cases that are built to estimate all of them."""
+SMALL_FILES = 12_000
+"""Bytes of the files beside run.h5 in the folder of a case."""
+ROW, ROW_OF_BLOCK = 570, 230
+"""Bytes of a case in manifest and table, and more for each block; three blocks and three keys take 1.25 kB."""
 
 
 @dataclass(frozen=True)
@@ -168,3 +179,89 @@ def _case(document: Document, values: Settings) -> Case:
     except BlocksimError as error:
         return Case(values, None, problem=str(error).splitlines()[0])
     return Case(values, scenario, name=run_hash(scenario))
+
+
+@dataclass(frozen=True)
+class Variations:
+    """What is said of each key, as a [sweep] table has it, and the text in which a person said it."""
+
+    tables: Mapping[str, Values]
+    texts: Mapping[str, str]
+
+    @classmethod
+    def of(cls, tables: Mapping[str, Values]) -> "Variations":
+        """Take tables such as {"contact.restitution": {"from": 0.2, "to": 0.4}} from Python."""
+        return cls(tables, {key: f"{key}={values}" for key, values in tables.items()})
+
+
+def varied(document: Document, given: Variations, option: str, mode: str) -> Sweep:
+    """Return the distributions, checked against the scenario.
+
+    Raises ScenarioError that shows each mistake in the text given to `option`.
+    """
+    labelled = with_sweep(document, given.tables, mode, given.texts)
+    overrides = [
+        replace(one, label=one.label.replace("--vary", option, 1)) if one.path[:1] == ("sweep",) else one
+        for one in labelled.overrides
+    ]
+    sweep = replace(labelled, overrides=tuple(overrides)).build().sweep
+    assert sweep is not None  # noqa: S101 - it was just put there
+    return sweep
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Cases of a sweep and what they cost, from the steps of some of them and the measured speed of a step."""
+
+    cases: int
+    looked_at: int
+    impossible: int  # of those looked at
+    reason: str  # why the first impossible one is
+    seconds: float  # of solving all cases on one core, at most: as if none came to rest before its end
+    bytes: int  # of all that the sweep writes, at most
+    memory: int  # bytes of one process that runs a case, of the largest case looked at
+    stop_at_rest: int  # cases of those looked at that end before, where they come to rest
+    remarks: tuple[str, ...]
+
+
+def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
+    """Return what the sweep of a document comes to, with all frames of every case or without; nothing is written.
+
+    Raises what building the document, its plan or a scene raises, InvalidInputError where nothing is varied.
+    """
+    from blocksim.world.describe import describe  # noqa: PLC0415 - the solver, which reading a sweep does not need
+
+    base = document.build()
+    if base.sweep is None:
+        message = "nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario"
+        raise InvalidInputError(message)
+    check_experiment(base)
+    cases = cases_of(document, base.sweep)
+    chosen = [cases[number] for number in _spread_out(len(cases))]
+    described = [describe(case.scenario) for case in chosen if case.scenario is not None]
+    problems = [case.problem for case in chosen if case.scenario is None]
+    share = len(described) / len(chosen)
+    return Estimate(
+        cases=len(cases),
+        looked_at=len(chosen),
+        impossible=len(problems),
+        reason=problems[0] if problems else "",
+        seconds=share * len(cases) * fmean([one.seconds for one in described] or [0.0]),
+        bytes=round(share * len(cases) * fmean([_bytes(one, keep_cases=keep_cases) for one in described] or [0.0])),
+        memory=max((one.memory for one in described), default=0),
+        stop_at_rest=sum(case.scenario.time.stop_at_rest for case in chosen if case.scenario is not None),
+        remarks=tuple(remarks(base.sweep)),
+    )
+
+
+def _bytes(one: "Description", *, keep_cases: bool) -> int:
+    row = ROW + ROW_OF_BLOCK * len(one.bodies)
+    return row + one.bytes + SMALL_FILES if keep_cases else row
+
+
+def _spread_out(count: int) -> list[int]:
+    """Return numbers of cases, all of them or a random choice: evenly spaced ones may meet one value of a key only."""
+    if count <= LOOKED_AT:
+        return list(range(count))
+    chosen = np.random.default_rng(0).choice(count, LOOKED_AT, replace=False)
+    return sorted(chosen.tolist())

@@ -9,8 +9,8 @@ from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import BlocksimError, InputMissingError, UnavailableError
 from blocksim.scenario import Scenario, load_stored
 from blocksim.simulation import folder as files
-from blocksim.study.judge import compare_sweep
-from blocksim.study.places import FINISHED, find_run
+from blocksim.study.compare import compare_sweep
+from blocksim.study.stored_run import FINISHED, find_run
 from blocksim.study.sweep_folder import PLAN, case_folder
 from blocksim.view.report.packing import MOST_BYTES
 from blocksim.view.report.page import write_report

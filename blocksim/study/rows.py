@@ -1,18 +1,40 @@
-"""What a sweep keeps of a case: one row, the same from whatever ran it."""
+"""Rows of sweep.csv: what is kept of a case, how it stands in a cell, and whether it is inside all measured ranges.
 
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+A column of varied values is a number column where every value is one, and has a unit where some value was typed with
+one; its head is then `ground.tilt [deg]`, as in a table of cases. All other values stand as they were given. Tables
+that were written before have the bare key in their heads, and are read anyway.
+"""
 
-from blocksim.errors import BlocksimError
-from blocksim.scenario import PlacedBody
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from blocksim.analysis.compare import compare_final, limits
+from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
+from blocksim.errors import BlocksimError, InvalidInputError
+from blocksim.scenario import PlacedBody, Scenario, Sweep, place_bodies
+from blocksim.scenario import quantities as q
+from blocksim.scenario.units import parse_unit
 from blocksim.simulation.movement import FirstMove, from_start_to_end
-from blocksim.simulation.table import Columns
+from blocksim.simulation.table import COLUMNS, Columns
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Row = dict[str, object]
 X = ".x_mm"
 MOVEMENT = ("outcome", "first_mover", "first_moved_s", "displacement_mm", "turn_deg")
 """As in run.json, but displacement and rotation are the largest of all blocks from start to end."""
 KEPT = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")  # of the final table, for every block
+DIGITS = 12  # of a number in the table: more show the rounding of the unit
+HEAD = re.compile(r"(?P<key>.*?) \[(?P<unit>[^\[\]]+)\]")
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+MARK = "'"  # spreadsheets show what follows as text
+NUMBERS = "if"  # kinds of numpy
 
 
 class Course(NamedTuple):
@@ -50,3 +72,166 @@ def invalid_row(problem: str) -> Row:
 def blocks_in(names: Iterable[str]) -> tuple[str, ...]:
     """Return the blocks that a row, or a table of rows, tells of."""
     return tuple(name.removesuffix(X) for name in names if name.endswith(X))
+
+
+@dataclass(frozen=True)
+class Head:
+    """A column of varied values; `unit` is empty where they stand as they were given."""
+
+    key: str
+    unit: str = ""
+
+    @classmethod
+    def read(cls, name: str) -> "Head":
+        """Take the name of a column apart."""
+        found = HEAD.fullmatch(name)
+        return cls(name) if found is None else cls(found["key"], found["unit"])
+
+    def __str__(self) -> str:
+        """Return the name of the column."""
+        return f"{self.key} [{self.unit}]" if self.unit else self.key
+
+    def cell(self, value: object) -> object:
+        """Return a value as it stands in the column."""
+        if not self.unit:
+            return value
+        return float(f"{_si(value) / float(parse_unit(self.unit).factor):.{DIGITS}g}")
+
+    def si(self, cell: float) -> float:
+        """Return a number of the column in SI."""
+        return cell * float(parse_unit(self.unit).factor) if self.unit else cell
+
+
+def heads_of(sweep: Sweep) -> tuple[Head, ...]:
+    """Return the columns of the keys that a sweep varies, in their order."""
+    return tuple(Head(key, _unit(values)) for key, values in sweep.vary.items())
+
+
+def told(heads: Iterable[Head], settings: Mapping[str, object]) -> dict[str, object]:
+    """Return the varied values of a case by the names of their columns."""
+    return {str(head): head.cell(settings[head.key]) for head in heads}
+
+
+def _unit(values: object) -> str:
+    """Return the unit of a column: the first that was typed, where all values are numbers."""
+    if not isinstance(values, tuple):
+        return str(getattr(values, "unit", ""))
+    typed = next((unit for value in values if isinstance(value, str) and (unit := q.unit_in(value))), "")
+    return typed if typed and all(_is_number(value) for value in values) else ""
+
+
+def _is_number(value: object) -> bool:
+    if isinstance(value, bool):
+        return False
+    return isinstance(value, int | float) or (isinstance(value, str) and bool(q.unit_in(value)))
+
+
+def _si(value: object) -> float:
+    """Return a value of a number column in SI; NaN for what is none."""
+    if isinstance(value, str):
+        return q.parse_quantity(value)[0]
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def as_cell(value: object) -> object:
+    """Return a value as it may stand in a table; a text that would be computed gets an apostrophe before it.
+
+    Values and reasons may come from the scenario of a stranger. Numbers and quantities ("-5 deg") stay as they are.
+    """
+    is_suspect = isinstance(value, str) and value.startswith(FORMULA)
+    return f"{MARK}{value}" if is_suspect and not _is_quantity(str(value)) else value
+
+
+def _is_quantity(text: str) -> bool:
+    with suppress(ValueError):
+        float(text)
+        return True
+    try:
+        q.parse_quantity(text, q.NUMBER)
+    except ValueError:
+        return False
+    return True
+
+
+@dataclass(frozen=True)
+class Range:
+    """The limits of one measured quantity of one block (mm or degrees); `column` is its column in the final table."""
+
+    block: str
+    column: str
+    lower: float
+    upper: float
+
+    def off_centre(self, value: float) -> float:
+        """Return the distance from the middle in half-widths: at most 1 inside."""
+        half = 0.5 * (self.upper - self.lower)
+        return abs(value - 0.5 * (self.lower + self.upper)) / half
+
+    def holds(self, value: float) -> bool:
+        """Return True if a value is inside, ends included."""
+        return self.lower <= value <= self.upper
+
+
+def ranges_of(table: ExperimentTable) -> tuple[Range, ...]:
+    """Return the limits of every measured quantity, as `compare` has them."""
+    return tuple(
+        Range(
+            row.block, QUANTITIES[row.quantity].final_column, *limits(row.quantity, row.mean, row.minimum, row.maximum)
+        )
+        for row in table.summaries()
+    )
+
+
+def values_at(final: Columns, ranges: Sequence[Range]) -> list[float]:
+    """Return the values of a final table (mm, degrees) that the ranges are about."""
+    rows = {name: row for row, name in enumerate(final["block"])}
+    return [float(final[one.column][rows[one.block]]) for one in ranges]
+
+
+def are_inside(values: Sequence[float], ranges: Sequence[Range]) -> bool:
+    """Return True if all values are inside their ranges."""
+    return all(one.holds(value) for one, value in zip(ranges, values, strict=True))
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """The limits (mm, degrees) of every measured quantity, by the name of its column in sweep.csv."""
+
+    source: str
+    limits: Mapping[str, tuple[float, float]]
+
+    @classmethod
+    def read(cls, table: Path | str) -> "Ranges":
+        """Take the limits of an experiment table by the rules of `compare`. Raises what reading it raises."""
+        measured = load_table(table)
+        limits = {f"{one.block}.{one.column}": (one.lower, one.upper) for one in ranges_of(measured)}
+        return cls(measured.source, limits)
+
+    def hold(self, row: Mapping[str, object]) -> bool:
+        """Return True if everything measured is inside; a block that a case does not have is not."""
+        values = ((row.get(name), lower, upper) for name, (lower, upper) in self.limits.items())
+        return all(isinstance(value, float) and lower <= value <= upper for value, lower, upper in values)
+
+    def count(self, table: "pd.DataFrame") -> int:
+        """Return how many rows of a table are inside. Raises InvalidInputError for no such block, or no numbers."""
+        return sum(self.inside(table))
+
+    def inside(self, table: "pd.DataFrame") -> list[bool]:
+        """Tell of every row of a table whether it is inside. Raises as `count`."""
+        missing = [name for name in self.limits if name not in table]
+        if missing:
+            message = f"{self.source} measures {missing[0]}, but the sweep has no such column"
+            raise InvalidInputError(message)
+        texts = [name for name in self.limits if table[name].dtype.kind not in NUMBERS and table[name].notna().any()]
+        if texts:
+            raise InvalidInputError(f"the column {texts[0]} of the sweep does not hold numbers only")
+        inside = [table[name].between(lower, upper) for name, (lower, upper) in self.limits.items()]
+        return [all(row) for row in zip(*inside, strict=True)]
+
+
+def check_experiment(scenario: Scenario) -> None:
+    """Read the table that a scenario names and look whether it goes with the blocks: better now than after the run."""
+    if scenario.experiment is not None:
+        names = [body.name for body in place_bodies(scenario)]
+        unknown = dict.fromkeys(COLUMNS[1:], [0.0] * len(names))
+        compare_final({"block": names, **unknown}, load_table(scenario.experiment.table))

@@ -26,7 +26,7 @@ from blocksim.simulation.result_files import (
     read_tables,
     refuse_foreign_copies,
 )
-from blocksim.study.manifest import is_in_use
+from blocksim.study.progress import is_in_use
 
 PLAN = "sweep.toml"
 ORIGIN = "sweep.json"

@@ -11,18 +11,14 @@ from pathlib import Path
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.limited import open_regular
-from blocksim.study.done import Done
 from blocksim.study.executors.ensemble import rows_of
-from blocksim.study.heads import Head, told
-from blocksim.study.manifest import PATTERN, read_entries
-from blocksim.study.many import cases_in, ranges_of
 from blocksim.study.plan import Case, Cases
-from blocksim.study.ranges import Ranges
-from blocksim.study.rows import Row, invalid_row
-from blocksim.study.single import FINISHED
-from blocksim.study.spreadsheet import as_cell
+from blocksim.study.progress import PATTERN, CaseIndex, read_entries
+from blocksim.study.rows import Head, Ranges, Row, as_cell, invalid_row, told
+from blocksim.study.stored_run import FINISHED
+from blocksim.study.sweep import cases_in, ranges_of
 from blocksim.study.sweep_folder import case_folder, read_origin, read_plan
-from blocksim.study.table import OUTCOME, TABLE
+from blocksim.study.sweep_table import OUTCOME, TABLE
 from blocksim.study.verify_run import Origin, RunVerdict, changed_origins, tells_of_code, verify_run
 
 SAMPLE = 16  # rows, where nobody says how many
@@ -135,7 +131,7 @@ def _numbers(folder: Path, cases: Cases, count: int) -> Sequence[int]:
     """Return the number of the case that each of `count` rows tells of. Raises InvalidInputError."""
     if count == len(cases):
         return range(count)
-    done = Done(folder, len(cases))
+    done = CaseIndex(folder, len(cases))
     held = [number for number in range(len(cases)) if done.holds(number, cases.design[number])]
     if len(held) != count:
         message = f"{folder / TABLE}: {count} rows of {len(cases)} cases, but the manifest tells of {len(held)}"

@@ -16,7 +16,8 @@ from typing import Any
 from blocksim import __version__
 from blocksim.analysis.compare import Verdict
 from blocksim.scenario import load_scenario
-from blocksim.study.single import compare, run
+from blocksim.study.compare import compare_run
+from blocksim.study.run import run
 
 BEGIN = "<!-- findings: written by `make findings` -->"
 END = "<!-- end of findings -->"
@@ -66,7 +67,7 @@ FINDINGS = (
 def measured(finding: Finding) -> dict[str, Any]:
     """Run a finding; return its centres in mm, how far each lies beyond the measured range, and what is inside."""
     result = run(load_scenario(SCENARIOS / f"{finding.scenario}.toml", finding.settings))
-    rows = {(row.block, row.quantity): row for row in compare(result).rows}
+    rows = {(row.block, row.quantity): row for row in compare_run(result).rows}
     inside = [f"block {block}" for block in BLOCKS if rows[block, "x"].verdict is Verdict.INSIDE]
     turned = all(rows[block, "rotation"].verdict is Verdict.INSIDE for block in BLOCKS)
     return {

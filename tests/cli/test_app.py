@@ -14,7 +14,7 @@ from blocksim.cli.commands import COMMANDS, GROUPS
 from tests.cli.conftest import SOFT, Command
 
 HEAVY = ("numba", "pandas", "h5py", "matplotlib", "pint", "numpy")
-UNUSED_BY_A_RUN = ("pandas", "matplotlib", "pint", "multiprocessing.pool", "blocksim.study.many")
+UNUSED_BY_A_RUN = ("pandas", "matplotlib", "pint", "multiprocessing.pool", "blocksim.study.sweep")
 
 
 def test_help_lists_all_commands_in_80_columns(blocksim: Command) -> None:

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from blocksim.scenario import Document
-from blocksim.study.many import sweep
+from blocksim.study.sweep import sweep
 from tests.cli.conftest import SCENARIOS, SOFT, Command
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"

@@ -7,10 +7,9 @@ import pytest
 
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Document, Scenario
-from blocksim.study import folders
-from blocksim.study.converge import converge
-from blocksim.study.convergence import Coordinates, Study, Verdict, judge
-from blocksim.study.refinement import Refinement, refinements_of, with_setting
+from blocksim.study.converge import converge, refinements_of
+from blocksim.study.convergence import Coordinates, Refinement, Study, Verdict, judge, with_setting
+from blocksim.study.executors import ensemble as folders
 from blocksim.study.rows import Row
 from tests.study.conftest import SCENARIOS
 

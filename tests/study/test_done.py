@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from blocksim.study.done import Done
-from blocksim.study.manifest import Entry, values_hash
+from blocksim.study.progress import CaseIndex, Entry, values_hash
 
 ONE: dict[str, object] = {"friction": 0.2}
 OTHER: dict[str, object] = {"friction": 0.3}
@@ -14,7 +13,7 @@ def entry(status: str, settings: dict[str, object] = ONE) -> Entry:
 
 
 def test_row_of_other_values_is_none_of_this_case(tmp_path: Path) -> None:
-    done = Done(tmp_path, 1)
+    done = CaseIndex(tmp_path, 1)
     done.note(tmp_path / "manifest.jsonl", 0, entry("finished"))
     assert done.holds(0, ONE)
     assert not done.holds(0, OTHER)
@@ -22,7 +21,7 @@ def test_row_of_other_values_is_none_of_this_case(tmp_path: Path) -> None:
 
 
 def test_case_that_ended_well_stays_so_whatever_comes_after(tmp_path: Path) -> None:
-    done = Done(tmp_path, 1)
+    done = CaseIndex(tmp_path, 1)
     for start, status in enumerate(("failed", "finished", "failed")):
         done.note(tmp_path / "manifest.jsonl", start, entry(status))
     assert done.starts[0] == 1

@@ -13,8 +13,9 @@ from blocksim.scenario import Document
 from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint_policy import CheckpointPolicy
 from blocksim.simulation.summary import read_summary
-from blocksim.study.folders import _outcome, run_all, run_case
-from blocksim.study.single import run
+from blocksim.study.executors.ensemble import run_case
+from blocksim.study.executors.processes import _outcome, run_all
+from blocksim.study.run import run
 
 
 def test_dead_worker_fails_its_case_and_says_what_to_do() -> None:

@@ -7,10 +7,10 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Document
-from blocksim.study.found import read_found
-from blocksim.study.many import sweep
-from blocksim.study.picture import draw_sweep
+from blocksim.study.pictures import draw_sweep
 from blocksim.study.plan import Values, with_sweep
+from blocksim.study.sweep import sweep
+from blocksim.study.sweep_data import read_sweep_data
 from blocksim.study.sweep_folder import prepare
 from blocksim.view.sweeps.found import FoundSweep
 from tests.study.conftest import SCENARIOS
@@ -25,7 +25,7 @@ def stored(nominal: Document, folder: Path, vary: dict[str, Values], rows: list[
     heads = ["case", *vary, "status", "reason", "seconds", *(f"{block}.{end}" for block in "123" for end in ENDS)]
     lines = [f"case{number},{row}" for number, row in enumerate(rows)]
     (folder / "sweep.csv").write_text("\n".join([",".join(heads), *lines, ""]), encoding="utf-8")
-    return read_found(folder)
+    return read_sweep_data(folder)
 
 
 def ended(x2: float, x3: float) -> str:
@@ -44,7 +44,7 @@ def test_values_are_in_si_with_the_unit_of_their_key(nominal: Document, tmp_path
 def test_values_keep_the_unit_that_was_typed(quick: Document, tmp_path: Path) -> None:
     vary: dict[str, Values] = {"structures.0.overlap": ["0.9 cm", "1 cm"], "ground.tilt": ["0.01 rad", "0.02 rad"]}
     folder = sweep(quick, vary, out=tmp_path).folder
-    overlap, tilt = read_found(folder).inputs
+    overlap, tilt = read_sweep_data(folder).inputs
     assert [(one.unit, one.typed and one.typed.unit) for one in (overlap, tilt)] == [("m", "cm"), ("rad", "rad")]
     assert overlap.told(0.009) == "0.9 cm"
     draw_sweep(folder, tmp_path / "map.svg", kind="map")
@@ -103,7 +103,7 @@ def test_sweep_without_experiment_measures_nothing(tmp_path: Path) -> None:
     prepare(tmp_path, base, "made-up", overwrite=False)
     text = "case,gravity,status,reason,seconds,block.x_mm,block.rotation_deg\nc,1.0,finished,at rest,1,16,0\n"
     (tmp_path / "sweep.csv").write_text(text, encoding="utf-8")
-    found = read_found(tmp_path)
+    found = read_sweep_data(tmp_path)
     assert found.inside is None
     assert not found.measured.x_mm
 
@@ -112,4 +112,4 @@ def test_what_cannot_be_drawn_is_refused(nominal: Document, tmp_path: Path) -> N
     with pytest.raises(InvalidInputError, match="no case of this sweep has finished"):
         stored(nominal, tmp_path / "failed", {"gravity": [1.0]}, ["1.0,failed,too large,0.1" + "," * 15])
     with pytest.raises(InputMissingError, match="no such file"):
-        read_found(tmp_path / "nix")
+        read_sweep_data(tmp_path / "nix")

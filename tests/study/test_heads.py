@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import Document
-from blocksim.study.found import read_found
-from blocksim.study.heads import Head, heads_of
-from blocksim.study.many import sweep
 from blocksim.study.plan import Values, cases_of, with_sweep
+from blocksim.study.rows import Head, heads_of
+from blocksim.study.sweep import sweep
+from blocksim.study.sweep_data import read_sweep_data
 from blocksim.study.verify_sweep import verify_sweep
 from tests.study.conftest import SCENARIOS
 
@@ -61,7 +61,7 @@ def test_table_pictures_and_verification_agree_on_the_unit(tmp_path: Path) -> No
     found = sweep(document, {TILT: {"from": "0 deg", "to": "10 deg", "count": 3}}, out=tmp_path / "out")
     assert found.keys == ("ground.tilt [deg]",)
     assert found.table["ground.tilt [deg]"].tolist() == [0.0, 5.0, 10.0]
-    (tilt,) = read_found(found.folder).inputs
+    (tilt,) = read_sweep_data(found.folder).inputs
     assert (tilt.key, tilt.unit) == (TILT, "rad")
     assert tilt.values[1:] == pytest.approx([0.08726646, 0.17453293])
     assert verify_sweep(found.folder).agrees

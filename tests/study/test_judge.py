@@ -10,9 +10,10 @@ from blocksim.analysis.compare import Comparison
 from blocksim.analysis.judgement import Judgement, Settings
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Document
-from blocksim.study.judge import compare, compare_sweep
-from blocksim.study.many import SweepResult, sweep
-from blocksim.study.single import run
+from blocksim.study.compare import compare, compare_sweep
+from blocksim.study.run import run
+from blocksim.study.sweep import sweep
+from blocksim.study.sweep_table import SweepResult
 from tests.study.conftest import SCENARIOS
 
 PAPER = SCENARIOS / "experiments" / "three_blocks.csv"

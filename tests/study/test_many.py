@@ -11,13 +11,13 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.scenario import Document, load_scenario
-from blocksim.study.manifest import Manifest
-from blocksim.study.many import read_sweep, sweep
 from blocksim.study.plan import with_sweep
+from blocksim.study.progress import Manifest, Shard
 from blocksim.study.rows import MOVEMENT
-from blocksim.study.shard import Shard
-from blocksim.study.single import run
+from blocksim.study.run import run
+from blocksim.study.sweep import sweep
 from blocksim.study.sweep_folder import prepare
+from blocksim.study.sweep_table import read_sweep
 from tests.study.conftest import SCENARIOS
 
 KINETIC = "friction.block_block.kinetic"

@@ -6,7 +6,7 @@ import pytest
 
 from blocksim.scenario import Document
 from blocksim.simulation import simulate
-from blocksim.study.members import BATCH, run_members
+from blocksim.study.executors.ensemble import BATCH, run_members
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 FRICTION = "friction.block_ground"

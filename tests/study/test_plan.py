@@ -11,7 +11,7 @@ from blocksim.scenario import Document, scenario_to_toml
 from blocksim.simulation.provenance import run_hash
 from blocksim.study import plan
 from blocksim.study.plan import Values, cases_of, with_sweep
-from blocksim.study.sampling.modes import design_of
+from blocksim.study.sampling import design_of
 
 KINETIC = "friction.block_block.kinetic"
 SCALE = "contact.stiffness_scale"

@@ -8,7 +8,7 @@ import pytest
 
 from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import load_table
-from blocksim.study.ranges import Ranges
+from blocksim.study.rows import Ranges
 from tests.study.conftest import SCENARIOS
 
 TABLE = SCENARIOS / "experiments" / "three_blocks.csv"

@@ -8,9 +8,8 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Document, Scenario
-from blocksim.study.converge import converge
+from blocksim.study.converge import STUDIES, converge, refinements_of
 from blocksim.study.convergence import Verdict
-from blocksim.study.refinement import STUDIES, refinements_of
 from tests.study.conftest import SCENARIOS
 
 if TYPE_CHECKING:

@@ -7,8 +7,9 @@ from blocksim.analysis import Verdict, closed_forms
 from blocksim.analysis.compare import Comparison
 from blocksim.scenario import Document, load_scenario
 from blocksim.simulation import Frames, Result
+from blocksim.study.compare import compare_run
 from blocksim.study.plan import cases_of
-from blocksim.study.single import compare, run
+from blocksim.study.run import run
 from tests.study.conftest import SCENARIOS
 
 HALF_HEIGHT = 0.0125  # m
@@ -24,19 +25,19 @@ def verdicts(comparison: Comparison) -> dict[tuple[str, str], Verdict]:
 
 
 def test_calibrated_scenario_is_inside_everywhere() -> None:
-    comparison = compare(run_shipped("three_blocks"))
+    comparison = compare_run(run_shipped("three_blocks"))
     assert len(comparison.rows) == 6
     assert comparison.inside, comparison.to_frame()
 
 
 def test_nominal_scenario_gets_block_1_and_all_rotations() -> None:
-    found = verdicts(compare(run_shipped("three_blocks_nominal")))
+    found = verdicts(compare_run(run_shipped("three_blocks_nominal")))
     assert found[("1", "x")] == Verdict.INSIDE
     assert [found[(block, "rotation")] for block in "123"] == [Verdict.INSIDE] * 3
 
 
 def test_literal_reading_is_far_outside() -> None:
-    found = {(row.block, row.quantity): row.distance for row in compare(run_shipped("three_blocks_literal")).rows}
+    found = {(row.block, row.quantity): row.distance for row in compare_run(run_shipped("three_blocks_literal")).rows}
     assert found[("2", "x")] > 10.0
     assert found[("3", "x")] > 10.0
 
@@ -53,7 +54,7 @@ def test_shipped_studies_have_cases_that_can_be_run(name: str, count: int) -> No
 
 def reading(upright: str, overlap: str, restitution: float) -> Comparison:
     values = {"blocks.brick.upright": upright, "structures.0.overlap": overlap, "contact.restitution": restitution}
-    return compare(run_shipped("sweep_readings", **values))
+    return compare_run(run_shipped("sweep_readings", **values))
 
 
 @pytest.mark.parametrize("restitution", [0.3, 0.4, 0.5])

@@ -11,8 +11,10 @@ import blocksim
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario
 from blocksim.simulation import Result
-from blocksim.study import single
-from blocksim.study.single import compare, find_run, run
+from blocksim.study import run as single
+from blocksim.study.compare import compare_run
+from blocksim.study.run import run
+from blocksim.study.stored_run import find_run
 from tests.study.conftest import SCENARIOS
 
 if TYPE_CHECKING:
@@ -79,13 +81,13 @@ def test_result_table_and_folder_compare_alike(kept: Result, what: str) -> None:
         "folder": kept.folder,
         "parent": kept.folder.parent,
     }
-    found = compare(given[what], SCENARIOS / "experiments" / "three_blocks.csv")
-    assert [row.simulated for row in found.rows] == [row.simulated for row in compare(kept).rows]
+    found = compare_run(given[what], SCENARIOS / "experiments" / "three_blocks.csv")
+    assert [row.simulated for row in found.rows] == [row.simulated for row in compare_run(kept).rows]
 
 
 def test_comparison_needs_a_table(kept: Result) -> None:
     with pytest.raises(InputMissingError, match="--experiment"):
-        compare(kept.final)
+        compare_run(kept.final)
 
 
 def test_unfinished_run_is_not_judged(scenario: Scenario, tmp_path: Path) -> None:
@@ -93,28 +95,28 @@ def test_unfinished_run_is_not_judged(scenario: Scenario, tmp_path: Path) -> Non
     failed = run(scenario.model_copy(update={"contact": limited}), out=tmp_path / "run")
     for given in (failed, tmp_path / "run"):
         with pytest.raises(InvalidInputError, match="has failed"):
-            compare(given)
+            compare_run(given)
 
 
 @pytest.mark.parametrize("name", ["run.json", "final.csv", "scenario.toml"])
 def test_missing_file_of_a_run_is_named(copy: Path, name: str) -> None:
     (copy / name).unlink()
     with pytest.raises(InputMissingError, match=name.replace(".", r"\.")):
-        compare(copy, SCENARIOS / "experiments" / "three_blocks.csv")
+        compare_run(copy, SCENARIOS / "experiments" / "three_blocks.csv")
 
 
 def test_final_table_without_one_of_the_blocks_is_named(copy: Path) -> None:  # and not the experiment's, which has it
     lines = (copy / "final.csv").read_text().splitlines(keepends=True)
     (copy / "final.csv").write_text("".join(lines[:1] + lines[2:]))
     with pytest.raises(InvalidInputError, match=r"final\.csv: holds other blocks than scenario\.toml"):
-        compare(copy)
+        compare_run(copy)
 
 
 def test_status_in_run_json_counts(copy: Path) -> None:
     data = json.loads((copy / "run.json").read_text())
     (copy / "run.json").write_text(json.dumps({**data, "status": "interrupted"}))
     with pytest.raises(InvalidInputError, match="interrupted"):
-        compare(copy)
+        compare_run(copy)
 
 
 def test_scenario_without_its_run_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ import pytest
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.simulation import simulate_into
-from blocksim.study.stored import stored_run
+from blocksim.study.stored_run import stored_run
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 

@@ -1,11 +1,21 @@
 """What runs the cases of a sweep. A new executor is one module with `check` and `run_tasks`, and one line here."""
 
+import time
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
 from importlib import import_module
+from itertools import takewhile
+from pathlib import Path
+from typing import NamedTuple
 
 from blocksim.errors import InvalidInputError
+from blocksim.scenario import Scenario
 from blocksim.scenario.findings import did_you_mean_or_list
-from blocksim.study.executors.task import Executor
+from blocksim.study.rows import Row
 
+SECONDS = 0.5  # of work in a batch
+MOST = 512  # tasks, so that memory does not depend on how quick they are
+GROWTH = 4  # at most, from one batch to the next: the first members may be quicker than the others
 EXECUTORS = {
     "ensemble": "blocksim.study.executors.ensemble",
     "processes": "blocksim.study.executors.processes",
@@ -14,6 +24,78 @@ EXECUTORS = {
 DEFAULT = "ensemble"
 WITH_FOLDERS = "processes"
 WITH_SCHEDULER = "dask"
+
+
+class Task(NamedTuple):
+    """One case to be run: its number, the name of its run, its varied values."""
+
+    number: int
+    name: str
+    settings: dict[str, object]
+    scenario: Scenario
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Tasks that have ended together, their rows in the same order, the wall time (s) they took, and where."""
+
+    tasks: tuple[Task, ...]
+    rows: tuple[Row, ...]
+    seconds: float
+    host: str
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How tasks are to be run; `is_stopped` tells whether the user wants to stop."""
+
+    jobs: int  # threads or processes
+    is_stopped: Callable[[], bool] = lambda: False
+    scheduler: str | None = None  # address of a Dask cluster
+    folder: Path | None = None  # where folders of runs are kept
+
+    def folder_of(self, task: Task) -> Path | None:
+        """Return where a run is kept, None where it is not."""
+        return None if self.folder is None else self.folder / task.name
+
+
+def needs_nothing(_: Setting) -> None:
+    """Check nothing: this executor is always there."""
+
+
+Run = Callable[[Iterator[Task], Setting], Generator[Batch, None, None]]
+"""Take tasks one by one, as many as are needed to keep busy, and yield them in batches, in any order.
+
+A task that fails has a row that says so. Once `is_stopped`, no batch is begun, and what has not ended within a second
+is given up. Closed before the end, it stops at once.
+"""
+
+
+class Executor(NamedTuple):
+    """What runs tasks; `check` raises UnavailableError where it cannot, before anything is written."""
+
+    run: Run
+    check: Callable[[Setting], None]
+
+
+@dataclass
+class BatchSize:
+    """How many tasks make a batch, from how long the last ones took. Rows do not depend on it."""
+
+    count: int = 1
+    least: int = 1
+
+    def measured(self, count: int, seconds: float) -> None:
+        """Go by a batch of `count` tasks that took so long (s of wall time)."""
+        wanted = count * SECONDS / max(seconds, 1e-6)
+        self.count = int(min(max(wanted, self.least), GROWTH * self.count, MOST))
+
+
+def take(tasks: Iterator[Task], count: int, is_stopped: Callable[[], bool]) -> tuple[Task, ...]:
+    """Take up to `count` tasks; their scenarios are made now, so it gives up after a batch's time or when stopped."""
+    latest = time.monotonic() + SECONDS
+    numbers = takewhile(lambda _: not is_stopped() and time.monotonic() < latest, range(count))
+    return tuple(task for _, task in zip(numbers, tasks, strict=False))
 
 
 def executor_named(name: str) -> Executor:

@@ -15,9 +15,8 @@ from typing import Any, NoReturn
 from blocksim.errors import InvalidInputError, UnavailableError
 from blocksim.extras import CLUSTER, loaded
 from blocksim.simulation.provenance import code_hash
-from blocksim.study.executors.batch_run import run_batch
-from blocksim.study.executors.batches import BatchSize, take
-from blocksim.study.executors.task import Batch, Setting, Task
+from blocksim.study.executors import Batch, BatchSize, Setting, Task, take
+from blocksim.study.executors.ensemble import run_batch
 from blocksim.study.rows import Row, row_of_error
 
 PATIENCE = 3.0  # s until a scheduler has answered

@@ -1,4 +1,4 @@
-"""Tasks advanced together in compiled code, on all cores of this process: the default.
+"""Cases in this process: advanced together in compiled code, on all cores (the default), or one by one into folders.
 
 The next batch is made while the steps of one are under way. A batch has a thread of its own, so that a Ctrl-C is heard
 at once, also where a single case takes minutes.
@@ -7,20 +7,33 @@ at once, also where a single case takes minutes.
 import platform
 import threading
 import time
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple
 
-from blocksim.scenario import Scenario
-from blocksim.simulation import MemberEnd, MemberFailure, run_in_batches
-from blocksim.study.executors.batches import BatchSize, take
-from blocksim.study.executors.task import Batch, Setting, Task, needs_nothing
+from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
+from blocksim.scenario import Document, Scenario, place_bodies
+from blocksim.simulation import MemberEnd, MemberFailure, Result, Summary, run_in_batches
+from blocksim.simulation import folder as files
+from blocksim.simulation.provenance import HASH_DIGITS, code_hash, run_hash
+from blocksim.simulation.summary import changed_results, read_summary
+from blocksim.simulation.table import Columns, read_table
+from blocksim.study.executors import Batch, BatchSize, Setting, Task, needs_nothing, take
 from blocksim.study.rows import Course, Row, row_of, row_of_error
+from blocksim.study.run import run
+from blocksim.study.stored_run import FINISHED
 
 PATIENCE = 0.7  # s that a batch has to end once the user wants to stop
 POLL = 0.05  # s
 THREAD = "blocksim-batch"
-
-
 check = needs_nothing
+BATCH = 64  # members run together: enough for all cores, few enough to tell how it goes
+Values = Mapping[str, object]
+INTERRUPTED = "interrupted"
+Payload = Sequence[tuple[Scenario, Path | None]]  # None: nothing is kept but the row
 
 
 def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
@@ -90,3 +103,113 @@ def _row_of(member: MemberEnd | MemberFailure) -> Row:
         return row_of_error(member.error)
     course = Course(member.outcome.status, member.outcome.reason, member.seconds, member.first_move)
     return row_of(course, member.columns, member.placed)
+
+
+@dataclass(frozen=True)
+class Member:
+    """The end of one member: its final table, or the reason why it has none."""
+
+    final: Columns | None
+    problem: str = ""
+
+
+def run_members(document: Document, values: Iterable[Values]) -> Iterator[Member]:
+    """Yield where the scenario ends with each set of values (dotted key: value), in order.
+
+    A member whose values do not go together, or whose run fails, has a problem instead of a final table; the others do
+    not depend on it.
+    """
+    rest = iter(values)
+    while batch := list(islice(rest, BATCH)):
+        yield from _run_batch([_built(document, one) for one in batch])
+
+
+def _built(document: Document, values: Values) -> Scenario | Member:
+    try:
+        return document.with_values(values).build().model_copy(update={"sweep": None})
+    except BlocksimError as error:
+        return Member(None, str(error).splitlines()[0])
+
+
+def _run_batch(built: Sequence[Scenario | Member]) -> Iterator[Member]:
+    scenarios = [one for one in built if isinstance(one, Scenario)]
+    ends = (_member(one) for ended in run_in_batches(scenarios) for one in ended)
+    for one in built:
+        yield one if isinstance(one, Member) else next(ends)
+
+
+def _member(member: MemberEnd | MemberFailure) -> Member:
+    if isinstance(member, MemberFailure) or not member.outcome.is_finished:
+        return Member(None, member.outcome.reason.splitlines()[0])
+    return Member(member.columns)
+
+
+def run_case(scenario: Scenario, folder: Path) -> Row:
+    """Run one case into its folder, or what is left of it, unless it is there already, and return its row."""
+    try:
+        row = _known_row(scenario, folder)
+        if row is None:
+            result = _run_on(scenario, folder)
+            row = row_of(_course(result.summary), result.columns, place_bodies(scenario))
+    except Exception as error:  # noqa: BLE001 - one broken case must not end the others
+        return row_of_error(error)
+    return row
+
+
+def _run_on(scenario: Scenario, folder: Path) -> Result:
+    """Run a case from where an interruption has left it; again, where that cannot be taken up, or there was none."""
+    try:
+        return run(scenario, out=folder, resume=True)
+    except (InvalidInputError, InputMissingError, OutputExistsError):
+        return run(scenario, out=folder, overwrite=True)
+
+
+def _known_row(scenario: Scenario, folder: Path) -> Row | None:
+    """Return the row of a case that came to its end before, well or not; None where it has to be run."""
+    with suppress(BlocksimError):
+        summary = read_summary(folder / files.SUMMARY)
+        is_same = summary.run == run_hash(scenario)
+        if is_same and _has_ended(folder, summary) and not changed_results(folder, summary):
+            final = read_table(folder / files.FINAL)
+            return row_of(_course(summary), final, place_bodies(scenario))
+    return None
+
+
+def _course(summary: Summary) -> Course:
+    first = None if summary.movement is None else summary.movement.first_move
+    return Course(summary.status, summary.reason, summary.simulated_time_s, first)
+
+
+def _has_ended(folder: Path, summary: Summary) -> bool:
+    return files.is_finished(folder) if summary.status == FINISHED else summary.status != INTERRUPTED
+
+
+class Outcome(NamedTuple):
+    """Rows in the order of the scenarios, wall time (s), name of the machine."""
+
+    rows: tuple[Row, ...]
+    seconds: float
+    host: str
+
+
+def run_batch(payload: Payload, code: str) -> Outcome:
+    """Run scenarios on one thread, by the same code as whoever asks. Raises InvalidInputError where it is another."""
+    if code != code_hash():
+        message = (
+            f"the worker on {platform.node()} has another version of blocksim (code {code_hash()[:HASH_DIGITS]}, "
+            f"here {code[:HASH_DIGITS]}); install the same one"
+        )
+        raise InvalidInputError(message)
+    began = time.perf_counter()
+    if any(folder is not None for _, folder in payload):
+        rows = [_kept(scenario, folder) for scenario, folder in payload if folder is not None]
+    else:
+        rows = rows_of([scenario for scenario, _ in payload], 1)
+    return Outcome(tuple(rows), time.perf_counter() - began, platform.node())
+
+
+def _kept(scenario: Scenario, folder: Path) -> Row:
+    row = run_case(scenario, folder)
+    if row["status"] == INTERRUPTED:  # somebody has ended this process: no end of the case
+        raise KeyboardInterrupt
+    return row

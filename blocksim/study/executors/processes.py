@@ -3,18 +3,23 @@
 The only executor that can keep whole runs, in folders of their own.
 """
 
+import signal
+import threading
 from collections import deque
-from collections.abc import Generator, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Generator, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, as_completed, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from multiprocessing import active_children, get_context, parent_process, resource_tracker
+from os import _exit
+from pathlib import Path
 from typing import NamedTuple
 
+from blocksim.scenario import Scenario
 from blocksim.simulation.provenance import code_hash
-from blocksim.study.executors.batch_run import Outcome, run_batch
-from blocksim.study.executors.batches import BatchSize, take
-from blocksim.study.executors.pool import pool_of
-from blocksim.study.executors.task import Batch, Setting, Task, needs_nothing
+from blocksim.simulation.stopping import FOR_ALL
+from blocksim.study.executors import Batch, BatchSize, Setting, Task, needs_nothing, take
+from blocksim.study.executors.ensemble import INTERRUPTED, Outcome, run_batch, run_case
 from blocksim.study.rows import Row
 
 AHEAD = 2  # batches a process: it need not wait for the next one
@@ -24,9 +29,52 @@ DEAD: Row = {
     "reason": "its worker process has died twice (out of memory?); --retry-failed runs it again",
     "seconds": 0.0,
 }
-
-
 check = needs_nothing
+
+
+@contextmanager
+def pool_of(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Give a pool that ends at once when something goes wrong here: what is cut off is run again next time."""
+    others = set(active_children())
+    _start_tracker()
+    # spawned, not forked: threads of numerical libraries do not survive a fork
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
+    try:
+        yield pool
+    except BaseException:
+        for process in set(active_children()) - others:
+            process.kill()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _start_tracker() -> None:
+    """Start the process in which Python counts semaphores so that it outlives what a terminal sends to all processes.
+
+    It would be killed otherwise, and its successor complain. What is blocked while it starts is blocked in it for ever.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, FOR_ALL)
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _start_worker() -> None:
+    """Leave to the parent what a terminal sends to all processes, and end with it."""
+    for number in FOR_ALL:
+        signal.signal(number, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+    _exit(0)
 
 
 class Job(NamedTuple):
@@ -42,16 +90,16 @@ class StoppedError(Exception):
 
 def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
     """Run batches on `setting.jobs` processes, each on one thread; a pool that has died is replaced by a new one."""
-    twins = Twins()
-    work = Work(tasks if setting.folder is None else twins.without(tasks), setting)
+    duplicates = Duplicates()
+    work = Work(tasks if setting.folder is None else duplicates.without(tasks), setting)
     with suppress(StoppedError):
         while not work.is_done:
             with suppress(BrokenProcessPool), pool_of(setting.jobs) as pool:
                 for batch in work.run_on(pool):
-                    twins.note(batch)
+                    duplicates.note(batch)
                     yield batch
             yield from work.after_death()
-        yield from twins.batches()
+        yield from duplicates.batches()
 
 
 class Work:
@@ -114,7 +162,7 @@ class Work:
         self.pending.clear()
 
 
-class Twins:
+class Duplicates:
     """Cases that come to the same run, such as "10 mm" and 0.01: one folder cannot be written by two processes."""
 
     def __init__(self) -> None:
@@ -140,3 +188,31 @@ class Twins:
         """Yield the others, once all have ended."""
         if self.later:
             yield Batch(tuple(self.later), tuple(self.rows.get(task.name, DEAD) for task in self.later), 0.0, "")
+
+
+def run_all(tasks: Mapping[Path, Scenario], jobs: int) -> Generator[tuple[Path, Row], None, None]:
+    """Run every scenario into its folder; yield folder and row as they end. Raises KeyboardInterrupt on Ctrl-C."""
+    workers = min(jobs, len(tasks))
+    if workers <= 1:
+        yield from _run_here(tasks)
+        return
+    with pool_of(workers) as pool:
+        futures = {pool.submit(run_case, scenario, folder): folder for folder, scenario in tasks.items()}
+        for future in as_completed(futures):
+            yield futures[future], _outcome(future)
+
+
+def _run_here(tasks: Mapping[Path, Scenario]) -> Iterator[tuple[Path, Row]]:
+    for folder, scenario in tasks.items():
+        row = run_case(scenario, folder)
+        if row["status"] == INTERRUPTED:
+            raise KeyboardInterrupt
+        yield folder, row
+
+
+def _outcome(future: Future[Row]) -> Row:
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        reason = "a worker process has died (out of memory?); rerun the command to repeat this case"
+        return {"status": "failed", "reason": reason, "seconds": 0.0}

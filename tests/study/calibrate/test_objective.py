@@ -6,9 +6,9 @@ import math
 import pytest
 from scipy.stats import binomtest
 
-from blocksim.study.calibrate.objective import Score, hits_of, miss_of, score_of
-from blocksim.study.members import Member
-from blocksim.study.targets import Range
+from blocksim.study.calibrate_search import Score, hits_of, miss_of, score_of
+from blocksim.study.executors.ensemble import Member
+from blocksim.study.rows import Range
 
 RANGES = (Range("1", "x_mm", 10.0, 14.0), Range("2", "rotation_deg", -95.0, -85.0))
 

@@ -3,7 +3,7 @@
 import pytest
 
 from blocksim.scenario.models.variation import Uniform
-from blocksim.study.calibrate.prior import Prior, prior_of, si_number
+from blocksim.study.calibrate_plan import Prior, prior_of, si_number
 
 FRICTION = Prior("friction.block_block.kinetic", 0.17, 0.31)
 OVERLAP = Prior("structures.0.overlap", 9.5, 10.5, "mm")

@@ -5,7 +5,7 @@ import pytest
 
 from blocksim.scenario import Sweep
 from blocksim.scenario.models.variation import Normal, Uniform
-from blocksim.study.calibrate.scatter import Scatter, about
+from blocksim.study.calibrate_plan import Scatter, about
 
 OVERLAP, KINETIC = "structures.0.overlap", "friction.block_block.kinetic"
 

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import InvalidInputError, OutputExistsError
-from blocksim.study.calibrate.objective import Score
-from blocksim.study.calibrate.prior import Prior
-from blocksim.study.calibrate.search import FIRST, Trial, opened, search
+from blocksim.study.calibrate_plan import Prior
+from blocksim.study.calibrate_search import FIRST, Score, Trial, opened, search
 
 PRIORS = (Prior("a", 0.0, 1.0), Prior("b", 10.0, 20.0, "mm"))
 PLAN = {"scenario": "one", "seed": 3}

@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.scenario import Document
 from blocksim.study.executors.dask import silence
-from blocksim.study.many import sweep
+from blocksim.study.sweep import sweep
 from tests.study.conftest import SCENARIOS
 
 COUNT = 400

@@ -7,13 +7,11 @@ import pytest
 
 from blocksim.errors import UnavailableError
 from blocksim.scenario import Document
-from blocksim.study.executors import EXECUTORS, batches, executor_named
-from blocksim.study.executors.batches import GROWTH, MOST, BatchSize, take
-from blocksim.study.executors.task import Setting, Task
-from blocksim.study.many import sweep
-from blocksim.study.merge import merge
+from blocksim.study import executors as batches
+from blocksim.study.executors import EXECUTORS, GROWTH, MOST, BatchSize, Setting, Task, executor_named, take
 from blocksim.study.plan import Values
-from blocksim.study.shard import Shard
+from blocksim.study.progress import Shard
+from blocksim.study.sweep import merge, sweep
 
 KINETIC = "friction.block_block.kinetic"
 # values that finish, fail in the run, fail before it, and do not go together; other shapes and schemes beside them

@@ -1,6 +1,6 @@
 """Which values go together without chance."""
 
-from blocksim.study.sampling.design import Combinations, Together
+from blocksim.study.design import Combinations, Together
 
 
 def test_combinations_go_through_the_last_key_first() -> None:

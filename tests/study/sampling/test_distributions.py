@@ -7,9 +7,7 @@ import pytest
 
 from blocksim.scenario import Document
 from blocksim.scenario.models.variation import Normal, Uniform
-from blocksim.study.sampling.distributions import drawn
-from blocksim.study.sampling.draws import open_interval
-from blocksim.study.sampling.modes import design_of
+from blocksim.study.sampling import design_of, drawn, open_interval
 from tests.study.sampling.plans import OVERLAP, SCALE, sweep_of
 
 MIDDLES = (np.arange(10_000) + 0.5) / 10_000

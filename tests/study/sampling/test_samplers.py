@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from blocksim import extras
 from blocksim.errors import UnavailableError
 from blocksim.scenario import Document, Sweep
-from blocksim.study.sampling.modes import design_of, remarks
+from blocksim.study.sampling import design_of, remarks
 from tests.study.sampling.plans import OVERLAP, RATIO, SCALE, TILT, sweep_of
 
 UNIT = {"from": 1, "to": 2}  # minus 1: the places themselves

@@ -6,9 +6,9 @@ import pytest
 
 from blocksim.errors import BlocksimError
 from blocksim.scenario import Document
+from blocksim.study import design as mode
 from blocksim.study.plan import cases_of, with_sweep
-from blocksim.study.sampling import table as mode
-from blocksim.study.sampling.modes import design_of
+from blocksim.study.sampling import design_of
 
 GOOD = """\
 # overlaps measured with a feeler gauge

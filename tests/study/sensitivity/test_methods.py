@@ -8,10 +8,8 @@ import pytest
 
 from blocksim.extras import loaded
 from blocksim.scenario.models.variation import Normal, Uniform, Variation
-from blocksim.study.sensitivity.methods import METHODS
-from blocksim.study.sensitivity.methods.method import Floats, unit_cube
-from blocksim.study.sensitivity.outputs import Output
-from blocksim.study.sensitivity.sensitivity import Indices, indices_of, settings_at
+from blocksim.study.sensitivity import Indices, Output, indices_of, settings_at
+from blocksim.study.sensitivity_methods import METHODS, Floats, unit_cube
 
 Function = Callable[..., Floats]
 G_WEIGHTS = np.array([0.0, 1.0, 4.5, 9.0, 99.0])

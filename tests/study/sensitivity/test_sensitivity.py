@@ -7,8 +7,8 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Document, Sweep
-from blocksim.study.sensitivity.methods import METHODS
-from blocksim.study.sensitivity.sensitivity import Sensitivity, TooManyFailuresError, sensitivity
+from blocksim.study.sensitivity import Sensitivity, TooManyFailuresError, sensitivity
+from blocksim.study.sensitivity_methods import METHODS
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 SPEED, FRICTION = "bodies.0.velocity.0", "friction.block_ground"

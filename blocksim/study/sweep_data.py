@@ -14,12 +14,10 @@ from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario import quantities as q
 from blocksim.scenario.keys import KeyPath, field_at, follow, parse_key
 from blocksim.scenario.models.variation import Normal, Uniform
-from blocksim.study.heads import Head
-from blocksim.study.places import FINISHED
-from blocksim.study.ranges import Ranges
-from blocksim.study.rows import blocks_in
+from blocksim.study.rows import Head, Ranges, blocks_in
+from blocksim.study.stored_run import FINISHED
 from blocksim.study.sweep_folder import PLAN
-from blocksim.study.table import TABLE, read_sweep
+from blocksim.study.sweep_table import TABLE, read_sweep
 from blocksim.view.series import Typed
 from blocksim.view.sweeps.found import QUARTER, FoundSweep, Input, Measured
 
@@ -27,7 +25,7 @@ Floats = NDArray[np.float64]
 LARGEST = 1e30  # of inputs (SI) and of places (mm) that are drawn
 
 
-def read_found(folder: Path, experiment: Path | None = None) -> FoundSweep:
+def read_sweep_data(folder: Path, experiment: Path | None = None) -> FoundSweep:
     """Return what a sweep's folder holds, beside the scenario's experiment or another table.
 
     Raises InputMissingError or InvalidInputError: where files are missing or damaged, no case has finished, or the

@@ -1,4 +1,6 @@
-"""Mode "table": the rows of a CSV file, one case a row.
+"""The values of all cases of a sweep whose values are given: as lists, or in a table. Each case is made when asked for.
+
+In mode "table" every row of a CSV file is a case:
 
     # overlaps measured with a feeler gauge
     structures.0.overlap [mm],friction.block_block.kinetic,time.scheme
@@ -10,24 +12,96 @@ in a scenario ("10.1 mm"). Lines that begin with `#` are notes.
 """
 
 import functools
+import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from abc import abstractmethod
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import overload
 
 from blocksim.analysis.cells import NUMBER, Cell, raise_problems, read_open_table
 from blocksim.errors import Problem
 from blocksim.scenario import Document, Sweep
 from blocksim.scenario import quantities as q
 from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, unfit_to_vary
+from blocksim.scenario.models.variation import Variation
 from blocksim.scenario.overrides import parse_value
-from blocksim.study.sampling.design import Design, Together
 
+Settings = dict[str, object]
+"""Dotted key and value of everything that one case sets."""
 LARGEST_FILE = 20_000_000  # bytes
 MOST_TRIED = 50
 """Different values of a column that are tried by themselves, beside its least and its greatest number."""
 HEAD = re.compile(r"(?P<key>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
 WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
+
+
+@dataclass(frozen=True)
+class Design(Sequence[Settings]):
+    """A sequence of settings made from one column of values a key."""
+
+    columns: Mapping[str, Sequence[object]]
+
+    @abstractmethod
+    def __len__(self) -> int:
+        """Return the number of cases."""
+
+    @abstractmethod
+    def row(self, number: int) -> Settings:
+        """Return the settings of a case, 0 <= number < len."""
+
+    @overload
+    def __getitem__(self, number: int) -> Settings: ...
+    @overload
+    def __getitem__(self, number: slice) -> Sequence[Settings]: ...
+    def __getitem__(self, number: int | slice) -> Settings | Sequence[Settings]:
+        if isinstance(number, slice):
+            return [self.row(index) for index in range(len(self))[number]]
+        return self.row(range(len(self))[number])
+
+
+class Together(Design):
+    """The k-th case has the k-th value of every key; all columns are equally long."""
+
+    def __len__(self) -> int:
+        """Return the length of any column."""
+        return len(next(iter(self.columns.values())))
+
+    def row(self, number: int) -> Settings:
+        """Return the values of one row."""
+        return {key: column[number] for key, column in self.columns.items()}
+
+
+class Combinations(Design):
+    """Every value of every key with all values of the others; the last key changes fastest."""
+
+    def __len__(self) -> int:
+        """Return the product of the lengths."""
+        return math.prod(len(column) for column in self.columns.values())
+
+    def row(self, number: int) -> Settings:
+        """Return one combination, from the digits of its number."""
+        settings: Settings = {}
+        for key, column in reversed(list(self.columns.items())):
+            number, place = divmod(number, len(column))
+            settings[key] = column[place]
+        return {key: settings[key] for key in self.columns}
+
+
+def levels_of(values: Variation) -> tuple[object, ...]:
+    """Return the values of a list; a distribution, which no mode without samples accepts, has none to list."""
+    return values if isinstance(values, tuple) else ()
+
+
+def grid(sweep: Sweep) -> Design:
+    """Return all combinations; the last key changes fastest."""
+    return Combinations({key: levels_of(values) for key, values in sweep.vary.items()})
+
+
+def listed(sweep: Sweep) -> Design:
+    """Return one case for every place in the lists, which are equally long."""
+    return Together({key: levels_of(values) for key, values in sweep.vary.items()})
 
 
 @dataclass(frozen=True)

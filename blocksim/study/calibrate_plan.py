@@ -1,24 +1,31 @@
-"""What a calibration is asked for, checked before anything runs."""
+"""What a calibration is asked for, checked before anything runs: priors of what is fitted, and scatter of inputs."""
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import ceil, exp, log, log10, sqrt
 from pathlib import Path
 
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, Problem, ScenarioError
 from blocksim.scenario import Document, Scenario, Sweep, scenario_hash
+from blocksim.scenario import quantities as q
 from blocksim.scenario.keys import parse_key
-from blocksim.scenario.models.variation import Uniform
+from blocksim.scenario.models.variation import Uniform, Variation, written
 from blocksim.scenario.reach import said_by_hand
+from blocksim.scenario.units import parse_unit
 from blocksim.simulation.atomic import sha256_of
 from blocksim.simulation.provenance import code_hash
-from blocksim.study.calibrate.prior import Prior, prior_of
-from blocksim.study.calibrate.scatter import Scatter
-from blocksim.study.single import check_experiment
-from blocksim.study.targets import Range, ranges_of
-from blocksim.study.variation import Variations, varied
+from blocksim.study.plan import Variations, varied
+from blocksim.study.rows import Range, check_experiment, ranges_of
+from blocksim.study.sampling import design_of
 
+STEPS = 1000  # as fine as this part of the prior are the values that are tried
+AT_BOUND = 0.01  # of the prior's width: nearer to a bound, a value is reported to lie at it
+_UNIT = re.compile(r"\s*[-+]?[0-9._]+(?:[eE][-+]?[0-9]+)?\s*(.*?)\s*", re.DOTALL)
+SAME = "sobol"  # the same points for every trial: trials differ by their values only
+FRESH = "normal"  # independent draws, from streams of their own
 FIT, SCATTER = "--fit", "--scatter"
 MODE = "sobol"
 TABLE = "experiment.table"
@@ -27,6 +34,127 @@ NO_SCATTER = (
     "no input scatter: give --scatter KEY=MEAN+-SD (or KEY=FROM:TO), or a [sweep] table with distributions; "
     "--members 1 fits a single run, whose agreement may be luck"
 )
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Bounds of a key, in `unit` (empty: plain numbers, or SI); `log`: even in the logarithm."""
+
+    key: str
+    low: float
+    high: float
+    unit: str = ""
+    log: bool = False
+
+    def at(self, share: float) -> float:
+        """Return the number at a share (0 to 1) of the prior."""
+        if not self.log:
+            return self.low + share * (self.high - self.low)
+        return exp(log(self.low) + share * (log(self.high) - log(self.low)))
+
+    def value(self, number: float) -> object:
+        """Return a number as a scenario takes it, rounded to what matters and never outside the bounds."""
+        width = self.high - self.low
+        finest = min(width, abs(number)) if self.log and number else width
+        digits = ceil(log10(STEPS / finest))
+        within = min(max(round(number, digits), self.low), self.high)
+        return f"{within:.12g} {self.unit}" if self.unit else within
+
+    def number(self, value: object) -> float:
+        """Return the number in a value that `value` gave."""
+        return float(str(value).split(" ", maxsplit=1)[0])
+
+    def lies_at_bound(self, value: object) -> bool:
+        """Return True if a value is within a hundredth of the prior's width of one of its ends."""
+        ends, number = (self.low, self.high), self.number(value)
+        if self.log:
+            ends, number = (log(self.low), log(self.high)), log(number)
+        return min(number - ends[0], ends[1] - number) <= AT_BOUND * (ends[1] - ends[0])
+
+    def __str__(self) -> str:
+        """Write the range as a person does: "0.17-0.31"."""
+        unit = f" {self.unit}" if self.unit else ""
+        return f"{self.low:g} to {self.high:g}{unit}"
+
+
+def prior_of(key: str, table: Uniform, written: object) -> Prior:
+    """Return the prior that a distribution says; `written` is its lower end as the user wrote it, for the unit."""
+    unit = unit_of(written)
+    if not unit:
+        return Prior(key, table.low, table.high, "rad" if table.angle else "", table.scale == "log")
+    factor = float(parse_unit(unit).factor)
+    low, high = (float(f"{end / factor:.12g}") for end in (table.low, table.high))
+    return Prior(key, low, high, unit, table.scale == "log")
+
+
+def unit_of(written: object) -> str:
+    """Return the unit in a text such as "9.5 mm", empty where there is none."""
+    found = _UNIT.fullmatch(written) if isinstance(written, str) else None
+    return "" if found is None else found[1]
+
+
+def si_number(value: object) -> float:
+    """Return the SI number of a value as a scenario takes it."""
+    return q.parse_quantity(value)[0] if isinstance(value, str) else float(str(value))
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Distributions of scenario keys; `plan` is None where nothing scatters."""
+
+    plan: Sweep | None
+
+    def members(self, fitted: Mapping[str, object], count: int, seed: int) -> Iterator[dict[str, object]]:
+        """Yield the values of the members of a trial: the same points of the unit cube for every trial."""
+        return self._drawn(fitted, SAME, count, seed)
+
+    def fresh_members(self, fitted: Mapping[str, object], count: int, seed: int) -> Iterator[dict[str, object]]:
+        """Yield the values of members drawn independently, from random numbers that no trial has seen."""
+        return self._drawn(fitted, FRESH, count, seed)
+
+    def _drawn(self, fitted: Mapping[str, object], mode: str, count: int, seed: int) -> Iterator[dict[str, object]]:
+        if self.plan is None:
+            yield from (dict(fitted) for _ in range(count))
+            return
+        plan = self.plan.model_copy(update={"mode": mode, "samples": count, "seed": seed})
+        names = {parse_key(key): key for key in fitted}
+        for row in design_of(plan):
+            values = dict(fitted)
+            for key, value in row.items():
+                name = names.get(parse_key(key), key)
+                values[name] = about(plan.vary[key], value, fitted[name]) if name in fitted else value
+            yield values
+
+    def described(self) -> dict[str, str]:
+        """Return every key with its distribution in words."""
+        return {} if self.plan is None else {key: in_words(values) for key, values in self.plan.vary.items()}
+
+
+def about(distribution: Variation, drawn: object, fitted: object) -> object:
+    """Return a drawn value moved so that the distribution lies about the fitted value.
+
+    By the difference to its mean or middle, or by the ratio where its logarithm is evenly distributed.
+    """
+    assert not isinstance(distribution, tuple)  # noqa: S101 - levels are refused when the plan is read
+    number, centre = si_number(drawn), si_number(fitted)
+    if isinstance(distribution, Uniform) and distribution.scale == "log":
+        moved = number * centre / sqrt(distribution.low * distribution.high)
+    elif isinstance(distribution, Uniform):
+        moved = number - 0.5 * (distribution.low + distribution.high) + centre
+    else:
+        moved = number - distribution.mean + centre
+    return written(moved, angle=distribution.angle)
+
+
+def in_words(values: Variation) -> str:
+    """Write a distribution for a message or for provenance, in SI."""
+    if isinstance(values, tuple):
+        return " or ".join(map(str, values))
+    table = values.as_table()
+    if "mean" in table:
+        bounds = f" in {table['from']}-{table['to']}" if {"from", "to"} <= set(table) else ""
+        return f"{table['mean']} +- {table['sd']}{bounds}"
+    return f"{table['from']} to {table['to']}" + (", log" if "scale" in table else "")
 
 
 @dataclass(frozen=True)

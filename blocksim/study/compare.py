@@ -3,29 +3,38 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
-from blocksim.analysis.compare import Comparison
-from blocksim.analysis.experiment import load_table
+from blocksim.analysis.compare import Comparison, compare_final
+from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.analysis.judgement import Judgement, Settings, judge
 from blocksim.analysis.members import Members
-from blocksim.errors import InputMissingError
-from blocksim.scenario import Scenario, load_stored
+from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.scenario import Scenario, load_scenario, load_stored
+from blocksim.simulation import Result
+from blocksim.simulation import folder as files
+from blocksim.simulation.result import read_final
+from blocksim.simulation.summary import read_summary
+from blocksim.study.stored_run import FINISHED, find_run
 from blocksim.study.sweep_folder import PLAN
-from blocksim.study.table import TABLE, SweepResult, read_sweep
+from blocksim.study.sweep_table import TABLE, SweepResult, read_sweep
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from blocksim.simulation import Result
-
 
 @overload
 def compare(run: SweepResult, experiment: Path | str | None = None, settings: Settings | None = None) -> Judgement: ...
+
+
 @overload
 def compare(run: "Result | pd.DataFrame", experiment: Path | str | None = None) -> Comparison: ...
+
+
 @overload
 def compare(
     run: Path | str, experiment: Path | str | None = None, settings: Settings | None = None
 ) -> Comparison | Judgement: ...
+
+
 def compare(
     run: "SweepResult | Result | pd.DataFrame | Path | str",
     experiment: Path | str | None = None,
@@ -33,15 +42,13 @@ def compare(
 ) -> Comparison | Judgement:
     """Compare a run, or a sweep or its folder, with an experiment table.
 
-    A run is what `blocksim.study.single.compare` takes; `settings` are for sweeps. Raises what `compare` and
+    A run is what `compare_run` takes; `settings` are for sweeps. Raises what `compare` and
     `compare_sweep` raise.
     """
     if isinstance(run, SweepResult):
         return compare_sweep(run, experiment, settings)
     if isinstance(run, Path | str) and is_sweep(run):
         return compare_sweep(run, experiment, settings)
-    from blocksim.study.single import compare as compare_run  # noqa: PLC0415 - the solver, which no table needs
-
     return compare_run(run, experiment)
 
 
@@ -83,3 +90,38 @@ def _remarks(scenario: Scenario | None) -> tuple[str, ...]:
         f"mode {plan.mode!r} chooses its members: shares count them, they are no probabilities",
         "the 95 % limits hold for samples only (modes lhs, sobol, normal)",
     )
+
+
+def compare_run(run: "Result | pd.DataFrame | Path | str", experiment: Path | str | None = None) -> Comparison:
+    """Compare a result, a final table or what `find_run` understands with an experiment table.
+
+    Without `experiment` the table that the run's scenario names is taken. Raises InputMissingError without any table,
+    InvalidInputError for a run that did not finish.
+    """
+    if isinstance(run, Result):
+        _refuse_unfinished(run.name, run.status, run.reason)
+        return compare_final(run.columns, _table(experiment, run.experiment))
+    if not isinstance(run, Path | str):
+        return compare_final(run, _table(experiment, None))
+    folder = find_run(run)
+    summary = read_summary(folder / files.SUMMARY)
+    _refuse_unfinished(str(folder), summary.status, summary.reason)
+    was = load_stored(folder / files.SCENARIO)
+    # a scenario file may name another table by now than it did when it was run
+    named = (load_scenario(run) if Path(run).is_file() else was).experiment
+    return compare_final(read_final(folder, was), _table(experiment, named.table if named else None))
+
+
+def _table(given: Path | str | None, named: Path | None) -> ExperimentTable:
+    table = given or named
+    if table is None:
+        message = "the scenario names no experiment; give a table with --experiment"
+        raise InputMissingError(message)
+    return load_table(table)
+
+
+def _refuse_unfinished(name: str, status: str, reason: str) -> None:
+    if status != FINISHED:
+        verb = "was" if status == "interrupted" else "has"
+        message = f"{name}: this run {verb} {status} ({reason}); only a finished run can be compared"
+        raise InvalidInputError(message)

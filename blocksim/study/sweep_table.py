@@ -14,14 +14,10 @@ from typing import TYPE_CHECKING
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.limited import MEGABYTE, refuse_large
 from blocksim.simulation.atomic import writing
-from blocksim.study.done import Done
-from blocksim.study.heads import told
-from blocksim.study.places import FINISHED, SWEEP
 from blocksim.study.plan import Cases
-from blocksim.study.ranges import Ranges
-from blocksim.study.rows import KEPT, MOVEMENT
-from blocksim.study.shard import WHOLE, Shard
-from blocksim.study.spreadsheet import as_cell
+from blocksim.study.progress import WHOLE, CaseIndex, Shard
+from blocksim.study.rows import KEPT, MOVEMENT, Ranges, as_cell, told
+from blocksim.study.stored_run import FINISHED, SWEEP
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,7 +38,7 @@ class SweepTable:
 
     path: Path
     cases: Cases
-    done: Done
+    done: CaseIndex
     ranges: Ranges | None
     shard: Shard = WHOLE
     next_at: float = field(default_factory=lambda: time.monotonic() + SOONEST)

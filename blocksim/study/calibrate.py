@@ -8,12 +8,20 @@ from blocksim.errors import InvalidInputError, OutputExistsError, StoppedEarlyEr
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.stopping import interruptible
-from blocksim.study.calibrate.objective import Hit, Score, hits_of, score_of
-from blocksim.study.calibrate.plan import Plan
-from blocksim.study.calibrate.prior import Prior
-from blocksim.study.calibrate.search import Trial, finished_trials, opened, refuse_other_file, search
-from blocksim.study.calibrate.written import with_fitted
-from blocksim.study.members import Values, run_members
+from blocksim.study.calibrate_plan import Plan, Prior
+from blocksim.study.calibrate_search import (
+    Hit,
+    Score,
+    Trial,
+    finished_trials,
+    hits_of,
+    opened,
+    refuse_other_file,
+    score_of,
+    search,
+)
+from blocksim.study.executors.ensemble import Values, run_members
+from blocksim.study.fitted_file import with_fitted
 
 TRIALS = 100
 MEMBERS = 64

@@ -7,36 +7,37 @@ table is written from the manifest: it depends neither on the executor nor on th
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
+from dataclasses import dataclass, field
 from multiprocessing import current_process
 from pathlib import Path
+from typing import NamedTuple
 
-from blocksim.errors import InvalidInputError
+from blocksim.errors import InputMissingError, InvalidInputError, StoppedEarlyError, UnavailableError
 from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
 from blocksim.scenario.models.study import Sweep
 from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernel_set
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
-from blocksim.study import manifest
-from blocksim.study.done import Done
-from blocksim.study.executors import DEFAULT, WITH_FOLDERS, WITH_SCHEDULER, executor_named
-from blocksim.study.executors.task import Setting
-from blocksim.study.manifest import Manifest
+from blocksim.simulation.stopping import stop_requests
+from blocksim.study.design import levels_of
+from blocksim.study.executors import DEFAULT, WITH_FOLDERS, WITH_SCHEDULER, Batch, Run, Setting, Task, executor_named
 from blocksim.study.plan import Cases, Values, cases_of, with_sweep
-from blocksim.study.ranges import Ranges
-from blocksim.study.sampling.design import levels_of
-from blocksim.study.shard import WHOLE, Shard
-from blocksim.study.single import check_experiment
-from blocksim.study.sweep_folder import CASES, PLAN, prepare
-from blocksim.study.sweeping import OnRow, Sweeping
-from blocksim.study.table import TABLE, SweepResult, SweepTable, read_sweep
-from blocksim.study.timings import Timings
-
-__all__ = ["PLAN", "TABLE", "OnRow", "SweepResult", "kernels_for", "read_sweep", "sweep", "sweep_hash"]
+from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Entry, Manifest, Shard, Timings, values_hash
+from blocksim.study.rows import Ranges, Row, check_experiment, invalid_row
+from blocksim.study.stored_run import FINISHED
+from blocksim.study.sweep_folder import CASES, prepare, read_plan
+from blocksim.study.sweep_table import TABLE, SweepResult, SweepTable
 
 TIMINGS = "timings.csv"
 MEASURED = "experiment.table"
+MOST_INVALID = 500  # kept in memory before they are written
+AGAIN = "rerun the command to finish"
+OnRow = Callable[[int, int, Row], None]
+SHARDED = re.compile(r"manifest-\d+-of-(\d+)\.jsonl")
+MOST_TOLD = 20
 
 
 def sweep(  # noqa: PLR0913 - one argument for each option of the command
@@ -85,13 +86,13 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     prepare(folder, base, name, overwrite=overwrite)
     for kernels in kernels_for(document):
         compile_kernels(kernels)
-    with closing(Manifest(folder / shard.file(manifest.NAME))) as kept:
-        done = Done(folder, len(cases))
+    with closing(Manifest(folder / shard.file(MANIFEST))) as kept:
+        done = CaseIndex(folder, len(cases))
         if retry_failed:
             done.forget_failed(shard)
         table = SweepTable(folder / shard.file(TABLE), cases, done, ranges_of(base), shard)
         timings = Timings(folder / shard.file(TIMINGS), executor)
-        Sweeping(cases, shard, kept, done, table, timings, on_row).run(runner.run, setting, fail_fast=fail_fast)
+        SweepRun(cases, shard, kept, done, table, timings, on_row).run(runner.run, setting, fail_fast=fail_fast)
     return SweepResult(folder, shard.file(TABLE), len(done.state[shard.slice]))
 
 
@@ -160,3 +161,131 @@ def kernels_for(document: Document) -> tuple[str, ...]:
     schemes = (base.time.scheme, *map(str, levels_of(vary.get("time.scheme", ()))))
     models = (base.contact.model, *map(str, levels_of(vary.get("contact.model", ()))))
     return tuple(dict.fromkeys(kernel_set(scheme, model) for scheme in schemes for model in models))
+
+
+class Ended(NamedTuple):
+    """A case that has its row."""
+
+    number: int
+    name: str
+    settings: dict[str, object]
+    row: Row
+
+
+@dataclass
+class SweepRun:
+    """One process's share of a sweep."""
+
+    cases: Cases
+    shard: Shard
+    manifest: Manifest
+    done: CaseIndex
+    table: SweepTable
+    timings: Timings
+    on_row: OnRow
+    invalid: list[Ended] = field(default_factory=list)
+
+    def run(self, executor: Run, setting: Setting, *, fail_fast: bool) -> None:
+        """Run what has no row yet. Raises StoppedEarlyError on Ctrl-C; what has ended by then is kept."""
+        try:
+            with stop_requests() as is_stopped:
+                setting = Setting(setting.jobs, is_stopped, setting.scheduler, setting.folder)
+                self._run(executor, setting, fail_fast=fail_fast)
+                stopped = is_stopped()
+        except KeyboardInterrupt:
+            stopped = True
+        except UnavailableError:
+            self.table.write()
+            raise
+        self.table.write()
+        if stopped and self.done.count(self.shard) < self.count:
+            message = f"stopped with {self.done.count(self.shard)} of {self.count} cases done; {AGAIN}"
+            raise StoppedEarlyError(message)
+
+    @property
+    def count(self) -> int:
+        """How many cases there are in this share."""
+        return len(self.done.state[self.shard.slice])
+
+    def _run(self, executor: Run, setting: Setting, *, fail_fast: bool) -> None:
+        # closed here and now: left to the garbage collector, workers would continue
+        with closing(executor(self._tasks(), setting)) as batches:
+            for batch in batches:
+                has_failed = self._keep_batch(batch)
+                self.table.write_now_and_then()
+                if fail_fast and has_failed:
+                    return
+        self._keep_invalid()
+
+    def _tasks(self) -> Iterator[Task]:
+        """Make one task after the other; cases that cannot be run get their rows on the way."""
+        for number in self.shard.numbers(len(self.cases)):
+            if self.done.holds(number, self.cases.design[number]):
+                continue
+            case = self.cases[number]
+            if case.scenario is not None:
+                yield Task(number, case.name, case.settings, case.scenario)
+                continue
+            self.invalid.append(Ended(number, case.name, case.settings, invalid_row(case.problem)))
+            if len(self.invalid) >= MOST_INVALID:
+                self._keep_invalid()
+
+    def _keep_batch(self, batch: Batch) -> bool:
+        """Keep rows, and return whether one of them is of a case that failed."""
+        ended = [
+            Ended(task.number, task.name, task.settings, row) for task, row in zip(batch.tasks, batch.rows, strict=True)
+        ]
+        has_failed = bool(self.invalid) or any(one.row["status"] != FINISHED for one in ended)
+        self._keep(ended)
+        self._keep_invalid()
+        self.timings.append((one.name for one in ended), batch.seconds, batch.host)
+        return has_failed
+
+    def _keep_invalid(self) -> None:
+        ended, self.invalid = self.invalid, []
+        self._keep(ended)
+
+    def _keep(self, ended: list[Ended]) -> None:
+        """Bring rows to the disk, and then tell of them."""
+        if not ended:
+            return
+        entries = [Entry(one.number, one.name, values_hash(one.settings), one.row) for one in ended]
+        for start, entry in zip(self.manifest.append(entries), entries, strict=True):
+            self.done.note(self.manifest.path, start, entry)
+        before = self.done.count(self.shard) - len(ended)
+        for position, one in enumerate(ended, start=1):
+            self.on_row(before + position, self.count, {"case": one.name, **one.settings, **one.row})
+
+
+def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
+    """Write sweep.csv from everything that has been run in a folder, by shards or not.
+
+    Raises InputMissingError where no sweep is there, and InvalidInputError, with a list of shards, where cases are
+    missing, unless that is allowed.
+    """
+    folder = Path(folder)
+    document = read_plan(folder)
+    base = document.build()
+    cases = cases_in(document)
+    done = CaseIndex(folder, len(cases))
+    if not done.paths:
+        message = f"{folder}: no case of this sweep has been run yet"
+        raise InputMissingError(message)
+    for number, settings in enumerate(cases.design):
+        done.holds(number, settings)
+    if done.count() < len(cases) and not allow_missing:
+        raise InvalidInputError("\n".join(_what_is_missing(folder, done, len(cases))))
+    SweepTable(folder / TABLE, cases, done, ranges_of(base)).write()
+    return SweepResult(folder, planned=len(cases))
+
+
+def _what_is_missing(folder: Path, done: CaseIndex, count: int) -> Iterator[str]:
+    """Tell it by shards, those of the job array with the most jobs where there were several."""
+    yield f"{folder}: {count - done.count()} of {count} cases are missing; --allow-missing makes a table without them"
+    of = max((int(match[1]) for path in done.paths if (match := SHARDED.fullmatch(path.name))), default=1)
+    shards = [(shard, len(shard.numbers(count))) for shard in (Shard(index, of) for index in range(of))]
+    missing = [(shard, size - done.count(shard), size) for shard, size in shards if done.count(shard) < size]
+    if of > 1:
+        yield from (f"  --shard {shard}: {left} of {size} missing" for shard, left, size in missing[:MOST_TOLD])
+        if len(missing) > MOST_TOLD:
+            yield f"  and {len(missing) - MOST_TOLD} more shards"

@@ -1,0 +1,298 @@
+"""The state of a sweep on the disk: what has been run, by all processes that share its folder.
+
+manifest.jsonl: what has been run of a sweep, a line a case, so written that a kill at any moment loses no line.
+
+A line is one JSON object: `number` (of the case in the plan), `case` (hash of its run), `values` (hash of its varied
+values), `row` (what sweep.csv tells of it), and last `sum`, the CRC-32 of all before. A line whose sum is wrong (torn
+by a kill, or by a full disk) counts as not written.
+
+timings.csv has what the cases cost, apart from what they came to, which is the same on every machine.
+"""
+
+import csv
+import hashlib
+import io
+import itertools
+import json
+import math
+import os
+import re
+import zlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import Any, BinaryIO, Self
+
+import numpy as np
+
+from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
+from blocksim.scenario.limited import open_regular
+from blocksim.simulation.folder import takes_lock
+from blocksim.study.rows import Row, as_cell, blocks_in
+from blocksim.study.stored_run import FINISHED
+
+SHARD_FORM = re.compile(r"(\d{1,6})/(\d{1,6})")
+MANIFEST = "manifest.jsonl"
+PATTERN = "manifest*.jsonl"
+DIGITS = 12
+SUM = b',"sum":"'
+NEWLINE = b"\n"
+NO_LINK = getattr(os, "O_NOFOLLOW", 0)
+LONGEST = 1 << 30
+"""Bytes of a line that are read at once; a row of a million blocks has 200 million."""
+MISSING, ENDED_WELL, ENDED_BADLY = range(3)
+TIMING_COLUMNS = ("case", "executor", "seconds", "host")
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Every `of`-th case, beginning with number `index`; both count from 0 as job arrays do."""
+
+    index: int = 0
+    of: int = 1
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Read "i/n". Raises InvalidInputError unless 0 <= i < n."""
+        match = SHARD_FORM.fullmatch(text.strip())
+        shard = None if match is None else cls(int(match[1]), int(match[2]))
+        if shard is None or shard.index >= shard.of:
+            message = f"--shard {text}: write I/N with I from 0 to N - 1, such as 0/8 for the first of eight"
+            raise InvalidInputError(message)
+        return shard
+
+    def __str__(self) -> str:
+        """Return "i/n"."""
+        return f"{self.index}/{self.of}"
+
+    @property
+    def slice(self) -> slice:
+        """The numbers of its cases, among those of all cases."""
+        return slice(self.index, None, self.of)
+
+    def numbers(self, count: int) -> range:
+        """Return the numbers of its cases where there are `count` in all."""
+        return range(count)[self.slice]
+
+    def file(self, name: str) -> str:
+        """Return the name of its own file: sweep.csv, or sweep-0-of-8.csv."""
+        path = PurePath(name)
+        return name if self.of == 1 else f"{path.stem}-{self.index}-of-{self.of}{path.suffix}"
+
+
+WHOLE = Shard()
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One case that has ended: its number, the name of its run, the hash of its values, its row."""
+
+    number: int
+    case: str
+    values: str
+    row: Row
+
+    def to_line(self) -> bytes:
+        """Return the line of the manifest; numbers that are not finite become null."""
+        row = {name: None if _is_not_finite(value) else value for name, value in self.row.items()}
+        data = {"number": self.number, "case": self.case, "values": self.values, "row": row}
+        head = json.dumps(data, separators=(",", ":")).encode()[:-1]
+        return b'%s%s%08x"}\n' % (head, SUM, zlib.crc32(head))
+
+    @classmethod
+    def from_line(cls, line: bytes) -> Self | None:
+        """Return the entry of a line, or None where the line is not whole."""
+        head, _, end = line.rpartition(SUM)
+        if end != b'%08x"}\n' % zlib.crc32(head):
+            return None
+        try:
+            data = json.loads(head + b"}")
+            parts = (data["number"], data["case"], data["values"], data["row"])
+        except (ValueError, KeyError, TypeError, RecursionError):  # a right sum below what no sweep writes
+            return None
+        return cls(*parts) if _are_parts(*parts) else None
+
+
+def _are_parts(number: Any, case: Any, values: Any, row: Any) -> bool:
+    """Return True if a line holds what a sweep writes, in its types."""
+    is_hash = isinstance(values, str) and re.fullmatch("[0-9a-f]{1,15}", values) is not None
+    return type(number) is int and isinstance(case, str) and is_hash and isinstance(row, dict)
+
+
+def _is_not_finite(value: object) -> bool:
+    return isinstance(value, float) and not math.isfinite(value)
+
+
+def values_hash(settings: dict[str, object]) -> str:
+    """Return a hash of the varied values of a case, in the form in which they were given."""
+    return hashlib.sha256(json.dumps(settings, default=str).encode()).hexdigest()[:DIGITS]
+
+
+class Manifest:
+    """A manifest that this process, and no other, appends to."""
+
+    def __init__(self, path: Path) -> None:
+        """Open the file and keep others out. Raises OutputExistsError where another process has it, and OutputError."""
+        self.path = path
+        try:
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, 0o644)
+        except OSError as error:
+            message = f"{path}: cannot be written: {error.strerror}"
+            raise OutputError(message) from error
+        if not takes_lock(self._file):
+            os.close(self._file)
+            message = f"{path.parent}: this sweep is running already; wait for it, or write elsewhere with --out DIR"
+            raise OutputExistsError(message)
+        self.size = os.fstat(self._file).st_size
+        if self.size and os.pread(self._file, 1, self.size - 1) != NEWLINE:
+            self._write(NEWLINE)  # a line torn by a kill must not take the next one with it
+
+    def append(self, entries: Iterable[Entry]) -> list[int]:
+        """Bring entries to the disk and return where each begins. Raises OutputError (disk full)."""
+        lines = [entry.to_line() for entry in entries]
+        starts = list(itertools.accumulate(map(len, lines), initial=self.size))[:-1]
+        self._write(b"".join(lines))
+        return starts
+
+    def _write(self, content: bytes) -> None:
+        try:
+            left = memoryview(content)
+            while left:
+                left = left[os.write(self._file, left) :]
+            os.fsync(self._file)
+        except OSError as error:
+            message = f"{self.path}: cannot be written: {error.strerror}"
+            raise OutputError(message) from error
+        self.size += len(content)
+
+    def close(self) -> None:
+        """Let others have the file."""
+        os.close(self._file)
+
+
+def is_in_use(path: Path) -> bool:
+    """Return True if another process appends to a manifest."""
+    with open_regular(path) as file:
+        return not takes_lock(file.fileno())
+
+
+def read_entries(path: Path) -> Iterator[tuple[int, Entry]]:
+    """Yield where each whole line of a manifest begins, and its entry."""
+    start = 0
+    with open_regular(path) as file:
+        while line := file.readline(LONGEST):
+            entry = Entry.from_line(line)
+            if entry is not None:
+                yield start, entry
+            start += len(line)
+
+
+class CaseIndex:
+    """Where in the manifests the row of each of n cases is: some bytes a case, whatever its row holds."""
+
+    def __init__(self, folder: Path, count: int) -> None:
+        """Read all manifests of a folder; torn lines are passed over."""
+        self.folder = folder
+        self.state = np.zeros(count, dtype=np.int8)
+        self.starts = np.zeros(count, dtype=np.int64)  # bytes from the begin of the manifest
+        self.values = np.zeros(count, dtype=np.int64)  # hash of the varied values
+        self.sources = np.zeros(count, dtype=np.int16)  # number of the manifest in `paths`
+        self.paths: list[Path] = []
+        self.blocks: dict[tuple[str, ...], int] = {}  # blocks of a row: first case that has such a row
+        for path in sorted(folder.glob(PATTERN)):
+            for start, entry in read_entries(path):
+                self.note(path, start, entry)
+
+    def note(self, path: Path, start: int, entry: Entry) -> None:
+        """Remember where an entry is; one that ended well is not given up for another."""
+        number = entry.number
+        if not 0 <= number < len(self.state) or self.state[number] == ENDED_WELL:
+            return
+        if path not in self.paths:
+            self.paths.append(path)
+        self.state[number] = ENDED_WELL if entry.row.get("status") == FINISHED else ENDED_BADLY
+        self.starts[number], self.sources[number] = start, self.paths.index(path)
+        self.values[number] = int(entry.values, 16)
+        blocks = blocks_in(entry.row)
+        self.blocks[blocks] = min(number, self.blocks.get(blocks, number))
+
+    def forget(self, number: int) -> None:
+        """Have a case run again."""
+        self.state[number] = MISSING
+
+    def forget_failed(self, shard: Shard) -> None:
+        """Have those cases of a shard run again that did not end well."""
+        state = self.state[shard.slice]
+        state[state == ENDED_BADLY] = MISSING
+
+    def holds(self, number: int, settings: dict[str, object]) -> bool:
+        """Return True if a case has a row, and that with these values: other code may have numbered the cases again."""
+        if self.state[number] != MISSING and self.values[number] != int(values_hash(settings), 16):
+            self.forget(number)
+        return bool(self.state[number] != MISSING)
+
+    def count(self, shard: Shard = WHOLE) -> int:
+        """Return how many cases of a shard have a row."""
+        return int(np.count_nonzero(self.state[shard.slice]))
+
+    def all_blocks(self) -> tuple[str, ...]:
+        """Return the blocks of all rows, in the order of the cases in which they first appear."""
+        first = sorted(self.blocks, key=self.blocks.__getitem__)
+        return tuple(dict.fromkeys(block for blocks in first for block in blocks))
+
+    def reader(self) -> "Reader":
+        """Return what reads entries back."""
+        return Reader(self)
+
+
+class Reader:
+    """The manifests, open for reading."""
+
+    def __init__(self, done: CaseIndex) -> None:
+        """Open no file yet."""
+        self.done = done
+        self.files: dict[int, BinaryIO] = {}
+
+    def entry(self, number: int) -> Entry | None:
+        """Return the entry of a case that has a row, or None where the file has changed since."""
+        source = int(self.done.sources[number])
+        if source not in self.files:
+            self.files[source] = open_regular(self.done.paths[source])
+        file = self.files[source]
+        file.seek(int(self.done.starts[number]))
+        return Entry.from_line(file.readline())
+
+    def close(self) -> None:
+        """Close all files."""
+        for file in self.files.values():
+            file.close()
+
+
+class Timings:
+    """A table that grows by a line a case: its share (s) of the wall time of the batch that it was run in."""
+
+    def __init__(self, path: Path, executor: str) -> None:
+        """Begin, or continue with, a table."""
+        self.path, self.executor = path, executor
+
+    def append(self, cases: Iterable[str], seconds: float, host: str) -> None:
+        """Add the cases of a batch that took so long (s). Raises OutputError."""
+        names = list(cases)
+        share = f"{seconds / max(len(names), 1):.6f}"
+        try:
+            is_new = not self.path.exists() or not self.path.stat().st_size
+            text = io.StringIO()
+            writer = csv.writer(text, lineterminator="\n")
+            writer.writerows([TIMING_COLUMNS] if is_new else [])
+            writer.writerows((name, self.executor, share, as_cell(host)) for name in names)
+            with self.path.open("a", encoding="utf-8", newline="") as file:
+                file.write(("" if is_new or self._is_whole() else "\n") + text.getvalue())
+        except OSError as error:
+            message = f"{self.path}: cannot be written: {error.strerror}"
+            raise OutputError(message) from error
+
+    def _is_whole(self) -> bool:
+        """Return True if the last line was not torn by a kill."""
+        with self.path.open("rb") as file:
+            file.seek(-1, os.SEEK_END)
+            return file.read() == b"\n"
