@@ -16,7 +16,7 @@ COUNT = 400
 SCRIPT = f"""
 import os, sys
 from distributed import LocalCluster
-from blocksim.study.many import sweep
+from blocksim.study.sweep import sweep
 from blocksim.scenario import Document
 
 if __name__ == "__main__":

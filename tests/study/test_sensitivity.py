@@ -10,7 +10,7 @@ from blocksim.scenario import Document, Sweep
 from blocksim.study.sensitivity import Sensitivity, TooManyFailuresError, sensitivity
 from blocksim.study.sensitivity_methods import METHODS
 
-SCENARIOS = Path(__file__).parents[3] / "scenarios"
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SPEED, FRICTION = "bodies.0.velocity.0", "friction.block_ground"
 SOFT = {"contact.stiffness_scale": 0.001}
 

@@ -1,4 +1,4 @@
-"""A pool ends with whoever started it, and survives the death of a worker."""
+"""Members run together, and cases kept one by one in folders."""
 
 import os
 import signal
@@ -11,11 +11,47 @@ import pytest
 
 from blocksim.scenario import Document
 from blocksim.simulation import folder as files
+from blocksim.simulation import simulate
 from blocksim.simulation.checkpoint_policy import CheckpointPolicy
 from blocksim.simulation.summary import read_summary
-from blocksim.study.executors.ensemble import run_case
+from blocksim.study.executors.ensemble import BATCH, run_case, run_members
 from blocksim.study.executors.processes import _outcome, run_all
 from blocksim.study.run import run
+
+SCENARIOS = Path(__file__).parents[3] / "scenarios"
+FRICTION = "friction.block_ground"
+
+
+@pytest.fixture(scope="module")
+def slide() -> Document:
+    return Document.read(SCENARIOS / "slide.toml").with_values({"contact.stiffness_scale": 0.001, "time.end": 0.05})
+
+
+def test_member_ends_as_a_run_of_its_own(slide: Document) -> None:
+    (member,) = run_members(slide, [{FRICTION: 0.3}])
+    assert member.final == simulate(slide.with_values({FRICTION: 0.3}).build()).columns
+
+
+def test_members_that_fail_do_not_touch_the_others(slide: Document) -> None:
+    values: list[dict[str, object]] = [
+        {FRICTION: 0.3},
+        {"bodies.0.y": "11 mm"},  # inside the ground
+        {"contact.max_overlap": "1e-12 m"},  # fails on the way
+        {"time.step": "1 s"},  # cannot be started
+        {FRICTION: 0.4},
+    ]
+    members = list(run_members(slide, values))
+    assert [member.final is None for member in members] == [False, True, True, True, False]
+    assert [bool(member.problem) for member in members] == [False, True, True, True, False]
+    assert [members[0], members[4]] == list(run_members(slide, [values[0], values[4]]))
+
+
+def test_members_keep_their_order_beyond_a_batch(slide: Document) -> None:
+    ends = [0.001 + 1e-5 * number for number in range(BATCH + 3)]
+    finals = [member.final for member in run_members(slide, ({"time.end": end} for end in ends))]
+    places = [final["x_mm"][0] for final in finals if final is not None]
+    assert len(places) == len(ends)
+    assert places == sorted(places)
 
 
 def test_dead_worker_fails_its_case_and_says_what_to_do() -> None:

@@ -1,4 +1,4 @@
-"""Mode "table": rows of a file are cases, and mistakes in it are shown in their cells."""
+"""Cases whose values are given: combinations, lists, and tables of cases."""
 
 from pathlib import Path
 
@@ -7,8 +7,24 @@ import pytest
 from blocksim.errors import BlocksimError
 from blocksim.scenario import Document
 from blocksim.study import design as mode
+from blocksim.study.design import Combinations, Together
 from blocksim.study.plan import cases_of, with_sweep
 from blocksim.study.sampling import design_of
+
+
+def test_combinations_go_through_the_last_key_first() -> None:
+    design = Combinations({"a": (1, 2), "b": ("x", "y", "z")})
+    assert [tuple(row.values()) for row in design] == [(1, "x"), (1, "y"), (1, "z"), (2, "x"), (2, "y"), (2, "z")]
+    assert [list(row) for row in design] == [["a", "b"]] * 6
+
+
+def test_any_row_can_be_asked_for_alone() -> None:
+    design = Combinations({str(key): range(10) for key in range(18)})
+    assert len(design) == 10**18
+    assert "".join(str(value) for value in design[123456789012345678].values()) == "123456789012345678"
+    assert design[-1] == dict.fromkeys(design[0], 9)
+    assert Together({"a": (1, 2, 3), "b": (4, 5, 6)})[1:] == [{"a": 2, "b": 5}, {"a": 3, "b": 6}]
+
 
 GOOD = """\
 # overlaps measured with a feeler gauge

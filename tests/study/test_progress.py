@@ -1,4 +1,4 @@
-"""Lines of the manifest are whole, or not there."""
+"""What has been run of a sweep, and that a kill loses no line of it."""
 
 import math
 import zlib
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import OutputExistsError
-from blocksim.study.progress import Entry, Manifest, read_entries
+from blocksim.study.progress import CaseIndex, Entry, Manifest, read_entries, values_hash
 
 ROW: dict[str, object] = {"status": "finished", "reason": 'at "rest",\n', "seconds": 0.1, "1.x_mm": 1.0 / 3.0}
 ENTRIES = [Entry(number, f"{number:012x}", "00ff", {**ROW, "1.y_mm": 0.1 * number}) for number in range(4)]
@@ -75,3 +75,26 @@ def test_second_writer_is_refused_until_the_first_has_gone(tmp_path: Path) -> No
 def test_line_with_a_right_sum_that_no_sweep_has_written_is_passed_over(text: str) -> None:
     head = text.encode()
     assert Entry.from_line(b'%s,"sum":"%08x"}\n' % (head, zlib.crc32(head))) is None
+
+
+ONE: dict[str, object] = {"friction": 0.2}
+OTHER: dict[str, object] = {"friction": 0.3}
+
+
+def entry(status: str, settings: dict[str, object] = ONE) -> Entry:
+    return Entry(0, "case", values_hash(settings), {"status": status})
+
+
+def test_row_of_other_values_is_none_of_this_case(tmp_path: Path) -> None:
+    done = CaseIndex(tmp_path, 1)
+    done.note(tmp_path / "manifest.jsonl", 0, entry("finished"))
+    assert done.holds(0, ONE)
+    assert not done.holds(0, OTHER)
+    assert done.count() == 0
+
+
+def test_case_that_ended_well_stays_so_whatever_comes_after(tmp_path: Path) -> None:
+    done = CaseIndex(tmp_path, 1)
+    for start, status in enumerate(("failed", "finished", "failed")):
+        done.note(tmp_path / "manifest.jsonl", start, entry(status))
+    assert done.starts[0] == 1

@@ -7,7 +7,7 @@ import pytest
 from blocksim.scenario import Document, scenario_hash
 from blocksim.study.fitted_file import toml_value, with_fitted
 
-SCENARIOS = Path(__file__).parents[3] / "scenarios"
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
 KINETIC, RESTITUTION = "friction.block_block.kinetic", "contact.restitution"
 
 
