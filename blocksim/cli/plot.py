@@ -9,11 +9,8 @@ import typer
 
 from blocksim.cli import options
 from blocksim.cli.output import note
-from blocksim.errors import InputMissingError
 from blocksim.simulation.own_files import is_picture, refuse_foreign
-from blocksim.study.pictures import RunLook, draw_indices, draw_run, draw_sweep, refuse
-from blocksim.study.sweep_table import TABLE
-from blocksim.view.kinds import STRIP
+from blocksim.study.pictures import RunLook, draw
 
 
 def plot_command(
@@ -86,19 +83,9 @@ def plot_command(
     asked = RunLook(_moments(times), frames, *chosen, relative, colour, forces)
     paper = options.paper_of(size, dots)
     ready = partial(refuse_foreign, is_own=is_picture, overwrite=overwrite)
-    if not run.exists():
-        message = f"{run}: no such run folder, sweep folder, table or scenario file"
-        raise InputMissingError(message)
-    if (run / TABLE).is_file():
-        refuse(asked.of_runs(), f"{run} is a sweep")
-        picture = draw_sweep(run, out, experiment, kind, paper, ready=ready)
-    elif run.suffix.lower() == ".csv":
-        refuse(asked.of_runs(), f"{run} is a table")
-        picture = draw_indices(run, out, kind, paper, ready=ready)
-    else:
-        picture, remark = draw_run(run, out, asked, experiment, kind or STRIP, paper, ready=ready)
-        if remark:
-            note(remark)
+    picture, remark = draw(run, out, asked, experiment, kind, paper, ready=ready)
+    if remark:
+        note(remark)
     if not quiet:
         note(f"picture: {picture}")
 

@@ -16,14 +16,13 @@ from blocksim.simulation.own_files import is_film, is_picture, is_report, refuse
 from blocksim.study import calibrate as calibration
 from blocksim.study import sensitivity as analysis
 from blocksim.study.calibrate_plan import read_plan
-from blocksim.study.pictures import RunLook, draw_indices, draw_run, draw_sweep
+from blocksim.study.pictures import RunLook, draw
 from blocksim.study.plan import Values, Variations, varied
 from blocksim.study.reporting import report_on
 from blocksim.study.sensitivity_methods import METHODS
 from blocksim.study.stored_run import stored_run
-from blocksim.study.sweep_table import TABLE, SweepResult
+from blocksim.study.sweep_table import SweepResult
 from blocksim.view.animation import Look, Pace, draw_film
-from blocksim.view.kinds import STRIP
 from blocksim.view.paint import paint_named
 from blocksim.view.paper import OWN
 from blocksim.view.support import support_of
@@ -54,15 +53,10 @@ def plot(  # noqa: PLR0913 - one argument for each option of the command
     (default: NAME.png in the current folder). Raises InvalidInputError for an unknown kind or format and for a result
     that was not kept, InputMissingError, OutputExistsError for a file of others unless `overwrite`, OutputError.
     """
-    where, path = _folder(place), None if out is None else Path(out)
     table = None if experiment is None else Path(experiment)
     ready = partial(refuse_foreign, is_own=is_picture, overwrite=overwrite)
-    if (where / TABLE).is_file():
-        return draw_sweep(where, path, table, kind, ready=ready)
-    if where.suffix.lower() == ".csv":
-        return draw_indices(where, path, kind, ready=ready)
     look = RunLook(_tuple(times), frames, _tuple(panels), _tuple(blocks), relative, colour, forces)
-    return draw_run(where, path, look, table, kind or STRIP, OWN, ready=ready)[0]
+    return draw(_folder(place), None if out is None else Path(out), look, table, kind, OWN, ready=ready)[0]
 
 
 def animate(  # noqa: PLR0913 - one argument for each option of the command

@@ -44,7 +44,7 @@ class Fit:
 
     @property
     def found(self) -> bool:
-        """Whether any member of the best trial or any fresh one is inside all ranges; if not, it is the nearest one."""
+        """Return True if a member of the best trial or a fresh one is inside all ranges; if not, it is the nearest."""
         return _is_found(self.best, self.score)
 
     @property
@@ -63,7 +63,7 @@ def calibrate(  # noqa: PLR0913 - one argument for each option of the command
     overwrite: bool = False,
     on_trial: OnTrial = lambda *_: None,
 ) -> Fit:
-    """Look for the best values in `trials` trials, measure how probable agreement is with them, write a scenario file.
+    """Find the best values in `trials` trials, measure how probable agreement is with them, write a scenario file.
 
     The file is `out` (default: results/NAME/calibrate-HASH/scenario.toml); beside it every trial is kept as it ends, in
     FILE.trials.jsonl. `resume` continues with trials that are there, `overwrite` replaces them and the file. `on_trial`

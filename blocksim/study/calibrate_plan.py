@@ -1,7 +1,6 @@
 """What a calibration is asked for, checked before anything runs: priors of what is fitted, and scatter of inputs."""
 
 import hashlib
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, exp, log, log10, sqrt
@@ -18,12 +17,11 @@ from blocksim.scenario.units import parse_unit
 from blocksim.simulation.atomic import sha256_of
 from blocksim.simulation.provenance import code_hash
 from blocksim.study.plan import Variations, varied
-from blocksim.study.rows import Range, check_experiment, ranges_of
+from blocksim.study.rows import Range, check_experiment, ranges_of, si_number
 from blocksim.study.sampling import design_of
 
 STEPS = 1000  # as fine as this part of the prior are the values that are tried
 AT_BOUND = 0.01  # of the prior's width: nearer to a bound, a value is reported to lie at it
-_UNIT = re.compile(r"\s*[-+]?[0-9._]+(?:[eE][-+]?[0-9]+)?\s*(.*?)\s*", re.DOTALL)
 SAME = "sobol"  # the same points for every trial: trials differ by their values only
 FRESH = "normal"  # independent draws, from streams of their own
 FIT, SCATTER = "--fit", "--scatter"
@@ -79,23 +77,12 @@ class Prior:
 
 def prior_of(key: str, table: Uniform, written: object) -> Prior:
     """Return the prior that a distribution says; `written` is its lower end as the user wrote it, for the unit."""
-    unit = unit_of(written)
+    unit = q.unit_in(written) if isinstance(written, str) else ""
     if not unit:
         return Prior(key, table.low, table.high, "rad" if table.angle else "", table.scale == "log")
     factor = float(parse_unit(unit).factor)
     low, high = (float(f"{end / factor:.12g}") for end in (table.low, table.high))
     return Prior(key, low, high, unit, table.scale == "log")
-
-
-def unit_of(written: object) -> str:
-    """Return the unit in a text such as "9.5 mm", empty where there is none."""
-    found = _UNIT.fullmatch(written) if isinstance(written, str) else None
-    return "" if found is None else found[1]
-
-
-def si_number(value: object) -> float:
-    """Return the SI number of a value as a scenario takes it."""
-    return q.parse_quantity(value)[0] if isinstance(value, str) else float(str(value))
 
 
 @dataclass(frozen=True)
@@ -176,7 +163,7 @@ class Plan:
         return ranges_of(self.table)
 
     def fingerprint(self) -> dict[str, object]:
-        """Return all that decides a trial, to return whether trials in a journal belong to this plan."""
+        """Return all that decides a trial: trials in a journal belong to this plan if theirs is the same."""
         return {
             "scenario": scenario_hash(self.base),
             "priors": [str((one.key, one.low, one.high, one.unit, one.log)) for one in self.priors],

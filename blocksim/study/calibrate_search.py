@@ -91,7 +91,7 @@ class Hit:
 
 
 def hits_of(members: Sequence[Member], ranges: Sequence[Range]) -> tuple[Hit, ...]:
-    """Look at each quantity by itself, for at least one member."""
+    """Return how each quantity agrees, for at least one member."""
     finals = [member.final for member in members if member.final is not None]
     values = [values_at(final, ranges) for final in finals]
     columns = [[row[i] for row in values if isfinite(row[i])] for i in range(len(ranges))]

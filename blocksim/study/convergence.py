@@ -87,7 +87,7 @@ class Level:
 
     @property
     def is_finished(self) -> bool:
-        """Whether the run came to its proper end."""
+        """Return True if the run came to its proper end."""
         return self.status == FINISHED
 
 
@@ -149,12 +149,12 @@ class Convergence:
 
     @property
     def failed(self) -> bool:
-        """Whether the scenario does not even run as it is."""
+        """Return True if the scenario does not even run as it is."""
         return not self.studies[0].own.is_finished
 
     @property
     def converged(self) -> bool:
-        """Whether every study has converged."""
+        """Return True if every study has converged."""
         return all(study.verdict is Verdict.CONVERGED for study in self.studies)
 
 

@@ -177,7 +177,7 @@ def _word(text: str) -> object:
     value = parse_value(text)
     if isinstance(value, list | dict):
         message = f"a cell holds one value, not a {'list' if isinstance(value, list) else 'table'}"
-        raise ValueError(message)  # noqa: TRY004 - a mistake of the user's, told with its cell
+        raise ValueError(message)  # noqa: TRY004 - a mistake of the user's, reported with its cell
     return value
 
 

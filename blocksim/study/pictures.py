@@ -9,12 +9,13 @@ import numpy as np
 
 from blocksim.analysis.cells import Cell, raise_problems, read_open_table
 from blocksim.analysis.experiment import load_table
-from blocksim.errors import InvalidInputError, Problem
+from blocksim.errors import InputMissingError, InvalidInputError, Problem
 from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario.findings import did_you_mean_or_list
 from blocksim.study.stored_run import stored_run
 from blocksim.study.sweep_data import read_sweep_data
 from blocksim.study.sweep_folder import PLAN
+from blocksim.study.sweep_table import TABLE
 from blocksim.view.curves import Choice
 from blocksim.view.kinds import FINAL, HISTORY, STRIP, kind_named
 from blocksim.view.levels import Panel, draw_levels
@@ -221,6 +222,32 @@ def draw_run(  # noqa: PLR0913 - what a picture is made of
     return picture, stored.remark
 
 
+def draw(  # noqa: PLR0913 - what a picture is made of
+    place: Path,
+    out: Path | None,
+    asked: RunLook,
+    experiment: Path | None,
+    kind: str | None,
+    paper: Paper,
+    *,
+    ready: Callable[[Path], None],
+) -> tuple[Path, str]:
+    """Draw what lies at a place: a run, a sweep, or a table of sensitivities; return as `draw_run`, and raise alike.
+
+    Raises InputMissingError where nothing is there.
+    """
+    if not place.exists():
+        message = f"{place}: no such run folder, sweep folder, table or scenario file"
+        raise InputMissingError(message)
+    if (place / TABLE).is_file():
+        refuse(asked.of_runs(), f"{place} is a sweep")
+        return draw_sweep(place, out, experiment, kind, paper, ready=ready), ""
+    if place.suffix.lower() == ".csv":
+        refuse(asked.of_runs(), f"{place} is a table")
+        return draw_indices(place, out, kind, paper, ready=ready), ""
+    return draw_run(place, out, asked, experiment, kind or STRIP, paper, ready=ready)
+
+
 def refuse(given: Sequence[str], what: str) -> None:
     """Raise InvalidInputError for options that mean nothing for what is drawn."""
     if given:
@@ -284,7 +311,7 @@ def _bars(rows: list[dict[str, str | float]], shown: Shown) -> Bars:
         return np.array([row[name] for row in rows], dtype=np.float64)
 
     unit = str(rows[0]["unit"])
-    told = f" ({unit})" if shown.has_unit and unit not in UNITLESS else ""
+    bracket = f" ({unit})" if shown.has_unit and unit not in UNITLESS else ""
     part = column(shown.part) if shown.part and shown.part in rows[0] else None
     keys = tuple(str(row["key"]) for row in rows)
-    return Bars(f"{rows[0]['output']}{told}", keys, column(shown.value), column(shown.half_width), part)
+    return Bars(f"{rows[0]['output']}{bracket}", keys, column(shown.value), column(shown.half_width), part)

@@ -3,7 +3,7 @@
 manifest.jsonl: what has been run of a sweep, a line a case, so written that a kill at any moment loses no line.
 
 A line is one JSON object: `number` (of the case in the plan), `case` (hash of its run), `values` (hash of its varied
-values), `row` (what sweep.csv tells of it), and last `sum`, the CRC-32 of all before. A line whose sum is wrong (torn
+values), `row` (its row of sweep.csv), and last `sum`, the CRC-32 of all before. A line whose sum is wrong (torn
 by a kill, or by a full disk) counts as not written.
 
 timings.csv has what the cases cost, apart from what they came to, which is the same on every machine.

@@ -59,8 +59,8 @@ def row_of(course: Course, final: Columns, placed: Sequence[PlacedBody]) -> Row:
 
 def row_of_error(error: Exception) -> Row:
     """Return the row of a case that could not be run."""
-    told = isinstance(error, BlocksimError)
-    reason = str(error) if told else f"internal error: {type(error).__name__}: {error}"
+    is_ours = isinstance(error, BlocksimError)
+    reason = str(error) if is_ours else f"internal error: {type(error).__name__}: {error}"
     return {"status": "failed", "reason": reason, "seconds": 0.0}
 
 
@@ -70,7 +70,7 @@ def invalid_row(problem: str) -> Row:
 
 
 def blocks_in(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the blocks that a row, or a table of rows, tells of."""
+    """Return the blocks of a row, or of a table of rows."""
     return tuple(name.removesuffix(X) for name in names if name.endswith(X))
 
 
@@ -95,7 +95,7 @@ class Head:
         """Return a value as it stands in the column."""
         if not self.unit:
             return value
-        return float(f"{_si(value) / float(parse_unit(self.unit).factor):.{DIGITS}g}")
+        return float(f"{si_number(value) / float(parse_unit(self.unit).factor):.{DIGITS}g}")
 
     def si(self, cell: float) -> float:
         """Return a number of the column in SI."""
@@ -107,7 +107,7 @@ def heads_of(sweep: Sweep) -> tuple[Head, ...]:
     return tuple(Head(key, _unit(values)) for key, values in sweep.vary.items())
 
 
-def told(heads: Iterable[Head], settings: Mapping[str, object]) -> dict[str, object]:
+def varied_cells(heads: Iterable[Head], settings: Mapping[str, object]) -> dict[str, object]:
     """Return the varied values of a case by the names of their columns."""
     return {str(head): head.cell(settings[head.key]) for head in heads}
 
@@ -126,8 +126,8 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) or (isinstance(value, str) and bool(q.unit_in(value)))
 
 
-def _si(value: object) -> float:
-    """Return a value of a number column in SI; NaN for what is none."""
+def si_number(value: object) -> float:
+    """Return a value as a scenario takes it in SI; NaN for what is no number."""
     if isinstance(value, str):
         return q.parse_quantity(value)[0]
     return float(value) if isinstance(value, int | float) else math.nan
@@ -198,26 +198,25 @@ class Ranges:
     """The limits (mm, degrees) of every measured quantity, by the name of its column in sweep.csv."""
 
     source: str
-    limits: Mapping[str, tuple[float, float]]
+    limits: Mapping[str, Range]
 
     @classmethod
     def read(cls, table: Path | str) -> "Ranges":
         """Take the limits of an experiment table by the rules of `compare`. Raises what reading it raises."""
         measured = load_table(table)
-        limits = {f"{one.block}.{one.column}": (one.lower, one.upper) for one in ranges_of(measured)}
-        return cls(measured.source, limits)
+        return cls(measured.source, {f"{one.block}.{one.column}": one for one in ranges_of(measured)})
 
     def hold(self, row: Mapping[str, object]) -> bool:
         """Return True if everything measured is inside; a block that a case does not have is not."""
-        values = ((row.get(name), lower, upper) for name, (lower, upper) in self.limits.items())
-        return all(isinstance(value, float) and lower <= value <= upper for value, lower, upper in values)
+        values = ((row.get(name), limits) for name, limits in self.limits.items())
+        return all(isinstance(value, float) and limits.holds(value) for value, limits in values)
 
     def count(self, table: "pd.DataFrame") -> int:
         """Return how many rows of a table are inside. Raises InvalidInputError for no such block, or no numbers."""
         return sum(self.inside(table))
 
     def inside(self, table: "pd.DataFrame") -> list[bool]:
-        """Tell of every row of a table whether it is inside. Raises as `count`."""
+        """Return whether each row of a table is inside. Raises as `count`."""
         missing = [name for name in self.limits if name not in table]
         if missing:
             message = f"{self.source} measures {missing[0]}, but the sweep has no such column"
@@ -225,12 +224,12 @@ class Ranges:
         texts = [name for name in self.limits if table[name].dtype.kind not in NUMBERS and table[name].notna().any()]
         if texts:
             raise InvalidInputError(f"the column {texts[0]} of the sweep does not hold numbers only")
-        inside = [table[name].between(lower, upper) for name, (lower, upper) in self.limits.items()]
+        inside = [table[name].between(limits.lower, limits.upper) for name, limits in self.limits.items()]
         return [all(row) for row in zip(*inside, strict=True)]
 
 
 def check_experiment(scenario: Scenario) -> None:
-    """Read the table that a scenario names and look whether it goes with the blocks: better now than after the run."""
+    """Check that the table that a scenario names goes with the blocks: better now than after the run."""
     if scenario.experiment is not None:
         names = [body.name for body in place_bodies(scenario)]
         unknown = dict.fromkeys(COLUMNS[1:], [0.0] * len(names))

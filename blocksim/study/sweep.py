@@ -90,7 +90,7 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
         done = CaseIndex(folder, len(cases))
         if retry_failed:
             done.forget_failed(shard)
-        table = SweepTable(folder / shard.file(TABLE), cases, done, ranges_of(base), shard)
+        table = SweepTable(folder / shard.file(TABLE), cases, done, measured_ranges(base), shard)
         timings = Timings(folder / shard.file(TIMINGS), executor)
         SweepRun(cases, shard, kept, done, table, timings, on_row).run(runner.run, setting, fail_fast=fail_fast)
     return SweepResult(folder, shard.file(TABLE), len(done.state[shard.slice]))
@@ -143,7 +143,7 @@ def cases_in(document: Document) -> Cases:
     return cases_of(document, _plan_of(document.build()))
 
 
-def ranges_of(base: Scenario) -> Ranges | None:
+def measured_ranges(base: Scenario) -> Ranges | None:
     """Return the measured ranges that a scenario is compared with, if it names any."""
     return None if base.experiment is None else Ranges.read(base.experiment.table)
 
@@ -246,7 +246,7 @@ class SweepRun:
         self._keep(ended)
 
     def _keep(self, ended: list[Ended]) -> None:
-        """Bring rows to the disk, and then tell of them."""
+        """Bring rows to the disk, and then report them."""
         if not ended:
             return
         entries = [Entry(one.number, one.name, values_hash(one.settings), one.row) for one in ended]
@@ -275,12 +275,12 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
         done.holds(number, settings)
     if done.count() < len(cases) and not allow_missing:
         raise InvalidInputError("\n".join(_what_is_missing(folder, done, len(cases))))
-    SweepTable(folder / TABLE, cases, done, ranges_of(base)).write()
+    SweepTable(folder / TABLE, cases, done, measured_ranges(base)).write()
     return SweepResult(folder, planned=len(cases))
 
 
 def _what_is_missing(folder: Path, done: CaseIndex, count: int) -> Iterator[str]:
-    """Tell it by shards, those of the job array with the most jobs where there were several."""
+    """Yield it by shards, those of the job array with the most jobs where there were several."""
     yield f"{folder}: {count - done.count()} of {count} cases are missing; --allow-missing makes a table without them"
     of = max((int(match[1]) for path in done.paths if (match := SHARDED.fullmatch(path.name))), default=1)
     shards = [(shard, len(shard.numbers(count))) for shard in (Shard(index, of) for index in range(of))]

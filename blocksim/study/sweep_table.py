@@ -16,7 +16,7 @@ from blocksim.scenario.limited import MEGABYTE, refuse_large
 from blocksim.simulation.atomic import writing
 from blocksim.study.plan import Cases
 from blocksim.study.progress import WHOLE, CaseIndex, Shard
-from blocksim.study.rows import KEPT, MOVEMENT, Ranges, as_cell, told
+from blocksim.study.rows import KEPT, MOVEMENT, Ranges, as_cell, varied_cells
 from blocksim.study.stored_run import FINISHED, SWEEP
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class SweepTable:
                 if entry is not None:
                     row = entry.row
                     outcome = [row.get(name) for name in OUTCOME]
-                    values = told(self.cases.heads, settings).values()
+                    values = varied_cells(self.cases.heads, settings).values()
                     cells = [entry.case, *values, *outcome, *self._verdict(row), *map(row.get, (*MOVEMENT, *ends))]
                     yield list(map(as_cell, cells))
 

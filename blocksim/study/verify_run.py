@@ -1,4 +1,4 @@
-"""Whether a stored run comes out again, bit for bit, and if not, where it parts and what may be the reason.
+"""Bitwise reproducibility of a stored run: whether it comes out again, and if not, where it parts and why it may.
 
 Of run.json and done.json those entries are compared that follow from the scenario: not wall times, nor when, where and
 in which parts the run was made.
@@ -189,7 +189,7 @@ def _ends(then: Summary, now: Summary) -> tuple[str, str]:
 
 
 def origins(summary: Summary, scenario: Scenario) -> tuple[Origin, ...]:
-    """Return what is not the same now as when a run was made, of all that its run.json tells of."""
+    """Return what is not the same now as when a run was made, of all that its run.json has."""
     hashes = () if (now := scenario_hash(scenario)) == summary.scenario_hash else ((summary.scenario_hash, now),)
     return (*(Origin(SCENARIO, *pair) for pair in hashes), *changed_origins(summary.environment))
 
@@ -200,8 +200,8 @@ def tells_of_code(found: tuple[Origin, ...]) -> bool:
 
 
 def changed_origins(then: Mapping[str, str]) -> tuple[Origin, ...]:
-    """Return which entries of an older `environment` are others now; what it does not tell cannot be compared."""
+    """Return which entries of an older `environment` are others now; what it lacks cannot be compared."""
     now = environment()
-    whole = () if any(name.startswith(ROOM_PREFIX) for name in then) else (CODE,)  # rooms tell more
+    whole = () if any(name.startswith(ROOM_PREFIX) for name in then) else (CODE,)  # rooms say more
     known = [name for name in now if name in then and (name in whole or name.startswith(DECIDES))]
     return tuple(Origin(name, then[name], now[name]) for name in known if then[name] != now[name])

@@ -1,4 +1,4 @@
-"""Whether rows of a stored sweep come out again, digit by digit: a sample of them, drawn with a seed."""
+"""Reproducibility of a stored sweep: a sample of its rows, drawn with a seed, run again and compared by digits."""
 
 import csv
 import io
@@ -14,9 +14,9 @@ from blocksim.scenario.limited import open_regular
 from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.plan import Case, Cases
 from blocksim.study.progress import PATTERN, CaseIndex, read_entries
-from blocksim.study.rows import Head, Ranges, Row, as_cell, invalid_row, told
+from blocksim.study.rows import Head, Ranges, Row, as_cell, invalid_row, varied_cells
 from blocksim.study.stored_run import FINISHED
-from blocksim.study.sweep import cases_in, ranges_of
+from blocksim.study.sweep import cases_in, measured_ranges
 from blocksim.study.sweep_folder import case_folder, read_origin, read_plan
 from blocksim.study.sweep_table import OUTCOME, TABLE
 from blocksim.study.verify_run import Origin, RunVerdict, changed_origins, tells_of_code, verify_run
@@ -74,7 +74,7 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
     numbers = _numbers(folder, cases, len(lines))
     rows = sorted(random.Random(seed).sample(range(len(lines)), min(sample, len(lines))))  # noqa: S311 - no secret
     ends = _ends([cases[numbers[row]] for row in rows])
-    ranges = ranges_of(document.build())
+    ranges = measured_ranges(document.build())
     origins = () if (origin := read_origin(folder)) is None else changed_origins(origin.environment)
     names = _names(folder)
     if origin is not None and not tells_of_code(origins):
@@ -128,13 +128,13 @@ def _names(folder: Path) -> dict[int, str]:
 
 
 def _numbers(folder: Path, cases: Cases, count: int) -> Sequence[int]:
-    """Return the number of the case that each of `count` rows tells of. Raises InvalidInputError."""
+    """Return the number of the case of each of `count` rows. Raises InvalidInputError."""
     if count == len(cases):
         return range(count)
     done = CaseIndex(folder, len(cases))
     held = [number for number in range(len(cases)) if done.holds(number, cases.design[number])]
     if len(held) != count:
-        message = f"{folder / TABLE}: {count} rows of {len(cases)} cases, but the manifest tells of {len(held)}"
+        message = f"{folder / TABLE}: {count} rows of {len(cases)} cases, but the manifest has {len(held)}"
         raise InvalidInputError(message)
     return held
 
@@ -149,8 +149,8 @@ def _ends(cases: Sequence[Case]) -> Iterator[tuple[Case, Row]]:
 
 def _cells(columns: Sequence[str], case: Case, row: Row, ranges: Ranges | None) -> dict[str, str]:
     """Return the cells of a row as texts, as the table of a sweep has them."""
-    settings = told((Head.read(name) for name in columns if Head.read(name).key in case.settings), case.settings)
-    values: Row = {CASE: case.name, **settings, **row}
+    heads = (head for head in map(Head.read, columns) if head.key in case.settings)
+    values: Row = {CASE: case.name, **varied_cells(heads, case.settings), **row}
     if ranges is not None:
         values[INSIDE] = ranges.hold(row) if row["status"] == FINISHED else None
     text = io.StringIO(newline="")

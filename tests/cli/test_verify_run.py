@@ -257,7 +257,7 @@ def test_table_that_does_not_go_with_the_manifest_is_refused(blocksim: Command, 
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
     answer = blocksim("verify-run", copy_of_sweep)
     assert answer.code == 65
-    assert "4 rows of 5 cases, but the manifest tells of 5" in answer.err
+    assert "4 rows of 5 cases, but the manifest has 5" in answer.err
 
 
 def test_rows_of_a_sweep_that_was_stopped_find_their_cases(blocksim: Command, copy_of_sweep: Path) -> None:

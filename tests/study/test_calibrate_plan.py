@@ -5,7 +5,8 @@ import pytest
 
 from blocksim.scenario import Sweep
 from blocksim.scenario.models.variation import Normal, Uniform
-from blocksim.study.calibrate_plan import Prior, Scatter, about, prior_of, si_number
+from blocksim.study.calibrate_plan import Prior, Scatter, about, prior_of
+from blocksim.study.rows import si_number
 
 FRICTION = Prior("friction.block_block.kinetic", 0.17, 0.31)
 OVERLAP = Prior("structures.0.overlap", 9.5, 10.5, "mm")

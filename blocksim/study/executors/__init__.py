@@ -47,7 +47,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class Setting:
-    """How tasks are to be run; `is_stopped` tells whether the user wants to stop."""
+    """How tasks are to be run; `is_stopped` returns True once the user wants to stop."""
 
     jobs: int  # threads or processes
     is_stopped: Callable[[], bool] = lambda: False
