@@ -7,7 +7,7 @@ A level counts refinements of the scenario's own value: 0 is that value, 1 the n
 """
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable
 from contextlib import closing, suppress
 from dataclasses import replace
 from math import log10, sqrt
@@ -33,7 +33,8 @@ from blocksim.study.convergence import (
     judge,
     with_setting,
 )
-from blocksim.study.executors.processes import run_all
+from blocksim.study.executors import Batch, Setting, Task
+from blocksim.study.executors.processes import DEAD, run_here, run_tasks
 from blocksim.study.rows import Row, check_experiment
 from blocksim.study.stored_run import FINISHED
 from blocksim.world.nonsmooth import velocity_tolerance
@@ -42,6 +43,7 @@ FOLDER = "converge"
 TOLERANCE_MM = 0.1
 LEVELS = 4  # refinements of the scenario's own value
 FEWEST_LEVELS = 2  # refinements that it takes to converge
+DIED = "a worker process has died (out of memory?); rerun the command to repeat this case"
 UNFINISHED = {Verdict.NOT_YET, Verdict.SCATTERED, Verdict.FLIPS}
 UNRELIABLE = {Verdict.SCATTERED, Verdict.FLIPS}
 OnRun = Callable[[str, Row], None]
@@ -100,17 +102,28 @@ class _Runs:
 
     def run(self, scenarios: dict[str, Scenario]) -> None:
         """Run what has not run yet; the keys are labels for people."""
-        labels = {self.folder / run_hash(scenario): label for label, scenario in reversed(scenarios.items())}
-        tasks = {self.folder / run_hash(scenario): scenario for scenario in scenarios.values()}
-        missing = {place: scenario for place, scenario in tasks.items() if place.name not in self.rows}
+        labels = {run_hash(scenario): label for label, scenario in reversed(scenarios.items())}
+        wanted = {run_hash(scenario): scenario for scenario in scenarios.values()}
+        missing = [(name, scenario) for name, scenario in wanted.items() if name not in self.rows]
+        tasks = [Task(number, name, {}, scenario) for number, (name, scenario) in enumerate(missing)]
         try:
-            with interruptible(), closing(run_all(missing, self.jobs)) as ended:
-                for place, row in ended:
-                    self.rows[place.name] = {**row, "seconds": _solver_seconds(place, row)}
-                    self.on_run(labels[place], self.rows[place.name])
+            with interruptible(), closing(self._batches(tasks)) as batches:
+                for batch in batches:
+                    for task, row in zip(batch.tasks, batch.rows, strict=True):
+                        self._keep(task.name, row, labels[task.name])
         except KeyboardInterrupt:
             message = f"stopped after {len(self.rows)} runs; rerun the command to finish"
             raise StoppedEarlyError(message) from None
+
+    def _batches(self, tasks: list[Task]) -> Generator[Batch, None, None]:
+        jobs = min(self.jobs, len(tasks))
+        run = run_tasks if jobs > 1 else run_here
+        return run(iter(tasks), Setting(jobs, folder=self.folder))
+
+    def _keep(self, name: str, row: Row, label: str) -> None:
+        kept = {**row, "reason": DIED} if row == DEAD else {**row, "seconds": _solver_seconds(self.folder / name, row)}
+        self.rows[name] = kept
+        self.on_run(label, kept)
 
     def row(self, scenario: Scenario) -> Row:
         """Return the row of a scenario that has run."""

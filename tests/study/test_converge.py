@@ -10,12 +10,16 @@ import pytest
 
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Document, Scenario
+from blocksim.study import converge as converging
 from blocksim.study.converge import STUDIES, converge, refinements_of
 from blocksim.study.convergence import Coordinates, Refinement, Study, Verdict, judge, with_setting
+from blocksim.study.executors import Batch, Setting, Task
 from blocksim.study.executors import ensemble as folders
+from blocksim.study.executors.processes import DEAD
 from tests.study.conftest import SCENARIOS
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from blocksim.study.rows import Row
@@ -206,6 +210,18 @@ def test_refining_continues_until_the_tolerance_is_met(slide: Scenario, tmp_path
     assert more.verdict is Verdict.CONVERGED
     assert len(few.levels) < len(more.levels) < 2 + 1 + 6
     assert more.last_change_mm < 1e-6
+
+
+def test_dead_worker_fails_its_runs_and_says_what_to_do(
+    slide: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def dying(tasks: Iterator[Task], _: Setting) -> Iterator[Batch]:
+        yield from (Batch((task,), (DEAD,), 0.0, "") for task in tasks)
+
+    monkeypatch.setattr(converging, "run_tasks", dying)
+    study = converge(slide, studies=["step"], out=tmp_path, jobs=2).studies[0]
+    assert {level.status for level in study.levels} == {"failed"}
+    assert "rerun the command to repeat this case" in study.own.reason
 
 
 def test_scenario_that_fails_as_it_is_says_so(slide: Scenario, tmp_path: Path) -> None:

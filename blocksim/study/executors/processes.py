@@ -6,20 +6,18 @@ The only executor that can keep whole runs, in folders of their own.
 import signal
 import threading
 from collections import deque
-from collections.abc import Generator, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, as_completed, wait
+from collections.abc import Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from multiprocessing import active_children, get_context, parent_process, resource_tracker
 from os import _exit
-from pathlib import Path
 from typing import NamedTuple
 
-from blocksim.scenario import Scenario
 from blocksim.simulation.provenance import code_hash
 from blocksim.simulation.stopping import FOR_ALL
 from blocksim.study.executors import Batch, BatchSize, Setting, Task, needs_nothing, take
-from blocksim.study.executors.ensemble import INTERRUPTED, Outcome, run_batch, run_case
+from blocksim.study.executors.ensemble import Outcome, run_batch
 from blocksim.study.rows import Row
 
 AHEAD = 2  # batches a process: it need not wait for the next one
@@ -100,6 +98,12 @@ def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None,
                     yield batch
             yield from work.after_death()
         yield from duplicates.batches()
+
+
+def run_here(tasks: Iterable[Task], setting: Setting) -> Generator[Batch, None, None]:
+    """Run tasks one after the other in this process, as a worker does. Raises KeyboardInterrupt on Ctrl-C."""
+    for task in tasks:
+        yield Batch((task,), *run_batch([(task.scenario, setting.folder_of(task))], code_hash()))
 
 
 class Work:
@@ -188,31 +192,3 @@ class Duplicates:
         """Yield the others, once all have ended."""
         if self.later:
             yield Batch(tuple(self.later), tuple(self.rows.get(task.name, DEAD) for task in self.later), 0.0, "")
-
-
-def run_all(tasks: Mapping[Path, Scenario], jobs: int) -> Generator[tuple[Path, Row], None, None]:
-    """Run every scenario into its folder; yield folder and row as they end. Raises KeyboardInterrupt on Ctrl-C."""
-    workers = min(jobs, len(tasks))
-    if workers <= 1:
-        yield from _run_here(tasks)
-        return
-    with pool_of(workers) as pool:
-        futures = {pool.submit(run_case, scenario, folder): folder for folder, scenario in tasks.items()}
-        for future in as_completed(futures):
-            yield futures[future], _outcome(future)
-
-
-def _run_here(tasks: Mapping[Path, Scenario]) -> Iterator[tuple[Path, Row]]:
-    for folder, scenario in tasks.items():
-        row = run_case(scenario, folder)
-        if row["status"] == INTERRUPTED:
-            raise KeyboardInterrupt
-        yield folder, row
-
-
-def _outcome(future: Future[Row]) -> Row:
-    try:
-        return future.result()
-    except BrokenProcessPool:
-        reason = "a worker process has died (out of memory?); rerun the command to repeat this case"
-        return {"status": "failed", "reason": reason, "seconds": 0.0}

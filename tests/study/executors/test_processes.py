@@ -1,0 +1,29 @@
+"""A pool ends with whoever started it."""
+
+import os
+import signal
+from multiprocessing import active_children
+from pathlib import Path
+
+import pytest
+
+from blocksim.scenario import Document
+from blocksim.study.executors import Setting, Task
+from blocksim.study.executors.processes import run_tasks
+
+
+def test_ctrl_c_ends_the_workers_at_once(nominal: Document, tmp_path: Path) -> None:
+    quick = nominal.with_values({"time.end": 0.01}).build()
+    endless = nominal.with_values({"time.end": 1e5, "time.stop_at_rest": False}).build()
+    scenarios = {"quick": quick, "a": endless, "b": endless}
+    tasks = (Task(number, name, {}, one) for number, (name, one) in enumerate(scenarios.items()))
+    batches = run_tasks(tasks, Setting(2, folder=tmp_path))
+    assert next(batches).tasks[0].name == "quick"
+    before = signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGINT))
+    signal.setitimer(signal.ITIMER_REAL, 0.5)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            next(batches)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert active_children() == []
