@@ -13,8 +13,9 @@ from blocksim.cli.judgement import judgement_lines, meanings
 from blocksim.cli.output import answer, print_json
 from blocksim.cli.verdict import comparison_table, verdict_lines
 from blocksim.errors import ExitCode
-from blocksim.study.compare import compare_run, compare_sweep, is_sweep
+from blocksim.study.compare import compare_run, compare_sweep
 from blocksim.study.stored_run import find_run
+from blocksim.study.sweep_table import is_sweep
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from blocksim.cli.output import answer, note, print_json
 from blocksim.cli.progress import watching
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedEarlyError
 from blocksim.simulation.compilation import kernels_of
-from blocksim.study.compare import is_sweep
 from blocksim.study.sweep import kernels_for
 from blocksim.study.sweep_folder import read_plan
+from blocksim.study.sweep_table import is_sweep
 from blocksim.study.verify_run import Origin, RunVerdict, scenario_of, verify_run
 from blocksim.study.verify_sweep import SAMPLE, SweepVerdict, verify_sweep
 

@@ -39,6 +39,7 @@ from blocksim.analysis.proportion import interval
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.extras import loaded
 from blocksim.scenario.limited import read_head
+from blocksim.simulation.claim import takes_lock
 from blocksim.study.calibrate_plan import Prior
 from blocksim.study.executors.ensemble import Member
 from blocksim.study.rows import Range, are_inside, values_at
@@ -213,7 +214,7 @@ def opened(journal: Path, plan: Mapping[str, object]) -> "Iterator[Study]":
     loaded("optuna", PURPOSE).logging.set_verbosity(logging.ERROR)
     try:
         with journal.open("ab") as file:
-            _take(file, journal)
+            _take(file.fileno(), journal)
             _drop_torn_line(journal)
             study = _study_in(journal)
             _refuse_other_plan(study, plan, journal)
@@ -247,17 +248,11 @@ class _AlreadyLocked:
         pass
 
 
-def _take(file: Any, journal: Path) -> None:
+def _take(file: int, journal: Path) -> None:
     """Lock a file until it is closed; raises OutputExistsError where somebody else has it."""
-    try:
-        import fcntl  # noqa: PLC0415 - not on every system; there two at once are the user's affair
-    except ImportError:
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+    if not takes_lock(file):
         message = f"{journal}: another calibration is writing here; wait for its end, or choose another file with --out"
-        raise OutputExistsError(message) from None
+        raise OutputExistsError(message)
 
 
 def refuse_other_file(journal: Path) -> None:

@@ -15,7 +15,7 @@ from blocksim.simulation.result import read_final
 from blocksim.simulation.summary import read_summary
 from blocksim.study.stored_run import FINISHED, find_run
 from blocksim.study.sweep_folder import PLAN
-from blocksim.study.sweep_table import TABLE, SweepResult, read_sweep
+from blocksim.study.sweep_table import TABLE, SweepResult, is_sweep, read_sweep
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,11 +50,6 @@ def compare(
     if isinstance(run, Path | str) and is_sweep(run):
         return compare_sweep(run, experiment, settings)
     return compare_run(run, experiment)
-
-
-def is_sweep(place: Path | str) -> bool:
-    """Return True if a place is the folder of a sweep."""
-    return (Path(place) / TABLE).is_file()
 
 
 def compare_sweep(

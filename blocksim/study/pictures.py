@@ -15,7 +15,7 @@ from blocksim.scenario.findings import did_you_mean_or_list
 from blocksim.study.stored_run import stored_run
 from blocksim.study.sweep_data import read_sweep_data
 from blocksim.study.sweep_folder import PLAN
-from blocksim.study.sweep_table import TABLE
+from blocksim.study.sweep_table import is_sweep
 from blocksim.view.curves import Choice
 from blocksim.view.kinds import FINAL, HISTORY, STRIP, kind_named
 from blocksim.view.levels import Panel, draw_levels
@@ -239,7 +239,7 @@ def draw(  # noqa: PLR0913 - what a picture is made of
     if not place.exists():
         message = f"{place}: no such run folder, sweep folder, table or scenario file"
         raise InputMissingError(message)
-    if (place / TABLE).is_file():
+    if is_sweep(place):
         refuse(asked.of_runs(), f"{place} is a sweep")
         return draw_sweep(place, out, experiment, kind, paper, ready=ready), ""
     if place.suffix.lower() == ".csv":

@@ -12,11 +12,12 @@ from blocksim.simulation import folder as files
 from blocksim.study.compare import compare_sweep
 from blocksim.study.stored_run import FINISHED, find_run
 from blocksim.study.sweep_folder import PLAN, case_folder
+from blocksim.study.sweep_table import is_sweep
 from blocksim.view.report.packing import MOST_BYTES
 from blocksim.view.report.page import write_report
 from blocksim.view.report.stored import StoredRun, read_stored
 from blocksim.view.report.subjects import Subject, run_subject
-from blocksim.view.report.sweeps import TABLE, SweepTable, read_sweep_table, sweep_subject
+from blocksim.view.report.sweeps import SweepTable, read_sweep_table, sweep_subject
 
 MEMBERS = 50  # of a sweep in one page
 
@@ -33,7 +34,7 @@ def report_on(
     problems: list[str] = []
     for place in places:
         key = f"part-{len(shown) + 1}"
-        subjects, found = _sweep(key, place, experiment, members) if _is_sweep(place) else _run(key, place, experiment)
+        subjects, found = _sweep(key, place, experiment, members) if is_sweep(place) else _run(key, place, experiment)
         shown += subjects
         problems += found
     return write_report(shown, out, title=_title(shown), version=__version__), problems
@@ -42,10 +43,6 @@ def report_on(
 def _title(subjects: Sequence[Subject]) -> str:
     names = dict.fromkeys(subject.name for subject in subjects if not subject.page.get("parent"))
     return ", ".join(names) + " – blocksim report"
-
-
-def _is_sweep(place: Path) -> bool:
-    return (place / TABLE).is_file()
 
 
 def _run(key: str, place: Path, experiment: Path | None) -> tuple[list[Subject], tuple[str, ...]]:

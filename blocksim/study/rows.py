@@ -30,6 +30,7 @@ X = ".x_mm"
 MOVEMENT = ("outcome", "first_mover", "first_moved_s", "displacement_mm", "turn_deg")
 """As in run.json, but displacement and rotation are the largest of all blocks from start to end."""
 KEPT = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")  # of the final table, for every block
+QUARTER = 90.0  # deg
 DIGITS = 12  # of a number in the table: more show the rounding of the unit
 HEAD = re.compile(r"(?P<key>.*?) \[(?P<unit>[^\[\]]+)\]")
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -72,6 +73,11 @@ def invalid_row(problem: str) -> Row:
 def blocks_in(names: Iterable[str]) -> tuple[str, ...]:
     """Return the blocks of a row, or of a table of rows."""
     return tuple(name.removesuffix(X) for name in names if name.endswith(X))
+
+
+def quarter_turns(rotations: Iterable[float]) -> tuple[int, ...]:
+    """Return the class of an outcome: the rotations (degrees) of all blocks, rounded to quarters of a turn."""
+    return tuple(round(rotation / QUARTER) * int(QUARTER) for rotation in rotations)
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,13 @@ from blocksim.scenario import Document, Sweep
 from blocksim.scenario.models.variation import Normal, Variation
 from blocksim.simulation.table import Columns
 from blocksim.study.executors.ensemble import Member, run_members
-from blocksim.study.rows import are_inside, ranges_of, values_at
+from blocksim.study.rows import are_inside, quarter_turns, ranges_of, values_at
 from blocksim.study.sampling import drawn, open_interval
 from blocksim.study.sensitivity_methods import Floats, Method
 
 if TYPE_CHECKING:
     import pandas as pd
 
-QUARTER = 90.0  # deg
 MOST_BLOCKS = 10
 INDICATOR = "share"
 TAIL = 0.005  # of a normal distribution is left out at either end, for methods that go to the ends of the unit cube
@@ -42,9 +41,10 @@ class Output:
 def outputs_of(finals: Sequence[Columns], table: ExperimentTable | None) -> list[Output]:
     """Return every measured quantity (without a table: x of the first blocks), and indicators of the outcome."""
     positions = _positions(finals) if table is None else _measured(finals, table)
-    wanted, name = _class(finals, table)
-    hits = np.array([outcome_of(final) == wanted for final in finals], dtype=np.float64)
-    found = [*positions, Output(f"{name} {_told(wanted)}", INDICATOR, hits)]
+    outcomes = [quarter_turns(final["rotation_deg"]) for final in finals]
+    wanted, name = _class(finals[0]["block"], outcomes, table)
+    hits = np.array([outcome == wanted for outcome in outcomes], dtype=np.float64)
+    found = [*positions, Output(f"{name} {_written(wanted)}", INDICATOR, hits)]
     return found if table is None else [*found, _inside(finals, table)]
 
 
@@ -55,28 +55,25 @@ def _positions(finals: Sequence[Columns]) -> list[Output]:
 
 
 def _measured(finals: Sequence[Columns], table: ExperimentTable) -> list[Output]:
-    values = np.array([values_at(final, ranges_of(table)) for final in finals])
+    ranges = ranges_of(table)
+    values = np.array([values_at(final, ranges) for final in finals])
     return [
         Output(f"{row.quantity} of block {row.block}", QUANTITIES[row.quantity].unit, values[:, index])
         for index, row in enumerate(table.summaries())
     ]
 
 
-def outcome_of(final: Columns) -> tuple[int, ...]:
-    """Return the class of an outcome: the rotations of all blocks, in degrees, rounded to quarters of a turn."""
-    return tuple(round(rotation / QUARTER) * int(QUARTER) for rotation in final["rotation_deg"])
-
-
-def _class(finals: Sequence[Columns], table: ExperimentTable | None) -> tuple[tuple[int, ...], str]:
+def _class(
+    blocks: Sequence[str], outcomes: Sequence[tuple[int, ...]], table: ExperimentTable | None
+) -> tuple[tuple[int, ...], str]:
     """Return the measured class where the rotations of all blocks are measured, else the most frequent one."""
     measured = {} if table is None else {one.block: one.mean for one in table.summaries() if one.quantity == "rotation"}
-    blocks = finals[0]["block"]
     if set(blocks) <= set(measured):
-        return outcome_of({"rotation_deg": [measured[block] for block in blocks]}), "measured outcome"
-    return Counter(map(outcome_of, finals)).most_common(1)[0][0], "most frequent outcome"
+        return quarter_turns([measured[block] for block in blocks]), "measured outcome"
+    return Counter(outcomes).most_common(1)[0][0], "most frequent outcome"
 
 
-def _told(outcome: tuple[int, ...]) -> str:
+def _written(outcome: tuple[int, ...]) -> str:
     """Write a class for people: the turned blocks of many, or all rotations of a few."""
     if len(outcome) <= MOST_BLOCKS:
         return "/".join(f"{angle}" for angle in outcome)

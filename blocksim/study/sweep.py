@@ -10,7 +10,7 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing import current_process
 from pathlib import Path
 from typing import NamedTuple
@@ -37,7 +37,7 @@ MOST_INVALID = 500  # kept in memory before they are written
 AGAIN = "rerun the command to finish"
 OnRow = Callable[[int, int, Row], None]
 SHARDED = re.compile(r"manifest-\d+-of-(\d+)\.jsonl")
-MOST_TOLD = 20
+MOST_SHARDS = 20
 
 
 def sweep(  # noqa: PLR0913 - one argument for each option of the command
@@ -189,8 +189,7 @@ class SweepRun:
         """Run what has no row yet. Raises StoppedEarlyError on Ctrl-C; what has ended by then is kept."""
         try:
             with stop_requests() as is_stopped:
-                setting = Setting(setting.jobs, is_stopped, setting.scheduler, setting.folder)
-                self._run(executor, setting, fail_fast=fail_fast)
+                self._run(executor, replace(setting, is_stopped=is_stopped), fail_fast=fail_fast)
                 stopped = is_stopped()
         except KeyboardInterrupt:
             stopped = True
@@ -286,6 +285,6 @@ def _what_is_missing(folder: Path, done: CaseIndex, count: int) -> Iterator[str]
     shards = [(shard, len(shard.numbers(count))) for shard in (Shard(index, of) for index in range(of))]
     missing = [(shard, size - done.count(shard), size) for shard, size in shards if done.count(shard) < size]
     if of > 1:
-        yield from (f"  --shard {shard}: {left} of {size} missing" for shard, left, size in missing[:MOST_TOLD])
-        if len(missing) > MOST_TOLD:
-            yield f"  and {len(missing) - MOST_TOLD} more shards"
+        yield from (f"  --shard {shard}: {left} of {size} missing" for shard, left, size in missing[:MOST_SHARDS])
+        if len(missing) > MOST_SHARDS:
+            yield f"  and {len(missing) - MOST_SHARDS} more shards"

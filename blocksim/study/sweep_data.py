@@ -14,12 +14,12 @@ from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario import quantities as q
 from blocksim.scenario.keys import KeyPath, field_at, follow, parse_key
 from blocksim.scenario.models.variation import Normal, Uniform
-from blocksim.study.rows import Head, Ranges, blocks_in
+from blocksim.study.rows import Head, Ranges, blocks_in, quarter_turns
 from blocksim.study.stored_run import FINISHED
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import TABLE, read_sweep
 from blocksim.view.series import Typed
-from blocksim.view.sweeps.found import QUARTER, FoundSweep, Input, Measured
+from blocksim.view.sweeps.found import FoundSweep, Input, Measured
 
 Floats = NDArray[np.float64]
 LARGEST = 1e30  # of inputs (SI) and of places (mm) that are drawn
@@ -58,7 +58,7 @@ def read_sweep_data(folder: Path, experiment: Path | None = None) -> FoundSweep:
 def measured_of(table: ExperimentTable, blocks: tuple[str, ...]) -> Measured:
     """Return repeats and prediction intervals of x (mm), and the measured class where all rotations are measured."""
     means = {row.block: row.mean for row in table.summaries() if row.quantity == "rotation"}
-    turned = [round(means[block] / QUARTER) * int(QUARTER) for block in blocks if block in means]
+    turned = quarter_turns([means[block] for block in blocks if block in means])
     rows = [row for row in table.summaries() if row.quantity == "x" and row.block in blocks]
     return Measured(
         x_mm={row.block: table.values(row.block, "x").to_numpy(dtype=float) for row in rows},
@@ -68,7 +68,7 @@ def measured_of(table: ExperimentTable, blocks: tuple[str, ...]) -> Measured:
             for row in rows
             if (half := prediction_half_width(row.s, row.n)) > 0.0
         },
-        outcome=tuple(turned) if len(turned) == len(blocks) else None,
+        outcome=turned if len(turned) == len(blocks) else None,
     )
 
 

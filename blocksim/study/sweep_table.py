@@ -140,6 +140,11 @@ class SweepResult:
         return Ranges.read(experiment).count(finished) / len(self.table)
 
 
+def is_sweep(place: Path | str) -> bool:
+    """Return True if a place is the folder of a sweep."""
+    return (Path(place) / TABLE).is_file()
+
+
 def read_sweep(folder: Path | str) -> SweepResult:
     """Return the sweep that a folder holds. Raises InputMissingError or InvalidInputError."""
     result = SweepResult(Path(folder))
