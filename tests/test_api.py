@@ -2,6 +2,7 @@
 
 import doctest
 import pydoc
+import struct
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -93,7 +94,8 @@ def test_stored_runs_and_sweeps_open_again(tmp_path: Path) -> None:
 def test_pictures_animations_and_reports_are_made_of_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     kept = blocksim.run(blocksim.load(SLIDE, {**SOFT, "time.end": 0.02}), out="kept")
-    assert blocksim.plot(kept, frames=3).name == "slide.png"
+    assert blocksim.plot(kept, frames=3, size=(127.0, 101.6), dpi=100.0).name == "slide.png"
+    assert struct.unpack(">II", Path("slide.png").read_bytes()[16:24]) == (500, 400)
     assert blocksim.plot("kept", "h.svg", kind="history", panels=["x"]).stat().st_size > 0
     assert blocksim.animate(kept, width=200, fps=5.0).name == "slide.gif"
     assert "slide" in blocksim.report(kept).read_text(encoding="utf-8")

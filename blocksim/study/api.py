@@ -24,7 +24,7 @@ from blocksim.study.stored_run import stored_run
 from blocksim.study.sweep_table import SweepResult
 from blocksim.view.animation import Look, Pace, draw_film
 from blocksim.view.paint import paint_named
-from blocksim.view.paper import OWN
+from blocksim.view.paper import MILLIMETRES_PER_INCH, Paper
 from blocksim.view.support import support_of
 
 Place = Path | str | Result | SweepResult
@@ -44,19 +44,23 @@ def plot(  # noqa: PLR0913 - one argument for each option of the command
     relative: bool = False,
     colour: str = "block",
     forces: bool = False,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
     experiment: Path | str | None = None,
     overwrite: bool = False,
 ) -> Path:
     """Draw a run (kind strip, final or history), a sweep (lines, map, matrix, histogram) or a table of sensitivities.
 
-    `place` is a result that is kept in a folder, a sweep, or what the command takes. Returns the path of the picture
-    (default: NAME.png in the current folder). Raises InvalidInputError for an unknown kind or format and for a result
-    that was not kept, InputMissingError, OutputExistsError for a file of others unless `overwrite`, OutputError.
+    `place` is a result that is kept in a folder, a sweep, or what the command takes; `size` is width and height in mm.
+    Returns the path of the picture (default: NAME.png in the current folder). Raises InvalidInputError for an unknown
+    kind or format, too small a page and a result that was not kept, InputMissingError, OutputExistsError for a file of
+    others unless `overwrite`, OutputError.
     """
     table = None if experiment is None else Path(experiment)
     ready = partial(refuse_foreign, is_own=is_picture, overwrite=overwrite)
+    paper = Paper(None if size is None else (size[0] / MILLIMETRES_PER_INCH, size[1] / MILLIMETRES_PER_INCH), dpi)
     look = RunLook(_tuple(times), frames, _tuple(panels), _tuple(blocks), relative, colour, forces)
-    return draw(_folder(place), None if out is None else Path(out), look, table, kind, OWN, ready=ready)[0]
+    return draw(_folder(place), None if out is None else Path(out), look, table, kind, paper, ready=ready)[0]
 
 
 def animate(  # noqa: PLR0913 - one argument for each option of the command

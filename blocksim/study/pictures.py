@@ -13,7 +13,7 @@ from blocksim.errors import InputMissingError, InvalidInputError, Problem
 from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario.findings import did_you_mean_or_list
 from blocksim.study.stored_run import stored_run
-from blocksim.study.sweep_data import read_sweep_data
+from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import is_sweep
 from blocksim.view.curves import Choice
@@ -53,7 +53,7 @@ def draw_convergence(result: "Convergence", scenario: Scenario, path: Path, pape
     written.
     """
     panels = [
-        _panel(result, study)
+        _panel(result, study, unit_of(scenario, study.key))
         for study in result.studies
         if sum(level.is_finished for level in study.levels) >= FEWEST_LEVELS
     ]
@@ -129,12 +129,12 @@ def _kind_named(name: str) -> Kind:
     return KINDS[name]
 
 
-def _panel(result: "Convergence", study: "Study") -> Panel:
+def _panel(result: "Convergence", study: "Study", unit: str) -> Panel:
     levels = [level for level in study.levels if level.is_finished]
     x = np.array([level.x_mm for level in levels])
     return Panel(
         title=study.title,
-        key=study.key,
+        key=f"{study.key} ({unit})" if unit else study.key,
         verdict=study.verdict.value,
         values=np.array([level.value for level in levels]),
         blocks=result.blocks,

@@ -112,7 +112,7 @@ def _input(scenario: Scenario, head: Head, column: pd.Series) -> Input:
     if all(number is not None for number in numbers):
         typed = Typed(head.unit, head.si(1.0)) if head.unit else None
         values = np.array(numbers, dtype=np.float64)
-        return Input(key, _unit(scenario, key), values, is_even=_is_even(scenario, key), typed=typed)
+        return Input(key, unit_of(scenario, key), values, is_even=_is_even(scenario, key), typed=typed)
     words = [q.shown(value).strip('"') for value in column]
     levels = tuple(dict.fromkeys(words))
     return Input(key, "", np.array([levels.index(word) for word in words], dtype=np.float64), levels)
@@ -136,8 +136,8 @@ def _number(value: object) -> float | None:
         return None
 
 
-def _unit(scenario: Scenario, key: str) -> str:
-    """Return the unit that a key's values have inside, empty for plain numbers."""
+def unit_of(scenario: Scenario, key: str) -> str:
+    """Return the SI unit of a key's values, empty for plain numbers."""
     data = scenario.model_dump(by_alias=True, exclude={"sweep"})
     path: KeyPath = ()
     for part in parse_key(key):

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.scenario import Document
+from blocksim.scenario import Document, Scenario
 from blocksim.study.pictures import draw_sweep
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.sweep import sweep
-from blocksim.study.sweep_data import read_sweep_data
+from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import prepare
 from blocksim.view.sweeps.found import FoundSweep
 from tests.study.conftest import SCENARIOS
@@ -55,6 +55,11 @@ def test_values_keep_the_unit_that_was_typed(quick: Document, tmp_path: Path) ->
     drawn = (tmp_path / "lines.svg").read_text()
     assert "<!-- structures.0.overlap (cm) -->" in drawn
     assert "<!-- ground.tilt = 0.01 rad -->" in drawn
+
+
+def test_refined_spacing_is_drawn_with_its_unit(scenario: Scenario) -> None:
+    units = {key: unit_of(scenario, key) for key in ("contact.particle_spacing", "time.safety")}
+    assert units == {"contact.particle_spacing": "m", "time.safety": ""}
 
 
 def test_words_become_levels_and_keys_keep_the_order_of_the_table(nominal: Document, tmp_path: Path) -> None:
