@@ -18,7 +18,7 @@ from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import PlacedBody, Scenario, Sweep, place_bodies
 from blocksim.scenario import quantities as q
-from blocksim.scenario.units import parse_unit
+from blocksim.scenario.units import ANGLE, parse_unit
 from blocksim.simulation.movement import FirstMove, from_start_to_end
 from blocksim.simulation.table import COLUMNS, Columns
 
@@ -97,6 +97,11 @@ class Head:
         """Return the name of the column."""
         return f"{self.key} [{self.unit}]" if self.unit else self.key
 
+    @property
+    def si_unit(self) -> str:
+        """Return "rad" for a column of angles, as of friction angles; empty for all others."""
+        return "rad" if _is_angle(self.unit) else ""
+
     def cell(self, value: object) -> object:
         """Return a value as it stands in the column."""
         if not self.unit:
@@ -123,7 +128,13 @@ def _unit(values: object) -> str:
     if not isinstance(values, tuple):
         return str(getattr(values, "unit", ""))
     typed = next((unit for value in values if isinstance(value, str) and (unit := q.unit_in(value))), "")
+    if _is_angle(typed) and not all(isinstance(value, str) or value == 0 for value in values):
+        return ""  # friction angles among friction coefficients: no unit holds for both
     return typed if typed and all(_is_number(value) for value in values) else ""
+
+
+def _is_angle(unit: str) -> bool:
+    return bool(unit) and parse_unit(unit).dimension == ANGLE
 
 
 def _is_number(value: object) -> bool:

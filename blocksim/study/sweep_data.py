@@ -112,7 +112,8 @@ def _input(scenario: Scenario, head: Head, column: pd.Series) -> Input:
     if all(number is not None for number in numbers):
         typed = Typed(head.unit, head.si(1.0)) if head.unit else None
         values = np.array(numbers, dtype=np.float64)
-        return Input(key, unit_of(scenario, key), values, is_even=_is_even(scenario, key), typed=typed)
+        unit = unit_of(scenario, key) or head.si_unit
+        return Input(key, unit, values, is_even=_is_even(scenario, key), typed=typed)
     words = [q.shown(value).strip('"') for value in column]
     levels = tuple(dict.fromkeys(words))
     return Input(key, "", np.array([levels.index(word) for word in words], dtype=np.float64), levels)

@@ -16,7 +16,7 @@ from blocksim.study.sweep_data import read_sweep_data
 from blocksim.study.verify_sweep import verify_sweep
 from tests.study.conftest import SCENARIOS
 
-TILT, OVERLAP = "ground.tilt", "structures.0.overlap"
+TILT, OVERLAP, FRICTION = "ground.tilt", "structures.0.overlap", "friction.block_block"
 
 
 @pytest.mark.parametrize(
@@ -24,8 +24,11 @@ TILT, OVERLAP = "ground.tilt", "structures.0.overlap"
     [
         (TILT, {"from": "0 deg", "to": "10 deg", "count": 3}, "ground.tilt [deg]", [0.0, 5.0, 10.0]),
         (TILT, ["1 deg", "0.1 rad"], "ground.tilt [deg]", [1.0, pytest.approx(5.729577951)]),
+        (TILT, [0, "10 deg"], "ground.tilt [deg]", [0.0, 10.0]),
         (OVERLAP, ["11 mm", 0.01, "0.9 cm"], "structures.0.overlap [mm]", [11.0, 10.0, 9.0]),
         (OVERLAP, [0.01, 0.011], OVERLAP, [0.01, 0.011]),
+        (FRICTION, ["20 deg", "30 deg"], "friction.block_block [deg]", [20.0, 30.0]),
+        (FRICTION, ["20 deg", 0.4], FRICTION, ["20 deg", 0.4]),  # 0.4 is no angle of 0.4 rad
         ("gravity", [9.81, 1.62], "gravity", [9.81, 1.62]),
         ("contact.model", ["surface", "kernel"], "contact.model", ["surface", "kernel"]),
         ("time.step", ["auto", "1e-7 s"], "time.step", ["auto", "1e-7 s"]),

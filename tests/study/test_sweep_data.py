@@ -12,6 +12,7 @@ from blocksim.study.plan import Values, with_sweep
 from blocksim.study.sweep import sweep
 from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import prepare
+from blocksim.view.series import value_axis
 from blocksim.view.sweeps.found import FoundSweep
 from tests.study.conftest import SCENARIOS
 
@@ -60,6 +61,20 @@ def test_values_keep_the_unit_that_was_typed(quick: Document, tmp_path: Path) ->
 def test_refined_spacing_is_drawn_with_its_unit(scenario: Scenario) -> None:
     units = {key: unit_of(scenario, key) for key in ("contact.particle_spacing", "time.safety")}
     assert units == {"contact.particle_spacing": "m", "time.safety": ""}
+
+
+def test_friction_angles_are_an_axis_in_degrees(nominal: Document, tmp_path: Path) -> None:
+    base = with_sweep(nominal, {"friction.block_block": ["20 deg", "30 deg"]}, "grid").build()
+    prepare(tmp_path, base, "made-up", overwrite=False)
+    heads = ["case", "friction.block_block [deg]", "status", "reason", "seconds"]
+    heads += [f"{block}.{end}" for block in "123" for end in ENDS]
+    lines = [",".join(heads), f"a,20.0,{ended(74.0, 130.0)}", f"b,30.0,{ended(75.0, 131.0)}", ""]
+    (tmp_path / "sweep.csv").write_text("\n".join(lines), encoding="utf-8")
+    (friction,) = read_sweep_data(tmp_path).inputs
+    assert value_axis(friction.values, friction.key, friction.unit, typed=friction.typed).label.endswith(
+        "block_block (deg)"
+    )
+    assert friction.told(friction.values[0]) == "20 deg"
 
 
 def test_words_become_levels_and_keys_keep_the_order_of_the_table(nominal: Document, tmp_path: Path) -> None:
