@@ -10,7 +10,7 @@ import typer
 
 from blocksim.cli import options
 from blocksim.cli.output import GAP, answer, duration, note, number, print_json, table_lines, width_of_screen
-from blocksim.cli.scenario import read_scenario
+from blocksim.cli.scenario import read_scenario, warn_of_values
 from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
 from blocksim.study.rows import check_experiment
@@ -52,6 +52,7 @@ def check_command(
         answer(scenario_to_toml(ready))
     elif not quiet:
         answer("\n\n".join("\n".join(lines) for lines in _tables(ready, description)))
+        warn_of_values(ready)
         note(f"{ready.name}: valid")
 
 

@@ -10,7 +10,7 @@ from blocksim.cli import options
 from blocksim.cli.compiling import tell_compilation
 from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.progress import watching
-from blocksim.cli.scenario import read_scenario
+from blocksim.cli.scenario import read_scenario, warn_of_values
 from blocksim.cli.verdict import comparison_table, verdict_lines
 from blocksim.simulation import Result
 from blocksim.simulation.checkpoint_policy import CHECKPOINT_SECONDS, CheckpointPolicy
@@ -62,6 +62,8 @@ def run_command(
 
     listener = Listener(on_start=start) if silent else Listener(note, start)
     with read_scenario(scenario, settings or []) as ready, watching(quiet=silent) as on_progress:
+        if not silent:
+            warn_of_values(ready)
         result = run(
             ready,
             out=out or default_folder(ready),

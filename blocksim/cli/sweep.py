@@ -13,6 +13,7 @@ from blocksim.cli.compiling import tell_compilation
 from blocksim.cli.dry_run import show_estimate
 from blocksim.cli.output import GAP, answer, note, print_json, table_lines, width_of_screen
 from blocksim.cli.reporter import reporting, shown
+from blocksim.cli.scenario import warn_of_values
 from blocksim.cli.vary import with_vary
 from blocksim.errors import ExitCode, StoppedEarlyError
 from blocksim.scenario import Document
@@ -119,6 +120,8 @@ def sweep_command(
         samples=samples,
         seed=seed,
     )
+    if not silent:
+        warn_of_values(document.build())
     if dry_run:
         show_estimate(document, jobs, keep_cases=keep_cases, as_json=as_json)
         return

@@ -39,7 +39,7 @@ from blocksim.analysis.proportion import interval
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.extras import loaded
 from blocksim.scenario.limited import read_head
-from blocksim.simulation.claim import takes_lock
+from blocksim.simulation.folder import takes_lock
 from blocksim.study.calibrate_plan import Prior
 from blocksim.study.executors.ensemble import Member
 from blocksim.study.rows import Range, are_inside, values_at

@@ -249,3 +249,12 @@ def test_an_absurd_stiffness_is_no_internal_error(blocksim: Command) -> None:
     answer = blocksim("check", "scenarios/three_blocks.toml", *settings)
     assert answer.code == 65
     assert "time.step" in answer.err
+
+
+def test_friction_angle_without_its_unit_is_warned_of(blocksim: Command) -> None:
+    settings = ("scenarios/slide.toml", "--set", "friction.block_ground=30")
+    warning = 'warning: friction.block_ground = 30 is a friction coefficient; for an angle write "30 deg"\n'
+    assert warning in blocksim("check", *settings).err
+    assert warning in blocksim("run", *settings).err
+    assert warning in blocksim("sweep", *settings[:1], "--vary", "friction.block_ground=20,30", "--dry-run").err
+    assert "warning" not in blocksim("check", *settings[:2], "friction.block_ground=30 deg").err
