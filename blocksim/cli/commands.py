@@ -3,6 +3,7 @@
 So `blocksim --help` need not wait for numba, pandas and HDF5, and `blocksim check` not for matplotlib.
 """
 
+import re
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,8 @@ GROUPS = {  # heads of the list in `blocksim --help`
     "Study": ("sweep", "calibrate", "sensitivity", "converge"),
     "Check": ("check", "compare", "verify", "verify-run", "bench"),
 }
+UsageError: Any = typer.BadParameter.__mro__[1]
+"""Mistake of usage; typer exports this class under no name."""
 HELP = {"help_option_names": ["-h", "--help"]}
 
 
@@ -63,7 +66,21 @@ class CommandGroup(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
         with told(), clearing_up(wanted=True):
-            return super().invoke(ctx)
+            try:
+                return super().invoke(ctx)
+            except UsageError as error:
+                error.message += _quoting_hint(error.message)
+                raise
+
+
+def _quoting_hint(message: str) -> str:
+    """Return how to quote a value where the shell took its unit for an argument; empty otherwise."""
+    found = re.fullmatch(r"Got unexpected extra argument\w*(?:\(s\))? \((\S+)\)", message)
+    if found is None:
+        return ""
+    from blocksim.scenario.quantities import unit_in
+
+    return f'; quote a value that has a unit: "KEY=10 {found[1]}"' if unit_in(f"1 {found[1]}") else ""
 
 
 def _refuse_no_folder() -> None:

@@ -134,8 +134,8 @@ CheckpointEvery = Annotated[
         "--checkpoint-every",
         parser=seconds_of,
         metavar="TIME",
-        help="Wall time between checkpoints.",
-        show_default="60 s",
+        help="Wall time between checkpoints (default: 60 s).",
+        show_default=False,
     ),
 ]
 CheckpointSteps = Annotated[

@@ -9,8 +9,9 @@ from typing import Any, Literal, cast
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from blocksim.scenario.keys import MISSING, KeyPath, field_at, follow, keys_of, table_at
+from blocksim.scenario.keys import MISSING, NAMED, KeyPath, field_at, follow, keys_of, table_at
 from blocksim.scenario.models.motion import MOTIONS
+from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES, scheme_of
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.spelling import nearest
@@ -109,8 +110,17 @@ def _unknown_key(path: KeyPath, data: object) -> Finding:
     table = SCHEMES[scheme_of(follow(data, path[:-1]))] if path[0] == "time" else table_at(path[:-1], data)
     known = keys_of(table) if table is not None else ()
     meant = similar_word(str(path[-1]), known)
+    if (len(path) == 1 or not meant) and (other := _table_with(str(path[-1]))):
+        return Finding(path, f"unknown key, did you mean {f'{other}.{path[-1]}'!r}?", at="key")
     hint = f"did you mean {meant!r}?" if meant else f"allowed are: {', '.join(known)}"
     return Finding(path, f"unknown key, {hint}", at="key", meant=(*path[:-1], meant) if meant else ())
+
+
+def _table_with(word: str) -> str:
+    """Return the table of the scenario that has a key, where exactly one has it; empty otherwise."""
+    tables = ((name, table_at((name,), {})) for name in keys_of(Scenario) if name not in NAMED)
+    having = [name for name, table in tables if table is not None and word in keys_of(table)]
+    return having[0] if len(having) == 1 else ""
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

@@ -116,3 +116,12 @@ def test_shell_completes_kinds_and_keys(line: str, offered: list[str]) -> None:
         [sys.executable, "-c", code], env={**os.environ, **words}, cwd=root, capture_output=True, text=True, check=False
     )
     assert (done.stdout.split(), done.stderr) == (offered, "")
+
+
+def test_value_whose_unit_the_shell_split_off_is_named(blocksim: Command) -> None:
+    answer = blocksim("run", "scenarios/slide.toml", "--set", "ground.tilt=10", "deg")
+    assert (answer.code, answer.err.splitlines()[-1]) == (
+        2,
+        'Error: Got unexpected extra argument(s) (deg); quote a value that has a unit: "KEY=10 deg"',
+    )
+    assert "quote" not in blocksim("run", "scenarios/slide.toml", "other.toml").err

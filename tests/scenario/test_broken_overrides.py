@@ -7,6 +7,30 @@ import pytest
 Refusal = Callable[..., tuple[int, str]]
 
 CASES = {
+    "key without its table": (
+        "tilt=0",
+        """
+--set tilt=0: unknown key, did you mean 'ground.tilt'?
+      | tilt=0
+      | ^^^^
+""",
+    ),
+    "key in a wrong table": (
+        "ground.end=3",
+        """
+--set ground.end=3: unknown key, did you mean 'time.end'?
+      | ground.end=3
+      | ^^^^^^^^^^
+""",
+    ),
+    "key that more resembles another one": (
+        "restitution=0.3",
+        """
+--set restitution=0.3: unknown key, did you mean 'contact.restitution'?
+      | restitution=0.3
+      | ^^^^^^^^^^^
+""",
+    ),
     "no value": (
         "time.end",
         """
