@@ -124,11 +124,11 @@ def draw_ruler(canvas: Canvas, depth: float) -> None:
     locator = MaxNLocator(nbins=max(2, int(room / TICK_SPACING)), steps=[1, 2, 5, 10])
     tick = TICK_LENGTH / canvas.points_per_mm
     canvas.axes.plot([low, high], [y, y], color=style.FAINT_INK, linewidth=style.LINE_WIDTH, transform=canvas.scene)
-    for x in locator.tick_values(low, high):
-        if low + edge <= x <= high - edge:
-            colour, width = style.FAINT_INK, style.LINE_WIDTH
-            canvas.axes.plot([x, x], [y - tick, y], color=colour, linewidth=width, transform=canvas.scene)
-            _number(canvas, x, y - 1.6 * tick)
+    ticks = [float(x) for x in locator.tick_values(low, high) if low + edge <= x <= high - edge]
+    for x in ticks:
+        colour, width = style.FAINT_INK, style.LINE_WIDTH
+        canvas.axes.plot([x, x], [y - tick, y], color=colour, linewidth=width, transform=canvas.scene)
+        _number(canvas, x, y - 1.6 * tick, " mm" if x == ticks[-1] else "")
 
 
 def ground_line(support: Support, canvas: Canvas) -> Floats:
@@ -190,12 +190,12 @@ def _fill(canvas: Canvas, outline: Floats, zorder: float) -> None:
     canvas.axes.add_artist(patch)
 
 
-def _number(canvas: Canvas, x: float, y: float) -> None:
-    """Write a number below (x, y), along the ground."""
+def _number(canvas: Canvas, x: float, y: float, unit: str) -> None:
+    """Write a number, with its unit if any, below (x, y), along the ground."""
     canvas.axes.text(
         x,
         y,
-        f"{x:g}".replace("-", "−"),
+        f"{x:g}{unit}".replace("-", "−"),
         rotation=float(np.degrees(canvas.extent.tilt)),
         rotation_mode="anchor",
         ha="center",

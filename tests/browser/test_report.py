@@ -273,6 +273,22 @@ def test_sweep_is_sorted_filtered_and_its_members_open(swept: Path, open_page: O
     assert one.page.locator(".map canvas").is_visible()
 
 
+def test_outcomes_are_the_colours_of_the_map(tmp_path: Path, open_page: Open) -> None:
+    write_sweep(tmp_path / "sweep", kept=0)
+    table = tmp_path / "sweep" / "sweep.csv"
+    head, *rows = table.read_text(encoding="utf-8").splitlines()
+    ends = ["fell", "fell", "slid", "stands", "rocked back", "fell"]  # the last case failed
+    rows = [f"{row},{end}" for row, end in zip(rows, ends, strict=True)]
+    table.write_text("\n".join([f"{head},outcome", *rows, ""]), encoding="utf-8")
+    report(tmp_path / "sweep", "--out", tmp_path / "report.html")
+    one = open_page(tmp_path / "report.html")
+    one.page.locator("[data-option=colour]").select_option("outcome")
+    assert (
+        " ".join(one.page.locator(".map .legend").inner_text().split())
+        == "stands: 1 rocked back: 1 slid: 1 fell: 2 did not finish: 1"
+    )
+
+
 def test_measured_range_is_marked_in_the_map_and_the_table(tmp_path: Path, open_page: Open) -> None:
     write_sweep(tmp_path / "sweep", kept=0)
     write_experiment(tmp_path / "repeats.csv")

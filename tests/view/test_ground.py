@@ -180,7 +180,8 @@ def test_tilted_ground_is_turned_in_the_picture_and_numbered_along_itself(tilt: 
     draw_ruler(drawn, depth=10.0)
     numbers = [(text.get_text(), text.get_position()[0]) for text in drawn.axes.texts]
     assert len(numbers) > 5
-    assert all(float(shown.replace("−", "-")) == x for shown, x in numbers)
+    assert all(float(shown.removesuffix(" mm").replace("−", "-")) == x for shown, x in numbers)
+    assert [shown.endswith(" mm") for shown, _ in numbers] == [False] * (len(numbers) - 1) + [True]
     turns = np.array([text.get_rotation() for text in drawn.axes.texts])
     assert turns == pytest.approx(np.degrees(tilt) % 360.0)
     assert all(text.get_position()[1] < -10.0 / SCALE for text in drawn.axes.texts)

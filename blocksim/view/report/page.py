@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from blocksim.simulation.atomic import write_bytes
+from blocksim.view.report.differences import labels
 from blocksim.view.report.subjects import Subject
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ def write_report(subjects: Sequence[Subject], path: Path, *, title: str, version
 
 def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
     """Return the text of the page; those subjects that have a parent are reached from it only."""
+    listed = [subject for subject in subjects if not subject.page.get("parent")]
     return (
         _environment()
         .get_template("page.html")
@@ -36,7 +38,8 @@ def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
             title=title,
             version=version,
             subjects=subjects,
-            listed=[subject for subject in subjects if not subject.page.get("parent")],
+            listed=listed,
+            labels=labels(listed),
             style=_part("style.css"),
             script="\n".join(_part(f"{name}.js") for name in SCRIPTS),
         )

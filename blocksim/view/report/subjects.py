@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from blocksim.errors import InvalidInputError
+from blocksim.simulation.movement import Movement
 from blocksim.simulation.table import rows_of
 from blocksim.view.report.packing import MOST_BYTES, frame_indices, pack_forces, pack_frames
 from blocksim.view.report.scene import scene_data
@@ -66,6 +67,7 @@ def run_subject(
         "summary": _summary(run),
         "problems": [*run.problems, *problems, *remarks],
         "scenario": run.scenario_text,
+        "values": None if run.scenario is None else run.scenario.model_dump(by_alias=True, exclude={"sweep"}),
         "description": None if run.scenario is None else run.scenario.description,
         "notes": notes,
         "final": [] if run.final is None else rows_of(run.final),
@@ -123,12 +125,27 @@ def _summary(run: StoredRun) -> list[tuple[str, str]]:
     told = run.summary
     return [
         *blocks,
+        *_movement(told.movement),
         ("simulated time", f"{told.simulated_time_s:.4g} s"),
         ("steps", f"{told.steps} of {told.time_step_s:.3g} s"),
         ("solver time", f"{told.solver_seconds:.2f} s on {told.threads} thread{'s' if told.threads > 1 else ''}"),
         ("relative energy error", _share(told.energy_J.relative_residual)),
         *(("warning", warning) for warning in told.warnings),
     ]
+
+
+def _movement(found: Movement | None) -> list[tuple[str, str]]:
+    """Return what moved, how far and first; nothing for runs of earlier versions."""
+    if found is None:
+        return []
+    rows = [
+        ("outcome", str(found.outcome)),
+        ("largest displacement", f"{found.largest_displacement_mm:.2f} mm (block {found.displaced_block})"),
+        ("largest rotation", f"{found.largest_rotation_deg:.2f}° (block {found.rotated_block})"),
+    ]
+    if found.first_mover is not None:
+        rows.append(("first moved", f"block {found.first_mover} at {found.first_moved_s:.3f} s"))
+    return rows
 
 
 def _share(value: float) -> str:

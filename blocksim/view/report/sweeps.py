@@ -15,9 +15,8 @@ from blocksim.view.report.subjects import Subject
 
 TABLE = "sweep.csv"
 MOST_BYTES = 200 * MEGABYTE  # of the table
-HEAD = ("case",)
-MOVEMENT = ("outcome", "first_mover", "first_moved_s", "displacement_mm", "turn_deg")
-TAIL = ("status", "reason", "seconds", "inside", *MOVEMENT)
+MOVES = ("first_mover", "first_moved_s", "displacement_mm", "turn_deg")
+HEAD, TAIL = ("case",), ("status", "reason", "seconds", "inside", "outcome", *MOVES)
 NEEDED = {"case", "status"}
 OF_BLOCKS = (".x_mm", ".y_mm", ".rotation_deg", ".left_mm", ".right_mm")
 MOST_VALUES = 400_000  # of blocks in the page; a sweep of 10 000 cases shows 13 blocks

@@ -1,6 +1,7 @@
 // The outcome of every case over two varied keys.
 const EDGE = { left: 74, right: 16, top: 12, bottom: 46 };
 const SIGNS = { inside: "#009E73", outside: "#D55E00", finished: "#56B4E9", other: "#777777" };
+const OUTCOMES = { stands: "#009E73", "rocked back": "#56B4E9", slid: "#E69F00", fell: "#D55E00" };
 const DECADES = 30;
 
 // Whether the median is nearer to the middle of a logarithmic axis than to that of a linear one.
@@ -63,6 +64,8 @@ class OutcomeMap {
     const ends = names("block");
     const places = [...names("varied"), ...ends];
     const isJudged = this.column("inside")?.values.some((value) => value !== null);
+    const hasOutcome = this.column("outcome")?.values.some((value) => value !== null);
+    const colours = [...(isJudged ? ["inside"] : []), ...(hasOutcome ? ["outcome"] : []), "status", ...ends];
     const fill = (select, options, chosen) => {
       for (const name of options) select.append(make("option", { value: name }, name || "row in the table"));
       select.value = chosen ?? options[0];
@@ -70,7 +73,7 @@ class OutcomeMap {
     const varied = names("varied");
     fill(this.selects.across, [...places, ""], varied[0] ?? "");
     fill(this.selects.up, [...places, ""], varied[1] ?? ends.at(-2) ?? "");
-    fill(this.selects.colour, [...(isJudged ? ["inside"] : []), "status", ...ends], isJudged ? "inside" : "status");
+    fill(this.selects.colour, colours, colours[0]);
   }
 
   wire() {
@@ -138,12 +141,22 @@ class OutcomeMap {
     const name = this.selects.colour.value;
     const column = this.column(name);
     if (name === "inside" || name === "status") return this.verdicts(name, column);
+    if (name === "outcome") return this.outcomes(column);
     const finite = column.values.filter((value) => value !== null);
     const [low, high] = [finite.reduce((a, b) => Math.min(a, b), Infinity), finite.reduce((a, b) => Math.max(a, b), -Infinity)];
     const tone = (share) => `hsl(${260 - 200 * share} 75% ${32 + 36 * share}%)`; // dark to bright, also where colours look alike
     const fills = column.values.map((value) => (value === null ? SIGNS.other : tone(high > low ? (value - low) / (high - low) : 0.5)));
     const legend = [0, 0.25, 0.5, 0.75, 1].map((share) => [tone(share), shown(low + share * (high - low)), "disc"]);
     return { fills, forms: column.values.map((value) => (value === null ? "cross" : "disc")), legend };
+  }
+
+  outcomes(column) {
+    const status = this.column("status").values;
+    const kinds = column.values.map((value, row) => (status[row] === "finished" && value in OUTCOMES ? value : null));
+    const count = (one) => kinds.filter((other) => other === one).length;
+    const legend = Object.keys(OUTCOMES).filter(count).map((one) => [OUTCOMES[one], `${one}: ${count(one)}`, "disc"]);
+    if (count(null)) legend.push([SIGNS.other, `did not finish: ${count(null)}`, "cross"]);
+    return { fills: kinds.map((one) => OUTCOMES[one] ?? SIGNS.other), forms: kinds.map((one) => (one === null ? "cross" : "disc")), legend };
   }
 
   verdicts(name, column) {
