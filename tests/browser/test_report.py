@@ -270,7 +270,7 @@ def test_sweep_is_sorted_filtered_and_its_members_open(swept: Path, open_page: O
     one.page.keyboard.press("End")
     assert one.state()["frame"] == 4
     one.page.get_by_role("link", name="Back to the sweep").click()
-    assert one.page.locator(".map canvas").is_visible()
+    one.page.locator(".map canvas").wait_for(state="visible")
 
 
 def test_outcomes_are_the_colours_of_the_map(tmp_path: Path, open_page: Open) -> None:
