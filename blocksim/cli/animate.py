@@ -33,7 +33,7 @@ def animate_command(
 ) -> None:
     """Show a run as an animation, GIF or MP4.
 
-    The default is a GIF, NAME.gif, at a quarter of the real speed; the last frame is held for a while. A run that was
+    The default is a GIF, NAME.gif, at a quarter of the real speed; the last frame is held. A run that was
     stopped or killed is shown as far as it came. --forces needs a run that has stored contacts (output.contacts =
     true), MP4 the extra `video` or the system's ffmpeg. The window fits what the blocks occupy; a few that fly far off
     leave it. An older animation of blocksim is replaced; any other file only with --overwrite.

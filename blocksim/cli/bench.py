@@ -1,4 +1,4 @@
-"""blocksim bench: speed and memory, measured now; other engines beside it on request."""
+"""blocksim bench: measure speed and memory, of other engines too on request."""
 
 import json
 import math
@@ -40,9 +40,12 @@ def bench_command(
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Run a reduced version; the last lines say how.")] = False,
     repeats: Annotated[int, typer.Option(min=1, metavar="N", help="Samples of each number.")] = REPEATS,
-    peers: Annotated[bool, typer.Option("--peers", help="Compare with pymunk and Box2D, with a picture.")] = False,
+    peers: Annotated[
+        bool, typer.Option("--peers", help="Compare with pymunk and Box2D, and draw the comparison.")
+    ] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Write everything as JSON; the picture goes beside it.")
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Write everything as JSON; the picture goes into the same folder."),
     ] = None,
     size: options.Size = None,
     dots: options.Dots = None,
@@ -53,7 +56,7 @@ def bench_command(
     """Measure speed and memory, and show the table.
 
     Times of the solver are CPU seconds of its steps, medians over repeats with the smallest and largest sample. All
-    takes some minutes on one core; nothing else should run. --peers needs the extra blocksim[bench].
+    measurements take some minutes on one core; nothing else should run. --peers needs the extra blocksim[bench].
 
     Example: blocksim bench walls --out bench.json
     """
@@ -71,13 +74,13 @@ def bench_command(
     outcomes: list[Outcome] = []
     try:
         outcomes.extend(_run(wanted, Setting(quick, repeats), quiet=silent))
-    finally:  # also when stopped: minutes of measuring are not to be lost, and the list has what came before
+    finally:  # also when stopped: minutes of measuring must not be lost; the list has what was measured
         if outcomes:
             _show(machine, outcomes, out, paper, as_json=as_json, quiet=silent)
 
 
 def _refuse_present(out: Path | None, *, peers: bool, overwrite: bool) -> None:
-    """Notice before minutes of measuring that the report, or the picture that --peers draws, cannot be written."""
+    """Check before minutes of measuring that the report, and the picture that --peers draws, can be written."""
     if out is not None and (out.is_dir() or not out.absolute().parent.is_dir()):
         message = f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'there is no such folder'}"
         raise OutputError(message)
@@ -92,7 +95,7 @@ def _picture(out: Path | None) -> Path:
 
 
 def _run(measurements: Sequence[Measurement], setting: Setting, *, quiet: bool) -> Iterator[Outcome]:
-    """Run measurements one after the other and say which one is under way."""
+    """Run measurements one after the other and report which one is running."""
     for position, measurement in enumerate(measurements, start=1):
         if not quiet:
             note(f"{position}/{len(measurements)} {measurement.name}: {measurement.title} ...")
@@ -144,7 +147,7 @@ def _cells(one: Number) -> tuple[str, ...]:
 
 
 def _shown(value: float) -> str:
-    """Return a number with three digits, a large one with all before the point."""
+    """Return a number with three significant digits, a large one with all digits before the point."""
     return f"{value:.0f}" if LARGE <= abs(value) < math.inf else number(value, DIGITS)
 
 

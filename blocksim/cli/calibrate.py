@@ -39,7 +39,7 @@ def calibrate_command(
     trials: Annotated[int, typer.Option(min=1, metavar="N", help="Number of trials.")] = TRIALS,
     members: Annotated[int, typer.Option(min=1, metavar="M", help="Runs over the scatter per trial.")] = MEMBERS,
     fresh: Annotated[
-        int, typer.Option(min=1, metavar="M", help="Fresh runs that the probability is measured with in the end.")
+        int, typer.Option(min=1, metavar="M", help="Fresh runs for the final estimate of the probability.")
     ] = FRESH_MEMBERS,
     seed: Annotated[int, typer.Option(min=0, metavar="S", help="Random seed.")] = 0,
     experiment: options.ExperimentPath = None,
@@ -51,14 +51,14 @@ def calibrate_command(
         ),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Resume with the existing trials.")] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file and the trials there.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file and the existing trials.")] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Fit inputs to measured repeats, within priors.
+    """Fit inputs to measured repeats, within their priors.
 
-    What is maximised is the probability that a run is inside all measured ranges (as in compare) while the other inputs
-    scatter as stated, not the agreement of one run. Writes the scenario with the fitted values and where they come from
+    Maximises the probability that a run is inside all measured ranges (as in compare) while the other inputs scatter as
+    stated, not the agreement of one run. Writes the scenario with the fitted values and where they come from
     in [provenance]. Every trial is kept as it ends; a search that was stopped continues with --resume. Needs the extra
     blocksim[study]. Exit code 1: nothing inside all ranges was found. The search then goes by the distance to the
     ranges, and the file holds the nearest values. The example takes the scatter from [sweep], as in
@@ -96,7 +96,7 @@ def calibrate_command(
 
 
 def _telling() -> Callable[[Trial, Trial, int], None]:
-    """Return a function that tells every trial that is the best so far, and another now and then."""
+    """Return a function that reports every trial that is the best so far, and others now and then."""
     told_at = 0.0
 
     def tell(trial: Trial, best: Trial, trials: int) -> None:
@@ -111,7 +111,7 @@ def _telling() -> Callable[[Trial, Trial, int], None]:
 
 
 def _agreement(trial: Trial, best: Trial) -> str:
-    """Return the share inside; where no trial has any, how far off: 0 at the ranges, towards 1 far from them."""
+    """Return the share inside or, where no trial has any, the distance: 0 at the ranges, towards 1 far from them."""
     if best.score.inside:
         return f"{trial.score.share_inside:.0%} inside (best {best.score.share_inside:.0%})"
     return f"nothing inside, {trial.score.miss:.3f} off (best {best.score.miss:.3f} of 0 to 1)"
@@ -149,7 +149,7 @@ def _probability(found: Fit) -> list[str]:
     low, high = score.interval
     return [
         f"P(inside all ranges) = {score.share_inside:.3f}, 95 % interval {low:.3f} to {high:.3f} (Clopper-Pearson)",
-        f"of {score.members} fresh random members; the search had {tried.share_inside:.3f} of its {tried.members}",
+        f"of {score.members} fresh random members; search estimate {tried.share_inside:.3f} ({tried.members} members)",
     ]
 
 

@@ -1,4 +1,4 @@
-"""blocksim check: validate a scenario and show what it comes to."""
+"""blocksim check: validate a scenario and summarise it."""
 
 import textwrap
 from collections import Counter
@@ -38,8 +38,8 @@ def check_command(
 ) -> None:
     """Validate a scenario and summarise it.
 
-    Prints time step and cost, then masses, inertias, contact parameters and the keys that decided them. Nothing is run;
-    with --quiet only mistakes are printed. --resolved writes a scenario file with every value that will be used.
+    Prints time step and cost, then masses, inertias, contact parameters and the keys that set them. Nothing is run;
+    with --quiet only mistakes are printed. --resolved prints a scenario file with every value that a run will use.
 
     Example: blocksim check scenarios/three_blocks.toml
     """
@@ -71,7 +71,7 @@ def _tables(scenario: Scenario, description: Description) -> list[list[str]]:
 
 
 def _bodies(bodies: Sequence[PlacedBody]) -> list[str]:
-    """Tell of every block; of a crowd tell the kinds of blocks, how many there are of each and where they all are."""
+    """List every block; of more than MOST_BODIES list the kinds, their numbers and the range of the centres."""
     if len(bodies) <= MOST_BODIES:
         return table_lines(("block", "x mm", "y mm", *SIDES), [_body_cells(body) for body in bodies])
     counts = Counter(body.block for body in bodies)
@@ -107,7 +107,7 @@ def _meanings(scenario: Scenario, pair: PairDescription) -> list[str]:
     if pair.normal_damping_ratio is None:
         return [
             "μs static and μk kinetic friction, e restitution; rigid contacts: K in N/m is",
-            "what one point (a face has two) gives way by at rest, for this step",
+            "the stiffness of one contact point (a face has two) at rest, for this step",
         ]
     points = "a face has two" if scenario.contact.model == "surface" else "the particles of a face share 2 K"
     return [
@@ -117,7 +117,7 @@ def _meanings(scenario: Scenario, pair: PairDescription) -> list[str]:
 
 
 def _rules(pairs: Sequence[PairDescription]) -> list[str]:
-    """Tell which keys of the scenario decided, and for which pairs; the rest follows defaults and materials."""
+    """List the keys of the scenario that set values, with their pairs; the rest follows defaults and materials."""
     found: dict[str, dict[str, None]] = {}
     for pair in pairs:
         for key in pair.rules.values():
@@ -127,7 +127,7 @@ def _rules(pairs: Sequence[PairDescription]) -> list[str]:
     rows = [cells for key in sorted(found, key=_specific_first) for cells in _wrapped(key, found[key], room)]
     lines = table_lines(("set by", "for"), rows, left=2) if found else []
     is_rigid = pairs[0].normal_damping_ratio is None
-    return [*lines, f"where no key is named: defaults{'' if is_rigid else '; stiffness from E and ν of the materials'}"]
+    return [*lines, f"other values: defaults{'' if is_rigid else '; stiffness from E and ν of the materials'}"]
 
 
 def _specific_first(key: str) -> bool:
@@ -151,7 +151,7 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
         *_short_interval(scenario, description),
         *_motion(description.motion),
         *_boundary(scenario, description),
-        f"neighbours listed up to {MILLI * description.skin:.3g} mm apart",
+        f"neighbours checked up to {MILLI * description.skin:.3g} mm apart",
     ]
 
 
@@ -173,14 +173,14 @@ def _boundary(scenario: Scenario, description: Description) -> list[str]:
 
 
 def _sag(rigid: SagDescription | None) -> list[str]:
-    """Tell what the step of the non-smooth scheme implies."""
+    """Return what the step of the non-smooth scheme implies."""
     if rigid is None:
         return []
     solved = f"each solved to {MILLI * rigid.tolerance:g} mm/s"
     return [
         f"           {rigid.why}",
         f"           in {rigid.substeps} substeps, {solved}; manual limit {rigid.longest_step:.1e} s",
-        f"sag        {MICRO * rigid.sag:.3g} µm of block {rigid.block} as all stand, with the step squared",
+        f"sag        {MICRO * rigid.sag:.3g} µm of block {rigid.block} at rest; grows with the square of the step",
         *([f"warning: {rigid.warning}"] if rigid.warning else []),
     ]
 
@@ -195,7 +195,7 @@ def _motion(motion: MotionDescription | None) -> list[str]:
 def _use_of_particles(contact: Contact) -> str:
     match contact.model:
         case "surface":
-            return "of which the surface model needs the corners"
+            return "the surface model uses those at the corners"
         case "kernel":
             return f"{contact.kernel}, smoothing length {number(MILLI * contact.resolved_smoothing_length)} mm"
         case _:

@@ -22,9 +22,9 @@ COMMANDS = {  # name: module in this folder, function in it, first line of its h
     "compare": ("compare", "compare_command", "Compare runs with measured repeats."),
     "check": ("check", "check_command", "Validate a scenario and summarise it."),
     "sweep": ("sweep", "sweep_command", "Run a scenario many times with some keys varied."),
-    "calibrate": ("calibrate", "calibrate_command", "Fit inputs to measured repeats, within priors."),
+    "calibrate": ("calibrate", "calibrate_command", "Fit inputs to measured repeats, within their priors."),
     "sensitivity": ("sensitivity", "sensitivity_command", "Show which inputs decide where the blocks end."),
-    "converge": ("converge", "converge_command", "Refine step, stiffness and spacing until the run-out stays."),
+    "converge": ("converge", "converge_command", "Refine step, stiffness and spacing until the run-out converges."),
     "verify": ("verify", "verify_command", "Run the verification cases and show the table."),
     "verify-run": ("verify_run", "verify_run_command", "Run stored results again and check bitwise reproducibility."),
     "bench": ("bench", "bench_command", "Measure speed and memory, and show the table."),
@@ -48,7 +48,7 @@ HELP = {"help_option_names": ["-h", "--help"]}
 
 
 class CommandGroup(TyperGroup):
-    """The group of all commands; it also turns errors into messages and exit codes."""
+    """Group of all commands; it also turns errors into messages and exit codes."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - the signature is the base class's
         """Write the list of commands, by what they are for."""
@@ -58,7 +58,7 @@ class CommandGroup(TyperGroup):
                 formatter.write_dl([(name.ljust(width), COMMANDS[name][2]) for name in names])
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
-        """Import the command that was asked for."""
+        """Import the command that the user named."""
         name, command, rest = super().resolve_command(ctx, args)
         _refuse_no_folder()
         return name, loaded(name) if name in COMMANDS else command, rest
@@ -84,11 +84,11 @@ def _quoting_hint(message: str) -> str:
 
 
 def _refuse_no_folder() -> None:
-    """Raise InputMissingError where the current folder was removed: no path could be told or written."""
+    """Raise InputMissingError where the current folder was removed: no path could be shown or written."""
     try:
         Path.cwd()
     except OSError:
-        raise InputMissingError("the current folder does not exist any more; go to another one with cd") from None
+        raise InputMissingError("the current folder no longer exists; change to another one with cd") from None
 
 
 def loaded(name: str) -> Any:

@@ -20,7 +20,7 @@ from blocksim.study.sweep_table import is_sweep
 
 @dataclass(frozen=True)
 class Judged:
-    """What is to be said of one place: for people, for programs, and whether it is inside."""
+    """Result for one place: for people, for programs, and whether it is inside."""
 
     head: str
     lines: tuple[str, ...]
@@ -51,9 +51,9 @@ def compare_command(
 ) -> None:
     """Compare runs with measured repeats.
 
-    Exit code 1 says that something is outside. A position is inside between the smallest and the largest repeat (0.5 mm
+    Exit code 1: something is outside. A position is inside between the smallest and the largest repeat (0.5 mm
     either side where all repeats are equal), a rotation within 5 degrees of the mean. Of a sweep, at least the share
-    --threshold of its members has to be inside in everything; needs the extra blocksim[study]. Its numbers:
+    --threshold of the members must be within all measured ranges; this needs the extra blocksim[study]. Its numbers:
 
     {meanings}
 

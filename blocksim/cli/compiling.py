@@ -1,4 +1,4 @@
-"""Compiling the solver before a command needs it, said in one line: it is no part of a run."""
+"""Compiling the solver before a command needs it, reported in one line: it is not part of a run."""
 
 from blocksim.cli.collector import loading
 from blocksim.cli.output import note
@@ -7,7 +7,7 @@ from blocksim.simulation.compilation import compile_kernels, is_compiled
 
 
 def tell_compilation(kernels: str, *, quiet: bool) -> None:
-    """Compile a set of kernels where that is still to be done, and say so: it is no part of a run."""
+    """Compile a set of kernels unless that is done, and report it: it is not part of a run."""
     if is_compiled(kernels):
         with loading():
             compile_kernels(kernels)
@@ -19,4 +19,4 @@ def tell_compilation(kernels: str, *, quiet: bool) -> None:
     note(f"Compiled in {compile_kernels(kernels):.0f} s.")
     if not is_compiled(kernels):
         folder = jit.cache_folder() or jit.cache_root()
-        note(f"{folder}: the compiled solver cannot be kept there; make room, or set BLOCKSIM_CACHE_DIR")
+        note(f"{folder}: the compiled solver cannot be stored there; free some space, or set BLOCKSIM_CACHE_DIR")

@@ -1,6 +1,6 @@
 """What the shell completes after TAB: kinds, keys of the scenario on the line, names of cases and measurements.
 
-Completion must never fail or print: where something cannot be read, nothing is offered.
+Completion must never fail or print: it offers nothing where something cannot be read.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -12,7 +12,7 @@ Complete = Callable[[Any, str], list[str]]
 
 
 def of_names(names: Callable[[], Any]) -> Complete:
-    """Return a completion of some names, which are asked for when TAB is pressed and not before."""
+    """Return a completion of some names, which are computed only when TAB is pressed."""
 
     def complete(ctx: Any, incomplete: str) -> list[str]:  # noqa: ARG001 - typer passes both by name
         return [name for name in names() if name.startswith(incomplete)]
@@ -21,8 +21,10 @@ def of_names(names: Callable[[], Any]) -> Complete:
 
 
 def scenario_keys(ctx: Any, incomplete: str) -> list[str]:
-    """Return the dotted keys of the scenario that is named on the line, each with its equals sign."""
-    words = [str(word) for word in (ctx.params.get("scenario"), *ctx.args)]  # behind an open option all words are args
+    """Return the dotted keys of the scenario on the line, each with its equals sign."""
+    words = [
+        str(word) for word in (ctx.params.get("scenario"), *ctx.args)
+    ]  # after an option without value all words are args
     place = next((word for word in words if word.endswith(".toml")), None)
     if place is None:
         return []

@@ -1,4 +1,4 @@
-"""blocksim converge: time step, stiffness, spacing and tolerance refined until the run-out stays."""
+"""blocksim converge: refine time step, stiffness, spacing and tolerance until the run-out converges."""
 
 import shlex
 from collections.abc import Sequence
@@ -56,10 +56,11 @@ def converge_command(
         list[Which] | None, typer.Option(help="What to refine (default: all that matters). Repeatable.")
     ] = None,
     tolerance: Annotated[
-        float, typer.Option(metavar="MM", help="Change of the run-out that does not matter, in mm.")
+        float, typer.Option(metavar="MM", help="Largest change of the run-out that counts as converged, in mm.")
     ] = TOLERANCE_MM,
     levels: Annotated[
-        int, typer.Option(min=FEWEST_LEVELS, metavar="N", help="Most refinements of the scenario's own value.")
+        int,
+        typer.Option(min=FEWEST_LEVELS, metavar="N", help="Maximum number of refinements of the scenario's own value."),
     ] = LEVELS,
     settings: options.Settings = None,
     jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes (default: one a core).")] = None,
@@ -74,13 +75,13 @@ def converge_command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Refine step, stiffness and spacing until the run-out stays.
+    """Refine step, stiffness and spacing until the run-out converges.
 
-    One of time step, contact stiffness and particle spacing (with rigid contacts: of step and tolerance) is refined at
-    a time, the others stay as the scenario has them, until two refinements in a row move no block by more than the
-    tolerance. Where a block ends on another side or farther away than its size, the outcome flips, and no order or
-    shrinking of changes is read from that. Exit code 0 says that the question is answered, whatever the answer. Called
-    again, only runs that are missing are done.
+    Refines time step, contact stiffness and particle spacing one at a time (with rigid contacts: step and tolerance),
+    the others as in the scenario, until two refinements in a row move no block by more than the tolerance. Where a
+    block ends on another side, or farther away than its size, the outcome flips and no order of convergence is
+    estimated. Exit code 0 means that the study is complete, converged or not. The same command again runs only missing
+    levels.
 
     Example: blocksim converge scenarios/three_blocks_nominal.toml
     """
@@ -149,12 +150,14 @@ def _table(result: Convergence, study: Study) -> list[str]:
     columns = ("value", *heads, "change mm", "order", "seconds")
     lines = table_lines(columns, rows)
     if 0 < len(chosen) < len(result.blocks):
-        lines.append(f"the {len(chosen)} of {len(result.blocks)} blocks that move most; change: the largest of all")
+        lines.append(
+            f"the {len(chosen)} of {len(result.blocks)} blocks that move most; change: the largest of all blocks"
+        )
     return lines
 
 
 def most_moved(study: Study, count: int) -> list[int]:
-    """Return the blocks, in their order, whose final x differs most between the levels."""
+    """Return the blocks whose final x differs most between the levels, in their order."""
     finished = np.array([level.x_mm for level in study.levels if level.is_finished])
     if not finished.size:
         return []
@@ -182,7 +185,7 @@ def _verdict(study: Study) -> list[str]:
         case Verdict.SCATTERED:
             return [
                 "not converged: the changes do not shrink. Impacts amplify small differences, so",
-                "a single run may mean little: vary the start by a micrometre (blocksim sweep)",
+                "a single run means little: vary the start by a micrometre (blocksim sweep)",
             ]
         case Verdict.FLIPS:
             return [
@@ -241,10 +244,10 @@ def _recommendation(result: Convergence, command: str) -> list[str]:
 
 def _told_nothing(result: Convergence) -> str:
     if not result.converged:
-        return "nothing is recommended before every study has converged"
+        return "no recommendation before every study has converged"
     if all(study.recommended == study.own for study in result.studies):
         return "recommended: the scenario as it is"
-    return "nothing is recommended: no other setting stays near all finest levels"
+    return "no recommendation: no other setting stays near all finest levels"
 
 
 def _told_saving(joint: Joint) -> str:

@@ -15,9 +15,9 @@ from blocksim.errors import BlocksimError, ExitCode
 PATH_TROUBLE = {errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES}
 DISK_TROUBLE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
 
-MEMORY = "memory for this; end other programs, or raise the limit (ulimit -v)"
-FILES = "room for open files; raise the limit (ulimit -n)"
-THREADS = "room for another process or thread; use fewer (--threads, --jobs), or raise the limit (ulimit -u, ulimit -v)"
+MEMORY = "memory; close other programs, or raise the limit (ulimit -v)"
+FILES = "file handles; raise the limit (ulimit -n)"
+THREADS = "threads or processes; use fewer (--threads, --jobs), or raise the limit (ulimit -u, ulimit -v)"
 SHORTAGES = (
     (MEMORY, {errno.ENOMEM}, ("Cannot allocate memory", "failed to map segment", "nable to allocate")),
     (FILES, {errno.EMFILE, errno.ENFILE}, ("Too many open files",)),
@@ -29,7 +29,7 @@ LONGEST_NAME = 200  # characters of a path that a message shows
 
 @contextmanager
 def told() -> Iterator[None]:
-    """Tell every error a user can cause, and leave with its exit code; the answer is on its way by then."""
+    """Report every error that a user can cause and leave with its exit code; flush the answer first."""
     try:
         yield
         sys.stdout.flush()
@@ -42,7 +42,7 @@ def told() -> Iterator[None]:
     except Exception as error:
         missing = _shortage(error)
         if missing:
-            note(f"the system has no more {missing}")
+            note(f"the system has run out of {missing}")
             raise typer.Exit(ExitCode.INPUT_OUTPUT) from None
         if not isinstance(error, OSError):
             raise
@@ -50,9 +50,9 @@ def told() -> Iterator[None]:
 
 
 def _shortage(error: BaseException | None) -> str:
-    """Return what the system had no more of, in words; nothing where that was not the reason of an error.
+    """Return what the system ran out of, in words; nothing where that was not the cause of an error.
 
-    Libraries wrap such an error in others, and the loader of shared libraries tells it as a text.
+    Libraries wrap such an error in others, and the loader of shared libraries reports it as a text.
     """
     while error is not None:
         for words, numbers, texts in SHORTAGES:
@@ -66,8 +66,8 @@ def _shortage(error: BaseException | None) -> str:
 
 
 def _tell_trouble(error: OSError) -> ExitCode:
-    """Tell an input or output error; raises it again when a user has no part in it."""
-    if isinstance(error, BrokenPipeError):  # whoever read our answer has gone: nothing to tell
+    """Report an input or output error; raise it again where the user did not cause it."""
+    if isinstance(error, BrokenPipeError):  # the reader of our answer has gone: nothing to report
         abandon(sys.stdout)
         return ExitCode.INPUT_OUTPUT
     if error.errno in PATH_TROUBLE and error.filename is not None:
@@ -93,6 +93,6 @@ def tell_internal_error(error: Exception) -> None:
         with tempfile.NamedTemporaryFile("w", prefix="blocksim-error-", suffix=".txt", delete=False) as file:
             traceback.print_exception(error, file=file)
     except OSError:
-        note(f"internal error: {what}; please report it (there is no room for a file with the details)")
+        note(f"internal error: {what}; please report it (a file with the details could not be written)")
     else:
         note(f"internal error: {what}; please report it with the file {file.name}")

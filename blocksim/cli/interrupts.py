@@ -15,7 +15,7 @@ from blocksim.errors import ExitCode
 
 
 class Interrupts:
-    """The handler of Ctrl-C of the whole process; whoever can stop in a better way may take its place for a while."""
+    """Handler of Ctrl-C of the whole process; a part that can stop in a better way may replace it for a while."""
 
     gives_way = True
 
@@ -24,7 +24,7 @@ class Interrupts:
         self.has_to_clear_up = self.has_come = False
 
     def __call__(self, _number: int, _frame: Any) -> None:
-        """Hear of Ctrl-C."""
+        """Take Ctrl-C."""
         if not self.has_to_clear_up:
             leave_now()
         self.has_to_clear_up, self.has_come = False, True
@@ -33,7 +33,7 @@ class Interrupts:
 
 def take_interrupts() -> None:
     """Take over Ctrl-C for the rest of the process, unless somebody has it or it is ignored."""
-    with suppress(ValueError):  # not the main thread, which alone hears signals
+    with suppress(ValueError):  # not the main thread, which alone receives signals
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, Interrupts())
             # Python's end would bring the system's handler back, and with it another exit code; what is ignored stays
@@ -42,7 +42,7 @@ def take_interrupts() -> None:
 
 @contextmanager
 def clearing_up(*, wanted: bool) -> Iterator[None]:
-    """Say for a while whether something is begun that has to be cleared up.
+    """State for a while whether something has been started that must be cleared up.
 
     If not, as during an import, Ctrl-C ends the process; else the first one raises KeyboardInterrupt.
     """

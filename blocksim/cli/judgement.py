@@ -17,7 +17,7 @@ DASH = "–"
 
 
 def judgement_lines(judgement: Judgement) -> list[str]:
-    """Return all tables and what is to be said of them, for a screen 80 columns wide."""
+    """Return all tables and their notes, for a screen 80 columns wide."""
     lines = [*_failures(judgement.failures), *_wrapped(judgement.messages)]
     for name, found in judgement.findings.items():
         lines += ["", *_wrapped([f"{name}: {METRICS[name].meaning}"]), *_table(METRICS[name], found)]

@@ -20,7 +20,7 @@ SWEEP = "sweep-"
 
 
 def templates() -> dict[str, Traversable]:
-    """Return the templates by kind: the name of their file without its ending."""
+    """Return the templates by kind: the name of their file without its extension."""
     found = (files("blocksim.cli") / TEMPLATES).iterdir()
     return {entry.name.partition(".")[0]: entry for entry in sorted(found, key=lambda entry: entry.name)}
 
@@ -32,12 +32,14 @@ def new_command(
             metavar="KIND", help=f"One of {', '.join(templates())}.", autocompletion=completion.of_names(templates)
         ),
     ],
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the scenario, and of its file without ending.")],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="Name of the scenario, and of its file without extension.")
+    ],
     quiet: options.Quiet = False,
 ) -> None:
     """Write a commented scenario, sweep or table from a template.
 
-    The file is ready to be checked and run; what is there already is never replaced.
+    The file is ready to be checked and run; an existing file is never replaced.
 
     Example: blocksim new three-blocks my_blocks
     """
@@ -73,7 +75,7 @@ def _refuse_bad_name(name: str) -> None:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write a file that must not be there yet. Raises OutputExistsError, and OutputError where the disk is full."""
+    """Write a file that must not exist yet. Raises OutputExistsError, and OutputError where the disk is full."""
     try:
         file = path.open("x", encoding="utf-8")
     except FileExistsError:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 SIZE = re.compile(r"([0-9]+(?:\.[0-9]*)?)\s*[x×]\s*([0-9]+(?:\.[0-9]*)?)\s*(mm|cm|in|px)?")
 INCHES = {"mm": 1.0 / 25.4, "cm": 1.0 / 2.54, "in": 1.0}
 LEAST_SIDE, MOST_SIDE = 20.0 / 25.4 - 1e-9, 2000.0 / 25.4 + 1e-9  # inches
-SPARE_PIXEL = 0.25  # so that no round-off takes a whole one
+SPARE_PIXEL = 0.25  # so that no round-off removes a whole one
 MOST_PIXELS = 1e8
 MOST_SHOWN = 40  # letters of a value in a message
 
@@ -34,7 +34,7 @@ def seconds_of(text: object) -> float:
 
 @dataclass(frozen=True)
 class PageSize:
-    """A size of pictures as asked for: width and height in a unit."""
+    """Picture size as the user gave it: width and height in a unit."""
 
     width: float
     height: float
@@ -51,15 +51,17 @@ def page_size(text: object) -> PageSize:
     """Return a size of pictures, WxH with mm, cm, in or px. Raises BadParameter, a mistake of usage."""
     found = SIZE.fullmatch(str(text).strip())
     if found is None:
-        raise typer.BadParameter(f"{str(text)[:MOST_SHOWN]!r} is no size of a picture, such as 180x120mm or 1600x900px")
+        raise typer.BadParameter(
+            f"{str(text)[:MOST_SHOWN]!r} is not a picture size; write it as in 180x120mm or 1600x900px"
+        )
     size = PageSize(float(found[1]), float(found[2]), found[3] or "mm")
     if not all(LEAST_SIDE <= side <= MOST_SIDE for side in size.inches(150.0)):
-        raise typer.BadParameter("each side of a picture has 20 to 2000 mm (about 120 to 12 000 px)")
+        raise typer.BadParameter("each side of a picture must be 20 to 2000 mm (about 120 to 12 000 px)")
     return size
 
 
 def paper_of(size: PageSize | None, dots: float | None) -> "Paper":
-    """Return the page for --size and --dpi. Raises BadParameter for more pixels than anybody can open."""
+    """Return the page for --size and --dpi. Raises BadParameter for more than MOST_PIXELS."""
     from blocksim.view.paper import Paper
     from blocksim.view.style import DOTS_PER_INCH
 
@@ -93,7 +95,7 @@ ScenarioPath = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario
 StoredRunPath = Annotated[
     Path, typer.Argument(metavar="RUN", help="Run folder, results/NAME (its newest finished run) or scenario file.")
 ]
-Forces = Annotated[bool, typer.Option("--forces", help="Draw contact forces, where the run has stored them.")]
+Forces = Annotated[bool, typer.Option("--forces", help="Draw contact forces, if the run has stored them.")]
 Size = Annotated[
     PageSize | None,
     typer.Option(
@@ -157,7 +159,7 @@ WallTime = Annotated[
 Threads = Annotated[
     int,
     typer.Option(
-        "--threads", min=1, metavar="N", help="Threads, for scenes of 200 blocks and more. The result stays the same."
+        "--threads", min=1, metavar="N", help="Threads, for scenes of 200 blocks and more. Results are bit-identical."
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the answer as JSON, for programs.")]

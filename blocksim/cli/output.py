@@ -1,4 +1,4 @@
-"""Where things are printed: the answer on standard output, everything else on standard error."""
+"""Printing: the answer on standard output, everything else on standard error."""
 
 import json
 import math
@@ -16,14 +16,14 @@ GAP = "  "
 SHORTEST = 8
 STEERING = re.compile(
     r"[\x00-\x08\x0b-\x1f\x7f-\x9f"  # control characters of ASCII and Latin-1 but tab and newline
-    r"\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # marks that turn the direction of what follows
+    r"\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # marks that change the direction of the text that follows
     r"\ud800-\udfff]"  # halves of characters
 )
 LONG_TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))  # s
 
 
 def note(text: str) -> None:
-    """Print a line about what is in progress, to standard error; where nobody reads it any more, nothing happens."""
+    """Print a line to standard error; do nothing where nobody reads it any more."""
     try:
         print(harmless(text), file=sys.stderr, flush=True)  # noqa: T201 - this is the place for it
     except OSError:
@@ -37,12 +37,12 @@ def abandon(stream: TextIO) -> None:
 
 
 def replacement(path: Path) -> str:
-    """Return what to tell of a file that is about to be written where an older one is; nothing where none is."""
+    """Return a note for a file that replaces an older one; nothing where none exists."""
     return "replaces an older file, " if path.exists() else ""
 
 
 def answer(text: str) -> None:
-    """Print text that was asked for, to standard output."""
+    """Print the answer to standard output."""
     print(harmless(text))  # noqa: T201 - this is the place for it
 
 
@@ -62,7 +62,7 @@ def _finite(data: object) -> object:
 
 
 def width_of_screen() -> int:
-    """Return the columns of the terminal (or of COLUMNS), 80 where there is none."""
+    """Return the columns of the terminal (or of COLUMNS), 80 without one."""
     return shutil.get_terminal_size((NARROW, 24)).columns
 
 
@@ -101,14 +101,14 @@ def number(value: float, digits: int = 2) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Return a time in the largest unit of which there are two."""
+    """Return a time in the largest unit of which it has two or more."""
     worth, unit = next((entry for entry in LONG_TIMES if seconds >= 2.0 * entry[0]), (1.0, "s"))
     return f"{seconds / worth:.1f} {unit}"
 
 
 def harmless(text: str) -> str:
-    """Return a text without what steers a terminal, or shows a line in another order than it has.
+    """Return a text without control characters and marks that change the order of a line.
 
-    Names, descriptions and reasons may come from the files of a stranger.
+    Names, descriptions and reasons may come from files of somebody else.
     """
     return STEERING.sub("\ufffd", text)

@@ -17,7 +17,7 @@ WITH_SCENARIOS = {
     "export",
     "report",
 }
-"""Commands that read scenario files, by themselves or beside results."""
+"""Commands that read scenario files, directly or with results."""
 
 
 def add_outside(name: str, command: Any) -> Any:
@@ -28,7 +28,7 @@ def add_outside(name: str, command: Any) -> Any:
 
 
 def _option() -> Any:
-    """Have typer make the option, as it makes all others."""
+    """Let typer make the option, as it makes all others."""
     alone = typer.Typer(add_completion=False)
     alone.command()(_asked)
     return next(param for param in typer.main.get_command(alone).params if param.name == "allow_outside")
@@ -48,7 +48,7 @@ def _asked(
             "--allow-outside",
             callback=_allow,
             expose_value=False,
-            help="Read tables that a scenario names outside its folder and the current one.",
+            help="Allow tables outside the scenario's folder and the current one.",
         ),
     ] = False,
 ) -> None:

@@ -54,9 +54,7 @@ def plot_command(
     blocks: Annotated[
         str | None, typer.Option("--block", metavar="N,N,...", help="Blocks of a history, by name.")
     ] = None,
-    relative: Annotated[
-        bool, typer.Option("--relative", help="Places and velocities of a history as seen from the moving ground.")
-    ] = False,
+    relative: Annotated[bool, typer.Option("--relative", help="Plot a history relative to the moving ground.")] = False,
     colour: options.Colour = "block",
     size: options.Size = None,
     dots: options.Dots = None,
@@ -67,13 +65,13 @@ def plot_command(
 ) -> None:
     """Draw a run, a sweep or a table of sensitivities.
 
-    Below the final state of a run stand the measured ranges. --kind final shows where the blocks end, with rotation and
-    measured range below each of them; --kind history shows x, y, rotation, energies, contacts and the ground's motion
-    over time, or what --panels names. --forces draws contact forces as arrows, of runs that have stored them
+    The strip shows the measured ranges below the final state. --kind final shows where the blocks end, with rotation
+    and measured range below each of them; --kind history shows x, y, rotation, energies, contacts and the ground's
+    motion over time, or the panels of --panels. --forces draws contact forces as arrows, of runs that have stored them
     (output.contacts = true). A run that was stopped or killed is drawn as far as it came.
 
-    A sweep over one key, or a second one with few values, shows final x as lines; one over two keys a map of
-    run-outs and outcomes; a sampled one every two of its inputs. The measured range is marked in all of them.
+    A sweep over one key, or a second one with few values, is drawn as lines of final x; over two keys as a map of
+    run-outs and outcomes; a sampled one as a matrix of its inputs. The measured range is marked in all of them.
 
     An older picture of blocksim is replaced; any other file only with --overwrite.
 
@@ -101,5 +99,5 @@ def _seconds(text: str) -> float:
         return float(text)
     with suppress(typer.BadParameter):
         return options.seconds_of(text)
-    message = f"{text.strip()[:40]!r} is no time; give seconds, separated by commas, such as 0,0.1,0.355 or '20 ms'"
+    message = f"{text.strip()[:40]!r} is not a time; give seconds, separated by commas, such as 0,0.1,0.355 or '20 ms'"
     raise typer.BadParameter(message, param_hint="--at")

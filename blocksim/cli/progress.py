@@ -1,4 +1,4 @@
-"""How a run is going: a live line on a terminal, a plain line every now and then elsewhere."""
+"""Progress of a run: a live line on a terminal, a plain line now and then elsewhere."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ LIVE_SECONDS = 0.1
 
 @contextmanager
 def watching(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
-    """Give a function that shows where a run stands; on a terminal the line disappears at the end."""
+    """Give a function that shows the progress of a run; on a terminal the line disappears at the end."""
     if quiet:
         yield lambda _: None
         return
@@ -32,7 +32,7 @@ def watching(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
 
 @contextmanager
 def counting(what: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    """Give a function that shows how many of how many are done; on a terminal the line disappears at the end."""
+    """Give a function that shows how many of all are done; on a terminal the line disappears at the end."""
     if quiet:
         yield lambda *_: None
         return

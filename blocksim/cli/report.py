@@ -1,4 +1,4 @@
-"""blocksim report: runs and sweeps as one HTML file to look at and to pass on."""
+"""blocksim report: runs and sweeps as one HTML file."""
 
 from pathlib import Path
 from typing import Annotated
@@ -29,11 +29,11 @@ def report_command(
 ) -> None:
     """Write runs and sweeps into one HTML file.
 
-    It has a player, time histories, the comparison with measured repeats, energies and where everything comes from;
-    for a sweep the share of its members inside, a table, a map and, where --keep-cases kept their frames, its members.
-    The file is self-contained and can be opened from the disk or sent by mail. Many frames are thinned and
-    rounded; the page says so. A run that was killed or damaged is shown as far as it can be read (exit code 65 where
-    something is damaged). An older report is replaced; any other file only with --overwrite.
+    It has a player, time histories, the comparison with measured repeats, energies and provenance; for a sweep the
+    share of members inside, a table, a map and, with --keep-cases, the members. The file is self-contained and can be
+    opened from disk or sent by mail. Frames are thinned and rounded where they are many; the page says so. A run that
+    was killed or damaged is shown as far as it can be read (exit code 65 for damage). An older report is replaced; any
+    other file only with --overwrite.
 
     Example: blocksim report scenarios/three_blocks.toml --out three_blocks.html
     """
@@ -42,4 +42,4 @@ def report_command(
     if not quiet:
         note(f"report: {out} ({size / MEGABYTE:.1f} MB)")
     if problems:
-        raise InvalidInputError("\n".join([*problems, "the report shows the rest"]))
+        raise InvalidInputError("\n".join([*problems, "the report shows everything else"]))

@@ -1,4 +1,4 @@
-"""How a sweep is going: a line a case where they are few, else a line every now and then."""
+"""Progress of a sweep: a line for each case where they are few, else a line now and then."""
 
 import math
 import time
@@ -20,7 +20,7 @@ EVERY = 2.0  # s
 
 @contextmanager
 def reporting(short: Mapping[str, str], heads: Mapping[str, Head], *, quiet: bool) -> Iterator[OnRow]:
-    """Give what is reported every row: a bar on a terminal, lines elsewhere."""
+    """Give a function that takes every row: a bar on a terminal, lines elsewhere."""
     if quiet or not Console(stderr=True).is_terminal:
         yield (lambda *_: None) if quiet else Reporter(short, heads).tell
         return
@@ -30,7 +30,7 @@ def reporting(short: Mapping[str, str], heads: Mapping[str, Head], *, quiet: boo
 
 @dataclass
 class Reporter:
-    """Tells of rows as they come; `short` has the varied keys and their names for people."""
+    """Reports rows as they come; `short` has the varied keys and their names for people."""
 
     short: Mapping[str, str]
     heads: Mapping[str, Head] = field(default_factory=dict)
@@ -40,7 +40,7 @@ class Reporter:
     failed: int = 0
 
     def tell(self, done: int, total: int, row: Row) -> None:
-        """Tell of a row, one of `done` so far."""
+        """Report a row, one of `done` so far."""
         self.new += 1
         self.failed += row["status"] != FINISHED
         if total <= FEW:

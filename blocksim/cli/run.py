@@ -22,7 +22,7 @@ from blocksim.study.compare import compare_run
 from blocksim.study.run import run
 from blocksim.study.stored_run import FINISHED
 
-MOST_ROWS = 40  # of the final table on the screen; of a longer one the first are shown
+MOST_ROWS = 40  # of the final table on the screen; of a longer one the first FIRST_ROWS are shown
 FIRST_ROWS = 10
 INTERRUPTED = "interrupted"
 
@@ -43,9 +43,9 @@ def run_command(
 ) -> None:
     """Simulate a scenario and show where the blocks end.
 
-    Where the scenario names an experiment, the measured ranges stand beside. A run that is there already is shown
-    again. Ctrl-C, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1 and --wall-time stop a run so that --resume continues it, to the
-    same bits.
+    If the scenario names an experiment, the table has the measured ranges. A finished run is not repeated but shown.
+    Ctrl-C, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1 and --wall-time stop a run; --resume continues it with bit-identical
+    results.
 
     Example: blocksim run scenarios/three_blocks.toml --set time.end=0.1
     """
@@ -74,7 +74,7 @@ def run_command(
             on_progress=on_progress,
             listener=listener,
         )
-    with nullcontext() if result.status == FINISHED else suppress(OSError):  # the terminal that is lost, SIGHUP tells
+    with nullcontext() if result.status == FINISHED else suppress(OSError):  # SIGHUP reports that the terminal is lost
         show_result(result, as_json=as_json, quiet=silent)
     raise typer.Exit(result.summary.exit_code)
 
@@ -85,7 +85,7 @@ def cores() -> int:
 
 
 def warn_of_threads(threads: int) -> None:
-    """Warn of more threads than there are cores, as all wait for one another at every step."""
+    """Warn of more threads than cores, as all wait for one another at every step."""
     count = cores()
     if threads > count:
         note(
@@ -94,7 +94,7 @@ def warn_of_threads(threads: int) -> None:
 
 
 def show_result(result: Result, *, as_json: bool, quiet: bool) -> None:
-    """Print the final table, beside the measured ranges where the scenario names an experiment."""
+    """Print the final table, with the measured ranges if the scenario names an experiment."""
     if not quiet:
         _tell_end(result)
     if as_json:
@@ -119,7 +119,7 @@ def _way_on(result: Result) -> str:
 
 
 def _answer_lines(result: Result) -> list[str]:
-    """Return the lines of the final table; of a crowd the first ones, as all are in the run's folder."""
+    """Return the lines of the final table; of a long one the first, as all are in the run's folder."""
     if result.experiment is not None and result.status == FINISHED:
         comparison = compare_run(result)
         return [*comparison_table(comparison), *verdict_lines(comparison)]
@@ -128,7 +128,7 @@ def _answer_lines(result: Result) -> list[str]:
     shown = count if count <= MOST_ROWS else FIRST_ROWS
     rows = [(block, *map(number, row)) for block, *row in islice(zip(blocks, *values, strict=True), shown)]
     lines = table_lines(("block", "x mm", "y mm", "rotation °"), rows)
-    return lines if shown == count else [*lines, f"... and {count - shown} blocks more, see final.csv"]
+    return lines if shown == count else [*lines, f"... and {count - shown} more blocks in final.csv"]
 
 
 def _moved(found: Movement) -> str:

@@ -1,4 +1,4 @@
-"""Reading a scenario for a command, so that mistakes found later still point into the file."""
+"""Reading a scenario for a command, so that mistakes found later also point into the file."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -25,6 +25,6 @@ def read_scenario(path: Path, settings: Sequence[str]) -> Iterator[Scenario]:
 
 
 def warn_of_values(scenario: Scenario) -> None:
-    """Warn of values that are allowed and hardly meant."""
+    """Warn of values that are allowed but implausible."""
     for text in implausible_values(scenario):
         note(f"warning: {text}")

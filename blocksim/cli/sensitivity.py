@@ -67,8 +67,8 @@ def sensitivity_command(
 ) -> None:
     """Show which inputs decide where the blocks end.
 
-    The results looked at are all measured quantities (without an experiment, x of the blocks) and the class of the
-    outcome: rotations rounded to quarters of a turn. Blocks of a design with a failed run are left out and counted.
+    The results are all measured quantities (without an experiment, x of the blocks) and the class of the outcome:
+    rotations rounded to quarter turns. Blocks of the design with a failed run are left out and counted.
     Needs the extra blocksim[study].
 
     Example: blocksim sensitivity scenarios/slide.toml --vary gravity=9.7:9.9
@@ -100,7 +100,7 @@ def _plan(document: Document, texts: list[str]) -> Sweep:
 
 
 def _refuse_present(out: Path | None, *, overwrite: bool) -> None:
-    """Notice before minutes of running that the table cannot be written."""
+    """Check before minutes of running that the table can be written."""
     if out is None:
         return
     if out.is_dir() or not out.absolute().parent.is_dir():
@@ -116,7 +116,7 @@ def _lines(found: Sensitivity) -> list[str]:
     for output in found.outputs:
         if output.varies:
             lines += [*([""] if lines else []), _title(output), *_table(found, output)]
-    return lines or ["no result varies: none of these inputs matters here"]
+    return lines or ["no result varies: none of these inputs matters"]
 
 
 def _title(output: Indices) -> str:
@@ -126,7 +126,7 @@ def _title(output: Indices) -> str:
 
 
 def _table(found: Sensitivity, output: Indices) -> list[str]:
-    """Return the keys of an output, those that matter most first."""
+    """Return the keys of an output, the most important first."""
     columns = tuple(found.method.columns)
     first = output.numbers[columns[0]]
     order = sorted(range(len(found.keys)), key=lambda i: -abs(first[i]))
@@ -143,7 +143,7 @@ def _tell_end(found: Sensitivity, out: Path | None) -> None:
     if found.failed:
         note(
             f"{found.failed} of {found.runs} runs failed; {found.left_out} of {found.blocks} "
-            f"{found.method.sample_word} are left out for that. The first: {found.first_problem}"
+            f"{found.method.sample_word} are left out for it. The first: {found.first_problem}"
         )
     note(f"{found.runs} runs" + (f"; table: {out}" if out is not None else ""))
 

@@ -43,7 +43,7 @@ class Executor(StrEnum):
 
 
 class Mode(StrEnum):
-    """How values go together."""
+    """How values are combined."""
 
     GRID = "grid"
     LIST = "list"
@@ -60,23 +60,23 @@ def sweep_command(
         typer.Option(
             "--vary",
             metavar="KEY=VALUES",
-            help="KEY=a,b,c or KEY=from:to:count; to be drawn from, KEY=from:to or KEY=mean+-sd. With :log behind, "
-            "from:to is divided evenly in the logarithm. Repeatable.",
+            help="KEY=a,b,c or KEY=from:to:count; for random draws KEY=from:to or KEY=mean+-sd. With :log at the end, "
+            "from:to is spaced logarithmically. Repeatable.",
         ),
     ] = None,
     mode: Annotated[
         Mode | None,
         typer.Option(help="All combinations, the k-th value of every key, the scenario's table, or random draws."),
     ] = None,
-    samples: Annotated[int | None, typer.Option(metavar="N", help="How many cases are drawn (default: 128).")] = None,
+    samples: Annotated[int | None, typer.Option(metavar="N", help="Number of cases to draw (default: 128).")] = None,
     seed: Annotated[int | None, typer.Option(metavar="S", help="Random seed (default: 0).")] = None,
     settings: options.Settings = None,
     executor: Annotated[
         Executor | None,
-        typer.Option(help="ensemble: in this process (default); processes: one case cannot take others with it."),
+        typer.Option(help="ensemble: in this process (default); processes: a case that crashes stops no other."),
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Threads or processes (default: one a core).")
+        int | None, typer.Option(min=1, metavar="N", help="Threads or processes (default: one per core).")
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster, such as tcp://host:8786.")
@@ -96,15 +96,14 @@ def sweep_command(
     out: options.SweepFolder = None,
     overwrite: options.Overwrite = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Print number of cases, cost and size; run and write nothing.")
+        bool, typer.Option("--dry-run", help="Print number of cases, cost and size without running anything.")
     ] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Run a scenario many times with some keys varied.
 
-    Every case gives a row in sweep.csv. Called again, also after a kill, the same sweep runs only the cases that are
-    missing.
+    Every case gives a row in sweep.csv. The same command again, also after a kill, runs only the missing cases.
 
     Example: blocksim sweep scenarios/slide.toml --vary gravity=1.62,9.81
     """
@@ -144,7 +143,7 @@ def sweep_command(
 
 
 def _sweep(document: Document, *, silent: bool, **wanted: Any) -> SweepResult:
-    """Run a sweep; stopped early, leave without waiting for a case that takes minutes."""
+    """Run a sweep; if stopped early, leave without waiting for a case that takes minutes."""
     try:
         with reporting(short_keys(document), heads_in(document), quiet=silent) as on_row:
             return sweep(document, on_row=on_row, **wanted)
@@ -229,7 +228,7 @@ def _tell_movement(result: SweepResult) -> None:
         return
     counts = ", ".join(f"{count} {name}" for name, count in table[OUTCOME].value_counts().items())
     far, turned = table[DISPLACEMENT].max(), table[TURN].max()
-    note(f"{counts}; largest displacement {far:.2f} mm, rotation {turned:.2f}°, from start to end")
+    note(f"{counts}; largest displacement {far:.2f} mm, rotation {turned:.2f}° (start to end)")
     if MOVER in table and table[MOVER].notna().any():
         movers = table[MOVER].value_counts()
         first = ", ".join(f"block {name} in {count}" for name, count in movers.head(MOST_MOVERS).items())
@@ -252,7 +251,7 @@ def _tell_failures(result: SweepResult, short: dict[str, str]) -> None:
 
 
 def _varies(values: Iterable[object]) -> bool:
-    """Return True if a column says anything: all finished, or a block that stays where it is, does not."""
+    """Return True if a column varies: "finished" in all rows does not, nor does a block that stays."""
     told = [f"{value:.2f}" if isinstance(value, float) else str(value) for value in values]
     return len(told) == 1 or len(set(told)) > 1
 

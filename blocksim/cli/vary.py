@@ -31,7 +31,7 @@ def with_vary(
 
 
 def read_variations(texts: Sequence[str], option: str) -> Variations:
-    """Return what such texts, given to an option, say of each key; raises ScenarioError where one is none of them."""
+    """Return the values of each key in such texts, given to an option; raises ScenarioError for any other text."""
     problems = [Problem(f"{option} {text}", f"write {FORMS}") for text in texts if not _parts(text)]
     keys = [key for text in texts for key, _ in _parts(text)]
     problems += [
@@ -66,7 +66,7 @@ def _values(text: str) -> Values:
 
 
 def _value(text: str) -> object:
-    """Return a TOML value or bare text; what is neither is refused where it is tried, as text."""
+    """Return a TOML value, or the bare text, which is checked where it is used."""
     text = text.strip()
     try:
         return parse_value(text) if text else text

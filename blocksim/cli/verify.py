@@ -1,4 +1,4 @@
-"""blocksim verify: the verification table, measured now."""
+"""blocksim verify: run the verification cases and print their table."""
 
 from collections.abc import Iterator, Sequence
 from enum import StrEnum
@@ -48,7 +48,7 @@ class Scheme(StrEnum):
 
 
 def verify_command(
-    cases: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="V1 to V24; all without any.")] = None,
+    cases: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="V1 to V24 (default: all).")] = None,
     model: Annotated[Model, typer.Option(help="Contact model.")] = Model.SURFACE,
     law: Annotated[Law, typer.Option(help="Force law.")] = Law.LINEAR,
     scheme: Annotated[Scheme, typer.Option(help="Stepping: springs or impulses.")] = Scheme.EXPLICIT,
@@ -58,8 +58,8 @@ def verify_command(
 ) -> None:
     """Run the verification cases and show the table.
 
-    Exit code 1 says that a number is outside its tolerance. All cases take some four minutes on one core, half a minute
-    with --scheme nonsmooth, which leaves out those that are about springs and shortens none.
+    Exit code 1: a number is outside its tolerance. All cases take about four minutes on one core, half a minute with
+    --scheme nonsmooth, which leaves out the cases about springs.
 
     Example: blocksim verify V3 V7 --law hertz-mindlin
     """
@@ -71,7 +71,7 @@ def verify_command(
     outcomes: list[Outcome] = []
     try:
         outcomes.extend(_run(wanted, setting, quiet=silent))
-    finally:  # also when stopped: minutes of measuring are not to be lost, and the list has what came before
+    finally:  # also when stopped: minutes of measuring must not be lost; the list has what was measured
         if outcomes:
             _show(outcomes, as_json=as_json, quiet=quiet)
     if not (silent or cases):
@@ -81,7 +81,7 @@ def verify_command(
 
 
 def _run(cases: Sequence[Case], setting: Setting, *, quiet: bool) -> Iterator[Outcome]:
-    """Run cases one after the other and say which one is under way."""
+    """Run cases one after the other and report which one is running."""
     for position, case in enumerate(cases, start=1):
         if not quiet:
             note(f"{position}/{len(cases)} {case.id} {case.title} ...")

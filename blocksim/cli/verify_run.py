@@ -1,4 +1,4 @@
-"""blocksim verify-run: whether stored results come out again, bit for bit."""
+"""blocksim verify-run: check bitwise reproducibility of stored results."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ UNITS = {"_mm": " mm", "_deg": "°", "_mm_s": " mm/s", "_deg_s": "°/s", "_J": "
 
 @dataclass(frozen=True)
 class Verified:
-    """What is to be said of one place: for people, for programs, and the exit code."""
+    """Result for one place: for people, for programs, and the exit code."""
 
     lines: tuple[str, ...]
     data: dict[str, object]
@@ -44,17 +44,17 @@ def verify_run_command(
         ),
     ],
     threads: options.Threads = 1,
-    sample: Annotated[int, typer.Option(min=1, metavar="N", help="Of a sweep, how many rows are run again.")] = SAMPLE,
-    seed: Annotated[int, typer.Option(min=0, metavar="S", help="Which rows these are.")] = 0,
+    sample: Annotated[int, typer.Option(min=1, metavar="N", help="Number of rows of a sweep to run again.")] = SAMPLE,
+    seed: Annotated[int, typer.Option(min=0, metavar="S", help="Random seed for the choice of rows.")] = 0,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Run stored results again and check bitwise reproducibility.
 
-    Of a run: checksums of all files, final state, every frame of run.h5, final.csv, and what run.json says of steps,
-    times, energies and the end. Of a sweep: the name of every case, and every cell of a sample of its rows. Exit code 1
-    says that something differs; then the answer tells where first, by how much at most, and what is not the same as
-    when the results were made: code, versions, processor. Nothing is written.
+    Of a run: checksums of all files, final state, every frame of run.h5, final.csv, and the steps, times, energies and
+    end in run.json. Of a sweep: the name of every case, and every cell of a sample of rows. Exit code 1: something
+    differs; the answer gives the first and the largest difference, and what has changed since: code, versions,
+    processor. Nothing is written.
 
     Example: blocksim verify-run results/three_blocks
     """
@@ -64,11 +64,11 @@ def verify_run_command(
         print_json([one.data for one in verified])
     else:
         answer("\n".join(line for one in verified for line in one.lines))
-    raise typer.Exit(max(one.code for one in verified))  # of several the gravest: 65, 66 before 1 before 0
+    raise typer.Exit(max(one.code for one in verified))  # of several the most severe: 65, 66 before 1 before 0
 
 
 def _verified(place: Path, threads: int, sample: int, seed: int, *, silent: bool) -> Verified:
-    """Verify one place; what is wrong with it does not keep the others from being looked at."""
+    """Verify one place; an error in it does not stop the others."""
     try:
         if is_sweep(place):
             return _of_sweep(_sample_again(place, sample, seed, silent=silent))
@@ -97,7 +97,7 @@ def _sample_again(folder: Path, sample: int, seed: int, *, silent: bool) -> Swee
 def _of_run(verdict: RunVerdict, *, told: bool) -> Verified:
     count = verdict.frames.frames[0]
     if verdict.agrees:
-        lines = [f"{verdict.folder}: the same bits: final state, {count} frames, final.csv"]
+        lines = [f"{verdict.folder}: bit-identical: final state, {count} frames, final.csv"]
         if verdict.origins and told:
             note("\n".join(_told_origins(verdict.origins)))
     else:
@@ -106,15 +106,15 @@ def _of_run(verdict: RunVerdict, *, told: bool) -> Verified:
 
 
 def _reasons(verdict: RunVerdict) -> Iterator[str]:
-    """Tell in what a run differs."""
-    yield from (f"{name} is not as the run left it (SHA-256 in run.json)" for name in verdict.changed)
+    """Report in what a run differs."""
+    yield from (f"{name} was changed after the run (SHA-256 in run.json)" for name in verdict.changed)
     then, now = verdict.status
     if then != now:
-        yield f"the run was {then}, its repetition {now}"
+        yield f"the stored run is {then}, the new one {now}"
     if not verdict.state:
-        yield "the final state has another hash than run.json tells"
+        yield "the final state has another hash than in run.json"
     if not verdict.table:
-        yield "final.csv is not what comes out"
+        yield "final.csv differs"
     for one in verdict.entries[:MOST_ENTRIES]:
         yield f"{one.file}: {one.entry}: {one.stored!r} stored, {one.now!r} now"
     if len(verdict.entries) > MOST_ENTRIES:
@@ -124,14 +124,14 @@ def _reasons(verdict: RunVerdict) -> Iterator[str]:
 
 
 def _parting(verdict: RunVerdict) -> Iterator[str]:
-    """Tell where the frames of a run part from those of its repetition."""
+    """Report where the frames of a run differ from those of the new run."""
     frames = verdict.frames
     stored, now = frames.frames
     if stored != now:
-        yield f"run.h5 has {stored} frames, the repetition {now}"
+        yield f"run.h5 has {stored} frames, the new run {now}"
     first = frames.first
     if first is None:
-        yield "every frame that both have is the same" if stored != now else f"all {stored} frames are the same"
+        yield "all frames that both have are identical" if stored != now else f"all {stored} frames are identical"
         return
     whose = "" if first.block is None else f"block {first.block}, "
     name, unit = _named(first.quantity)
@@ -150,14 +150,14 @@ def _named(quantity: str) -> tuple[str, str]:
 
 
 def _told_origins(origins: tuple[Origin, ...]) -> list[str]:
-    """Tell what is not the same as when results were made."""
+    """Report what has changed since the results were made."""
     if not origins:
-        return ["code, versions and processor are the same as then"]
-    return [f"since then {one.name}: {_change(one)}" for one in origins]
+        return ["code, versions and processor are unchanged"]
+    return [f"changed since: {one.name}: {_change(one)}" for one in origins]
 
 
 def _change(one: Origin) -> str:
-    """Return a change in few words; of long lists only what has gone or come."""
+    """Return a change in few words; of long lists only what was removed or added."""
     then, now = set(one.then.split()), set(one.now.split())
     if len(then | now) > MOST_WORDS:
         return " ".join([f"-{word}" for word in sorted(then - now)] + [f"+{word}" for word in sorted(now - then)])
@@ -167,8 +167,8 @@ def _change(one: Origin) -> str:
 def _of_sweep(verdict: SweepVerdict) -> Verified:
     count = f"{len(verdict.checked)} of {verdict.rows} rows"
     if verdict.agrees:
-        kept = f", the same bits in {len(verdict.runs)} kept runs" if verdict.runs else ""
-        lines = [f"{verdict.folder}: the same numbers in {count}{kept}"]
+        kept = f", bit-identical in {len(verdict.runs)} kept runs" if verdict.runs else ""
+        lines = [f"{verdict.folder}: identical numbers in {count}{kept}"]
     else:
         rows = {one.row for one in verdict.cells}
         lines = [f"{verdict.folder}: differs in {len(rows)} of the {count} that were run again"]
@@ -179,7 +179,7 @@ def _of_sweep(verdict: SweepVerdict) -> Verified:
 
 
 def _cells(verdict: SweepVerdict) -> Iterator[str]:
-    """Tell which cells of a sweep differ."""
+    """Report which cells of a sweep differ."""
     for one in verdict.cells[:MOST_CELLS]:
         values = f"{one.stored or 'nothing'} stored, {one.now or 'nothing'} now"
         yield f"row {one.row}, case {one.case}, {one.column}: {values}"

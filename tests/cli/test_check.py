@@ -72,7 +72,7 @@ def two_materials(tmp_path: Path) -> str:
 
 def test_the_keys_that_decided_are_reported_with_their_pairs(blocksim: Command, two_materials: str) -> None:
     answer = blocksim("check", two_materials)
-    told = answer.out[answer.out.index("set by") : answer.out.index("where no key")]
+    told = answer.out[answer.out.index("set by") : answer.out.index("other values")]
     assert told == TOLD.lstrip("\n")
     tables = answer.out[answer.out.index("block  ") :]
     assert max(map(len, tables.splitlines())) <= 80
@@ -157,9 +157,9 @@ def test_step_that_is_too_large_is_reported_where_it_stands(blocksim: Command, t
 
 def test_skin_is_reported_as_it_follows_from_the_blocks_or_as_it_is_given(blocksim: Command) -> None:
     usual = blocksim("check", "scenarios/three_blocks_nominal.toml")
-    assert "neighbours listed up to 8 mm apart\n" in usual.out  # a quarter of 32 mm
+    assert "neighbours checked up to 8 mm apart\n" in usual.out  # a quarter of 32 mm
     given = ("check", "scenarios/three_blocks_nominal.toml", "--set", "contact.skin=0.25 mm")
-    assert "neighbours listed up to 0.25 mm apart\n" in blocksim(*given).out
+    assert "neighbours checked up to 0.25 mm apart\n" in blocksim(*given).out
     assert json.loads(blocksim(*given, "--json").out)["skin"] == 2.5e-4
 
 
@@ -221,7 +221,7 @@ def test_json_of_a_crowd_has_every_block(blocksim: Command) -> None:
 
 def test_rigid_contacts_show_what_their_step_implies_in_80_columns(blocksim: Command) -> None:
     answer = blocksim("check", "scenarios/tower.toml", "--set", "time.scheme=nonsmooth", "--set", "time.step=1 ms")
-    assert "sag        142 µm of block 10 as all stand, with the step squared" in answer.out
+    assert "sag        142 µm of block 10 at rest; grows with the square of the step" in answer.out
     assert "in 4 substeps, each solved to 1 mm/s; manual limit 4.4e-03 s" in answer.out
     tables = answer.out[answer.out.index("block   x mm") :]
     assert "ζ" not in tables

@@ -47,7 +47,7 @@ def test_shortage_that_a_library_wraps_is_reported(capsys: pytest.CaptureFixture
     error = RuntimeError("cannot compile")
     error.__cause__ = MemoryError()
     assert exit_code_of(error) == ExitCode.INPUT_OUTPUT
-    assert capsys.readouterr().err.startswith("the system has no more memory for this")
+    assert capsys.readouterr().err.startswith("the system has run out of memory")
 
 
 def test_error_that_is_no_shortage_stays_what_it_is() -> None:
@@ -63,7 +63,7 @@ def test_current_folder_that_is_gone_is_reported(
     (tmp_path / "gone").rmdir()
     answer = blocksim("run", tmp_path / "scenarios" / "three_blocks_nominal.toml")
     assert answer.code == 66
-    assert answer.err == "the current folder does not exist any more; go to another one with cd\n"
+    assert answer.err == "the current folder no longer exists; change to another one with cd\n"
 
 
 def test_internal_error_is_one_line_and_a_file(

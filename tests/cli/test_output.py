@@ -55,4 +55,4 @@ def test_compiled_solver_that_cannot_be_kept_is_reported(
     monkeypatch.setattr("blocksim.cli.compiling.jit.cache_folder", lambda: Path("/disk/blocksim/0123"))
     compiling.tell_compilation("surface", quiet=False)
     told = capsys.readouterr().err.splitlines()
-    assert told[-1].startswith("/disk/blocksim/0123: the compiled solver cannot be kept there; make room")
+    assert told[-1].startswith("/disk/blocksim/0123: the compiled solver cannot be stored there; free some space")

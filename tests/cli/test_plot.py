@@ -92,9 +92,9 @@ def test_the_folder_alone_tells_what_the_blocks_stand_on(blocksim: Command) -> N
     [
         (["--out", "strip.bmp"], 65, "'.bmp' is no picture format"),
         (["--out", "nix/strip.png"], 74, "nix/strip.png: cannot be written"),
-        (["--times", "0,x"], 2, "'x' is no time; give"),
-        (["--at", "5 furlongs"], 2, "'5 furlongs' is no time; give"),
-        (["--size", "10 by 20"], 2, "'10 by 20' is no size of a picture"),
+        (["--times", "0,x"], 2, "'x' is not a time; give"),
+        (["--at", "5 furlongs"], 2, "'5 furlongs' is not a time; give"),
+        (["--size", "10 by 20"], 2, "'10 by 20' is not a picture size"),
         (["--size", "5x3000mm"], 2, "20 to 2000 mm"),
         (["--size", "40x30mm"], 65, "--size 40x30 mm is too small for this picture"),
         (["--size", "2000x2000mm", "--dpi", "300"], 2, "million pixels"),

@@ -53,7 +53,7 @@ def copy_of_sweep(swept: Path, tmp_path: Path) -> Path:
 def test_finished_run_has_the_same_bits(blocksim: Command, finished: Path) -> None:
     answer = blocksim("verify-run", finished)
     assert answer.code == 0
-    assert answer.out.startswith(f"{finished}: the same bits: final state, ")
+    assert answer.out.startswith(f"{finished}: bit-identical: final state, ")
 
 
 @pytest.mark.parametrize("settings", [RIGID, (*SHORT, "--set", "contact.law=hertz-mindlin")])
@@ -90,14 +90,14 @@ def test_changed_file_is_named(blocksim: Command, copied: Path) -> None:
     altered(copied, "final.csv", "\n2,", "\n2,1")
     answer = blocksim("verify-run", copied)
     assert answer.code == 1
-    assert "  final.csv is not as the run left it (SHA-256 in run.json)\n" in answer.out
-    assert "  final.csv is not what comes out\n" in answer.out
-    assert "  code, versions and processor are the same as then" in answer.out
+    assert "  final.csv was changed after the run (SHA-256 in run.json)\n" in answer.out
+    assert "  final.csv differs\n" in answer.out
+    assert "  code, versions and processor are unchanged" in answer.out
 
 
 def test_lost_file_is_named(blocksim: Command, copied: Path) -> None:
     (copied / "experiment.csv").write_text("")
-    assert "experiment.csv is not as the run left it" in blocksim("verify-run", copied).out
+    assert "experiment.csv was changed after the run" in blocksim("verify-run", copied).out
 
 
 def test_other_scenario_is_found_though_its_checksum_fits(blocksim: Command, copied: Path) -> None:
@@ -106,9 +106,9 @@ def test_other_scenario_is_found_though_its_checksum_fits(blocksim: Command, cop
     answer = blocksim("verify-run", copied)
     assert answer.code == 1
     assert "SHA-256" not in answer.out
-    assert "the final state has another hash than run.json tells" in answer.out
+    assert "the final state has another hash than in run.json" in answer.out
     assert "first difference: frame " in answer.out
-    assert "since then scenario: " in answer.out
+    assert "changed since: scenario: " in answer.out
 
 
 def test_first_difference_is_reported_with_frame_block_and_quantity(blocksim: Command, copied: Path) -> None:
@@ -174,9 +174,9 @@ def test_other_versions_and_processors_are_reported(blocksim: Command, copied: P
     (copied / "run.json").write_text(json.dumps(told))
     answer = blocksim("verify-run", copied)
     assert answer.code == 1
-    assert "since then numba: 0.1 -> " in answer.out
-    assert "since then code_kernels: old -> " in answer.out
-    assert "since then cpu_features: -avx9 +" in answer.out
+    assert "changed since: numba: 0.1 -> " in answer.out
+    assert "changed since: code_kernels: old -> " in answer.out
+    assert "changed since: cpu_features: -avx9 +" in answer.out
     assert "command" not in answer.out
 
 
@@ -184,7 +184,7 @@ def test_same_bits_in_spite_of_another_version_are_reported_beside(blocksim: Com
     altered(copied, "run.json", '"numba": "', '"numba": "0.')
     answer = blocksim("verify-run", copied)
     assert (answer.code, answer.out.count("\n")) == (0, 1)
-    assert "since then numba: 0." in answer.err
+    assert "changed since: numba: 0." in answer.err
 
 
 @pytest.mark.parametrize("name", ["scenario.toml", "run.json", "run.h5", "final.csv"])
@@ -201,7 +201,7 @@ def test_one_damaged_folder_does_not_hide_the_others(blocksim: Command, finished
     answer = blocksim("verify-run", copied, finished, "--quiet")
     assert answer.code == 65
     assert answer.out.splitlines()[0] == f"{copied}: damaged"
-    assert answer.out.splitlines()[1].startswith(f"{finished}: the same bits")
+    assert answer.out.splitlines()[1].startswith(f"{finished}: bit-identical")
 
 
 def test_place_without_a_run_is_reported(blocksim: Command) -> None:
@@ -216,7 +216,7 @@ def test_nothing_is_written(blocksim: Command, finished: Path) -> None:
 
 
 def test_rows_of_a_sweep_come_out_again(blocksim: Command, swept: Path) -> None:
-    assert blocksim("verify-run", swept).out == f"{swept}: the same numbers in 5 of 5 rows\n"
+    assert blocksim("verify-run", swept).out == f"{swept}: identical numbers in 5 of 5 rows\n"
     some = [json.loads(blocksim("verify-run", swept, "--sample", 2, "--seed", s, "--json").out)[0] for s in (1, 1, 2)]
     assert some[0]["checked"] == some[1]["checked"] != some[2]["checked"]
     assert len(some[0]["checked"]) == 2
@@ -265,13 +265,13 @@ def test_rows_of_a_sweep_that_was_stopped_find_their_cases(blocksim: Command, co
         lines = (copy_of_sweep / name).read_text().splitlines(keepends=True)
         del lines[2 if name == "sweep.csv" else 1]
         (copy_of_sweep / name).write_text("".join(lines))
-    assert blocksim("verify-run", copy_of_sweep).out.endswith("the same numbers in 4 of 4 rows\n")
+    assert blocksim("verify-run", copy_of_sweep).out.endswith("identical numbers in 4 of 4 rows\n")
 
 
 def test_kept_cases_are_verified_as_runs(blocksim: Command) -> None:
     scenario = ("scenarios/three_blocks_nonsmooth.toml", "--set", "time.end=0.01")
     blocksim("sweep", *scenario, "--vary", "gravity=9,10", "--keep-cases", "--jobs", 1, "--out", "kept", "--quiet")
-    assert blocksim("verify-run", "kept").out.endswith("2 of 2 rows, the same bits in 2 kept runs\n")
+    assert blocksim("verify-run", "kept").out.endswith("2 of 2 rows, bit-identical in 2 kept runs\n")
     one = next(Path("kept/cases").iterdir())
     altered(one, "final.csv", "block,", "blocks,")
     assert blocksim("verify-run", "kept").code == 65
