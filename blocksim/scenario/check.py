@@ -21,12 +21,12 @@ MAX_TRIED = 100
 MAX_VARIED = 100
 MODES = get_args(Mode)
 ENDS = ("from", "mean", "to")
-"""What a variation that is no list says of its values, in the order in which it is reported."""
+"""Keys of a variation that is not a list, in the order in which they are reported."""
 UNVARIED = ("schema", "name", "description", "experiment", "sweep", "provenance")
 
 
 class Trial(NamedTuple):
-    """What the values of a sweep are tried in: data without sweep and experiment, and the mistakes in them."""
+    """Context in which the values of a sweep are tried: data without sweep and experiment, and the mistakes in them."""
 
     data: Data
     folder: Path
@@ -36,7 +36,7 @@ class Trial(NamedTuple):
 def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Finding]]:
     """Validate data (tuples for lists): the scenario, or None and all mistakes.
 
-    Mistakes of placement, such as overlapping bodies, can only be told once everything else is right.
+    Mistakes of placement, such as overlapping bodies, can only be found once everything else is right.
     """
     scenario, findings = _validated(data, folder)
     findings += islice(wrong_names(data), MAX_FINDINGS)
@@ -54,7 +54,7 @@ def _validated(data: Data, folder: Path) -> tuple[Scenario | None, list[Finding]
 
 
 def _sweep(data: Data, folder: Path) -> Iterator[Finding]:
-    """Try the values of a sweep one by one; whether values go together shows in each case of the sweep."""
+    """Try the values of a sweep one by one; whether values are compatible shows in each case of the sweep."""
     sweep = data.get("sweep")
     if not isinstance(sweep, Mapping):
         return
@@ -71,12 +71,12 @@ def _sweep(data: Data, folder: Path) -> Iterator[Finding]:
 
 
 def _varied_twice(sweep: Data) -> Iterator[Finding]:
-    """Find keys beside which the other way to write the same thing is varied too."""
+    """Find keys that are varied together with the other way to write the same thing."""
     for key in sweep:
         table, dot, word = str(key).rpartition(".")
         twin = f"{table}{dot}{TWINS.get(word, word)}"
         if word == "kinetic_ratio" and twin in sweep:
-            message = f"{twin} is varied too, and says the same thing; keep one of the two"
+            message = f"{twin}, which means the same, is varied too; keep one of the two"
             yield Finding(("sweep", key), message, at="key")
 
 
@@ -89,7 +89,7 @@ def _is_variation(sweep: Mapping[str, object]) -> bool:
 
 
 def _varied(trial: Trial, key: str, values: object) -> Iterator[Finding]:
-    """Yield what is wrong with a swept key, then with its values."""
+    """Yield the mistakes in a swept key, then in its values."""
     place: keys.KeyPath = ("sweep", key)
     complaint = unfit_to_vary(key)
     if complaint:
@@ -101,7 +101,7 @@ def _varied(trial: Trial, key: str, values: object) -> Iterator[Finding]:
 
 
 def unfit_to_vary(key: str) -> str:
-    """Tell why a key can be in no sweep, or nothing; whether the scenario has the key shows when it is tried."""
+    """Return why a key cannot be swept, or nothing; whether the scenario has the key shows when it is tried."""
     try:
         first = keys.parse_key(key)[0]
     except ValueError:
@@ -110,7 +110,7 @@ def unfit_to_vary(key: str) -> str:
 
 
 def _given(values: object) -> Iterator[tuple[str | int, object]]:
-    """Yield the values that a variation names, as they are written, so that their dimension is judged too."""
+    """Yield the values of a variation as they are written, so that their dimension is checked too."""
     if isinstance(values, Mapping):
         yield from ((end, values[end]) for end in ENDS if end in values)
     elif isinstance(values, tuple):
@@ -118,7 +118,7 @@ def _given(values: object) -> Iterator[tuple[str | int, object]]:
 
 
 def mistakes_of_value(data: Data, folder: Path, key: str, value: object) -> list[Finding]:
-    """List what is wrong with one value of one key by itself, in data that may have a sweep."""
+    """List the mistakes in one value of one key by itself, in data that may have a sweep."""
     bare = {name: entry for name, entry in data.items() if name not in ("sweep", "experiment")}
     trial = Trial(bare, folder, _single_mistakes(bare, folder))
     return list(_tried(trial, keys.parse_key(key), value, ("sweep", key)))

@@ -1,4 +1,4 @@
-"""A scenario file as read: its data, the values set over it, and where everything stands."""
+"""A scenario file as read: its data, the values set over it, and the place of each key."""
 
 import difflib
 import functools
@@ -39,10 +39,10 @@ ENDLESS_KEY = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART})
 
 @dataclass(frozen=True)
 class Document:
-    """Raw data of one scenario with its text, so that mistakes can be shown where they stand.
+    """Raw data of one scenario with its text, so that mistakes can be shown in their line.
 
-    Relative paths inside are resolved against `folder`; with `allow_outside` they may lead anywhere. Of a file in a
-    folder of results (`is_stored`), no link is followed: it may come from a stranger and lead to a private file.
+    Relative paths inside are resolved against `folder`; with `allow_outside` they may lead anywhere. In a
+    folder of results (`is_stored`) no link is followed: it may come from somebody else and lead to a private file.
     """
 
     data: Data
@@ -56,8 +56,8 @@ class Document:
     def read(cls, path: Path | str, *, is_stored: bool = False) -> Self:
         """Read a TOML file, `is_stored` in a folder of results.
 
-        Raises InputMissingError where it cannot be read, ScenarioError where it is no TOML, InvalidInputError where it
-        is no regular file.
+        Raises InputMissingError where it cannot be read, ScenarioError where it is not TOML, InvalidInputError where it
+        is not a regular file.
         """
         path = Path(path)
         text = _decoded(_content(path, is_stored=is_stored), str(path))
@@ -67,7 +67,7 @@ class Document:
     def parse(cls, text: str, where: str = "scenario", folder: Path = Path()) -> Self:
         """Take the text of a TOML file, named `where` in messages.
 
-        Raises ScenarioError where it is no TOML.
+        Raises ScenarioError where it is not TOML.
         """
         source = Source(where, text.replace("\r\n", "\n"))
         endless = ENDLESS_KEY.search(source.text)
@@ -104,7 +104,7 @@ class Document:
         return self._with(texts, [functools.partial(_setting, text) for text in settings])
 
     def _with(self, texts: Sequence[tuple[str, str]], pairs: Sequence[Callable[[], Pair]]) -> Self:
-        """Set one value after the other, and tell all that cannot be set together."""
+        """Set one value after the other, and report all that cannot be set."""
         data, overrides, problems = self.data, list(self.overrides), []
         for (label, text), pair in zip(texts, pairs, strict=True):
             try:
@@ -129,12 +129,12 @@ class Document:
         problems = list(dict.fromkeys(self.problem(finding) for finding in findings))
         problems.sort(key=lambda p: (p.line_number is None, p.line_number or 0, p.caret_start))
         if len(problems) > MAX_PROBLEMS:
-            more = Problem(self.source.where, "and more mistakes")
+            more = Problem(self.source.where, "more mistakes follow")
             return [*problems[:MAX_PROBLEMS], more]
         return problems
 
     def problem(self, finding: Finding) -> Problem:
-        """Show a finding where it can be mended: in a value set from outside, or else in the text."""
+        """Show a finding where it can be corrected: in a value set from outside, or else in the text."""
         causes = (self._is_cause, self._began_its_table)
         override = next((o for is_it in causes for o in reversed(self.overrides) if is_it(o, finding)), None)
         if override is not None:
@@ -149,7 +149,7 @@ class Document:
         return inside or (bool(found) and on_the_way) or beside
 
     def _began_its_table(self, override: Override, finding: Finding) -> bool:
-        """Return True if the table in which something is missing is not in the text but was begun from outside."""
+        """Return True if the table in which something is missing is not in the text but was created from outside."""
         table = finding.path[:-1]
         return bool(table) and table not in self.source.places and override.path[: len(table)] == table
 
@@ -168,7 +168,7 @@ def _unusable(where: str, message: str) -> ScenarioError:
 
 
 def _content(path: Path, *, is_stored: bool) -> bytes:
-    """Read a file, but never much more than a scenario can be."""
+    """Read a file, but never much more than a scenario may have."""
     if is_folder(path):
         message = f"{path}: this is a folder; a scenario file is needed{_similar_file(path / path.name)}"
         raise InputMissingError(message)

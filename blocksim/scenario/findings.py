@@ -1,4 +1,4 @@
-"""Mistakes in the data of a scenario, in a person's words, with the path of the guilty key."""
+"""Mistakes in the data of a scenario, in plain words, with the path of the key concerned."""
 
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
@@ -19,20 +19,20 @@ from blocksim.scenario.structures import KINDS
 
 TWO_VALUES = "two values are needed, one along x and one along y"
 MIN_BEGINNING = 3
-"""Letters that a word needs before its continuation is suggested."""
+"""Letters that a word needs before a longer word is suggested."""
 MAX_FINDINGS = 200
-"""Mistakes that are looked at closely; a file of a million mistakes must not take minutes."""
+"""Mistakes that are examined; a file of a million mistakes must not take minutes."""
 MAX_COMPARED = 1000
-"""Words that a misspelt one is compared with, for the same reason."""
+"""Known words that a misspelt one is compared with, for the same reason."""
 MAX_LISTED = 10
 KINDS_IN: dict[str | int, Iterable[str]] = {"structures": KINDS, "motion": MOTIONS}
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One mistake: where in the data, what is wrong, and which part of the line a caret belongs under.
+    """One mistake: its place in the data, its message, and the part of the line to mark with a caret.
 
-    `relation` is true where single values are fine and only do not go together; `meant` is the path that a
+    `relation` is true where each value is valid and only their combination is not; `meant` is the path that a
     misspelt key was probably meant to be.
     """
 
@@ -84,7 +84,7 @@ def _path(loc: Sequence[str | int]) -> KeyPath:
 
 
 def _existing(path: KeyPath, data: object) -> KeyPath:
-    """Cut a path down to what stands in the file: a bare number may have become a table."""
+    """Cut a path down to what is in the file: a bare number may have become a table."""
     while path and follow(data, path) is MISSING:
         path = path[:-1]
     return path
@@ -105,12 +105,13 @@ def _unknown_key(path: KeyPath, data: object) -> Finding:
     if schemes:
         present = scheme_of(follow(data, path[:-1]))
         return Finding(
-            path, f"this key is for scheme {shown(schemes[0])}; the scheme here is {shown(present)}", at="key"
+            path, f"this key belongs to scheme {shown(schemes[0])}; the scheme here is {shown(present)}", at="key"
         )
     table = SCHEMES[scheme_of(follow(data, path[:-1]))] if path[0] == "time" else table_at(path[:-1], data)
     known = keys_of(table) if table is not None else ()
     meant = similar_word(str(path[-1]), known)
-    if (len(path) == 1 or not meant) and (other := _table_with(str(path[-1]))):
+    is_typing_error = nearest(str(path[-1]), known, most=1) is not None
+    if (not meant or (len(path) == 1 and not is_typing_error)) and (other := _table_with(str(path[-1]))):
         return Finding(path, f"unknown key, did you mean {f'{other}.{path[-1]}'!r}?", at="key")
     hint = f"did you mean {meant!r}?" if meant else f"allowed are: {', '.join(known)}"
     return Finding(path, f"unknown key, {hint}", at="key", meant=(*path[:-1], meant) if meant else ())
@@ -133,11 +134,11 @@ def did_you_mean_or_list(word: str, known: Iterable[object]) -> str:
     """Suggest the known word that may have been meant, or list the first known words."""
     names = [str(name) for name in known]
     listed = ", ".join(names[:MAX_LISTED]) + (", …" if len(names) > MAX_LISTED else "")
-    return did_you_mean(word, names) or (f"known: {listed}" if names else "there is none")
+    return did_you_mean(word, names) or (f"known: {listed}" if names else "none is defined")
 
 
 def similar_word(word: str, known: Iterable[str]) -> str | None:
-    """Return the known word that has the fewest slips, begins like the one found, or shares most of it."""
+    """Return the known word that has the fewest typing errors, begins like the given one, or shares most of it."""
     known = tuple(islice(known, MAX_COMPARED))
     similar = nearest(word, known, most=max(1, len(word) // 3))
     if similar is not None or len(word) < MIN_BEGINNING:
@@ -168,7 +169,7 @@ def _wrong_type(entry: ErrorDetails, path: KeyPath) -> str:
             return f"this list is too long; {TWO_VALUES}"
         case "string_type":
             quote = "; quote the whole dotted key" if isinstance(value, Mapping) else ""
-            return f"{shown(value)} is not a text in quotes{quote}"
+            return f"{shown(value)} is not a string in quotes{quote}"
         case "bool_type":
             return f"{shown(value)} is neither true nor false"
         case _:

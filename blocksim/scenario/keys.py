@@ -13,19 +13,19 @@ from blocksim.scenario.models.base import Table
 from blocksim.scenario.models.scenario import Scenario
 
 KeyPath = tuple[str | int, ...]
-"""A place in a scenario, such as ("structures", 0, "overlap")."""
+"""Path in a scenario, such as ("structures", 0, "overlap")."""
 
 NAMED: dict[str | int, int] = {"materials": 2, "blocks": 2, "structures": 2, "bodies": 2, "walls": 2, "pairs": 3}
 """Tables of named or numbered entries: how many parts of a path lead to one entry."""
 
 TAGS = ("kind", "scheme")
-"""Keys whose word tells which of several tables stands at a place."""
+"""Keys whose word selects one of several tables."""
 
 MISSING = object()
 """What `follow` returns where there is nothing."""
 
 MAX_PARTS = 64
-"""Of a dotted key; tomllib takes the time of their square."""
+"""Of a dotted key; the time of tomllib grows with their square."""
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _BASIC = re.compile(r'"(?:[^"\\\n]|\\[^\n])*"')
@@ -87,7 +87,7 @@ def _quoted(part: str) -> str:
 
 
 def follow(data: object, path: Sequence[str | int]) -> object:
-    """Return what stands at a path of nested mappings and sequences, or MISSING."""
+    """Return the value at a path of nested mappings and sequences, or MISSING."""
     for part in path:
         if isinstance(data, Mapping):
             data = data.get(part, MISSING)
@@ -99,7 +99,7 @@ def follow(data: object, path: Sequence[str | int]) -> object:
 
 
 def table_at(path: Sequence[str | int], data: object) -> type[Table] | None:
-    """Return the model of the table at a path; `data` tells the kinds of structures and motion."""
+    """Return the model of the table at a path; `data` has the kinds of structures and motion."""
     annotation: object = Scenario
     for depth, part in enumerate(path):
         annotation = _inside(annotation, part, follow(data, path[:depth]))
@@ -155,7 +155,7 @@ def _table(annotation: object, node: object) -> type[Table] | None:
 
 
 def _word(table: type[Table], node: object) -> object:
-    """Return the word of a table that tells it from its alternatives, or the one that is meant without."""
+    """Return the word that distinguishes a table from its alternatives, or the default."""
     tag = _tag(table)
     word = node.get(tag, MISSING) if isinstance(node, Mapping) else MISSING
     return table.model_fields[tag].default if word is MISSING else word
@@ -166,7 +166,7 @@ def _tag(table: type[Table]) -> str:
 
 
 def kinds_of(table: type[Table]) -> tuple[str, ...]:
-    """Return the words that tell this table from its alternatives."""
+    """Return the words that distinguish this table from its alternatives."""
     return get_args(table.model_fields[_tag(table)].annotation)
 
 

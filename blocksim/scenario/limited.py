@@ -1,7 +1,7 @@
 """Files that others may have made: regular files only, read up to a size.
 
 A pipe or a device may never end, a file of any size must not take all memory, and a link in a result folder may lead to
-a file that is nobody's business but its owner's. A link that a person names (`links=True`) is followed.
+a private file. A link that the user names (`links=True`) is followed.
 """
 
 import errno
@@ -25,7 +25,7 @@ KINDS = (
 
 
 class NoSuchFileError(InputMissingError):
-    """There is nothing of this name."""
+    """Nothing of this name exists."""
 
 
 def is_folder(path: Path) -> bool:
@@ -37,7 +37,7 @@ def is_folder(path: Path) -> bool:
 
 
 def open_regular(path: Path, *, links: bool = False) -> BinaryIO:
-    """Open a regular file for reading, without waiting for anybody at the other end of a pipe.
+    """Open a regular file for reading, without waiting for the other end of a pipe.
 
     Raises InputMissingError where there is no file or it cannot be read, InvalidInputError where it is a folder, a pipe
     or a device, or, without `links`, where its last part is a link.
@@ -47,7 +47,7 @@ def open_regular(path: Path, *, links: bool = False) -> BinaryIO:
         file = open(path, "rb", opener=_opener(links=links))  # noqa: SIM115 - the caller closes it
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         raise unreadable(path, error) from None
-    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):  # replaced since
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):  # replaced in the meantime
         file.close()
         message = f"{path}: not a file"
         raise InvalidInputError(message)
@@ -117,4 +117,4 @@ def _read(path: Path, file: BinaryIO, count: int) -> bytes:
 
 
 def _too_large(limit: int) -> str:
-    return f"larger than {limit / MEGABYTE:g} MB, which is the most that is read"
+    return f"larger than {limit / MEGABYTE:g} MB, the limit for this file"

@@ -1,4 +1,4 @@
-"""The two ways to a scenario: from a file, and from Python."""
+"""Loading a scenario from a file or from Python."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,7 +13,7 @@ Source = Path | str | Mapping[str, object] | Scenario | Document
 
 
 def load_stored(path: Path | str) -> Scenario:
-    """Read and check a scenario in a folder of results, which a stranger may have made: no link is followed.
+    """Read and check a scenario in a folder of results, which may come from somebody else: no link is followed.
 
     Raises as `load_scenario`, and InvalidInputError for a link.
     """
@@ -26,10 +26,10 @@ def load_scenario(
     *,
     allow_outside: bool = False,
 ) -> Scenario:
-    """Read and check a scenario: a file, nested dictionaries in the form of the file, or a scenario to be changed.
+    """Read and check a scenario: a file, nested dictionaries in the form of the file, or an existing scenario.
 
     `overrides` are "key=value" texts as given to --set, or dotted keys with Python values. Tables that the file names
-    have to lie below its folder or below the current one, unless `allow_outside` is given or an override names them.
+    must lie below its folder or below the current one, unless `allow_outside` is given or an override names them.
     Raises ScenarioError with all mistakes together, and InputMissingError where the file itself cannot be read.
     """
     document = _reaching(document_of(source), allow_outside=allow_outside)
@@ -51,16 +51,16 @@ def scenario_from_mapping(
 def replace_values(scenario: Scenario, changes: Mapping[str, object]) -> Scenario:
     """Return a scenario with some keys changed, validated as a file would be.
 
-    `changes` are dotted keys with Python values or strings with a unit: {"ground.tilt": "10 deg"}. The scenario given
-    stays as it is. Raises ScenarioError with all mistakes together.
+    `changes` are dotted keys with Python values or strings with a unit: {"ground.tilt": "10 deg"}. The given
+    scenario is unchanged. Raises ScenarioError with all mistakes together.
     """
     return document_of(scenario).with_values({key: said_by_hand(key, value) for key, value in changes.items()}).build()
 
 
 def document_of(source: Source) -> Document:
-    """Return what a scenario is built from: of a file, of nested dictionaries, or of a scenario that is built already.
+    """Return the document of a file, of nested dictionaries, or of a scenario.
 
-    Tables that a built scenario names were found once and may lie anywhere. Raises what reading raises.
+    Tables of an existing scenario may lie anywhere. Raises what reading raises.
     """
     if isinstance(source, Document):
         return source

@@ -1,7 +1,7 @@
-"""Where every key and value of a TOML text stands.
+"""Positions of all keys and values in a TOML text.
 
-tomllib tells values but no places, so this small scanner walks over a text that tomllib has accepted and
-notes them.
+tomllib returns values without positions, so this small scanner walks over a text that tomllib has accepted and
+records them.
 """
 
 import bisect
@@ -23,7 +23,7 @@ _STRINGS = (
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A stretch of one line: line from 1, column from 0, length in characters."""
+    """Part of one line: line from 1, column from 0, length in characters."""
 
     line: int
     column: int
@@ -32,7 +32,7 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a key and its value stand; for a [table] both are the name in its header."""
+    """Positions of a key and its value; for a [table] both are the name in its header."""
 
     key: Span
     value: Span
@@ -44,7 +44,7 @@ def locate(text: str) -> dict[KeyPath, Place]:
 
 
 class _Scanner:
-    """One walk over a text; the first mention of a table is the place that counts."""
+    """One walk over a text; the first mention of a table counts."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -106,7 +106,7 @@ class _Scanner:
         return after
 
     def value(self, path: KeyPath, at: int) -> int:
-        """Pass one value, noting what is inside it; return its end."""
+        """Pass one value and record what is inside it; return its end."""
         opening = self.text[at : at + 1]
         if opening == "[":
             return self.array(path, at)
@@ -119,7 +119,7 @@ class _Scanner:
         return at if scalar is None else at + len(scalar[0].rstrip())
 
     def array(self, path: KeyPath, at: int) -> int:
-        """Pass a list, noting every element."""
+        """Pass a list and record every element."""
         for index, start in enumerate(self.elements(at, "]")):
             element = (*path, index)
             self.after = self.value(element, start)
@@ -128,13 +128,13 @@ class _Scanner:
         return self.after
 
     def inline_table(self, path: KeyPath, at: int) -> int:
-        """Pass { key = value, … }, noting every key."""
+        """Pass { key = value, … } and record every key."""
         for start in self.elements(at, "}"):
             self.after = self.pair(path, start)
         return self.after
 
     def elements(self, at: int, closing: str) -> Iterator[int]:
-        """Yield where each element starts; the caller sets `after` to its end. It ends as that of all."""
+        """Yield the start of each element; the caller sets `after` to its end, and finally to that of the list."""
         at = self.skip(at + 1)
         while at < len(self.text) and self.text[at] != closing:
             yield at
@@ -144,7 +144,7 @@ class _Scanner:
         self.after = at + 1
 
     def span(self, start: int, end: int) -> Span:
-        """Give line and column of a stretch, cut at the end of its first line."""
+        """Return line and column of a part, cut at the end of its first line."""
         line = bisect.bisect_right(self.line_starts, start)
         first = self.line_starts[line - 1]
         newline = self.text.find("\n", start, end)

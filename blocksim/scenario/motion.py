@@ -12,7 +12,7 @@ from blocksim.scenario.models.scenario import Scenario
 Floats = NDArray[np.float64]
 
 BEYOND = 1.01
-"""How far the pieces reach, in ends of the scenario: the last step may end a little later."""
+"""Extent of the pieces, in ends of the scenario: the last step may end a little later."""
 SHORTEST_SHARE = 1e-9
 """Joints closer together than this share of a cycle are one."""
 
@@ -20,8 +20,8 @@ SHORTEST_SHARE = 1e-9
 class MotionPieces(NamedTuple):
     """Displacement c0 + c1 s + c2 s² + c3 s³ of piece i, with s = t - times[i] from 0 to times[i + 1] - times[i].
 
-    The pieces join with equal displacement and velocity, from 0 to a little beyond the end of the scenario. Where a
-    motion is over before, the last piece is constant, or linear where a table of accelerations leaves a velocity.
+    The pieces join with equal displacement and velocity, from 0 to a little beyond the end of the scenario. If the
+    motion ends before, the last piece is constant, or linear where a table of accelerations leaves a velocity.
     """
 
     times: Floats  # (k + 1,) s, increasing from 0
@@ -36,7 +36,7 @@ def motion_direction(scenario: Scenario) -> tuple[float, float]:
 
 
 def motion_pieces(scenario: Scenario) -> MotionPieces:
-    """Return the displacement of the supports; no pieces (k = 0) where they rest."""
+    """Return the displacement of the supports; no pieces (k = 0) if they rest."""
     motion, end = scenario.motion, BEYOND * scenario.time.end
     if motion is None:
         return MotionPieces(np.zeros(1), np.zeros((0, 4)), 0.0)

@@ -20,7 +20,7 @@ from blocksim.scenario.limited import read_limited
 from blocksim.scenario.quantities import shown
 
 STANDARD_GRAVITY = 9.80665
-"""m/s²; what accelerograms mean by g."""
+"""m/s²; the g of accelerograms."""
 TIME = "time_s"
 COLUMNS: dict[str, tuple[Literal["displacement", "acceleration"], float]] = {
     "displacement_m": ("displacement", 1.0),
@@ -28,19 +28,19 @@ COLUMNS: dict[str, tuple[Literal["displacement", "acceleration"], float]] = {
     "acceleration_m_s2": ("acceleration", 1.0),
     "acceleration_g": ("acceleration", STANDARD_GRAVITY),
 }
-"""What the second column may be called: the quantity, and its unit in SI."""
+"""Possible names of the second column: the quantity, and its unit in SI."""
 MAX_BYTES = 20_000_000
 MAX_ROWS = 500_000
 LEAST_ROWS = 2
 
 
 class MotionTableError(ValueError):
-    """A table that is none; the text says where and why."""
+    """Invalid table; the text has the place and the reason."""
 
 
 @dataclass(frozen=True)
 class MotionTable:
-    """Samples of one quantity over time, SI (s; m or m/s²); two tables are equal where their samples are."""
+    """Samples of one quantity over time, SI (s; m or m/s²); two tables are equal if their samples are."""
 
     path: Path = field(compare=False)
     quantity: Literal["displacement", "acceleration"]
@@ -71,7 +71,7 @@ def read_motion_table(path: Path) -> MotionTable:
     quantity, unit = COLUMNS[column[1 - column.index(TIME)]]
     rows = list(_samples(lines[1:], column.index(TIME)))
     if len(rows) < LEAST_ROWS or len(rows) > MAX_ROWS:
-        message = f"{len(rows)} lines with samples; {LEAST_ROWS} to {MAX_ROWS} are possible"
+        message = f"{len(rows)} lines with samples; {LEAST_ROWS} to {MAX_ROWS} are allowed"
         raise MotionTableError(message)
     times, values = zip(*rows, strict=True)
     return MotionTable(path, quantity, times, tuple(unit * value for value in values), content)
@@ -103,7 +103,7 @@ def _samples(lines: Sequence[tuple[int, list[str]]], first: int) -> Iterator[tup
             raise MotionTableError(message)
         time, value = (_number(number, cells[place]) for place in (first, 1 - first))
         if time < 0.0 or time <= before:
-            why = "times must not be negative" if time < 0.0 else f"times must increase, and {before:g} s came before"
+            why = "times must not be negative" if time < 0.0 else f"times must increase, the one before is {before:g} s"
             message = f"line {number}: time {time:g} s: {why}"
             raise MotionTableError(message)
         before = time

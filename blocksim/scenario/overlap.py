@@ -1,4 +1,4 @@
-"""Which placed rectangles overlap, and which reach into the ground or a wall, exactly (separating axes)."""
+"""Overlap of placed rectangles with one another, the ground and walls, exactly (separating axes)."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -16,9 +16,9 @@ Integers = NDArray[np.int64]
 Pairs = tuple[Integers, Integers]
 
 MOST_AT_ONCE = 1_000_000
-"""Pairs that are looked at together; more only takes more memory."""
+"""Pairs that are examined together; more only takes more memory."""
 FEW = 32
-"""Of so few boxes all pairs are looked at; sorting them into cells would take longer."""
+"""Number of boxes up to which all pairs are examined; sorting into cells would take longer."""
 ROOM = 1.01
 
 
@@ -68,7 +68,7 @@ def _column(bodies: Sequence[PlacedBody], value: Callable[[PlacedBody], float]) 
 
 
 def penetration(ones: Rectangles, others: Rectangles) -> Floats:
-    """Return the shortest ways (m) that part each two rectangles; zero or negative where they are apart."""
+    """Return the penetration depths (m) of pairs of rectangles; zero or negative where they are apart."""
     x, y = others.x - ones.x, others.y - ones.y
     axes = [axis for r in (ones, others) for axis in ((r.cosine, r.sine), (-r.sine, r.cosine))]
     depths = [ones.reach(*axis) + others.reach(*axis) - np.abs(x * axis[0] + y * axis[1]) for axis in axes]
@@ -161,7 +161,7 @@ def _in_cells(boxes: _Boxes, is_small: NDArray[np.bool_], cell: tuple[float, flo
 
 
 def _meet(boxes: _Boxes, i: Integers, j: Integers) -> NDArray[np.bool_]:
-    """Tell of each two boxes whether they touch or overlap."""
+    """Return for each two boxes whether they touch or overlap."""
     along = (boxes.low_x[i] <= boxes.high_x[j]) & (boxes.low_x[j] <= boxes.high_x[i])
     across = (boxes.low_y[i] <= boxes.high_y[j]) & (boxes.low_y[j] <= boxes.high_y[i])
     return along & across
@@ -180,7 +180,7 @@ def _entries(low: tuple[Floats, Floats], high: tuple[Floats, Floats]) -> tuple[I
 
 
 def _expanded(partners: Integers) -> Iterator[Pairs]:
-    """Yield positions one and other, other = one + 1 ... one + partners[one], in portions."""
+    """Yield positions one and other, other = one + 1 ... one + partners[one], in batches."""
     total = np.cumsum(partners)
     begin = 0
     while begin < partners.size:

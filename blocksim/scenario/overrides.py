@@ -15,18 +15,18 @@ Data = Mapping[str, object]
 
 MAX_DEPTH = 16
 TWINS = {"kinetic": "kinetic_ratio", "kinetic_ratio": "kinetic"}
-"""Two keys that say the same thing; setting one takes the other away."""
+"""Two keys with the same meaning; setting one removes the other."""
 _NAMED = (("materials",), ("blocks",))
 _FRICTION = Friction()
 
 
 class UnfitOverrideError(ValueError):
-    """A dotted key or a value cannot be set; the text says why."""
+    """A dotted key or a value cannot be set; the text has the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class Override:
-    """One value set from outside: its name in messages, how it was written, and the path that it sets."""
+    """One value set from outside: its name in messages, its text, and the path that it sets."""
 
     label: str
     text: str
@@ -34,7 +34,7 @@ class Override:
 
     @property
     def key_length(self) -> int:
-        """Number of characters of `text` that are the key."""
+        """Length of the key in `text`."""
         try:
             return read_key(self.text)[1]
         except ValueError:
@@ -76,7 +76,7 @@ def parse_override(text: str) -> tuple[tuple[str, ...], object]:
 
 
 def parse_value(text: str) -> object:
-    """Read a TOML value; what neither is one nor starts like one ("5 mm/s", "linear") is text."""
+    """Read a TOML value; anything that does not start like one ("5 mm/s", "linear") is text."""
     try:
         found = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
@@ -92,7 +92,7 @@ def parse_value(text: str) -> object:
 def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tuple[Data, KeyPath]:
     """Return data with one value set, and the path that was set; raises UnfitOverrideError.
 
-    Tables on the way are made where they are missing. A bare friction c becomes { static = c }, whose kinetic part
+    Missing tables on the way are created. A bare friction c becomes { static = c }, whose kinetic part
     follows the static one until it is set, by itself or by its ratio, of which the later one holds; the friction of a
     pair of materials starts as that of all pairs; a bare restitution becomes a table of both.
     """
@@ -110,7 +110,7 @@ def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tup
 
 
 def _in_given_order(data: Data, parts: Sequence[str | int]) -> Sequence[str | int]:
-    """Turn pairs.B.A round where the data have pairs.A.B: it is the same pair."""
+    """Reverse pairs.B.A if the data have pairs.A.B: it is the same pair."""
     if parts[0] != "pairs" or len(parts) < 3 or follow(data, parts[:3]) is not MISSING:  # noqa: PLR2004 - pairs.A.B
         return parts
     turned = (parts[0], parts[2], parts[1])
@@ -118,7 +118,7 @@ def _in_given_order(data: Data, parts: Sequence[str | int]) -> Sequence[str | in
 
 
 def _with_own_friction(data: Data, parts: Sequence[str | int]) -> Data:
-    """Give a pair of materials the general friction to start from, before something in its own is set."""
+    """Give a pair of materials the general friction to start from, before a value in its own is set."""
     inside_friction = parts[0] == "pairs" and tuple(parts[3:4]) == ("friction",) and len(parts) > 4  # noqa: PLR2004
     if not inside_friction or follow(data, parts[:4]) is not MISSING:
         return data
@@ -128,7 +128,7 @@ def _with_own_friction(data: Data, parts: Sequence[str | int]) -> Data:
 
 
 def _with_list_to_change(data: Data, parts: Sequence[str | int]) -> Data:
-    """Write out the default of a list that is not there, before one of its entries is set (bodies.0.velocity.1)."""
+    """Write out the default of a missing list before one of its entries is set (bodies.0.velocity.1)."""
     path: KeyPath = ()
     for part, following in pairwise(parts):
         path = (*path, int(part) if isinstance(follow(data, path), tuple) and str(part).isdecimal() else part)
@@ -154,7 +154,7 @@ def _put(node: object, parts: Sequence[str | int], value: object, done: list[str
     child = node.get(part, MISSING)
     if child is MISSING and tuple(done) in _NAMED and len(parts) > 1:
         hint = did_you_mean_or_list(part, node)
-        message = f"there is no {shown(part)} in {done[0]}, {hint}"
+        message = f"{done[0]} has no {shown(part)}, {hint}"
         raise UnfitOverrideError(message)
     done.append(part)
     return {
@@ -172,7 +172,7 @@ def _without_twin(node: Data, part: str) -> Data:
 def _index(entries: Sequence[object], part: str | int, done: Sequence[str | int]) -> int:
     if str(part).isdecimal() and len(str(part)) < MAX_DEPTH and int(part) < len(entries):
         return int(part)
-    message = f"{format_key(done)} is a list of {len(entries)}, numbered from 0; there is no {shown(part)}"
+    message = f"{format_key(done)} is a list of {len(entries)}, numbered from 0; {shown(part)} does not exist"
     raise UnfitOverrideError(message)
 
 

@@ -1,6 +1,6 @@
-"""Which friction, restitution and stiffness two materials have on each other, and which key says so.
+"""Friction, restitution and stiffness of two materials, and the keys that set them.
 
-For every quantity by itself, the first of these keys that is given decides:
+Each quantity is set by the first of these keys that is given:
 
   between two blocks         pairs.A.B, in either order; then friction.block_block, contact.restitution.block_block
   on the ground              pairs.A.ground; then pairs.A.M, where the ground names its material M; then block_ground
@@ -26,10 +26,10 @@ MATERIALS = "materials"
 
 @dataclass(frozen=True)
 class ResolvedPair:
-    """What holds between two materials, SI; None where it follows from the materials, or damping from the normal one.
+    """Contact parameters of two materials, SI; None where they follow from the materials, or from normal damping.
 
-    `normal_stiffness` is as given, not yet times contact.stiffness_scale. `rules` tells for every field the key that
-    decided, "default" where none is given, "materials" where Young's moduli and Poisson's ratios decide.
+    `normal_stiffness` is as given, not yet times contact.stiffness_scale. `rules` has for every field the key that
+    set it, "default" where none is given, "materials" where it follows from Young's moduli and Poisson's ratios.
     """
 
     friction: PairFriction
@@ -41,7 +41,7 @@ class ResolvedPair:
 
 
 def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> ResolvedPair:
-    """Return what holds between the materials `one` and `other`, of two blocks unless `ground`.
+    """Return the contact parameters of the materials `one` and `other`, of two blocks unless `ground`.
 
     With `ground`, `one` is a block's material and `other` is "ground" or the material that a wall names; a wall
     without a material is as the ground.
@@ -56,7 +56,7 @@ def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> R
 
 
 def _partners(scenario: Scenario, one: str, other: str, *, ground: bool) -> list[tuple[str, str]]:
-    """Return the pairs of names whose tables count, the first most."""
+    """Return the pairs of names whose tables apply, in order of precedence."""
     if not ground:
         return [(one, other)]
     if other != GROUND:
@@ -66,7 +66,7 @@ def _partners(scenario: Scenario, one: str, other: str, *, ground: bool) -> list
 
 
 def _overrides(scenario: Scenario, partners: Sequence[tuple[str, str]]) -> Iterator[tuple[str, Pair]]:
-    """Yield the tables of these pairs with their keys as they stand in the file, in either order."""
+    """Yield the tables of these pairs with their keys as in the file, in either order."""
     for one, other in partners:
         for left, right in dict.fromkeys([(one, other), (other, one)]):
             pair = scenario.pairs.get(left, {}).get(right)
@@ -75,7 +75,7 @@ def _overrides(scenario: Scenario, partners: Sequence[tuple[str, str]]) -> Itera
 
 
 def _general(scenario: Scenario, side: str) -> dict[str, tuple[object, str]]:
-    """Return what holds for every pair of this side without a table of its own, and the key that says so."""
+    """Return the values for all pairs of this side without a table of their own, and the keys that set them."""
     contact, friction = scenario.contact, scenario.friction
     restitution = contact.restitution
     return {

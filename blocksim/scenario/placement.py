@@ -38,7 +38,7 @@ class PlacedBody(NamedTuple):
 
 
 class _Placement(NamedTuple):
-    """All bodies of a scenario and where they come from."""
+    """All bodies of a scenario and their origin."""
 
     scenario: weakref.ref[Scenario]
     bodies: tuple[PlacedBody, ...]
@@ -51,8 +51,8 @@ _latest: list[_Placement] = []  # at most one, for as long as its scenario lives
 def place_bodies(scenario: Scenario) -> tuple[PlacedBody, ...]:
     """Place all bodies: structures first, then single bodies, each in the order of the file.
 
-    Called again for the same scenario object, the same bodies are returned. Raises UnfitError where a structure does
-    not go with its block; loading a scenario has checked that.
+    The same scenario object gives the same bodies again. Raises UnfitError where a structure does
+    not suit its block; loading a scenario has checked that.
     """
     return _placement(scenario).bodies
 
@@ -95,7 +95,7 @@ class _Place(Protocol):
 
 
 def _placer(scenario: Scenario, key: str) -> _Place:
-    """Return what places one kind of block; looking its sides up for every one of them would take most of the time."""
+    """Return a function that places one kind of block; looking up its sides every time would be slow."""
     block = scenario.blocks[key]
     material = block.material
     size_x, size_y, depth = block.size_x, block.size_y, block.depth

@@ -1,4 +1,4 @@
-"""Values that a scenario may have, and that are hardly meant."""
+"""Values that are allowed but implausible."""
 
 from collections.abc import Iterator
 

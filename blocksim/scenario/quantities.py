@@ -1,4 +1,4 @@
-"""Numbers with a unit as people write them in a scenario, and as SI floats inside.
+"""Numbers with a unit as written in a scenario, and as SI floats inside.
 
 Every quantity type accepts a number, taken as SI, or a string with a unit ("32 mm"), checked for its
 dimension and its allowed range. An angle needs its unit unless it is zero.
@@ -22,11 +22,11 @@ _TEXT = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
 _MAX_LENGTH = 80
 _MAX_SHOWN = 40
 LEAST, MOST = 1e-18, 1e30
-"""What is positive lies above, and everything below (SI): products of many such numbers stay those of a double."""
+"""Bounds (SI) of positive numbers and of all numbers: products of many such numbers stay finite doubles."""
 
 
 def shown(value: object) -> str:
-    """Write a value as it stands in a TOML file, shortened, for a message."""
+    """Write a value as in a TOML file, shortened, for a message."""
     match value:
         case bool():
             text = str(value).lower()
@@ -46,13 +46,13 @@ def shown(value: object) -> str:
 
 
 def invalid(message: str, *key: str | int, at: Literal["key", "value"] = "value") -> PydanticCustomError:
-    """Build the error that carries a finished message through pydantic; `key` is the path of the guilty key."""
+    """Build the error that carries a finished message through pydantic; `key` is the path of the key concerned."""
     return PydanticCustomError("blocksim", "{message}", {"message": message, "key": key, "at": at})
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A sort of quantity: its dimension, the unit it has inside, and an example for messages."""
+    """Kind of quantity: its dimension, its SI unit, and an example for messages."""
 
     dimension: Dimension
     unit: str
@@ -60,7 +60,7 @@ class Kind:
 
     @property
     def name(self) -> str:
-        """Say what it is, with its article: "a length"."""
+        """Return its name with the article: "a length"."""
         return units.NAMES[self.dimension]
 
     def in_words(self, value: float) -> str:
@@ -86,7 +86,7 @@ STIFFNESS = Kind(units.STIFFNESS, "N/m", "1e6 N/m")
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """Annotation of a float field: which kind of quantity it is and which values are allowed (SI)."""
+    """Annotation of a float field: kind of quantity and allowed values (SI)."""
 
     kind: Kind
     above: float | None = None
@@ -96,7 +96,7 @@ class Quantity:
 
     @property
     def wanted(self) -> str:
-        """Say what is allowed: 'a length above 0 such as "32 mm"'."""
+        """Return what is allowed: 'a length above 0 such as "32 mm"'."""
         low, high = self._low(), self._high()
         span = f" {low} and {high}" if low and high else f" {low}{high}"
         example = f' such as "{self.kind.example}"' if self.kind.example else ""
@@ -113,7 +113,7 @@ class Quantity:
         return f"at most {self.kind.in_words(self.at_most)}" if self.at_most is not None else ""
 
     def read(self, value: object) -> float:
-        """Turn what stands in the file into an SI float; the pydantic error raised says what is allowed."""
+        """Turn the value of the file into an SI float; the pydantic error has what is allowed."""
         number = self._text(value) if isinstance(value, str) else self._number(value)
         if not math.isfinite(number):
             message = f"{shown(value)} is not a finite number; {self.wanted} is needed"
@@ -156,10 +156,10 @@ class Quantity:
             message = f"{shown(value)} is too {'small' if too_small else 'large'}; {self.wanted} is needed"
             raise invalid(message)
         if abs(number) > MOST:
-            message = f"{shown(value)} is too large to compute with; at most {MOST:g} (SI) is possible"
+            message = f"{shown(value)} is too large to compute with; at most {MOST:g} (SI) is allowed"
             raise invalid(message)
         if self.above == 0.0 and number < LEAST:
-            message = f"{shown(value)} is too small to compute with; at least {LEAST:g} (SI) is possible"
+            message = f"{shown(value)} is too small to compute with; at least {LEAST:g} (SI) is allowed"
             raise invalid(message)
         return number
 
@@ -174,7 +174,7 @@ class Quantity:
         return self.json_schema()
 
     def json_schema(self) -> dict[str, Any]:
-        """JSON Schema of what may stand in the file: a number in SI or a string with a unit."""
+        """JSON Schema of the value in the file: a number in SI or a string with a unit."""
         bounds = {
             "exclusiveMinimum": self.above,
             "minimum": self.at_least,
@@ -192,7 +192,7 @@ class Quantity:
 
 @functools.lru_cache(maxsize=1024)
 def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
-    """Read "number unit" into an SI float and its dimension; raises ValueError whose text says what is wrong.
+    """Read "number unit" into an SI float and its dimension; raises ValueError with the reason.
 
     `wanted` only decides which unit is suggested for a misspelt one.
     """
@@ -215,7 +215,7 @@ def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
 
 
 def unit_in(text: str) -> str:
-    """Return the unit in a text such as "9.5 mm"; empty where it is no number with a unit that exists."""
+    """Return the unit in a text such as "9.5 mm"; empty if it is not a number with a known unit."""
     found = _TEXT.fullmatch(text) if len(text) <= _MAX_LENGTH else None
     if found is None or found[2] is None:
         return ""
@@ -251,7 +251,7 @@ def _text_schema(example: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class FrictionCoefficient:
-    """Annotation of a float field: a coefficient, or a friction angle ("21 deg") whose tangent is meant."""
+    """Annotation of a float field: a coefficient, or a friction angle ("21 deg") whose tangent it is."""
 
     wanted = 'a number of at least 0 such as 0.31, or a friction angle below 90 deg such as "21 deg",'
 
@@ -275,7 +275,7 @@ class FrictionCoefficient:
         return self.json_schema()
 
     def json_schema(self) -> dict[str, Any]:
-        """JSON Schema of what may stand in the file: a number or an angle with its unit."""
+        """JSON Schema of the value in the file: a number or an angle with its unit."""
         return {"anyOf": [{"type": "number", "minimum": 0}, _text_schema("21 deg")]}
 
 

@@ -1,7 +1,7 @@
-"""Which files a scenario may name: those below its own folder or below the current one, unless somebody asks for more.
+"""Files that a scenario may name: those below its own folder or below the current one, unless the user allows more.
 
-A scenario may come from a stranger, and what it names is read, shown where it has mistakes, and copied into results. A
-path that a person gives by hand (`--set experiment.table=PATH`, or an override in Python) may lead anywhere.
+A scenario may come from somebody else, and the files that it names are read, quoted in messages, and copied into
+results. A path that the user gives (`--set experiment.table=PATH`, or an override in Python) may lead anywhere.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,23 +19,23 @@ _follows_links = ContextVar("_follows_links", default=True)
 
 
 class ByHand(str):
-    """A path that a person gave beside the scenario; it may lead anywhere."""
+    """A path that the user gave in addition to the scenario; it may lead anywhere."""
 
     __slots__ = ()
 
 
 class OutOfReachError(ValueError):
-    """A path that leads outside, or to no file; the text says why."""
+    """A path that leads outside, or to no file; the text has the reason."""
 
 
 def is_anywhere() -> bool:
-    """Return True if scenarios that are read now may name any file."""
+    """Return True if scenarios may name any file at present."""
     return _is_anywhere.get()
 
 
 @contextmanager
 def reaching(*, anywhere: bool, links: bool = True) -> Iterator[None]:
-    """Let scenarios that are read and checked meanwhile name any file, or only those within reach; and links or not."""
+    """Let scenarios that are read meanwhile name any file, or only those within reach; and links or not."""
     anywhere_before, links_before = _is_anywhere.set(anywhere), _follows_links.set(links)
     try:
         yield
@@ -45,7 +45,7 @@ def reaching(*, anywhere: bool, links: bool = True) -> Iterator[None]:
 
 
 def said_by_hand(key: str | Sequence[str | int], value: object) -> object:
-    """Mark a value that a person sets, where it is the path of a table."""
+    """Mark a value that the user sets, if it is the path of a table."""
     last = key.rpartition(".")[2] if isinstance(key, str) else key[-1]
     return ByHand(value) if last == "table" and isinstance(value, str) else value
 
@@ -70,7 +70,7 @@ def table_in(folder: Path | str, text: str) -> Path:
 
 
 def _what_it_is(table: Path) -> str:
-    """Return what is in the place of a table; nothing where it is a file."""
+    """Return what is found in place of a table; nothing if it is a file."""
     if table.is_file():
         return ""
     if table.is_dir():
@@ -87,7 +87,7 @@ def _refuse_outside(folder: Path, text: str, table: Path) -> None:
 
 
 def _roots(folder: Path) -> Iterator[Path]:
-    """Yield the folders below which files may be read: not all that somebody has, where that is the current folder."""
+    """Yield the folders below which files may be read: not the home folder if that is the current one."""
     yield folder.resolve()
     here = Path.cwd()
     if not Path.home().resolve().is_relative_to(here):

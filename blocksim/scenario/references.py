@@ -1,4 +1,4 @@
-"""Names in a scenario that must be names of something: blocks, materials, pairs of materials."""
+"""Names in a scenario that must exist: blocks, materials, pairs of materials."""
 
 from collections.abc import Iterator, Mapping
 
@@ -74,7 +74,7 @@ def _one_material(one: str) -> str:
 
 def _wrong_pair(one: str, other: str, found: set[frozenset[str]]) -> Iterator[Finding]:
     if one == other == GROUND:
-        yield Finding(("pairs", one, other), "the ground does not touch itself", at="key")
+        yield Finding(("pairs", one, other), "the ground is not in contact with itself", at="key")
     elif frozenset((one, other)) in found:
         twin = keys.format_key(("pairs", other, one))
         yield Finding(("pairs", one, other), f"the same pair is given as {twin}; keep one of the two", at="key")

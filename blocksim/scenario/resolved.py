@@ -1,4 +1,4 @@
-"""A scenario written out again, complete and exact, and its fingerprint."""
+"""A scenario written out, complete and exact, and its hash."""
 
 import functools
 import hashlib
@@ -19,7 +19,7 @@ from blocksim.scenario.models.study import Sweep
 from blocksim.scenario.motion_table import MotionTable
 from blocksim.scenario.quantities import ANGLE, Quantity
 
-HEADER = "# Resolved by blocksim: every value that was used, in SI units (m, kg, s, N, Pa), angles in rad.\n"
+HEADER = "# Resolved by blocksim: all values as used, in SI units (m, kg, s, N, Pa), angles in rad.\n"
 SCHEME = "time.scheme"
 UNHASHED = {"description", "experiment", "sweep", "provenance"}
 
@@ -27,7 +27,7 @@ UNHASHED = {"description", "experiment", "sweep", "provenance"}
 def scenario_to_toml(scenario: Scenario, experiment_table: str | None = None, motion_table: str | None = None) -> str:
     """Write every key with its value; loading the text gives an equal scenario, floats to the last bit.
 
-    Where a sweep varies the scheme, keys that only one of them has are left out; a sweep is refused unless they have
+    Where a sweep varies the scheme, keys that only one scheme has are left out; a sweep is refused unless they have
     their defaults. `experiment_table` and `motion_table` replace the paths of tables, for copies kept beside the
     resolved file.
     """
@@ -57,7 +57,7 @@ def _leave_to_static(scenario: Scenario, data: dict[str, Any]) -> None:
 
 
 def deciding_values(scenario: Scenario) -> dict[str, Any]:
-    """Return all that decides the motion and the output, as JSON has it; of a table of motion its digest."""
+    """Return everything that determines the motion and the output, as for JSON; of a table of motion its digest."""
     data = scenario.model_dump(mode="json", exclude=UNHASHED)
     if isinstance(scenario.motion, FromTable):
         data["motion"]["table"] = scenario.motion.table.digest
@@ -65,18 +65,18 @@ def deciding_values(scenario: Scenario) -> dict[str, Any]:
 
 
 def scenario_hash(scenario: Scenario) -> str:
-    """Return the SHA-256 (hex) of all that decides the motion and the output, in any order of the file."""
+    """Return the SHA-256 (hex) of everything that determines motion and output, whatever the order of the file."""
     text = json.dumps(deciding_values(scenario), sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def motion_table_content(scenario: Scenario) -> bytes | None:
-    """Return the table of motion as it was read, for a copy, or None where there is none."""
+    """Return the table of motion as it was read, for a copy, or None without one."""
     return scenario.motion.table.content if isinstance(scenario.motion, FromTable) else None
 
 
 def _plain(table: BaseModel) -> dict[str, Any]:
-    """Turn a table into what its TOML looks like; keys without a value are left out."""
+    """Turn a table into its TOML form; keys without a value are left out."""
     if isinstance(table, Sweep):
         return {key: _value(entry) for key, entry in table.as_table().items()}
     fields = type(table).model_fields

@@ -1,4 +1,4 @@
-"""What a scenario may not ask for where contacts are rigid: a choice among springs is then a mistake."""
+"""Keys that rigid contacts do not have: a choice among springs is then a mistake."""
 
 from collections.abc import Iterator
 

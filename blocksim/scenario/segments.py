@@ -1,4 +1,4 @@
-"""The straight pieces that a ground profile and walls consist of, and how they join.
+"""Straight segments of a ground profile and walls, and their joints.
 
 A piece runs from (x0, y0) to (x1, y1) with the solid on its right hand, as the profile does when it is walked towards
 +x. Where two pieces join, walking turns left at a valley (concave) and right at an edge (convex).
@@ -21,7 +21,7 @@ ENDLESS = 1e5
 STRAIGHT = 1e-12
 """Sine of the turn below which two pieces are in one line."""
 TOLERANCE = 1e-9
-"""m; what is this near touches, and ends this near to each other are one."""
+"""m; things at this distance touch, and ends at this distance are one."""
 
 Point = tuple[float, float]
 Floats = NDArray[np.float64]
@@ -64,7 +64,7 @@ def place_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
 
 
 def surface_height(scenario: Scenario, x: float) -> float:
-    """Return the height (m) of the ground at x, the upper one where it is vertical."""
+    """Return the height (m) of the ground at x, the upper one at a vertical segment."""
     return float(surface_heights(scenario, np.array([x]))[0])
 
 
@@ -177,7 +177,7 @@ def _wall(
 
 
 def _neighbour(points: Floats, end: Point, number: int) -> int | None:
-    """Return the first wall but this one of which the point (n, 2) is where an end is."""
+    """Return the first other wall with an end at the same point; ends are (n, 2)."""
     near = np.flatnonzero(np.hypot(points[:, 0] - end[0], points[:, 1] - end[1]) <= TOLERANCE)
     return next((int(other) for other in near if other != number), None)
 

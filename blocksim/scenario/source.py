@@ -1,4 +1,4 @@
-"""The text a scenario comes from, and mistakes shown in it: line, line number and caret."""
+"""Text of a scenario, and mistakes shown in it: line, line number and caret."""
 
 import functools
 import re
@@ -22,14 +22,14 @@ _TWICE = (
     "Cannot redefine",
 )
 _CLEARER = {
-    "Illegal character '\\n'": "a text in quotes must end on its line",
-    "Expected newline or end of document after a statement": "this cannot follow here; texts stand in quotes",
+    "Illegal character '\\n'": "a string in quotes must end on its line",
+    "Expected newline or end of document after a statement": "this cannot follow here; strings need quotes",
 }
 
 
 @dataclass(frozen=True)
 class Source:
-    """A named text; the name stands in messages. Scenarios made in Python have no text."""
+    """A named text; the name is used in messages. Scenarios made in Python have no text."""
 
     where: str
     text: str = ""
@@ -41,7 +41,7 @@ class Source:
 
     @functools.cached_property
     def places(self) -> dict[KeyPath, Place]:
-        """Every key and value of the text; only looked for once there is a mistake to show."""
+        """Every key and value of the text; only located once a mistake must be shown."""
         return locate(self.text)
 
     def problem(self, path: KeyPath, message: str, at: str) -> Problem:
@@ -68,7 +68,7 @@ class Source:
         return Problem(self.where, message, key, span.line, line, start, length)
 
     def syntax_problem(self, error: tomllib.TOMLDecodeError) -> Problem:
-        """Show where tomllib gave up."""
+        """Show where tomllib stopped."""
         text = str(error)
         found = _SYNTAX_PLACE.search(text)
         message = text if found is None else text[: found.start()]
@@ -79,7 +79,7 @@ class Source:
         if message.startswith(_TWICE):
             head = re.match(r"\s*(\[*)([^=\]]*[^=\]\s])?", line)
             start, end = (head.start(2), head.end(2)) if head is not None and head[2] else (0, len(line))
-            return self.shown("this key or table is already there, further up", "", Span(number, start, end - start))
+            return self.shown("this key or table is defined further up", "", Span(number, start, end - start))
         message = _CLEARER.get(message) or f"not valid TOML: {message[:1].lower()}{message[1:]}"
         return self.shown(message, "", Span(number, column, 1))
 
@@ -98,7 +98,7 @@ def override_problem(override: Override, path: KeyPath, message: str, at: str) -
 
 
 def clipped(line: str, start: int) -> tuple[str, int]:
-    """Return a line fit for a screen and where the caret goes: no control characters, no endless lines."""
+    """Return a line for the screen and the place of the caret: no control characters, no endless lines."""
     clean = "".join(c if c.isprintable() else " " if c == "\t" else "\ufffd" for c in line)
     if len(clean) <= MAX_SHOWN:
         return clean, start

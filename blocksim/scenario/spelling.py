@@ -1,10 +1,10 @@
-"""Which known word a misspelt one was meant to be."""
+"""Known words that a misspelt one may mean."""
 
 from collections.abc import Iterable
 
 
 def nearest(word: str, candidates: Iterable[str], most: int) -> str | None:
-    """Return the candidate with the fewest slips, preferring equal length; None above `most` slips."""
+    """Return the candidate with the fewest typing errors, preferring equal length; None above `most` errors."""
     alike = (other for other in candidates if abs(len(word) - len(other)) <= most)
     scored = ((slips(word, other), abs(len(word) - len(other)), other) for other in alike)
     best = min(scored, key=lambda entry: entry[:2], default=None)

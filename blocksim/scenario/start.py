@@ -1,4 +1,4 @@
-"""What cannot be at the start although every value is fine by itself: sizes that do not go together, overlaps."""
+"""Impossible starts although every value is valid by itself: incompatible sizes, overlaps."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -24,18 +24,18 @@ MAX_INTERVALS = 65_000
 """Of particles along one side; the solver counts them in 16 bits."""
 MAX_PARTICLES = 1_000_000
 SHORTEST_SHARE = 0.01
-"""Least length of a piece of boundary, in smallest sides of the blocks."""
+"""Least length of a segment of boundary, in smallest sides of the blocks."""
 LEAST_SKIN = 1e-4
-"""Least skin, in smallest sides of the blocks. Below it the list of neighbours is made again at every step, even where
+"""Least skin, in smallest sides of the blocks. Below it the list of neighbours is updated at every step, even where
 steps are as short as with the full stiffness of a metal: at 1 m/s a block moves 1e-5 of its side in one of them, and a
 list is kept only where 0.4 skins last for a step at four times the speed."""
 ROUND_OFFS = 100
-"""Least skin, in roundings of the farthest coordinate: a fifth of the skin is left for what nobody foresaw, and
+"""Least skin, in roundings of the farthest coordinate: a fifth of the skin is a reserve, and
 distances are differences of a few rounded places."""
 
 
 def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
-    """Place everything and find what cannot be at the start; the scenario is valid otherwise."""
+    """Place everything and find impossible starts; the scenario is valid otherwise."""
     too_many = list(_too_many(scenario))
     if too_many:
         yield from too_many
@@ -65,7 +65,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
 
 
 def _ends(bodies: Sequence[PlacedBody], name: str) -> tuple[float, float]:
-    """Return the least and the greatest of a number that every body has."""
+    """Return the smallest and the largest value of a number of all bodies."""
     values = list(map(attrgetter(name), bodies))
     return min(values), max(values)
 
@@ -79,7 +79,7 @@ def _too_many(scenario: Scenario) -> Iterator[Finding]:
     for path, (count, what) in counts.items():
         most = MAX_BLOCKS if what == "bodies" else MAX_SEGMENTS
         if count > most:
-            yield Finding(path, f"{count} {what} are too many; at most {most} are possible")
+            yield Finding(path, f"{count} {what} are too many; at most {most} are allowed")
 
 
 def _endless_motion(scenario: Scenario) -> Iterator[Finding]:
@@ -89,7 +89,7 @@ def _endless_motion(scenario: Scenario) -> Iterator[Finding]:
         pieces = sum(count for *_, count in motion.sections(scenario.time.end))
         if pieces > MAX_PIECES:
             message = f"{pieces / PIECES_PER_CYCLE:.6g} cycles are too many; at most {MAX_PIECES // PIECES_PER_CYCLE}"
-            yield Finding(("motion", "frequency"), f"{message} are possible")
+            yield Finding(("motion", "frequency"), f"{message} are allowed")
 
 
 def _fixed_stiffnesses(scenario: Scenario) -> Iterator[Finding]:
@@ -110,7 +110,7 @@ def _unfit_structures(scenario: Scenario) -> Iterator[Finding]:
 
 
 def _endless_places(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
-    """Find structures whose keys are possible numbers while a place or velocity that follows from them is not."""
+    """Find structures with valid keys from which an invalid position or velocity follows."""
     told = set()
     numbers = map(attrgetter("x", "y", "vx", "vy", "spin"), bodies)
     values = np.fromiter(chain.from_iterable(numbers), np.float64, 5 * len(bodies)).reshape(-1, 5)
@@ -126,7 +126,7 @@ def _endless_places(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody
 
 
 def _impossible_masses(scenario: Scenario) -> Iterator[Finding]:
-    """Find blocks whose sizes are possible numbers while their mass or inertia is not."""
+    """Find blocks with valid sizes but an invalid mass or inertia."""
     for name, block in scenario.blocks.items():
         mass = scenario.materials[block.material].density * block.size_x * block.size_y * block.depth
         inertia = mass * (block.size_x * block.size_x + block.size_y * block.size_y) / 12.0
@@ -145,41 +145,41 @@ def _coarse_particles(scenario: Scenario, smallest: float) -> Iterator[Finding]:
     elif contact.model == "kernel" and contact.support_radius >= smallest:
         key = "particle_spacing" if contact.smoothing_length is None else "smoothing_length"
         length = _mm(contact.resolved_smoothing_length)
-        message = f"a {contact.kernel} of smoothing length {length} reaches {_mm(contact.support_radius)} far"
+        message = f"a {contact.kernel} of smoothing length {length} reaches {_mm(contact.support_radius)}"
         yield Finding(("contact", key), f"{message}, through {side}", relation=True)
 
 
 def _fine_particles(scenario: Scenario) -> Iterator[Finding]:
-    """Find particles so close that a side, or all kinds of blocks together, would have too many of them."""
+    """Find particle spacings that give a side, or all kinds of blocks together, too many particles."""
     spacing = scenario.contact.particle_spacing
     if scenario.contact.model == "surface":
         return
     sides = [side / spacing for block in scenario.blocks.values() for side in (block.size_x, block.size_y)]
     if max(sides) > MAX_INTERVALS or 2.0 * sum(sides) > MAX_PARTICLES:
         message = f"{_mm(spacing)} is too small: the longest side would have {max(sides):.6g} particles"
-        most = f"at most {MAX_INTERVALS} on a side and {MAX_PARTICLES} around one block of each kind are possible"
+        most = f"at most {MAX_INTERVALS} on a side and {MAX_PARTICLES} around one block of each kind are allowed"
         yield Finding(("contact", "particle_spacing"), f"{message}; {most}", relation=True)
 
 
 def _unfit_skin(scenario: Scenario, smallest: float, farthest: float) -> Iterator[Finding]:
-    """Find a skin that does not go with the smallest side (m) of the blocks and their farthest coordinate (m)."""
+    """Find a skin that does not suit the smallest side (m) of the blocks and their farthest coordinate (m)."""
     skin = scenario.contact.skin
     if skin is None:
         return
     least, why = max(
         (LEAST_SKIN * smallest, f"{100 * LEAST_SKIN:g} % of the smallest side of a block"),
-        (ROUND_OFFS * math.ulp(farthest), f"{ROUND_OFFS} times the round-off of places {farthest:g} m away"),
+        (ROUND_OFFS * math.ulp(farthest), f"{ROUND_OFFS} times the round-off of positions {farthest:g} m away"),
     )
     if skin > smallest:
         message = f"{_mm(skin)} is more than the smallest side of a block, {_mm(smallest)}"
-        yield Finding(("contact", "skin"), f"{message}; blocks far away would be listed as neighbours", relation=True)
+        yield Finding(("contact", "skin"), f"{message}; distant blocks would be listed as neighbours", relation=True)
     elif skin < least:
         message = f"{_mm(skin)} is too small; at least {_mm(least)} is needed, {why}"
         yield Finding(("contact", "skin"), message, relation=True)
 
 
 def _short_segments(scenario: Scenario, least: float) -> Iterator[Finding]:
-    """Find pieces of boundary shorter than `least` (m): a corner could pass by them."""
+    """Find segments of boundary shorter than `least` (m): a corner could miss them."""
     points = scenario.ground.profile or ()
     pieces: list[tuple[keys.KeyPath, float]] = [
         (("ground", "profile", number), math.dist(*ends)) for number, ends in enumerate(pairwise(points), start=1)
@@ -188,7 +188,7 @@ def _short_segments(scenario: Scenario, least: float) -> Iterator[Finding]:
     for path, length in pieces:
         if length < least:
             why = f"at least {_mm(least)} is needed, {100 * SHORTEST_SHARE:g} % of the smallest side of a block"
-            yield Finding(path, f"this piece is only {_mm(length)} long; {why}", relation=True)
+            yield Finding(path, f"this segment is only {_mm(length)} long; {why}", relation=True)
 
 
 def _equal_names(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
@@ -197,7 +197,7 @@ def _equal_names(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) 
     seen: set[str] = set()
     for origin, body in zip(origins, bodies, strict=True):
         if body.name in seen:
-            message = f"two bodies are named {shown(body.name)}; a body without a name has its number"
+            message = f"two bodies are named {shown(body.name)}; a body without a name is called by its number"
             yield Finding((*origin, "name"), message)
         seen.add(body.name)
 
@@ -217,7 +217,7 @@ def _below_ground(
 def _below_profile(
     scenario: Scenario, origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]
 ) -> Iterator[Finding]:
-    """Find bodies across a piece of the profile, each with its greatest depth, and those wholly below."""
+    """Find bodies across a segment of the profile, each with its largest depth, and those wholly below."""
     depths: dict[int, float] = {}
     for index, _, depth in overlap.crossings(bodies, profile_segments(scenario)):
         depths[index] = max(depths.get(index, 0.0), depth)
@@ -232,13 +232,13 @@ def _below_profile(
 def _in_walls(scenario: Scenario, origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
     for body, wall, depth in islice(overlap.crossings(bodies, wall_segments(scenario)), MAX_OVERLAPS):
         name = bodies[body].name
-        yield Finding(origins[body], f"body {name} and walls.{wall} overlap by {_mm(depth)}; they may touch, no more")
+        yield Finding(origins[body], f"body {name} and walls.{wall} overlap by {_mm(depth)}; they may only touch")
 
 
 def _overlaps(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
     for first, second, depth in islice(overlap.overlapping_pairs(bodies), MAX_OVERLAPS):
         names = f"bodies {bodies[first].name} and {bodies[second].name}"
-        yield Finding(origins[second], f"{names} overlap by {_mm(depth)}; they may touch, no more")
+        yield Finding(origins[second], f"{names} overlap by {_mm(depth)}; they may only touch")
 
 
 def _mm(length: float) -> str:

@@ -1,8 +1,8 @@
-"""Unit expressions such as "kN/m^3": what they are worth in SI, and their dimension.
+"""Unit expressions such as "kN/m^3": their value in SI, and their dimension.
 
 pint decides, from a small registry of the units that scenarios use. Importing pint costs a third of a second,
-so the expressions that nearly every scenario uses are also listed here with their worth (a test compares them
-with pint).
+so common expressions are also listed here with their values (a test compares them with
+pint).
 Factors are exact fractions: "35 mm" is the float nearest to 0.035, not 35 times a rounded 0.001.
 """
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pint
 
 Dimension = tuple[int, int, int, int]
-"""Exponents of length, mass, time and angle; an angle counts, so that "1/s" is no spin and "3" no angle."""
+"""Exponents of length, mass, time and angle; an angle counts, so that "1/s" is not a spin and "3" not an angle."""
 
 NUMBER: Dimension = (0, 0, 0, 0)
 LENGTH: Dimension = (1, 0, 0, 0)
@@ -134,11 +134,11 @@ _OPERATOR = re.compile(r" ?([*/·]) ?")
 _SUPERSCRIPTS = str.maketrans({"²": "^2", "³": "^3"})
 _MAX_LENGTH = 40
 _NO_NUMBER = re.compile(r"\bnan(?![A-Za-z_])", re.IGNORECASE)
-"""What pint takes for a number, which no fraction is."""
+"""Numbers for pint, which does not take fractions."""
 
 
 class UnitError(ValueError):
-    """The text is not a unit; `unknown` is the name in it that is none, or empty where the form is wrong."""
+    """The text is not a unit; `unknown` is the unknown name in it, or empty if the form is wrong."""
 
     def __init__(self, unknown: str = "") -> None:
         """Keep the unknown name."""
@@ -148,7 +148,7 @@ class UnitError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What one of a unit is in SI, exactly, and its dimension."""
+    """Exact value of a unit in SI, and its dimension."""
 
     factor: Fraction
     dimension: Dimension
@@ -199,7 +199,7 @@ def _registry() -> "pint.UnitRegistry[Fraction]":
 
 
 def similar_unit(name: str, expression: str, dimension: Dimension) -> str | None:
-    """Name the unit one slip away from `name` with which the whole expression gets the dimension."""
+    """Name the unit one typing error away from `name` with which the whole expression gets the dimension."""
     simple = (unit for unit in COMMON if "/" not in unit)
     return nearest(name, [unit for unit in simple if _fits(name, unit, expression, dimension)], most=1)
 

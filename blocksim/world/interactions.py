@@ -141,6 +141,6 @@ def interaction_tables(members: Sequence[Interactions]) -> Records:
 def _materials(a: ContactClass, b: ContactClass) -> tuple[str, str]:
     one, other = a.material or b.material, b.material or a.material
     if one is None or other is None:
-        message = "the ground does not touch itself"
+        message = "the ground is not in contact with itself"
         raise ValueError(message)
     return one, other

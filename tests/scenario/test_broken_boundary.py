@@ -93,7 +93,7 @@ bad.toml:21: ground.profile.2: the same point as the one before
     "back down its own riser": (
         "\n[ground]\nprofile = [[1, 0], [1, 0.5], [1, 0.2]]\n",
         """
-bad.toml:21: ground.profile.2: the profile goes back over its own vertical piece
+bad.toml:21: ground.profile.2: the profile goes back over its own vertical segment
    21 | profile = [[1, 0], [1, 0.5], [1, 0.2]]
       |                              ^^^^^^^^
 """,
@@ -101,7 +101,7 @@ bad.toml:21: ground.profile.2: the profile goes back over its own vertical piece
     "too short a piece": (
         '\n[ground]\nprofile = [[1, 0], [2, -1], ["2.0001 m", -1]]\n',
         """
-bad.toml:21: ground.profile.2: this piece is only 0.1 mm long; at least 0.2 mm is needed, 1 % of the smallest side of a block
+bad.toml:21: ground.profile.2: this segment is only 0.1 mm long; at least 0.2 mm is needed, 1 % of the smallest side of a block
    21 | profile = [[1, 0], [2, -1], ["2.0001 m", -1]]
       |                             ^^^^^^^^^^^^^^^^
 """,
@@ -150,7 +150,7 @@ bad.toml:15: structures.0: body 3 lies below the ground's profile
     "wall without an end": (
         "\n[[walls]]\nfrom = [0.1, 0]\n",
         """
-bad.toml:20: walls.0.to: this key is missing: [x, y] where it ends
+bad.toml:20: walls.0.to: this key is missing: [x, y] of its end
    20 | [[walls]]
       |   ^^^^^
 """,
@@ -158,7 +158,7 @@ bad.toml:20: walls.0.to: this key is missing: [x, y] where it ends
     "wall of no length": (
         "\n[[walls]]\nfrom = [0.1, 0]\nto = [0.1, 0]\n",
         """
-bad.toml:22: walls.0.to: a wall cannot end where it begins
+bad.toml:22: walls.0.to: start and end of a wall must differ
    22 | to = [0.1, 0]
       |      ^^^^^^^^
 """,
@@ -174,7 +174,7 @@ bad.toml:23: walls.0.material: unknown material "stele", did you mean 'steel'?
     "too short a wall": (
         '\n[[walls]]\nfrom = [0.1, 0]\nto = [0.1, "0.1 mm"]\n',
         """
-bad.toml:20: walls.0: this piece is only 0.1 mm long; at least 0.2 mm is needed, 1 % of the smallest side of a block
+bad.toml:20: walls.0: this segment is only 0.1 mm long; at least 0.2 mm is needed, 1 % of the smallest side of a block
    20 | [[walls]]
       |   ^^^^^
 """,
@@ -198,10 +198,10 @@ bad.toml:20: walls: a table is not a list; write [[walls]] with double brackets
     "blocks in a wall": (
         '\n[[walls]]\nfrom = ["39 mm", "-1 m"]\nto = ["39 mm", "30 mm"]\n',
         """
-bad.toml:15: structures.0: body 1 and walls.0 overlap by 1 mm; they may touch, no more
+bad.toml:15: structures.0: body 1 and walls.0 overlap by 1 mm; they may only touch
    15 | [[structures]]
       |   ^^^^^^^^^^
-bad.toml:15: structures.0: body 2 and walls.0 overlap by 1 mm; they may touch, no more
+bad.toml:15: structures.0: body 2 and walls.0 overlap by 1 mm; they may only touch
    15 | [[structures]]
       |   ^^^^^^^^^^
 """,
@@ -209,7 +209,7 @@ bad.toml:15: structures.0: body 2 and walls.0 overlap by 1 mm; they may touch, n
     "tip of a wall in a block": (
         '\n[[walls]]\nfrom = ["20 mm", "0 mm"]\nto = ["20 mm", "0.5 mm"]\n',
         """
-bad.toml:15: structures.0: body 1 and walls.0 overlap by 0.5 mm; they may touch, no more
+bad.toml:15: structures.0: body 1 and walls.0 overlap by 0.5 mm; they may only touch
    15 | [[structures]]
       |   ^^^^^^^^^^
 """,

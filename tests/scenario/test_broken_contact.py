@@ -10,7 +10,7 @@ CASES = {
     "misspelt contact model": (
         '\n[contact]\nmodel = "kernels"\n',
         """
-bad.toml:21: contact.model: "kernels" is not known here, did you mean "kernel"?
+bad.toml:21: contact.model: "kernels" is unknown, did you mean "kernel"?
    21 | model = "kernels"
       |         ^^^^^^^^^
 """,
@@ -18,7 +18,7 @@ bad.toml:21: contact.model: "kernels" is not known here, did you mean "kernel"?
     "unknown kernel function": (
         '\n[contact]\nkernel = "gauss"\n',
         """
-bad.toml:21: contact.kernel: "gauss" is not known here, use "wendland-c2" or "cubic-spline" or "quintic-spline"
+bad.toml:21: contact.kernel: "gauss" is unknown, use "wendland-c2" or "cubic-spline" or "quintic-spline"
    21 | kernel = "gauss"
       |          ^^^^^^^
 """,
@@ -95,10 +95,10 @@ bad.toml:21: contact.skin: 0.0019 mm is too small; at least 0.002 mm is needed, 
       |        ^^^^^^^^
 """,
     ),
-    "skin lost in the round-off of places far away": (
+    "skin lost in the round-off of positions far away": (
         '\n[contact]\nskin = "0.01 mm"\n\n[[bodies]]\nblock = "brick"\nx = -1e9\ny = 1\n',
         """
-bad.toml:21: contact.skin: 0.01 mm is too small; at least 0.0119209 mm is needed, 100 times the round-off of places 1e+09 m away
+bad.toml:21: contact.skin: 0.01 mm is too small; at least 0.0119209 mm is needed, 100 times the round-off of positions 1e+09 m away
    21 | skin = "0.01 mm"
       |        ^^^^^^^^^
 """,
@@ -106,7 +106,7 @@ bad.toml:21: contact.skin: 0.01 mm is too small; at least 0.0119209 mm is needed
     "skin beyond the smallest block": (
         '\n[contact]\nskin = "20.1 mm"\n',
         """
-bad.toml:21: contact.skin: 20.1 mm is more than the smallest side of a block, 20 mm; blocks far away would be listed as neighbours
+bad.toml:21: contact.skin: 20.1 mm is more than the smallest side of a block, 20 mm; distant blocks would be listed as neighbours
    21 | skin = "20.1 mm"
       |        ^^^^^^^^^
 """,
@@ -122,7 +122,7 @@ bad.toml:22: contact.smoothing_length: 0.79 mm reaches too few particles; at lea
     "smoothing length through a block": (
         '\n[contact]\nmodel = "kernel"\nsmoothing_length = "10 mm"\n',
         """
-bad.toml:22: contact.smoothing_length: a wendland-c2 of smoothing length 10 mm reaches 20 mm far, through the smallest side of a block, 20 mm
+bad.toml:22: contact.smoothing_length: a wendland-c2 of smoothing length 10 mm reaches 20 mm, through the smallest side of a block, 20 mm
    22 | smoothing_length = "10 mm"
       |                    ^^^^^^^
 """,
@@ -130,7 +130,7 @@ bad.toml:22: contact.smoothing_length: a wendland-c2 of smoothing length 10 mm r
     "spacing whose kernel reaches through a block": (
         '\n[contact]\nmodel = "kernel"\nparticle_spacing = "7.7 mm"\n',
         """
-bad.toml:22: contact.particle_spacing: a wendland-c2 of smoothing length 10.01 mm reaches 20.02 mm far, through the smallest side of a block, 20 mm
+bad.toml:22: contact.particle_spacing: a wendland-c2 of smoothing length 10.01 mm reaches 20.02 mm, through the smallest side of a block, 20 mm
    22 | particle_spacing = "7.7 mm"
       |                    ^^^^^^^^
 """,
@@ -138,7 +138,7 @@ bad.toml:22: contact.particle_spacing: a wendland-c2 of smoothing length 10.01 m
     "kernel of a longer reach": (
         '\n[contact]\nmodel = "kernel"\nkernel = "quintic-spline"\nparticle_spacing = "6 mm"\n',
         """
-bad.toml:23: contact.particle_spacing: a quintic-spline of smoothing length 7.8 mm reaches 23.4 mm far, through the smallest side of a block, 20 mm
+bad.toml:23: contact.particle_spacing: a quintic-spline of smoothing length 7.8 mm reaches 23.4 mm, through the smallest side of a block, 20 mm
    23 | particle_spacing = "6 mm"
       |                    ^^^^^^
 """,

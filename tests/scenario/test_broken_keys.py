@@ -129,7 +129,7 @@ bad.toml:21: output."every frame": unknown key, did you mean 'every'?
         WIDTH,
         "# no width",
         """
-bad.toml:9: blocks.brick.width: this key is missing: the block's width; a length above 0 such as "32 mm" is needed
+bad.toml:9: blocks.brick.width: this key is missing: width of the block; a length above 0 such as "32 mm" is needed
     9 | [blocks.brick]
       |  ^^^^^^^^^^^^
 """,

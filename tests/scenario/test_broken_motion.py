@@ -83,7 +83,7 @@ bad.toml:24: motion.ramp: 0 is too small; a time above 0 such as "2 s" is needed
     "too many cycles": (
         '\n[motion]\nkind = "harmonic"\namplitude = "10 mm"\nfrequency = "1 MHz"\n',
         """
-bad.toml:23: motion.frequency: 2e+06 cycles are too many; at most 5000 are possible
+bad.toml:23: motion.frequency: 2e+06 cycles are too many; at most 5000 are allowed
    23 | frequency = "1 MHz"
       |             ^^^^^^^
 """,
@@ -91,7 +91,7 @@ bad.toml:23: motion.frequency: 2e+06 cycles are too many; at most 5000 are possi
     "endless cycles": (
         '\n[motion]\nkind = "harmonic"\namplitude = "10 mm"\nfrequency = 1e18\n',
         """
-bad.toml:23: motion.frequency: 2e+18 cycles are too many; at most 5000 are possible
+bad.toml:23: motion.frequency: 2e+18 cycles are too many; at most 5000 are allowed
    23 | frequency = 1e18
       |             ^^^^
 """,
@@ -158,10 +158,10 @@ TABLES = {
     "unknown column": (b"# n\ntime_s,displacement\n0,0\n", f'line 2: the columns are "time_s,displacement"; {NEEDED}'),
     "no time": (b"t,displacement_m\n0,0\n", f'line 1: the columns are "t,displacement_m"; {NEEDED}'),
     "time twice": (b"time_s,time_s\n0,0\n", f'line 1: the columns are "time_s,time_s"; {NEEDED}'),
-    "one sample": (b"time_s,displacement_m\n0,0\n", "1 lines with samples; 2 to 500000 are possible"),
+    "one sample": (b"time_s,displacement_m\n0,0\n", "1 lines with samples; 2 to 500000 are allowed"),
     "time stands still": (
         b"time_s,displacement_m\n0,0\n# a note\n\n0,1\n",
-        "line 5: time 0 s: times must increase, and 0 s came before",
+        "line 5: time 0 s: times must increase, the one before is 0 s",
     ),
     "negative time": (b"time_s,displacement_m\n-1,0\n1,0\n", "line 2: time -1 s: times must not be negative"),
     "word": (b"time_s,displacement_m\n0,0\n1,a\n", 'line 3: "a" is not a finite number'),

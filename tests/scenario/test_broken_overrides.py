@@ -74,7 +74,7 @@ CASES = {
     "unknown block": (
         "blocks.brik.width=1",
         """
---set blocks.brik.width=1: there is no "brik" in blocks, did you mean 'brick'?
+--set blocks.brik.width=1: blocks has no "brik", did you mean 'brick'?
       | blocks.brik.width=1
       | ^^^^^^^^^^^^^^^^^
 """,
@@ -82,7 +82,7 @@ CASES = {
     "unknown structure": (
         "structures.1.count=2",
         """
---set structures.1.count=2: structures is a list of 1, numbered from 0; there is no "1"
+--set structures.1.count=2: structures is a list of 1, numbered from 0; "1" does not exist
       | structures.1.count=2
       | ^^^^^^^^^^^^^^^^^^
 """,
@@ -90,7 +90,7 @@ CASES = {
     "structure by name": (
         "structures.tower.count=2",
         """
---set structures.tower.count=2: structures is a list of 1, numbered from 0; there is no "tower"
+--set structures.tower.count=2: structures is a list of 1, numbered from 0; "tower" does not exist
       | structures.tower.count=2
       | ^^^^^^^^^^^^^^^^^^^^^^
 """,

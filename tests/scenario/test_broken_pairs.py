@@ -34,7 +34,7 @@ bad.toml:20: pairs.steel.concrete: unknown material "concrete", known: steel, gr
     "ground with itself": (
         "\n[pairs.ground.ground]\nfriction = 0.2\n",
         """
-bad.toml:20: pairs.ground.ground: the ground does not touch itself
+bad.toml:20: pairs.ground.ground: the ground is not in contact with itself
    20 | [pairs.ground.ground]
       |  ^^^^^^^^^^^^^^^^^^^
 """,

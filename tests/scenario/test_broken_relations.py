@@ -11,7 +11,7 @@ CASES = {
         "density = 7850",
         'density = 7850\nunit_weight = "77 kN/m^3"',
         """
-bad.toml:6: materials.steel.unit_weight: density and unit_weight are both given; give one of them
+bad.toml:6: materials.steel.unit_weight: density and unit_weight are both given; keep one of them
     6 | unit_weight = "77 kN/m^3"
       |               ^^^^^^^^^^^
 """,
@@ -20,7 +20,7 @@ bad.toml:6: materials.steel.unit_weight: density and unit_weight are both given;
         'material = "steel"',
         'material = "steel"\nupright = "length"\nalong = "length"',
         """
-bad.toml:15: blocks.brick.along: "length" stands upright already; "width" or "height" can lie along x
+bad.toml:15: blocks.brick.along: "length" already stands upright; "width" or "height" can lie along x
    15 | along = "length"
       |         ^^^^^^^^
 """,
@@ -29,7 +29,7 @@ bad.toml:15: blocks.brick.along: "length" stands upright already; "width" or "he
         'material = "steel"',
         'material = "steel"\nupright = "hight"',
         """
-bad.toml:14: blocks.brick.upright: "hight" is not known here, did you mean "height"?
+bad.toml:14: blocks.brick.upright: "hight" is unknown, did you mean "height"?
    14 | upright = "hight"
       |           ^^^^^^^
 """,
@@ -93,7 +93,7 @@ bad.toml:16: structures.0.kind: unknown structure kind "stak"; did you mean 'sta
         None,
         '\n[contact]\nlaw = "lineal"\n',
         """
-bad.toml:21: contact.law: "lineal" is not known here, did you mean "linear"?
+bad.toml:21: contact.law: "lineal" is unknown, did you mean "linear"?
    21 | law = "lineal"
       |       ^^^^^^^^
 """,
@@ -102,7 +102,7 @@ bad.toml:21: contact.law: "lineal" is not known here, did you mean "linear"?
         None,
         '\n[time]\nscheme = "nonsmooth"\nsafety = 0.1\n',
         """
-bad.toml:22: time.safety: this key is for scheme "explicit"; the scheme here is "nonsmooth"
+bad.toml:22: time.safety: this key belongs to scheme "explicit"; the scheme here is "nonsmooth"
    22 | safety = 0.1
       | ^^^^^^
 """,
@@ -111,7 +111,7 @@ bad.toml:22: time.safety: this key is for scheme "explicit"; the scheme here is 
         None,
         "\n[time]\nsubsteps = 4\n",
         """
-bad.toml:21: time.substeps: this key is for scheme "nonsmooth"; the scheme here is "explicit"
+bad.toml:21: time.substeps: this key belongs to scheme "nonsmooth"; the scheme here is "explicit"
    21 | substeps = 4
       | ^^^^^^^^
 """,
@@ -120,7 +120,7 @@ bad.toml:21: time.substeps: this key is for scheme "nonsmooth"; the scheme here 
         None,
         '\n[time]\nscheme = "nonsmoth"\n',
         """
-bad.toml:21: time.scheme: "nonsmoth" is not known here, did you mean "nonsmooth"?
+bad.toml:21: time.scheme: "nonsmoth" is unknown, did you mean "nonsmooth"?
    21 | scheme = "nonsmoth"
       |          ^^^^^^^^^^
 """,
@@ -129,13 +129,13 @@ bad.toml:21: time.scheme: "nonsmoth" is not known here, did you mean "nonsmooth"
         None,
         '\n[time]\nscheme = "non-smooth"\nsubstep = 4\nvelocity_tolerance = "1 mm/s"\nsafety = 0.1\n',
         """
-bad.toml:21: time.scheme: "non-smooth" is not known here, did you mean "nonsmooth"?
+bad.toml:21: time.scheme: "non-smooth" is unknown, did you mean "nonsmooth"?
    21 | scheme = "non-smooth"
       |          ^^^^^^^^^^^^
 bad.toml:22: time.substep: unknown key, did you mean 'substeps'?
    22 | substep = 4
       | ^^^^^^^
-bad.toml:24: time.safety: this key is for scheme "explicit"; the scheme here is "nonsmooth"
+bad.toml:24: time.safety: this key belongs to scheme "explicit"; the scheme here is "nonsmooth"
    24 | safety = 0.1
       | ^^^^^^
 """,
@@ -171,10 +171,10 @@ bad.toml:19: structures.0.overlap: 41 mm is more than the block's 40 mm along x
         None,
         '\n[[bodies]]\nblock = "brick"\nx = "45 mm"\ny = "15 mm"\n',
         """
-bad.toml:20: bodies.0: bodies 1 and 4 overlap by 15 mm; they may touch, no more
+bad.toml:20: bodies.0: bodies 1 and 4 overlap by 15 mm; they may only touch
    20 | [[bodies]]
       |   ^^^^^^
-bad.toml:20: bodies.0: bodies 2 and 4 overlap by 5 mm; they may touch, no more
+bad.toml:20: bodies.0: bodies 2 and 4 overlap by 5 mm; they may only touch
    20 | [[bodies]]
       |   ^^^^^^
 """,
@@ -183,7 +183,7 @@ bad.toml:20: bodies.0: bodies 2 and 4 overlap by 5 mm; they may touch, no more
         None,
         '\n[[bodies]]\nblock = "brick"\nx = "60 mm"\ny = "40 mm"\nangle = "45 deg"\n',
         """
-bad.toml:20: bodies.0: bodies 2 and 4 overlap by 1.2132 mm; they may touch, no more
+bad.toml:20: bodies.0: bodies 2 and 4 overlap by 1.2132 mm; they may only touch
    20 | [[bodies]]
       |   ^^^^^^
 """,
@@ -210,7 +210,7 @@ bad.toml:20: bodies.0: body 4 reaches 0.347525 mm below the ground (y = 0)
         None,
         '\n[[structures]]\nkind = "stack"\nblock = "brick"\ncount = 1\nleft = "30 mm"\n',
         """
-bad.toml:20: structures.1: bodies 1 and 4 overlap by 10 mm; they may touch, no more
+bad.toml:20: structures.1: bodies 1 and 4 overlap by 10 mm; they may only touch
    20 | [[structures]]
       |   ^^^^^^^^^^
 """,
@@ -219,7 +219,7 @@ bad.toml:20: structures.1: bodies 1 and 4 overlap by 10 mm; they may touch, no m
         None,
         '\n[[bodies]]\nblock = "brick"\nx = "1 m"\ny = "1 m"\nname = "2"\n',
         """
-bad.toml:24: bodies.0.name: two bodies are named "2"; a body without a name has its number
+bad.toml:24: bodies.0.name: two bodies are named "2"; a body without a name is called by its number
    24 | name = "2"
       |        ^^^
 """,
@@ -237,7 +237,7 @@ bad.toml:25: bodies.0.fixed: a fixed body cannot have a velocity or a spin
         "count = 3",
         'count = 1\n[[structures]]\nkind = "wall"\nblock = "brick"\nrows = 1000\ncolumns = 1000',
         """
-bad.toml:15: structures: 1000001 bodies are too many; at most 1000000 are possible
+bad.toml:15: structures: 1000001 bodies are too many; at most 1000000 are allowed
    15 | [[structures]]
       |   ^^^^^^^^^^
 """,
@@ -246,7 +246,7 @@ bad.toml:15: structures: 1000001 bodies are too many; at most 1000000 are possib
         WIDTH,
         "width = 1e308",
         """
-bad.toml:10: blocks.brick.width: 1e+308 is too large to compute with; at most 1e+30 (SI) is possible
+bad.toml:10: blocks.brick.width: 1e+308 is too large to compute with; at most 1e+30 (SI) is allowed
    10 | width = 1e308
       |         ^^^^^
 """,

@@ -45,7 +45,7 @@ bad.toml:18: structures.0.rows: 5000050000 blocks are too many; a structure has 
     "unknown bond": (
         WALL + 'bond = "runing"\n',
         """
-bad.toml:20: structures.0.bond: "runing" is not known here, did you mean "running"?
+bad.toml:20: structures.0.bond: "runing" is unknown, did you mean "running"?
    20 | bond = "runing"
       |        ^^^^^^^^
 """,
@@ -137,7 +137,7 @@ bad.toml:20: structures.0.missing: 5 is too large; a plain number of at least 0 
         WALL + 'gap = "1 mm"\noffset = "0.6 mm"\n',
         """
 bad.toml:21: structures.0.offset: two neighbours shifted by 0.6 mm could overlap; \
-at most half of the gap, 0.5 mm, is possible
+at most half of the gap, 0.5 mm, is allowed
    21 | offset = "0.6 mm"
       |          ^^^^^^^^
 """,
@@ -202,7 +202,7 @@ bad.toml:20: structures.0.velocity: this list is too short; two values are neede
     "places beyond all numbers": (
         WALL + "gap = 1e308\n",
         """
-bad.toml:20: structures.0.gap: 1e+308 is too large to compute with; at most 1e+30 (SI) is possible
+bad.toml:20: structures.0.gap: 1e+308 is too large to compute with; at most 1e+30 (SI) is allowed
    20 | gap = 1e308
       |       ^^^^^
 """,
@@ -210,10 +210,10 @@ bad.toml:20: structures.0.gap: 1e+308 is too large to compute with; at most 1e+3
     "velocity beyond all numbers": (
         WALL + "velocity = [1e308, 0]\nshear_velocity = 1e308\n",
         """
-bad.toml:20: structures.0.velocity.0: 1e+308 is too large to compute with; at most 1e+30 (SI) is possible
+bad.toml:20: structures.0.velocity.0: 1e+308 is too large to compute with; at most 1e+30 (SI) is allowed
    20 | velocity = [1e308, 0]
       |             ^^^^^
-bad.toml:21: structures.0.shear_velocity: 1e+308 is too large to compute with; at most 1e+30 (SI) is possible
+bad.toml:21: structures.0.shear_velocity: 1e+308 is too large to compute with; at most 1e+30 (SI) is allowed
    21 | shear_velocity = 1e308
       |                  ^^^^^
 """,

@@ -56,7 +56,7 @@ bad.toml:20: sweep: nothing to vary; add a line such as "contact.stiffness_scale
         None,
         '\n[sweep]\nmode = "sobel"\n"time.end" = [1, 2]\n',
         """
-bad.toml:21: sweep.mode: "sobel" is not known here, did you mean "sobol"?
+bad.toml:21: sweep.mode: "sobel" is unknown, did you mean "sobol"?
    21 | mode = "sobel"
       |        ^^^^^^^
 """,
@@ -74,7 +74,7 @@ bad.toml:21: sweep."friction.block_blok.static": unknown key, did you mean 'bloc
         None,
         '\n[sweep]\n"blocks.brik.width" = ["1 mm", "2 mm"]\n',
         """
-bad.toml:21: sweep."blocks.brik.width": there is no "brik" in blocks, did you mean 'brick'?
+bad.toml:21: sweep."blocks.brik.width": blocks has no "brik", did you mean 'brick'?
    21 | "blocks.brik.width" = ["1 mm", "2 mm"]
       | ^^^^^^^^^^^^^^^^^^^
 """,
@@ -228,7 +228,7 @@ bad.toml:21: sweep.mode: mode "table" needs the path of a table, as in table = "
 bad.toml:22: sweep.table: "none.csv": no such file (paths are relative to the scenario file)
    22 | table = "none.csv"
       |         ^^^^^^^^^^
-bad.toml:23: sweep.seed: mode "table" has no seed; it belongs to "lhs", "sobol", "normal"
+bad.toml:23: sweep.seed: mode "table" has no key seed, which belongs to "lhs", "sobol", "normal"
    23 | seed = 3
       | ^^^^
 bad.toml:24: sweep."time.end": mode "table" takes keys and values from its table
@@ -249,7 +249,7 @@ bad.toml:21: provenance."friction.blok": "friction.blok" is not a key of this sc
         None,
         '\n[provenance]\nfriction.block_block = "measured"\n',
         """
-bad.toml:21: provenance.friction: a table is not a text in quotes; quote the whole dotted key
+bad.toml:21: provenance.friction: a table is not a string in quotes; quote the whole dotted key
    21 | friction.block_block = "measured"
       |                        ^^^^^^^^^^
 """,
@@ -258,7 +258,7 @@ bad.toml:21: provenance.friction: a table is not a text in quotes; quote the who
         None,
         '\n[provenance]\n"time.end" = 3\n',
         """
-bad.toml:21: provenance."time.end": 3 is not a text in quotes
+bad.toml:21: provenance."time.end": 3 is not a string in quotes
    21 | "time.end" = 3
       |              ^
 """,

@@ -20,7 +20,7 @@ bad.toml:21: not valid TOML: invalid value
         WIDTH,
         "width = 40 mm",
         """
-bad.toml:10: this cannot follow here; texts stand in quotes
+bad.toml:10: this cannot follow here; strings need quotes
    10 | width = 40 mm
       |            ^
 """,
@@ -29,7 +29,7 @@ bad.toml:10: this cannot follow here; texts stand in quotes
         WIDTH,
         'width = "40 mm',
         """
-bad.toml:10: a text in quotes must end on its line
+bad.toml:10: a string in quotes must end on its line
    10 | width = "40 mm
       |               ^
 """,
@@ -56,7 +56,7 @@ bad.toml:21: not valid TOML: unclosed array
         WIDTH,
         'width = "40 mm"\nwidth = "41 mm"',
         """
-bad.toml:11: this key or table is already there, further up
+bad.toml:11: this key or table is defined further up
    11 | width = "41 mm"
       | ^^^^^
 """,
@@ -65,7 +65,7 @@ bad.toml:11: this key or table is already there, further up
         None,
         "\n[materials.steel]\ndensity = 1\n",
         """
-bad.toml:20: this key or table is already there, further up
+bad.toml:20: this key or table is defined further up
    20 | [materials.steel]
       |  ^^^^^^^^^^^^^^^
 """,
@@ -74,7 +74,7 @@ bad.toml:20: this key or table is already there, further up
         None,
         "\n[friction]\nblock_block = { static = 1, static = 2 }\n",
         """
-bad.toml:21: this key or table is already there, further up
+bad.toml:21: this key or table is defined further up
    21 | block_block = { static = 1, static = 2 }
       | ^^^^^^^^^^^
 """,

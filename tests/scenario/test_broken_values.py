@@ -119,7 +119,7 @@ bad.toml:21: friction.block_ground: -0.1 is too small; a plain number of at leas
         None,
         "\n[friction]\nblock_ground = true\n",
         """
-bad.toml:21: friction.block_ground: true is not a friction; write a number, an angle, or { static, kinetic }
+bad.toml:21: friction.block_ground: true is not a friction coefficient; write a number, an angle, or { static, kinetic }
    21 | block_ground = true
       |                ^^^^
 """,
@@ -236,7 +236,7 @@ bad.toml:26: bodies.0.velocity.1: "1 m" is a length; a speed such as "5 mm/s" is
         "schema = 1",
         "schema = 2",
         """
-bad.toml:1: schema: 2 is not known here, use 1
+bad.toml:1: schema: 2 is unknown, use 1
     1 | schema = 2
       |          ^
 """,
@@ -245,7 +245,7 @@ bad.toml:1: schema: 2 is not known here, use 1
         "schema = 1",
         "schema = true",
         """
-bad.toml:1: schema: true is not known here, use 1
+bad.toml:1: schema: true is unknown, use 1
     1 | schema = true
       |          ^^^^
 """,
@@ -263,7 +263,7 @@ bad.toml:2: name: "../case" is not a name; 1 to 100 of a-z A-Z 0-9 . _ - are all
         'name = "case"',
         "name = 7",
         """
-bad.toml:2: name: 7 is not a text in quotes
+bad.toml:2: name: 7 is not a string in quotes
     2 | name = 7
       |        ^
 """,

@@ -46,7 +46,7 @@ def test_a_pair_of_materials_may_have_a_ratio(document: Document) -> None:
 @pytest.mark.parametrize(
     ("value", "told"),
     [
-        ({"static": 0.5, "kinetic": 0.4, "kinetic_ratio": 0.8}, "kinetic and kinetic_ratio say the same thing"),
+        ({"static": 0.5, "kinetic": 0.4, "kinetic_ratio": 0.8}, "kinetic and kinetic_ratio mean the same"),
         ({"static": 0.5, "kinetic_ratio": 0}, "0 is too small; a plain number above 0 and at most 1 is needed"),
         ({"static": 0.5, "kinetic_ratio": 1.1}, "1.1 is too large"),
         ({"static": 0.5, "kinetic_ratio": "3 deg"}, "is an angle; a plain number"),
@@ -60,7 +60,7 @@ def test_impossible_ratios_are_refused(document: Document, value: object, told: 
 
 def test_ratio_and_kinetic_friction_are_not_varied_together(document: Document) -> None:
     sweep = {"mode": "list", f"{SIDE}.kinetic": [0.1], f"{SIDE}.kinetic_ratio": [0.5]}
-    with pytest.raises(ScenarioError, match=f"{SIDE}.kinetic is varied too, and says the same thing"):
+    with pytest.raises(ScenarioError, match=f"{SIDE}.kinetic, which means the same, is varied too"):
         document.with_values({"sweep": sweep}).build()
 
 

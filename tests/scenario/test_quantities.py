@@ -134,7 +134,7 @@ def test_numbers_whose_products_no_double_holds_are_refused(kind: Kind, value: f
     quantity = Quantity(kind, above=0.0)
     assert quantity.read(1.1e-18) == 1.1e-18
     assert quantity.read(0.9e30) == 0.9e30
-    with pytest.raises(PydanticCustomError, match=rf"is too {told} \(SI\) is possible"):
+    with pytest.raises(PydanticCustomError, match=rf"is too {told} \(SI\) is allowed"):
         quantity.read(value)
 
 

@@ -106,7 +106,7 @@ def test_the_skin_is_held_against_the_smallest_block_in_use_whatever_the_model()
     assert mistakes(scenario_data([{"x": 0, "y": 1}], blocks=blocks, contact=contact)) == []
     used: list[dict[str, object]] = [{"x": 0, "y": 1}, {"x": 1, "y": 1, "block": "tiny"}]
     assert mistakes(scenario_data(used, blocks=blocks, contact=contact)) == [
-        "1.1 mm is more than the smallest side of a block, 1 mm; blocks far away would be listed as neighbours"
+        "1.1 mm is more than the smallest side of a block, 1 mm; distant blocks would be listed as neighbours"
     ]
 
 
@@ -119,11 +119,11 @@ def test_round_off_of_places_far_away_refuses_no_scenario_that_names_no_skin() -
     [
         (
             {"ground": {"profile": [[float(i), 0.0] for i in range(1001)]}},
-            "1001 points are too many; at most 1000 are possible",
+            "1001 points are too many; at most 1000 are allowed",
         ),
         (
             {"walls": [{"from": [float(i), 9], "to": [i + 0.5, 9]} for i in range(1001)]},
-            "1001 walls are too many; at most 1000 are possible",
+            "1001 walls are too many; at most 1000 are allowed",
         ),
     ],
 )

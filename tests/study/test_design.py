@@ -100,7 +100,7 @@ def test_cells_may_have_units_of_their_own(document: Document) -> None:
         ("gravity [mm]\n1\n", '2: gravity [mm]: "1 mm" is a length; an acceleration of at least 0'),
         ("contact.restitution\n0.1\n1.5\n", "3: contact.restitution: 1.5 is too large"),
         ("contact.restitution\n0.1\nnan\n", "3: contact.restitution: nan is not a finite number"),
-        ("time.scheme\nexplicit\nnonsmoth\n", '3: time.scheme: "nonsmoth" is not known here, did you mean'),
+        ("time.scheme\nexplicit\nnonsmoth\n", '3: time.scheme: "nonsmoth" is unknown, did you mean'),
         ("blocks.brick.material\nsteel\n", '2: blocks.brick.material: unknown material "steel"'),
     ],
 )

@@ -159,7 +159,7 @@ def test_given_shear_damping_replaces_the_normal_one_in_shear_only() -> None:
 def test_ground_cannot_touch_itself() -> None:
     of = scenario()
     ground = classes(of)[0]
-    with pytest.raises(ValueError, match="does not touch itself"):
+    with pytest.raises(ValueError, match="is not in contact with itself"):
         normal_stiffness(of, ground, ground)
 
 

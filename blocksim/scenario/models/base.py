@@ -1,4 +1,4 @@
-"""What every table of a scenario has in common, and field types that are no quantities."""
+"""Common base of all tables of a scenario, and field types that are not quantities."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,18 +24,18 @@ class Table(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class OneOf:
-    """Annotation of a literal field: the words that work now, and those that are planned."""
+    """Annotation of a literal field: the words that are available, and those that are planned."""
 
     available: tuple[str | int, ...]
     planned: tuple[str, ...] = ()
 
     @property
     def wanted(self) -> str:
-        """Say what is allowed."""
+        """Return what is allowed."""
         return " or ".join(shown(word) for word in self.available)
 
     def read(self, value: object) -> object:
-        """Pass an available word; raises a pydantic error that says which words are."""
+        """Pass an available word; raises a pydantic error that lists the available words."""
         if type(value) in (str, int) and value in self.available:
             return value
         if isinstance(value, str) and value in self.planned:
@@ -44,7 +44,7 @@ class OneOf:
         words = [word for word in self.available if isinstance(word, str)]
         similar = nearest(value, words, most=2) if isinstance(value, str) else None
         hint = f"did you mean {shown(similar)}?" if similar else f"use {self.wanted}"
-        message = f"{shown(value)} is not known here, {hint}"
+        message = f"{shown(value)} is unknown, {hint}"
         raise invalid(message)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -66,21 +66,21 @@ def whole(least: int, most: int) -> Callable[[object], object]:
 
 def _identifier(value: object) -> object:
     if not isinstance(value, str):
-        message = f"{shown(value)} is not a text in quotes"
+        message = f"{shown(value)} is not a string in quotes"
         raise invalid(message)
     allowed = value.isascii() and all(c.isalnum() or c in "._-" for c in value)
     if not allowed or not 1 <= len(value) <= MAX_NAME or value[0] in ".-":
         message = f"{shown(value)} is not a name; 1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
         raise invalid(message)
     if value.endswith(".") or value.partition(".")[0].upper() in DEVICES:
-        message = f"{shown(value)} is not a name: on some systems it means a device, or another name"
+        message = f"{shown(value)} is not a name: some systems reserve it"
         raise invalid(message)
     return value
 
 
 MAX_NAME = 100
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{number}" for port in ("COM", "LPT") for number in range(1, 10))}
-"""Names that Windows keeps for itself, whatever follows after a dot."""
+"""Names that Windows reserves, whatever follows after a dot."""
 _DEVICE = "([Cc][Oo][Nn]|[Pp][Rr][Nn]|[Aa][Uu][Xx]|[Nn][Uu][Ll]|[Cc][Oo][Mm][1-9]|[Ll][Pp][Tt][1-9])"
 Identifier = Annotated[
     str,

@@ -1,4 +1,4 @@
-"""What blocks fall on and lean against: the ground and walls."""
+"""Boundary: the ground and walls."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -13,7 +13,7 @@ Point = tuple[q.Length, q.Length]
 
 
 def _slips(points: Sequence[tuple[float, float]]) -> Iterator[tuple[int, str]]:
-    """Yield the number of every point that no profile can have, and why."""
+    """Yield the number of every invalid point of a profile, and why."""
     for number, ((x_before, y_before), (x, y)) in enumerate(pairwise(points), start=1):
         if (x, y) == (x_before, y_before):
             yield number, "the same point as the one before"
@@ -22,11 +22,11 @@ def _slips(points: Sequence[tuple[float, float]]) -> Iterator[tuple[int, str]]:
         if number > 1 and points[number - 2][0] == x_before == x:
             turns = (y_before - points[number - 2][1]) * (y - y_before) < 0.0
             if turns:
-                yield number, "the profile goes back over its own vertical piece"
+                yield number, "the profile goes back over its own vertical segment"
 
 
 class Ground(Table):
-    """The half-plane below y = 0, or what lies below a profile; a tilt turns gravity, x stays along the ground."""
+    """The half-plane below y = 0, or the region below a profile; a tilt turns gravity, x stays along the ground."""
 
     tilt: q.TiltAngle = Field(default=0.0, description="slope of the ground, positive where its +x end is raised")
     material: str | None = Field(default=None, description="the name of its material (default: the blocks' own)")
@@ -49,15 +49,17 @@ class Ground(Table):
 
 
 class Wall(Table):
-    """A straight piece of boundary with one face: solid on the right hand of who walks along it."""
+    """Straight segment of boundary with one face: the solid is on the right of the way from `from` to `to`."""
 
-    start: Point = Field(alias="from", description="[x, y] where it begins; the solid is on the right hand from here")
-    end: Point = Field(alias="to", description="[x, y] where it ends")
+    start: Point = Field(
+        alias="from", description="[x, y] of its start; the solid is on the right of the way to its end"
+    )
+    end: Point = Field(alias="to", description="[x, y] of its end")
     material: str | None = Field(default=None, description="the name of its material (default: as the ground)")
 
     @model_validator(mode="after")
     def _has_a_length(self) -> Self:
         if self.start == self.end:
-            message = "a wall cannot end where it begins"
+            message = "start and end of a wall must differ"
             raise q.invalid(message, "to")
         return self

@@ -33,7 +33,7 @@ class PairFriction(Table):
     """Coulomb friction of one material pair, falling from static to kinetic with the sliding speed.
 
     mu(v) = kinetic + (static - kinetic) exp(-|v| / transition_speed). A bare number or friction angle in the
-    file means static = kinetic. With kinetic_ratio, kinetic follows the static one where that is varied.
+    file means static = kinetic. With kinetic_ratio, kinetic follows static where that is varied.
     """
 
     static: q.Friction = Field(description="friction coefficient at rest")
@@ -44,7 +44,7 @@ class PairFriction(Table):
         default_factory=lambda known: known.get("static", math.inf) * (known.get("kinetic_ratio") or 1.0),
         description="friction coefficient in fast sliding (default: static)",
     )
-    transition_speed: q.PositiveSpeed = Field(default=0.005, description="sliding speed of the change-over")
+    transition_speed: q.PositiveSpeed = Field(default=0.005, description="sliding speed of the transition")
 
     @model_validator(mode="before")
     @classmethod
@@ -53,13 +53,13 @@ class PairFriction(Table):
             return value
         if isinstance(value, int | float | str) and not isinstance(value, bool):
             return {"static": value}
-        message = f"{q.shown(value)} is not a friction; write a number, an angle, or {{ static, kinetic }}"
+        message = f"{q.shown(value)} is not a friction coefficient; write a number, an angle, or {{ static, kinetic }}"
         raise q.invalid(message)
 
     @model_validator(mode="after")
     def _kinetic_said_once(self) -> Self:
         if self.kinetic_ratio is not None and "kinetic" in self.model_fields_set:
-            message = "kinetic and kinetic_ratio say the same thing; keep one of the two"
+            message = "kinetic and kinetic_ratio mean the same; keep one of the two"
             raise q.invalid(message, "kinetic_ratio", at="key")
         return self
 
@@ -109,7 +109,7 @@ class Restitution(Table):
 
 
 class Pair(Table):
-    """What is special about one pair of materials, or of a material and the ground; the rest follows the defaults."""
+    """Values of one pair of materials, or of a material and the ground; the rest follows the defaults."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1})
 
@@ -151,14 +151,14 @@ class Contact(Table):
     )
     max_overlap: q.PositiveLength | None = Field(
         default=None,
-        description="overlap that stops the run, on springs never more than half of the smallest side of a pair "
-        "(default: 5 % of that side, 50 % where contacts are rigid)",
+        description="overlap that stops the run; with springs at most half of the smallest side of a pair "
+        "(default: 5 % of that side, 50 % for rigid contacts)",
     )
     skin: q.PositiveLength | None = Field(
         default=None,
-        description="how far apart blocks may be that are listed as neighbours; decides how often the list is made and "
-        "how long it is, the motion on springs stays the same bit for bit (default: 25 % of the smallest side of all "
-        "blocks, with particles 5 %)",
+        description="largest gap between blocks that are listed as neighbours; sets how often the list is updated and "
+        "how long it is; with springs the motion is bit-identical (default: 25 % of the smallest side of all blocks, "
+        "5 % with particles)",
     )
     contact_radius: q.PositiveLength = Field(
         default=0.001, description="radius of curvature R* of every contact (assumed; hertz-mindlin only)"
@@ -181,7 +181,7 @@ class Contact(Table):
 
     @property
     def support_radius(self) -> float:
-        """Distance in m at which the kernel function ends."""
+        """Radius in m at which the kernel function ends."""
         return SUPPORT[self.kernel] * self.resolved_smoothing_length
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""What moves: materials, blocks and single bodies."""
+"""Materials, blocks and single bodies."""
 
 import math
 from typing import Annotated, Literal, Self
@@ -35,7 +35,7 @@ class Material(Table):
             message = 'the density is missing: give density (such as "2700 kg/m^3") or unit_weight'
             raise q.invalid(message)
         if self.given_density is not None and self.unit_weight is not None:
-            message = "density and unit_weight are both given; give one of them"
+            message = "density and unit_weight are both given; keep one of them"
             raise q.invalid(message, "unit_weight")
         return self
 
@@ -48,19 +48,19 @@ class Material(Table):
 
 
 class Block(Table):
-    """A rectangular block by its three printed sides, and how it is turned into the plane.
+    """A rectangular block by its three sides, and its orientation in the plane.
 
-    The names of the sides are only names: `upright` says which of them stands upright and `along` which lies
-    along x; the third is the depth.
+    The names of the sides are only names: `upright` selects the one that stands upright and `along` the one along
+    x; the third is the depth.
     """
 
-    width: q.PositiveLength = Field(description="the block's width")
-    height: q.PositiveLength = Field(description="the block's height")
-    length: q.PositiveLength = Field(description="the block's length")
+    width: q.PositiveLength = Field(description="width of the block")
+    height: q.PositiveLength = Field(description="height of the block")
+    length: q.PositiveLength = Field(description="length of the block")
     upright: Annotated[Side, OneOf(SIDES)] = Field(default="height", description="the side that stands upright")
     along: Annotated[Side, OneOf(SIDES)] = Field(
         default_factory=lambda known: "length" if known.get("upright") == "width" else "width",
-        description="the side that lies along x (default: width, or length where width stands upright)",
+        description="the side that lies along x (default: width, or length if width stands upright)",
     )
     material: str = Field(description="the name of the block's material")
 
@@ -68,7 +68,7 @@ class Block(Table):
     def _two_sides(self) -> Self:
         if self.along == self.upright:
             others = " or ".join(q.shown(side) for side in SIDES if side != self.upright)
-            message = f"{q.shown(self.upright)} stands upright already; {others} can lie along x"
+            message = f"{q.shown(self.upright)} already stands upright; {others} can lie along x"
             raise q.invalid(message, "along")
         return self
 
@@ -98,7 +98,7 @@ class BodySpec(Table):
     block: str = Field(description="the name of a block")
     x: q.Length = Field(description="centre along the ground")
     y: q.Length = Field(description="centre above the ground")
-    angle: q.Angle = Field(default=0.0, description="turned counter-clockwise by this angle")
+    angle: q.Angle = Field(default=0.0, description="rotation, counter-clockwise positive")
     velocity: tuple[q.Speed, q.Speed] = Field(default=(0.0, 0.0), description="velocity of the centre along x and y")
     spin: q.Spin = Field(default=0.0, description="angular velocity, counter-clockwise positive")
     fixed: bool = Field(default=False, description="true for a body that never moves")

@@ -18,16 +18,16 @@ PIECES_PER_CYCLE = 200
 class Harmonic(Table):
     """u(t) = amplitude r(t) sin(2 pi frequency (t - start) + phase) from `start` on, for `duration`.
 
-    r rises smoothly from 0 to 1 within `ramp` and, where there is a duration, falls as smoothly at its end.
+    r rises smoothly from 0 to 1 within `ramp` and falls as smoothly at the end of a duration.
     """
 
     kind: Literal["harmonic"] = Field(description="kind of motion")
-    amplitude: q.PositiveLength = Field(description="greatest displacement")
+    amplitude: q.PositiveLength = Field(description="largest displacement")
     frequency: q.PositiveFrequency = Field(description="cycles per second")
     phase: q.Angle = Field(default=0.0, description="phase at the start")
     direction: q.Angle = Field(default=0.0, description="direction of the motion, counter-clockwise from +x")
-    start: q.NonNegativeTime = Field(default=0.0, description="when it begins; the supports rest before")
-    duration: q.PositiveTime | None = Field(default=None, description="how long it lasts (default: to the end)")
+    start: q.NonNegativeTime = Field(default=0.0, description="start of the motion; the supports rest before")
+    duration: q.PositiveTime | None = Field(default=None, description="duration of the motion (default: to the end)")
     ramp: q.PositiveTime | None = Field(
         default=None, description="time of the smooth rise, and of the fall after a duration (default: one cycle)"
     )
@@ -38,7 +38,7 @@ class Harmonic(Table):
         return 1.0 / self.frequency if self.ramp is None else self.ramp
 
     def sections(self, end: float) -> Iterator[tuple[float, float, int]]:
-        """Yield begin and end (s) of rise, steady part and fall, as far as `end`, and how many pieces each needs."""
+        """Yield start and end (s) of rise, steady part and fall, up to `end`, and the number of pieces of each."""
         ramp, cycle = self.resolved_ramp, 1.0 / self.frequency
         stop = math.inf if self.duration is None else self.start + self.duration
         breaks = [(self.start, min(cycle, ramp)), (self.start + ramp, cycle), (stop - ramp, min(cycle, ramp))]
@@ -81,8 +81,8 @@ def _path(table: MotionTable) -> str:
 class FromTable(Table):
     """Samples of a CSV table; see `blocksim.scenario.motion_table`.
 
-    Displacements count from the first one and are joined by a cubic spline that begins and ends at rest.
-    Accelerations are joined by straight lines and integrated from rest; at their end the velocity stays what it is.
+    Displacements count from the first and are joined by a cubic spline that begins and ends at rest.
+    Accelerations are joined by straight lines and integrated from rest; after the last one the velocity is constant.
     """
 
     kind: Literal["table"] = Field(description="kind of motion")
@@ -93,10 +93,12 @@ class FromTable(Table):
     )
     scale: q.Number = Field(default=1.0, description="factor on the table's values")
     direction: q.Angle = Field(default=0.0, description="direction of the motion, counter-clockwise from +x")
-    start: q.NonNegativeTime = Field(default=0.0, description="when the table's time is zero; the supports rest before")
+    start: q.NonNegativeTime = Field(
+        default=0.0, description="time at which the table's time is zero; the supports rest before"
+    )
 
 
 AnyMotion = Annotated[Harmonic | FromTable, Field(discriminator="kind")]
-"""Any prescribed motion, told apart by its `kind`."""
+"""Any prescribed motion, distinguished by its `kind`."""
 MOTIONS: dict[str, type[Table]] = {"harmonic": Harmonic, "table": FromTable}
-"""Kind as written in a scenario, and its class."""
+"""Class by kind, as written in a scenario."""

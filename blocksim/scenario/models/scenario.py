@@ -18,7 +18,7 @@ SCHEMA_VERSION = 1
 
 
 class Scenario(Table):
-    """Everything that decides one simulation, in SI.
+    """Complete input of one simulation, in SI.
 
     Build it with `load_scenario` or `scenario_from_mapping`, which also check what no single table can know:
     that named blocks and materials exist and that no bodies overlap.
@@ -35,7 +35,7 @@ class Scenario(Table):
     structures: tuple[AnyStructure, ...] = Field(default=(), description="generators of bodies")
     bodies: tuple[BodySpec, ...] = Field(default=(), description="single bodies")
     ground: Ground = Field(default=Ground(), description="the ground")
-    walls: tuple[Wall, ...] = Field(default=(), description="straight pieces of boundary beside the ground")
+    walls: tuple[Wall, ...] = Field(default=(), description="straight segments of boundary, in addition to the ground")
     motion: AnyMotion | None = Field(default=None, description="prescribed motion of ground, walls and fixed bodies")
     friction: Friction = Field(default=Friction(), description="friction between blocks and with the ground")
     pairs: dict[str, dict[str, Pair]] = Field(
@@ -52,7 +52,7 @@ class Scenario(Table):
     )
 
     def __repr__(self) -> str:
-        """Return a line: the name and what it holds; all values are in `scenario_to_toml`."""
+        """Return a line with the name and the contents; all values are in `scenario_to_toml`."""
         parts: list[str] = [structure.kind for structure in self.structures]
         if self.bodies:
             parts.append(f"{len(self.bodies)} single {'body' if len(self.bodies) == 1 else 'bodies'}")

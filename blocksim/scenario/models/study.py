@@ -1,4 +1,4 @@
-"""What the run is compared with, and what may be varied."""
+"""Experiment and sweep of a scenario."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -66,7 +66,7 @@ class _Slip:
 
 
 def _variation(value: object, info: ValidationInfo) -> Variation:
-    """Read what the mode allows; anything that some mode allows where the mode itself is wrong."""
+    """Read what the mode allows; where the mode itself is wrong, anything that some mode allows."""
     if isinstance(value, _Slip):
         message = f"unknown key, did you mean {value.meant!r}?"
         raise q.invalid(message, at="key")
@@ -80,11 +80,13 @@ def _variation(value: object, info: ValidationInfo) -> Variation:
 
 
 def _of_the_mode(value: object, info: ValidationInfo) -> object:
-    """Refuse a key that belongs to other modes than the one chosen."""
+    """Refuse a key that belongs to other modes."""
     modes = KEYS_OF[str(info.field_name)]
     mode = info.data.get("mode")
     if mode is not None and mode not in modes:
-        message = f"mode {q.shown(mode)} has no {info.field_name}; it belongs to {', '.join(map(q.shown, modes))}"
+        message = (
+            f"mode {q.shown(mode)} has no key {info.field_name}, which belongs to {', '.join(map(q.shown, modes))}"
+        )
         raise q.invalid(message, at="key")
     return value
 
@@ -93,12 +95,12 @@ Values = Annotated[Variation, PlainValidator(_variation), WithJsonSchema(VALUES_
 
 
 def _lists_first(vary: dict[str, Any]) -> dict[str, Any]:
-    """Put lists before distributions, as they stand in a resolved file: Sobol's dimensions follow the order of keys."""
+    """Put lists before distributions, as in a resolved file: Sobol's dimensions follow the order of keys."""
     return dict(sorted(vary.items(), key=lambda entry: not isinstance(entry[1], tuple)))
 
 
 class Sweep(Table):
-    """Which scenario keys to vary; in the file every dotted key stands in quotes beside `mode`."""
+    """Scenario keys to vary; in the file every dotted key is a key in quotes next to `mode`."""
 
     mode: Annotated[Mode, OneOf(get_args(Mode))] = Field(
         default="grid",
@@ -111,21 +113,21 @@ class Sweep(Table):
         BeforeValidator(_of_the_mode),
         Field(json_schema_extra={"minimum": 1, "maximum": MAX_SAMPLES}),
     ] = Field(
-        default=128, description="how many cases are drawn (lhs, sobol, normal; sobol is balanced at powers of two)"
+        default=128, description="number of cases to draw (lhs, sobol, normal; sobol is balanced at powers of two)"
     )
     seed: Annotated[
         int,
         BeforeValidator(whole(0, MAX_SEED)),
         BeforeValidator(_of_the_mode),
         Field(json_schema_extra={"minimum": 0, "maximum": MAX_SEED}),
-    ] = Field(default=0, description="the same seed draws the same values (lhs, sobol, normal)")
+    ] = Field(default=0, description="random seed (lhs, sobol, normal)")
     table: Annotated[TablePath | None, BeforeValidator(_of_the_mode)] = Field(
         default=None,
-        description="CSV table of cases, relative to the scenario file: a column a key, units as in `overlap [mm]`",
+        description="CSV table of cases, relative to the scenario file: one column per key, units as in `overlap [mm]`",
     )
     vary: Annotated[dict[str, Values], AfterValidator(_lists_first)] = Field(
         description="dotted key of the scenario, and a list, { from, to, count }, { from, to }, { mean, sd } or "
-        '{ mean, sd, from, to }; scale = "log" beside from and to'
+        '{ mean, sd, from, to }; scale = "log" with from and to'
     )
 
     @model_validator(mode="before")
@@ -168,7 +170,7 @@ class Sweep(Table):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Describe the table of the file, where the varied keys stand beside `mode`."""
+        """Describe the table of the file, where the varied keys are next to `mode`."""
         table = handler.resolve_ref_schema(handler(schema))
         return {
             "type": "object",
@@ -184,7 +186,7 @@ OWN_KEYS = tuple(name for name in Sweep.model_fields if name != "vary")
 
 
 def slip_of(key: object) -> str | None:
-    """Return the key of [sweep] itself that a word was meant to be; the keys of a scenario are not near them."""
+    """Return the key of [sweep] itself that a word was probably meant to be."""
     return nearest(str(key), OWN_KEYS, most=2)
 
 

@@ -1,4 +1,4 @@
-"""What may be said about one varied key: a list, evenly spread values, or a distribution to sample from."""
+"""Values of one varied key: a list, evenly spaced values, or a distribution to sample from."""
 
 import math
 from collections.abc import Mapping
@@ -12,9 +12,9 @@ from blocksim.scenario.spelling import nearest
 
 MAX_VALUES = 100_000
 SIGNIFICANT = 12
-"""Digits that spread and sampled values keep: mathematical libraries differ in the last ones."""
+"""Digits that spaced and sampled values keep: mathematical libraries differ in the last ones."""
 FARTHEST = 8.0
-"""How far from the mean, in standard deviations, a truncated normal distribution may begin."""
+"""Largest distance from the mean, in standard deviations, at which a truncated normal distribution may begin."""
 
 Scale = Literal["linear", "log"]
 
@@ -63,12 +63,12 @@ Variation = tuple[Any, ...] | Distribution
 
 
 def written(number: float, *, angle: bool) -> object:
-    """Return a number as a scenario takes it: an angle as a text with its unit."""
+    """Return a number as in a scenario: an angle as a string with its unit."""
     return f"{number!r} rad" if angle else number
 
 
 def _typed(number: float, values: Distribution) -> object:
-    """Return a number with the unit that it was typed in, where that gives the same number again."""
+    """Return a number with the unit of the file, if that gives the same number again."""
     if values.unit:
         text = f"{number / float(units.parse_unit(values.unit).factor):.{SIGNIFICANT}g} {values.unit}"
         if q.parse_quantity(text)[0] == number:
@@ -83,12 +83,12 @@ def _unit(value: Mapping[str, Any], *names: str) -> str:
 
 
 def rounded(number: float) -> float:
-    """Return a number to the digits that are the same on every machine."""
+    """Return a number to the digits that are equal on every machine."""
     return float(f"{number:.{SIGNIFICANT - 1}e}")
 
 
 def read_spread(value: object) -> tuple[Any, ...]:
-    """Return the values of a list or of { from, to, count }; raises a pydantic error where it is neither."""
+    """Return the values of a list or of { from, to, count }; raises a pydantic error for anything else."""
     if isinstance(value, Mapping):
         _refuse_distribution(value)
         _refuse_slips(value, ("from", "to", "count", "scale"), needed=("from", "to", "count"))
@@ -97,11 +97,11 @@ def read_spread(value: object) -> tuple[Any, ...]:
 
 
 def read_sampled(value: object) -> Variation:
-    """Return the levels of a list, or the distribution that a table says; raises a pydantic error."""
+    """Return the levels of a list, or the distribution of a table; raises a pydantic error."""
     if not isinstance(value, Mapping):
         return _levels(value, "{ from, to } or { mean, sd }")
     if "count" in value:
-        message = 'count belongs to the modes "grid" and "list"; here `samples` says how many'
+        message = 'count belongs to the modes "grid" and "list"; here `samples` sets the number'
         raise q.invalid(message, "count")
     if "mean" in value or "sd" in value:
         return _normal(value)
@@ -133,7 +133,7 @@ def _refuse_distribution(value: Mapping[str, Any]) -> None:
 
 
 def _refuse_slips(value: Mapping[str, Any], known: tuple[str, ...], needed: tuple[str, ...]) -> None:
-    """Refuse keys that a variation does not have, and tell which are missing."""
+    """Refuse keys that a variation does not have, and report missing ones."""
     if not set(value) & set(known):
         message = (
             f"{q.shown(value)} is not a variation; write a list or {{ {', '.join(needed)} }}, and the key in quotes"
@@ -192,14 +192,14 @@ def _normal(value: Mapping[str, Any]) -> Normal:
     if len(bounds) == 2:  # noqa: PLR2004 - both ends
         _refuse_empty(value, low, high)
     if low > mean + FARTHEST * sd or high < mean - FARTHEST * sd:
-        message = f"the bounds leave nothing within {FARTHEST:g} standard deviations of the mean"
+        message = f"the bounds exclude everything within {FARTHEST:g} standard deviations of the mean"
         raise q.invalid(message, "from" if low > mean else "to")
     return Normal(mean, sd, low, high, angle, _unit(value, "mean", "sd"))
 
 
 def _refuse_empty(value: Mapping[str, Any], low: float, high: float) -> None:
     if low >= high:
-        message = f"from {q.shown(value['from'])} is not below to {q.shown(value['to'])}"
+        message = f"from = {q.shown(value['from'])} is not below to = {q.shown(value['to'])}"
         raise q.invalid(message, "from")
 
 
@@ -213,7 +213,7 @@ def _scale(value: Mapping[str, Any], low: float, high: float) -> Scale:
 
 
 def _numbers(value: Mapping[str, Any], *names: str) -> tuple[list[float], bool]:
-    """Return the SI numbers of keys that have to be of one kind, and whether they are angles."""
+    """Return the SI numbers of keys of one kind, and whether they are angles."""
     ends = [_end(value[name]) for name in names]
     kinds = {dimension for number, dimension in ends if number != 0.0 or dimension != units.NUMBER}
     if len(kinds) > 1:
@@ -254,4 +254,4 @@ VALUES_SCHEMA: dict[str, Any] = {
         _table_schema({"mean": _END, "sd": _END, "from": _END, "to": _END}, "mean", "sd"),
     ]
 }
-"""JSON Schema of everything that may stand at a varied key."""
+"""JSON Schema of all values of a varied key."""

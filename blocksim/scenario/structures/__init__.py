@@ -1,4 +1,4 @@
-"""The kinds of structure; a new kind is one file beside this one and one line in `AnyStructure`."""
+"""The kinds of structure; a new kind is one file next to this one and one line in `AnyStructure`."""
 
 from typing import Annotated, get_args
 
@@ -14,12 +14,12 @@ from blocksim.scenario.structures.wall import BlockWall
 
 _Union = Staircase | Stack | BlockWall | Pyramid | Dominoes | Grid
 AnyStructure = Annotated[_Union, Field(discriminator="kind")]
-"""Any structure of a scenario, told apart by its `kind`."""
+"""Any structure of a scenario, distinguished by its `kind`."""
 
 KINDS: dict[str, type[Structure]] = {
     word: cls for cls in get_args(_Union) for word in get_args(cls.model_fields["kind"].annotation)
 }
-"""Kind as written in a scenario, and its class."""
+"""Class by kind, as written in a scenario."""
 
 __all__ = [
     "KINDS",

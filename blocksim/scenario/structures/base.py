@@ -1,4 +1,4 @@
-"""What every kind of structure has in common."""
+"""Common base of all kinds of structure."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ class UnfitError(ValueError):
     """A structure cannot be built from its block; `key` is the key to change."""
 
     def __init__(self, key: str, message: str) -> None:
-        """Keep the key and what is wrong with its value."""
+        """Keep the key and the reason."""
         self.key = key
         super().__init__(message)
 
@@ -50,19 +50,18 @@ class UnfitError(ValueError):
 class Structure(Table, ABC):
     """A generator of bodies; every kind adds its `kind` literal and its own keys."""
 
-    block: str = Field(description="the name of the block it is made of")
+    block: str = Field(description="the name of its block")
     left: q.Length = Field(default=0.0, description="left edge of its first block, the lowest and leftmost")
     bottom: q.Length = Field(default=0.0, description="height of that block's lower edge")
     velocity: tuple[q.Speed, q.Speed] = Field(default=(0.0, 0.0), description="velocity of all blocks along x and y")
     shear_velocity: q.Speed = Field(
-        default=0.0,
-        description="more velocity along x, in proportion to the height of the centre; this at full height",
+        default=0.0, description="additional velocity along x at full height, in proportion to the height of the centre"
     )
 
     @property
     @abstractmethod
     def size(self) -> int:
-        """Number of bodies, told without placing them."""
+        """Number of bodies, without placing them."""
 
     @abstractmethod
     def height(self, block: Block) -> float:
@@ -70,9 +69,9 @@ class Structure(Table, ABC):
 
     @abstractmethod
     def place(self, block: Block) -> Sequence[Pose]:
-        """Return the pose of every block, lowest first, before all are set in motion; raises UnfitError."""
+        """Return the pose of every block, lowest first, before the initial velocities are added; raises UnfitError."""
 
-    @np.errstate(over="ignore", invalid="ignore")  # places that are no numbers are found later
+    @np.errstate(over="ignore", invalid="ignore")  # positions that are not finite are found later
     def start(self, block: Block) -> Sequence[Pose]:
         """Return the poses with the initial velocities: v_x = velocity_x + shear_velocity (y - bottom) / height.
 
@@ -112,6 +111,6 @@ def poses_at(x: Floats, y: Floats, angle: Floats | None = None) -> list[Pose]:
 def draws(seed: int, *shape: int) -> Floats:
     """Return uniform random numbers in [0, 1), the same for a seed on every machine and with every version of numpy.
 
-    Only the bit stream of PCG64 and its conversion to doubles are promised to stay; distributions are not.
+    numpy guarantees only the bit stream of PCG64 and its conversion to doubles, not distributions.
     """
     return np.random.Generator(np.random.PCG64(seed)).random(shape)

@@ -13,16 +13,16 @@ from blocksim.scenario.structures.base import Count, Pose, Structure
 class Dominoes(Structure):
     """Block i (from 0) has its left edge at left + i (size_x + spacing).
 
-    A push turns the first one about its lower edge on the side that it falls to, without slip: its centre moves along x
-    at the speed of the push and rises at push size_x / size_y, its spin is 2 push / size_y.
+    A push turns the first domino about its lower edge on the side that it falls to, without slip: its centre moves
+    along x at the speed of the push and rises at push size_x / size_y, its spin is 2 push / size_y.
     """
 
     kind: Literal["dominoes"] = Field(description="kind of structure")
     count: Count = Field(description="number of blocks")
-    spacing: q.PositiveLength = Field(description="clear distance of neighbours")
+    spacing: q.PositiveLength = Field(description="clear distance between neighbours")
     push: q.Speed = Field(
         default=0.0,
-        description="speed along x of the first one's centre, which turns about its lower edge",
+        description="speed along x of the centre of the first domino, which turns about its lower edge",
     )
 
     @property

@@ -1,4 +1,4 @@
-"""Blocks apart from each other in rows and columns, shifted and turned at random."""
+"""Separate blocks in rows and columns, shifted and turned at random."""
 
 import math
 from collections.abc import Sequence
@@ -20,13 +20,13 @@ class Grid(Courses):
 
     kind: Literal["grid"] = Field(description="kind of structure")
     columns: Count = Field(description="number of blocks in a row")
-    gap_x: q.NonNegativeLength = Field(description="distance of neighbours along x, before they are shifted and turned")
-    gap_y: q.NonNegativeLength = Field(description="distance of neighbours along y, before they are shifted and turned")
+    gap_x: q.NonNegativeLength = Field(description="gap between neighbours along x, before they are shifted and turned")
+    gap_y: q.NonNegativeLength = Field(description="gap between neighbours along y, before they are shifted and turned")
     offset: q.NonNegativeLength = Field(
         default=0.0, description="largest random shift of a block along x and along y, to either side"
     )
     turn: q.HalfTurn = Field(default=0.0, description="largest random angle of a block, to either side")
-    seed: Seed = Field(default=0, description="chooses among random shifts and angles")
+    seed: Seed = Field(default=0, description="random seed of shifts and angles")
 
     @property
     def size(self) -> int:
@@ -62,6 +62,6 @@ class Grid(Courses):
 
 
 def _growth(side: float, other: float, turn: float) -> float:
-    """Return by how much (m) a rectangle grows along a side at most when it is turned by up to `turn` (rad)."""
+    """Return the largest growth (m) of a rectangle along a side when it is turned by up to `turn` (rad)."""
     widest = min(turn, math.atan2(other, side))
     return side * math.cos(widest) + other * math.sin(widest) - side

@@ -1,4 +1,4 @@
-"""Courses that each have one block less than the one below."""
+"""Courses of which each has one block less than the one below."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -15,7 +15,7 @@ class Pyramid(Courses):
     """Course i (from 0) has rows - i blocks, each in the middle above two of the course below."""
 
     kind: Literal["pyramid"] = Field(description="kind of structure")
-    gap: q.NonNegativeLength = Field(default=0.0, description="distance of neighbours in a course")
+    gap: q.NonNegativeLength = Field(default=0.0, description="gap between neighbours in a course")
 
     @property
     def size(self) -> int:

@@ -15,7 +15,7 @@ class Stack(Structure):
 
     kind: Literal["stack"] = Field(description="kind of structure")
     count: Count = Field(description="number of blocks")
-    offset: q.Length = Field(default=0.0, description="shift of each block against the one below")
+    offset: q.Length = Field(default=0.0, description="shift of each block relative to the one below")
 
     @property
     def size(self) -> int:

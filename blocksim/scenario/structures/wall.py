@@ -1,4 +1,4 @@
-"""A wall of whole blocks in courses, in running bond or stack bond, with or without holes."""
+"""A wall of whole blocks in courses, in running or stack bond, with or without holes."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal, Self
@@ -14,7 +14,7 @@ from blocksim.scenario.structures.base import Count, Courses, Pose, Seed, draws,
 
 Bond = Literal["running", "stack"]
 BONDS: tuple[Bond, ...] = ("running", "stack")
-PLACE = 2  # numbers that say where a hole is
+PLACE = 2  # numbers of the position of a hole
 
 
 def _hole(value: object) -> object:
@@ -31,8 +31,8 @@ class BlockWall(Courses):
     """Block j of course i (both from 0) begins at x = left + j (size_x + gap) and y = bottom + i size_y.
 
     In running bond every second course is shifted to the right by half of that distance; all courses have whole blocks
-    and the same number of them, so that the ends are toothed. Where a block is left out nothing carries the ones above,
-    which fall into the hole as far as their neighbours let them.
+    and the same number of them, so that the ends are toothed. A missing block does not support the ones above,
+    which fall into the hole as far as their neighbours allow.
     """
 
     kind: Literal["wall"] = Field(description="kind of structure")
@@ -40,15 +40,15 @@ class BlockWall(Courses):
     bond: Annotated[Bond, OneOf(BONDS)] = Field(
         default="running", description="running: every second course is shifted by half a block; stack: none is"
     )
-    gap: q.NonNegativeLength = Field(default=0.0, description="distance of neighbours in a course")
+    gap: q.NonNegativeLength = Field(default=0.0, description="gap between neighbours in a course")
     holes: tuple[Hole, ...] = Field(
-        default=(), description="blocks left out, [row, column] from 1, the lowest and leftmost first"
+        default=(), description="blocks to leave out, [row, column] from 1, the lowest and leftmost first"
     )
-    missing: q.Share = Field(default=0.0, description="share of the other blocks left out at random")
+    missing: q.Share = Field(default=0.0, description="share of the other blocks to leave out at random")
     offset: q.NonNegativeLength = Field(
         default=0.0, description="largest random shift of a block along x, to either side; at most half of the gap"
     )
-    seed: Seed = Field(default=0, description="chooses among random shifts and blocks left out")
+    seed: Seed = Field(default=0, description="random seed of shifts and blocks left out")
 
     @model_validator(mode="after")
     def _holes_are_inside(self) -> Self:
@@ -75,7 +75,7 @@ class BlockWall(Courses):
         if self.offset > 0.5 * self.gap:
             message = (
                 f"two neighbours shifted by {self.offset * 1e3:g} mm could overlap; "
-                f"at most half of the gap, {0.5e3 * self.gap:g} mm, is possible"
+                f"at most half of the gap, {0.5e3 * self.gap:g} mm, is allowed"
             )
             raise q.invalid(message, "offset")
         return self
