@@ -1,4 +1,4 @@
-"""Two recordings of what should be the same run, compared bit for bit."""
+"""Bitwise comparison of two recordings of the same run."""
 
 import math
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ CONTACT_ENDS = {name: f"_{unit}" for name, unit in UNITS.items() if unit != "1"}
 
 @dataclass(frozen=True)
 class FirstDifference:
-    """Where two recordings part: in which frame (from 0), when, which block (none: the whole scene) and quantity."""
+    """First difference of two recordings: frame (from 0), time, block (none: the whole scene) and quantity."""
 
     frame: int
     time: float  # s
@@ -35,7 +35,7 @@ class FirstDifference:
 
 @dataclass(frozen=True)
 class Differences:
-    """How two recordings differ; in nothing, where `is_none`."""
+    """Differences of two recordings; none if `is_none`."""
 
     frames: tuple[int, int]  # how many the stored one has, and the new one
     first: FirstDifference | None = None
@@ -44,14 +44,14 @@ class Differences:
 
     @property
     def is_none(self) -> bool:
-        """Return True if all frames have the same bits."""
+        """Return True if all frames are bit-identical."""
         return self.first is None and self.frames[0] == self.frames[1]
 
 
 def differences(stored: Frames, now: Frames) -> Differences:
     """Compare all numbers of all frames of the same blocks, recorded contacts with their forces included.
 
-    A difference in the sign of zero counts as one. Differences of places are those of the frames that both have, NaN
+    A difference in the sign of zero counts as one. Differences of positions are those of the frames that both have, NaN
     where a state is not finite.
     """
     counts = (len(stored), len(now))
@@ -98,7 +98,7 @@ def _first_in_scene(stored: Frames, count: int, name: str, old: Floats, new: Flo
 
 
 def _first_in_contacts(stored: Frames, now: Frames, count: int) -> FirstDifference | None:
-    """Return the first frame whose recorded contacts differ; where one recording has none, that is in the first."""
+    """Return the first frame whose recorded contacts differ; the first one if one recording has none."""
     old, new = stored.contacts, now.contacts
     if old is None or new is None:
         return None if old is new else _in_frame(stored, 0, "recorded_contacts", *map(_number_in_all, (old, new)))
@@ -129,7 +129,7 @@ def _in_frame(stored: Frames, frame: int, quantity: str, old: float, new: float)
 
 
 def _is_other(old: Floats, new: Floats) -> NDArray[np.bool_]:
-    """Tell where the bits of two arrays differ."""
+    """Return where the bits of two arrays differ."""
     return np.not_equal(*(np.ascontiguousarray(one).view(np.uint64) for one in (old, new)), dtype=np.bool_)
 
 

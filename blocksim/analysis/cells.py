@@ -1,4 +1,4 @@
-"""Comma-separated tables with `#` comment lines; every cell knows where it stands in the file."""
+"""Comma-separated tables with `#` comment lines; every cell has its place in the file."""
 
 import difflib
 import re
@@ -20,7 +20,7 @@ NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 @dataclass(frozen=True)
 class Line:
-    """One line of the file, counted from 1, and as it may be shown on a terminal."""
+    """One line of the file, counted from 1, with its text for a terminal."""
 
     where: str
     number: int
@@ -80,8 +80,9 @@ class Table:
 def read_table(path: Path, columns: Sequence[str]) -> Table:
     """Read a table that has exactly these columns, in any order.
 
-    Rows of the wrong shape are left out and noted in `problems`, and so are columns that are only misspelt. Raises
-    InputMissingError when the file cannot be read and InvalidInputError when it is no text or its header is wrong.
+    Rows of the wrong shape are left out and recorded in `problems`, and so are misspelt columns. Raises
+    InputMissingError when the file cannot be read and InvalidInputError when it is not a text file or its header is
+    wrong.
     """
     notes, content = _content(_lines(path))
     if not content:
@@ -122,7 +123,7 @@ def _content(lines: Sequence[Line]) -> tuple[tuple[str, ...], list[Line]]:
 
 
 def _filled(table: Table, names: Sequence[str], lines: Sequence[Line]) -> Table:
-    """Add the rows, or what is wrong with their shape."""
+    """Add the rows, or the errors in their shape."""
     for line in lines:
         cells = _cells(line)
         complaint = _shape_complaint(line, cells, len(names))
@@ -135,7 +136,7 @@ def _filled(table: Table, names: Sequence[str], lines: Sequence[Line]) -> Table:
 
 
 def raise_problems(problems: Sequence[Problem]) -> NoReturn:
-    """Raise one InvalidInputError that shows the problems by line; a flood is cut and counted."""
+    """Raise one InvalidInputError that shows the problems by line; many are cut and counted."""
     by_line = sorted(problems, key=lambda problem: (problem.line_number or 0, problem.caret_start))
     shown = [problem.render() for problem in by_line[:MOST_PROBLEMS_SHOWN]]
     if len(by_line) > len(shown):
@@ -144,7 +145,7 @@ def raise_problems(problems: Sequence[Problem]) -> NoReturn:
 
 
 def suggestion(found: str, allowed: Sequence[str]) -> str:
-    """Say what was meant, or what is allowed where nothing comes close."""
+    """Return the word that was probably meant, or the allowed ones."""
     close = difflib.get_close_matches(found.lower(), allowed, n=1)
     return f"did you mean '{close[0]}'?" if close else "allowed: " + ", ".join(allowed)
 
@@ -157,7 +158,7 @@ def _lines(path: Path, limit: int = LARGEST_FILE) -> list[Line]:
 def _text(path: Path, limit: int) -> str:
     raw = _bytes(path, limit)
     if len(raw) > limit:
-        raise_problems([Problem(str(path), f"the file is too large for a table, limit {limit} bytes")])
+        raise_problems([Problem(str(path), f"the file is too large for a table; the limit is {limit} bytes")])
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -204,7 +205,7 @@ def _cells(line: Line) -> list[tuple[str, Line, int, int]] | None:
 
 
 def _shape_complaint(line: Line, cells: list[tuple[str, Line, int, int]] | None, count: int) -> str:
-    """Return what is wrong with the shape of a row, or nothing."""
+    """Return the error in the shape of a row, or nothing."""
     if len(line.text) > LONGEST_LINE:
         return f"the line has {len(line.text)} characters, at most {LONGEST_LINE} are read"
     if cells is None:
@@ -217,9 +218,9 @@ def _shape_complaint(line: Line, cells: list[tuple[str, Line, int, int]] | None,
 
 
 def _header(line: Line, columns: Sequence[str]) -> tuple[list[str], list[Problem]]:
-    """Return the column names that are meant, in the file's order, and the mistakes in them.
+    """Return the column names as meant, in the file's order, and the mistakes in them.
 
-    Raises InvalidInputError where they do not come to the expected columns.
+    Raises InvalidInputError where they are not the expected columns.
     """
     cells = _cells(line)
     if cells is None:

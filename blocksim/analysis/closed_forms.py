@@ -1,4 +1,4 @@
-"""Closed forms that the simulation is checked against, derived from Newton's laws; SI, angles in radians.
+"""Closed forms for checking the simulation, derived from Newton's laws; SI, angles in radians.
 
 Equation numbers are those of the paper (Tran and Nguyen 2020). Restitution `e` is the ratio of the normal
 velocities after and before an impact (Eq. 11).
@@ -37,7 +37,7 @@ def rebound_speed(height: float, restitution: float, impacts: int, gravity: floa
 def rebound_height(time: float, height: float, restitution: float, impacts: int, gravity: float = GRAVITY) -> float:
     """Return the height (m) at `time` (s) after impact number `impacts`: v t - g t^2/2, v the rebound speed.
 
-    This is what Eq. 10, second form, is meant to give; see `remaining_rise` for what it does give.
+    This is the meaning of Eq. 10, second form; see `remaining_rise` for the equation as printed.
     """
     return rebound_speed(height, restitution, impacts, gravity) * time - fall_distance(time, gravity)
 

@@ -9,9 +9,9 @@ The rules, in the order in which they are tried:
 * everything else: inside when within [minimum, maximum] of the repeats, ends included. This is the rule of
   the paper, and such ranges are not widened.
 
-Beside the verdict stand the numbers of a validation in the manner of ASME V&V 20: the error E = S - D, the
+The verdict comes with the numbers of a validation after ASME V&V 20: the error E = S - D, the
 standard uncertainty of the measured mean u_D = sqrt(s^2/n + reading^2), and the half-width of the 95 %
-prediction interval for one more test, t_(n-1, 0.975) s sqrt(1 + 1/n).
+prediction interval for the next test, t_(n-1, 0.975) s sqrt(1 + 1/n).
 """
 
 from collections import Counter
@@ -44,11 +44,11 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class ComparisonRow:
-    """One quantity of one block, in `unit` (mm or deg); NaN where there is no such number.
+    """One quantity of one block, in `unit` (mm or deg); NaN where a number is missing.
 
     `minimum` and `maximum` are measured, `lower` and `upper` are the limits judged by (see the module's
-    rules), `error` is simulated - mean, `distance` how far the simulated value lies beyond the nearer limit
-    (0 inside). `u_data` and `prediction` (half-width for one more test) are given for lengths.
+    rules), `error` is simulated - mean, `distance` the distance of the simulated value beyond the nearer limit
+    (0 inside). `u_data` and `prediction` (half-width for the next test) are given for lengths.
     """
 
     block: str
@@ -71,7 +71,7 @@ class ComparisonRow:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All compared quantities of one run; `source` is the measured table, `messages` say what is missing."""
+    """All compared quantities of one run; `source` is the measured table, `messages` list what is missing."""
 
     rows: tuple[ComparisonRow, ...]
     source: str
@@ -115,12 +115,12 @@ def compare_final(final: "pd.DataFrame | Mapping[str, Sequence[Any]]", table: Ex
         for quantity, value in values.items()
     ]
     unmeasured = [block for block in simulated if block not in table.blocks]
-    messages = [f"block '{block}' is not in {table.source}, it is not compared" for block in unmeasured]
+    messages = [f"block '{block}' is not in {table.source}; it is not compared" for block in unmeasured]
     return Comparison(rows=tuple(rows), source=table.source, messages=(*table.messages, *messages))
 
 
 def limits(quantity: str, mean: float, minimum: float, maximum: float) -> tuple[float, float]:
-    """Return the lowest and the highest value that count as inside (mm or deg)."""
+    """Return the limits of inside (mm or deg)."""
     if quantity == "rotation":
         return mean - ROTATION_TOLERANCE, mean + ROTATION_TOLERANCE
     if minimum == maximum:
@@ -134,7 +134,7 @@ def data_uncertainty(s: float, n: int) -> float:
 
 
 def prediction_half_width(s: float, n: int) -> float:
-    """Return half width of the 95 % prediction interval for one more test (unit of `s`); NaN for n = 1."""
+    """Return half width of the 95 % prediction interval for the next test (unit of `s`); NaN for n = 1."""
     if n < 2:  # noqa: PLR2004 - no scatter without a second repeat
         return nan
     return quantile(0.5 * (1.0 + CONFIDENCE), n - 1) * s * sqrt(1.0 + 1.0 / n)

@@ -17,13 +17,13 @@ COLUMNS = ("block", "quantity", "unit", "replicate", "value")
 LONGEST_NAME = 100  # characters in a block name
 LARGEST_VALUE = 1e9  # mm or degrees: squares and sums stay far from overflow
 LARGEST_REPLICATE = 1_000_000
-MISSING = ("", "nan", "na")  # what a cell says, in small letters, where a repeat has no value
+MISSING = ("", "nan", "na")  # texts, in lower case, of a cell without a value
 MOST_NAMES = 8  # that a message lists
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What may be measured of a block: the unit it is kept in and its column in the final table."""
+    """A measured quantity of a block: its stored unit and its column in the final table."""
 
     unit: str
     final_column: str
@@ -33,7 +33,7 @@ class Quantity:
 QUANTITIES = {
     "x": Quantity("mm", "x_mm", "centre along the ground"),
     "y": Quantity("mm", "y_mm", "centre above the ground"),
-    "rotation": Quantity("deg", "rotation_deg", "angle turned, counter-clockwise positive"),
+    "rotation": Quantity("deg", "rotation_deg", "rotation, counter-clockwise positive"),
     "left": Quantity("mm", "left_mm", "leftmost point"),
     "right": Quantity("mm", "right_mm", "rightmost point"),
 }
@@ -50,7 +50,7 @@ class Measurement(NamedTuple):
 
 
 class Statistics(NamedTuple):
-    """What the repeats of one quantity of one block come to, in mm or degrees; `s` is NaN for a single repeat."""
+    """Statistics of the repeats of one quantity of one block, in mm or degrees; `s` is NaN for a single repeat."""
 
     block: str
     quantity: str
@@ -66,7 +66,7 @@ class Statistics(NamedTuple):
 class ExperimentTable:
     """The measured repeats of one experiment.
 
-    `measurements` stand in the file's order; rows without a value are in `missing` (value NaN) and nowhere else.
+    `measurements` stand in the file's order; rows without a value are only in `missing` (value NaN).
     `source` is the path as it was given, `notes` the comment lines, `places` where each block is first named.
     """
 
@@ -98,7 +98,7 @@ class ExperimentTable:
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """What a reader of a comparison has to know: which values are missing."""
+        """Notes for the reader of a comparison: missing values."""
         if not self.missing:
             return ()
         first, more = self.missing[0], len(self.missing) - 1
@@ -131,7 +131,7 @@ class ExperimentTable:
         return _frame(self.summaries())
 
     def summaries(self) -> tuple[Statistics, ...]:
-        """Return what was measured of every pair of block and quantity, in order of first appearance."""
+        """Return the statistics of every pair of block and quantity, in order of first appearance."""
         repeats: dict[tuple[str, str, str], list[float]] = {}
         for one in self.measurements:
             repeats.setdefault((one.block, one.quantity, one.unit), []).append(one.value)
@@ -184,7 +184,7 @@ def load_table(path: Path | str) -> ExperimentTable:
 def _note_emptiness(
     rows: Sequence[tuple[Measurement, dict[str, Cell]]], measured: Sequence[Measurement], table: Table
 ) -> None:
-    """Note a problem where there is no row, and for every quantity of a block that has no value in any repeat."""
+    """Record a problem if there is no row, and for every quantity of a block without a value in any repeat."""
     if not table.rows and not table.problems:
         table.problems.append(table.header.problem("the table has a header and no rows"))
     known = {(one.block, one.quantity) for one in measured}
@@ -196,7 +196,7 @@ def _note_emptiness(
 
 
 def _measurement(row: dict[str, Cell], table: Table) -> Measurement | None:
-    """Check one row; None after noting its problems."""
+    """Check one row; None after recording its problems."""
     before = len(table.problems)
     name = row["quantity"].text
     quantity = QUANTITIES.get(name)
@@ -215,7 +215,7 @@ def _measurement(row: dict[str, Cell], table: Table) -> Measurement | None:
 def _note_repetition(
     measurement: Measurement, cell: Cell, first_lines: dict[tuple[str, str, int], int], table: Table
 ) -> None:
-    """Note a problem when the same repeat of the same quantity was read before."""
+    """Record a problem when the same repeat of the same quantity was read before."""
     key = (measurement.block, measurement.quantity, measurement.replicate)
     first = first_lines.setdefault(key, cell.line.number)
     if first != cell.line.number:
@@ -231,27 +231,27 @@ def _check_name(cell: Cell, table: Table) -> None:
 
 
 def _replicate(cell: Cell, table: Table) -> int:
-    """Return the number of the repeat; 0 after noting a problem."""
+    """Return the number of the repeat; 0 after recording a problem."""
     is_number = cell.text.isascii() and cell.text.isdigit() and len(cell.text) <= len(str(LARGEST_REPLICATE))
     if is_number and 1 <= int(cell.text) <= LARGEST_REPLICATE:
         return int(cell.text)
-    table.problems.append(cell.problem(f"'{cell.text}' is not the number of a repeat, count them 1, 2, 3, ..."))
+    table.problems.append(cell.problem(f"'{cell.text}' is not a repeat number; count repeats as 1, 2, 3, ..."))
     return 0
 
 
 def _factor(cell: Cell, quantity: Quantity, table: Table) -> float:
-    """Return the factor to mm or deg; 1 after noting a problem."""
+    """Return the factor to mm or deg; 1 after recording a problem."""
     factor = unit_factor(cell.text, quantity.unit)
     if factor is not None:
         return factor
     kind, allowed = ("an angle", "deg or rad") if quantity.unit == "deg" else ("a length", "mm, cm or m")
     found = f"'{cell.text}' is not the unit of {kind}" if cell.text else "no unit"
-    table.problems.append(cell.problem(f"{found}, write {allowed}"))
+    table.problems.append(cell.problem(f"{found}; write {allowed}"))
     return 1.0
 
 
 def _value(cell: Cell, factor: float, table: Table) -> float:
-    """Return the value in mm or deg; NaN where the cell says that there is none, 0 after noting a problem."""
+    """Return the value in mm or deg; NaN for an empty cell, 0 after recording a problem."""
     if cell.text.lower() in MISSING:
         return nan
     try:

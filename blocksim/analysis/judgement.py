@@ -14,19 +14,19 @@ from blocksim.errors import InvalidInputError
 if TYPE_CHECKING:
     import pandas as pd
 
-U_NUM = 0.5  # mm: what step and stiffness may move a block by in an ensemble that is fast enough to be run
+U_NUM = 0.5  # mm: numerical error that step and stiffness may cause in an affordable ensemble
 THRESHOLD = 0.5
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What a user may choose: the share of members that must be inside, and u_num (mm)."""
+    """Settings: the share of members that must be inside, and u_num (mm)."""
 
     threshold: float = THRESHOLD
     u_num: float = U_NUM
 
     def __post_init__(self) -> None:
-        """Raise InvalidInputError for what is no share or no uncertainty."""
+        """Raise InvalidInputError for an invalid share or uncertainty."""
         if not 0.0 <= self.threshold <= 1.0:
             message = f"threshold {self.threshold} is not a share from 0 to 1"
             raise InvalidInputError(message)
@@ -37,7 +37,7 @@ class Settings:
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """What all metrics find, by their names; `sweep` and `source` say what was compared with what."""
+    """Results of all metrics by name; `sweep` and `source` are what was compared."""
 
     sweep: str
     source: str
@@ -50,7 +50,7 @@ class Judgement:
 
     @property
     def share_inside(self) -> float:
-        """Share of all members, failed ones included, that are inside in everything measured."""
+        """Share of all members, failed ones included, that are within all measured ranges."""
         return self.inside_all / self.members
 
     @property
@@ -93,7 +93,7 @@ def judge(
     table.refuse_unknown(members.blocks, "the sweep")
     evidence = Evidence(members, table, settings.u_num)
     unmeasured = [block for block in members.blocks if block not in table.blocks]
-    told = [f"block '{block}' is not in {table.source}, it is not compared" for block in unmeasured]
+    told = [f"block '{block}' is not in {table.source}; it is not compared" for block in unmeasured]
     return Judgement(
         sweep=members.source,
         source=table.source,
@@ -107,7 +107,7 @@ def judge(
 
 
 def _incomplete(evidence: Evidence) -> list[str]:
-    """Say of which measured quantities finished members have no value."""
+    """Report measured quantities of which finished members have no value."""
     finished = int(evidence.members.finished.sum())
     return [
         f"{finished - pair.known.size} finished members have no {_named(pair.measured)}: they count as outside"

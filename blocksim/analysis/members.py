@@ -16,7 +16,7 @@ FINISHED = "finished"
 
 
 class Failure(NamedTuple):
-    """A member without a result: its row counted from 1, the name of its case, how it ended and why."""
+    """A member without a result: its row counted from 1, the name of its case, status and reason."""
 
     row: int
     case: str
@@ -42,7 +42,7 @@ class Members:
             message = f"{self.source}: not the table of a sweep: no column {' and '.join(missing)}"
             raise InvalidInputError(message)
         if not self.finished.any():
-            message = f"{self.source}: none of the {self.count} cases has finished, there is nothing to compare"
+            message = f"{self.source}: none of the {self.count} cases has finished; nothing to compare"
             raise InvalidInputError(message)
 
     @property
@@ -68,7 +68,7 @@ class Members:
 
     @property
     def blocks(self) -> tuple[str, ...]:
-        """The blocks of which anything is known, in the order of the columns."""
+        """The blocks with any result, in the order of the columns."""
         ends = tuple(f".{quantity.final_column}" for quantity in QUANTITIES.values())
         names = (str(name) for name in self.table.columns)
         return tuple(dict.fromkeys(name.rpartition(".")[0] for name in names if name.endswith(ends)))

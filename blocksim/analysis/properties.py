@@ -62,7 +62,7 @@ def load_properties(path: Path | str) -> PropertyTable:
 
 
 def _read_property(row: dict[str, Cell], values: dict[str, float], table: Table) -> None:
-    """Check one row and keep its value in SI, or note what is wrong with it."""
+    """Check one row and store its value in SI, or record its error."""
     name = row["property"].text
     bounds = PROPERTIES.get(name)
     if bounds is None:

@@ -1,4 +1,4 @@
-"""What k of n tells about a probability: exact limits after Clopper and Pearson (Biometrika 26, 1934).
+"""Exact limits of a probability from k of n, after Clopper and Pearson (Biometrika 26, 1934).
 
 They hold at least the stated confidence whatever the probability is. Each is the probability at which k, or more
 (fewer), of n has just the remaining chance; a quantile of a beta distribution solves that equation.
@@ -10,7 +10,7 @@ CONFIDENCE = 0.95
 
 
 def interval(count: int, total: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Return the two-sided limits of the probability behind `count` of `total`; (0, 1) where `total` is 0."""
+    """Return the two-sided limits of the probability, given `count` of `total`; (0, 1) where `total` is 0."""
     tail = 0.5 * (1.0 - confidence)
     return _lower(count, total, tail), 1.0 - _lower(total - count, total, tail)
 

@@ -1,1 +1,1 @@
-"""How fast it is: measurements of speed and memory, run on demand (`blocksim bench`), and other engines beside it."""
+"""Measurements of speed and memory, run on demand (`blocksim bench`), also of other engines."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a measurement has found, and how long it took."""
+    """Result of a measurement, and its duration."""
 
     measurement: Measurement
     setting: Setting
@@ -55,7 +55,7 @@ def run_measurement(measurement: Measurement, setting: Setting) -> Outcome:
 
 
 def report(machine: Machine, outcomes: Sequence[Outcome]) -> dict[str, object]:
-    """Return everything for programs; what is not finite becomes None, as JSON has no such numbers."""
+    """Return everything for programs; numbers that are not finite become None, as JSON has none."""
     found = {"machine": machine.to_dict(), "measurements": [outcome.to_dict() for outcome in outcomes]}
     plain: dict[str, object] = json.loads(json.dumps(found), parse_constant=lambda _: None)
     return plain

@@ -1,4 +1,4 @@
-"""Ensembles: how many collapses of the three blocks a second, each with friction of its own, by both schemes."""
+"""Ensembles: collapses of the three blocks per second, each with its own friction, by both schemes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ THREADS = (1, 2)
 
 
 class Way(NamedTuple):
-    """How the collapses are computed."""
+    """Settings of the collapses."""
 
     scheme: str
     contact: Table

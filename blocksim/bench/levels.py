@@ -1,4 +1,4 @@
-"""One collapse of the three blocks at several settings, and which of these are fine enough."""
+"""One collapse of the three blocks at several settings, and the settings that are fine enough."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Level:
         return statistics.median(self.seconds)
 
     def off(self, other: Level) -> float:
-        """Return how far (m) the block that differs most ends from where it ends in another way."""
+        """Return the largest distance (m) between final positions of a block by this and another way."""
         return float(np.hypot(*(self.centres - other.centres)).max())
 
     def detail(self, finest: Level) -> dict[str, object]:

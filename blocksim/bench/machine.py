@@ -1,4 +1,4 @@
-"""The machine that numbers come from, and whether it had anything else to do."""
+"""The machine of a measurement, and its load."""
 
 import os
 from dataclasses import asdict, dataclass
@@ -20,7 +20,7 @@ class Machine:
     numpy: str
     blocksim: str
     code: str
-    load: float | None  # None where the system does not tell
+    load: float | None  # None where the system does not report it
 
     @property
     def is_busy(self) -> bool:
@@ -28,7 +28,7 @@ class Machine:
         return self.load is not None and self.load > BUSY
 
     def lines(self) -> list[str]:
-        """Return it for people."""
+        """Return it as text."""
         load = "unknown" if self.load is None else f"{self.load:.2f}"
         found = [
             f"{self.processor}, {self.cores} cores, load {load} at the start",
@@ -36,7 +36,7 @@ class Machine:
             self.platform,
         ]
         if self.is_busy:
-            found.append("The machine is busy with something else: times are upper bounds and scatter.")
+            found.append("Other processes are running: times are upper bounds and scatter.")
         return found
 
     def to_dict(self) -> dict[str, object]:
@@ -45,7 +45,7 @@ class Machine:
 
 
 def this_machine() -> Machine:
-    """Return the machine we are on; the load is that of this moment."""
+    """Return this machine with its present load."""
     found = environment()
     names = ("processor", "platform", "python", "numba", "numpy", "blocksim", "code")
     return Machine(cores=os.cpu_count() or 1, load=_load(), **{name: found[name] for name in names})

@@ -1,4 +1,4 @@
-"""What a measurement of speed is, and what it finds: numbers with the samples that they come from."""
+"""Definition of a measurement of speed, and its result: numbers with their samples."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Setting:
-    """What a measurement is run with."""
+    """Settings of a measurement."""
 
     quick: bool = False  # its shortened size
     repeats: int = REPEATS
@@ -53,10 +53,10 @@ class Setting:
 
 @dataclass(frozen=True)
 class Findings:
-    """What a measurement has found."""
+    """Result of a measurement."""
 
     numbers: tuple[Number, ...]
-    notes: tuple[str, ...] = ()  # what a reader has to know about the numbers
+    notes: tuple[str, ...] = ()  # notes on the numbers
     details: tuple[Mapping[str, object], ...] = ()  # more of it, for programs
     panel: Panel | None = None  # part of the work-precision picture
 
@@ -72,10 +72,10 @@ class Measurement:
 
 
 def repeated(quantity: str, unit: str, sample: Callable[[], float], repeats: int) -> Number:
-    """Return a number sampled so many times."""
+    """Return a number with its samples."""
     return Number(quantity, unit, tuple(float(sample()) for _ in range(repeats)))
 
 
 def single(quantity: str, unit: str, value: float) -> Number:
-    """Return a number that needs no repeats: counted, or worked out from others."""
+    """Return a number that needs no repeats: counted, or computed from others."""
     return Number(quantity, unit, (float(value),))

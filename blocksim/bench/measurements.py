@@ -76,4 +76,4 @@ def _unknown(name: str, known: Sequence[str], *, peers: bool) -> str:
     meant = nearest(name, known, MOST_SLIPS)
     hint = f", did you mean '{meant}'?" if meant else ";"
     where = " with --peers" if peers else ""
-    return f"bench: NAME '{name}': no such measurement{hint} There are{where}: {', '.join(known)}".replace("; T", "; t")
+    return f"bench: NAME '{name}': no such measurement{hint} Choose{where}: {', '.join(known)}".replace("; C", "; c")

@@ -1,4 +1,4 @@
-"""Pushed walls with the non-smooth scheme: time of a substep, its growth, and where a collapse ends."""
+"""Pushed walls with the non-smooth scheme: time of a substep, its growth, and the end of a collapse."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ USUAL = Stepping(1e-3)
 
 @dataclass(frozen=True)
 class Wall:
-    """What was found for one size."""
+    """Result for one size."""
 
     size: Size
     seconds: tuple[float, ...]  # CPU time of every repeat
@@ -82,7 +82,7 @@ def measure(setting: Setting) -> Findings:
     note = (
         f"running bond of 32 x 25 mm, pushed with 1 m/s y/H, restitution 0.1, {USUAL.setting}; a substep and growth: "
         f"the first {common:g} s of every wall (the higher, the less of it has fallen by then), {first.rebuilds} to "
-        f"{last.rebuilds} pair lists made anew, {first.sweeps / first.substeps:.2f} to "
+        f"{last.rebuilds} pair list updates, {first.sweeps / first.substeps:.2f} to "
         f"{last.sweeps / last.substeps:.2f} velocity sweeps a substep"
     )
     return Findings(numbers, notes=(note,), details=tuple(wall.detail() for wall in (whole, *walls)))

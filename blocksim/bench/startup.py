@@ -1,4 +1,4 @@
-"""Starting the command: what a user waits for, in wall time."""
+"""Start of the command: waiting time of the user, in wall time."""
 
 from __future__ import annotations
 
@@ -56,6 +56,6 @@ def _seconds(code: str, *arguments: str, **environment: str) -> float:
     )
     seconds = time.perf_counter() - began
     if done.returncode != 0:
-        told = done.stderr.strip().splitlines() or ["nothing was told"]
+        told = done.stderr.strip().splitlines() or ["no message"]
         raise StartError(f"blocksim {' '.join(arguments)}: exit code {done.returncode}: {told[-1]}")
     return seconds

@@ -1,4 +1,4 @@
-"""The non-smooth scheme at one setting, for whatever is measured with it."""
+"""The non-smooth scheme at one setting, for measurements."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two threads on one wall: by how much they are faster than one, and that small walls do not become slower."""
+"""Two threads on one wall: their speed-up over one, and that small walls do not become slower."""
 
 from __future__ import annotations
 
@@ -71,10 +71,10 @@ def compared(case: Case, repeats: int) -> Iterable[Number]:
 
 
 def notes(cases: Sequence[Case]) -> tuple[str, ...]:
-    """Tell what a speed-up is, and which walls have none."""
-    note = f"speed-up: one thread's seconds of the clock over those of {THREADS}; {THREADS} cores must be idle"
+    """Explain the speed-up, and which walls have none."""
+    note = f"speed-up: wall time of one thread over that of {THREADS}; {THREADS} cores must be idle"
     few = [case.blocks for case in cases if case.threads == 1]
-    unused = f"walls of {', '.join(map(str, few))} blocks are left to one thread, whatever is asked for"
+    unused = f"walls of {', '.join(map(str, few))} blocks always use one thread"
     return (note, unused) if few else (note,)
 
 

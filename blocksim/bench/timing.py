@@ -72,7 +72,7 @@ class Rerun:
     def run(self, last_step: int) -> Timed:
         """Advance from the start to a step, or until all rests; more room for pairs is part of it.
 
-        Raises RunFailedError: the time of a run that broke off says nothing.
+        Raises RunFailedError: the time of a failed run is meaningless.
         """
         self.restore()
         began = time.process_time()
@@ -85,7 +85,7 @@ class Rerun:
             np.copyto(array, saved)
 
     def advance(self, last_step: int, team: Team = ALONE) -> AnyScene:
-        """Go on from wherever it is. Raises RunFailedError."""
+        """Continue from the present state. Raises RunFailedError."""
         scene, status = team.advance(self.scene, last_step)
         outcome = BY_CODE[status]
         if not outcome.is_finished:

@@ -43,14 +43,14 @@ class Sized(Protocol):
 
 SIZES = (Size(10, 10), Size(40, 25), Size(125, 80), Size(400, 250))
 QUICK_SIZES = (Size(10, 10), Size(25, 16))
-STIFFNESS_SCALE = 1e-4  # long steps, so that blocks move on and pair lists are made again, as in a whole collapse
+STIFFNESS_SCALE = 1e-4  # long steps, so that blocks move and pair lists are updated, as in a whole collapse
 STEPS, QUICK_STEPS = 300, 150
 FEWEST_BLOCKS = 3000  # of one sample: smaller walls are advanced several times
 
 
 @dataclass(frozen=True)
 class Wall:
-    """What was found for one size."""
+    """Result for one size."""
 
     size: Size
     times: Number  # ns per block and step
@@ -75,7 +75,7 @@ def measure(setting: Setting) -> Findings:
     first = walls[0]
     note = (
         f"running bond, pushed with 1 m/s y/H, restitution 0.1, stiffness_scale {STIFFNESS_SCALE:g}, the first "
-        f"{1e3 * first.duration:.1f} ms, {first.rebuilds} to {walls[-1].rebuilds} pair lists made anew"
+        f"{1e3 * first.duration:.1f} ms, {first.rebuilds} to {walls[-1].rebuilds} pair list updates"
     )
     return Findings(numbers, notes=(note,), details=tuple(_detail(wall) for wall in walls))
 

@@ -118,4 +118,4 @@ def _write(path: Path, content: bytes) -> None:
 @functools.cache
 def _tell_damage(folder: Path) -> None:
     """Tell of damage, once a process."""
-    log.warning("%s: compiled code is damaged there; what is damaged is compiled anew (less than a minute) ...", folder)
+    log.warning("%s: damaged compiled code found; recompiling it (less than a minute) ...", folder)

@@ -113,11 +113,11 @@ def read_checkpoint(path: Path) -> Stored:
         content = _content(path)
         body, digest = content[:-DIGEST_BYTES], content[-DIGEST_BYTES:]
         if hashlib.sha256(body).digest() != digest:
-            raise ValueError("its checksum is not that of its content")  # noqa: TRY301 - reported as all other damage
+            raise ValueError("its checksum does not match its content")  # noqa: TRY301 - reported as all other damage
         head, arrays = _parts(body)
     except (OSError, ValueError, MemoryError, ValidationError) as error:  # memory: of an array of a forged size
         reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
-        raise InvalidInputError(f"{path}: not a whole checkpoint: {reason}") from error
+        raise InvalidInputError(f"{path}: not a complete checkpoint: {reason}") from error
     return Stored(path, head, arrays)
 
 
@@ -125,7 +125,7 @@ def _content(path: Path) -> bytes:
     """Return all bytes of a file. Raises OSError, and ValueError where their copies would not fit into memory."""
     size, available = path.stat().st_size, available_bytes()
     if available is not None and COPIES * size > available:
-        raise ValueError(f"it has {readable(size)}, and {readable(available)} of memory are free")
+        raise ValueError(f"it has {readable(size)}, but only {readable(available)} of memory are free")
     return path.read_bytes()
 
 
@@ -136,7 +136,7 @@ def restored(stored: Stored, built: AnyScene) -> AnyScene:
     """
     types, arrays = stored.head.arrays, stored.arrays
     if len(types) != len(arrays_of(built)):
-        raise InvalidInputError(f"{stored.path}: {len(types)} arrays are not those of this scene")
+        raise InvalidInputError(f"{stored.path}: its {len(types)} arrays do not fit this scene")
     scene: AnyScene = _filled(built, zip(types, arrays, strict=True), stored.path)
     return scene
 
@@ -154,7 +154,7 @@ def _array_like(built: NDArray[Any], kind: ArrayType, content: NDArray[np.uint8]
     count = math.prod(kind.shape)
     is_alike = kind.dtype == str(built.dtype) and len(kind.shape) == built.ndim and min(kind.shape, default=0) >= 0
     if not is_alike or content.size != count * built.dtype.itemsize:
-        raise InvalidInputError(f"{path}: an array {kind} is not one of this scene")
+        raise InvalidInputError(f"{path}: an array {kind} does not fit this scene")
     array: NDArray[Any] = zeros(kind.shape, built.dtype).view(type(built))
     if count:
         array[...] = content.view(built.dtype).reshape(kind.shape)
@@ -171,7 +171,7 @@ def _parts(body: bytes) -> tuple[Head, tuple[NDArray[np.uint8], ...]]:
     head = Head.model_validate_json(file.readline())
     arrays = tuple(np.asarray(npy.read_array(file, allow_pickle=False)) for _ in head.arrays)
     if any(array.dtype != np.uint8 or array.ndim != 1 for array in arrays):
-        raise ValueError("an array is not one of bytes")
+        raise ValueError("an array is not an array of bytes")
     return head, arrays
 
 

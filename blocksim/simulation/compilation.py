@@ -51,8 +51,8 @@ def compile_kernels(kernels: str = SURFACE) -> float:
         _compile(kernels)
     except OSError as error:
         message = (
-            f"{jit.cache_folder()}: the compiled solver cannot be kept there: {error.strerror or error}; "
-            "make room, or set BLOCKSIM_CACHE_DIR to a folder on another disk"
+            f"{jit.cache_folder()}: the compiled solver cannot be stored there: {error.strerror or error}; "
+            "free some space, or set BLOCKSIM_CACHE_DIR to a folder on another disk"
         )
         raise OutputError(message) from error
     return time.perf_counter() - began

@@ -93,7 +93,7 @@ def _what_is_in_the_way(folder: Path) -> str:
     try:
         for place in (folder, *folder.parents):
             if place.is_symlink() and not place.exists():
-                return f"{place} is a link that leads nowhere"
+                return f"{place} is a broken link"
             if place.exists() and not place.is_dir():
                 return f"{place} is a file, not a folder"
     except OSError:  # a name that is too long, which the system reports
@@ -113,7 +113,7 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
         if present and not overwrite:
             _refuse_finished(folder)
             message = (
-                f"{folder}: a run that did not finish (stopped or failed) is there; --resume continues it, "
+                f"{folder}: contains an unfinished run (stopped or failed); --resume continues it, "
                 "--overwrite replaces it, --out DIR writes elsewhere"
             )
             raise OutputExistsError(message)
@@ -201,7 +201,7 @@ def remove_run(folder: Path) -> None:
 
 def _refuse_finished(folder: Path) -> None:
     if is_finished(folder):
-        message = f"{folder}: another run is there; --overwrite replaces it, --out DIR writes elsewhere"
+        message = f"{folder}: contains another run; --overwrite replaces it, --out DIR writes elsewhere"
         raise OutputExistsError(message)
 
 

@@ -53,7 +53,7 @@ BY_CODE = {
     arrays.AT_REST: REST,
     arrays.NOT_FINITE: Outcome("failed", "a position or velocity is no longer finite", ExitCode.NUMERICAL_FAILURE),
     arrays.TOO_FAST: Outcome(
-        "failed", "a block moves too far in one step for its contacts to be found", ExitCode.NUMERICAL_FAILURE
+        "failed", "a block moves too far in one step for its contacts to be detected", ExitCode.NUMERICAL_FAILURE
     ),
     arrays.OVERLAP_LIMIT: Outcome("failed", "an overlap exceeds contact.max_overlap", ExitCode.NUMERICAL_FAILURE),
 }

@@ -98,6 +98,6 @@ def read_final(folder: Path, scenario: Scenario) -> Columns:
     path = folder / files.FINAL
     columns = read_table(path)
     if columns["block"] != [body.name for body in place_bodies(scenario)]:
-        message = f"{path}: holds other blocks than {files.SCENARIO} beside it"
+        message = f"{path}: its blocks are not those of {files.SCENARIO}"
         raise InvalidInputError(message)
     return columns

@@ -211,7 +211,9 @@ def _holds(path: Path, content: bytes) -> bool:
 
 
 def _foreign(path: Path) -> OutputExistsError:
-    return OutputExistsError(f"{path}: not as blocksim wrote it; move it away, or write elsewhere with --out DIR")
+    return OutputExistsError(
+        f"{path}: changed since blocksim wrote it; move it away, or write elsewhere with --out DIR"
+    )
 
 
 def resolved_beside(scenario: Scenario, tables: Mapping[str, bytes]) -> str:

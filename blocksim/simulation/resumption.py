@@ -83,12 +83,12 @@ def check_frames(stored: Stored, recorder: Recorder) -> None:
     if count != position.frames:
         raise InvalidInputError(
             f"{path}: holds {count} of the {position.frames} frames before step {position.step}, at which "
-            f"{stored.path.name} goes on; {REMEDY}"
+            f"{stored.path.name} resumes; {REMEDY}"
         )
     if recorder.digest_until(position.step) != position.frames_sha256:
         raise InvalidInputError(
-            f"{path}: changed since the run was interrupted: the {count} frames before step {position.step} do not "
-            f"have the SHA-256 that {stored.path.name} has of them; {REMEDY}"
+            f"{path}: changed after the interruption: the {count} frames before step {position.step} do not "
+            f"match the SHA-256 in {stored.path.name}; {REMEDY}"
         )
 
 
@@ -97,11 +97,11 @@ def _newest_good(paths: list[Path], scenario: Scenario) -> Resumption:
     remarks: list[str] = []
     whole = sorted(_whole(paths, remarks), key=lambda stored: stored.position.step)
     if not whole:
-        raise InvalidInputError("\n".join([*remarks, f"{paths[0].parent}: no checkpoint is whole; {REMEDY}"]))
+        raise InvalidInputError("\n".join([*remarks, f"{paths[0].parent}: no checkpoint is complete; {REMEDY}"]))
     newest, origin = whole[-1], origin_of(scenario)
     refuse_other(newest.path, newest.head.origin, origin)
     if remarks:
-        remarks.append(f"the run goes on from the other checkpoint, {newest.path.name}")
+        remarks.append(f"resuming from the other checkpoint, {newest.path.name}")
     if newest.head.origin.machine != origin.machine:
         was = newest.head.origin.machine
         remarks.append(f"this part runs on another machine than before ({was}): the last digits may differ")

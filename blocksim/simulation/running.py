@@ -197,7 +197,7 @@ class Part:
             return ()
         more = f" and {len(steps) - 1} more" if len(steps) > 1 else ""
         where = f"{self.folder / files.FRAMES}: the frame of step {steps[0]}{more}"
-        return (f"{where} is not what comes out now: changed since it was recorded",)
+        return (f"{where} differs from the recomputed one: it was changed after recording",)
 
     def _writer(self, sink: FrameFile, precautions: CheckpointPolicy) -> CheckpointWriter:
         return CheckpointWriter(
@@ -262,7 +262,7 @@ def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds:
 def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResult) -> Iterator[str]:
     residual, every = ended.ledger.relative_residual, scenario.output.every
     if residual > RESIDUAL_PROMISE:
-        yield f"energy is off by {residual:.1e} of the energy in play, more than {RESIDUAL_PROMISE:g}"
+        yield f"relative energy error {residual:.1e}, above {RESIDUAL_PROMISE:g}"
     if is_shorter_than_step(every, float(ended.world.controls[0].step)):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     if isinstance(scenario.time, Nonsmooth) and ended.outcome.is_finished:
@@ -293,8 +293,8 @@ def refuse_full_disk(folder: Path, scenario: Scenario, scene: AnyScene) -> None:
     free = shutil.disk_usage(place).free
     if needed > free:
         raise OutputError(
-            f"{folder}: the results may take {readable(needed)} and {readable(free)} are free on that disk; write "
-            "elsewhere with --out DIR, or fewer frames (output.every, time.end)"
+            f"{folder}: the results may take {readable(needed)}, but only {readable(free)} are free there; write "
+            "elsewhere with --out DIR, or store fewer frames (output.every, time.end)"
         )
 
 

@@ -118,7 +118,7 @@ def read_table(path: Path) -> Columns:
 def _columns_of(lines: Iterator[list[str]]) -> Columns:
     """Return the columns in the lines of a file, which are not kept. Raises ValueError."""
     if tuple(next(lines, ())) != COLUMNS:
-        raise ValueError(f"the columns have to be {','.join(COLUMNS)}")
+        raise ValueError(f"the columns must be {','.join(COLUMNS)}")
     columns: Columns = {name: [] for name in COLUMNS}
     for number, cells in enumerate(lines, start=1):
         if len(cells) != len(COLUMNS):

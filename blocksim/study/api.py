@@ -111,7 +111,7 @@ def _folder(place: Place) -> Path:
     if not isinstance(place, Result):
         return Path(place)
     if place.folder is None:
-        message = f"{place.name}: this result is in memory only; run it with out=FOLDER to keep what pictures need"
+        message = f"{place.name}: this result is in memory only; run it with out=FOLDER to store what pictures need"
         raise InvalidInputError(message)
     return place.folder
 

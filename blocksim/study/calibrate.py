@@ -87,11 +87,11 @@ def calibrate(  # noqa: PLR0913 - one argument for each option of the command
 def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None:
     """Make the folder, and room in it. Raises OutputExistsError for files that must not go."""
     if path.is_dir():
-        raise OutputExistsError(f"{path}: this is a folder; name a file")
+        raise OutputExistsError(f"{path}: this is a folder; a file name is needed")
     if path.exists() and not overwrite:
         raise OutputExistsError(f"{path}: already exists; --overwrite replaces it, --out FILE writes elsewhere")
     if journal.exists() and journal.stat().st_size and not (resume or overwrite):
-        message = f"{journal}: trials of a calibration are there; --resume continues them, --overwrite starts again"
+        message = f"{journal}: has trials of a calibration; --resume continues them, --overwrite starts again"
         raise OutputExistsError(message)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -117,7 +117,7 @@ def _searched(plan: Plan, journal: Path, trials: int, on_trial: OnTrial) -> Tria
                 if trial.number > done:
                     on_trial(trial, best, trials)
         except KeyboardInterrupt:
-            message = f"stopped after {len(finished_trials(study))} of {trials} trials; --resume runs the others"
+            message = f"stopped after {len(finished_trials(study))} of {trials} trials; --resume runs the rest"
             raise StoppedEarlyError(message) from None
     if best is None:
         raise InvalidInputError("at least one trial is needed")

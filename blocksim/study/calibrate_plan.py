@@ -30,7 +30,7 @@ TABLE = "experiment.table"
 NO_FIT = "nothing to fit: give --fit KEY=FROM:TO"
 NO_SCATTER = (
     "no input scatter: give --scatter KEY=MEAN+-SD (or KEY=FROM:TO), or a [sweep] table with distributions; "
-    "--members 1 fits a single run, whose agreement may be luck"
+    "--members 1 fits a single run, whose agreement may be chance"
 )
 
 
@@ -248,12 +248,12 @@ def _unfit_scatter(fits: Sweep, scattered: Sweep, texts: Mapping[str, str]) -> I
         where = f"{SCATTER} {texts[key]}" if key in texts else f"[sweep] {key}"
         fitted = fits.vary.get(parsed.get(parse_key(key), ""))
         if fitted is not None and isinstance(values, tuple):
-            yield Problem(where, "this key is fitted; its scatter has to be a distribution, not a list")
+            yield Problem(where, "this key is fitted; its scatter must be a distribution, not a list")
         elif isinstance(fitted, Uniform) and not isinstance(values, tuple) and fitted.angle != values.angle:
-            yield Problem(where, "this key is fitted within a prior of another unit; write both in the same unit")
+            yield Problem(where, "prior and scatter of this key have different units; use the same unit")
     for key, other in _nested(scattered.vary, fits.vary):
         where = f"{SCATTER} {texts[key]}" if key in texts else f"[sweep] {key}"
-        yield Problem(where, f"this lies inside or around {other}, which is fitted; scatter {other} itself")
+        yield Problem(where, f"this is part of {other}, or contains it, which is fitted; scatter {other} itself")
 
 
 def _nested(keys: Iterable[str], others: Sequence[str] | Mapping[str, object]) -> list[tuple[str, str]]:
@@ -267,4 +267,4 @@ def _nested(keys: Iterable[str], others: Sequence[str] | Mapping[str, object]) -
 
 
 def _inside(key: str, other: str, fit: Variations) -> Problem:
-    return Problem(f"{FIT} {fit.texts[key]}", f"this lies inside or around {other}, which is fitted too")
+    return Problem(f"{FIT} {fit.texts[key]}", f"this is part of {other}, or contains it, which is fitted too")

@@ -251,7 +251,7 @@ class _AlreadyLocked:
 def _take(file: int, journal: Path) -> None:
     """Lock a file until it is closed; raises OutputExistsError where somebody else has it."""
     if not takes_lock(file):
-        message = f"{journal}: another calibration is writing here; wait for its end, or choose another file with --out"
+        message = f"{journal}: another calibration is running here; wait for it, or choose another file with --out"
         raise OutputExistsError(message)
 
 

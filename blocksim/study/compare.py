@@ -82,7 +82,7 @@ def _remarks(scenario: Scenario | None) -> tuple[str, ...]:
     if plan is None or plan.is_sampled:
         return ()
     return (
-        f"mode {plan.mode!r} chooses its members: shares count them, they are no probabilities",
+        f"mode {plan.mode!r} sets its members: shares are counts, not probabilities",
         "the 95 % limits hold for samples only (modes lhs, sobol, normal)",
     )
 

@@ -73,7 +73,7 @@ def converge(  # noqa: PLR0913 - one argument for each option of the command
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
     if not tolerance_mm > 0.0 or levels < FEWEST_LEVELS:
-        message = f"the tolerance has to be above 0 mm and levels {FEWEST_LEVELS} or more"
+        message = f"the tolerance must be above 0 mm and levels {FEWEST_LEVELS} or more"
         raise InvalidInputError(message)
     scenario = scenario.model_copy(update={"sweep": None})
     check_experiment(scenario)
@@ -204,7 +204,7 @@ def refinements_of(scenario: Scenario, studies: Iterable[str] | None = None) -> 
     asked = STUDIES if studies is None else tuple(studies)
     unknown = [name for name in asked if name not in STUDIES]
     if unknown:
-        message = f"'{unknown[0]}' is no study of convergence; there are {', '.join(STUDIES)}"
+        message = f"'{unknown[0]}' unknown convergence study; choose {', '.join(STUDIES)}"
         raise InvalidInputError(message)
     chosen = tuple(one for one in _possible(scenario) if one.study in asked)
     if not chosen:

@@ -124,7 +124,7 @@ def read_columns(path: Path) -> list[Column]:
     heads, rows = read_open_table(path, LARGEST_FILE)
     problems = list(rows.problems)
     if not rows.rows and not problems:
-        problems.append(rows.header.problem("no row follows; every row is one case"))
+        problems.append(rows.header.problem("no row follows the header; every row is one case"))
     if len(heads) > MAX_VARIED:
         problems.append(rows.header.problem(f"{len(heads)} columns are too many; at most {MAX_VARIED} can be varied"))
     columns = [_column(head, [row[head.text] for row in rows.rows], problems) for head in heads]

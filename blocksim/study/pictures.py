@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 FEWEST_LEVELS = 2  # to show a distance
 TORNADO = "tornado"
 MEANINGS = {
-    "--at": "picks frames of a run's strip or final picture",
-    "--frames": "counts the panels of a run's strip",
-    "--panels": "chooses the panels of a run's history",
-    "--block": "chooses the blocks of a run's history",
-    "--relative": "moves a run's history with the ground",
+    "--at": "selects frames of a run's strip or final picture",
+    "--frames": "sets the number of panels of a run's strip",
+    "--panels": "selects the panels of a run's history",
+    "--block": "selects the blocks of a run's history",
+    "--relative": "plots a run's history relative to the ground",
     "--forces": "shows contacts of a run",
     "--colour": "colours the blocks of a run",
 }
@@ -209,7 +209,7 @@ def draw_run(  # noqa: PLR0913 - what a picture is made of
     kind or format and options that mean nothing for it, what `stored_run` raises, OutputError.
     """
     draw = kind_named(kind)
-    refuse(asked.beside(kind), f"this picture is of the kind {kind}")
+    refuse(asked.beside(kind), f"this picture is of kind {kind}")
     stored = stored_run(run)
     scenario = stored.scenario
     table = experiment or (scenario.experiment.table if scenario.experiment is not None else None)
@@ -287,7 +287,7 @@ def read_indices(path: Path) -> tuple[list[Bars], tuple[str, str]]:
     if table.problems:
         raise_problems(table.problems)
     if not rows:
-        message = f"{path}: no result varies, there is nothing to draw"
+        message = f"{path}: no result varies; nothing to draw"
         raise InvalidInputError(message)
     outputs = dict.fromkeys(str(row["output"]) for row in rows)
     return [_bars([row for row in rows if row["output"] == output], shown) for output in outputs], shown.labels

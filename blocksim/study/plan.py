@@ -126,7 +126,7 @@ def cases_of(document: Document, sweep: Sweep) -> Cases:
     """
     design = design_of(sweep)
     if len(design) > MOST_CASES:
-        message = f"{len(design)} cases are too many for one sweep; at most {MOST_CASES} are possible"
+        message = f"{len(design)} cases are too many for one sweep; at most {MOST_CASES} are allowed"
         raise InvalidInputError(message)
     _refuse_wrong_draws(document, sweep, design)
     cases = Cases(_for_cases(document), design, heads_of(sweep))

@@ -141,7 +141,7 @@ class Manifest:
             raise OutputError(message) from error
         if not takes_lock(self._file):
             os.close(self._file)
-            message = f"{path.parent}: this sweep is running already; wait for it, or write elsewhere with --out DIR"
+            message = f"{path.parent}: this sweep is already running; wait for it, or write elsewhere with --out DIR"
             raise OutputExistsError(message)
         self.size = os.fstat(self._file).st_size
         if self.size and os.pread(self._file, 1, self.size - 1) != NEWLINE:

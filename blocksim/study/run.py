@@ -40,7 +40,7 @@ def run(  # noqa: PLR0913 - what a user can choose for a run
     with `overwrite` or without `out`.
     """
     if resume and (overwrite or out is None):
-        raise ValueError("a run is resumed where it was kept: resume needs out, and cannot go with overwrite")
+        raise ValueError("resume needs out=FOLDER, and cannot be combined with overwrite")
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
     check_experiment(scenario)

@@ -186,7 +186,7 @@ def _analysed(
     if whole.sum() < max(LEAST_BLOCKS, LEAST_SHARE * len(whole)):
         raise TooManyFailuresError(
             f"{len(problems)} of {len(members)} runs failed, in {np.sum(~whole)} of {len(whole)} {method.sample_word}; "
-            f"no indices can be given. The first: {problems[0]}"
+            f"no indices can be computed. The first: {problems[0]}"
         )
     kept = np.repeat(whole, rows)
     finals = [member.final for member, is_kept in zip(members, kept, strict=True) if is_kept and member.final]

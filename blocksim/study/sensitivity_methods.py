@@ -130,9 +130,9 @@ SOBOL = Method(
     samples=128,
     sample_word="base samples",
     columns={
-        "S1": "share of the variance that goes when the key is known",
+        "S1": "share of the variance that is removed when the key is known",
         "± S1": "half-width of the 95 % interval of S1, bootstrapped",
-        "ST": "share of the variance that stays when all other keys are known",
+        "ST": "share of the variance that remains when all other keys are known",
         "± ST": "half-width of the 95 % interval of ST, bootstrapped",
     },
     rows_of_block=lambda keys: keys + 2,

@@ -41,7 +41,7 @@ def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Pat
 def _not_run(scenario: Path, folder: Path) -> str:
     """Say that a scenario has not been run as it is, and where runs of it with other values are."""
     newest = files.newest_finished(folder.parent) if folder.parent.is_dir() else None
-    message = f"{scenario}: no finished run of this scenario as it is; first: blocksim run {scenario}"
+    message = f"{scenario}: no finished run of this scenario without changes; first: blocksim run {scenario}"
     if newest is None:
         return message
     return f"{message}\nruns with other values (--set, or an older file) are in {folder.parent}; the newest: {newest}"
@@ -52,7 +52,7 @@ def _run_in(place: Path, needed: Sequence[str]) -> Path:
     if not missing:
         return place
     if (place / files.SCENARIO).is_file():
-        message = f"{place}: this run is not complete (there is no {missing[0]}); blocksim run --overwrite repeats it"
+        message = f"{place}: this run is not complete (no {missing[0]}); repeat it with blocksim run --overwrite"
         raise InputMissingError(message)
     newest = files.newest_finished(place)
     if newest is not None:
@@ -77,7 +77,7 @@ class StoredRun:
         state = _state(self.folder)
         if not state:
             return ""
-        return f"{self.folder}: {state}; its {len(self.frames)} frames go to {float(self.frames.time[-1]):.4g} s"
+        return f"{self.folder}: {state}; its {len(self.frames)} frames end at {float(self.frames.time[-1]):.4g} s"
 
 
 def stored_run(place: Path | str) -> StoredRun:

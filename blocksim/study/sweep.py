@@ -100,10 +100,10 @@ def _chosen(executor: str | None, scheduler: str | None, *, keep_cases: bool) ->
     """Return the executor that the other options ask for. Raises InvalidInputError where they contradict it."""
     needed = WITH_SCHEDULER if scheduler is not None else WITH_FOLDERS if keep_cases else executor or DEFAULT
     if keep_cases and WITH_SCHEDULER in {needed, executor}:
-        raise InvalidInputError("folders of cases are kept on this machine only: not with a scheduler")
+        raise InvalidInputError("folders of cases are kept on this machine only, not with a scheduler")
     if executor is not None and executor != needed:
         why = "a scheduler" if scheduler is not None else "keeping the folders of cases"
-        message = f"{why} goes with the executor {needed}, not {executor}"
+        message = f"{why} needs the executor {needed}, not {executor}"
         executor_named(executor)
         raise InvalidInputError(message)
     if needed == WITH_SCHEDULER and scheduler is None:
@@ -132,7 +132,7 @@ def _plan_of(base: Scenario) -> Sweep:
         message = "nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario"
         raise InvalidInputError(message)
     if MEASURED in base.sweep.vary:
-        message = f"{MEASURED} cannot be varied: compare --experiment judges by another table"
+        message = f"{MEASURED} cannot be varied; compare --experiment uses another table"
         raise InvalidInputError(message)
     check_experiment(base)
     return base.sweep
@@ -280,7 +280,7 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
 
 def _what_is_missing(folder: Path, done: CaseIndex, count: int) -> Iterator[str]:
     """Yield it by shards, those of the job array with the most jobs where there were several."""
-    yield f"{folder}: {count - done.count()} of {count} cases are missing; --allow-missing makes a table without them"
+    yield f"{folder}: {count - done.count()} of {count} cases are missing; --allow-missing merges the others"
     of = max((int(match[1]) for path in done.paths if (match := SHARDED.fullmatch(path.name))), default=1)
     shards = [(shard, len(shard.numbers(count))) for shard in (Shard(index, of) for index in range(of))]
     missing = [(shard, size - done.count(shard), size) for shard, size in shards if done.count(shard) < size]

@@ -36,7 +36,7 @@ def read_sweep_data(folder: Path, experiment: Path | None = None) -> FoundSweep:
     blocks = blocks_in(map(str, table.columns))
     finished = (table["status"] == FINISHED).to_numpy(dtype=bool)
     if not blocks or not finished.any():
-        message = f"{folder}: no case of this sweep has finished, there is nothing to draw"
+        message = f"{folder}: no case of this sweep has finished; nothing to draw"
         raise InvalidInputError(message)
     members = Members(table, str(folder / TABLE))
     x_mm, rotation_deg = (_columns(members, quantity) for quantity in ("x", "rotation"))
@@ -76,7 +76,7 @@ def _columns(members: Members, quantity: str) -> Floats:
     """Return one quantity of all blocks, (count, b); NaN where a member has none. Raises InvalidInputError."""
     found = np.stack([members.values(block, quantity) for block in blocks_in(map(str, members.table.columns))], axis=1)
     if np.nanmax(np.abs(found), initial=0.0) > LARGEST:
-        raise InvalidInputError(f"{members.source}: a block has gone farther than can be drawn")
+        raise InvalidInputError(f"{members.source}: a block has moved too far to be drawn")
     return found
 
 
@@ -84,7 +84,7 @@ def _refuse_cut(members: Members, cut: NDArray[np.bool_]) -> None:
     """Raise InvalidInputError where the row of a finished case is not whole; it has neither ended nor failed."""
     if cut.any():
         case = members.table["case"].iloc[int(np.argmax(cut))]
-        raise InvalidInputError(f"{members.source}: case {case} has finished, but its row lacks places of blocks")
+        raise InvalidInputError(f"{members.source}: case {case} has finished, but its row lacks positions of blocks")
 
 
 def _inside(table: pd.DataFrame, ranges: Ranges) -> NDArray[np.bool_]:
@@ -98,7 +98,7 @@ def _inputs(scenario: Scenario, table: pd.DataFrame) -> tuple[Input, ...]:
     missing = [key for key in vary if key not in {head.key for head in heads}]
     if missing or not heads:
         message = f"{TABLE} has no column {missing[0]}" if missing else f"{PLAN} varies no key"
-        raise InvalidInputError(f"{message}; the two do not belong together")
+        raise InvalidInputError(f"{message}; table and plan do not belong together")
     inputs = [_input(scenario, head, table[str(head)]) for head in heads]
     varied = [one for one in inputs if one.count > 1]
     return tuple(varied or inputs[:1])
@@ -108,7 +108,7 @@ def _input(scenario: Scenario, head: Head, column: pd.Series) -> Input:
     key = head.key
     numbers = [None if (number := _number(value)) is None else head.si(number) for value in column]
     if not all(number is None or abs(number) <= LARGEST for number in numbers):
-        raise InvalidInputError(f"{TABLE}: the column {key} holds what is no number, or too large a one")
+        raise InvalidInputError(f"{TABLE}: the column {key} holds values that are not numbers or too large")
     if all(number is not None for number in numbers):
         typed = Typed(head.unit, head.si(1.0)) if head.unit else None
         values = np.array(numbers, dtype=np.float64)

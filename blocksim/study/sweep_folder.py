@@ -94,7 +94,7 @@ def read_origin(folder: Path) -> Origin | None:
     except InputMissingError:
         return None
     except ValidationError as error:
-        message = f"{path}: not what a sweep came from: {str(error).splitlines()[0]}"
+        message = f"{path}: not the plan of a sweep: {str(error).splitlines()[0]}"
         raise InvalidInputError(message) from None
 
 
@@ -108,7 +108,7 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], *, overwr
         raise OutputExistsError(message)
     is_same = read_head(folder / PLAN, len(head)) == head
     if not (overwrite or is_same):
-        message = f"{folder}: another sweep is there; --overwrite replaces it, --out DIR writes elsewhere"
+        message = f"{folder}: contains another sweep; --overwrite replaces it, --out DIR writes elsewhere"
         raise OutputExistsError(message)
     _refuse_foreign(present)
     refuse_foreign_copies(tables, folder, PLAN)
@@ -120,7 +120,7 @@ def _refuse_foreign(present: Sequence[Path]) -> None:
     """Raise OutputExistsError where a file of somebody else has the name of a result."""
     foreign = next((path for path in present if _kind_of(path.name) and not _is_ours(path)), None)
     if foreign is not None:
-        message = f"{foreign}: not as a sweep writes it; move it away, or write elsewhere with --out DIR"
+        message = f"{foreign}: changed since the sweep wrote it; move it away, or write elsewhere with --out DIR"
         raise OutputExistsError(message)
 
 
@@ -163,6 +163,6 @@ def case_folder(sweep: Path, case: str) -> Path | None:
 def read_plan(folder: Path) -> Document:
     """Return the plan of a sweep. Raises InputMissingError where the folder holds none."""
     if not (folder / PLAN).exists():
-        message = f"{folder}: no sweep is there (no {PLAN})"
+        message = f"{folder}: not a sweep folder (no {PLAN})"
         raise InputMissingError(message)
     return Document.read(folder / PLAN, is_stored=True)

@@ -144,7 +144,7 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = _i
     stored = _read(folder, changed)
     again = simulate(_as_far(stored.scenario, summary), threads=threads, on_progress=on_progress)
     if again.status == INTERRUPTED:
-        message = f"{folder}: stopped before the repetition was complete"
+        message = f"{folder}: stopped before the new run was complete"
         raise StoppedEarlyError(message)
     now = origins(summary, stored.scenario)
     return RunVerdict(
@@ -171,7 +171,7 @@ def _read(folder: Path, changed: tuple[str, ...]) -> Result:
     except InvalidInputError as error:
         if not changed:
             raise
-        message = f"{error}\n{folder}: changed since the run, by their checksums: {', '.join(changed)}"
+        message = f"{error}\n{folder}: changed after the run, by their checksums: {', '.join(changed)}"
         raise InvalidInputError(message) from error
 
 

@@ -112,7 +112,7 @@ def _read_table(path: Path) -> tuple[list[str], list[list[str]]]:
         message = f"{path}: not the table of a sweep: {error}"
         raise InvalidInputError(message) from error
     if head[:1] != [CASE] or not set(OUTCOME) <= set(head) or len(set(head)) < len(head):
-        message = f"{path}: not the table of a sweep: its heads are not case, ..., {', '.join(OUTCOME)}, ..."
+        message = f"{path}: not the table of a sweep: its columns are not case, ..., {', '.join(OUTCOME)}, ..."
         raise InvalidInputError(message)
     short = next((number for number, line in enumerate(lines, start=2) if len(line) != len(head)), None)
     if short is not None:

@@ -1,4 +1,4 @@
-"""Where an outcome changes: the limit that a closed form predicts, found by bisection."""
+"""Limit at which an outcome changes, found by bisection, for comparison with closed forms."""
 
 from collections.abc import Callable
 

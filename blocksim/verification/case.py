@@ -1,4 +1,4 @@
-"""What a verification case is, and what it measures: rows of expected and measured numbers with a tolerance."""
+"""Definition of a verification case: rows of expected and measured numbers with a tolerance."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ VELOCITY_TOLERANCE = 1e-6
 
 
 class Verdict(StrEnum):
-    """What is said of a row."""
+    """Verdict of a row."""
 
     INSIDE = "inside"
     OUTSIDE = "outside"
@@ -54,7 +54,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Setting:
-    """What a case is run with."""
+    """Settings of a case."""
 
     model: str = "surface"
     law: str = "linear"
@@ -78,7 +78,7 @@ class Setting:
         return {"scheme": self.scheme, **steps}
 
     def distinct(self, spacings: Sequence[float]) -> Sequence[float]:
-        """Return the particle spacings (m) that a case has to try: one where there are no particles to any contact."""
+        """Return the particle spacings (m) that a case must try: one for contacts without particles."""
         return spacings[:1] if self.rigid else spacings
 
     def stepped(self, step: float) -> Setting:
@@ -119,7 +119,7 @@ class Case:
     measure: Measure
     quick: str = ""  # what the quick size leaves out; empty where there is but one size
     remarks: Mapping[str, str] = field(default_factory=dict)  # model: why it may be outside
-    not_for: Mapping[str, str] = field(default_factory=dict)  # scheme: why the case says nothing about it
+    not_for: Mapping[str, str] = field(default_factory=dict)  # scheme: why the case does not apply to it
 
 
 def absolute(quantity: str, unit: str, expected: float, measured: float, tolerance: float) -> Row:
@@ -138,10 +138,10 @@ def at_least(quantity: str, unit: str, bound: float, measured: float) -> Row:
 
 
 def count(quantity: str, expected: int, measured: int) -> Row:
-    """Return a row of outcomes counted; all have to be as expected."""
+    """Return a row of counted outcomes; all must be as expected."""
     return Row(quantity, "", float(expected), float(measured), 0.0)
 
 
 def farthest(expected: float, values: Iterable[float]) -> float:
-    """Return the value that is farthest from the expected one; one that is no number is."""
+    """Return the value that is farthest from the expected one; NaN counts as farthest."""
     return max(values, key=lambda value: abs(value - expected) if value == value else float("inf"))  # noqa: PLR0124

@@ -90,7 +90,7 @@ class UnknownCaseError(InvalidInputError):
 
 
 class SettingError(BlocksimError):
-    """Options that do not go together."""
+    """Incompatible options."""
 
     exit_code = ExitCode.USAGE
 
@@ -108,7 +108,7 @@ def chosen(ids: list[str], scheme: str = "explicit") -> tuple[Case, ...]:
     wanted = {name.upper() for name in ids}
     unknown = sorted(wanted - {case.id for case in CASES})
     if unknown:
-        raise UnknownCaseError(f"{', '.join(unknown)}: no such case; there are {CASES[0].id} to {CASES[-1].id}")
+        raise UnknownCaseError(f"{', '.join(unknown)}: no such case; choose {CASES[0].id} to {CASES[-1].id}")
     foreign = [reason for reason in left_out(scheme) if reason.split()[0] in wanted]
     if foreign:
         raise SettingError(f"not for --scheme {scheme}: {'; '.join(foreign)}")
@@ -116,5 +116,5 @@ def chosen(ids: list[str], scheme: str = "explicit") -> tuple[Case, ...]:
 
 
 def left_out(scheme: str) -> tuple[str, ...]:
-    """Return the cases that say nothing about a scheme, each with the reason."""
+    """Return the cases that do not apply to a scheme, each with the reason."""
     return tuple(f"{case.id} ({case.not_for[scheme]})" for case in CASES if scheme in case.not_for)

@@ -1,4 +1,4 @@
-"""V24 the three blocks before their first impact, V22 where they come to rest without restitution."""
+"""V24 the three blocks before their first impact, V22 their rest positions without restitution."""
 
 from __future__ import annotations
 

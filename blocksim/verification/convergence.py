@@ -1,4 +1,4 @@
-"""V20: how fast errors fall with the step, and what the particle spacing does to the run-out."""
+"""V20: order of errors in the step, and effect of the particle spacing on the run-out."""
 
 from __future__ import annotations
 

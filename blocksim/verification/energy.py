@@ -1,4 +1,4 @@
-"""V15 impacts never gain kinetic energy, V23 the energy ledger of every scenario that ships."""
+"""V15 impacts never gain kinetic energy, V23 the energy ledger of every shipped scenario."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def largest_gain(thrower: Thrower, throws: Iterable[Throw]) -> float:
 
 
 def ledgers(setting: Setting) -> Iterator[Row]:
-    """Run every scenario that ships, crowds for their first moments, and look at the ledger at every output.
+    """Run every shipped scenario, large ones for their first moments, and check the ledger at every output.
 
     All can have rigid contacts; those that ship with them have no springs.
     """
@@ -78,7 +78,7 @@ def ledgers(setting: Setting) -> Iterator[Row]:
 
 
 def _name(setting: Setting, path: Path) -> str:
-    """Return the name of a scenario, and how much of it is run where that is not all."""
+    """Return the name of a scenario, and the part of it that is run."""
     if setting.rigid or not _is_crowd(load_scenario(path)):
         return path.stem
     return f"{path.stem}, first moments"

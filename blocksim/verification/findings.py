@@ -1,8 +1,8 @@
 """Run-outs of the three blocks that results/README.md quotes: measured, kept with their command and version.
 
-`python -m blocksim.verification.findings results/README.md` writes the table again from results/findings.json. With
+`python -m blocksim.verification.findings results/README.md` rewrites the table from results/findings.json. With
 `--measure` every run is repeated first: seconds for exact edges, some minutes for boundary particles. The tests repeat
-the quick ones and compare them with what is printed.
+the quick ones and compare them with the table.
 """
 
 import json
@@ -29,7 +29,7 @@ BLOCKS = ("1", "2", "3")
 
 @dataclass(frozen=True)
 class Finding:
-    """One quoted run: a scenario that ships and the keys that are changed for it."""
+    """One quoted run: a shipped scenario and the changed keys."""
 
     title: str
     scenario: str

@@ -52,7 +52,7 @@ def _number(value: float | None) -> float:
 
 
 def table(stored: Stored) -> str:
-    """Return the tables as Markdown: below the first why models miss, below that of rigid contacts what is left out."""
+    """Return the tables as Markdown: with the reasons for misses of models and for cases left out."""
     lines = _heads(["case", "quantity", "expected", "tolerance", *COLUMNS])
     lines += [line for case in CASES for line in _case_lines(stored, case)]
     return "\n".join([*lines, *_remarks(stored), "", *_rigid_table(stored)])

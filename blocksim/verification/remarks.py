@@ -1,4 +1,4 @@
-"""Why contact models of particles miss tolerances and schemes have no part in cases: case, model or scheme, one line.
+"""Why particle models miss tolerances, and schemes are left out of cases: case, model or scheme, one line.
 
 Remarks about models are printed only where a case is outside.
 """
@@ -6,10 +6,10 @@ Remarks about models are printed only where a case is outside.
 BUMPS = "equal spacings of the two boundaries interlock, so bodies climb over bumps as high as (1 − √3/2) spacing"
 SETTLING = "particles settle in the gaps between those opposite, (1 − √3/2) spacing deeper than flat faces"
 ROUNDING = "corners are rounded by half a spacing, which moves the contact point inwards"
-SAMPLING = "where the opposite particles lie decides by how much an edge is felt; small differences grow"
+SAMPLING = "the position of the opposite particles decides how strongly an edge acts; small differences grow"
 
 NOT_FOR = {
-    "V2": {"nonsmooth": "rigid blocks have no stiffness; what they sink in by is the step's doing, see blocksim check"},
+    "V2": {"nonsmooth": "rigid blocks have no stiffness; their overlap follows from the step, see blocksim check"},
     "V20": {"nonsmooth": "it is about the second order of springs; rigid contacts are first order in the step"},
 }
 
@@ -29,7 +29,7 @@ REMARKS = {
     },
     "V13": {
         "particles": ROUNDING,
-        "kernel": "likely as few particles bear at an edge, which gives way too far on the soft contacts measured",
+        "kernel": "probably because few particles bear at an edge, which overlaps too far with these soft contacts",
     },
     "V17": {"particles": ROUNDING},
     "V18": {
@@ -50,8 +50,8 @@ REMARKS = {
         "kernel": "edges are felt within a smoothing length of 1.3 mm, as if they were rounded",
     },
     "V23": {
-        "particles": "likely as the ends of pieces of ground have no disc, so contacts at edges end at full overlap",
-        "kernel": "the stiffness of a particle changes with its angle to the face, and no torque goes with that",
+        "particles": "probably because ends of ground segments have no disc, so contacts at edges end at full overlap",
+        "kernel": "the stiffness of a particle changes with its angle to the face, without a corresponding torque",
     },
     "V24": {
         "particles": BUMPS,

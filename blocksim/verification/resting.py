@@ -55,7 +55,7 @@ def stacks(offset: float, share: float) -> Iterator[Sequence[Mapping[str, object
 
 
 def outcome(setting: Setting, bodies: Sequence[Mapping[str, object]]) -> bool | None:
-    """Return True if a stack falls; None where it neither falls nor comes to a stand.
+    """Return True if a stack falls; None where it neither falls nor comes to rest.
 
     It is loaded gently: at the limit a sudden release tips it, where contacts are soft. What a stack of three gains by
     sinking 1 micrometre, as under Hertz contacts, is thirty times what tips it at 99 % of the limit.
@@ -81,7 +81,7 @@ def load_gently(stack: Simulation) -> None:
 
 
 def tower(setting: Setting) -> Iterator[Row]:
-    """Ten blocks straight up: how fast they creep, and what mechanical energy they ever gain."""
+    """Ten blocks straight up: their creep speed and largest gain of mechanical energy."""
     begin, end = (0.5, 1.0) if setting.quick else (5.0, 10.0)
     contact = {"stiffness_scale": SOFT if setting.quick else 1.0}
     stack = setting.start([{"y": (i + 0.5) * HEIGHT} for i in range(TOWER)], contact=contact)
@@ -95,7 +95,7 @@ def tower(setting: Setting) -> Iterator[Row]:
 
 
 def climb(stack: Simulation, until: float) -> float:
-    """Go on; return by how much (J) the mechanical energy was ever above that at the start, or 0."""
+    """Continue; return the largest excess (J) of the mechanical energy over that at the start, or 0."""
     highest = 0.0
     for time in np.linspace(stack.time, until, 51)[1:]:
         stack.to_time(float(time))

@@ -1,4 +1,4 @@
-"""V4: measured restitution of flat and corner impacts is the asked one, at any speed and particle spacing."""
+"""V4: measured restitution of flat and corner impacts is the requested one, at any speed and particle spacing."""
 
 from __future__ import annotations
 

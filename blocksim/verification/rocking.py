@@ -41,7 +41,7 @@ def quarter_period(setting: Setting) -> Iterator[Row]:
 
 
 def until_upright(scene: Simulation) -> tuple[float, float]:
-    """Go on until the angle changes its sign; return time (s) and spin (rad/s) then, by interpolation."""
+    """Continue until the angle changes its sign; return time (s) and spin (rad/s) there, by interpolation."""
     block, steps = scene.bodies[0], scene.steps
     angle = float(block.angle)
     while block.angle < 0.0 and scene.time < LONGEST:

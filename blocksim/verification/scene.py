@@ -1,4 +1,4 @@
-"""Scenes of a few blocks, started and stepped: what verification cases and tests share. SI units, angles in rad."""
+"""Scenes of a few blocks, started and stepped, for verification cases and tests. SI units, angles in rad."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Simulation:
 
     @property
     def touching(self) -> Any:
-        """Records of all contacts there are, pair after pair; of the explicit scheme."""
+        """Records of all contacts, pair after pair; of the explicit scheme."""
         count = int(self.world.clock[0].pair_count)
         is_active = np.arange(self.world.contacts.shape[1]) < self.world.pairs.active[:count, np.newaxis]
         return self.world.contacts[:count][is_active]
@@ -95,12 +95,12 @@ class Simulation:
         return self.steps * self.step
 
     def to_step(self, last_step: int) -> Simulation:
-        """Go on to a step number."""
+        """Advance to a step number."""
         self.scene, self.status = ALONE.advance(self.scene, last_step)
         return self
 
     def to_time(self, time: float) -> Simulation:
-        """Go on to the step nearest to a time (s)."""
+        """Advance to the step nearest to a time (s)."""
         return self.to_step(round(time / self.step))
 
     def measured(self) -> NDArray[np.float64]:
@@ -128,7 +128,7 @@ class Simulation:
         return start_energy(self.scene)
 
     def residual(self) -> float:
-        """Return what the ledger lacks, as a share of the energy in play."""
+        """Return the residual of the ledger, as a share of the energy in play."""
         return energy_ledger(self.scene, self.start_energy).relative_residual
 
     def state(self) -> NDArray[np.float64]:
@@ -195,5 +195,5 @@ def placement(body: Mapping[str, object]) -> dict[str, object]:
 
 
 def in_radians(angle: object) -> object:
-    """Return an angle (rad) as scenarios want it: with its unit, unless it is zero."""
+    """Return an angle (rad) as in scenarios: with its unit, unless it is zero."""
     return f"{float(str(angle))!r} rad" if angle else angle

@@ -55,7 +55,7 @@ class Thrower:
         return float(self.world.controls[0].step)
 
     def throw(self, throw: Throw, poll: int = POLL) -> Any:
-        """Throw the block; return its record after the impact, once it touches nothing at the end of `poll` steps."""
+        """Throw the block; return its record after the impact, once it has no contact at the end of `poll` steps."""
         self._place(throw)
         body = self.world.bodies[0]
         steps, before = 0, float(body.vy)

@@ -11,7 +11,7 @@ from blocksim.verification.case import Case, Row, Setting, Verdict
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a case has measured."""
+    """Measurements of a case."""
 
     case: Case
     setting: Setting
@@ -25,7 +25,7 @@ class Outcome:
 
     @property
     def remark(self) -> str:
-        """Why it is outside, where that is known."""
+        """Reason for being outside, if known."""
         return "" if self.inside else self.case.remarks.get(self.setting.model, "")
 
     def to_dicts(self) -> list[dict[str, object]]:
@@ -78,7 +78,7 @@ def run_case(case: Case, setting: Setting) -> Outcome:
 
 
 def number(value: float, digits: int = 4) -> str:
-    """Return a number for people: so many significant digits, a dash where there is none."""
+    """Return a number as text: so many significant digits, a dash for NaN."""
     if not math.isfinite(value):
         return "–"
     text = f"{value:.{digits}g}"

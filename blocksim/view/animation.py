@@ -1,4 +1,4 @@
-"""A run as an animation: which frames to show when, and one picture after the other."""
+"""A run as an animation: choice of frames, and one picture after the other."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -35,13 +35,13 @@ KEY_FOOT = 0.04  # inches, below what explains the colours
 HELD = 1.5  # s that the last picture stays
 MOST_PICTURES = 10_000
 TIME_ROOM = 60.0  # points
-FEW_BLOCKS = 30  # up to which trails are drawn unless somebody decides
+FEW_BLOCKS = 30  # up to which trails are drawn by default
 TRAIL: dict[str, Any] = {"linewidths": 1.0, "alpha": 0.5, "zorder": 2.5}  # below names
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast an animation runs: seconds of the run in a second of animation, and pictures a second."""
+    """Speed of an animation: seconds of the run per second of animation, and pictures per second."""
 
     speed: float = 0.25
     rate: float = 30.0
@@ -49,7 +49,7 @@ class Pace:
 
 @dataclass(frozen=True)
 class Look:
-    """How an animation looks: width in pixels, paths of the centres (default: for few blocks), forces."""
+    """Appearance of an animation: width in pixels, paths of the centres (default: for few blocks), forces."""
 
     width: int = 800
     trails: bool | None = None
@@ -66,7 +66,7 @@ def draw_film(
     support: Support | None = None,
     on_picture: Callable[[int, int], None] = lambda *_: None,
 ) -> tuple[int, int]:
-    """Write a run as GIF or MP4; the last frame is held for a while.
+    """Write a run as GIF or MP4; the last frame is held.
 
     Returns the number of frames, and of blocks that leave the window. `support` is what the blocks stand on: level
     ground at rest if it is not given. `on_picture` is called with the numbers of frames drawn and to draw. Raises
@@ -99,7 +99,7 @@ def writer_of(path: Path) -> Writer:
 def timed(frames: FramesLike, drawable: Indices, pace: Pace) -> tuple[Indices, Floats]:
     """Return which frame each picture shows and how long (s of animation): even in time, the last one held.
 
-    Every picture shows the frame nearest to its time. Raises InvalidInputError for more pictures than anybody wants.
+    Every picture shows the frame nearest to its time. Raises InvalidInputError for more than MOST_PICTURES.
     """
     recorded = frames.time[drawable]
     length = float(recorded[-1] - recorded[0]) / pace.speed
@@ -118,7 +118,7 @@ def timed(frames: FramesLike, drawable: Indices, pace: Pace) -> tuple[Indices, F
 
 
 class Film:
-    """Draws one frame after the other on the same page; what never moves is drawn once."""
+    """Draws one frame after the other on the same page; fixed parts are drawn once."""
 
     def __init__(self, frames: WithContacts, support: Support, look: Look) -> None:
         """Prepare the page, as high as the run needs. Raises InvalidInputError for forces that were not stored."""
@@ -135,7 +135,7 @@ class Film:
         self._prepare(look.title)
 
     def _prepare(self, title: str) -> None:
-        """Draw what stays: title, axis, and the support unless it moves."""
+        """Draw the fixed parts: title, axis, and the support unless it moves."""
         from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415 - see style
 
         with style.styled_figure(*_even(self.page)) as figure, style.no_word_of_missing_letters():
@@ -161,7 +161,7 @@ class Film:
             draw_standing(self.canvas, self.frames, int(self.drawable[0]), self.support)
 
     def _tell_scale(self, example: str) -> None:
-        """Write how long forces are at the right, in the line of the time and as far as there is room beside it."""
+        """Write the scale of forces at the right, in the line of the time, as far as there is room."""
         room = self.page.panel_width * style.POINTS_PER_INCH - TIME_ROOM
         top = self.page.extent.top + 4.0 / self.page.points_per_mm
         text = style.cut_to(f"forces: {example}", room, style.FONT_SIZE)
@@ -195,7 +195,7 @@ class Film:
         self.canvas.axes.text(self.page.extent.left, top, time, va="bottom")
 
     def _draw_trails(self, frame: int) -> None:
-        """Draw the way of every free centre up to a frame."""
+        """Draw the path of every free centre up to a frame."""
         from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
 
         past = self.drawable[self.drawable <= frame]

@@ -1,4 +1,4 @@
-"""What a history can show over time: motions of blocks, absolute or relative to the ground, and their names."""
+"""Panels of a history: motions of blocks, absolute or relative to the ground, and their names."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -33,9 +33,9 @@ class HistoryFrames(MovingFrames, Protocol):
 
 @dataclass(frozen=True)
 class Choice:
-    """What to show: panels by name (none: the usual ones), blocks by name (none: those that come farthest).
+    """Panels by name (none: the default ones) and blocks by name (none: those that move farthest).
 
-    With `relative`, places and velocities are those seen from the moving ground.
+    With `relative`, positions and velocities are relative to the moving ground.
     """
 
     panels: tuple[str, ...] = ()
@@ -63,7 +63,7 @@ class Seen:
 
     @property
     def from_ground(self) -> str:
-        """What labels say after a place or a velocity."""
+        """Suffix of the labels of positions and velocities."""
         return " − ground" if self.relative and self.support.motion is not None else ""
 
     def place(self, axis: int) -> Floats:
@@ -83,7 +83,7 @@ class Seen:
 
     @property
     def _carried(self) -> Floats:
-        """How far the ground has moved (m), (n, 2); nothing where it is not asked for."""
+        """Displacement of the ground (m), (n, 2); zero unless relative motion is wanted."""
         return np.asarray(self.support.offset(self._time) * bool(self.from_ground))
 
 
@@ -118,7 +118,7 @@ PANELS = (*MOTIONS, *SCENE, *GROUPS)
 
 
 def panels_named(names: Sequence[str]) -> tuple[str, ...]:
-    """Return panels in the order asked for, groups as their members. Raises InvalidInputError for an unknown name."""
+    """Return panels in the given order, groups as their members. Raises InvalidInputError for an unknown name."""
     for name in names:
         if name not in PANELS:
             meant = nearest(name, PANELS, MOST_SLIPS)
@@ -143,7 +143,7 @@ def blocks_named(frames: FramesLike, names: Sequence[str]) -> list[int]:
 
 
 def farthest_blocks(frames: FramesLike, chosen: Indices, support: Support, most: int) -> list[int]:
-    """Return the blocks to colour, in their order: free ones, of many those that end farthest from their start."""
+    """Return the blocks to colour, in their order: free ones; of many, those that end farthest from their start."""
     away = np.hypot(frames.x[chosen[-1]] - frames.x[0], frames.y[chosen[-1]] - frames.y[0])
     free = ~np.array(support.fixed or (False,) * len(away))
     ordered = [int(block) for block in np.argsort(-away, kind="stable") if free[block]]

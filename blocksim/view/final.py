@@ -1,4 +1,4 @@
-"""Where the blocks of a run end, like Figure 3 of the paper: x, rotation and what was measured, below each block."""
+"""Where the blocks of a run end, like Figure 3 of the paper: x, rotation and measured range below each block."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 WIDTH = 7.2  # inches
 SIDE, HEAD, AXIS, FOOT = 0.25, 0.32, 0.42, 0.24  # inches; AXIS: numbers below the panel, FOOT: the line below all
 TALLEST = 5.0  # inches, of the panel
-MOST_LINES = 36  # below the panel; more labels than that fit nobody's page
+MOST_LINES = 36  # below the panel; more labels fit no page
 LETTERS_AN_INCH = 15.0  # in a line below
 LEAST_WIDTH, LOWEST = 2.0, 0.6  # inches, of a page and of a panel on a page whose size was asked for
 FITTINGS = 4  # a lower panel has labels nearer to each other, so in more rows
@@ -45,8 +45,8 @@ def draw_final(  # noqa: PLR0913 - one argument for each option of the command
 ) -> None:
     """Draw the last frame, or the one nearest to the last of `times` (s).
 
-    Below each block stand its x and rotation, and the measured mean and range of its centre; nothing where labels of
-    all blocks do not fit. `forces` draws those of all contacts, `paint` colours the blocks. The same input gives the
+    Labels below each block give x, rotation, and the measured mean and range of its centre, if the labels of all
+    blocks fit. `forces` draws those of all contacts, `paint` colours the blocks. The same input gives the
     same bytes. Raises InvalidInputError for an unknown picture format, a time or forces that were not stored, a page
     that is too small or nothing to draw, and OutputError when the file cannot be written.
     """
@@ -72,7 +72,7 @@ def draw_final(  # noqa: PLR0913 - one argument for each option of the command
 
 @dataclass(frozen=True)
 class Sheet:
-    """The page: its panel, the labels below it, the height of all and of what stands below the labels (inches)."""
+    """The page: its panel, the labels below it, its height and the height of everything below the labels (inches)."""
 
     page: Page
     labels: tuple[Label, ...]
@@ -100,7 +100,7 @@ def _sheet(  # noqa: PLR0913, PLR0917 - all that decides the layout
     key: float,
     scale: ForceScale | None,
 ) -> Sheet:
-    """Return the page; where its size was asked for, the panel is as large as what stands below leaves room for."""
+    """Return the page; if its size is given, the panel takes the room that the labels leave."""
     extent = widened(extent_of(frames, chosen, support), [])
     width, tallest = paper.width(WIDTH, LEAST_WIDTH), TALLEST
     sheet = _tried(frames, int(chosen[0]), page_for(extent, width, tallest, (SIDE, HEAD, AXIS)), measured, (key, scale))

@@ -1,4 +1,4 @@
-"""Contact forces as arrows: each at its contact point, on the upper block, on a scale told beside.
+"""Contact forces as arrows: each at its contact point, on the upper block, on a scale that is printed.
 
 A run has few impacts and long rests, and the forces of impacts are many times larger: the scale is that of the forces
 most contacts have most of the time, and arrows beyond twice that are cut.
@@ -45,26 +45,26 @@ class WithContacts(FramesLike, Protocol):
 
 @dataclass(frozen=True)
 class ForceScale:
-    """How long arrows are: `mm_per_newton` of the scene, and the length (mm) beyond which they are cut."""
+    """Scale of arrows: `mm_per_newton` of the scene, and the length (mm) beyond which they are cut."""
 
     mm_per_newton: float
     longest: float
 
     @property
     def told(self) -> str:
-        """What a person has to know to read the arrows."""
+        """Explanation of the arrows for the reader."""
         most = self.longest / self.mm_per_newton
         return f"Arrows: contact forces, drawn on the upper block; {self.example} long, capped at {most:.3g} N."
 
     @property
     def example(self) -> str:
-        """How long the arrow of a round force is."""
+        """Length of the arrow of a round force."""
         force = rounded(0.5 * self.longest / self.mm_per_newton)
         return f"{force:g} N is {force * self.mm_per_newton:.3g} mm"
 
 
 def contacts_of(frames: WithContacts) -> Contacts:
-    """Return the contacts of a run. Raises InvalidInputError, with what to do, where none were stored."""
+    """Return the contacts of a run. Raises InvalidInputError, with advice, where none were stored."""
     if frames.contacts is None:
         raise InvalidInputError(MISSING)
     return frames.contacts

@@ -25,7 +25,7 @@ MOST_BYTES = 1 << 30  # of all pictures together, which Pillow keeps in memory
 
 
 def write_gif(path: Path, pictures: Iterator[Pixels], seconds: NDArray[np.float64]) -> None:
-    """Write pictures (height, width, 3) that are shown for so many seconds each; it repeats for ever.
+    """Write pictures (height, width, 3) that are shown for the given seconds each; the GIF repeats for ever.
 
     Raises InvalidInputError for more than 50 pictures a second or more pictures than fit into memory, OutputError.
     """

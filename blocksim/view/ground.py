@@ -32,7 +32,7 @@ MOST_ALIGNED = -0.8  # cosine between two walls that turn back so sharply that a
 
 @dataclass(frozen=True)
 class Canvas:
-    """Where one moment is drawn: axes whose data are the picture's millimetres, all of them on one scale."""
+    """Canvas of one moment: axes in the picture's millimetres, all on one scale."""
 
     axes: "Axes"
     extent: Extent

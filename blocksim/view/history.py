@@ -119,10 +119,10 @@ def draw_history(  # noqa: PLR0913 - one argument for each option of the command
 ) -> None:
     """Draw x, y, rotation, energies and contacts over time, or the panels of `choice`.
 
-    Measured means and ranges stand at the end. Where contacts were stored, a panel has the force with which ground and
-    walls hold all blocks; `forces` asks for it. Under a run whose ground moves stands its displacement. Of more than
-    six blocks the six that come farthest are coloured, the others grey, unless `choice` names blocks. The same input
-    gives the same bytes. Raises InvalidInputError for an unknown picture format, panels or blocks that are not there,
+    Measured means and ranges are drawn at the end. If contacts were stored, a panel shows the force of ground and walls
+    on all blocks; `forces` requires it. A moving ground has a panel of its displacement. Of more than
+    six blocks the six that move farthest are coloured, the others grey, unless `choice` names blocks. The same input
+    gives the same bytes. Raises InvalidInputError for an unknown picture format, unknown panels or blocks,
     forces that were not stored, a page that is too small or nothing to draw, and OutputError when the file cannot be
     written.
     """
@@ -157,9 +157,9 @@ def line_looks(fills: Sequence[str], shown: Sequence[int]) -> dict[int, dict[str
 
 
 def _drawing(frames: HistoryLike, support: Support, choice: Choice, paint: Paint) -> _Drawing:
-    """Choose frames and blocks. Raises InvalidInputError for blocks that are not there."""
+    """Choose frames and blocks. Raises InvalidInputError for unknown blocks."""
     if not paint.is_lasting:
-        message = "lines of a history are coloured by block or material; speed and rotation are panels of their own"
+        message = "a history is coloured by block or material; speed and rotation are separate panels"
         raise InvalidInputError(message)
     chosen = _thinned(drawable_frames(frames))
     named = blocks_named(frames, choice.blocks)
@@ -169,7 +169,7 @@ def _drawing(frames: HistoryLike, support: Support, choice: Choice, paint: Paint
 
 
 def _panel_names(drawing: _Drawing, choice: Choice, *, forces: bool) -> tuple[str, ...]:
-    """Return what is drawn, from top to bottom; force and ground beside the usual panels where there are any."""
+    """Return the panels from top to bottom; force and ground in addition to the default ones where available."""
     if choice.panels:
         names = panels_named(choice.panels)
     else:
@@ -177,7 +177,7 @@ def _panel_names(drawing: _Drawing, choice: Choice, *, forces: bool) -> tuple[st
         has_force = drawing.frames.contacts is not None and drawing.support.weight > 0.0
         names = (*USUAL, *((FORCE,) if has_force else ()), *((GROUND,) if has_ground else ()))
     if FORCE in names or forces:
-        contacts_of(drawing.frames)  # says what to do where none were stored
+        contacts_of(drawing.frames)  # has advice where none were stored
     return names if not forces or FORCE in names else (*names, FORCE)
 
 

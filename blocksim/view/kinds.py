@@ -23,6 +23,6 @@ def kind_named(name: str) -> Callable[..., None]:
     if name not in KINDS:
         meant = nearest(name, KINDS, MOST_SLIPS)
         hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join(KINDS)}"
-        message = f"--kind {name}: no such picture of a run, {hint}"
+        message = f"--kind {name}: unknown kind for a run, {hint}"
         raise InvalidInputError(message)
     return KINDS[name]

@@ -1,4 +1,4 @@
-"""Labels below the blocks of a final state: x, rotation and what was measured, so that none covers another."""
+"""Labels below the blocks of a final state: x, rotation and measured range, so that none covers another."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ CAP = 2.2  # points
 
 @dataclass(frozen=True)
 class Label:
-    """What stands below one block; places in points from the panel's left end, `middle` is the block's centre."""
+    """Label of one block; positions in points from the panel's left end, `middle` is the block's centre."""
 
     lines: tuple[str, ...]
     middle: float

@@ -1,4 +1,4 @@
-"""A simulated quantity over time beside the law it should follow, and below it how far the two are apart."""
+"""A simulated quantity over time with the law that it should follow, and the difference below."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""How far coarser levels of a numerical setting end from the finest: a panel for each setting, finer to the right."""
+"""Distance of coarser levels of a numerical setting from the finest: a panel for each setting, finer to the right."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

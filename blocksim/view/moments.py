@@ -1,4 +1,4 @@
-"""Which frames of a run to show."""
+"""Choice of frames of a run."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -54,13 +54,13 @@ class FramesLike(Protocol):
 
 
 BEYOND_REACH = 1e34
-"""Metres or radians: ten thousand times what is computed with, and as 32-bit millimetres still a number."""
+"""Metres or radians: ten thousand times the largest simulated value, and finite as 32-bit millimetres."""
 
 
 def drawable_frames(frames: FramesLike) -> Indices:
-    """Return the indices of the frames in which every number is one (a failed run may end in others).
+    """Return the indices of the frames in which every number is finite (a failed run may end in others).
 
-    What lies beyond all reach, as in a file that is damaged, counts as none: millimetres and areas would overflow.
+    Values beyond all reach, as in a damaged file, do not count: millimetres and areas would overflow.
     Raises InvalidInputError when there is none, or no block.
     """
     if len(frames.names) == 0:

@@ -42,7 +42,7 @@ def write_mp4(path: Path, pictures: Iterator[NDArray[np.uint8]], seconds: NDArra
             is_whole = encode(temporary, _repeated(pictures, repeats), rate, int(repeats.sum()))
         except (OSError, RuntimeError):
             is_whole = False
-        if not is_whole:  # nothing else tells of a disk that was full in the end
+        if not is_whole:  # nothing else reports a disk that was full at the end
             message = f"{path}: cannot be written: ffmpeg stopped before the end"
             raise OutputError(message)
 

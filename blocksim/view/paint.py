@@ -1,4 +1,4 @@
-"""How blocks are coloured: each in its own colour, or by material, speed or the angle they have turned.
+"""Colours of blocks: each in its own colour, or by material, speed or rotation.
 
 A block has the same colour in every picture: strip, final state, history, animation and report.
 """
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEED_COLOURS = "YlGnBu"  # light at rest; darker in steps that are seen in grey as well
-TURN_COLOURS = "PuOr"  # told apart with every common colour blindness
+TURN_COLOURS = "PuOr"  # distinguishable with every common colour blindness
 HALF_TURN = 180.0  # degrees; blocks that have turned farther share the colour
 LEAST_TURN = 1.0  # degrees
 RARE = 0.995  # share of all speeds that the scale covers
@@ -130,7 +130,7 @@ PAINTS: dict[str, Callable[[Any, Scenario], Paint]] = {
 
 
 def paint_named(name: str, frames: Any, scenario: Scenario) -> Paint:
-    """Return the colours of a run by what they mean. Raises InvalidInputError for an unknown meaning."""
+    """Return the colours of a run by their meaning. Raises InvalidInputError for an unknown meaning."""
     if name not in PAINTS:
         message = f"unknown colour {name!r}; choose {', '.join(PAINTS)}"
         raise InvalidInputError(message)

@@ -1,4 +1,4 @@
-"""One panel of a picture of blocks: its x axis, what stands below its ground, and a page that holds nothing else."""
+"""One panel of a picture of blocks: its x axis, the rows below its ground, and a page that holds nothing else."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""The page of a picture: its own size or the one asked for, and the dots per inch of a PNG."""
+"""The page of a picture: its default or the given size, and the dots per inch of a PNG."""
 
 from dataclasses import dataclass
 
@@ -30,7 +30,7 @@ class Paper:
         return own if self.size is None else self.size[1]
 
     def panel(self, own: float, count: int, others: float, least: float) -> float:
-        """Return the height (inches) of each of `count` panels beside `others` inches of text, axes and gaps.
+        """Return the height (inches) of each of `count` panels in addition to `others` inches of text, axes and gaps.
 
         Raises InvalidInputError where panels would be lower than `least`.
         """

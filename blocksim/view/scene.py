@@ -72,7 +72,7 @@ def draw_blocks(canvas: Canvas, frames: FramesLike, frame: int, support: Support
 
 
 def _fixed(frames: FramesLike, support: Support) -> Flags:
-    """Tell of every block whether it moves with the support, (b,)."""
+    """Return for every block whether it moves with the support, (b,)."""
     return np.array(support.fixed or (False,) * len(frames.names))
 
 

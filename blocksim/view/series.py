@@ -1,4 +1,4 @@
-"""Where blocks end over the values of one key: a row for each block, a column for each series."""
+"""Final x of blocks over the values of one key: a row for each block, a column for each series."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -49,7 +49,7 @@ class SeriesLike(Protocol):
 
     @property
     def label(self) -> str:
-        """What all runs of this series share."""
+        """Label of what all runs of this series share."""
         ...
 
     @property
@@ -65,7 +65,7 @@ class SeriesLike(Protocol):
 
 @dataclass(frozen=True)
 class ValueAxis:
-    """How values of a key are shown: `(value - middle) * factor`."""
+    """Scale of the values of a key: `(value - middle) * factor`."""
 
     label: str
     middle: float
@@ -200,7 +200,7 @@ def most_moving(spread: Floats) -> list[int]:
 
 
 def value_axis(values: Floats, key: str, unit: str, *, is_even: bool = False, typed: Typed | None = None) -> ValueAxis:
-    """Return how to show values of a key: over decades (not if spread evenly), around their middle, or as they are."""
+    """Return the axis for values of a key: over decades (not if spaced evenly), around their middle, or plain."""
     low, high = float(values.min()), float(values.max())
     factor, shown = scale_of(max(abs(low), abs(high)), unit, typed)
     if low > 0.0 and high >= DECADES * low and not is_even:
@@ -234,7 +234,7 @@ def scale_of(size: float, unit: str, typed: Typed | None = None) -> tuple[float,
 
 
 def is_smooth(values: Floats) -> bool:
-    """Return True if values go up and down so little that a line through them is no invention."""
+    """Return True if values go up and down so little that a line through them is justified."""
     spread = float(np.ptp(values))
     return spread < STAYS_MM or float(np.abs(np.diff(values)).sum()) <= WAVERING * spread
 
@@ -299,7 +299,7 @@ def _finish(axes: "Axes", *, is_log: bool, is_first: bool, is_last: bool) -> Non
 def captions_of(
     series: Sequence[SeriesLike], rows: Sequence[tuple[int, str]], room: float
 ) -> tuple[tuple[str, ...], ...]:
-    """Return what stands above every panel: block and range in one line where there is room (points), else in two."""
+    """Return the text above every panel: block and range in one line where there is room (points), else in two."""
     told = [[_extent(one.x_mm[:, block]) for one in series] for block, _ in rows]
     widest = max(style.width_of(extent[0], style.FONT_SIZE) for row in told for extent in row)
     form = 0 if widest <= style.SURE * room else 1
@@ -312,7 +312,7 @@ def captions_of(
 
 
 def _extent(x: Floats) -> tuple[str, str]:
-    """Return where a block ends in all runs of a series, in more and in fewer words."""
+    """Return the final places of a block in all runs of a series, in a long and a short form."""
     apart = f"{np.ptp(x):.2f} mm apart"
     ends = [f"{end:.2f}".replace("-0.00", "0.00").replace("-", "−") for end in (x.min(), x.max())]
     return f"{' to '.join(ends)} mm, {apart}", apart

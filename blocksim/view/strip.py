@@ -35,7 +35,7 @@ TALLEST_PANEL = 4.0  # inches
 WIDEST_IN_FOURS, WIDEST_IN_PAIRS = 2.5, 6.0  # width over height, so that a panel stays about an inch tall
 LOW_ENOUGH = 1.6  # width over height from which four rows of pairs fit on a page
 NARROWEST = 0.35  # width over height
-LEAST_MOVED = 0.005  # mm; less is nothing in two decimals
+LEAST_MOVED = 0.005  # mm; less is zero in two decimals
 LEAST_ANGLE = 0.05  # degrees; motion closer to x is along x
 RANGE_GAP = 0.06  # part of the width that two measured ranges in one row keep apart
 
@@ -102,7 +102,7 @@ def draw_strip(  # noqa: PLR0913 - one argument for each option of the command
 ) -> None:
     """Draw the run as 6 to 8 panels from release to the final state and write them as PNG, SVG or PDF.
 
-    `times` (s) picks the panels by hand, `count` is how many there are at most. With `measured` the last panel shows
+    `times` (s) selects the panels, `count` is their maximum number. With `measured` the last panel shows
     mean and range of the measured centres below the ground. `support` is what the blocks stand on: level ground at rest
     if it is not given. `forces` draws those of all contacts; `paint` colours the blocks. The same input gives the same
     bytes. Raises InvalidInputError for an unknown picture format, a time that was not recorded, forces that were not, a
@@ -284,7 +284,7 @@ def _draw_texts(figure: "Figure", layout: Layout, title: str | None, notes: Sequ
 
 
 def _caption(frames: FramesLike, frame: int, support: Support) -> str:
-    """Return the time of a frame and how far the support has moved; the two ends of a run are named."""
+    """Return the time of a frame and the displacement of the support; the two ends of a run are named."""
     time = f"{float(frames.time[frame]):.3f} s"
     if frame == 0:
         time = f"{time}, release"

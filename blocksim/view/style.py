@@ -1,4 +1,4 @@
-"""The one place for colours, fonts and sizes, and for making a picture file."""
+"""Colours, fonts and sizes, and writing of picture files."""
 
 import re
 import warnings
@@ -17,7 +17,7 @@ from blocksim.simulation.atomic import write_bytes
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Okabe & Ito (2008), told apart with every common colour blindness; vermilion is for measured values.
+# Okabe & Ito (2008), distinguishable with every common colour blindness; vermilion is for measured values.
 BLOCK_COLOURS = ("#56B4E9", "#E69F00", "#009E73", "#F0E442", "#0072B2", "#CC79A7")
 MEASURED_COLOUR = "#D55E00"
 INK = "#222222"
@@ -84,7 +84,7 @@ def picture_suffix(path: Path) -> str:
     """Return the suffix in lower case; raises InvalidInputError for a format that is not written."""
     suffix = path.suffix.lower()
     if suffix not in METADATA:
-        message = f"{path}: '{path.suffix}' is no picture format, write {', '.join(METADATA)}"
+        message = f"{path}: '{path.suffix}' unsupported picture format; use {', '.join(METADATA)}"
         raise InvalidInputError(message)
     return suffix
 
@@ -103,10 +103,10 @@ def styled_figure(width: float, height: float, dots: float | None = None) -> Ite
 
 @contextmanager
 def in_style(dots: float | None = None) -> Iterator[None]:
-    """Let whatever is drawn be drawn in this style, a PNG with so many dots per inch."""
+    """Draw in this style, a PNG with so many dots per inch."""
     from matplotlib import rc_context, rcParamsDefault  # noqa: PLC0415 - half a second, only for pictures
 
-    # A user's own matplotlibrc must not change the file, but the backend is none of our business.
+    # A user's own matplotlibrc must not change the file, but the backend is the user's choice.
     settings: dict[Any, Any] = {key: value for key, value in rcParamsDefault.items() if not key.startswith("backend")}
     resolution: dict[Any, Any] = {} if dots is None else {"savefig.dpi": dots}
     with rc_context(settings | SETTINGS | resolution):
@@ -124,7 +124,7 @@ def save_figure(figure: "Figure", path: Path) -> None:
 
 @contextmanager
 def no_word_of_missing_letters() -> Iterator[None]:
-    """Draw letters that the font lacks as boxes and do not warn: whoever looks sees it."""
+    """Draw letters that the font lacks as boxes and do not warn: the reader sees it."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font", category=UserWarning)
         yield

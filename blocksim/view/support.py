@@ -1,4 +1,4 @@
-"""What a run's blocks stand on and lean against, as pictures need it: ground, walls, fixed bodies, and their motion."""
+"""Support of a run's blocks, as pictures need it: ground, walls, fixed bodies, and their motion."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from blocksim.view.moments import Floats
 class Support:
     """Ground, walls and fixed bodies of one run; x runs along the ground, all in SI. The default: level and at rest.
 
-    `profile` is the surface towards +x, level beyond both ends. `fixed` tells for every body whether it moves with the
+    `profile` is the surface towards +x, level beyond both ends. `fixed` states for every body whether it moves with the
     support. A tilt raises the +x end. Without `motion` all rest. `weight` (N) is that of all free bodies.
     """
 

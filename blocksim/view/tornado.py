@@ -1,4 +1,4 @@
-"""Tornado: how much each input matters, the most important at the top, a panel for each result."""
+"""Tornado: importance of each input, the largest at the top, a panel for each result."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Histories of the whole scene: energies, contacts, the force of what blocks stand on, the ground's motion."""
+"""Histories of the whole scene: energies, contacts, support force, the ground's motion."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ ENERGIES = {  # how entries of the ledger are drawn together
     "lost in impacts": ("dashpot", "broken", "impacts", "correction"),
     "given to support": ("to_support",),
 }
-ENERGY_LOOKS: dict[str, tuple[str, Any]] = {  # the same in every picture; dashes tell them apart in grey
+ENERGY_LOOKS: dict[str, tuple[str, Any]] = {  # the same in every picture; dashes distinguish them in grey
     "kinetic": ("#0072B2", "-"),
     "potential": ("#E69F00", "-"),
     "stored in contacts": ("#CC79A7", (0, (1, 1))),
@@ -46,7 +46,7 @@ Entries = dict[str, Floats]
 
 
 def drawn_energies(energy: Entries, chosen: Indices) -> Entries:
-    """Return the energies (J) to draw, by what they are called: all that matter, potential relative to its minimum."""
+    """Return the energies (J) to draw by name: all that matter, potential relative to its minimum."""
     known = {entry for entries in ENERGIES.values() for entry in entries}
     groups = {**ENERGIES, **{name.replace("_", " "): (name,) for name in energy if name not in known}}
     sums = {
@@ -61,7 +61,7 @@ def drawn_energies(energy: Entries, chosen: Indices) -> Entries:
 
 
 def support_force(frames: WithContacts, chosen: Indices, support: Support) -> Floats:
-    """Return the force (N) upwards on all free blocks by what they stand on, (n,).
+    """Return the upward force (N) of the supports on all free blocks, (n,).
 
     Raises InvalidInputError where contacts were not stored.
     """
@@ -78,7 +78,7 @@ def unit_for(most: float, unit: str) -> tuple[float, str]:
 
 
 def draw_energies(axes: "Axes", time: Floats, energies: Entries) -> None:
-    """Draw energies (J) by what they are called, each in its own colour and dashes."""
+    """Draw energies (J) by name, each in its own colour and dashes."""
     factor, unit = unit_for(max((float(np.abs(values).max()) for values in energies.values()), default=0.0), "J")
     for label, values in energies.items():
         colour, dashes = ENERGY_LOOKS.get(label, OTHER_ENERGY)
@@ -96,7 +96,7 @@ def draw_contacts(axes: "Axes", time: Floats, count: Floats) -> None:
 
 
 def draw_force(axes: "Axes", time: Floats, force: Floats, weight: float) -> None:
-    """Draw the force of the supports beside the weight (N); where it is cut, its largest value is reported beside."""
+    """Draw the support force with the weight (N); where it is cut, its largest value is printed."""
     largest, reference = float(force.max(initial=0.0)), weight or float(np.median(force)) or 1.0
     factor, unit = unit_for(reference, "N")
     axes.plot(time, factor * force, color=style.INK, linewidth=0.8)
@@ -109,7 +109,7 @@ def draw_force(axes: "Axes", time: Floats, force: Floats, weight: float) -> None
 
 
 def draw_ground(axes: "Axes", time: Floats, support: Support) -> None:
-    """Draw how far ground, walls and fixed bodies have moved."""
+    """Draw the displacement of ground, walls and fixed bodies."""
     moved = MILLIMETRES * support.displacement(time)
     axes.plot(time, moved, color=style.INK, linewidth=1.0)
     axes.set_ylim(*limits_of(moved))

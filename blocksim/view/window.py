@@ -1,4 +1,4 @@
-"""The part of the plane that a strip shows: all that blocks reach, and what of the support is near. Millimetres.
+"""The part of the plane that a strip shows: the reach of all blocks, and the support near them. Millimetres.
 
 Gravity points down in pictures: where the ground is tilted, all that is drawn is turned by the tilt. "Picture" means
 the turned axes, "scene" those of the scenario, with x along the ground.
@@ -67,10 +67,10 @@ class Extent:
 def extent_of(
     frames: FramesLike, chosen: Indices, support: Support | None = None, blocks: Flags | None = None
 ) -> Extent:
-    """Return what has to be shown so that no block is cut in any chosen frame, with a small margin.
+    """Return the extent in which no block is cut in any chosen frame, with a small margin.
 
     The ground below every block is shown, and the corners of the ground and the walls that are near. `blocks` (b,)
-    tells which blocks count, by default all.
+    selects the blocks that count, by default all.
     """
     support = support or Support()
     reached = _reached(frames, chosen, support)

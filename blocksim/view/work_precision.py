@@ -1,4 +1,4 @@
-"""How accurate an answer is for the computing time it takes: a panel for each scene, a line for each method."""
+"""Accuracy over computing time: a panel for each scene, a line for each method."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,10 +44,10 @@ class Panel:
     """One scene."""
 
     title: str
-    quantity: str  # what is on the vertical axis, with its unit
+    quantity: str  # label of the vertical axis, with its unit
     curves: tuple[Curve, ...]
     level: float | None = None  # an error worth a line, such as a tolerance
-    meaning: str = ""  # what is written at that line
+    meaning: str = ""  # label of that line
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def _draw_level(axes: "Axes", level: float, meaning: str) -> None:
         ("axes fraction", "data"),
         "offset points",
         color=style.FAINT_INK,
-        ha="left",  # where what takes little time is far off
+        ha="left",  # where quick settings have large errors
     )
 
 

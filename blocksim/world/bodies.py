@@ -26,7 +26,7 @@ SHARP_RIGHT, SHARP_LEFT = 1 << 4, 1 << 5
 
 
 class Outline(NamedTuple):
-    """What a scenario places where, before there are arrays: it decides how large they are."""
+    """Placement of a scenario before arrays are built: it determines their sizes."""
 
     scenario: Scenario
     placed: tuple[PlacedBody, ...]
@@ -37,7 +37,7 @@ class Outline(NamedTuple):
 
     @property
     def shape(self) -> tuple[str, int, int, int, int]:
-        """What scenes must have in common to be built together."""
+        """Common properties of scenes that are built together."""
         model = self.scenario.contact.model
         return model, len(self.placed), len(self.segments), len(self.classes), self.motion.size
 

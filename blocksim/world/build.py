@@ -35,8 +35,8 @@ from blocksim.world.memory import SceneSize, refuse_if_too_large
 from blocksim.world.scenes import Construction, Parts, Stride, build_one, joined
 from blocksim.world.step import MOST_STEPS, choose_skin, choose_step
 
-CHECK_INTERVAL = 1e-4  # s of simulated time between examines rest, overlap and finiteness
-CHEAP_CHECKS = 50  # steps between looks, from which on they cost next to nothing; where steps are long, at most for
+CHECK_INTERVAL = 1e-4  # s of simulated time between checks of rest, overlap and finiteness
+CHEAP_CHECKS = 50  # steps between checks, from which on they cost almost nothing; where steps are long, at most for
 LONGEST_CHECK = 1e-3  # s
 LEAST_PAIRS = 16
 PAIRS_PER_BODY = 3
@@ -81,7 +81,7 @@ EXPLICIT = Construction(_choose, _model, _size, _assemble)
 
 
 def assembled(parts: Parts, controls: Records, **arrays: Any) -> World:
-    """Return stacked worlds at time zero from their parts and the arrays that are the scheme's own affair."""
+    """Return stacked worlds at time zero from their parts and the scheme's own arrays."""
     members, count = parts.bodies.shape
     bodies = parts.bodies
     bodies["half_x"][:, -1] = math.inf  # the half-plane has one face without ends
@@ -117,7 +117,7 @@ def without_lists(parts: Parts, controls: Records) -> World:
 def _kinetic_energies(bodies: Records) -> list[float]:
     speed_squared = bodies["vx"] ** 2 + bodies["vy"] ** 2
     energies = bodies["mass"] * speed_squared + bodies["inertia"] * bodies["spin"] ** 2
-    return [0.5 * float(np.sum(one)) for one in energies]  # one by one, as the order of a sum decides on its last digit
+    return [0.5 * float(np.sum(one)) for one in energies]  # one by one, as the order of a sum affects its last digit
 
 
 def numbers(shape: tuple[int, ...], kind: type[np.generic]) -> Any:
@@ -172,8 +172,8 @@ def with_more_room(world: World) -> World:
 
 
 def with_threads(world: World, threads: int) -> World:
-    """Return the same world with room for what that many threads tell one another."""
-    between = world.pairs.size if threads > 1 else 1  # memory that nobody has written to is not there yet
+    """Return the same world with room for the exchange between that many threads."""
+    between = world.pairs.size if threads > 1 else 1  # memory that was never written is not allocated yet
     return world._replace(shares=zeros(threads, SHARE), between=zeros(between, ACTION))
 
 

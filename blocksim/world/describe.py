@@ -1,4 +1,4 @@
-"""What a scenario comes to before it runs: masses, pair parameters, step, cost and size of the results."""
+"""Summary of a scenario before it runs: masses, pair parameters, step, cost and size of the results."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -41,7 +41,7 @@ STIFFNESS_UNITS = {"linear": "N/m", "hertz-mindlin": "N/m^1.5"}
 
 @dataclass(frozen=True)
 class PairDescription:
-    """Contact parameters of one kind of pair, SI, and the keys of the scenario that decided them."""
+    """Contact parameters of one kind of pair, SI, and the keys of the scenario that set them."""
 
     pair: str
     materials: tuple[str, str]  # without the depth that `pair` may name
@@ -54,12 +54,12 @@ class PairDescription:
     normal_stiffness: float  # of one contact point, in `stiffness_unit`; of rigid ones see world/sag.py
     stiffness_unit: str  # N/m, with the law of Hertz N/m^1.5
     shear_stiffness_ratio: float | None  # shear stiffness over (tangent) normal stiffness
-    rules: Mapping[str, str]  # quantity and what decided it, as in ResolvedPair
+    rules: Mapping[str, str]  # quantity and the key that set it, as in ResolvedPair
 
 
 @dataclass(frozen=True)
 class MotionDescription:
-    """How far and how fast the supports move, SI."""
+    """Displacement and speed of the supports, SI."""
 
     displacement: float  # m, greatest
     speed: float  # m/s, greatest
@@ -68,13 +68,13 @@ class MotionDescription:
 
 @dataclass(frozen=True)
 class SagDescription:
-    """By how much blocks sink into one another at rest where contacts are rigid, SI; it goes with the step squared."""
+    """Overlap of rigid contacts at rest, SI; it grows with the square of the step."""
 
     why: str  # of the step
     substeps: int
     tolerance: float  # m/s, of the velocity pass
     longest_step: float  # s, that may be given by hand
-    sag: float  # m, of the block that sinks most, as all stand at the start
+    sag: float  # m, of the block that sinks most, in the initial arrangement
     block: str  # its name
     overlap: float  # m, of the contact that gives way most
     warning: str  # where that is too far
@@ -95,12 +95,12 @@ class Description:
     memory: int  # bytes of the process that runs it into a folder
     frames_at_every_step: bool  # output.every is shorter than a step
     particles: int  # on all boundaries, corners included
-    skin: float  # m, how far apart bodies are listed as neighbours
+    skin: float  # m, distance up to which bodies are listed as neighbours
     rigid: SagDescription | None  # where contacts are
 
 
 def describe(scenario: Scenario) -> Description:
-    """Build the scene and tell what is in it. Raises what building it raises."""
+    """Build the scene and describe it. Raises what building it raises."""
     placed = place_bodies(scenario)
     world, size = _built(scenario, len(placed))
     step = float(world.controls[0].step)
@@ -237,7 +237,7 @@ def _pair(
 
 
 def _class_names(classes: tuple[ContactClass, ...]) -> list[str]:
-    """Return names for people: the material, and the depth where blocks of one material differ in it."""
+    """Return names: the material, and the depth where blocks of one material differ in it."""
     blocks = [one.material for one in classes if not one.is_ground]
     return [GROUND, *(_class_name(one, blocks.count(one.material)) for one in classes[1:])]
 

@@ -1,4 +1,4 @@
-"""How much memory there is, and how to say a number of bytes. Knows nothing of scenes, nor of the solver."""
+"""Available memory, and numbers of bytes as text. Independent of scenes and the solver."""
 
 import os
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ def readable(count: int) -> str:
 
 
 def available_bytes(root: Path = Path("/")) -> int | None:
-    """Return the memory (bytes) that a process can still get, or None on a system that does not tell.
+    """Return the memory (bytes) that a process can still get, or None on a system that does not report it.
 
     That of the machine, or what is left of the limit of a control group (container, batch job). Swap does not count.
     """

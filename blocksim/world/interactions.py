@@ -12,7 +12,7 @@ from blocksim.world.restitution import damping_ratio
 
 
 class ContactClass(NamedTuple):
-    """Bodies of one class touch alike: same material, same depth. Ground (class 0) and walls have an endless depth."""
+    """Bodies of one material and depth; ground (class 0) and walls have endless depth."""
 
     material: str | None  # None: the ground takes the material of its partner
     depth: float  # m
@@ -55,7 +55,7 @@ def contact_classes(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> tuple
 
 
 def pair_of(scenario: Scenario, a: ContactClass, b: ContactClass) -> ResolvedPair:
-    """Return what the scenario says of two classes, at least one of them blocks."""
+    """Return the scenario's contact parameters of two classes, at least one of them blocks."""
     block, other = (b, a) if a.is_ground else (a, b)
     partner = other.material if other.is_wall or not other.is_ground else GROUND
     return resolve_pair(scenario, str(block.material), str(partner), ground=other.is_ground)

@@ -1,7 +1,7 @@
-"""What blocks at rest carry: every block hands its weight, and that of the blocks on it, to what it stands on.
+"""Loads of blocks at rest: every block passes its weight, and that of the blocks on it, to its supports.
 
 A block stands on blocks whose upper faces are as high as its lower one, or else on the ground. Blocks are taken from
-above downwards, so that everything that stands on one is known before it hands its load on. Of more than one support
+above downwards, so that all loads on a block are known before it passes its own on. Of more than one support
 the two outermost share the load by the lever; each touches along an interval whose two ends share its part by the lever
 too. Turned blocks count as their bounding boxes.
 """
@@ -27,7 +27,7 @@ class Box(NamedTuple):
 
 
 class Load(NamedTuple):
-    """What one end of an interval of contact carries: `lower` is None for the ground."""
+    """Load of one end of an interval of contact: `lower` is None for the ground."""
 
     upper: int
     lower: int | None

@@ -1,4 +1,4 @@
-"""How much memory a run needs, told before anything is allocated.
+"""Memory that a run needs, known before anything is allocated.
 
 Sizes follow from the types in blocksim.kernels.arrays, so that they change with them.
 """
@@ -29,21 +29,21 @@ COPIES = 2  # of all frames at the end of a run: as they came, and joined
 
 
 class SceneTooLargeError(InvalidInputError):
-    """A scene needs more memory than there is; both in bytes."""
+    """A scene needs more memory than is available; both in bytes."""
 
     def __init__(self, size: "Size", available: int) -> None:
-        """Say both, and what the need consists of."""
+        """Report both, and the parts of the need."""
         self.needed = size.bytes_needed
         self.available = available
         frames = f", {readable(size.record_bytes)} for {size.frames} frames (output.every)" if size.frames else ""
         super().__init__(
-            f"this scene is too large: it needs about {readable(self.needed)} of memory and {readable(available)} are "
+            f"this scene is too large: it needs about {readable(self.needed)} of memory, and {readable(available)} are "
             f"free; {readable(size.world_bytes)} for {size.bodies} bodies and {size.pairs} pairs of neighbours{frames}"
         )
 
 
 class Size(ABC):
-    """What the memory of a run depends on."""
+    """Quantities that determine the memory of a run."""
 
     bodies: int
     pairs: int  # of neighbours that there is room for
@@ -130,7 +130,7 @@ def recorded_contacts(bodies: int, particles: int) -> int:
 
 
 def refuse_if_too_large(size: Size) -> None:
-    """Raise SceneTooLargeError where a run needs more memory than there is; nothing where that cannot be told."""
+    """Raise SceneTooLargeError where a run needs more memory than is available, if that is known."""
     available = available_bytes()
     if available is not None and size.bytes_needed > available:
         raise SceneTooLargeError(size, available)

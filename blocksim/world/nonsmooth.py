@@ -1,4 +1,4 @@
-"""Build what the non-smooth scheme needs from a scenario, beside the world that both schemes share."""
+"""Build the arrays of the non-smooth scheme from a scenario, in addition to the world that both schemes share."""
 
 import math
 from collections.abc import Sequence
@@ -44,7 +44,7 @@ LINE_WORDS = CACHE_LINE // 8  # so that no two threads write to one cache line
 def stepping_of(scenario: Scenario) -> Stepping:
     """Return how the non-smooth scheme steps a scenario. Raises ValueError for a scenario of another scheme."""
     if not isinstance(scenario.time, Stepping):
-        message = f"scenario {scenario.name} is not one of the non-smooth scheme"
+        message = f"scenario {scenario.name} does not use the non-smooth scheme"
         raise ValueError(message)  # noqa: TRY004 - the scenario is of the right type
     return scenario.time
 
@@ -159,7 +159,7 @@ def groups_for(capacity: int) -> int:
 
 
 def threads_of(scene: Nonsmooth) -> int:
-    """Return for how many threads there is room for what they tell one another."""
+    """Return for how many threads there is room to exchange data."""
     return int(scene.contacts.residuals.shape[1]) // LINE_WORDS
 
 
@@ -176,5 +176,5 @@ def with_more_rows(scene: Nonsmooth) -> Nonsmooth:
 
 
 def with_more_threads(scene: Nonsmooth, threads: int) -> Nonsmooth:
-    """Return the same scene with room for what that many threads tell one another."""
+    """Return the same scene with room for the exchange between that many threads."""
     return scene._replace(contacts=scene.contacts._replace(residuals=np.zeros((2, LINE_WORDS * threads))))

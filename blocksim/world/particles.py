@@ -1,4 +1,4 @@
-"""Boundary particles of all bodies, as the contact models `particles` and `kernel` want them."""
+"""Boundary particles of all bodies for the contact models `particles` and `kernel`."""
 
 import math
 

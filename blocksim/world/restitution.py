@@ -1,8 +1,8 @@
-"""Damping ratio that gives an asked coefficient of restitution when contacts cannot pull.
+"""Damping ratio for a coefficient of restitution when contacts cannot pull.
 
 Linear spring and dashpot whose force is clipped at zero: the contact ends when the force, not the overlap, returns
 to zero. Closed form of T. Schwager and T. Poeschel, "Coefficient of restitution and linear-dashpot model
-revisited", Granular Matter 9 (2007) 465-469. The textbook formula without clipping gives 0.40 where 0.30 is asked.
+revisited", Granular Matter 9 (2007) 465-469. The textbook formula without clipping gives 0.40 where 0.30 is wanted.
 
 Hertz's law with a dashpot 2 z sqrt(m k_t), k_t = 3/2 K x^(1/2) its slope, follows from the linear case exactly. With
 m = K = 1 and p = dx/dt, p dp/dx = -x^(3/2) - 2 z (3/2)^(1/2) x^(1/4) p. With w = x^(5/4), dw = 5/4 x^(1/4) dx, this is

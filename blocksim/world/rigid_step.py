@@ -3,7 +3,7 @@
 Contacts are found once a step, and what a block turns and moves meanwhile is the error of a step, first order in its
 length. So the automatic step is the usual one unless the fastest point could move farther than a tenth of the smallest
 side in it. That speed is a bound, a fall of the highest corner to the lowest ground, or sliding down to the end of
-time; walls do not fall that fast. A step given by hand is therefore refused only where blocks go farther from the
+time; walls do not fall that fast. A manual step is therefore refused only where blocks go farther from the
 start, or in one substep at that bound.
 
 A block that meets something in a substep h stays there until it ends, and has not yet moved with its new velocity: it
@@ -38,20 +38,20 @@ MILLI = 1e3
 
 
 class StepTooLongError(StepError):
-    """A block moves too far in a step given by hand that is not forced; `limit` in s."""
+    """A block moves too far in a manual step that is not forced; `limit` in s."""
 
     def __init__(self, step: float, limit: float, smallest: float) -> None:
-        """Say what is too far."""
+        """Report the limits."""
         self.limit = limit
         super().__init__(
             f"{step:.4g} s is too long: blocks could move farther than a tenth of the smallest side "
-            f"({MILLI * smallest:.4g} mm) before contacts are looked at again; at most {limit:.4g} s with these "
-            'substeps. Use step = "auto", or force_step = true to take it all the same'
+            f"({MILLI * smallest:.4g} mm) before contacts are detected again; at most {limit:.4g} s with these "
+            'substeps. Use step = "auto", or force_step = true to override'
         )
 
 
 class Reason(NamedTuple):
-    """A step (s) that is not to be exceeded, and why in a few words."""
+    """A step (s) that must not be exceeded, and the reason in a few words."""
 
     step: float
     why: str
@@ -115,7 +115,7 @@ def _substeps(scenario: Scenario) -> int:
 
 
 def longest_step(outline: Outline, bounds: Bounds) -> float:
-    """Return the longest step (s) that may be given by hand."""
+    """Return the longest manual step (s)."""
     scenario = outline.scenario
     speed = greatest_speed(scenario, bounds, outline.interactions)
     rate = max(bounds.speed, speed / _substeps(scenario))

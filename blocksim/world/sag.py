@@ -1,4 +1,4 @@
-"""What rigid contacts give way by at rest: the position pass holds blocks apart like springs, stiffer for small steps.
+"""Overlap of rigid contacts at rest: the position pass holds blocks apart like springs, stiffer for small steps.
 
 At rest s = -F A / w^2 for a contact point that carries F, A = J M^-1 J^T, w = 2 pi f / h (blocksim.kernels.nonsmooth):
 a spring of w^2 / A, proportional to 1 / h^2. Of two blocks in face contact A = sum of 1/m + r^2/I over both, with half
@@ -45,7 +45,7 @@ def point_stiffness(substep: float, blocks: Iterable[PlacedBody]) -> float:
 
 
 class Sag(NamedTuple):
-    """How far blocks sink as they stand at the start (m): the one that sinks most, and the contact that gives most."""
+    """Sag of blocks in the initial arrangement (m): the one that sinks most, and the contact that overlaps most."""
 
     sag: float
     block: str
@@ -53,7 +53,7 @@ class Sag(NamedTuple):
 
 
 def scene_sag(substep: float, placed: Sequence[PlacedBody], gravity: float) -> Sag:
-    """Return what the blocks of a scene sink by once they rest on one another; see loads.py.
+    """Return the sag of the blocks of a scene at rest on one another; see loads.py.
 
     The stiffness w^2 / A of a contact goes with the smaller mass of its pair, not with what it carries. So a heavy
     block on a light one sinks by their ratio further than equal blocks.
@@ -85,10 +85,10 @@ def _inverse_mass_at(body: PlacedBody, x: float) -> float:
 
 
 def overlap_warning(overlap: float, smallest: float) -> str:
-    """Return what is to be said of an overlap (m) at rest, given the smallest side (m); nothing where it is small."""
+    """Return a warning of an overlap (m) at rest, given the smallest side (m); nothing where it is small."""
     if not overlap > WARNING_SHARE * smallest:
         return ""
     return (
         f"rigid contacts overlap by {MILLI * overlap:.3g} mm at rest, above {WARNING_SHARE:.0%} of the smallest side "
-        f"({MILLI * smallest:.4g} mm): a light block carries a heavy one; overlaps go with time.step squared"
+        f"({MILLI * smallest:.4g} mm): a light block carries a heavy one; overlaps grow with time.step squared"
     )

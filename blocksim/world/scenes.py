@@ -22,14 +22,14 @@ from blocksim.world.memory import Size, refuse_if_too_large
 from blocksim.world.particles import place_particles, slots_of_a_pair
 
 MOST_BYTES = 1 << 26  # of a stack of more than one scene
-MOST_LARGE = 64  # bodies that are looked at one by one, outside the grid of the broad phase
+MOST_LARGE = 64  # bodies that are checked one by one, outside the grid of the broad phase
 LARGE_RATIO = 4.0  # over the smallest body; nothing is large below that
 SURFACE = "surface"  # the model without particles
 Floats = NDArray[np.float64]
 
 
 class Stride(NamedTuple):
-    """What was chosen for one scene."""
+    """Values chosen for one scene."""
 
     step: float  # s
     skin: float  # m
@@ -64,7 +64,7 @@ class Parts(NamedTuple):
 
 @dataclass(frozen=True)
 class Construction:
-    """What a scheme does of its own where scenes are built."""
+    """Parts of building scenes that depend on the scheme."""
 
     choose: Callable[[Outline, Bounds], Stride]  # raises BlocksimError
     model: Callable[[Outline], str]  # of contacts, as the scheme's arrays have it
@@ -117,7 +117,7 @@ def build_one(scenario: Scenario, construction: Construction) -> Built:
 def build_stacks(scenarios: Sequence[Scenario], construction: Construction) -> Iterator[Stack | Refusal]:
     """Build scenarios of one scheme; those of one shape come in as few stacks as memory allows.
 
-    A scenario whose step, skin or size is refused does not keep the others from being built.
+    A scenario whose step, skin or size is refused does not stop the others.
     """
     outlines = [outline_of(scenario) for scenario in scenarios]
     for numbers in alike([outline.shape for outline in outlines]):
@@ -136,7 +136,7 @@ def _group(numbers: Sequence[int], outlines: Outlines, construction: Constructio
 
 
 def _choose(outlines: Outlines, construction: Construction) -> tuple[Records, list[Stride | BlocksimError]]:
-    """Return the bodies, and what is chosen for every scene or why nothing can be."""
+    """Return the bodies, and the values chosen for every scene or the reason why none can be."""
     chosen: list[Stride | BlocksimError] = []
     with np.errstate(all="ignore"):  # as in `build_one`
         bodies = body_records(outlines)
@@ -168,7 +168,7 @@ def _stacks(
 
 
 class _Boundary(NamedTuple):
-    """What the bodies of one scene touch others with."""
+    """Boundaries of the bodies of one scene."""
 
     particles: Records | None
     slots: int  # of a pair

@@ -42,7 +42,7 @@ STABILITY_LIMIT = 2.0
 
 
 class ContactBody(NamedTuple):
-    """What one body contributes to the stiffest contact state; inverse masses are zero for fixed bodies."""
+    """Contribution of one body to the stiffest contact state; inverse masses are zero for fixed bodies."""
 
     size_x: float  # m
     size_y: float  # m
@@ -59,7 +59,7 @@ class ContactStiffness(NamedTuple):
 
 
 class Load(NamedTuple):
-    """What presses the contacts of a scene together, for laws whose stiffness grows with the overlap."""
+    """Loads on the contacts of a scene, for laws whose stiffness grows with the overlap."""
 
     speed: float  # m/s, of the fastest impact expected
     weight: float  # N, of all free bodies

@@ -43,22 +43,22 @@ class StepError(InvalidInputError):
 
 
 class StepTooLargeError(StepError):
-    """A step given by hand exceeds the admissible one and is not forced; `limit` in s."""
+    """A manual step exceeds the admissible one and is not forced; `limit` in s."""
 
     def __init__(self, step: float, limit: float) -> None:
-        """Say both."""
+        """Report both."""
         self.limit = limit
         super().__init__(
             f"{step:.4g} s is above the largest safe step {limit:.4g} s; "
-            'use step = "auto", or force_step = true to take it all the same'
+            'use step = "auto", or force_step = true to override'
         )
 
 
 class UncountableStepsError(StepError):
-    """Step and end do not go together: more steps than can be counted, or none of any length."""
+    """Step and end are incompatible: more steps than can be counted, or steps of length zero."""
 
     def __init__(self, end: float, step: float) -> None:
-        """Say both."""
+        """Report both."""
         super().__init__(f"{end:.4g} s cannot be divided into steps of {step:.4g} s")
 
 
@@ -70,7 +70,7 @@ class SkinTooSmallError(InvalidInputError):
         self.least = least
         super().__init__(
             f"{MILLI * skin:.4g} mm is too small for this time step: two blocks that meet at {speed:.4g} m/s each come "
-            f"{MILLI * nearer_in_a_step(speed, step):.4g} mm nearer in {step:.4g} s, and the contact could be missed; "
+            f"{MILLI * nearer_in_a_step(speed, step):.4g} mm closer in {step:.4g} s, and the contact could be missed; "
             f"at least {MILLI * ROUND_UP * least:.4g} mm is needed. Leave skin out for the default"
         )
 
@@ -115,7 +115,7 @@ def step_of_travel(scenario: Scenario, bounds: Bounds, table: Interactions) -> f
 def choose_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
     """Return the step (s) the run will take; raises StepTooLargeError."""
     if not isinstance(scenario.time, Explicit):
-        message = f"scenario {scenario.name} is not one of the explicit scheme"
+        message = f"scenario {scenario.name} does not use the explicit scheme"
         raise ValueError(message)  # noqa: TRY004 - the scenario is of the right type
     with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused below
         try:

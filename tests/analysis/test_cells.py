@@ -69,7 +69,7 @@ BROKEN = {
             "table.csv:1: units: unknown column, did you mean 'unit'?\n"
             "    1 | block,quantity,units,replicate,value\n"
             "      |                ^^^^^\n"
-            "table.csv:2: unit: 'kg' is not the unit of a length, write mm, cm or m\n"
+            "table.csv:2: unit: 'kg' is not the unit of a length; write mm, cm or m\n"
             "    2 | 1,x,kg,1,16\n"
             "      |     ^^\n"
             "table.csv:3: value: 'wide' is not a number, write it as 71.69 or 7.169e1\n"
@@ -156,7 +156,7 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
 
 def test_a_huge_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
     path = write(tmp_path, HEADER + "1,x,mm,1,16\n" * 90_000)
-    with pytest.raises(InvalidInputError, match="too large for a table, limit 1000000 bytes"):
+    with pytest.raises(InvalidInputError, match="too large for a table; the limit is 1000000 bytes"):
         load_table(path)
 
 

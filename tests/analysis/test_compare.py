@@ -105,7 +105,7 @@ def test_an_unmeasured_block_is_named_and_not_judged() -> None:
     comparison = compare_final(final, TABLE)
     assert comparison.inside
     assert row(comparison, "4", "x").verdict is Verdict.NO_DATA
-    assert comparison.messages == (f"block '4' is not in {TABLE.source}, it is not compared",)
+    assert comparison.messages == (f"block '4' is not in {TABLE.source}; it is not compared",)
 
 
 def test_a_block_that_the_run_lacks_is_an_error() -> None:

@@ -173,24 +173,24 @@ GOOD = "1,x,mm,1,16\n"
 BROKEN = {
     "unit of another kind": (
         HEADER + "1,x,kg,1,16\n",
-        ("table.csv:2: unit: 'kg' is not the unit of a length, write mm, cm or m\n    2 | 1,x,kg,1,16\n      |     ^^"),
+        ("table.csv:2: unit: 'kg' is not the unit of a length; write mm, cm or m\n    2 | 1,x,kg,1,16\n      |     ^^"),
     ),
     "unit that does not exist": (
         HEADER + "1,x,millimetrs,1,16\n",
         (
-            "table.csv:2: unit: 'millimetrs' is not the unit of a length, write mm, cm or m\n"
+            "table.csv:2: unit: 'millimetrs' is not the unit of a length; write mm, cm or m\n"
             "    2 | 1,x,millimetrs,1,16\n"
             "      |     ^^^^^^^^^^"
         ),
     ),
     "no unit": (
         HEADER + "1,rotation,,1,16\n",
-        "table.csv:2: unit: no unit, write deg or rad\n    2 | 1,rotation,,1,16\n      |            ^",
+        "table.csv:2: unit: no unit; write deg or rad\n    2 | 1,rotation,,1,16\n      |            ^",
     ),
     "pure number as an angle": (
         HEADER + "1,rotation,1,1,16\n",
         (
-            "table.csv:2: unit: '1' is not the unit of an angle, write deg or rad\n"
+            "table.csv:2: unit: '1' is not the unit of an angle; write deg or rad\n"
             "    2 | 1,rotation,1,1,16\n"
             "      |            ^"
         ),
@@ -198,7 +198,7 @@ BROKEN = {
     "unit that would take pint hours": (
         HEADER + "1,x,mm**9**9**9,1,16\n",
         (
-            "table.csv:2: unit: 'mm**9**9**9' is not the unit of a length, write mm, cm or m\n"
+            "table.csv:2: unit: 'mm**9**9**9' is not the unit of a length; write mm, cm or m\n"
             "    2 | 1,x,mm**9**9**9,1,16\n"
             "      |     ^^^^^^^^^^^"
         ),
@@ -262,7 +262,7 @@ BROKEN = {
     "repeat is no number": (
         HEADER + "1,x,mm,first,16\n",
         (
-            "table.csv:2: replicate: 'first' is not the number of a repeat, count them 1, 2, 3, ...\n"
+            "table.csv:2: replicate: 'first' is not a repeat number; count repeats as 1, 2, 3, ...\n"
             "    2 | 1,x,mm,first,16\n"
             "      |        ^^^^^"
         ),
@@ -270,7 +270,7 @@ BROKEN = {
     "repeat zero": (
         HEADER + "1,x,mm,0,16\n",
         (
-            "table.csv:2: replicate: '0' is not the number of a repeat, count them 1, 2, 3, ...\n"
+            "table.csv:2: replicate: '0' is not a repeat number; count repeats as 1, 2, 3, ...\n"
             "    2 | 1,x,mm,0,16\n"
             "      |        ^"
         ),

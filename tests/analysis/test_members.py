@@ -45,8 +45,8 @@ def test_reasons_may_be_missing() -> None:
     ("changed", "message"),
     [
         (table().drop(columns=["case", "status"]), "sweep.csv: not the table of a sweep: no column case and status"),
-        (table().iloc[1:], "sweep.csv: none of the 2 cases has finished, there is nothing to compare"),
-        (table().iloc[:0], "sweep.csv: none of the 0 cases has finished, there is nothing to compare"),
+        (table().iloc[1:], "sweep.csv: none of the 2 cases has finished; nothing to compare"),
+        (table().iloc[:0], "sweep.csv: none of the 0 cases has finished; nothing to compare"),
     ],
 )
 def test_table_that_is_of_no_use_is_refused(changed: pd.DataFrame, message: str) -> None:

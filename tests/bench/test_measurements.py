@@ -35,13 +35,13 @@ def test_chosen_keeps_the_order_of_the_registry() -> None:
         (
             "wals",
             False,
-            "NAME 'wals': no such measurement, did you mean 'walls'? There are: three-blocks, ensemble, walls, threads",
+            "NAME 'wals': no such measurement, did you mean 'walls'? Choose: three-blocks, ensemble, walls, threads",
         ),
-        ("wals", True, "did you mean 'wall'? There are with --peers: three-blocks, three-blocks-e0, wall"),
+        ("wals", True, "did you mean 'wall'? Choose with --peers: three-blocks, three-blocks-e0, wall"),
         (
             "memory",
             False,
-            "NAME 'memory': no such measurement; there are: three-blocks, ensemble, walls, threads, nonsmooth-blocks",
+            "NAME 'memory': no such measurement; choose: three-blocks, ensemble, walls, threads, nonsmooth-blocks",
         ),
     ],
 )
@@ -68,5 +68,5 @@ def test_a_busy_machine_is_reported(load: float | None, busy: bool) -> None:
     machine = Machine("P9", 4, "Linux", "3.12", "0.6", "2.0", "1.0", "abc", load)
     assert machine.is_busy == busy
     assert machine.to_dict()["busy"] == busy
-    assert any("busy" in line for line in machine.lines()) == busy
+    assert any("Other processes" in line for line in machine.lines()) == busy
     assert machine.lines()[0] == f"P9, 4 cores, load {'unknown' if load is None else f'{load:.2f}'} at the start"

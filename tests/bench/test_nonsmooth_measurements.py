@@ -76,4 +76,4 @@ def test_threads_leave_small_walls_alone() -> None:
         "1000 blocks, speed-up",
     ]
     assert all(math.isfinite(one.median) and one.median > 0.0 for one in found.numbers)
-    assert found.notes[1].startswith("walls of 40 blocks are left to one thread")
+    assert found.notes[1].startswith("walls of 40 blocks always use one thread")

@@ -56,7 +56,7 @@ def test_threads_tell_their_time_and_by_how_much_they_are_faster_and_leave_small
         "400 blocks, speed-up",
     ]
     assert all(len(one.samples) == 2 and math.isfinite(one.median) and one.median > 0.0 for one in found.numbers)
-    assert found.notes[1].startswith("walls of 100 blocks are left to one thread")
+    assert found.notes[1].startswith("walls of 100 blocks always use one thread")
 
 
 def test_growth_is_the_exponent_of_a_power_law() -> None:

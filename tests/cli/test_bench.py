@@ -74,7 +74,7 @@ def test_a_stop_keeps_what_was_measured(blocksim: Command) -> None:
 def test_an_unknown_name_is_reported(blocksim: Command) -> None:
     answer = blocksim("bench", "fisrt")
     assert (answer.code, answer.out) == (2, "")
-    assert answer.err == ("bench: NAME 'fisrt': no such measurement, did you mean 'first'? There are: first, stop\n")
+    assert answer.err == ("bench: NAME 'fisrt': no such measurement, did you mean 'first'? Choose: first, stop\n")
 
 
 def test_a_place_that_cannot_be_written_is_reported_before_anything_is_measured(blocksim: Command) -> None:

@@ -121,7 +121,7 @@ def test_more_trials_continue_where_fewer_ended(slide: Slide) -> None:
         ((*FIT,), 65, "no input scatter: give --scatter"),
         (("--fit", "friction.block_gruond=0.2:0.5"), 65, "did you mean 'block_ground'?"),
         (("--fit", f"{FRICTION}=0.2 mm:0.5 mm"), 65, f"--fit {FRICTION}=0.2 mm:0.5 mm"),
-        (("--fit", f"{FRICTION}=0.5:0.2"), 65, "from 0.5 is not below to 0.2"),
+        (("--fit", f"{FRICTION}=0.5:0.2"), 65, "from = 0.5 is not below to = 0.2"),
         (("--fit", f"{FRICTION}=0.2"), 65, "a prior is a range: write KEY=FROM:TO"),
         (("--fit", f"{FRICTION}=0.2+-0.1"), 65, "a prior is a range: write KEY=FROM:TO"),
         (("--fit", FRICTION), 65, f"--fit {FRICTION}: write KEY="),
@@ -132,7 +132,7 @@ def test_more_trials_continue_where_fewer_ended(slide: Slide) -> None:
             65,
             "which is fitted; scatter friction.block_ground itself",
         ),
-        ((*FIT, "--scatter", f"{FRICTION}=0.3,0.4"), 65, "has to be a distribution, not a list"),
+        ((*FIT, "--scatter", f"{FRICTION}=0.3,0.4"), 65, "must be a distribution, not a list"),
         ((*FIT, "--scatter", f"{SPEED}=0.5 mm+-0.1 mm"), 65, "is a length"),
         ((*FIT, *SCATTER, "--experiment", "missing.csv"), 66, "missing.csv: no such file"),
         ((*FIT, *SCATTER, "--out", "."), 73, "this is a folder"),
@@ -201,6 +201,6 @@ def test_stopped_killed_and_resumed_it_finds_the_same(slide: Slide, process: Pro
         assert not (tmp_path / "cut.toml").exists()
         if number == signal.SIGTERM:
             assert running.returncode == 75
-            assert "of 22 trials; --resume runs the others" in told
+            assert "of 22 trials; --resume runs the rest" in told
     assert slide(*many, "--out", "cut.toml", "--resume", "--quiet").code == 0
     assert (tmp_path / "cut.toml").read_text() == (tmp_path / "whole.toml").read_text()

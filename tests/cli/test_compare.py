@@ -62,7 +62,7 @@ def test_other_table_can_be_given(blocksim: Command, finished: Path, tmp_path: P
     (tmp_path / "wide.csv").write_text("block,quantity,unit,replicate,value\n2,x,mm,1,0\n2,x,mm,2,1000\n")
     answer = blocksim("compare", finished, "--experiment", "wide.csv")
     assert answer.code == 0
-    assert "block '1' is not in wide.csv, it is not compared" in answer.out
+    assert "block '1' is not in wide.csv; it is not compared" in answer.out
 
 
 @pytest.mark.parametrize(

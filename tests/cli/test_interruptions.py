@@ -211,7 +211,7 @@ def test_results_that_cannot_fit_are_reported_before_the_start(blocksim: Command
     answer = blocksim("run", NOMINAL, "--set", "output.every=1e-9", "--set", "time.end=1e6", "--out", "out")
     assert answer.code == 74
     assert "out: the results may take " in answer.err
-    assert " are free on that disk; write elsewhere with --out DIR" in answer.err
+    assert " are free there; write elsewhere with --out DIR" in answer.err
     assert not (tmp_path / "out").exists()
 
 

@@ -90,7 +90,7 @@ def test_the_folder_alone_tells_what_the_blocks_stand_on(blocksim: Command) -> N
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
-        (["--out", "strip.bmp"], 65, "'.bmp' is no picture format"),
+        (["--out", "strip.bmp"], 65, "'.bmp' unsupported picture format"),
         (["--out", "nix/strip.png"], 74, "nix/strip.png: cannot be written"),
         (["--times", "0,x"], 2, "'x' is not a time; give"),
         (["--at", "5 furlongs"], 2, "'5 furlongs' is not a time; give"),
@@ -100,12 +100,12 @@ def test_the_folder_alone_tells_what_the_blocks_stand_on(blocksim: Command) -> N
         (["--size", "2000x2000mm", "--dpi", "300"], 2, "million pixels"),
         (["--colour", "mood"], 2, "'mood' is unknown; choose block, material, speed, turn"),
         (["--block", ","], 2, "give one name or several"),
-        (["--block", "1"], 65, "--block chooses the blocks of a run's history, but this picture is of the kind strip"),
+        (["--block", "1"], 65, "--block selects the blocks of a run's history, but this picture is of kind strip"),
         (["--kind", "history", "--block", "7"], 65, "--block 7: no such block in this run, its 3 blocks are 1, 2, 3"),
-        (["--kind", "history", "--at", "0"], 65, "--at picks frames of a run's strip or final picture"),
+        (["--kind", "history", "--at", "0"], 65, "--at selects frames of a run's strip or final picture"),
         (["--kind", "history", "--colour", "speed"], 65, "coloured by block or material"),
-        (["--kind", "finel"], 65, "--kind finel: no such picture of a run, did you mean 'final'?"),
-        (["--kind", "final", "--frames", "4"], 65, "--frames counts the panels of a run's strip"),
+        (["--kind", "finel"], 65, "--kind finel: unknown kind for a run, did you mean 'final'?"),
+        (["--kind", "final", "--frames", "4"], 65, "--frames sets the number of panels of a run's strip"),
         (["--times", "0,99"], 65, "outside the recorded span"),
         (["--experiment", "nix.csv"], 66, "nix.csv: no such file"),
     ],
@@ -160,8 +160,8 @@ def test_sweep_gets_the_picture_that_is_asked_for(blocksim: Command) -> None:
         (["--kind", "lines"], "swept: 3 keys are varied; lines can show one or two"),
         (["--kind", "mapp"], "--kind mapp: unknown kind, did you mean 'map'?"),
         (["--kind", "tornado"], "a tornado is drawn from a table of indices"),
-        (["--out", "swept.bmp"], "'.bmp' is no picture format"),
-        (["--times", "0,0.01"], "--at picks frames of a run's strip or final picture, but swept is a sweep"),
+        (["--out", "swept.bmp"], "'.bmp' unsupported picture format"),
+        (["--times", "0,0.01"], "--at selects frames of a run's strip or final picture, but swept is a sweep"),
     ],
 )
 def test_sweep_that_cannot_be_drawn_is_reported(blocksim: Command, arguments: list[str], told: str) -> None:

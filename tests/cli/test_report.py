@@ -134,7 +134,7 @@ def test_damaged_run_is_shown_as_far_as_it_can_be_read(blocksim: Command, tmp_pa
     answer = blocksim("report", "run")
     assert answer.code == (0 if damaged == "experiment.csv" else 65)
     text = REPORT.read_text(encoding="utf-8")
-    assert damaged in text.split("Not everything could be read or judged")[1]
+    assert damaged in text.split("Some parts could not be read or compared")[1]
     assert (data_of(REPORT)["frames"] is None) == (damaged in ("run.h5", "scenario.toml"))
 
 

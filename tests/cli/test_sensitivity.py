@@ -57,7 +57,7 @@ def test_distributions_of_the_scenario_are_the_default(blocksim: Command, tmp_pa
     [
         ((), 65, "nothing to vary: give --vary KEY=FROM:TO"),
         (("--vary", "friction.block_gruond=0.3:0.4"), 65, "did you mean 'block_ground'?"),
-        (("--vary", "friction.block_ground=0.4:0.3"), 65, "from 0.4 is not below to 0.3"),
+        (("--vary", "friction.block_ground=0.4:0.3"), 65, "from = 0.4 is not below to = 0.3"),
         (("--vary", "bodies.0.velocity.0=1 mm:2 mm"), 65, "--vary bodies.0.velocity.0=1 mm:2 mm"),
         (("--vary", "friction.block_ground=0.3:0.4:5"), 65, "count belongs to the modes"),
         ((*VARY, "--samples", 1), 65, "1 trajectories are too few"),

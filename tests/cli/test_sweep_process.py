@@ -138,7 +138,7 @@ def test_scheduler_that_dies_in_the_middle_is_reported_in_one_line(start: Sweep,
         wait_for(tmp_path / "swept" / "timings.csv", running)  # written after the first rows
         cluster.kill()
         _, err = running.communicate(timeout=PATIENCE)
-    assert err == f"the Dask scheduler at {address} has gone; rerun the command to finish\n"
+    assert err == f"the Dask scheduler at {address} is gone; rerun the command to finish\n"
     assert running.returncode == 69
     assert 0 < len(list(read_entries(tmp_path / "swept" / "manifest.jsonl"))) < 20_000
     assert (tmp_path / "swept" / "sweep.csv").exists()

@@ -90,7 +90,7 @@ def test_a_stop_keeps_what_was_measured(blocksim: Command, monkeypatch: pytest.M
 def test_an_unknown_case_is_reported(blocksim: Command) -> None:
     answer = blocksim("verify", "V2", "V99")
     assert answer.code == 65
-    assert answer.err == "V99: no such case; there are V1 to V24\n"
+    assert answer.err == "V99: no such case; choose V1 to V24\n"
 
 
 def test_rigid_contacts_say_that_they_are_and_what_is_left_out(

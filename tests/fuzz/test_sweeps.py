@@ -72,7 +72,7 @@ def _try(child: Child, folder: Path, usual: dict[tuple[str, ...], float], data: 
         (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,1e308,", "farther than can be drawn"),
         (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,sixteen,", "not a number"),
         (b",1.rotation_deg,", b",turned,", "no column 1.rotation_deg"),
-        (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,,", "has finished, but its row lacks places"),
+        (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,,", "has finished, but its row lacks positions"),
     ],
 )
 def test_tables_that_do_not_go_with_their_plan_are_not_drawn(  # found by the damage below

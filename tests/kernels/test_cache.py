@@ -62,7 +62,7 @@ def test_damaged_file_is_reported_compiled_anew_and_whole_again(
         assert again(1.5) == 3.0
     assert loads_and_compilations(again) == (0, 1)
     assert [record.getMessage() for record in caplog.records] == [
-        f"{kept}: compiled code is damaged there; what is damaged is compiled anew (less than a minute) ..."
+        f"{kept}: damaged compiled code found; recompiling it (less than a minute) ..."
     ]
     assert files(kept) == [file]
     third = double()

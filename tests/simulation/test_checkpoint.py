@@ -65,21 +65,21 @@ def test_every_flipped_bit_is_seen(written: Path) -> None:
         content = bytearray(whole)
         content[place] ^= 1 << place % 8
         written.write_bytes(content)
-        with pytest.raises(InvalidInputError, match=r"checkpoint\.0: not a whole checkpoint"):
+        with pytest.raises(InvalidInputError, match=r"checkpoint\.0: not a complete checkpoint"):
             read_checkpoint(written)
 
 
 @pytest.mark.parametrize("length", [0, 1, 31, 32, 33, 5000])
 def test_cut_file_is_seen(written: Path, length: int) -> None:
     written.write_bytes(written.read_bytes()[:length])
-    with pytest.raises(InvalidInputError, match="not a whole checkpoint"):
+    with pytest.raises(InvalidInputError, match="not a complete checkpoint"):
         read_checkpoint(written)
 
 
 def test_file_that_is_whole_but_no_checkpoint_is_refused(written: Path) -> None:
     for body in (b"", b"{}\n", b'{"format": "blocksim checkpoint 1"}\n', b"\x80\x04pickle\n"):
         written.write_bytes(body + sha256(body).digest())
-        with pytest.raises(InvalidInputError, match="not a whole checkpoint"):
+        with pytest.raises(InvalidInputError, match="not a complete checkpoint"):
             read_checkpoint(written)
 
 
@@ -95,7 +95,7 @@ def forged(path: Path, old: bytes, new: bytes) -> Path:
 def test_array_that_claims_to_fill_all_memory_is_refused(written: Path) -> None:
     first = next(line for line in written.read_bytes().split(b"\x93NUMPY") if b"'shape': (" in line)
     shape = first[first.index(b"'shape': (") :].split(b"}")[0]
-    with pytest.raises(InvalidInputError, match="not a whole checkpoint"):
+    with pytest.raises(InvalidInputError, match="not a complete checkpoint"):
         read_checkpoint(forged(written, shape, b"'shape': (9" + b"9" * (len(shape) - 13) + b",)"))
 
 
@@ -103,7 +103,7 @@ def test_array_that_claims_to_fill_all_memory_is_refused(written: Path) -> None:
 def test_shapes_that_no_array_has_are_refused(written: Path, shape: str) -> None:
     old = f",{json.dumps(read_checkpoint(written).head.arrays[0].shape)}]".encode()
     stored = read_checkpoint(forged(written, old, f",{shape}]".encode()))
-    with pytest.raises(InvalidInputError, match="not one of this scene"):
+    with pytest.raises(InvalidInputError, match="does not fit this scene"):
         restored(stored, build_scene(sliding({})))
 
 
@@ -115,7 +115,7 @@ def test_checkpoint_larger_than_the_memory_is_not_read(written: Path, monkeypatc
 
 @pytest.mark.parametrize("name", ["particles-linear", "nonsmooth"])
 def test_arrays_of_another_scene_are_refused(written: Path, name: str) -> None:
-    with pytest.raises(InvalidInputError, match="of this scene"):
+    with pytest.raises(InvalidInputError, match="do not fit this scene"):
         restored(read_checkpoint(written), build_scene(sliding(MODELS[name])))
 
 

@@ -15,5 +15,7 @@ def test_full_disk_of_the_kernel_cache_is_named(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(compilation, "build_scene", fail)
     monkeypatch.setattr("blocksim.simulation.compilation.jit.cache_folder", lambda: "/disk/blocksim/0123")
     compilation.compile_kernels.cache_clear()
-    with pytest.raises(OutputError, match=r"^/disk/blocksim/0123: the compiled solver cannot be kept there: No space"):
+    with pytest.raises(
+        OutputError, match=r"^/disk/blocksim/0123: the compiled solver cannot be stored there: No space"
+    ):
         compilation.compile_kernels()

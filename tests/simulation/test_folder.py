@@ -58,7 +58,7 @@ def test_leftovers_of_a_kill_do_not_block_a_folder(copy: Path) -> None:
         (copy / name).unlink()
     (copy / ".final.csv.k2j3h4_x.csv").write_text("half")
     (copy / ".run.h5.new").write_text("half")
-    with pytest.raises(OutputExistsError, match="did not finish"):
+    with pytest.raises(OutputExistsError, match="contains an unfinished run"):
         prepare_folder(copy, overwrite=False)
     prepare_folder(copy, overwrite=True)
     assert names(copy) == set()
@@ -113,7 +113,7 @@ def test_table_of_a_person_is_neither_replaced_nor_removed_as_a_copy(copy: Path,
     renew_copies(scenario, copy)
     assert (copy / "motion.csv").is_file()
     (copy / "experiment.csv").write_text("corrected by hand")
-    with pytest.raises(OutputExistsError, match=r"experiment\.csv: not as blocksim wrote it"):
+    with pytest.raises(OutputExistsError, match=r"experiment\.csv: changed since blocksim wrote it"):
         renew_copies(scenario, copy)
     assert (copy / "experiment.csv").read_text() == "corrected by hand"
 
@@ -176,7 +176,7 @@ def read_only(tmp_path: Path) -> Iterator[Path]:
 def test_a_link_that_leads_nowhere_is_in_the_way(tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(tmp_path / "nowhere")
     for folder in (tmp_path / "link", tmp_path / "link" / "run"):
-        with pytest.raises(OutputExistsError, match="link is a link that leads nowhere"):
+        with pytest.raises(OutputExistsError, match="link is a broken link"):
             prepare_folder(folder, overwrite=True)
     assert not (tmp_path / "nowhere").exists()
 

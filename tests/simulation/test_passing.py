@@ -157,7 +157,7 @@ def test_forced_step_in_which_a_block_could_pass_ends_the_run(speed: float) -> N
     result = simulate(scene(bodies, 0.2 / speed, {}, {"step": 1e-3 / speed, "force_step": True}))
     assert result.summary.exit_code == ExitCode.NUMERICAL_FAILURE
     assert (
-        f"moves too far in one step for its contacts to be found (the fastest is block 1 with {speed:.3g}"
+        f"moves too far in one step for its contacts to be detected (the fastest is block 1 with {speed:.3g}"
         in result.reason
     )
 

@@ -167,7 +167,7 @@ def test_damaged_checkpoint_falls_back_to_the_older_one_and_says_so(begun: Path,
     path.write_bytes({"flip": bytes(content), "cut": bytes(content[:-100]), "empty": b""}[damage])
     resumed = simulate_into(sliding({}), begun, resume=True)
     assert resumed.summary.resumed_from == (500,)
-    assert f"{path}: not a whole checkpoint" in resumed.summary.warnings[0]
+    assert f"{path}: not a complete checkpoint" in resumed.summary.warnings[0]
     assert_same(simulate_into(sliding({}), tmp_path / "whole"), resumed)
 
 
@@ -175,7 +175,7 @@ def test_nothing_continues_where_no_checkpoint_is_whole(begun: Path) -> None:
     for path in begun.glob("checkpoint.*"):
         path.write_bytes(path.read_bytes()[:-1])
     before = {path.name: path.read_bytes() for path in begun.iterdir()}
-    with pytest.raises(InvalidInputError, match="no checkpoint is whole; --overwrite starts again"):
+    with pytest.raises(InvalidInputError, match="no checkpoint is complete; --overwrite starts again"):
         simulate_into(sliding({}), begun, resume=True)
     assert {path.name: path.read_bytes() for path in begun.iterdir()} == before
 
@@ -217,7 +217,7 @@ def test_frame_that_was_changed_before_the_run_continues_is_found(tmp_path: Path
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         place = (4, 0) if file[name].ndim == 2 else 4
         file[name][place] = np.nextafter(file[name][place], np.inf)
-    with pytest.raises(InvalidInputError, match=r"run\.h5: changed since the run was interrupted: the \d+ fr"):
+    with pytest.raises(InvalidInputError, match=r"run\.h5: changed after the interruption: the \d+ fr"):
         simulate_into(scenario, tmp_path, resume=True)
 
 
@@ -229,7 +229,7 @@ def test_changed_frame_after_the_checkpoint_is_reported_when_it_is_repeated(begu
         file["particles/blocks/y"][place, 0] *= 1 + 1e-15
     resumed = simulate_into(sliding({}), begun, resume=True)
     (told,) = resumed.summary.warnings
-    assert told.startswith(f"{begun}/run.h5: the frame of step {steps[place]} is not what comes out now")
+    assert told.startswith(f"{begun}/run.h5: the frame of step {steps[place]} differs from the recomputed one")
 
 
 def test_run_without_a_checkpoint_starts_anew_and_says_so(begun: Path, tmp_path: Path) -> None:
@@ -246,7 +246,7 @@ def test_run_without_a_checkpoint_starts_anew_and_says_so(begun: Path, tmp_path:
 
 def test_another_finished_run_is_not_resumed_over(begun: Path) -> None:
     simulate_into(sliding({}), begun, resume=True)
-    with pytest.raises(OutputExistsError, match="another run is there"):
+    with pytest.raises(OutputExistsError, match="contains another run"):
         simulate_into(sliding({}, end=0.07), begun, resume=True)
 
 

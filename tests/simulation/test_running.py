@@ -171,7 +171,7 @@ def test_vanished_experiment_leaves_no_folder(soft: Shipped, tmp_path: Path) -> 
 
 def test_run_is_not_overwritten_unasked(kept: Result, soft: Shipped) -> None:
     assert kept.folder is not None
-    with pytest.raises(OutputExistsError, match="another run is there; --overwrite"):
+    with pytest.raises(OutputExistsError, match="contains another run; --overwrite"):
         simulate_into(soft(time__end=0.01), kept.folder)
 
 
@@ -199,7 +199,7 @@ def test_too_small_a_disk_is_reported_with_both_sizes(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr("shutil.disk_usage", usage)
     scenario = sliding({}, end=0.05, every=1e-7)
-    with pytest.raises(OutputError, match=r"the results may take 1\.84 MB and 1 MB are free on that disk"):
+    with pytest.raises(OutputError, match=r"the results may take 1\.84 MB, but only 1 MB are free there"):
         simulate_into(scenario, tmp_path / "not" / "yet")
     assert asked == [tmp_path]
     assert list(tmp_path.iterdir()) == []

@@ -176,7 +176,7 @@ def test_two_at_once_are_refused(tmp_path: Path) -> None:
         with opened(tmp_path / "journal", PLAN):
             yield
 
-    with second(), pytest.raises(OutputExistsError, match="another calibration is writing here"), second():
+    with second(), pytest.raises(OutputExistsError, match="another calibration is running here"), second():
         pass
 
 

@@ -51,7 +51,7 @@ def test_settings_reach_the_verdict(swept: SweepResult) -> None:
 
 
 def test_chosen_members_are_no_sample_and_this_is_said(swept: SweepResult) -> None:
-    assert any("are no probabilities" in message for message in compare_sweep(swept).messages)
+    assert any("not probabilities" in message for message in compare_sweep(swept).messages)
 
 
 def test_table_alone_needs_an_experiment(swept: SweepResult, tmp_path: Path) -> None:

@@ -170,7 +170,7 @@ def test_spacing_is_refined_where_there_are_particles(slide: Scenario) -> None:
     assert (spacing.key, spacing.value(0), spacing.value(1)) == ("contact.particle_spacing", 1e-3, 5e-4)
     with pytest.raises(InvalidInputError, match=r'no effect on contact\.model = "surface"'):
         refinements_of(slide, ["spacing"])
-    with pytest.raises(InvalidInputError, match="'speed' is no study of convergence; there are step, stiffness"):
+    with pytest.raises(InvalidInputError, match="'speed' unknown convergence study; choose step, stiffness"):
         refinements_of(slide, ["speed"])
 
 

@@ -90,7 +90,7 @@ def test_cells_may_have_units_of_their_own(document: Document) -> None:
         ("gravity,gravity [m/s^2]\n1,2\n", "1: key given twice"),
         ("gravity [m/ss]\n1\n", "1: unknown unit 'ss'"),
         ("gravity []\n1\n", "1: the unit is missing"),
-        ("gravity\n", "1: no row follows; every row is one case"),
+        ("gravity\n", "1: no row follows the header; every row is one case"),
         ("# nothing\n", "the table is empty"),
         ("gravity\n1\n2,3\n", "3: 2 cells where the header has 1 columns"),
         ("gravity,time.end\n1,\n", "2: time.end: this cell is empty"),

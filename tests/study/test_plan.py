@@ -157,11 +157,11 @@ def test_a_distribution_that_leaves_the_possible_values_is_refused_before_anythi
         ({SCALE: {"from": 0.1, "to": 1}}, "grid", "a distribution needs one of the modes lhs, sobol and normal"),
         ({SCALE: {"mean": 0.1, "sd": 1}}, "list", "a distribution needs one of the modes lhs, sobol and normal"),
         ({SCALE: {"from": 0.1, "to": 1, "count": 3}}, "lhs", "count belongs to the modes"),
-        ({SCALE: {"from": 1, "to": 1}}, "lhs", "from 1 is not below to 1"),
+        ({SCALE: {"from": 1, "to": 1}}, "lhs", "from = 1 is not below to = 1"),
         ({SCALE: {"from": 0.0, "to": 1, "scale": "log"}}, "lhs", "needs from and to above 0"),
         ({SCALE: {"mean": 0.5, "sd": -0.1}}, "normal", "the standard deviation -0.1 is not above 0"),
-        ({SCALE: {"mean": 0.5, "sd": 0.1, "from": 0.9, "to": 0.1}}, "sobol", "from 0.9 is not below to 0.1"),
-        ({SCALE: {"mean": 0.5, "sd": 0.1, "from": 2}}, "sobol", "nothing within 8 standard deviations"),
+        ({SCALE: {"mean": 0.5, "sd": 0.1, "from": 0.9, "to": 0.1}}, "sobol", "from = 0.9 is not below to = 0.1"),
+        ({SCALE: {"mean": 0.5, "sd": 0.1, "from": 2}}, "sobol", "everything within 8 standard deviations"),
         ({SCALE: {"mean": 0.5}}, "sobol", "sd is missing"),
         ({SCALE: {"form": 0.5, "to": 1.0}}, "sobol", "unknown key \"form\", did you mean 'from'?"),
         ({"structures.0.overlap": {"mean": "10 mm", "sd": "1 s"}}, "normal", "are not of one kind"),
@@ -187,7 +187,7 @@ def test_mistakes_of_a_sampled_sweep_are_reported_together(nominal: Document) ->
 
 
 def test_samples_belong_to_sampled_modes(nominal: Document) -> None:
-    with pytest.raises(ScenarioError, match='samples: mode "grid" has no samples; it belongs to "lhs", "sobol"'):
+    with pytest.raises(ScenarioError, match='samples: mode "grid" has no key samples, which belongs to "lhs", "sobol"'):
         with_sweep(nominal, {SCALE: [1.0]}, samples=3).build()
 
 

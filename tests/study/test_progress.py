@@ -53,7 +53,7 @@ def test_changed_byte_is_noticed(tmp_path: Path) -> None:
 def test_second_writer_is_refused_until_the_first_has_gone(tmp_path: Path) -> None:
     path = tmp_path / "manifest.jsonl"
     first = Manifest(path)
-    with pytest.raises(OutputExistsError, match="running already"):
+    with pytest.raises(OutputExistsError, match="already running"):
         Manifest(path)
     first.close()
     Manifest(path).close()

@@ -108,7 +108,7 @@ def test_missing_file_of_a_run_is_named(copy: Path, name: str) -> None:
 def test_final_table_without_one_of_the_blocks_is_named(copy: Path) -> None:  # and not the experiment's, which has it
     lines = (copy / "final.csv").read_text().splitlines(keepends=True)
     (copy / "final.csv").write_text("".join(lines[:1] + lines[2:]))
-    with pytest.raises(InvalidInputError, match=r"final\.csv: holds other blocks than scenario\.toml"):
+    with pytest.raises(InvalidInputError, match=r"final\.csv: its blocks are not those of scenario\.toml"):
         compare_run(copy)
 
 

@@ -81,7 +81,7 @@ def test_blocks_of_the_design_with_a_failed_run_are_left_out_and_counted() -> No
 
 def test_too_many_failures_are_refused() -> None:
     vary: dict[str, object] = {"bodies.0.y": ["12.5 mm", "11 mm"]}
-    with pytest.raises(TooManyFailuresError, match="base samples; no indices can be given"):
+    with pytest.raises(TooManyFailuresError, match="base samples; no indices can be computed"):
         found("slide", vary, "sobol", 8)
 
 

@@ -32,7 +32,7 @@ def test_what_did_not_finish_is_reported(folder: Path) -> None:
     summary = json.loads((folder / "run.json").read_text())
     for status, told in (("failed", "this run has failed (why)"), ("interrupted", "this run was interrupted (why)")):
         (folder / "run.json").write_text(json.dumps({**summary, "status": status, "reason": "why"}))
-        assert stored_run(folder).remark == f"{folder}: {told}; its 5 frames go to 0.002002 s"
+        assert stored_run(folder).remark == f"{folder}: {told}; its 5 frames end at 0.002002 s"
     (folder / "run.json").write_text("{")
     assert "run.json of this run is damaged" in stored_run(folder).remark
     (folder / "run.json").unlink()
@@ -44,5 +44,5 @@ def test_missing_and_damaged_frames_are_reported(folder: Path) -> None:
     with pytest.raises(InvalidInputError, match=r"run\.h5: not a"):
         stored_run(folder)
     (folder / "run.h5").unlink()
-    with pytest.raises(InputMissingError, match=r"there is no run\.h5"):
+    with pytest.raises(InputMissingError, match=r"no run\.h5"):
         stored_run(folder)

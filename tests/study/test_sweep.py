@@ -186,7 +186,7 @@ def test_case_that_cannot_be_built_does_not_end_the_others(nominal: Document, tm
 def test_other_sweep_in_the_folder_is_not_mixed_in(quick: Document, tmp_path: Path) -> None:
     sweep(quick, TWO, out=tmp_path)
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    with pytest.raises(OutputExistsError, match="another sweep is there; --overwrite"):
+    with pytest.raises(OutputExistsError, match="contains another sweep; --overwrite"):
         sweep(quick, {KINETIC: [0.1]}, out=tmp_path)
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
     result = sweep(quick, {KINETIC: [0.1]}, out=tmp_path, overwrite=True)
@@ -268,8 +268,8 @@ def test_mistake_leaves_no_folder(quick: Document, tmp_path: Path) -> None:
         ({"experiment.table": ["a.csv"]}, {}, "experiment.table"),
         (TWO, {"executor": "ensembel"}, "did you mean 'ensemble'"),
         (TWO, {"executor": "dask"}, "address of a scheduler"),
-        (TWO, {"executor": "ensemble", "keep_cases": True}, "goes with the executor processes"),
-        (TWO, {"scheduler": "tcp://localhost:1", "executor": "processes"}, "goes with the executor dask"),
+        (TWO, {"executor": "ensemble", "keep_cases": True}, "needs the executor processes"),
+        (TWO, {"scheduler": "tcp://localhost:1", "executor": "processes"}, "needs the executor dask"),
         (TWO, {"scheduler": "tcp://localhost:1", "keep_cases": True}, "not with a scheduler"),
         (TWO, {"shard": Shard(0, 2), "overwrite": True}, "cannot overwrite"),
     ]

@@ -104,7 +104,7 @@ def test_cases_are_inside_by_the_rules_of_compare_and_failed_ones_never(nominal:
 @pytest.mark.parametrize("kept", [3, 4, 6, 11, 15])
 def test_table_that_was_cut_off_in_a_finished_case_is_refused(nominal: Document, tmp_path: Path, kept: int) -> None:
     cut = ",".join(ended(67.0, 130.0).split(",")[:kept])
-    with pytest.raises(InvalidInputError, match=r"sweep\.csv: case case1 has finished, but its row lacks places"):
+    with pytest.raises(InvalidInputError, match=r"sweep\.csv: case case1 has finished, but its row lacks positions"):
         stored(nominal, tmp_path, {"gravity": [1.0, 2.0]}, [f"1.0,{ended(74.0, 130.0)}", f"2.0,{cut}"])
 
 

@@ -34,7 +34,7 @@ def test_sweep_does_what_shards_have_left(quick: Document, tmp_path: Path) -> No
 
 
 def test_what_is_no_sweep_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(InputMissingError, match=r"no sweep is there \(no sweep.toml\)"):
+    with pytest.raises(InputMissingError, match=r"not a sweep folder \(no sweep.toml\)"):
         merge(tmp_path)
 
 

@@ -140,7 +140,7 @@ def test_a_table_that_measures_other_blocks_is_no_trouble(caught: list[Figure]) 
 
 
 def test_trouble_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="no picture format"):
+    with pytest.raises(InvalidInputError, match="unsupported picture format"):
         draw_final(toppling(1), tmp_path / "final.bmp")
     with pytest.raises(OutputError, match="cannot be written"):
         draw_final(toppling(1), tmp_path / "none" / "final.png")

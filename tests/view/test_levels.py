@@ -72,7 +72,7 @@ def test_nothing_but_zeros_can_be_drawn(tmp_path: Path) -> None:
 
 
 def test_wrong_files_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="no picture format"):
+    with pytest.raises(InvalidInputError, match="unsupported picture format"):
         draw_levels([panel()], tmp_path / "levels.bmp")
     with pytest.raises(OutputError, match="cannot be written"):
         draw_levels([panel()], tmp_path / "nix" / "levels.png")

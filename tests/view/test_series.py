@@ -104,7 +104,7 @@ def test_blocks_that_stay_are_left_out_and_many_are_cut() -> None:
 
 
 def test_unknown_format_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="no picture format"):
+    with pytest.raises(InvalidInputError, match="unsupported picture format"):
         draw_series([made_up(2)], ("a", "b"), ("gravity", ""), tmp_path / "series.bmp")
 
 

@@ -162,8 +162,8 @@ def test_odd_names_are_drawn_as_they_are(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("strip.bmp", "'.bmp' is no picture format, write .png, .svg, .pdf"),
-        ("strip", "'' is no picture format"),
+        ("strip.bmp", "'.bmp' unsupported picture format; use .png, .svg, .pdf"),
+        ("strip", "'' unsupported picture format"),
     ],
 )
 def test_an_unknown_format_is_refused(tmp_path: Path, name: str, message: str) -> None:

@@ -41,5 +41,5 @@ def test_intervals_that_are_hardly_known_do_not_hide_the_bars() -> None:
 
 
 def test_unknown_format_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="no picture format"):
+    with pytest.raises(InvalidInputError, match="unsupported picture format"):
         draw_tornado([BARS], ("total", ""), tmp_path / "tornado.bmp", "x")

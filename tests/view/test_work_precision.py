@@ -59,7 +59,7 @@ def test_zero_errors_are_drawn_at_the_floor(tmp_path: Path) -> None:
 
 
 def test_wrong_files_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="no picture format"):
+    with pytest.raises(InvalidInputError, match="unsupported picture format"):
         draw_work_precision([PANEL], tmp_path / "work.bmp")
     with pytest.raises(OutputError, match="cannot be written"):
         draw_work_precision([PANEL], tmp_path / "nix" / "work.png")

@@ -154,8 +154,7 @@ def test_step_above_the_admissible_one_is_refused_with_both_numbers() -> None:
     with pytest.raises(StepTooLargeError) as refusal:
         build_world(scenario(time={"step": 1e-5}))
     assert str(refusal.value) == (
-        f"1e-05 s is above the largest safe step {limit:.4g} s; "
-        'use step = "auto", or force_step = true to take it all the same'
+        f'1e-05 s is above the largest safe step {limit:.4g} s; use step = "auto", or force_step = true to override'
     )
     assert refusal.value.exit_code == ExitCode.INVALID_INPUT
     assert refusal.value.limit == limit

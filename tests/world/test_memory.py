@@ -68,7 +68,7 @@ def test_a_scene_that_does_not_fit_is_refused_with_both_numbers(monkeypatch: pyt
     assert caught.value.exit_code == ExitCode.INVALID_INPUT
     assert (caught.value.needed, caught.value.available) == (size.bytes_needed, 12 * GIB)
     message = str(caught.value)
-    assert f"needs about {readable(size.bytes_needed)} of memory and 12.9 GB are free" in message
+    assert f"needs about {readable(size.bytes_needed)} of memory, and 12.9 GB are free" in message
     assert "for 1000000 bodies and 8000000 pairs" in message
     assert "for 2001 frames (output.every)" in message
 

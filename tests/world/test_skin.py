@@ -65,7 +65,7 @@ def test_a_skin_that_blocks_can_outrun_is_refused_with_the_least_one() -> None:
         build_world(scenario(contact={"skin": 0.999 * least}))
     assert refusal.value.exit_code == ExitCode.INVALID_INPUT
     assert refusal.value.least == pytest.approx(least, rel=1e-12)
-    assert f"{speed:.4g} m/s each come {400 * least:.4g} mm nearer in {step:.4g} s" in str(refusal.value)
+    assert f"{speed:.4g} m/s each come {400 * least:.4g} mm closer in {step:.4g} s" in str(refusal.value)
     cure = float(str(refusal.value).split("at least ")[1].split()[0])
     assert build_world(scenario(contact={"skin": 1e-3 * cure})).controls[0].skin == 1e-3 * cure
 

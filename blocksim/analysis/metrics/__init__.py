@@ -1,4 +1,4 @@
-"""The metrics by which an ensemble is judged against repeats: one file a metric, one line here."""
+"""Metrics that compare an ensemble with repeats: one file per metric, one line here."""
 
 from blocksim.analysis.metrics.area import AREA
 from blocksim.analysis.metrics.inside import INSIDE

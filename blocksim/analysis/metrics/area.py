@@ -56,7 +56,7 @@ class Steps:
     def area(self, one: "Counts", other: "Counts") -> float:
         """Return the area between two samples, given as the places of their values on the grid."""
         gap = self._distribution(one) - self._distribution(other)
-        return float(np.sum(np.abs(gap) * self.widths))  # not by BLAS, whose threads get in each other's way here
+        return float(np.sum(np.abs(gap) * self.widths))  # not by BLAS, whose threads hinder one another here
 
     def _distribution(self, places: "Counts") -> "Floats":
         """Return the share of values up to each place of the grid but the last."""
@@ -102,7 +102,7 @@ def _find(evidence: Evidence) -> Findings:
 
 
 def _complaint(pair: Pair) -> str:
-    """Say why there is no interval, or nothing."""
+    """Return why there is no interval, or nothing."""
     if not pair.scatters:
         return "as the repeats do not scatter"
     few = min(pair.known.size, len(pair.repeats)) < FEWEST
@@ -125,8 +125,8 @@ AREA = Metric(
         *BLOCK,
         Column("members", "members", Form.COUNT, "members with a value"),
         Column("repeats", "repeats", Form.COUNT, "repeats with a value"),
-        Column("area", "area", Form.NUMBER, "integral of |F_members - F_repeats| dx: 0 where they are alike"),
-        Column("interval", "95 %", Form.NUMBER, "bootstrap interval of the area, both samples drawn anew"),
+        Column("area", "area", Form.NUMBER, "integral of |F_members - F_repeats| dx: 0 where they are equal"),
+        Column("interval", "95 %", Form.NUMBER, "bootstrap interval of the area, both samples resampled"),
     ),
     _find,
 )

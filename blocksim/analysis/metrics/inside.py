@@ -1,6 +1,6 @@
-"""The test of the paper, [minimum, maximum] of the repeats, for every member; and what passing it is worth.
+"""The test of the paper, [minimum, maximum] of the repeats, for every member, and its significance.
 
-One more repeat of the experiment is, in rank, equally likely to fall into each of the n + 1 gaps that n repeats leave,
+The next repeat of the experiment is, in rank, equally likely to fall into each of the n + 1 gaps between n repeats,
 so it lies between the smallest and the largest with probability (n - 1)/(n + 1), whatever the distribution (at least
 that, where equal values are possible). Of several such tests at once only bounds are known without their dependence:
 at most the smallest of the probabilities, at least 1 - the sum of the complements (Bonferroni).
@@ -13,12 +13,12 @@ ALL = "all"
 
 
 def repeat_passes(n: int) -> float:
-    """Return the probability that one more repeat lies within [minimum, maximum] of `n` repeats."""
+    """Return the probability that the next repeat lies within [minimum, maximum] of `n` repeats."""
     return (n - 1) / (n + 1)
 
 
 def repeat_passes_all(counts: list[int]) -> Interval | float | None:
-    """Return the bounds of the probability that one more repeat passes all tests, with n repeats in each."""
+    """Return the bounds of the probability that the next repeat passes all tests, with n repeats in each."""
     if not counts:
         return None
     chances = [repeat_passes(n) for n in counts]
@@ -54,15 +54,15 @@ def _has_range(pair: Pair) -> bool:
 
 INSIDE = Metric(
     "inside",
-    "members inside the measured limits, as single runs are judged",
+    "members inside the measured limits, by the rules for single runs",
     (
         *BLOCK,
-        Column("limits", "limits", Form.NUMBER, "ends of what counts as inside, as for a single run"),
-        Column("inside", "inside", Form.COUNT, "members inside; failed ones are not"),
+        Column("limits", "limits", Form.NUMBER, "limits of inside, as for a single run"),
+        Column("inside", "inside", Form.COUNT, "members inside; failed ones count as outside"),
         Column("of", "", Form.COUNT, "all members, failed ones included"),
         Column("share", "share", Form.SHARE, "inside / of", 1),
-        Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability behind it", 1),
-        Column("repeat_passes", "repeat", Form.SHARE, "chance that one more repeat is inside: (n-1)/(n+1)", 0),
+        Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability", 1),
+        Column("repeat_passes", "repeat", Form.SHARE, "probability that the next repeat is inside: (n-1)/(n+1)", 0),
     ),
     _find,
 )

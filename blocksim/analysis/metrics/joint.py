@@ -9,7 +9,7 @@ T2 (nu - p + 1)/(nu p) follows F(p, nu - p + 1) nearly, with
 
 (Krishnamoorthy and Yu, Statistics & Probability Letters 66, 2004, modifying Nel and van der Merwe). Where the ensemble
 is large, or has one member, or does not scatter, B = 0, nu = n - 1, and this is exactly the one-sample test of the
-repeats against the ensemble's mean. For p = 1 it is Welch's test. The uncertainty of the reading is not in it.
+repeats against the ensemble's mean. For p = 1 it is Welch's test. It does not include the uncertainty of the reading.
 """
 
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ SMALLEST_EIGENVALUE = 1e-9  # of the correlation matrix: below it, one position 
 
 
 class Hotelling(NamedTuple):
-    """T2, and the F distribution by which it is judged: `F` has `dof_1`, `dof_2` degrees of freedom."""
+    """T2, and the F distribution of its test: `F` has `dof_1`, `dof_2` degrees of freedom."""
 
     T2: float
     F: float
@@ -105,7 +105,7 @@ def _find(evidence: Evidence) -> Findings:
 
 
 def _complaint(repeats: "Floats", members: "Floats") -> str:
-    """Say why there can be no test, or nothing."""
+    """Return why no test is possible, or nothing."""
     n, p = repeats.shape
     if n <= p:
         return f"{n} complete repeats for {p} positions, at least {p + 1} are needed"
@@ -137,11 +137,11 @@ JOINT = Metric(
         Column("repeats", "n", Form.COUNT, "repeats in which all of them were measured"),
         Column("members", "N", Form.COUNT, "members that have all of them"),
         Column("T2", "T2", Form.NUMBER, "squared distance of the means in units of their scatter"),
-        Column("critical", "5 %", Form.NUMBER, "T2 that chance exceeds in 5 % of experiments"),
+        Column("critical", "5 %", Form.NUMBER, "T2 that is exceeded by chance in 5 % of experiments"),
         Column("F", "", Form.NUMBER, "T2 scaled to follow the F distribution"),
         Column("dof_1", "", Form.NUMBER, "its degrees of freedom: number of positions"),
         Column("dof_2", "dof", Form.NUMBER, "its degrees of freedom: n - p for large ensembles", 1),
-        Column("p_value", "p", Form.NUMBER, "chance of such a T2 where the true means agree", 3),
+        Column("p_value", "p", Form.NUMBER, "probability of such a T2 if the true means agree", 3),
         Column("within", "agree", Form.TEXT, "T2 <= critical T2"),
     ),
     _find,

@@ -1,4 +1,4 @@
-"""What a metric is: evidence in, a table of numbers out, and every number with its meaning."""
+"""Definition of a metric: evidence in, a table of numbers out, and the meaning of every number."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 Interval = tuple[float, float]
 Value = str | int | float | bool | Interval | None
-Row = dict[str, Value]  # by the names of the metric's columns; None where there is no such number
+Row = dict[str, Value]  # by the names of the metric's columns; None where a number is missing
 
 
 class Form(StrEnum):
-    """How the values of a column are written."""
+    """Format of the values of a column."""
 
     TEXT = "text"
     COUNT = "count"
@@ -50,12 +50,12 @@ class Pair:
 
     @property
     def is_length(self) -> bool:
-        """Whether it is a position in mm, and no angle."""
+        """Whether it is a position in mm, not an angle."""
         return self.measured.unit == "mm"
 
     @property
     def scatters(self) -> bool:
-        """Whether the repeats differ; equal ones only say that the scatter is below the reading."""
+        """Whether the repeats differ; equal ones only show that the scatter is below the reading."""
         return self.measured.minimum < self.measured.maximum
 
     @property
@@ -65,7 +65,7 @@ class Pair:
 
     @property
     def limits(self) -> Interval:
-        """The lowest and the highest value that count as inside, as for a single run."""
+        """The limits of inside, as for a single run."""
         return limits(self.measured.quantity, self.measured.mean, self.measured.minimum, self.measured.maximum)
 
     @property
@@ -74,7 +74,7 @@ class Pair:
         return self.between(self.limits)
 
     def between(self, ends: Interval) -> "NDArray[np.bool_]":
-        """Tell of each member whether it lies between two ends, ends included."""
+        """Return for each member whether it lies between two ends, ends included."""
         return (self.values >= ends[0]) & (self.values <= ends[1])
 
     @property
@@ -85,7 +85,7 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What metrics are computed from; `u_num` is the standard uncertainty (mm) of the numerical solution."""
+    """Input of the metrics; `u_num` is the standard uncertainty (mm) of the numerical solution."""
 
     members: Members
     table: ExperimentTable
@@ -104,7 +104,7 @@ class Evidence:
 
     @property
     def inside(self) -> "NDArray[np.bool_]":
-        """Whether each member is inside in everything that was measured."""
+        """Whether each member is within all measured ranges."""
         inside: NDArray[np.bool_] = np.all([pair.inside for pair in self.pairs], axis=0)
         return inside
 
@@ -119,7 +119,7 @@ class Findings:
 
 @dataclass(frozen=True)
 class Metric:
-    """One way of judging an ensemble: `meaning` is one line, `find` computes the rows."""
+    """One comparison of an ensemble with repeats: `meaning` is one line, `find` computes the rows."""
 
     name: str
     meaning: str
@@ -129,7 +129,7 @@ class Metric:
 
 BLOCK = (
     Column("block", "block", Form.TEXT, "name of the block"),
-    Column("quantity", "quantity", Form.TEXT, "what was measured of it"),
+    Column("quantity", "quantity", Form.TEXT, "measured quantity"),
     Column("unit", "", Form.TEXT, "unit of the numbers: mm or deg"),
 )
 

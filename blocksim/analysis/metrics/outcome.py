@@ -1,7 +1,7 @@
 """The probability of each outcome: the rotations of all blocks, rounded to quarter turns.
 
-A class is written as its angles in degrees, "0, -90, -90". It is that of the blocks whose rotation was measured, or of
-all blocks where none was. Members that failed are in the total, as a class of their own.
+A class is written as its angles in degrees, "0, -90, -90". It covers the blocks whose rotation was measured, or
+all blocks if none was. Members that failed are in the total, as a class of their own.
 """
 
 from collections import Counter
@@ -71,16 +71,16 @@ def _row(name: str, found: Counter[str], seen: Counter[str]) -> Row:
 
 OUTCOME = Metric(
     "outcome",
-    "rotations of the blocks, to quarter turns (deg)",
+    "final rotations, rounded to quarter turns (deg)",
     (
         Column("outcome", "outcome", Form.TEXT, "rotation of each block, rounded to 90 degrees"),
-        Column("members", "members", Form.COUNT, "members that end so"),
+        Column("members", "members", Form.COUNT, "members with this outcome"),
         Column("of", "of", Form.COUNT, "all members, failed ones included"),
         Column("share", "share", Form.SHARE, "members / of", 1),
-        Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability behind it", 1),
-        Column("measured", "measured", Form.COUNT, "repeats that ended so"),
+        Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability", 1),
+        Column("measured", "measured", Form.COUNT, "repeats with this outcome"),
         Column("repeats", "of", Form.COUNT, "all repeats"),
-        Column("lower_bound", "at least", Form.SHARE, "one-sided 95 % limit: 0.05^(1/n) where all n agree", 1),
+        Column("lower_bound", "at least", Form.SHARE, "one-sided 95 % limit: 0.05^(1/n) if all n agree", 1),
     ),
     _find,
 )

@@ -1,7 +1,7 @@
-"""Where one more test would fall, and how many members fall there.
+"""Prediction interval for the next test, and the members inside it.
 
-For normal scatter the interval is mean +- t_(n-1, 0.975) s sqrt(1 + 1/n). Repeats that are all equal give none: their
-scatter is not zero, only smaller than what was read.
+For normal scatter the interval is mean +- t_(n-1, 0.975) s sqrt(1 + 1/n). Equal repeats give none: their
+scatter is not zero, only below the reading.
 """
 
 from blocksim.analysis.compare import prediction_half_width
@@ -26,14 +26,14 @@ def _row(pair: Pair, total: int) -> Row:
 
 PREDICTION = Metric(
     "prediction",
-    "members inside the 95 % prediction interval for one more test (mm)",
+    "members inside the 95 % prediction interval for the next test (mm)",
     (
         *BLOCK,
-        Column("prediction", "one more test", Form.NUMBER, "mean +- t s sqrt(1 + 1/n) of the n repeats"),
-        Column("inside", "inside", Form.COUNT, "members in it; failed ones are not"),
+        Column("prediction", "next test", Form.NUMBER, "mean +- t s sqrt(1 + 1/n) of the n repeats"),
+        Column("inside", "inside", Form.COUNT, "members in it; failed ones count as outside"),
         Column("of", "of", Form.COUNT, "all members, failed ones included"),
         Column("share", "share", Form.SHARE, "inside / of", 1),
-        Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability behind it", 1),
+        Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability", 1),
     ),
     _find,
 )

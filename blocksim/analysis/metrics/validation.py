@@ -1,9 +1,10 @@
-"""Error and uncertainties in the manner of ASME V&V 20-2009, for every measured length.
+"""Error and uncertainties after ASME V&V 20-2009, for every measured length.
 
 E = S - D, with S the mean of the ensemble and D that of the repeats. u_val = sqrt(u_num^2 + u_input^2 + u_D^2), where
 u_input is the standard deviation (divisor n - 1) of the members, which stands for the inputs' uncertainty only if the
 members sample it, u_D that of the measured mean with its reading (see analysis/compare.py), and u_num is given. The
-error of the model itself lies in E +- 2 u_val, at about 95 %; |E| <= 2 u_val means that it cannot be told from zero.
+error of the model itself lies in E +- 2 u_val, at about 95 %; |E| <= 2 u_val means that it cannot be distinguished from
+zero.
 """
 
 from math import hypot, isfinite, nan
@@ -54,7 +55,7 @@ VALIDATION = Metric(
     "error and uncertainty after ASME V&V 20 (mm)",
     (
         *BLOCK,
-        Column("members", "", Form.COUNT, "members with a value, of which S and u_input are taken"),
+        Column("members", "", Form.COUNT, "members with a value, used for S and u_input"),
         Column("S", "S", Form.NUMBER, "mean of the members"),
         Column("D", "D", Form.NUMBER, "mean of the repeats"),
         Column("E", "E", Form.NUMBER, "S - D"),
@@ -62,7 +63,7 @@ VALIDATION = Metric(
         Column("u_input", "u_input", Form.NUMBER, "standard deviation of the members"),
         Column("u_D", "u_D", Form.NUMBER, "of D: sqrt(s^2/n + 0.5^2), reading included"),
         Column("u_val", "u_val", Form.NUMBER, "sqrt(u_num^2 + u_input^2 + u_D^2)"),
-        Column("within", "|E|<=2u", Form.TEXT, "|E| <= 2 u_val: no error of the model is seen"),
+        Column("within", "|E|<=2u", Form.TEXT, "|E| <= 2 u_val: no error of the model is detected"),
     ),
     _find,
 )

@@ -48,7 +48,7 @@ class Blocksim(ABC):
     def solve(self, scene: Scene) -> Final:
         """Compute the scene. Not counted: building the world and what a run does once, as the others' scenes are not.
 
-        A run that breaks off, such as when soft blocks overlap too far, ends nowhere: at positions that are no numbers.
+        A run that fails, as when soft blocks overlap too far, ends at positions that are NaN.
         """
         times = {**self.time, "end": scene.end, "stop_at_rest": False}
         own = build_scene(scene.make(contact=self.contact, time=times))

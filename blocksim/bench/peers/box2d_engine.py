@@ -32,7 +32,7 @@ class Box2D(Stepper):
     units = UNITS
 
     def call(self, world: Any) -> tuple[Callable[..., object], tuple[Any, ...]]:
-        """Return what is called for a step, and with what."""
+        """Return the function of a step, and its arguments."""
         return world.Step, (self.step, self.iterations, self.iterations)
 
     def made(self, scene: Scene) -> tuple[Any, list[Any]]:
@@ -61,7 +61,7 @@ class Box2D(Stepper):
 
 
 def empty_world() -> Any:
-    """Return a world without anything in it.
+    """Return an empty world.
 
     Nothing sleeps: a stack has to stand by itself. Continuous physics, which keeps fast bodies from passing through the
     ground, is off: at these steps none does, and without it a step takes 10 to 25 % less time for the same answers.

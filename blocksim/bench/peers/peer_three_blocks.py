@@ -161,7 +161,7 @@ def _curve(series: Series, levels: list[Level]) -> Curve:
 
 
 def _ends(engine: str, finals: list[Final]) -> str:
-    """Tell where an engine puts blocks 2 and 3, and how far its starts end apart."""
+    """Report the final places of blocks 2 and 3 by an engine, and the scatter over its starts."""
     x = 1e3 * np.array([final.x for final in finals])
     middle, apart = np.median(x, axis=0), np.ptp(x, axis=0)
     return (

@@ -24,7 +24,7 @@ class Pymunk(Stepper):
     """One step length and number of iterations."""
 
     def call(self, world: Any) -> tuple[Callable[..., object], tuple[Any, ...]]:
-        """Return what is called for a step, and with what."""
+        """Return the function of a step, and its arguments."""
         return world.step, (self.step,)
 
     def made(self, scene: Scene) -> tuple[Any, list[Any]]:
@@ -56,7 +56,7 @@ class Pymunk(Stepper):
 
 
 def empty_space() -> Any:
-    """Return a space without anything in it."""
+    """Return an empty space."""
     space = loaded("pymunk").Space()
     space.gravity = (0.0, -9.81)
     space.collision_slop = SLOP

@@ -1,4 +1,4 @@
-"""A scene for several engines, and what an engine makes of it."""
+"""A scene for several engines, and the result of an engine."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Solver(Protocol):
 
     @property
     def setting(self) -> str:
-        """What is refined from level to level, for people."""
+        """The refined quantity, as text."""
 
     def calls(self, scene: Scene) -> int:
         """Return how often Python calls the engine for a scene."""
@@ -64,7 +64,7 @@ class Solver(Protocol):
 
 @dataclass(frozen=True)
 class Series:
-    """Settings of one engine from coarse to fine, and the one that counts as its converged answer."""
+    """Settings of one engine from coarse to fine, and its converged reference."""
 
     engine: str
     label: str

@@ -1,4 +1,4 @@
-"""Which settings of which engine are compared: one line a curve."""
+"""Settings of the engines that are compared: one line per curve."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the engines with a step of their own choosing share: the loop that is timed."""
+"""Common base of engines with a chosen step: the timed loop."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Stepper(ABC):
 
     @abstractmethod
     def call(self, world: Any) -> tuple[Callable[..., object], tuple[Any, ...]]:
-        """Return what is called for a step, and with what."""
+        """Return the function of a step, and its arguments."""
 
 
 def timed(call: Callable[..., object], arguments: tuple[Any, ...], count: int) -> float:

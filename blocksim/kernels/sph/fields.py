@@ -67,7 +67,7 @@ def _positive(numbers: ArrayLike, name: str, count: int) -> Floats:
 
 def _code(name: str, codes: dict[str, int]) -> int:
     if name not in codes:
-        raise ValueError(f"{name!r} is none of {', '.join(codes)}")
+        raise ValueError(f"{name!r} is unknown; use {', '.join(codes)}")
     return codes[name]
 
 
@@ -95,7 +95,7 @@ class Particles:
         places = _numbers(positions, "positions", (-1, 2)).copy()
         count = places.shape[0]
         if count == 0:
-            raise ValueError("positions: there must be at least one particle")
+            raise ValueError("positions: at least one particle is needed")
         self.sources = Sources(
             positions=places,
             mass=_positive(mass, "mass", count).copy(),

@@ -68,5 +68,5 @@ def read_contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts |
         rows[name] = column[:count]
     for name, least in zip(BODIES, (0, SUPPORT), strict=True):
         if count and not (least <= rows[name].min() and rows[name].max() < bodies):
-            raise ValueError(f"{GROUP}/{name} names bodies that are none of {bodies}")
+            raise ValueError(f"{GROUP}/{name} names bodies that are not among the {bodies}")
     return Contacts(ends, rows)

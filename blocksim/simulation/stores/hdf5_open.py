@@ -154,13 +154,13 @@ def data_set(file: Any, name: str, dimensions: int) -> Any:
     if not isinstance(found, h5py.Dataset):
         raise UnsafeError(f"{name}: not a data set")
     if found.is_virtual or found.external:
-        raise UnsafeError(f"{name}: its values lie in other files; they are not followed")
+        raise UnsafeError(f"{name}: its values are in other files, which are not read")
     if found.dtype.kind not in NUMBERS or found.dtype.itemsize > 8 or found.dtype.shape:  # noqa: PLR2004 - bytes
-        raise UnsafeError(f"{name}: holds {found.dtype}, no plain numbers")
+        raise UnsafeError(f"{name}: holds {found.dtype}, not plain numbers")
     if found.ndim != dimensions:
         raise UnsafeError(f"{name}: has {found.ndim} dimensions, not {dimensions}")
     if found.id.get_create_plist().get_nfilters():
-        raise UnsafeError(f"{name}: compressed, which no run file is")
+        raise UnsafeError(f"{name}: compressed, unlike any run file")
     return found
 
 
@@ -186,7 +186,7 @@ def member(file: Any, name: str) -> Any:
         if not isinstance(place, h5py.Group):
             raise UnsafeError(f"{name}: not in a group")
         if place.id.links.get_info(part.encode()).type != h5py.h5l.TYPE_HARD:  # h5py's own get() follows links first
-            raise UnsafeError(f"{name}: a link to elsewhere; links are not followed")
+            raise UnsafeError(f"{name}: a link to another place; links are not followed")
         place = place[part]
     return place
 

@@ -64,7 +64,7 @@ def _read(path: Path, file: Any, bodies: int) -> tuple[float, Rows]:
     if found != {bodies}:
         raise ValueError(f"holds {'/'.join(map(str, sorted(found)))} bodies, not {bodies}")
     if count <= 0:
-        raise ValueError("holds no frame: the run was killed before its first one, or has only just begun")
+        raise ValueError("holds no frame: the run was killed before its first one, or has just started")
     safety.refuse_too_many(path, {layout.STEP: steps, **moving, **measured}, count)
     rows = Rows(
         steps[:count],
@@ -80,7 +80,7 @@ def _time_step(data_set: Any, steps: NDArray[np.int64]) -> float:
     """Return the time step (s) that goes with numbers of steps; raises ValueError where they make no times."""
     time_step = float(data_set.attrs["time_step"])
     if steps.dtype.kind != "i" or steps.min() < 0:
-        raise ValueError("the numbers of its steps are none")
+        raise ValueError("its step numbers are invalid")
     if not (math.isfinite(time_step * float(steps.max())) and time_step > 0.0):
-        raise ValueError(f"a time step of {time_step:g} s is none")
+        raise ValueError(f"its time step of {time_step:g} s is invalid")
     return time_step

@@ -66,7 +66,7 @@ def _finite(frames: Frames) -> Indices:
         finite &= np.isfinite(field).all(axis=1)
     chosen = np.flatnonzero(finite)
     if len(chosen) == 0 or len(frames.names) == 0:
-        message = "there is no frame to export"
+        message = "no frame to export"
         raise InvalidInputError(message)
     return chosen
 

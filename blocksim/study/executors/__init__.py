@@ -101,7 +101,7 @@ def take(tasks: Iterator[Task], count: int, is_stopped: Callable[[], bool]) -> t
 def executor_named(name: str) -> Executor:
     """Return an executor. Raises InvalidInputError."""
     if name not in EXECUTORS:
-        message = f"there is no executor '{name}', {did_you_mean_or_list(name, EXECUTORS)}"
+        message = f"unknown executor '{name}', {did_you_mean_or_list(name, EXECUTORS)}"
         raise InvalidInputError(message)
     module = import_module(EXECUTORS[name])
     return Executor(module.run_tasks, module.check)

@@ -147,11 +147,11 @@ class Submission:
             self._scheduler_has_gone()
 
     def _scheduler_has_gone(self) -> NoReturn:
-        message = f"the Dask scheduler at {self.setting.scheduler} has gone; rerun the command to finish"
+        message = f"the Dask scheduler at {self.setting.scheduler} is gone; rerun the command to finish"
         raise UnavailableError(message)
 
 
 def _dead(error: Exception) -> Row:
     """Return the row of a case whose workers have died again and again."""
     row = row_of_error(error)
-    return {**row, "reason": f"no worker came to its end ({type(error).__name__}); --retry-failed runs it again"}
+    return {**row, "reason": f"no worker finished it ({type(error).__name__}); --retry-failed runs it again"}

@@ -1,1 +1,1 @@
-"""The paper's figures, tables and equations beside what the shipped scenarios give."""
+"""The paper's figures, tables and equations with the results of the shipped scenarios."""

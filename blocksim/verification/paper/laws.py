@@ -29,7 +29,7 @@ class Bounce(NamedTuple):
 def bounce_law(result: Result) -> Law:
     """Return the height (mm) of the lower face over a bounce, and Eq. 10 from its start.
 
-    The second form of Eq. 10 as printed gives how far the block will still rise: the height is the apex of Eq. 12 less
+    The second form of Eq. 10 as printed gives the remaining rise: the height is the apex of Eq. 12 less
     that.
     """
     frames, scenario = result.frames, result.scenario

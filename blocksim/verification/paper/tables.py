@@ -1,6 +1,6 @@
-"""Tables 1 to 3 of the paper as Markdown, with what the scenarios have or give beside what is printed.
+"""Tables 1 to 3 of the paper as Markdown: printed values with those of the scenarios.
 
-What was measured stands in scenarios/experiments; the results of the paper's own simulation stand here.
+Measurements are in scenarios/experiments; the results of the paper's own simulation are here.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -89,7 +89,7 @@ def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def all_inside(run: Result, centres: ExperimentTable) -> bool:
-    """Return whether everything measured of a run's blocks is inside the measured ranges."""
+    """Return whether all measured quantities of a run's blocks are inside the measured ranges."""
     return all(row.verdict is not Verdict.OUTSIDE for row in _judged(run, centres).values())
 
 

@@ -1,1 +1,1 @@
-"""Runs and sweeps as one HTML file that needs nothing else: no network, no other file."""
+"""Runs and sweeps as one self-contained HTML file."""

@@ -1,4 +1,4 @@
-"""What distinguishes runs of one name in a report: the keys of their scenarios that differ."""
+"""Labels for runs of one name in a report: the keys of their scenarios that differ."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,7 +35,7 @@ def _differs(flat: Sequence[Mapping[str, object]], key: str) -> bool:
 
 
 def _follows(key: str, keys: Sequence[str], flat: Sequence[Mapping[str, object]]) -> bool:
-    """Return True for a kinetic friction that is the static one in all runs: one of the two says enough."""
+    """Return True for a kinetic friction that equals the static one in all runs: one of the two suffices."""
     static = f"{key.removesuffix('.kinetic')}.static"
     return key.endswith(".kinetic") and static in keys and all(one.get(key) == one.get(static) for one in flat)
 

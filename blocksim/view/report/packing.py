@@ -34,7 +34,7 @@ class Packed:
 
     @property
     def notes(self) -> list[str]:
-        """What was lost, in sentences."""
+        """Losses of thinning and rounding, in sentences."""
         told = [f"{name} {error:.1g} {CHANNELS[name]}" for name, error in self.errors.items()]
         thinned = "all" if self.kept == self.recorded else "evenly thinned"
         return [

@@ -1,4 +1,4 @@
-"""The HTML file: templates, style, scripts and data put together."""
+"""The HTML file: templates, style, scripts and data."""
 
 import functools
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ def write_report(subjects: Sequence[Subject], path: Path, *, title: str, version
     Raises OutputError.
     """
     text = page_text(subjects, title=title, version=version)
-    content = text.encode(errors="replace")  # names of folders may be no text
+    content = text.encode(errors="replace")  # names of folders may not be valid text
     write_bytes(path, content)
     return len(content)
 

@@ -1,4 +1,4 @@
-"""Where the particles along the edge of a block lie, for models that have them; drawn, never used for forces.
+"""Particles along the edge of a block, for models that have them; drawn, never used for forces.
 
 The same division of the sides as when the world is built: equal intervals, none longer than the spacing. Discs lie
 inset by half of it, the rows of the kernel model on the edge itself.

@@ -1,4 +1,4 @@
-"""What the player draws around the blocks: ground, walls, the part of the plane that is shown. Millimetres."""
+"""Surroundings of the blocks in the player: ground, walls, the part of the plane that is shown. Millimetres."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ ENDLESS_WIDTHS = 20.0  # of the shown part; how far level ground is drawn to eit
 
 
 def scene_data(frames: Frames, scenario: Scenario, kept: Indices) -> dict[str, Any]:
-    """Return what the player needs beside the frames, as plain values for JSON."""
+    """Return everything but the frames that the player needs, as plain values for JSON."""
     support = support_of(scenario)
     extent = extent_of(frames, kept, support)
     reach = ENDLESS_WIDTHS * (extent.width + extent.height) / MILLIMETRES

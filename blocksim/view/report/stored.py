@@ -1,4 +1,4 @@
-"""Whatever can be read of a run's folder, and what cannot: runs that were killed or damaged are shown as well."""
+"""Readable parts of a run's folder, and problems: runs that were killed or damaged are shown as well."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ Found = TypeVar("Found")
 class StoredRun:
     """The parts of a run that could be read, None for the others.
 
-    `problems` say why, a line each, `damage` those of them that are no missing files.
+    `problems` give the reasons, a line each; `damage` are those that are not missing files.
     """
 
     folder: Path
@@ -48,7 +48,7 @@ class StoredRun:
 
 
 class _Attempts:
-    """Reads one thing after the other and remembers what went wrong."""
+    """Reads one part after the other and records errors."""
 
     def __init__(self) -> None:
         self.problems: list[str] = []

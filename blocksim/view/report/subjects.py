@@ -1,4 +1,4 @@
-"""What a report is about, as plain values that templates and scripts can use: runs here, sweeps in `sweeps`."""
+"""Parts of a report as plain values for templates and scripts: runs here, sweeps in `sweeps`."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ from blocksim.view.report.packing import MOST_BYTES, frame_indices, pack_forces,
 from blocksim.view.report.scene import scene_data
 from blocksim.view.report.stored import StoredRun
 
-LEDGER = {  # name in run.json: what a person reads
+LEDGER = {  # name in run.json: name in the report
     "kinetic": "kinetic",
     "potential": "potential",
     "stored_normal": "stored, normal",
@@ -52,7 +52,7 @@ def run_subject(
     most_bytes: int = MOST_BYTES,
     parent: str | None = None,
 ) -> Subject:
-    """Return a run for a report; `comparison` is what `Comparison.to_dict` gives, `remarks` more that is to be told.
+    """Return a run for a report; `comparison` is what `Comparison.to_dict` gives, `remarks` are further problems.
 
     `parent` is the key of the sweep that it is a member of.
     """
@@ -83,7 +83,7 @@ def run_subject(
 
 
 def _moving(run: StoredRun, most_bytes: int) -> tuple[dict[str, Any] | None, list[str], list[str]]:
-    """Return frames and scene for the player, what is to be said of them, and what is wrong with them."""
+    """Return frames and scene for the player, notes on them, and problems with them."""
     if run.frames is None or run.scenario is None:
         return None, [], []
     try:
@@ -113,7 +113,7 @@ def _measured(names: Sequence[str], comparison: Mapping[str, Any] | None) -> lis
 def _reason(run: StoredRun) -> str:
     if run.summary is not None:
         return run.summary.reason
-    return "no summary: the run was stopped, is still going on, or its run.json cannot be read"
+    return "no summary: the run was killed, is still running, or its run.json cannot be read"
 
 
 def _summary(run: StoredRun) -> list[tuple[str, str]]:
@@ -151,14 +151,14 @@ def _movement(found: Movement | None) -> list[tuple[str, str]]:
 def _share(value: float) -> str:
     if value == 0.0:
         return "0"
-    return f"{value:.1e}" if math.isfinite(value) else "not known"
+    return f"{value:.1e}" if math.isfinite(value) else "unknown"
 
 
 def _ledger(run: StoredRun) -> list[tuple[str, str]]:
     if run.summary is None:
         return []
     values = run.summary.energy_J.model_dump()
-    # what a scheme does not know is zero, and no news
+    # entries that a scheme does not have are zero
     shown = {name: values[name] for name in LEDGER if values.get(name) != 0.0 or name in ("kinetic", "potential")}
     return [(LEDGER[name], _joule(value)) for name, value in shown.items()]
 

@@ -1,4 +1,4 @@
-"""Sweeps in a report: the table as it lies in sweep.csv, and the members whose frames were kept."""
+"""Sweeps in a report: the table of sweep.csv, and the members whose frames were kept."""
 
 import csv
 import io
@@ -32,7 +32,7 @@ class SweepTable:
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """Columns that are neither of all sweeps nor of a block."""
+        """Columns that are neither common to all sweeps nor of a block."""
         known = {*HEAD, *TAIL}
         return tuple(name for name in self.columns if name not in known and not name.endswith(OF_BLOCKS))
 
@@ -80,7 +80,7 @@ def sweep_subject(  # noqa: PLR0913 - the parts of a sweep
 ) -> Subject:
     """Return a sweep for a report; `members` are the keys of the subjects of its cases.
 
-    `left_out` are cases that have frames, for which there was no room. `judged` is what `Judgement.to_dict` gives.
+    `left_out` are cases with frames that are not in the page. `judged` is what `Judgement.to_dict` gives.
     """
     name = table.folder.name if scenario is None else scenario.name
     shown = table.blocks[: max(1, MOST_VALUES // (2 * max(1, len(table.rows))))]
@@ -106,7 +106,7 @@ def sweep_subject(  # noqa: PLR0913 - the parts of a sweep
 
 
 def _limits(judged: Mapping[str, Any]) -> dict[str, list[float]]:
-    """Return the ends of what counts as inside, by the column of the table."""
+    """Return the limits of inside, by the column of the table."""
     rows = [row for row in judged["metrics"]["inside"]["rows"] if row["quantity"] in COLUMN_OF and row["limits"]]
     return {f"{row['block']}.{COLUMN_OF[row['quantity']]}": list(row["limits"]) for row in rows}
 

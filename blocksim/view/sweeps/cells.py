@@ -1,4 +1,4 @@
-"""One panel of a map: cells of a grid or dots of samples, coloured by a number, with what agrees outlined."""
+"""One panel of a map: cells of a grid or dots of samples, coloured by a number, with agreeing ones outlined."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 STEPS = 8  # of run-out, at most
 RARE = 1.0  # percent at either end that share the colour of the last step
 LEAST_SPAN_MM = 1.0
-RUN_OUT_COLOURS = "viridis"  # told apart with every colour blindness, and in grey: brighter all the way
+RUN_OUT_COLOURS = "viridis"  # distinguishable with every colour blindness, and in grey: brighter all the way
 # The same holds of these: no two are nearer than 0.12 in brightness.
 CLASS_COLOURS = ("#56B4E9", "#16325B", "#F4E27A", "#A05A8C", "#1B6B4A")
 OTHER_COLOUR, FAILED_COLOUR = "#D9D9D9", "#FFFFFF"
@@ -23,7 +23,7 @@ OTHER_COLOUR, FAILED_COLOUR = "#D9D9D9", "#FFFFFF"
 
 @dataclass(frozen=True)
 class Classes:
-    """Numbers of classes by case, and what the numbers mean: the measured one first, then the most frequent."""
+    """Numbers of classes by case, and their meaning: the measured one first, then the most frequent."""
 
     numbers: Floats  # (n,)
     labels: tuple[str, ...]
@@ -58,7 +58,7 @@ def classes_of(sweep: FoundSweep) -> Classes:
 
 
 def percent(share: float) -> str:
-    """Write a share for people, never rounding something to nothing or to everything."""
+    """Write a share, never rounded to 0 or 100 % unless exact."""
     if 0.0 < share < 0.01:  # noqa: PLR2004 - one percent
         return f"{100.0 * share:.2g} %"
     return f"{min(round(100.0 * share), 99 if share < 1.0 else 100)} %"

@@ -1,4 +1,4 @@
-"""What a picture of a sweep is drawn from: the inputs of every case, and where its blocks ended."""
+"""Data of a picture of a sweep: the inputs of every case, and the final places of its blocks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -45,12 +45,12 @@ class Input:
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What was measured of the blocks: repeats of x, what counts as inside and as predicted (mm), and the class."""
+    """Measurements of the blocks: repeats of x, limits of inside and prediction (mm), and the class."""
 
     x_mm: Mapping[str, Floats] = field(default_factory=dict)  # by block, (repeats,)
     limits_mm: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     prediction_mm: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    outcome: tuple[int, ...] | None = None  # turns of all blocks in degrees, rounded to quarters
+    outcome: tuple[int, ...] | None = None  # rotations of all blocks in degrees, rounded to quarter turns
 
     def range_of(self, block: str) -> tuple[float, float] | None:
         """Return the smallest and largest repeat (mm), None where there is none."""
@@ -97,13 +97,13 @@ class FoundSweep:
 
 
 def short_names(keys: Sequence[str]) -> list[str]:
-    """Return the keys with the shortest ends that tell them apart."""
+    """Return the keys with the shortest ends that distinguish them."""
     ends = [_ends(key) for key in keys]
     return [next(end for end in mine if sum(end in others for others in ends) == 1 or end == mine[-1]) for mine in ends]
 
 
 def told_outcome(outcome: tuple[int, ...], most: int = 6) -> str:
-    """Write a class for people: the turns of a few blocks, or how many of many have turned."""
+    """Write a class: the rotations of a few blocks, or how many of many have turned."""
     if len(outcome) <= most:
         return "/".join(f"{turn}°".replace("-", "−") for turn in outcome)
     return f"{sum(turn != 0 for turn in outcome)} of {len(outcome)} turned"

@@ -1,4 +1,4 @@
-"""Histogram: where the members of a sweep end, beside the repeats of the experiment and their intervals."""
+"""Histogram: final x of the members of a sweep, with the repeats of the experiment and their intervals."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,12 +29,12 @@ ALL_COLOUR, INSIDE_COLOUR = "#B5D6EA", "#0072B2"
 
 
 def refusal(_sweep: FoundSweep) -> str:
-    """Tell why a sweep cannot be shown: never."""
+    """Return why a sweep cannot be shown: never."""
     return ""
 
 
 def suits(_sweep: FoundSweep) -> bool:
-    """Tell that any sweep may be shown."""
+    """Return True: any sweep may be shown."""
     return True
 
 
@@ -110,7 +110,7 @@ def _draw_bars(axes: "Axes", x: Floats, inside: Flags | None, count: int, limits
 
 
 def _draw_measured(axes: "Axes", repeats: Floats, interval: Floats, top: float) -> None:
-    """Draw the range as a band, and above the bars the repeats and the interval of one more test."""
+    """Draw the range as a band, and above the bars the repeats and the prediction interval of the next test."""
     if repeats.size:
         axes.axvspan(repeats.min(), repeats.max(), color=style.MEASURED_COLOUR, alpha=0.15, linewidth=0, zorder=0)
         axes.plot(repeats, np.full(len(repeats), 1.2 * top), **_REPEATS)
@@ -136,7 +136,7 @@ _INTERVAL: dict[str, Any] = {
 
 
 def _entries(sweep: FoundSweep) -> list[Any]:
-    """Return what the legend names."""
+    """Return the entries of the legend."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
     from matplotlib.patches import Patch  # noqa: PLC0415
 
@@ -148,7 +148,7 @@ def _entries(sweep: FoundSweep) -> list[Any]:
         count = max(len(repeats) for repeats in sweep.measured.x_mm.values())
         entries.append(Line2D([], [], **_REPEATS, label=f"{count} repeats and their range"))
     if sweep.measured.prediction_mm:
-        entries.append(Line2D([], [], **_INTERVAL, label="95 %: one more test"))
+        entries.append(Line2D([], [], **_INTERVAL, label="next test (95 %)"))
     return entries
 
 
@@ -158,4 +158,4 @@ def _caption(x: Floats, limits: tuple[float, float]) -> str:
     return f"median {np.median(x):.1f} mm{told}"
 
 
-HISTOGRAM = Kind("final x of the blocks, beside the repeats and their intervals", refusal, suits, draw)
+HISTOGRAM = Kind("final x of the blocks, with the repeats and their intervals", refusal, suits, draw)

@@ -1,4 +1,4 @@
-"""What a kind of picture of a sweep is."""
+"""Definition of a kind of picture of a sweep."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The kinds of pictures of a sweep; where none is asked for, the first that suits it is drawn."""
+"""The kinds of pictures of a sweep; by default the first that suits it is drawn."""
 
 from blocksim.view.sweeps.found import FoundSweep
 from blocksim.view.sweeps.histogram import HISTOGRAM

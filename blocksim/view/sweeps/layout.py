@@ -1,4 +1,4 @@
-"""Places on a figure in inches from its lower left corner, and what all pictures of sweeps share."""
+"""Places on a figure in inches from its lower left corner, and common parts of pictures of sweeps."""
 
 from typing import TYPE_CHECKING
 

@@ -24,17 +24,17 @@ class Series:
 
 
 def refusal(sweep: FoundSweep) -> str:
-    """Tell why a sweep cannot be shown."""
+    """Return why a sweep cannot be shown."""
     if len(sweep.inputs) > MOST_INPUTS:
         return f"{len(sweep.inputs)} keys are varied; lines can show one or two"
     if not any(one.is_number for one in sweep.inputs):
         words = next(iter(sweep.inputs))
-        return f"the values of {words.key} are no numbers (one is {words.levels[0]!r}); they cannot be an axis"
+        return f"the values of {words.key} are not numbers (such as {words.levels[0]!r}); they cannot be an axis"
     return ""
 
 
 def suits(sweep: FoundSweep) -> bool:
-    """Return True if inputs go together, or a column for each value of the second one is not too much."""
+    """Return True if all combinations exist, and the columns for the values of the second input are not too many."""
     if refusal(sweep) or (sweep.is_sampled and len(sweep.inputs) > 1):
         return False
     _, other = _axis_and_other(sweep)
@@ -71,4 +71,4 @@ def _axis_and_other(sweep: FoundSweep) -> tuple[Input, Input | None]:
     return axis, others[0] if others and sweep.is_grid else None
 
 
-LINES = Kind("final x over one input, a column a value of a second one", refusal, suits, draw)
+LINES = Kind("final x over one input, one column per value of a second one", refusal, suits, draw)

@@ -1,4 +1,4 @@
-"""Outcome map: over two inputs, how far the blocks get and which class the outcome is of; a column a third input."""
+"""Outcome map: run-outs and class of the outcome over two inputs; one column per value of a third."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,7 +33,7 @@ FEWEST = 3  # values of an input that is an axis
 
 @dataclass(frozen=True, eq=False)
 class _Map:
-    """What is drawn where."""
+    """Contents and layout."""
 
     sweep: FoundSweep
     x: Input
@@ -59,7 +59,7 @@ class _Map:
 
     @property
     def legend_columns(self) -> int:
-        """How many classes stand beside each other in the legend."""
+        """How many classes one row of the legend has."""
         return 1 if len(self.columns) == 1 else 2
 
     @property
@@ -104,8 +104,8 @@ def suits(sweep: FoundSweep) -> bool:
 
 
 def refusal(sweep: FoundSweep) -> str:
-    """Tell why a sweep cannot be shown."""
-    return "a map needs two inputs that are numbers" if len(_axes_of(sweep)) < AXES else ""
+    """Return why a sweep cannot be shown."""
+    return "a map needs two numeric inputs" if len(_axes_of(sweep)) < AXES else ""
 
 
 def draw(sweep: FoundSweep, path: Path, paper: Paper = OWN) -> None:
@@ -171,7 +171,7 @@ def _draw_row(
 
 
 def _draw_block(figure: "Figure", found: _Map, block: int, bottom: float) -> None:
-    """Draw the run-out of a block, with the measured range outlined and beside the bar of colours."""
+    """Draw the run-out of a block, with the measured range outlined and marked at the colour bar."""
     x = found.sweep.x_mm[:, block]
     colours, norm = run_out_scale(x)
     band = found.sweep.measured.limits_mm.get(found.sweep.blocks[block])
@@ -209,7 +209,7 @@ def _draw_classes(figure: "Figure", found: _Map, classes: Classes, bottom: float
 
 
 def _name_axes(figure: "Figure", found: _Map, foot: float) -> None:
-    """Write the keys once below and beside all panels, numbers only at the outer ones, and headings at the top."""
+    """Write the keys once below and at the left of all panels, numbers only at the outer ones, headings at the top."""
     for axes in figure.axes:
         if axes.get_label() != "<colorbar>":
             axes.tick_params(axis="x", labelbottom=_bottom_of(axes, figure) < foot + 0.01)

@@ -43,7 +43,7 @@ BAND: dict[str, Any] = {"color": style.MEASURED_COLOUR, "alpha": 0.13, "linewidt
 
 @dataclass(frozen=True, eq=False)
 class Variable:
-    """What one row and one column of the matrix show, n cases; `repeats` are measured values of it."""
+    """Variable of one row and one column of the matrix, n cases; `repeats` are measured values of it."""
 
     name: str
     values: Floats  # (n,) as shown on the axis; NaN where there is none
@@ -54,13 +54,13 @@ class Variable:
 
 
 def refusal(sweep: FoundSweep) -> str:
-    """Tell why a sweep cannot be shown: never."""
+    """Return why a sweep cannot be shown: never."""
     del sweep
     return ""
 
 
 def suits(sweep: FoundSweep) -> bool:
-    """Return True if there are inputs to set against each other."""
+    """Return True if two or more inputs vary."""
     return len(sweep.inputs) > 1
 
 
@@ -109,7 +109,7 @@ class _Sides:
 
 
 def _sides_of(variables: Sequence[Variable]) -> _Sides:
-    """Return what numbers and names of levels need."""
+    """Return the room that numbers and names of levels need."""
     levels = [level for one in variables for level in one.levels]
     if not levels:
         return _Sides(LEFT, FOOT)
@@ -252,7 +252,7 @@ def _clear_of_the_start(low: float, high: float, *, is_log: bool) -> list[float]
 
 
 def _entries(sweep: FoundSweep) -> list[Any]:
-    """Return what the legend names."""
+    """Return the entries of the legend."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
 
     dot: dict[str, Any] = {"linestyle": "", "marker": "o", "markeredgewidth": 0.0}
@@ -286,4 +286,4 @@ def _legend_place(across: float, height: float) -> dict[str, Any]:
     }
 
 
-MATRIX = Kind("every two of the inputs and final x, cases that agree marked", refusal, suits, draw)
+MATRIX = Kind("pairs of inputs and final x, agreeing cases marked", refusal, suits, draw)

@@ -1,4 +1,4 @@
-"""The prediction interval for one more test."""
+"""The prediction interval for the next test."""
 
 import numpy as np
 import pytest

@@ -41,7 +41,7 @@ def test_example_of_the_documentation_gives_what_it_says() -> None:
         ("smoothing_length", 0.0, "smoothing_length: every number must be above zero"),
         ("smoothing_length", np.nan, "smoothing_length: every number must be finite"),
         ("smoothing_length", 1e-31, "smoothing_length: every number must be above zero"),
-        ("kernel", "gaussian", "'gaussian' is none of wendland-c2, cubic-spline, quintic-spline"),
+        ("kernel", "gaussian", "'gaussian' is unknown; use wendland-c2, cubic-spline, quintic-spline"),
     ],
 )
 def test_particles_that_make_no_sense_are_refused(name: str, bad: object, message: str) -> None:
@@ -68,9 +68,9 @@ def test_points_that_do_not_fit_are_refused(points: list[float]) -> None:
 def test_unknown_forms_are_refused() -> None:
     particles = Particles(**GOOD)
     form: Any = "cubic"
-    with pytest.raises(ValueError, match="'cubic' is none of plain, shepard, linear"):
+    with pytest.raises(ValueError, match="'cubic' is unknown; use plain, shepard, linear"):
         interpolate(particles, 1.0, [[0.0, 0.0]], form)
-    with pytest.raises(ValueError, match="'cubic' is none of plain, symmetric, difference, corrected"):
+    with pytest.raises(ValueError, match="'cubic' is unknown; use plain, symmetric, difference, corrected"):
         gradient(particles, 1.0, form)
 
 

@@ -13,7 +13,7 @@ def test_histogram_names_cases_repeats_and_intervals(tmp_path: Path) -> None:
     sweep = made_up(samples(1)[:1], "sobol")
     HISTOGRAM.draw(sweep, path)
     text = path.read_text(encoding="utf-8")
-    for told in ("final x of block 2 (mm)", "all 50 cases", "6 repeats and their range", "95 %: one more test"):
+    for told in ("final x of block 2 (mm)", "all 50 cases", "6 repeats and their range", "next test (95 %)"):
         assert f"<!-- {told} -->" in text
     assert sweep.inside is not None
     assert f"<!-- all inside ({100 * int(sweep.inside.sum()) // 50} %) -->" in text

@@ -45,9 +45,9 @@ def test_every_kind_draws_what_it_does_not_refuse(tmp_path: Path, name: str, kin
 
 
 def test_refusals_say_what_is_missing() -> None:
-    assert "two inputs that are numbers" in KINDS["map"].refusal(made_up(ONE))
+    assert "two numeric inputs" in KINDS["map"].refusal(made_up(ONE))
     assert "3 keys are varied" in KINDS["lines"].refusal(made_up(grid(3)))
-    assert "(one is 'explicit')" in KINDS["lines"].refusal(made_up(samples()[3:], "list"))
+    assert "(such as 'explicit')" in KINDS["lines"].refusal(made_up(samples()[3:], "list"))
 
 
 @pytest.mark.parametrize("kind", ["map", "matrix", "histogram"])
@@ -61,7 +61,7 @@ def test_same_sweep_gives_the_same_bytes(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_wrong_files_are_refused(tmp_path: Path, kind: str) -> None:
     sweep = made_up(grid())
-    with pytest.raises(InvalidInputError, match="no picture format"):
+    with pytest.raises(InvalidInputError, match="unsupported picture format"):
         KINDS[kind].draw(sweep, tmp_path / "picture.bmp")
     with pytest.raises(OutputError, match="cannot be written"):
         KINDS[kind].draw(sweep, tmp_path / "nix" / "picture.png")

@@ -4,7 +4,7 @@ const SIGNS = { inside: "#009E73", outside: "#D55E00", finished: "#56B4E9", othe
 const OUTCOMES = { stands: "#009E73", "rocked back": "#56B4E9", slid: "#E69F00", fell: "#D55E00" };
 const DECADES = 30;
 
-// Whether the median is nearer to the middle of a logarithmic axis than to that of a linear one.
+// Returns whether the median is nearer to the middle of a logarithmic axis than to that of a linear one.
 function isMiddleInLogs(values) {
   const sorted = [...values].sort((a, b) => a - b);
   const [low, middle, high] = [0, Math.floor(sorted.length / 2), sorted.length - 1].map((place) => sorted[place]);
@@ -127,7 +127,7 @@ class OutcomeMap {
     const verdict = { True: "inside", False: "outside" }[value("inside")];
     const told = [`case ${name}`, ...parts, value("status") + (value("reason") ? ` (${value("reason")})` : ""), ...(verdict ? [verdict] : []), ...ends];
     const key = this.data.members[name];
-    const help = key ? make("a", { href: `#${key}` }, "open this member") : make("small", {}, isolated(this.help(name)));
+    const help = key ? make("a", { href: `#${key}` }, "open member") : make("small", {}, isolated(this.help(name)));
     this.root.querySelector(".map .state").replaceChildren(...told.map((text) => make("span", {}, isolated(text))), help);
   }
 
@@ -265,7 +265,7 @@ class OutcomeMap {
   }
 
   drawLegend(legend) {
-    const all = this.hasBand ? [...legend, [colour("band"), "band: counts as inside", "band"]] : legend;
+    const all = this.hasBand ? [...legend, [colour("band"), "band: inside", "band"]] : legend;
     this.root.querySelector(".legend").replaceChildren(...all.map(([fill, text, form]) => {
       const node = draw("svg", { width: 14, height: 14, viewBox: "0 0 14 14", "aria-hidden": "true" });
       if (form === "band") node.append(draw("rect", { width: 14, height: 14, fill }));
