@@ -15,14 +15,14 @@ from blocksim.simulation import run_ensemble, running, simulate, simulate_into
 from blocksim.simulation.checkpoint import read_checkpoint
 from blocksim.simulation.checkpoint_policy import CheckpointPolicy
 from blocksim.simulation.outcome import BY_CODE, RESIDUAL, diagnosed, interrupted
-from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.schemes import build, build_scene
 from tests.simulation.sliding import sliding
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from blocksim.scenario import Scenario
-    from blocksim.simulation.schemes import AnyScene
+    from blocksim.world.scenes import Built
     from tests.simulation.conftest import Shipped
 
 TIMES_THE_LIMIT = 50.0
@@ -32,12 +32,12 @@ TIMES_THE_LIMIT = 50.0
 def forced(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every scene step fifty times as far as it safely can."""
 
-    def build(scenario: Scenario) -> AnyScene:
-        scene = build_scene(scenario)
-        scene.world.controls[0].step *= TIMES_THE_LIMIT
-        return scene
+    def forced_build(scenario: Scenario) -> Built:
+        built = build(scenario)
+        built.scene.world.controls[0].step *= TIMES_THE_LIMIT
+        return built
 
-    monkeypatch.setattr(running, "build_scene", build)
+    monkeypatch.setattr(running, "build", forced_build)
 
 
 @pytest.mark.usefixtures("forced")
