@@ -10,8 +10,7 @@ from rich.console import Console
 
 from blocksim.cli.output import note
 from blocksim.cli.progress import counting
-from blocksim.study.rows import Head, Row
-from blocksim.study.stored_run import FINISHED
+from blocksim.study.rows import FINISHED, Head, Row
 
 OnRow = Callable[[int, int, Row], None]
 FEW = 40

@@ -19,8 +19,8 @@ from blocksim.simulation.movement import Movement
 from blocksim.simulation.running import Listener
 from blocksim.simulation.table import rows_of
 from blocksim.study.compare import compare_run
+from blocksim.study.rows import FINISHED
 from blocksim.study.run import run
-from blocksim.study.stored_run import FINISHED
 
 MOST_ROWS = 40  # of the final table on the screen; of a longer one the first FIRST_ROWS are shown
 FIRST_ROWS = 10

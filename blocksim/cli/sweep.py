@@ -19,8 +19,7 @@ from blocksim.errors import ExitCode, StoppedEarlyError
 from blocksim.scenario import Document
 from blocksim.study.executors.ensemble import is_still_running
 from blocksim.study.progress import WHOLE, Shard
-from blocksim.study.rows import MOVEMENT, Head, heads_of
-from blocksim.study.stored_run import FINISHED
+from blocksim.study.rows import FINISHED, MOVEMENT, Head, heads_of
 from blocksim.study.sweep import kernels_for, sweep
 from blocksim.study.sweep import merge as merge_shards
 from blocksim.study.sweep_table import SweepResult

@@ -13,9 +13,10 @@ from blocksim.simulation import Result
 from blocksim.simulation import folder as files
 from blocksim.simulation.result import read_final
 from blocksim.simulation.summary import read_summary
-from blocksim.study.stored_run import FINISHED, find_run
+from blocksim.study.rows import FINISHED, TABLE
+from blocksim.study.stored_run import find_run, how_it_ended
 from blocksim.study.sweep_folder import PLAN
-from blocksim.study.sweep_table import TABLE, SweepResult, is_sweep, read_sweep
+from blocksim.study.sweep_table import SweepResult, is_sweep, read_sweep
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -117,6 +118,4 @@ def _table(given: Path | str | None, named: Path | None) -> ExperimentTable:
 
 def _refuse_unfinished(name: str, status: str, reason: str) -> None:
     if status != FINISHED:
-        verb = "was" if status == "interrupted" else "has"
-        message = f"{name}: this run {verb} {status} ({reason}); only a finished run can be compared"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{name}: {how_it_ended(status, reason)}; only a finished run can be compared")

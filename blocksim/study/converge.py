@@ -35,8 +35,7 @@ from blocksim.study.convergence import (
 )
 from blocksim.study.executors import Batch, Setting, Task
 from blocksim.study.executors.processes import DEAD, run_here, run_tasks
-from blocksim.study.rows import Row, check_experiment
-from blocksim.study.stored_run import FINISHED
+from blocksim.study.rows import FINISHED, Row, check_experiment
 from blocksim.world.nonsmooth import velocity_tolerance
 
 FOLDER = "converge"

@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import Scenario, place_bodies
-from blocksim.study.rows import Row
-from blocksim.study.stored_run import FINISHED
+from blocksim.study.rows import FINISHED, Row
 
 DIGITS = 6  # of a level's value, so that the value that is reported gives the same run when it is set
 ROUND_OFF_MM = 1e-6  # a smaller change says nothing about the order

@@ -18,7 +18,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import overload
+from typing import TypeVar, overload
 
 from blocksim.analysis.cells import NUMBER, Cell, raise_problems, read_open_table
 from blocksim.errors import Problem
@@ -28,6 +28,7 @@ from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, unfit_to_vary
 from blocksim.scenario.models.variation import Variation
 from blocksim.scenario.overrides import parse_value
 
+T_co = TypeVar("T_co", covariant=True)
 Settings = dict[str, object]
 """Dotted key and value of everything that one case sets."""
 LARGEST_FILE = 20_000_000  # bytes
@@ -37,28 +38,28 @@ HEAD = re.compile(r"(?P<key>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
 WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
 
 
-@dataclass(frozen=True)
-class Design(Sequence[Settings]):
-    """A sequence of settings made from one column of values a key."""
-
-    columns: Mapping[str, Sequence[object]]
+class MadeOnDemand(Sequence[T_co]):
+    """A sequence that keeps none of its entries: each is made when it is asked for."""
 
     @abstractmethod
-    def __len__(self) -> int:
-        """Return the number of cases."""
-
-    @abstractmethod
-    def row(self, number: int) -> Settings:
-        """Return the settings of a case, 0 <= number < len."""
+    def row(self, number: int) -> T_co:
+        """Return an entry, 0 <= number < len."""
 
     @overload
-    def __getitem__(self, number: int) -> Settings: ...
+    def __getitem__(self, number: int) -> T_co: ...
     @overload
-    def __getitem__(self, number: slice) -> Sequence[Settings]: ...
-    def __getitem__(self, number: int | slice) -> Settings | Sequence[Settings]:
+    def __getitem__(self, number: slice) -> Sequence[T_co]: ...
+    def __getitem__(self, number: int | slice) -> T_co | Sequence[T_co]:
         if isinstance(number, slice):
             return [self.row(index) for index in range(len(self))[number]]
         return self.row(range(len(self))[number])
+
+
+@dataclass(frozen=True)
+class Design(MadeOnDemand[Settings]):
+    """The settings of cases, made from one column of values a key."""
+
+    columns: Mapping[str, Sequence[object]]
 
 
 class Together(Design):

@@ -1,10 +1,10 @@
 """What a sweep varies, the scenario of each of its cases, and what they will cost."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
 from statistics import fmean
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from blocksim.scenario.models.variation import Normal, written
 from blocksim.scenario.overrides import Override, frozen, with_value
 from blocksim.scenario.quantities import shown
 from blocksim.simulation.provenance import run_hash
-from blocksim.study.design import Design, Settings, read_columns, refuse_wrong_values
+from blocksim.study.design import Design, MadeOnDemand, Settings, read_columns, refuse_wrong_values
 from blocksim.study.rows import Head, check_experiment, heads_of
 from blocksim.study.sampling import design_of, remarks
 
@@ -47,7 +47,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Cases(Sequence[Case]):
+class Cases(MadeOnDemand[Case]):
     """All cases of a sweep; each is made when it is asked for, and none is kept."""
 
     document: Document
@@ -58,13 +58,8 @@ class Cases(Sequence[Case]):
         """Return the number of cases."""
         return len(self.design)
 
-    @overload
-    def __getitem__(self, number: int) -> Case: ...
-    @overload
-    def __getitem__(self, number: slice) -> Sequence[Case]: ...
-    def __getitem__(self, number: int | slice) -> Case | Sequence[Case]:
-        if isinstance(number, slice):
-            return [self[index] for index in range(len(self))[number]]
+    def row(self, number: int) -> Case:
+        """Return one case."""
         return _case(self.document, self.design[number])
 
 

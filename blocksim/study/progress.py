@@ -28,8 +28,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.scenario.limited import open_regular
 from blocksim.simulation.folder import takes_lock
-from blocksim.study.rows import Row, as_cell, blocks_in
-from blocksim.study.stored_run import FINISHED
+from blocksim.study.rows import FINISHED, Row, as_cell, blocks_in
 
 SHARD_FORM = re.compile(r"(\d{1,6})/(\d{1,6})")
 MANIFEST = "manifest.jsonl"

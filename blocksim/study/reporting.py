@@ -10,7 +10,8 @@ from blocksim.errors import BlocksimError, InputMissingError, UnavailableError
 from blocksim.scenario import Scenario, load_stored
 from blocksim.simulation import folder as files
 from blocksim.study.compare import compare_sweep
-from blocksim.study.stored_run import FINISHED, find_run
+from blocksim.study.rows import FINISHED
+from blocksim.study.stored_run import find_run
 from blocksim.study.sweep_folder import PLAN, case_folder
 from blocksim.study.sweep_table import is_sweep
 from blocksim.view.report.packing import MOST_BYTES

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Row = dict[str, object]
+FINISHED = "finished"
+"""Status of a run that has come to its end."""
+TABLE = "sweep.csv"
+"""Rows of all cases; it makes a folder one of a sweep."""
 X = ".x_mm"
 MOVEMENT = ("outcome", "first_mover", "first_moved_s", "displacement_mm", "turn_deg")
 """As in run.json, but displacement and rotation are the largest of all blocks from start to end."""

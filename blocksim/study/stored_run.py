@@ -14,11 +14,7 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import read_summary
-
-FINISHED = "finished"
-"""Status of a run that has come to its end."""
-SWEEP = "sweep.csv"
-"""What makes a folder one of a sweep."""
+from blocksim.study.rows import FINISHED, TABLE
 
 
 def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Path:
@@ -57,7 +53,7 @@ def _run_in(place: Path, needed: Sequence[str]) -> Path:
     newest = files.newest_finished(place)
     if newest is not None:
         return newest
-    sweep = next((entry for entry in sorted(place.iterdir()) if (entry / SWEEP).is_file()), None)
+    sweep = next((entry for entry in sorted(place.iterdir()) if (entry / TABLE).is_file()), None)
     found = f"but a sweep: {sweep}" if sweep is not None else "blocksim run SCENARIO makes one"
     message = f"{place}: no finished run in this folder{', ' if sweep is not None else '; '}{found}"
     raise InputMissingError(message)
@@ -98,8 +94,9 @@ def _state(folder: Path) -> str:
         summary = read_summary(folder / files.SUMMARY)
     except BlocksimError:
         return f"{files.SUMMARY} of this run is damaged"
-    return "" if summary.status == FINISHED else f"this run {_verb(summary.status)} ({summary.reason})"
+    return "" if summary.status == FINISHED else how_it_ended(summary.status, summary.reason)
 
 
-def _verb(status: str) -> str:
-    return f"was {status}" if status == "interrupted" else f"has {status}"
+def how_it_ended(status: str, reason: str) -> str:
+    """Return what a run that did not finish has come to, in words."""
+    return f"this run {'was' if status == 'interrupted' else 'has'} {status} ({reason})"

@@ -26,10 +26,9 @@ from blocksim.study.design import levels_of
 from blocksim.study.executors import DEFAULT, WITH_FOLDERS, WITH_SCHEDULER, Batch, Run, Setting, Task, executor_named
 from blocksim.study.plan import Cases, Values, cases_of, with_sweep
 from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Entry, Manifest, Shard, Timings, values_hash
-from blocksim.study.rows import Ranges, Row, check_experiment, invalid_row
-from blocksim.study.stored_run import FINISHED
+from blocksim.study.rows import FINISHED, TABLE, Ranges, Row, check_experiment, invalid_row
 from blocksim.study.sweep_folder import CASES, prepare, read_plan
-from blocksim.study.sweep_table import TABLE, SweepResult, SweepTable
+from blocksim.study.sweep_table import SweepResult, SweepTable
 
 TIMINGS = "timings.csv"
 MEASURED = "experiment.table"

@@ -14,10 +14,9 @@ from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario import quantities as q
 from blocksim.scenario.keys import KeyPath, field_at, follow, parse_key
 from blocksim.scenario.models.variation import Normal, Uniform
-from blocksim.study.rows import Head, Ranges, blocks_in, quarter_turns
-from blocksim.study.stored_run import FINISHED
+from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
 from blocksim.study.sweep_folder import PLAN
-from blocksim.study.sweep_table import TABLE, read_sweep
+from blocksim.study.sweep_table import read_sweep
 from blocksim.view.series import Typed
 from blocksim.view.sweeps.found import FoundSweep, Input, Measured
 

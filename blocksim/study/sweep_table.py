@@ -16,13 +16,11 @@ from blocksim.scenario.limited import MEGABYTE, refuse_large
 from blocksim.simulation.atomic import writing
 from blocksim.study.plan import Cases
 from blocksim.study.progress import WHOLE, CaseIndex, Shard
-from blocksim.study.rows import KEPT, MOVEMENT, Ranges, as_cell, varied_cells
-from blocksim.study.stored_run import FINISHED, SWEEP
+from blocksim.study.rows import FINISHED, KEPT, MOVEMENT, TABLE, Ranges, as_cell, varied_cells
 
 if TYPE_CHECKING:
     import pandas as pd
 
-TABLE = SWEEP
 TEXT_COLUMNS = {"case": str, "status": str, "reason": str, "first_mover": str}
 MOST_BYTES = 2000 * MEGABYTE
 """Of sweep.csv: a million cases of a hundred blocks do not fit into most memories."""

@@ -14,11 +14,10 @@ from blocksim.scenario.limited import open_regular
 from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.plan import Case, Cases
 from blocksim.study.progress import PATTERN, CaseIndex, read_entries
-from blocksim.study.rows import Head, Ranges, Row, as_cell, invalid_row, varied_cells
-from blocksim.study.stored_run import FINISHED
+from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, invalid_row, varied_cells
 from blocksim.study.sweep import cases_in, measured_ranges
 from blocksim.study.sweep_folder import case_folder, read_origin, read_plan
-from blocksim.study.sweep_table import OUTCOME, TABLE
+from blocksim.study.sweep_table import OUTCOME
 from blocksim.study.verify_run import Origin, RunVerdict, changed_origins, tells_of_code, verify_run
 
 SAMPLE = 16  # rows, where nobody says how many

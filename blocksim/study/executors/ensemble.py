@@ -22,9 +22,8 @@ from blocksim.simulation.provenance import HASH_DIGITS, code_hash, run_hash
 from blocksim.simulation.summary import changed_results, read_summary
 from blocksim.simulation.table import Columns, read_table
 from blocksim.study.executors import Batch, BatchSize, Setting, Task, needs_nothing, take
-from blocksim.study.rows import Course, Row, row_of, row_of_error
+from blocksim.study.rows import FINISHED, Course, Row, row_of, row_of_error
 from blocksim.study.run import run
-from blocksim.study.stored_run import FINISHED
 
 PATIENCE = 0.7  # s that a batch has to end once the user wants to stop
 POLL = 0.05  # s
