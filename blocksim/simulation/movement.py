@@ -92,7 +92,8 @@ def _shapes_of(placed: Sequence[PlacedBody]) -> _Shapes:
 def _shares(shapes: _Shapes, way: Floats, turn: Floats) -> Floats:
     """Return how far blocks, (b,) or (m, b), are from their start, in units of the threshold: above 1 is moved."""
     shares = np.fmax(way, turn * shapes.reach) / (MOVED_SHARE * shapes.shortest)
-    return np.where(shapes.is_free, np.nan_to_num(shares, nan=np.inf), 0.0)
+    shares[np.isnan(shares)] = np.inf
+    return np.where(shapes.is_free, shares, 0.0)
 
 
 def _manner(shapes: _Shapes, way: Floats, drop: Floats, turn: Floats) -> Manner:
