@@ -75,7 +75,7 @@ def _turn(dominoes: Dominoes, fallen: int, spin: float) -> tuple[float, float]:
     heights = np.array([dominoes.height(angles) for angles, _ in states])
     squares = (masses[0] * spin**2 + heights[0] - heights) / masses
     if squares.min() <= 0.0:
-        message = f"the row comes to a stand with domino {fallen}"
+        message = f"the row stops at domino {fallen}"
         raise ValueError(message)
     slowness = 1.0 / np.sqrt(squares)
     return float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(nodes))), float(np.sqrt(squares[-1]))

@@ -81,7 +81,7 @@ def measure(setting: Setting) -> Findings:
     first, last = walls[0], walls[-1]
     note = (
         f"running bond of 32 x 25 mm, pushed with 1 m/s y/H, restitution 0.1, {USUAL.setting}; a substep and growth: "
-        f"the first {common:g} s of every wall (the higher, the less of it has fallen by then), {first.rebuilds} to "
+        f"the first {common:g} s of every wall (a smaller part of higher walls has fallen), {first.rebuilds} to "
         f"{last.rebuilds} pair list updates, {first.sweeps / first.substeps:.2f} to "
         f"{last.sweeps / last.substeps:.2f} velocity sweeps a substep"
     )

@@ -82,7 +82,7 @@ def bench_command(
 def _refuse_present(out: Path | None, *, peers: bool, overwrite: bool) -> None:
     """Check before minutes of measuring that the report, and the picture that --peers draws, can be written."""
     if out is not None and (out.is_dir() or not out.absolute().parent.is_dir()):
-        message = f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'there is no such folder'}"
+        message = f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'no such folder'}"
         raise OutputError(message)
     if out is not None:
         refuse_foreign(out, is_bench, overwrite=overwrite)

@@ -32,7 +32,7 @@ class Interrupts:
 
 
 def take_interrupts() -> None:
-    """Take over Ctrl-C for the rest of the process, unless somebody has it or it is ignored."""
+    """Take over Ctrl-C for the rest of the process, unless it is taken or ignored."""
     with suppress(ValueError):  # not the main thread, which alone receives signals
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, Interrupts())

@@ -23,7 +23,7 @@ LONG_TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))  # s
 
 
 def note(text: str) -> None:
-    """Print a line to standard error; do nothing where nobody reads it any more."""
+    """Print a line to standard error; do nothing after its reader has gone."""
     try:
         print(harmless(text), file=sys.stderr, flush=True)  # noqa: T201 - this is the place for it
     except OSError:
@@ -109,6 +109,6 @@ def duration(seconds: float) -> str:
 def harmless(text: str) -> str:
     """Return a text without control characters and marks that change the order of a line.
 
-    Names, descriptions and reasons may come from files of somebody else.
+    Names, descriptions and reasons may come from files of others.
     """
     return STEERING.sub("\ufffd", text)

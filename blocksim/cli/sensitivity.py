@@ -104,7 +104,7 @@ def _refuse_present(out: Path | None, *, overwrite: bool) -> None:
     if out is None:
         return
     if out.is_dir() or not out.absolute().parent.is_dir():
-        reason = "it is a folder" if out.is_dir() else "there is no such folder"
+        reason = "it is a folder" if out.is_dir() else "no such folder"
         raise OutputExistsError(f"{out}: cannot be created: {reason}")
     if out.exists() and not overwrite:
         raise OutputExistsError(f"{out}: already exists; --overwrite replaces it")

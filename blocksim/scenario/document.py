@@ -185,7 +185,7 @@ def _content(path: Path, *, is_stored: bool) -> bytes:
 
 
 def _similar_file(path: Path) -> str:
-    """Suggest the scenario beside the missing one whose name is most like it."""
+    """Suggest the scenario in the same folder with the most similar name."""
     try:
         names = sorted(entry.name for entry in path.parent.glob("*.toml"))
     except OSError:

@@ -44,7 +44,7 @@ def scenario_to_toml(scenario: Scenario, experiment_table: str | None = None, mo
 
 
 def _leave_to_static(scenario: Scenario, data: dict[str, Any]) -> None:
-    """Leave out kinetic frictions that nobody has set: a sweep may vary the static one, which they follow."""
+    """Leave out kinetic frictions that were not set: a sweep may vary the static one, which they follow."""
     sides = ((getattr(scenario.friction, side), ("friction", side)) for side in Friction.model_fields)
     pairs = (
         (pair.friction, ("pairs", one, other, "friction"))

@@ -267,7 +267,7 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
     cases = cases_in(document)
     done = CaseIndex(folder, len(cases))
     if not done.paths:
-        message = f"{folder}: no case of this sweep has been run yet"
+        message = f"{folder}: no case of this sweep has run yet"
         raise InputMissingError(message)
     for number, settings in enumerate(cases.design):
         done.holds(number, settings)

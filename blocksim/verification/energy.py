@@ -98,7 +98,7 @@ def _crowd_end(setting: Setting) -> float:
 
 
 def asked_of(setting: Setting) -> dict[str, object]:
-    """Return the keys that a scenario has to change for a setting."""
+    """Return the keys that a scenario must change for a setting."""
     asked = {"contact.model": setting.model, "contact.law": setting.law}
     if setting.rigid:
         return {**asked, "time.scheme": setting.scheme}

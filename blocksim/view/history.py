@@ -57,7 +57,7 @@ MOST_POINTS = 2000  # of a line
 MOST_PATHS = 50  # grey lines in an SVG or PDF; more of them are stored as an image
 LETTERS = 16  # of a name
 LETTERS_AN_INCH = 14.5  # in a line below the panels
-NAME_ROOM = 1.2  # inches, for a name beside the panels
+NAME_ROOM = 1.2  # inches, for a name at the right of the panels
 LINE = 0.155  # inches, of each further line below the panels or beside them
 LEGEND = 0.25  # inches, of the head of a legend and the gap below it
 PALE = 0.7  # brightness from which a line is drawn on a darker one
@@ -267,7 +267,7 @@ def _draw_measured(axes: "Axes", drawing: _Drawing, motion: Motion, measured: Me
 
 
 def _finish(panels: dict[str, "Axes"], drawing: _Drawing) -> None:
-    """Name the coloured blocks beside the first panel of theirs, write plain numbers, give all one axis of time."""
+    """Name the coloured blocks at their first panel, write plain numbers, give all panels one axis of time."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
     from matplotlib.ticker import FuncFormatter, MaxNLocator  # noqa: PLC0415
 

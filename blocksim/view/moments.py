@@ -64,14 +64,14 @@ def drawable_frames(frames: FramesLike) -> Indices:
     Raises InvalidInputError when there is none, or no block.
     """
     if len(frames.names) == 0:
-        message = "there is no block to draw"
+        message = "no block to draw"
         raise InvalidInputError(message)
     finite = np.isfinite(frames.time)
     for field in (frames.x, frames.y, frames.angle):
         finite &= (np.abs(field) < BEYOND_REACH).all(axis=1)  # false for what is not finite
     indices = np.flatnonzero(finite)
     if len(indices) == 0:
-        message = "there is no frame to draw"
+        message = "no frame to draw"
         raise InvalidInputError(message)
     return indices
 

@@ -188,7 +188,7 @@ def _scale_on(paper: Paper, extent: Extent, columns: int, panels: int, lines: Li
 
 
 def _others(extent: Extent, columns: int, panels: int, lines: Lines) -> float:
-    """Return the height (inches) of all beside what panels show above the lowest ground."""
+    """Return the height (inches) of everything but the part of panels above the lowest ground."""
     rows = -(-panels // columns)
     ticks, head, foot = _heights(extent, lines)
     below = room_below(extent, lines.measured_rows) / style.POINTS_PER_INCH

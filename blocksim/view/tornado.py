@@ -82,7 +82,7 @@ def order_of(values: Floats) -> list[int]:
 
 
 def broken(name: str) -> str:
-    """Return a key in as many lines as it needs beside the bars."""
+    """Return a key in as many lines as it needs at the left of the bars."""
     return "\n".join(style.broken(name, MOST_ROOM))
 
 

@@ -152,7 +152,7 @@ def choose_skin(scenario: Scenario, bounds: Bounds, table: Interactions, step: f
         return bounds.smallest * share
     speed = greatest_speed(scenario, bounds, table) + support_speed(scenario)
     reserve = 1.0 if isinstance(scenario.time, Nonsmooth) else RESERVE
-    # a list holds for one step at least, even where it is made again at every one
+    # a list holds for one step at least, even where it is updated at every one
     least = reserve * nearer_in_a_step(speed, step)
     if given < least:
         raise SkinTooSmallError(given, least, speed, step)

@@ -297,7 +297,7 @@ def test_measured_range_is_marked_in_the_map_and_the_table(tmp_path: Path, open_
     assert one.page.locator("table.cases td.inside", has_text="69.00").count() == 1
     assert one.page.locator("table.cases td.outside", has_text="70.00").count() == 1
     one.page.locator("[data-option=up]").select_option("1.x_mm")
-    assert "counts as inside" in one.page.locator(".map .legend").inner_text()
+    assert "band: inside" in one.page.locator(".map .legend").inner_text()
     one.keep("sweep-judged")
     band = (246, 217, 196)
     url = one.page.evaluate("document.querySelector('.map canvas').toDataURL()")

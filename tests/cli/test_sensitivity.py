@@ -62,7 +62,7 @@ def test_distributions_of_the_scenario_are_the_default(blocksim: Command, tmp_pa
         (("--vary", "friction.block_ground=0.3:0.4:5"), 65, "count belongs to the modes"),
         ((*VARY, "--samples", 1), 65, "1 trajectories are too few"),
         ((*VARY, "--out", "scenarios"), 73, "it is a folder"),
-        ((*VARY, "--out", "nowhere/indices.csv"), 73, "there is no such folder"),
+        ((*VARY, "--out", "nowhere/indices.csv"), 73, "no such folder"),
         ((*VARY, "--method", "fast"), 2, "Invalid value"),
     ],
 )

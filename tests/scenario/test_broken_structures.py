@@ -112,7 +112,7 @@ bad.toml:20: structures.0.holes.2: [1, 1] is left out twice
     "nothing but holes": (
         'kind = "wall"\nblock = "brick"\nrows = 1\ncolumns = 2\nholes = [[1, 1], [1, 2]]\n',
         """
-bad.toml:20: structures.0.holes: no block is left in this wall
+bad.toml:20: structures.0.holes: this wall has no block left
    20 | holes = [[1, 1], [1, 2]]
       |         ^^^^^^^^^^^^^^^^
 """,
@@ -120,7 +120,7 @@ bad.toml:20: structures.0.holes: no block is left in this wall
     "everything missing": (
         WALL + "missing = 0.99\n",
         """
-bad.toml:20: structures.0.missing: no block is left in this wall
+bad.toml:20: structures.0.missing: this wall has no block left
    20 | missing = 0.99
       |           ^^^^
 """,

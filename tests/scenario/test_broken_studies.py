@@ -173,7 +173,7 @@ bad.toml:21: sweep."structures.0.offset": "1 nn": unknown unit 'nn', write it as
         None,
         '\n[sweep]\nmode = "list"\n"time.end" = [1, 2]\n"ground.tilt" = ["1 deg"]\n',
         """
-bad.toml:21: sweep.mode: mode "list" takes one value of every key at a time, but there are 2 for time.end, 1 for ground.tilt
+bad.toml:21: sweep.mode: mode "list" takes one value of every key at a time, but the numbers of values differ: 2 for time.end, 1 for ground.tilt
    21 | mode = "list"
       |        ^^^^^^
 """,

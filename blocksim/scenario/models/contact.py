@@ -25,7 +25,7 @@ NO_FIXED_STIFFNESS = 'law "hertz-mindlin" takes it from the materials and contac
 
 
 def or_bare(table: JsonSchemaValue, bare: JsonSchemaValue) -> JsonSchemaValue:
-    """Let the JSON Schema accept the short form beside the table."""
+    """Let the JSON Schema accept the short form as well as the table."""
     return {"anyOf": [bare, table]}
 
 

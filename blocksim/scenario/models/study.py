@@ -147,7 +147,7 @@ class Sweep(Table):
         counts = {key: len(values) for key, values in self.vary.items() if isinstance(values, tuple)}
         if self.mode == "list" and len(set(counts.values())) > 1:
             told = ", ".join(f"{count} for {key}" for key, count in counts.items())
-            message = f'mode "list" takes one value of every key at a time, but there are {told}'
+            message = f'mode "list" takes one value of every key at a time, but the numbers of values differ: {told}'
             raise q.invalid(message, "mode")
         return self
 

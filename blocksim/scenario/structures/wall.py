@@ -66,7 +66,7 @@ class BlockWall(Courses):
     @model_validator(mode="after")
     def _something_is_left(self) -> Self:
         if self.size == 0:
-            message = "no block is left in this wall"
+            message = "this wall has no block left"
             raise q.invalid(message, "holes" if len(self.holes) == self.rows * self.columns else "missing")
         return self
 

@@ -13,7 +13,7 @@ from blocksim.view.law import Law
 
 Floats = NDArray[np.float64]
 MILLI = 1e3
-LEAST_APEX = 2e-5  # m; lower bounces are not told apart from rest
+LEAST_APEX = 2e-5  # m; lower bounces are not distinguished from rest
 
 
 class Bounce(NamedTuple):

@@ -29,7 +29,7 @@ PRINTED = {  # property of the table, its name in the paper, unit
 
 
 def properties_table(printed: Mapping[str, float], scenario: Scenario) -> str:
-    """Return Table 1, and the sizes, beside those of a scenario."""
+    """Return Table 1, and the sizes, with those of a scenario."""
     used = _used(scenario)
     rows = []
     for name, (label, unit) in PRINTED.items():
@@ -72,7 +72,7 @@ def rotations_table(centres: ExperimentTable, runs: Sequence[Result]) -> str:
 
 
 def bounces_table(bounces: Sequence[Bounce]) -> str:
-    """Return apexes and flight times beside Eq. 12."""
+    """Return apexes and flight times with those of Eq. 12."""
     rows = [
         (str(one.number), *(f"{value:.3f}" for value in (one.told_apex, one.apex, one.told_flight, one.flight)))
         for one in bounces

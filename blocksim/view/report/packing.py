@@ -112,7 +112,7 @@ def pack(values: Floats, *, exact: bool = False) -> tuple[dict[str, Any], float]
 
 
 def _thinned(drawable: Indices, blocks: int, most_bytes: int, more: int) -> Indices:
-    """Return evenly chosen frames, first and last included, that fit; each has so many bytes more beside blocks."""
+    """Return evenly chosen frames, first and last included, that fit; each has some bytes in addition to its blocks."""
     values = len(drawable) * blocks * len(CHANNELS)
     bytes_each = (4 if len(drawable) * blocks <= EXACT_VALUES else SHORT_BYTES) * blocks * len(CHANNELS) + more
     most = max(2, most_bytes // bytes_each)
