@@ -68,8 +68,8 @@ def _try(child: Child, folder: Path, usual: dict[tuple[str, ...], float], data: 
     ("old", "new", "told"),
     [
         (b",friction.block_block.static,", b",nan,", "no column friction.block_block.static"),
-        (b"\n000000000000,0.2,", b"\n000000000000,nan,", "holds what is no number"),
-        (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,1e308,", "farther than can be drawn"),
+        (b"\n000000000000,0.2,", b"\n000000000000,nan,", "holds values that are not numbers"),
+        (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,1e308,", "too far to be drawn"),
         (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,sixteen,", "not a number"),
         (b",1.rotation_deg,", b",turned,", "no column 1.rotation_deg"),
         (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,,", "has finished, but its row lacks positions"),
