@@ -7,6 +7,7 @@ import numpy as np
 
 from blocksim.errors import OutputError
 from blocksim.kernels import jit
+from blocksim.kernels.watch import Watched
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.simulation.schemes import AnyScene, build_scene, measured_row, scheme_of
 from blocksim.simulation.team import ALONE
@@ -70,7 +71,9 @@ def _compile(kernels: str) -> None:
 def _compile_ensemble(scenes: AnyScene) -> None:
     """Compile the advance of members too: it shares all kernels but the outermost, so that it costs little now."""
     scheme, nothing = scheme_of(scenes), np.zeros(0, dtype=np.int64)
-    scheme.advance_members(scenes, nothing, nothing, np.zeros((1, len(scheme.measured))), nothing)
+    places, lengths = np.zeros((1, 3, 1)), np.zeros((1, 1))
+    watched = Watched(np.zeros(1), np.zeros(1, dtype=np.int64), places, places, lengths, lengths)
+    scheme.advance_members(scenes, nothing, nothing, np.zeros((1, len(scheme.measured))), nothing, watched)
 
 
 def is_compiled(kernels: str = SURFACE) -> bool:

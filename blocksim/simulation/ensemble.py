@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,14 +153,6 @@ def _run_batch(scenarios: Sequence[Scenario], pool: ThreadPoolExecutor, threads:
     return [ends[i] for i in range(len(scenarios))]
 
 
-class Stop(NamedTuple):
-    """A step at which compiled code returns: its number, and what is looked at there."""
-
-    step: int
-    is_look: bool  # at the energy
-    is_frame: bool  # at what has moved
-
-
 class Ensemble:
     """Scenes of one scheme and shape, stacked, to be advanced together once."""
 
@@ -177,48 +169,50 @@ class Ensemble:
         self.codes = np.zeros(len(ends), dtype=np.int64)
         every = [scenarios[number].output.every for number in stack.numbers]
         self.periods = [*map(steps_per_frame, every, self.time_steps)]
-        self.moves = FirstMoves(self.placed, self._positions(self.scenes, slice(None)))
+        self.moves = FirstMoves(self.placed, self._positions(self.scenes, slice(None)), self.periods)
 
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
         nobody = np.zeros(0, dtype=np.int64)  # compiles, before there are threads
-        self.scheme.advance_members(self.scenes, nobody, self.last_steps, self.starts, self.codes)
+        self.scheme.advance_members(self.scenes, nobody, self.last_steps, self.starts, self.codes, self.moves.watched)
         count = len(self.codes)
         chunk = min(CHUNK, -(-count // threads))
         list(pool.map(self._advance, (np.arange(i, min(i + chunk, count)) for i in range(0, count, chunk))))
 
     def _advance(self, members: NDArray[np.int64]) -> None:
-        """Advance some members from stop to stop, without those whose energy does not add up any more."""
-        rows, later = self.starts, np.zeros_like(self.starts)  # later calls measure nothing that is needed
-        done = np.zeros_like(self.codes)
+        """Advance some members from check to check, without those whose energy does not add up any more."""
+        rows, stops = self.starts, np.zeros_like(self.codes)
+        done = 0
         while members.size:
-            stops = {m: self._next_stop(m, int(done[m])) for m in members.tolist()}
-            done[members] = [stop.step for stop in stops.values()]
-            self.scheme.advance_members(self.scenes, members, done, rows, self.codes)
-            rows = later
-            going = [self._continues(m, stop) for m, stop in stops.items()]
-            self._see([m for (m, stop), goes in zip(stops.items(), going, strict=True) if stop.is_frame or not goes])
-            members = members[going]
+            done = next_energy_check(done, self.bodies)
+            np.minimum(self.last_steps, done, out=stops)
+            self.scheme.advance_members(self.scenes, members, stops, rows, self.codes, self.moves.watched)
+            rows = np.zeros_like(self.starts)  # what is measured at the start of a later call
+            members = members[(self.codes[members] == REACHED) & (self.last_steps[members] > done)]
+            members = members[[self._adds_up(m) for m in members.tolist()]]
 
-    def _next_stop(self, m: int, done: int) -> Stop:
-        """Return where a member stops next; frames count only until something has moved."""
-        look, last = next_energy_check(done, self.bodies), int(self.last_steps[m])
-        frame = last if self.moves.found[m] else next_frame(done, self.periods[m])
-        step = min(look, frame, last)
-        return Stop(step, step == look, step == frame)
+    def _next_look(self, m: int, done: int) -> int:
+        """Return the step at which the energy of a member is checked next, or its last."""
+        return min(next_energy_check(done, self.bodies), int(self.last_steps[m]))
 
-    def _continues(self, m: int, stop: Stop) -> bool:
-        """Return True if a member that has stopped is neither at its end nor lost."""
-        is_under_way = self.codes[m] == REACHED and stop.step < self.last_steps[m]
-        return bool(is_under_way) and (not stop.is_look or self._adds_up(m))
+    def _next_stop(self, m: int, done: int) -> int:
+        """Return where a member stops next that is advanced alone; frames count only until something has moved."""
+        look = self._next_look(m, done)
+        return look if self.moves.found[m] else min(look, next_frame(done, self.periods[m]))
 
-    def _see(self, members: list[int]) -> None:
-        """Note which members have moved; not of those whose list of pairs is full, which continue alone."""
-        which = [m for m in members if self.moves.found[m] is None and self.codes[m] != PAIRS_FULL]
-        if which:
-            steps = self.scenes.world.clock["steps"][which, 0].tolist()
-            times = [step * self.time_steps[m] for m, step in zip(which, steps, strict=True)]
-            self.moves.see(which, self._positions(self.scenes, which), times)
+    def _is_frame(self, m: int, step: int) -> bool:
+        return step > 0 and next_frame(step - 1, self.periods[m]) == step
+
+    def _see_ends(self) -> None:
+        """Find what moved first in members without a frame in which anything had: the end is one too.
+
+        Those whose list of pairs is full continue alone.
+        """
+        self.moves.take(self.time_steps)
+        which = [m for m, code in enumerate(self.codes) if self.moves.found[m] is None and code != PAIRS_FULL]
+        steps = self.scenes.world.clock["steps"][which, 0].tolist()
+        times = [step * self.time_steps[m] for m, step in zip(which, steps, strict=True)]
+        self.moves.see(which, self._positions(self.scenes, which), times)
 
     def _positions(self, scenes: AnyScene, which: list[int] | slice) -> NDArray[np.float64]:
         """Return x, y (m) and angle (rad) of the blocks of some scenes of a stack, (k, 3, b)."""
@@ -234,6 +228,7 @@ class Ensemble:
 
     def ends(self) -> list[Ended]:
         """Return where the members ended, in order."""
+        self._see_ends()
         closing = Closing(self.scenes, self.placed, self._measured())
         return [
             self._run_alone(m, self._start(m))
@@ -245,7 +240,9 @@ class Ensemble:
     def _measured(self) -> NDArray[np.float64]:
         """Return rows as `measured` of the scheme names them: a call that goes to no further step only measures."""
         rows, nowhere = np.zeros_like(self.starts), np.zeros_like(self.codes)
-        self.scheme.advance_members(self.scenes, np.arange(len(rows)), nowhere, rows, nowhere.copy())
+        self.scheme.advance_members(
+            self.scenes, np.arange(len(rows)), nowhere, rows, nowhere.copy(), self.moves.watched
+        )
         return rows
 
     def _run_alone(self, m: int, start: float) -> Ended:
@@ -264,11 +261,12 @@ class Ensemble:
     def _finish(self, m: int, scene: AnyScene, start: float) -> tuple[AnyScene, int]:
         """Advance one scene from stop to stop, as `_advance` does; return it and its status code."""
         while True:
-            stop = self._next_stop(m, int(scene.world.clock[0].steps))
-            scene, code = ALONE.advance(scene, stop.step)
-            is_under_way = code == REACHED and stop.step < self.last_steps[m]
-            continues = is_under_way and (not stop.is_look or adds_up(energy_ledger(scene, start)))
-            if stop.is_frame or not continues:
+            done = int(scene.world.clock[0].steps)
+            look, stop = self._next_look(m, done), self._next_stop(m, done)
+            scene, code = ALONE.advance(scene, stop)
+            is_under_way = code == REACHED and stop < self.last_steps[m]
+            continues = is_under_way and (stop != look or adds_up(energy_ledger(scene, start)))
+            if not continues or self._is_frame(m, stop):
                 time = int(scene.world.clock[0].steps) * self.time_steps[m]
                 self.moves.see([m], self._positions(stack_of_one(scene), slice(None)), [time])
             if not continues:

@@ -22,9 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from blocksim.kernels.watch import Watched
 from blocksim.scenario import PlacedBody
 from blocksim.simulation.table import MILLI, Columns
 
+ROUND_OFF = 1e-9  # between two ways to compute a distance
 MOVED_SHARE = 0.01  # of the shortest side
 FALLEN_TURN = np.radians(45.0)
 FALLEN_SHARE = 0.5  # of the shortest side, downwards
@@ -127,18 +129,30 @@ def _with_way_there(manner: Manner, first: FirstMove | None) -> Manner:
 class FirstMoves:
     """The first moves in m scenes with the same number b of blocks, advanced together."""
 
-    def __init__(self, placed: Sequence[Sequence[PlacedBody]], start: Floats) -> None:
-        """Take the blocks of every scene and where they begin, (m, 3, b): x, y (m), angle (rad)."""
+    def __init__(self, placed: Sequence[Sequence[PlacedBody]], start: Floats, periods: Sequence[float]) -> None:
+        """Take the blocks of every scene, where they begin, (m, 3, b): x, y (m), angle (rad), and steps per frame."""
         self.placed, self.start = placed, start
         self.shapes = _shapes_of([body for bodies in placed for body in bodies]).split(len(placed))
         self.found: list[FirstMove | None] = [None] * len(placed)
+        thresholds = np.where(self.shapes.is_free, MOVED_SHARE * self.shapes.shortest, np.inf)
+        steps = np.zeros(len(placed), dtype=np.int64)
+        self.watched = Watched(
+            np.array(periods, dtype=np.float64), steps, np.zeros_like(start), start, self.shapes.reach, thresholds
+        )
+        """For compiled code."""
 
-    def see(self, scenes: list[int], position: Floats, times: list[float]) -> None:
+    def take(self, time_steps: Sequence[float]) -> None:
+        """Take what compiled code has seen, given the length of a step (s) of every scene."""
+        which = np.flatnonzero(self.watched.steps).tolist()
+        times = [int(self.watched.steps[m]) * time_steps[m] for m in which]
+        self.see(which, self.watched.places[which], times, threshold=1.0 - ROUND_OFF)
+
+    def see(self, scenes: list[int], position: Floats, times: list[float], *, threshold: float = 1.0) -> None:
         """Examine some scenes, at positions (k, 3, b) and times (s); those that have moved before stay as they are."""
         dx, dy, angle = (position - self.start[scenes]).swapaxes(0, 1)
         shares = _shares(self.shapes.chosen(scenes), np.hypot(dx, dy), np.abs(angle))
         for m, block, share, time in zip(scenes, shares.argmax(axis=1), shares.max(axis=1), times, strict=True):
-            if share > 1.0 and self.found[m] is None:
+            if share > threshold and self.found[m] is None:
                 self.found[m] = FirstMove(self.placed[m][block].name, time)
 
 

@@ -1,11 +1,12 @@
 """Many copies of one scene with different numbers in them, one after the other in one compiled call."""
 
-from blocksim.kernels.arrays import Floats, Integers
+from blocksim.kernels.arrays import REACHED, Floats, Integers
 from blocksim.kernels.ensemble import member as world_of
 from blocksim.kernels.jit import entry_kernel, rare_kernel
 from blocksim.kernels.nonsmooth.advance import march_alone
 from blocksim.kernels.nonsmooth.arrays import Contacts, Nonsmooth
 from blocksim.kernels.nonsmooth.energy import measure_nonsmooth
+from blocksim.kernels.watch import Watched, frame_to_watch, watch
 
 
 @rare_kernel
@@ -35,9 +36,15 @@ def member(scenes: Nonsmooth, m: int) -> Nonsmooth:
     )
 
 
+@rare_kernel
+def march_member(scene: Nonsmooth, last_step: int) -> int:
+    """Step one member; see advance."""
+    return march_alone(scene, last_step)
+
+
 @entry_kernel
 def advance_nonsmooth_members(
-    scenes: Nonsmooth, members: Integers, last_steps: Integers, starts: Floats, codes: Integers
+    scenes: Nonsmooth, members: Integers, last_steps: Integers, starts: Floats, codes: Integers, watched: Watched
 ) -> None:
     """Advance some members from their start to their last step, or to what ends them before.
 
@@ -45,6 +52,12 @@ def advance_nonsmooth_members(
     """
     for m in members:
         scene = member(scenes, m)
-        march_alone(scene, 0)
+        codes[m] = march_member(scene, 0)
         measure_nonsmooth(scene, starts[m])
-        codes[m] = march_alone(scene, last_steps[m])
+        clock = scene.world.clock[0]
+        while codes[m] == REACHED and clock.steps < last_steps[m]:
+            frame = frame_to_watch(watched, m, clock.steps)
+            stop = min(frame, last_steps[m]) if frame > 0 else last_steps[m]
+            codes[m] = march_member(scene, stop)
+            if clock.steps == frame:
+                watch(scene.world.bodies, watched, m, frame)

@@ -15,6 +15,7 @@ from blocksim.kernels.arrays import AT_REST, REACHED, TEAM_SIZE
 from blocksim.kernels.nonsmooth.advance import advance_nonsmooth_in_team
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
 from blocksim.kernels.nonsmooth.solve import solve_two
+from blocksim.kernels.watch import Watched
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth, with_more_threads
 from blocksim.world.scenes import build_stacks, only
@@ -213,7 +214,9 @@ def test_members_of_an_ensemble_have_the_same_bits(begin: Callable[..., Any]) ->
     alone = [begin(scenario).to_step(400) for scenario in scenarios]
     scenes = only(build_stacks([rigid(scenario) for scenario in scenarios], NONSMOOTH)).scenes
     codes, starts = np.zeros(2, dtype=np.int64), np.zeros((2, 8))
-    advance_nonsmooth_members(scenes, np.arange(2), np.full(2, 400), starts, codes)
+    places, lengths = np.zeros((2, 3, 3)), np.zeros((2, 3))
+    watched = Watched(np.zeros(2), np.zeros(2, dtype=np.int64), places, places, lengths, lengths)  # no frames
+    advance_nonsmooth_members(scenes, np.arange(2), np.full(2, 400), starts, codes, watched)
     for m in range(2):
         assert codes[m] == alone[m].status
         assert np.array_equal(scenes.world.bodies[m].x, alone[m].world.bodies.x)
