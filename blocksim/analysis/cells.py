@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
-from blocksim.scenario.limited import is_folder, open_regular, unreadable
+from blocksim.scenario.bounded_read import is_folder, open_regular, unreadable
 
 LARGEST_FILE = 1_000_000  # bytes
 LONGEST_LINE = 1_000  # characters

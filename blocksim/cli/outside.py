@@ -35,7 +35,7 @@ def _option() -> Any:
 
 
 def _allow(context: typer.Context, asked: bool) -> None:
-    from blocksim.scenario.reach import reaching
+    from blocksim.scenario.path_policy import reaching
 
     if asked:
         context.with_resource(reaching(anywhere=True))

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Self, cast
 
 from blocksim.errors import InputMissingError, Problem, ScenarioError
+from blocksim.scenario.bounded_read import NoSuchFileError, is_folder, open_regular, unreadable
 from blocksim.scenario.check import examine
 from blocksim.scenario.findings import Finding
 from blocksim.scenario.keys import MAX_PARTS
-from blocksim.scenario.limited import NoSuchFileError, is_folder, open_regular, unreadable
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overrides import (
     Data,
@@ -24,8 +24,8 @@ from blocksim.scenario.overrides import (
     parse_override,
     with_value,
 )
+from blocksim.scenario.path_policy import is_anywhere, reaching, said_by_hand
 from blocksim.scenario.quantities import shown
-from blocksim.scenario.reach import is_anywhere, reaching, said_by_hand
 from blocksim.scenario.source import Source, clipped, override_problem
 
 MAX_BYTES = 1_000_000

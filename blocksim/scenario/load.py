@@ -6,7 +6,7 @@ from pathlib import Path
 
 from blocksim.scenario.document import Document
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.reach import said_by_hand
+from blocksim.scenario.path_policy import said_by_hand
 from blocksim.scenario.resolved import scenario_to_toml
 
 Source = Path | str | Mapping[str, object] | Scenario | Document

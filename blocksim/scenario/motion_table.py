@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from blocksim.errors import BlocksimError
-from blocksim.scenario.limited import read_limited
+from blocksim.scenario.bounded_read import read_limited
 from blocksim.scenario.quantities import shown
 
 STANDARD_GRAVITY = 9.80665

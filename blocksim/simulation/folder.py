@@ -12,7 +12,7 @@ from pathlib import Path
 
 from blocksim.errors import BlocksimError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario
-from blocksim.scenario.limited import MEGABYTE, read_limited
+from blocksim.scenario.bounded_read import MEGABYTE, read_limited
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.result_files import (
     CHECKPOINTS,

@@ -15,7 +15,7 @@ from typing import BinaryIO
 import h5py
 
 from blocksim.errors import BlocksimError, OutputExistsError
-from blocksim.scenario.limited import MEGABYTE, open_regular
+from blocksim.scenario.bounded_read import MEGABYTE, open_regular
 from blocksim.simulation.stores.hdf5_open import DAMAGE
 
 NAME = b"blocksim"

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from blocksim.errors import BlocksimError, OutputExistsError
 from blocksim.scenario import Scenario, motion_table_content, scenario_to_toml
-from blocksim.scenario.limited import MEGABYTE, read_head, read_limited
+from blocksim.scenario.bounded_read import MEGABYTE, read_head, read_limited
 from blocksim.scenario.resolved import HEADER
 from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
 from blocksim.simulation.table import COLUMNS

@@ -6,7 +6,7 @@ from typing import Literal
 from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario.limited import MEGABYTE, read_limited
+from blocksim.scenario.bounded_read import MEGABYTE, read_limited
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import sha256_of
 from blocksim.simulation.ledger import EnergyLedger

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario.limited import MEGABYTE, read_limited
+from blocksim.scenario.bounded_read import MEGABYTE, read_limited
 from blocksim.simulation.frames import Floats, Frames
 
 if TYPE_CHECKING:

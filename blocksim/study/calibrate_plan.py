@@ -12,7 +12,7 @@ from blocksim.scenario import Document, Scenario, Sweep, scenario_hash
 from blocksim.scenario import quantities as q
 from blocksim.scenario.keys import parse_key
 from blocksim.scenario.models.variation import Uniform, Variation, written
-from blocksim.scenario.reach import said_by_hand
+from blocksim.scenario.path_policy import said_by_hand
 from blocksim.scenario.units import parse_unit
 from blocksim.simulation.atomic import sha256_of
 from blocksim.simulation.provenance import code_hash

@@ -38,7 +38,7 @@ import numpy as np
 from blocksim.analysis.proportion import interval
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.extras import loaded
-from blocksim.scenario.limited import read_head
+from blocksim.scenario.bounded_read import read_head
 from blocksim.simulation.folder import takes_lock
 from blocksim.study.calibrate_plan import Prior
 from blocksim.study.executors.ensemble import Member

@@ -26,7 +26,7 @@ from typing import Any, BinaryIO, Self
 import numpy as np
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
-from blocksim.scenario.limited import open_regular
+from blocksim.scenario.bounded_read import open_regular
 from blocksim.simulation.folder import takes_lock
 from blocksim.study.rows import FINISHED, Row, as_cell, blocks_in
 

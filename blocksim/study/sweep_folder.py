@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
-from blocksim.scenario.limited import MEGABYTE, read_head, read_limited
+from blocksim.scenario.bounded_read import MEGABYTE, read_head, read_limited
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.folder import make_folder, remove_run
 from blocksim.simulation.provenance import environment

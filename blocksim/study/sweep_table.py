@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario.limited import MEGABYTE, refuse_large
+from blocksim.scenario.bounded_read import MEGABYTE, refuse_large
 from blocksim.simulation.atomic import writing
 from blocksim.study.plan import Cases
 from blocksim.study.progress import WHOLE, CaseIndex, Shard

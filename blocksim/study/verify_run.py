@@ -14,7 +14,7 @@ from typing import Any
 from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, load_stored, scenario_hash
-from blocksim.scenario.limited import read_limited
+from blocksim.scenario.bounded_read import read_limited
 from blocksim.simulation import Progress, Result, Watcher, read_result, simulate
 from blocksim.simulation import folder as files
 from blocksim.simulation.provenance import ROOM_PREFIX, environment

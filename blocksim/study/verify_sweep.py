@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario.limited import open_regular
+from blocksim.scenario.bounded_read import open_regular
 from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.plan import Case, Cases
 from blocksim.study.progress import PATTERN, CaseIndex, read_entries

@@ -9,7 +9,7 @@ from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, Wit
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import Table
 from blocksim.scenario.motion_table import MotionTable, MotionTableError, read_motion_table
-from blocksim.scenario.reach import OutOfReachError, table_in
+from blocksim.scenario.path_policy import OutOfReachError, table_in
 
 PIECES_PER_CYCLE = 200
 """The cubic pieces are then off by less than (2 pi/200)^4/384 = 3e-9 of the amplitude."""

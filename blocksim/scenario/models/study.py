@@ -21,7 +21,7 @@ from pydantic_core import CoreSchema
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import OneOf, Table, whole
 from blocksim.scenario.models.variation import VALUES_SCHEMA, Variation, read_any, read_sampled, read_spread
-from blocksim.scenario.reach import OutOfReachError, table_in
+from blocksim.scenario.path_policy import OutOfReachError, table_in
 from blocksim.scenario.spelling import nearest
 
 MAX_SAMPLES = 1_000_000

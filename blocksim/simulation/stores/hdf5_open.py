@@ -20,7 +20,7 @@ from typing import Any
 import h5py
 
 from blocksim.errors import BlocksimError, InvalidInputError
-from blocksim.scenario.limited import check_regular, read_head
+from blocksim.scenario.bounded_read import check_regular, read_head
 from blocksim.world.free_memory import available_bytes, readable
 
 SUPERBLOCK = struct.Struct("<8s4B3QQI")  # signature; version, sizes, flags; base, extension, end; root; checksum

@@ -7,8 +7,8 @@ from typing import TypeVar
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_stored
+from blocksim.scenario.bounded_read import read_limited
 from blocksim.scenario.document import MAX_BYTES
-from blocksim.scenario.limited import read_limited
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.stores.hdf5_reader import read_frames

@@ -10,7 +10,7 @@ from typing import Any
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
-from blocksim.scenario.limited import MEGABYTE, read_limited
+from blocksim.scenario.bounded_read import MEGABYTE, read_limited
 from blocksim.view.report.subjects import Subject
 
 TABLE = "sweep.csv"

@@ -7,7 +7,7 @@ import pytest
 
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Document, load_scenario, scenario_from_mapping
-from blocksim.scenario.reach import reaching
+from blocksim.scenario.path_policy import reaching
 
 TABLE = "block,quantity,unit,replicate,value\n1,x,mm,1,16\n"
 MOTION = "time_s,displacement_mm\n0,0\n0.1,1\n"

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
-from blocksim.scenario.limited import IS_LINK
+from blocksim.scenario.bounded_read import IS_LINK
 from blocksim.scenario.quantities import shown
 
 WAY_OUT = "--allow-outside (in Python allow_outside=True) to override"
