@@ -6,8 +6,8 @@ from math import inf, pi
 from pathlib import Path
 from types import MappingProxyType
 
-from blocksim.analysis.cells import Cell, Table, raise_problems, read_table, suggestion
 from blocksim.analysis.units import unit_factor
+from blocksim.scenario.csv_table import Cell, Table, raise_problems, read_table, suggestion
 
 COLUMNS = ("property", "unit", "value")
 

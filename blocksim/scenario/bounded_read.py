@@ -72,18 +72,20 @@ def check_regular(path: Path, *, links: bool = False) -> int:
 
 def read_limited(path: Path, limit: int, *, links: bool = False) -> bytes:
     """Return what a file holds, at most `limit` bytes. Raises as `open_regular`, InvalidInputError for a larger one."""
-    with open_regular(path, links=links) as file:
-        content = _read(path, file, limit + 1)
+    content = read_head(path, limit + 1, links=links)
     if len(content) > limit:
         message = f"{path}: {_too_large(limit)}"
         raise InvalidInputError(message)
     return content
 
 
-def read_head(path: Path, count: int) -> bytes:
+def read_head(path: Path, count: int, *, links: bool = False) -> bytes:
     """Return the first bytes of a file, at most `count`. Raises as `open_regular`."""
-    with open_regular(path) as file:
-        return _read(path, file, count)
+    with open_regular(path, links=links) as file:
+        try:
+            return file.read(count)
+        except OSError as error:
+            raise unreadable(path, error) from None
 
 
 def refuse_large(path: Path, limit: int) -> None:
@@ -107,13 +109,6 @@ def unreadable(path: Path, error: OSError | ValueError) -> InputMissingError | I
 def _opener(*, links: bool) -> Callable[[str, int], int]:
     extra = getattr(os, "O_NONBLOCK", 0) | (0 if links else getattr(os, "O_NOFOLLOW", 0))
     return lambda name, flags: os.open(name, flags | extra)
-
-
-def _read(path: Path, file: BinaryIO, count: int) -> bytes:
-    try:
-        return file.read(count)
-    except OSError as error:
-        raise unreadable(path, error) from None
 
 
 def _too_large(limit: int) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Self, cast
 
 from blocksim.errors import InputMissingError, Problem, ScenarioError
-from blocksim.scenario.bounded_read import NoSuchFileError, is_folder, open_regular, unreadable
+from blocksim.scenario.bounded_read import NoSuchFileError, is_folder, read_head
 from blocksim.scenario.check import examine
 from blocksim.scenario.findings import Finding
 from blocksim.scenario.keys import MAX_PARTS
@@ -173,12 +173,9 @@ def _content(path: Path, *, is_stored: bool) -> bytes:
         message = f"{path}: this is a folder; a scenario file is needed{_similar_file(path / path.name)}"
         raise InputMissingError(message)
     try:
-        with open_regular(path, links=not is_stored) as file:
-            content = file.read(MAX_BYTES + 1)
+        content = read_head(path, MAX_BYTES + 1, links=not is_stored)
     except NoSuchFileError as error:
         raise InputMissingError(f"{error}{_similar_file(path)}") from None
-    except OSError as error:
-        raise unreadable(path, error) from None
     if len(content) > MAX_BYTES:
         raise _unusable(str(path), f"larger than {MAX_BYTES // 1_000_000} MB; this is not a scenario")
     return content

@@ -12,11 +12,10 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from blocksim.scenario.models.contact import Friction, PairFriction
-from blocksim.scenario.models.motion import FromTable
+from blocksim.scenario.models.motion import FromTable, MotionTable
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Time
 from blocksim.scenario.models.study import Sweep
-from blocksim.scenario.motion_table import MotionTable
 from blocksim.scenario.quantities import ANGLE, Quantity
 
 HEADER = "# Resolved by blocksim: all values as used, in SI units (m, kg, s, N, Pa), angles in rad.\n"

@@ -20,11 +20,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar, overload
 
-from blocksim.analysis.cells import NUMBER, Cell, raise_problems, read_open_table
 from blocksim.errors import Problem
 from blocksim.scenario import Document, Sweep
 from blocksim.scenario import quantities as q
 from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, unfit_to_vary
+from blocksim.scenario.csv_table import NUMBER, Cell, raise_problems, read_open_table
 from blocksim.scenario.models.variation import Variation
 from blocksim.scenario.overrides import parse_value
 

@@ -1,14 +1,18 @@
-"""Comma-separated tables with `#` comment lines; every cell has its place in the file."""
+"""Comma-separated tables that users write, with `#` comment lines: read up to a size, every cell with its place.
+
+Tables of measurements, properties, cases and runs are read with the place of each cell; tables of motion, which may
+have half a million lines, as bare rows. Tables that blocksim itself has written are read where they are written.
+"""
 
 import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
-from blocksim.scenario.bounded_read import is_folder, open_regular, unreadable
+from blocksim.scenario.bounded_read import is_folder, read_head
 
 LARGEST_FILE = 1_000_000  # bytes
 LONGEST_LINE = 1_000  # characters
@@ -116,10 +120,20 @@ def read_open_table(path: Path, limit: int) -> tuple[tuple[Cell, ...], Table]:
     return heads, _filled(Table(where=str(path), notes=notes, header=line), names, content[1:])
 
 
+def bare_rows(content: bytes) -> list[tuple[int, list[str]]]:
+    """Return number (from 1) and cells of every line of a table that is neither empty nor a comment; no quotes.
+
+    Raises UnicodeDecodeError where the content is not UTF-8 text.
+    """
+    lines = _numbered(content.decode("utf-8-sig"))
+    kept = [(number, line) for number, line in lines if line.strip() and not _is_comment(line)]
+    return [(number, [cell.strip() for cell in line.split(",")]) for number, line in kept]
+
+
 def _content(lines: Sequence[Line]) -> tuple[tuple[str, ...], list[Line]]:
     """Return the texts of the comments, and the lines that are neither comments nor empty."""
-    notes = tuple(line.text.strip()[1:].strip() for line in lines if _is_comment(line))
-    return notes, [line for line in lines if line.text.strip() and not _is_comment(line)]
+    notes = tuple(line.text.strip()[1:].strip() for line in lines if _is_comment(line.text))
+    return notes, [line for line in lines if line.text.strip() and not _is_comment(line.text)]
 
 
 def _filled(table: Table, names: Sequence[str], lines: Sequence[Line]) -> Table:
@@ -151,8 +165,12 @@ def suggestion(found: str, allowed: Sequence[str]) -> str:
 
 
 def _lines(path: Path, limit: int = LARGEST_FILE) -> list[Line]:
-    text = _text(path, limit).replace("\r\n", "\n").replace("\r", "\n")
-    return [Line(str(path), number, _printable(line)) for number, line in enumerate(text.split("\n"), 1)]
+    return [Line(str(path), number, _printable(line)) for number, line in _numbered(_text(path, limit))]
+
+
+def _numbered(text: str) -> Iterator[tuple[int, str]]:
+    """Yield number (from 1) and text of every line, whatever system wrote it."""
+    return enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1)
 
 
 def _text(path: Path, limit: int) -> str:
@@ -171,11 +189,7 @@ def _text(path: Path, limit: int) -> str:
 def _bytes(path: Path, limit: int) -> bytes:
     if is_folder(path):
         raise InputMissingError(Problem(str(path), "is a folder, not a table").render())
-    with open_regular(path, links=True) as file:
-        try:
-            return file.read(limit + 1)
-        except OSError as error:
-            raise unreadable(path, error) from None
+    return read_head(path, limit + 1, links=True)
 
 
 def _printable(line: str) -> str:
@@ -183,8 +197,8 @@ def _printable(line: str) -> str:
     return "".join(character if character.isprintable() else " " for character in line)
 
 
-def _is_comment(line: Line) -> bool:
-    return line.text.lstrip().startswith("#")
+def _is_comment(line: str) -> bool:
+    return line.lstrip().startswith("#")
 
 
 def _cells(line: Line) -> list[tuple[str, Line, int, int]] | None:
