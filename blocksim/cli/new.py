@@ -10,7 +10,7 @@ import typer
 from blocksim.cli import completion, options
 from blocksim.cli.output import answer, note
 from blocksim.errors import OutputError, OutputExistsError
-from blocksim.scenario.findings import did_you_mean
+from blocksim.scenario.spelling import did_you_mean
 from blocksim.simulation.atomic import write_text
 
 TEMPLATES = "templates"

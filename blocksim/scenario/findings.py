@@ -1,9 +1,7 @@
 """Mistakes in the data of a scenario, in plain words, with the path of the key concerned."""
 
-import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from typing import Any, Literal, cast
 
 from pydantic import ValidationError
@@ -14,17 +12,12 @@ from blocksim.scenario.models.motion import MOTIONS
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES, scheme_of
 from blocksim.scenario.quantities import shown
-from blocksim.scenario.spelling import nearest
+from blocksim.scenario.spelling import did_you_mean, nearest, similar_word
 from blocksim.scenario.structures import KINDS
 
 TWO_VALUES = "two values are needed, one along x and one along y"
-MIN_BEGINNING = 3
-"""Letters that a word needs before a longer word is suggested."""
 MAX_FINDINGS = 200
 """Mistakes that are examined; a file of a million mistakes must not take minutes."""
-MAX_COMPARED = 1000
-"""Known words that a misspelt one is compared with, for the same reason."""
-MAX_LISTED = 10
 KINDS_IN: dict[str | int, Iterable[str]] = {"structures": KINDS, "motion": MOTIONS}
 
 
@@ -122,31 +115,6 @@ def _table_with(word: str) -> str:
     tables = ((name, table_at((name,), {})) for name in keys_of(Scenario) if name not in NAMED)
     having = [name for name, table in tables if table is not None and word in keys_of(table)]
     return having[0] if len(having) == 1 else ""
-
-
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Suggest the known word that may have been meant, or nothing."""
-    similar = similar_word(word, known)
-    return f"did you mean {similar!r}?" if similar else ""
-
-
-def did_you_mean_or_list(word: str, known: Iterable[object]) -> str:
-    """Suggest the known word that may have been meant, or list the first known words."""
-    names = [str(name) for name in known]
-    listed = ", ".join(names[:MAX_LISTED]) + (", …" if len(names) > MAX_LISTED else "")
-    return did_you_mean(word, names) or (f"known: {listed}" if names else "none is defined")
-
-
-def similar_word(word: str, known: Iterable[str]) -> str | None:
-    """Return the known word that has the fewest typing errors, begins like the given one, or shares most of it."""
-    known = tuple(islice(known, MAX_COMPARED))
-    similar = nearest(word, known, most=max(1, len(word) // 3))
-    if similar is not None or len(word) < MIN_BEGINNING:
-        return similar
-    alike = [other for other in known if other.startswith(word) or word.startswith(other)]
-    if alike:
-        return min(alike, key=lambda other: abs(len(other) - len(word)))
-    return next(iter(difflib.get_close_matches(word.lower(), known, n=1)), None)
 
 
 def _kinds(path: KeyPath) -> str:

@@ -3,11 +3,12 @@
 from collections.abc import Iterator, Mapping
 
 from blocksim.scenario import keys
-from blocksim.scenario.findings import Finding, did_you_mean_or_list
+from blocksim.scenario.findings import Finding
 from blocksim.scenario.models.contact import Pair
 from blocksim.scenario.overrides import Data
 from blocksim.scenario.pairs import GROUND
 from blocksim.scenario.quantities import shown
+from blocksim.scenario.spelling import did_you_mean_or_list
 
 BLOCKS_BY_NAME = ("structures", "bodies")
 

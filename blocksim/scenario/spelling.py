@@ -1,6 +1,14 @@
 """Known words that a misspelt one may mean."""
 
+import difflib
 from collections.abc import Iterable
+from itertools import islice
+
+MIN_BEGINNING = 3
+"""Letters that a word needs before a longer word is suggested."""
+MAX_COMPARED = 1000
+"""Known words that a misspelt one is compared with; a file of a million mistakes must not take minutes."""
+MAX_LISTED = 10
 
 
 def nearest(word: str, candidates: Iterable[str], most: int) -> str | None:
@@ -25,3 +33,28 @@ def slips(left: str, right: str) -> int:
             row.append(cost)
         before = above
     return row[-1]
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Suggest the known word that may have been meant, or nothing."""
+    similar = similar_word(word, known)
+    return f"did you mean {similar!r}?" if similar else ""
+
+
+def did_you_mean_or_list(word: str, known: Iterable[object]) -> str:
+    """Suggest the known word that may have been meant, or list the first known words."""
+    names = [str(name) for name in known]
+    listed = ", ".join(names[:MAX_LISTED]) + (", …" if len(names) > MAX_LISTED else "")
+    return did_you_mean(word, names) or (f"known: {listed}" if names else "none is defined")
+
+
+def similar_word(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word that has the fewest typing errors, begins like the given one, or shares most of it."""
+    known = tuple(islice(known, MAX_COMPARED))
+    similar = nearest(word, known, most=max(1, len(word) // 3))
+    if similar is not None or len(word) < MIN_BEGINNING:
+        return similar
+    alike = [other for other in known if other.startswith(word) or word.startswith(other)]
+    if alike:
+        return min(alike, key=lambda other: abs(len(other) - len(word)))
+    return next(iter(difflib.get_close_matches(word.lower(), known, n=1)), None)

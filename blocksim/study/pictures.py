@@ -11,7 +11,7 @@ from blocksim.analysis.experiment import load_table
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
 from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario.csv_table import Cell, raise_problems, read_open_table
-from blocksim.scenario.findings import did_you_mean_or_list
+from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.study.stored_run import stored_run
 from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import PLAN

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
-from blocksim.scenario.findings import did_you_mean_or_list
+from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.study.rows import Row
 
 SECONDS = 0.5  # of work in a batch
