@@ -1,16 +1,20 @@
-"""Names in a scenario that must exist: blocks, materials, pairs of materials."""
+"""What keys of a scenario say about one another: names that must exist, choices of the scheme, provenance of keys."""
 
 from collections.abc import Iterator, Mapping
 
 from blocksim.scenario import keys
 from blocksim.scenario.findings import Finding
-from blocksim.scenario.models.contact import Pair
+from blocksim.scenario.models.contact import Contact, Pair
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.scenario.overrides import Data
 from blocksim.scenario.pairs import GROUND
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.spelling import did_you_mean_or_list
 
 BLOCKS_BY_NAME = ("structures", "bodies")
+SPRING_CHOICES = ("model", "law")
+"""Keys of [contact] that rigid contacts do not have."""
 
 
 def wrong_names(data: Data) -> Iterator[Finding]:
@@ -79,3 +83,30 @@ def _wrong_pair(one: str, other: str, found: set[frozenset[str]]) -> Iterator[Fi
     elif frozenset((one, other)) in found:
         twin = keys.format_key(("pairs", other, one))
         yield Finding(("pairs", one, other), f"the same pair is given as {twin}; keep one of the two", at="key")
+
+
+def unfit_choices(scenario: Scenario) -> Iterator[Finding]:
+    """Find contact model and force law that the non-smooth scheme does not have.
+
+    Numbers of springs and dashpots are not refused, so that a scenario can be run by both schemes; they have no effect.
+    """
+    if not isinstance(scenario.time, Nonsmooth):
+        return
+    for name in SPRING_CHOICES:
+        chosen = getattr(scenario.contact, name)
+        usual = Contact.model_fields[name].default
+        if chosen != usual:
+            message = f'{shown(chosen)} needs springs, time.scheme = "explicit"; here contacts are rigid'
+            yield Finding(("contact", name), message, relation=True)
+
+
+def unknown_provenance(data: Data) -> Iterator[Finding]:
+    """Find provenance of keys that no scenario has."""
+    table = data.get("provenance")
+    for key, text in table.items() if isinstance(table, Mapping) else ():
+        try:
+            path = tuple(int(part) if part.isdecimal() else part for part in keys.parse_key(str(key)))
+        except ValueError:
+            path = ()
+        if isinstance(text, str) and not (path and keys.is_known(path, data)):
+            yield Finding(("provenance", key), f"{shown(key)} is not a key of this scenario", at="key")
