@@ -115,7 +115,7 @@ format: $(DEV_STAMP) ## Bring the code into shape
 
 .PHONY: readme
 readme: $(DEV_STAMP) ## Write the table of scenario keys in scenarios/README.md from the models
-	$(VENV_PYTHON) -m blocksim.scenario.reference scenarios/README.md
+	$(VENV_PYTHON) -m blocksim.scenario.key_table scenarios/README.md
 
 .PHONY: pictures
 pictures: $(RUN_STAMP) ## Draw the pictures of the findings in results/

@@ -10,7 +10,7 @@ import typer
 
 from blocksim.cli.app import app
 from blocksim.scenario import Document
-from blocksim.scenario.reference import with_key_table
+from blocksim.scenario.key_table import with_key_table
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -1,7 +1,7 @@
 """Scenarios: declared in TOML, checked, and given to the other rooms as frozen objects in SI."""
 
-from blocksim.scenario.document import Document
-from blocksim.scenario.load import (
+from blocksim.scenario.document import (
+    Document,
     Source,
     document_of,
     load_scenario,
@@ -9,16 +9,14 @@ from blocksim.scenario.load import (
     replace_values,
     scenario_from_mapping,
 )
-from blocksim.scenario.models.boundary import Ground, Wall
 from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
-from blocksim.scenario.models.geometry import Block, BodySpec, Material
-from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
+from blocksim.scenario.models.scenario import Scenario, json_schema
 from blocksim.scenario.models.stepping import Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.pairs import GROUND, ResolvedPair, resolve_pair
 from blocksim.scenario.placement import PlacedBody, place_bodies
 from blocksim.scenario.resolved import motion_table_content, scenario_hash, scenario_to_toml
-from blocksim.scenario.schema import json_schema
 from blocksim.scenario.segments import PlacedSegment, place_segments, surface_height
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""A scenario file as read: its data, the values set over it, and the place of each key."""
+"""Loading: a scenario file as read, the values set over it, and the scenario in it or all mistakes with their place."""
 
 import difflib
 import functools
@@ -26,7 +26,8 @@ from blocksim.scenario.overrides import (
 )
 from blocksim.scenario.path_policy import is_anywhere, reaching, said_by_hand
 from blocksim.scenario.quantities import shown
-from blocksim.scenario.source import Source, clipped, override_problem
+from blocksim.scenario.resolved import scenario_to_toml
+from blocksim.scenario.source import ScenarioText, clipped, override_problem
 
 MAX_BYTES = 1_000_000
 MAX_PROBLEMS = 50
@@ -46,7 +47,7 @@ class Document:
     """
 
     data: Data
-    source: Source
+    source: ScenarioText
     folder: Path = Path()
     overrides: tuple[Override, ...] = ()
     allow_outside: bool = field(default_factory=is_anywhere)
@@ -69,7 +70,7 @@ class Document:
 
         Raises ScenarioError where it is not TOML.
         """
-        source = Source(where, text.replace("\r\n", "\n"))
+        source = ScenarioText(where, text.replace("\r\n", "\n"))
         endless = ENDLESS_KEY.search(source.text)
         if endless is not None:
             raise ScenarioError([source.shown(TOO_DEEP, "", source.span_at(endless.start()))])
@@ -89,7 +90,7 @@ class Document:
     def from_mapping(cls, data: Mapping[str, object], folder: Path = Path()) -> Self:
         """Take data from Python in the form of a file; raises ScenarioError where it is nested too deeply."""
         try:
-            return cls(cast("Data", frozen(data)), Source("scenario"), folder)
+            return cls(cast("Data", frozen(data)), ScenarioText("scenario"), folder)
         except TooDeepError:
             raise _unusable("scenario", TOO_DEEP) from None
 
@@ -152,6 +153,71 @@ class Document:
         """Return True if the table in which something is missing is not in the text but was created from outside."""
         table = finding.path[:-1]
         return bool(table) and table not in self.source.places and override.path[: len(table)] == table
+
+
+Source = Path | str | Mapping[str, object] | Scenario | Document
+"""What a scenario can be loaded from."""
+
+
+def load_stored(path: Path | str) -> Scenario:
+    """Read and check a scenario in a folder of results, which may come from somebody else: no link is followed.
+
+    Raises as `load_scenario`, and InvalidInputError for a link.
+    """
+    return Document.read(path, is_stored=True).build()
+
+
+def load_scenario(
+    source: Source,
+    overrides: Mapping[str, object] | Sequence[str] = (),
+    *,
+    allow_outside: bool = False,
+) -> Scenario:
+    """Read and check a scenario: a file, nested dictionaries in the form of the file, or an existing scenario.
+
+    `overrides` are "key=value" texts as given to --set, or dotted keys with Python values. Tables that the file names
+    must lie below its folder or below the current one, unless `allow_outside` is given or an override names them.
+    Raises ScenarioError with all mistakes together, and InputMissingError where the file itself cannot be read.
+    """
+    document = _reaching(document_of(source), allow_outside=allow_outside)
+    if isinstance(overrides, Mapping):
+        return document.with_values({key: said_by_hand(key, value) for key, value in overrides.items()}).build()
+    return document.with_settings(overrides).build()
+
+
+def scenario_from_mapping(
+    data: Mapping[str, object], base_folder: Path = Path(), *, allow_outside: bool = False
+) -> Scenario:
+    """Check a scenario given as nested dicts and lists in the form of the file; raises ScenarioError.
+
+    Tables as in `load_scenario`.
+    """
+    return _reaching(Document.from_mapping(data, base_folder), allow_outside=allow_outside).build()
+
+
+def replace_values(scenario: Scenario, changes: Mapping[str, object]) -> Scenario:
+    """Return a scenario with some keys changed, validated as a file would be.
+
+    `changes` are dotted keys with Python values or strings with a unit: {"ground.tilt": "10 deg"}. The given
+    scenario is unchanged. Raises ScenarioError with all mistakes together.
+    """
+    return document_of(scenario).with_values({key: said_by_hand(key, value) for key, value in changes.items()}).build()
+
+
+def document_of(source: Source) -> Document:
+    """Return the document of a file, of nested dictionaries, or of a scenario.
+
+    Tables of an existing scenario may lie anywhere. Raises what reading raises.
+    """
+    if isinstance(source, Document):
+        return source
+    if isinstance(source, Scenario):
+        return replace(Document.parse(scenario_to_toml(source), source.name), allow_outside=True)
+    return Document.from_mapping(source) if isinstance(source, Mapping) else Document.read(source)
+
+
+def _reaching(document: Document, *, allow_outside: bool) -> Document:
+    return replace(document, allow_outside=True) if allow_outside else document
 
 
 def _pair(key: str, value: object) -> Pair:

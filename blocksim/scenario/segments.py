@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario.models.boundary import Wall
+from blocksim.scenario.models.geometry import Wall
 from blocksim.scenario.models.scenario import Scenario
 
 ENDLESS = 1e5

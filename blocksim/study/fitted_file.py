@@ -17,8 +17,8 @@ import tomli_w
 from blocksim.errors import BlocksimError
 from blocksim.scenario import Document, Scenario, scenario_hash, scenario_to_toml
 from blocksim.scenario.keys import KeyPath, follow, format_key
-from blocksim.scenario.locate import Place, Span, locate
 from blocksim.scenario.overrides import with_value
+from blocksim.scenario.source import Place, Span, locate
 
 TABLES: tuple[KeyPath, ...] = (("experiment", "table"), ("motion", "table"), ("sweep", "table"))
 """Keys whose values are paths, relative to the scenario's folder."""

@@ -1,20 +1,20 @@
-"""The whole scenario."""
+"""The whole scenario, and its JSON Schema."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table
-from blocksim.scenario.models.boundary import Ground, Wall
 from blocksim.scenario.models.contact import Contact, Friction, Pair
-from blocksim.scenario.models.geometry import Block, BodySpec, Material
+from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
 from blocksim.scenario.models.motion import AnyMotion
 from blocksim.scenario.models.stepping import AnyTime, Explicit, Output
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure
 
 SCHEMA_VERSION = 1
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 class Scenario(Table):
@@ -57,3 +57,8 @@ class Scenario(Table):
         if self.bodies:
             parts.append(f"{len(self.bodies)} single {'body' if len(self.bodies) == 1 else 'bodies'}")
         return f"<Scenario {self.name}: {', '.join(parts)}; scheme {self.time.scheme}>"
+
+
+def json_schema() -> dict[str, Any]:
+    """Describe the file for editors and other programs: quantities as SI numbers or as strings with a unit."""
+    return {"$schema": DIALECT, **Scenario.model_json_schema(by_alias=True, mode="validation")}

@@ -12,9 +12,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from blocksim.scenario.keys import options
-from blocksim.scenario.models.boundary import Ground, Wall
 from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
-from blocksim.scenario.models.geometry import Block, BodySpec, Material
+from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
 from blocksim.scenario.models.motion import MOTIONS
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES, Output, Time

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario.keys import KeyPath
-from blocksim.scenario.locate import Span, locate
+from blocksim.scenario.source import Span, locate
 
 TEXT = '''\
 # comment with [brackets] and = signs
