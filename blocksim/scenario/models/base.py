@@ -1,12 +1,14 @@
 """Common base of all tables of a scenario, and field types that are not quantities."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetCoreSchemaHandler
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
+from blocksim.scenario.path_policy import OutOfReachError, table_in
 from blocksim.scenario.quantities import invalid, shown
 from blocksim.scenario.spelling import nearest
 
@@ -52,16 +54,40 @@ class OneOf:
         return core_schema.no_info_before_validator_function(self.read, handler(source))
 
 
-def whole(least: int, most: int) -> Callable[[object], object]:
-    """Return a check that a value is a whole number in a range."""
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """Annotation of a whole number in a range."""
 
-    def check(value: object) -> object:
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            message = f"{shown(value)} is not a whole number from {least} to {most}"
+    least: int
+    most: int
+
+    def read(self, value: object) -> object:
+        """Pass a whole number in the range; raises a pydantic error."""
+        if isinstance(value, bool) or not isinstance(value, int) or not self.least <= value <= self.most:
+            message = f"{shown(value)} is not a whole number from {self.least} to {self.most}"
             raise invalid(message)
         return value
 
-    return check
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Check the range first, then let pydantic see the number."""
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Describe the range to editors."""
+        return {**handler(schema), "minimum": self.least, "maximum": self.most}
+
+
+def table_path(value: object, folder: Path | str | None, example: str) -> Path:
+    """Return the file that a key names, found from a folder, or unchecked without one; raises a pydantic error."""
+    if not isinstance(value, str) or not value or "\0" in value:
+        message = f"{shown(value)} is not the path of a table, such as {shown(example)}"
+        raise invalid(message)
+    if folder is None:
+        return Path(value)
+    try:
+        return table_in(folder, value)
+    except OutOfReachError as error:
+        raise invalid(str(error)) from None
 
 
 def _identifier(value: object) -> object:

@@ -23,8 +23,7 @@ from blocksim.errors import BlocksimError
 from blocksim.scenario import quantities as q
 from blocksim.scenario.bounded_read import read_limited
 from blocksim.scenario.csv_table import bare_rows
-from blocksim.scenario.models.base import Table
-from blocksim.scenario.path_policy import OutOfReachError, table_in
+from blocksim.scenario.models.base import Table, table_path
 
 PIECES_PER_CYCLE = 200
 """The cubic pieces are then off by less than (2 pi/200)^4/384 = 3e-9 of the amplitude."""
@@ -167,13 +166,7 @@ def _table(value: object, info: ValidationInfo) -> MotionTable:
     """Read the table; its path is relative to the scenario's folder, which is the validation context."""
     if isinstance(value, MotionTable):
         return value
-    if not isinstance(value, str) or not value or "\0" in value:
-        message = f'{q.shown(value)} is not the path of a table, such as "shaking.csv"'
-        raise q.invalid(message)
-    try:
-        path = table_in((info.context or {}).get("folder", ""), value)
-    except OutOfReachError as error:
-        raise q.invalid(str(error)) from None
+    path = table_path(value, (info.context or {}).get("folder", ""), "shaking.csv")
     try:
         return read_motion_table(path)
     except MotionTableError as error:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import OneOf, Table, whole
+from blocksim.scenario.models.base import OneOf, Table, Whole
 from blocksim.scenario.spelling import nearest
 
 Scheme = Literal["explicit", "nonsmooth"]
@@ -61,19 +61,17 @@ class Nonsmooth(Time):
     """Impulses between rigid blocks, Newton's restitution and Coulomb's friction; a hundred times longer steps."""
 
     scheme: Annotated[Literal["nonsmooth"], _WORDS] = Field(description="the scheme of this table")
-    substeps: Annotated[
-        int,
-        BeforeValidator(whole(1, MOST_SUBSTEPS)),
-        Field(json_schema_extra={"minimum": 1, "maximum": MOST_SUBSTEPS}),
-    ] = Field(default=4, description="substeps; contacts are detected once per step and solved in every substep")
+    substeps: Annotated[int, Whole(1, MOST_SUBSTEPS)] = Field(
+        default=4, description="substeps; contacts are detected once per step and solved in every substep"
+    )
     velocity_tolerance: Annotated[float, _TOLERANCE] | None = Field(
         default=None,
         description="largest change of velocity by one impulse at which a substep counts as solved (default: 1 mm/s, "
         "100 mm/s from 100 blocks on)",
     )
-    velocity_sweeps: Annotated[
-        int, BeforeValidator(whole(1, MOST_SWEEPS)), Field(json_schema_extra={"minimum": 1, "maximum": MOST_SWEEPS})
-    ] = Field(default=1000, description="maximum number of iterations over all contacts per substep")
+    velocity_sweeps: Annotated[int, Whole(1, MOST_SWEEPS)] = Field(
+        default=1000, description="maximum number of iterations over all contacts per substep"
+    )
     restitution_threshold: q.NonNegativeSpeed = Field(
         default=0.01, description="approach speed below which impacts do not rebound"
     )

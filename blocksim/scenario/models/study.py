@@ -19,9 +19,8 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import OneOf, Table, whole
+from blocksim.scenario.models.base import OneOf, Table, Whole, table_path
 from blocksim.scenario.models.variation import VALUES_SCHEMA, Variation, read_any, read_sampled, read_spread
-from blocksim.scenario.path_policy import OutOfReachError, table_in
 from blocksim.scenario.spelling import nearest
 
 MAX_SAMPLES = 1_000_000
@@ -38,15 +37,8 @@ def _existing_table(value: object, info: ValidationInfo) -> object:
     """Resolve the path against the scenario's folder, which is the validation context, and look for it."""
     if isinstance(value, Path):
         return value
-    if not isinstance(value, str) or not value or "\0" in value:
-        message = f'{q.shown(value)} is not the path of a table, such as "experiments/three_blocks.csv"'
-        raise q.invalid(message)
-    if info.context is None:
-        return Path(value)
-    try:
-        return table_in(info.context["folder"], value)
-    except OutOfReachError as error:
-        raise q.invalid(str(error)) from None
+    folder = None if info.context is None else info.context["folder"]
+    return table_path(value, folder, "experiments/three_blocks.csv")
 
 
 TablePath = Annotated[Path, BeforeValidator(_existing_table), WithJsonSchema({"type": "string", "minLength": 1})]
@@ -107,20 +99,12 @@ class Sweep(Table):
         description="grid: every combination; list: all first values, all second values …; table: rows of a file; "
         "lhs: Latin hypercube; sobol: scrambled Sobol points; normal: independent random draws",
     )
-    samples: Annotated[
-        int,
-        BeforeValidator(whole(1, MAX_SAMPLES)),
-        BeforeValidator(_of_the_mode),
-        Field(json_schema_extra={"minimum": 1, "maximum": MAX_SAMPLES}),
-    ] = Field(
+    samples: Annotated[int, Whole(1, MAX_SAMPLES), BeforeValidator(_of_the_mode)] = Field(
         default=128, description="number of cases to draw (lhs, sobol, normal; sobol is balanced at powers of two)"
     )
-    seed: Annotated[
-        int,
-        BeforeValidator(whole(0, MAX_SEED)),
-        BeforeValidator(_of_the_mode),
-        Field(json_schema_extra={"minimum": 0, "maximum": MAX_SEED}),
-    ] = Field(default=0, description="random seed (lhs, sobol, normal)")
+    seed: Annotated[int, Whole(0, MAX_SEED), BeforeValidator(_of_the_mode)] = Field(
+        default=0, description="random seed (lhs, sobol, normal)"
+    )
     table: Annotated[TablePath | None, BeforeValidator(_of_the_mode)] = Field(
         default=None,
         description="CSV table of cases, relative to the scenario file: one column per key, units as in `overlap [mm]`",

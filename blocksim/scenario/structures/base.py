@@ -6,10 +6,10 @@ from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import Table, whole
+from blocksim.scenario.models.base import Table, Whole
 from blocksim.scenario.models.geometry import Block
 
 MAX_COUNT = 100_000
@@ -19,12 +19,8 @@ MAX_BLOCKS = 1_000_000
 MAX_SEED = 2**32 - 1
 
 Floats = NDArray[np.float64]
-
-
-Count = Annotated[
-    int, BeforeValidator(whole(1, MAX_COUNT)), Field(json_schema_extra={"minimum": 1, "maximum": MAX_COUNT})
-]
-Seed = Annotated[int, BeforeValidator(whole(0, MAX_SEED)), Field(json_schema_extra={"minimum": 0, "maximum": MAX_SEED})]
+Count = Annotated[int, Whole(1, MAX_COUNT)]
+Seed = Annotated[int, Whole(0, MAX_SEED)]
 
 
 class Pose(NamedTuple):
