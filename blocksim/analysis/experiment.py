@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from blocksim.analysis.units import unit_factor
 from blocksim.errors import InvalidInputError
-from blocksim.scenario.csv_table import Cell, Table, raise_problems, read_table, suggestion
+from blocksim.scenario.csv_table import Cell, Table, raise_problems, read_table
+from blocksim.scenario.spelling import suggestion
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 from blocksim.analysis.units import unit_factor
-from blocksim.scenario.csv_table import Cell, Table, raise_problems, read_table, suggestion
+from blocksim.scenario.csv_table import Cell, Table, raise_problems, read_table
+from blocksim.scenario.spelling import suggestion
 
 COLUMNS = ("property", "unit", "value")
 

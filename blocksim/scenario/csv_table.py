@@ -13,6 +13,7 @@ from typing import NoReturn
 
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
 from blocksim.scenario.bounded_read import is_folder, read_head
+from blocksim.scenario.spelling import suggestion
 
 LARGEST_FILE = 1_000_000  # bytes
 LONGEST_LINE = 1_000  # characters
@@ -156,12 +157,6 @@ def raise_problems(problems: Sequence[Problem]) -> NoReturn:
     if len(by_line) > len(shown):
         shown.append(f"... and {len(by_line) - len(shown)} more problems")
     raise InvalidInputError("\n".join(shown))
-
-
-def suggestion(found: str, allowed: Sequence[str]) -> str:
-    """Return the word that was probably meant, or the allowed ones."""
-    close = difflib.get_close_matches(found.lower(), allowed, n=1)
-    return f"did you mean '{close[0]}'?" if close else "allowed: " + ", ".join(allowed)
 
 
 def _lines(path: Path, limit: int = LARGEST_FILE) -> list[Line]:

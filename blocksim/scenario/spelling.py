@@ -1,7 +1,7 @@
 """Known words that a misspelt one may mean."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import islice
 
 MIN_BEGINNING = 3
@@ -58,3 +58,9 @@ def similar_word(word: str, known: Iterable[str]) -> str | None:
     if alike:
         return min(alike, key=lambda other: abs(len(other) - len(word)))
     return next(iter(difflib.get_close_matches(word.lower(), known, n=1)), None)
+
+
+def suggestion(found: str, allowed: Sequence[str]) -> str:
+    """Return the word that was probably meant, or the allowed ones."""
+    close = difflib.get_close_matches(found.lower(), allowed, n=1)
+    return f"did you mean '{close[0]}'?" if close else "allowed: " + ", ".join(allowed)
