@@ -13,7 +13,7 @@ from blocksim.scenario.findings import MAX_FINDINGS, Finding, findings_of
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.study import OWN_KEYS, Mode, Sweep
 from blocksim.scenario.models.variation import Normal, Uniform
-from blocksim.scenario.overrides import TWINS, Data, UnfitOverrideError, with_value
+from blocksim.scenario.overrides import SYNONYMS, Data, UnfitOverrideError, with_value
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.start import impossible_starts
 
@@ -63,12 +63,11 @@ def _sweep(data: Data, folder: Path) -> Iterator[Finding]:
     if len(sweep) > MAX_VARIED:
         yield Finding(("sweep",), f"{len(sweep)} keys are too many; at most {MAX_VARIED} can be varied", at="key")
         return
-    bare = {key: entry for key, entry in data.items() if key not in ("sweep", "experiment")}
-    before = _single_mistakes(bare, folder)
+    trial = _trial(data, folder)
     mode = {"mode": sweep["mode"]} if sweep.get("mode") in MODES else {}
     for key, values in sweep.items():
         if key not in OWN_KEYS and _is_variation({**mode, key: values}):
-            yield from islice(_varied(Trial(bare, folder, before), str(key), values), 1)
+            yield from islice(_varied(trial, str(key), values), 1)
     yield from _varied_twice(sweep)
 
 
@@ -76,9 +75,9 @@ def _varied_twice(sweep: Data) -> Iterator[Finding]:
     """Find keys that are varied together with the other way to write the same thing."""
     for key in sweep:
         table, dot, word = str(key).rpartition(".")
-        twin = f"{table}{dot}{TWINS.get(word, word)}"
-        if word == "kinetic_ratio" and twin in sweep:
-            message = f"{twin}, which means the same, is varied too; keep one of the two"
+        synonym = f"{table}{dot}{SYNONYMS.get(word, word)}"
+        if word == "kinetic_ratio" and synonym in sweep:
+            message = f"{synonym}, which means the same, is varied too; keep one of the two"
             yield Finding(("sweep", key), message, at="key")
 
 
@@ -121,9 +120,12 @@ def _given(values: object) -> Iterator[tuple[str | int, object]]:
 
 def mistakes_of_value(data: Data, folder: Path, key: str, value: object) -> list[Finding]:
     """List the mistakes in one value of one key by itself, in data that may have a sweep."""
-    bare = {name: entry for name, entry in data.items() if name not in ("sweep", "experiment")}
-    trial = Trial(bare, folder, _single_mistakes(bare, folder))
-    return list(_tried(trial, keys.parse_key(key), value, ("sweep", key)))
+    return list(_tried(_trial(data, folder), keys.parse_key(key), value, ("sweep", key)))
+
+
+def _trial(data: Data, folder: Path) -> Trial:
+    bare = {key: entry for key, entry in data.items() if key not in ("sweep", "experiment")}
+    return Trial(bare, folder, _single_mistakes(bare, folder))
 
 
 def _tried(trial: Trial, path: keys.KeyPath, value: object, place: keys.KeyPath) -> Iterator[Finding]:

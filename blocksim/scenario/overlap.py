@@ -51,7 +51,7 @@ class Rectangles(NamedTuple):
         """Take some of them, in this order."""
         return type(self)(*(values[indices] for values in self))
 
-    def reach(self, axis_x: Floats | float, axis_y: Floats | float) -> Floats:
+    def half_extent(self, axis_x: Floats | float, axis_y: Floats | float) -> Floats:
         """Half of the extents along unit vectors."""
         along = np.abs(axis_x * self.cosine + axis_y * self.sine)
         across = np.abs(axis_y * self.cosine - axis_x * self.sine)
@@ -60,7 +60,7 @@ class Rectangles(NamedTuple):
     @property
     def bottom(self) -> Floats:
         """Heights of the lowest corners."""
-        return self.y - self.reach(0.0, 1.0)
+        return self.y - self.half_extent(0.0, 1.0)
 
 
 def _column(bodies: Sequence[PlacedBody], value: Callable[[PlacedBody], float]) -> Floats:
@@ -71,7 +71,7 @@ def penetration(ones: Rectangles, others: Rectangles) -> Floats:
     """Return the penetration depths (m) of pairs of rectangles; zero or negative where they are apart."""
     x, y = others.x - ones.x, others.y - ones.y
     axes = [axis for r in (ones, others) for axis in ((r.cosine, r.sine), (-r.sine, r.cosine))]
-    depths = [ones.reach(*axis) + others.reach(*axis) - np.abs(x * axis[0] + y * axis[1]) for axis in axes]
+    depths = [ones.half_extent(*axis) + others.half_extent(*axis) - np.abs(x * axis[0] + y * axis[1]) for axis in axes]
     least: Floats = np.min(depths, axis=0)
     return least
 
@@ -118,26 +118,26 @@ def near_pairs(rectangles: Rectangles) -> Iterator[Pairs]:
     would share one cell, so every size (from one power of two to the next) has cells of its own, in which the boxes of
     that size meet one another and all smaller ones.
     """
-    reach_x, reach_y = rectangles.reach(1.0, 0.0), rectangles.reach(0.0, 1.0)
+    extent_x, extent_y = rectangles.half_extent(1.0, 0.0), rectangles.half_extent(0.0, 1.0)
     x, y = rectangles.x, rectangles.y
-    boxes = _Boxes(x - reach_x, y - reach_y, x + reach_x, y + reach_y)
+    boxes = _Boxes(x - extent_x, y - extent_y, x + extent_x, y + extent_y)
     if x.size <= FEW:
         one, other = np.triu_indices(x.size, 1)
-        near = _meet(boxes, one, other)
+        near = _intersect(boxes, one, other)
         yield one[near], other[near]
         return
-    level = np.frexp(np.maximum(reach_x, reach_y))[1]
+    level = np.frexp(np.maximum(extent_x, extent_y))[1]
     for size in np.unique(level):
         members = np.flatnonzero(level <= size)
         is_small = level[members] < size
-        cell = (_cell(reach_x[members]), _cell(reach_y[members]))
+        cell = (_cell(extent_x[members]), _cell(extent_y[members]))
         for one, other in _in_cells(_Boxes(*(side[members] for side in boxes)), is_small, cell):
             yield members[one], members[other]
 
 
-def _cell(reach: Floats) -> float:
+def _cell(half_extent: Floats) -> float:
     """Return the side (m) of cells of which no box touches three: a little more than the largest box."""
-    return 2.0 * ROOM * float(reach.max()) or 1.0
+    return 2.0 * ROOM * float(half_extent.max()) or 1.0
 
 
 def _in_cells(boxes: _Boxes, is_small: NDArray[np.bool_], cell: tuple[float, float]) -> Iterator[Pairs]:
@@ -156,11 +156,11 @@ def _in_cells(boxes: _Boxes, is_small: NDArray[np.bool_], cell: tuple[float, flo
         i, j = box[one], box[other]
         # a pair may meet in several cells; it counts in that of the lower left corner of what it has in common
         is_first = (np.maximum(low[0][i], low[0][j]) == column[one]) & (np.maximum(low[1][i], low[1][j]) == row[one])
-        near = is_first & _meet(boxes, i, j)
+        near = is_first & _intersect(boxes, i, j)
         yield i[near], j[near]
 
 
-def _meet(boxes: _Boxes, i: Integers, j: Integers) -> NDArray[np.bool_]:
+def _intersect(boxes: _Boxes, i: Integers, j: Integers) -> NDArray[np.bool_]:
     """Return for each two boxes whether they touch or overlap."""
     along = (boxes.low_x[i] <= boxes.high_x[j]) & (boxes.low_x[j] <= boxes.high_x[i])
     across = (boxes.low_y[i] <= boxes.high_y[j]) & (boxes.low_y[j] <= boxes.high_y[i])

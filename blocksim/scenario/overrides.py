@@ -14,7 +14,7 @@ from blocksim.scenario.spelling import did_you_mean_or_list
 Data = Mapping[str, object]
 
 MAX_DEPTH = 16
-TWINS = {"kinetic": "kinetic_ratio", "kinetic_ratio": "kinetic"}
+SYNONYMS = {"kinetic": "kinetic_ratio", "kinetic_ratio": "kinetic"}
 """Two keys with the same meaning; setting one removes the other."""
 _NAMED = (("materials",), ("blocks",))
 _FRICTION = Friction()
@@ -158,15 +158,15 @@ def _put(node: object, parts: Sequence[str | int], value: object, done: list[str
         raise UnfitOverrideError(message)
     done.append(part)
     return {
-        **_without_twin(node, part),
+        **_without_synonym(node, part),
         part: _put(_opened(tuple(done), child) if len(parts) > 1 else child, parts[1:], value, done),
     }
 
 
-def _without_twin(node: Data, part: str) -> Data:
+def _without_synonym(node: Data, part: str) -> Data:
     """Leave out the other way to write what is going to be set."""
-    twin = TWINS.get(part)
-    return {key: entry for key, entry in node.items() if key != twin} if twin in node else node
+    synonym = SYNONYMS.get(part)
+    return {key: entry for key, entry in node.items() if key != synonym} if synonym in node else node
 
 
 def _index(entries: Sequence[object], part: str | int, done: Sequence[str | int]) -> int:
