@@ -16,6 +16,8 @@ from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import read_summary
 from blocksim.study.rows import FINISHED, TABLE
 
+MOST_FOLDERS = 5  # named in a message
+
 
 def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Path:
     """Return the run folder meant by a run folder, by `results/<name>` (newest finished run) or by a scenario file.
@@ -53,10 +55,28 @@ def _run_in(place: Path, needed: Sequence[str]) -> Path:
     newest = files.newest_finished(place)
     if newest is not None:
         return newest
-    sweep = next((entry for entry in sorted(place.iterdir()) if (entry / TABLE).is_file()), None)
-    found = f"but a sweep: {sweep}" if sweep is not None else "blocksim run SCENARIO makes one"
-    message = f"{place}: no finished run in this folder{', ' if sweep is not None else '; '}{found}"
+    message = f"{place}: {_instead(place)}"
     raise InputMissingError(message)
+
+
+def _instead(place: Path) -> str:
+    """Say what a folder without a finished run holds instead."""
+    if (place / TABLE).is_file():
+        return (
+            "this is a sweep, not a run; blocksim plot draws it, sweep --keep-cases keeps a run folder for every case"
+        )
+    begun = [path.parent for path in sorted(place.glob(f"*/{files.FRAMES}"))]
+    sweeps = [path.parent for path in sorted(place.glob(f"*/{TABLE}"))]
+    below = sorted({path.parents[1] for path in place.glob(f"*/*/{files.DONE}")})
+    for found, told in ((begun, "but an unfinished run"), (sweeps, "but a sweep"), (below, "but runs of scenarios")):
+        if found:
+            return f"no finished run in this folder, {told}: {_listed(found)}"
+    return "no finished run in this folder; blocksim run SCENARIO makes one"
+
+
+def _listed(folders: Sequence[Path]) -> str:
+    more = len(folders) - MOST_FOLDERS
+    return ", ".join(map(str, folders[:MOST_FOLDERS])) + (f" and {more} more" if more > 0 else "")
 
 
 @dataclass(frozen=True)

@@ -143,6 +143,27 @@ def test_folder_that_holds_a_sweep_only_names_the_sweep(tmp_path: Path) -> None:
         find_run(tmp_path)
 
 
+def test_folder_above_results_names_those_that_hold_runs(tmp_path: Path) -> None:
+    for name in ("quay", "wall"):
+        (tmp_path / name / "a1").mkdir(parents=True)
+        (tmp_path / name / "a1" / "done.json").touch()
+    with pytest.raises(InputMissingError, match=r"no finished run in this folder, but runs .*: .*/quay, .*/wall$"):
+        find_run(tmp_path)
+
+
+def test_folder_whose_only_run_was_stopped_names_that_run(tmp_path: Path) -> None:
+    (tmp_path / "a1").mkdir()
+    (tmp_path / "a1" / "run.h5").touch()
+    with pytest.raises(InputMissingError, match=r"no finished run in this folder, but an unfinished run: .*/a1$"):
+        find_run(tmp_path)
+
+
+def test_sweep_in_place_of_a_run_is_called_a_sweep(tmp_path: Path) -> None:
+    (tmp_path / "sweep.csv").touch()
+    with pytest.raises(InputMissingError, match="this is a sweep, not a run"):
+        find_run(tmp_path)
+
+
 def test_folder_without_a_run_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputMissingError, match="no finished run in this folder"):
         find_run(tmp_path)
