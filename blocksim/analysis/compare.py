@@ -105,7 +105,7 @@ def compare_final(final: "pd.DataFrame | Mapping[str, Sequence[Any]]", table: Ex
     """Compare a run's final table or its columns (`block`, `x_mm`, `rotation_deg`, ...) with the measured repeats.
 
     Raises InvalidInputError when the final table lacks a measured block or quantity, or names a block twice.
-    A block that was not measured has rows with the verdict "no data" and a message.
+    A block that was not measured has rows with the verdict "no data"; a message names all of them.
     """
     simulated = _simulated(final, table)
     measured = {(row.block, row.quantity): row for row in table.summaries()}
@@ -114,9 +114,8 @@ def compare_final(final: "pd.DataFrame | Mapping[str, Sequence[Any]]", table: Ex
         for block, values in simulated.items()
         for quantity, value in values.items()
     ]
-    unmeasured = [block for block in simulated if block not in table.blocks]
-    messages = [f"block '{block}' is not in {table.source}; it is not compared" for block in unmeasured]
-    return Comparison(rows=tuple(rows), source=table.source, messages=(*table.messages, *messages))
+    messages = (*table.messages, *table.unmeasured(list(simulated)))
+    return Comparison(rows=tuple(rows), source=table.source, messages=messages)
 
 
 def limits(quantity: str, mean: float, minimum: float, maximum: float) -> tuple[float, float]:

@@ -121,6 +121,13 @@ class ExperimentTable:
             message = f"{self.source} measures block {quoted(unknown)}, {known}"
             raise InvalidInputError(message)
 
+    def unmeasured(self, blocks: Sequence[str]) -> tuple[str, ...]:
+        """Return a message that names those of `blocks` that are not in the table; none where all are."""
+        names = [block for block in blocks if block not in self.blocks]
+        if len(names) > 1:
+            return (f"blocks {quoted(names)} are not in {self.source}; they are not compared",)
+        return tuple(f"block '{name}' is not in {self.source}; it is not compared" for name in names)
+
     def values(self, block: str, quantity: str) -> "pd.Series":
         """Return the repeats (mm or deg) of one quantity of one block by replicate; empty if unmeasured."""
         data = self.data

@@ -92,8 +92,6 @@ def judge(
     settings = settings or Settings()
     table.refuse_unknown(members.blocks, "the sweep")
     evidence = Evidence(members, table, settings.u_num)
-    unmeasured = [block for block in members.blocks if block not in table.blocks]
-    told = [f"block '{block}' is not in {table.source}; it is not compared" for block in unmeasured]
     return Judgement(
         sweep=members.source,
         source=table.source,
@@ -102,7 +100,7 @@ def judge(
         failures=members.failures,
         settings=settings,
         findings={name: metric.find(evidence) for name, metric in METRICS.items()},
-        messages=(*messages, *table.messages, *told, *_incomplete(evidence)),
+        messages=(*messages, *table.messages, *table.unmeasured(members.blocks), *_incomplete(evidence)),
     )
 
 

@@ -108,6 +108,13 @@ def test_an_unmeasured_block_is_named_and_not_judged() -> None:
     assert comparison.messages == (f"block '4' is not in {TABLE.source}; it is not compared",)
 
 
+def test_many_unmeasured_blocks_are_named_in_one_message() -> None:
+    final = final_table(x=(16.0, 74.0, 131.0, *[500.0] * 12), rotation=(0.0, -90.0, -90.0, *[0.0] * 12))
+    (message,) = compare_final(final, TABLE).messages
+    assert message.startswith("blocks '4', '5', ")
+    assert message.endswith(f"and 4 more are not in {TABLE.source}; they are not compared")
+
+
 def test_a_block_that_the_run_lacks_is_an_error() -> None:
     with pytest.raises(InvalidInputError) as caught:
         compare_final(final_table(x=(16.0, 74.0), rotation=(0.0, -90.0)), TABLE)

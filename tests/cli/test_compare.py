@@ -11,8 +11,11 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from blocksim.analysis.compare import compare_final
+from blocksim.analysis.experiment import ExperimentTable, Measurement
 from blocksim.analysis.metrics import METRICS
 from blocksim.analysis.metrics.metric import BLOCK
+from blocksim.cli.verdict import verdict_lines
 from tests.cli.conftest import SOFT, Command
 
 TABLE = "scenarios/experiments/three_blocks.csv"
@@ -42,6 +45,22 @@ def test_table_is_not_wider_than_80_columns(blocksim: Command, finished: Path) -
     assert len(table) == 2 + 6 + 1
 
 
+def test_metre_sized_blocks_fit_80_columns_uncut(blocksim: Command, finished: Path, tmp_path: Path) -> None:
+    rows = "3,x,mm,1,3500\n3,x,mm,2,3900\n2,rotation,deg,1,180\n2,rotation,deg,2,180\n"
+    (tmp_path / "far.csv").write_text(f"block,quantity,unit,replicate,value\n{rows}")
+    answer = blocksim("compare", finished, "--experiment", "far.csv", "--quiet")
+    table = answer.out.splitlines()[:6]
+    assert max(map(len, table)) <= 80
+    assert "rotation °" in answer.out
+
+
+def test_hair_outside_is_not_outside_by_nothing() -> None:
+    repeats = tuple(Measurement("1", "x", "mm", number, value) for number, value in enumerate((5.0, 6.0), 1))
+    table = ExperimentTable(repeats, source="made up")
+    comparison = compare_final({"block": ["1"], "x_mm": [6.000001]}, table)
+    assert verdict_lines(comparison) == ["outside: x of block 1 by less than 0.01 mm"]
+
+
 def test_several_runs_are_judged_together(blocksim: Command, finished: Path) -> None:
     answer = blocksim("compare", finished, finished)
     assert answer.code == 1
@@ -62,7 +81,8 @@ def test_other_table_can_be_given(blocksim: Command, finished: Path, tmp_path: P
     (tmp_path / "wide.csv").write_text("block,quantity,unit,replicate,value\n2,x,mm,1,0\n2,x,mm,2,1000\n")
     answer = blocksim("compare", finished, "--experiment", "wide.csv")
     assert answer.code == 0
-    assert "block '1' is not in wide.csv; it is not compared" in answer.out
+    assert "blocks '1', '3' are not in wide.csv; they are not compared" in answer.out
+    assert [line.split()[0] for line in answer.out.splitlines()[3:5]] == ["2", "blocks"]  # no rows without a number
 
 
 @pytest.mark.parametrize(
