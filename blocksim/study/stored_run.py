@@ -86,13 +86,14 @@ class StoredRun:
     folder: Path
     scenario: Scenario
     frames: Frames
+    choice: str = ""
 
     @cached_property
     def remark(self) -> str:
-        """What somebody who examines the frames has to know; empty for a finished run."""
+        """What somebody who examines the frames has to know; empty for a finished run that was meant for certain."""
         state = _state(self.folder)
         if not state:
-            return ""
+            return self.choice
         return f"{self.folder}: {state}; its {len(self.frames)} frames end at {float(self.frames.time[-1]):.4g} s"
 
 
@@ -103,7 +104,13 @@ def stored_run(place: Path | str) -> StoredRun:
     """
     folder = find_run(place, needed=(files.SCENARIO, files.FRAMES))
     scenario = load_stored(folder / files.SCENARIO)
-    return StoredRun(folder, scenario, read_frames(folder / files.FRAMES, scenario))
+    return StoredRun(folder, scenario, read_frames(folder / files.FRAMES, scenario), _choice(Path(place), folder))
+
+
+def _choice(place: Path, folder: Path) -> str:
+    """Say which run was taken where a folder holds several; changed by --set, they have the same name."""
+    count = sum(1 for _ in place.glob(f"*/{files.DONE}")) if place.is_dir() and place != folder else 0
+    return f"{place}: the newest of {count} runs is taken: {folder}" if count > 1 else ""
 
 
 def _state(folder: Path) -> str:

@@ -1,6 +1,8 @@
 """Runs as they lie on the disk."""
 
 import json
+import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -26,6 +28,14 @@ def test_a_finished_run_needs_no_remark(folder: Path) -> None:
     assert stored.remark == ""
     assert stored.scenario.name == "bounce"
     assert len(stored.frames) == 5
+
+
+def test_newest_of_several_runs_is_named(folder: Path) -> None:
+    assert stored_run(folder.parent).remark == ""
+    shutil.copytree(folder, folder.parent / "older")
+    os.utime(folder.parent / "older" / "done.json", (0.0, 0.0))
+    assert stored_run(folder.parent).remark == f"{folder.parent}: the newest of 2 runs is taken: {folder}"
+    assert stored_run(folder).remark == ""
 
 
 def test_what_did_not_finish_is_reported(folder: Path) -> None:
