@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 import h5py
 
-from blocksim.errors import BlocksimError, OutputExistsError
+from blocksim.errors import BlocksimError, OutputError, OutputExistsError
 from blocksim.scenario.bounded_read import MEGABYTE, open_regular
 from blocksim.simulation.stores.hdf5_open import DAMAGE
 
@@ -37,9 +37,10 @@ IsOwn = Callable[[BinaryIO], bool]
 def refuse_foreign(path: Path, is_own: IsOwn, *, overwrite: bool = False) -> None:
     """Raise OutputExistsError where something is in the way of a file: one of others, unless `overwrite`, or no file.
 
-    To be called before the work begins.
+    To be called before the work begins. Raises OutputError where the folder for the file is missing.
     """
     if not (path.exists() or path.is_symlink()):
+        _refuse_missing_folder(path)
         return
     try:
         with open_regular(path, links=True) as file:
@@ -50,6 +51,12 @@ def refuse_foreign(path: Path, is_own: IsOwn, *, overwrite: bool = False) -> Non
         raise OutputExistsError(message) from None
     message = f"{path}: already exists; rerun with --overwrite"
     raise OutputExistsError(message)
+
+
+def _refuse_missing_folder(path: Path) -> None:
+    if not path.parent.exists():
+        message = f"{path}: cannot be written: there is no folder {path.parent}"
+        raise OutputError(message)
 
 
 def is_picture(file: BinaryIO) -> bool:

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from blocksim.errors import OutputExistsError
+from blocksim.errors import OutputError, OutputExistsError
 from blocksim.simulation.own_files import (
     PNG,
     REPORT,
@@ -89,6 +89,11 @@ def test_file_of_others_is_replaced_only_when_asked(tmp_path: Path, name: str) -
         with pytest.raises(OutputExistsError, match="already exists; rerun with --overwrite"):
             refuse_foreign(tmp_path / name, is_own)
         refuse_foreign(tmp_path / name, is_own, overwrite=True)
+
+
+def test_missing_folder_is_told_before_the_work_begins(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match=r"out\.gif: cannot be written: there is no folder .*/none$"):
+        refuse_foreign(tmp_path / "none" / "out.gif", is_film)
 
 
 @pytest.mark.parametrize("what", ["folder", "device", "link that leads nowhere"])
