@@ -135,7 +135,7 @@ def _moved(found: Movement) -> str:
     """Return what moved, how far and first."""
     far = f"{number(found.largest_displacement_mm)} mm (block {found.displaced_block})"
     turned = f"{number(found.largest_rotation_deg)}° (block {found.rotated_block})"
-    first = f"; first moved: block {found.first_mover} at {found.first_moved_s:.3f} s" if found.first_mover else ""
+    first = f"\nfirst moved: block {found.first_mover} at {found.first_moved_s:.3f} s" if found.first_mover else ""
     return f"{found.outcome}: largest displacement {far}, rotation {turned}{first}"
 
 
