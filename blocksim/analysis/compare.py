@@ -77,6 +77,11 @@ class Comparison:
     source: str
     messages: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """Return a line: the table and how many quantities are inside; the numbers are in `to_frame`."""
+        judged = [row.verdict for row in self.rows if row.verdict is not Verdict.NO_DATA]
+        return f"<Comparison with {self.source}: {judged.count(Verdict.INSIDE)} of {len(judged)} quantities inside>"
+
     @property
     def inside(self) -> bool:
         """Whether every quantity with data is inside; there is always at least one."""

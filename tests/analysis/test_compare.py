@@ -108,6 +108,11 @@ def test_an_unmeasured_block_is_named_and_not_judged() -> None:
     assert comparison.messages == (f"block '4' is not in {TABLE.source}; it is not compared",)
 
 
+def test_printed_comparison_is_a_line() -> None:
+    found = repr(compare_final(final_table(x=(16.0, 67.0, 131.0, 500.0), rotation=(0.0, -90.0, -90.0, 0.0)), TABLE))
+    assert found == f"<Comparison with {TABLE.source}: 5 of 6 quantities inside>"
+
+
 def test_many_unmeasured_blocks_are_named_in_one_message() -> None:
     final = final_table(x=(16.0, 74.0, 131.0, *[500.0] * 12), rotation=(0.0, -90.0, -90.0, *[0.0] * 12))
     (message,) = compare_final(final, TABLE).messages
