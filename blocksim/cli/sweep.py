@@ -30,6 +30,7 @@ MOST_MOVERS = 3
 NOT_SHOWN = {"case", "reason", "seconds"}
 OUTCOME, MOVER, MOVED, DISPLACEMENT, TURN = MOVEMENT
 SHOWN_LAST = (DISPLACEMENT, TURN, MOVER, MOVED)
+POSITION = ".x_mm"
 NOT_SHOWN_ENDS = ("rotation_deg", "y_mm", "left_mm", "right_mm")
 
 
@@ -201,10 +202,10 @@ def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
     ]
     told += [name for name in SHOWN_LAST if name in table]
     names = [name for name in told if name in short or name == "inside" or _varies(table[name])]
-    rows = [[shown(value) for value in row] for row in table[names].head(MOST_ROWS).itertuples(index=False)]
-    fitting = _fitting([short.get(name, name) for name in names], rows)
-    heads = [short.get(name, name) for name in names[:fitting]]
-    answer("\n".join(table_lines(heads, [row[:fitting] for row in rows], left=0)))
+    heads, rows, fitting = _texts(result, names, short)
+    if fitting < sum(name not in SHOWN_LAST for name in names):  # the first blocks of many may all stay where they are
+        heads, rows, fitting = _texts(result, sorted(names, key=_rank), short)
+    answer("\n".join(table_lines(heads[:fitting], [row[:fitting] for row in rows], left=0)))
     if quiet:
         return
     counts = {"row": len(table) - len(rows), "column": len(names) - fitting, "constant column": len(told) - len(names)}
@@ -218,6 +219,18 @@ def _show(result: SweepResult, short: dict[str, str], *, quiet: bool) -> None:
     if result.left:
         note(f"{result.left} cases have not been run; rerun the command to finish")
     note(f"table: {result.folder / result.name}")
+
+
+def _texts(result: SweepResult, names: list[str], short: dict[str, str]) -> tuple[list[str], list[list[str]], int]:
+    """Return heads and rows of a table of some columns, and how many of these fit on the screen."""
+    heads = [short.get(name, name) for name in names]
+    rows = [[shown(value) for value in row] for row in result.table[names].head(MOST_ROWS).itertuples(index=False)]
+    return heads, rows, _fitting(heads, rows)
+
+
+def _rank(name: str) -> tuple[bool, bool]:
+    """Return a key that sorts columns of single blocks behind others, and last what a note below the table tells."""
+    return name in (MOVER, MOVED), name.endswith(POSITION)
 
 
 def _tell_movement(result: SweepResult) -> None:

@@ -131,6 +131,14 @@ def test_many_rows_and_columns_are_cut_and_counted(blocksim: Command) -> None:
     assert "not shown: 2 rows, 16 constant columns\n" in answer.err
 
 
+def test_largest_move_comes_before_the_places_of_many_blocks(blocksim: Command) -> None:
+    answer = blocksim(
+        "sweep", "scenarios/tower.toml", *SOFT, "--set", "time.end=0.05", "--jobs", 1, "--out", "out",
+        "--vary", "ground.tilt=0 deg,-40 deg",
+    )  # fmt: skip
+    assert "outcome  displacement_mm     turn_deg   1.x_mm   2.x_mm" in answer.out.splitlines()[0]
+
+
 def test_short_keys_are_the_shortest_ends_that_differ() -> None:
     document = with_sweep(
         Document.read(SCENARIOS / "three_blocks_nominal.toml"),
