@@ -27,7 +27,7 @@ def _lines(found: Estimate, cores: int) -> list[str]:
         f"solving    at most about {duration(found.seconds / cores)} on {cores} {'core' if cores == 1 else 'cores'}",
         f"results    at most about {readable(found.bytes)}",
         f"memory     about {readable(found.memory)} for a process that runs one case",
-        f"from the steps of {found.looked_at} cases and the measured speed of a step{_until_rest(found)}",
+        f"from the steps of {found.looked_at} cases at the measured speed{_until_rest(found)}",
     ]
     if found.impossible:
         lines.append(f"{found.impossible} of these {found.looked_at} cannot be simulated; the first: {found.reason}")
@@ -36,4 +36,4 @@ def _lines(found: Estimate, cores: int) -> list[str]:
 
 def _until_rest(found: Estimate) -> str:
     """Return what makes the estimate an upper limit."""
-    return "; cases that stop at rest take less" if found.stop_at_rest else ""
+    return "; less if they stop at rest" if found.stop_at_rest else ""
