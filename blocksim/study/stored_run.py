@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from blocksim.errors import BlocksimError, InputMissingError
+from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, load_stored
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
@@ -22,7 +22,8 @@ MOST_FOLDERS = 5  # named in a message
 def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Path:
     """Return the run folder meant by a run folder, by `results/<name>` (newest finished run) or by a scenario file.
 
-    A folder counts as a run when it has all `needed` files. Raises InputMissingError with the command that helps.
+    A folder counts as a run when it has all `needed` files. Raises InputMissingError with the command that helps, and
+    InvalidInputError for a table.
     """
     place = Path(place)
     if not place.exists():
@@ -30,6 +31,9 @@ def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Pat
         raise InputMissingError(message)
     if place.is_dir():
         return _run_in(place, needed)
+    if place.suffix.lower() == ".csv":
+        message = f"{place}: this is a table, not a run; a run folder, results/NAME or a scenario file is needed"
+        raise InvalidInputError(message)
     folder = files.default_folder(load_scenario(place))
     if not files.is_finished(folder):
         raise InputMissingError(_not_run(place, folder))

@@ -164,6 +164,12 @@ def test_sweep_in_place_of_a_run_is_called_a_sweep(tmp_path: Path) -> None:
         find_run(tmp_path)
 
 
+def test_table_in_place_of_a_run_is_called_a_table(tmp_path: Path) -> None:
+    (tmp_path / "measured.csv").write_text("block,quantity,unit,replicate,value\n1,x,mm,1,16\n")
+    with pytest.raises(InvalidInputError, match=r"measured\.csv: this is a table, not a run"):
+        find_run(tmp_path / "measured.csv")
+
+
 def test_folder_without_a_run_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputMissingError, match="no finished run in this folder"):
         find_run(tmp_path)
