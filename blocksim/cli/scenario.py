@@ -7,8 +7,8 @@ from pathlib import Path
 from blocksim.cli.output import note
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Document, Scenario
-from blocksim.scenario.check import implausible_values
 from blocksim.scenario.findings import Finding
+from blocksim.scenario.plausible import implausible_values
 from blocksim.world.step import SkinTooSmallError, StepError
 
 

@@ -1,4 +1,4 @@
-"""Everything that must hold before a scenario may be used, and warnings of values that are hardly meant."""
+"""Everything that must hold before a scenario may be used."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
@@ -12,7 +12,6 @@ from blocksim.scenario.consistency import unfit_choices, unknown_provenance, wro
 from blocksim.scenario.findings import MAX_FINDINGS, Finding, findings_of
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.study import OWN_KEYS, Mode, Sweep
-from blocksim.scenario.models.variation import Normal, Uniform
 from blocksim.scenario.overrides import SYNONYMS, Data, UnfitOverrideError, with_value
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.start import impossible_starts
@@ -22,8 +21,6 @@ MAX_VARIED = 100
 MODES = get_args(Mode)
 ENDS = ("from", "mean", "to")
 """Keys of a variation that is not a list, in the order in which they are reported."""
-STEEPEST = 5.0
-"""Friction coefficient (79 degrees) above which a friction angle without its unit is more likely."""
 UNVARIED = ("schema", "name", "description", "experiment", "sweep", "provenance")
 
 
@@ -145,37 +142,3 @@ def _single_mistakes(data: Data, folder: Path) -> list[Finding]:
     """List the mistakes of values by themselves."""
     _, findings = _validated(data, folder)
     return [finding for finding in (*findings, *islice(wrong_names(data), MAX_FINDINGS)) if not finding.relation]
-
-
-def implausible_values(scenario: Scenario) -> list[str]:
-    """Return a warning for each friction coefficient that looks like a friction angle in degrees, swept ones too."""
-    return [
-        f'{key} = {value:g} is a friction coefficient; for an angle write "{value:g} deg"'
-        for key, value in (*_frictions(scenario), *_varied_frictions(scenario))
-        if value > STEEPEST
-    ]
-
-
-def _frictions(scenario: Scenario) -> Iterator[tuple[str, float]]:
-    yield "friction.block_block", scenario.friction.block_block.static
-    yield "friction.block_ground", scenario.friction.block_ground.static
-    for left, others in scenario.pairs.items():
-        for right, pair in others.items():
-            if pair.friction is not None:
-                yield keys.format_key(("pairs", left, right, "friction")), pair.friction.static
-
-
-def _varied_frictions(scenario: Scenario) -> Iterator[tuple[str, float]]:
-    """Yield the largest bare value of each friction that the sweep varies."""
-    for key, values in {} if scenario.sweep is None else scenario.sweep.vary.items():
-        parts = keys.parse_key(key)
-        if "friction" not in (parts[0], *parts[3:4]) or parts[-1] in ("kinetic_ratio", "transition_speed"):
-            continue
-        match values:
-            case Uniform(angle=False):
-                yield key, values.high
-            case Normal(angle=False):
-                yield key, values.mean
-            case tuple():
-                bare = [float(value) for value in values if isinstance(value, int | float)]
-                yield from ((key, max(bare)) for _ in bare[:1])

@@ -253,8 +253,9 @@ def _similar_file(path: Path) -> str:
         names = sorted(entry.name for entry in path.parent.glob("*.toml"))
     except OSError:
         names = []
-    similar = difflib.get_close_matches(path.name, names, n=1)
-    return f", did you mean '{path.parent / similar[0]}'?" if similar else ""
+    by_stem = {Path(name).stem: name for name in names}  # the ending that all share makes any two names similar
+    similar = difflib.get_close_matches(path.stem, by_stem, n=1)
+    return f", did you mean '{path.parent / by_stem[similar[0]]}'?" if similar else ""
 
 
 def _decoded(content: bytes, where: str) -> str:

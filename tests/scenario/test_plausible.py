@@ -6,9 +6,10 @@ from typing import Any
 import pytest
 
 from blocksim.scenario import Document
-from blocksim.scenario.check import implausible_values
+from blocksim.scenario.plausible import implausible_values
 
 THREE_BLOCKS = Path(__file__).parents[2] / "scenarios" / "three_blocks.toml"
+APART = THREE_BLOCKS.with_name("bounce.toml")  # one block, of any size
 
 
 @pytest.mark.parametrize(
@@ -27,3 +28,20 @@ THREE_BLOCKS = Path(__file__).parents[2] / "scenarios" / "three_blocks.toml"
 def test_friction_angle_without_its_unit_is_warned_of(settings: dict[str, Any], suspects: list[str]) -> None:
     found = implausible_values(Document.read(THREE_BLOCKS).with_values(settings).build())
     assert [text.partition(" is a friction coefficient; for an angle write ")[0] for text in found] == suspects
+
+
+@pytest.mark.parametrize(
+    ("settings", "expected"),
+    [
+        ({"materials.aluminium": {"density": 2.4}}, ["materials.aluminium.density makes 2.4 kg/m^3"]),
+        ({"materials.aluminium.unit_weight": 26.7}, ["materials.aluminium.unit_weight makes 2.722 kg/m^3"]),
+        ({"materials.aluminium.young_modulus": 69}, ["materials.aluminium.young_modulus = 69 Pa"]),
+        ({"blocks.brick.width": 600}, ["blocks.brick.width = 600 m"]),
+        ({"materials.aluminium.young_modulus": "0.1 MPa", "blocks.brick.width": "2 m"}, []),
+    ],
+)
+def test_numbers_that_look_like_another_unit_are_warned_of(settings: dict[str, Any], expected: list[str]) -> None:
+    base = {"poisson_ratio": 0.3, "young_modulus": 69e9}
+    given = {key: {**base, **value} if isinstance(value, dict) else value for key, value in settings.items()}
+    found = implausible_values(Document.read(APART).with_values(given).build())
+    assert [text.removesuffix("; write the unit that is meant") for text in found] == expected

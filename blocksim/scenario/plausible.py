@@ -1,0 +1,63 @@
+"""Warnings of values that are allowed but hardly meant: as a rule a number without the unit that was in mind."""
+
+from collections.abc import Iterator
+
+from blocksim.scenario import keys
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.variation import Normal, Uniform
+
+STEEPEST = 5.0
+"""Friction coefficient (79 degrees) above which a friction angle without its unit is more likely."""
+LIGHTEST, HEAVIEST = 25.0, 25_000.0  # kg/m3: foams and osmium
+SOFTEST = 1e4  # Pa: gels
+LONGEST = 50.0  # m
+
+
+def implausible_values(scenario: Scenario) -> list[str]:
+    """Return a warning for each value that looks like one in another unit; of frictions swept ones too."""
+    return [*_bare_numbers(scenario), *_friction_angles(scenario)]
+
+
+def _bare_numbers(scenario: Scenario) -> Iterator[str]:
+    for name, material in scenario.materials.items():
+        key = keys.format_key(("materials", name))
+        if not LIGHTEST <= material.density <= HEAVIEST:
+            given = "density" if material.unit_weight is None else "unit_weight"
+            yield f"{key}.{given} makes {material.density:.4g} kg/m^3; write the unit that is meant"
+        if material.young_modulus < SOFTEST:
+            yield f"{key}.young_modulus = {material.young_modulus:.4g} Pa; write the unit that is meant"
+    for name, block in scenario.blocks.items():
+        for side in ("width", "height", "length"):
+            if (size := getattr(block, side)) > LONGEST:
+                yield f"{keys.format_key(('blocks', name, side))} = {size:.4g} m; write the unit that is meant"
+
+
+def _friction_angles(scenario: Scenario) -> Iterator[str]:
+    for key, value in (*_frictions(scenario), *_varied_frictions(scenario)):
+        if value > STEEPEST:
+            yield f'{key} = {value:g} is a friction coefficient; for an angle write "{value:g} deg"'
+
+
+def _frictions(scenario: Scenario) -> Iterator[tuple[str, float]]:
+    yield "friction.block_block", scenario.friction.block_block.static
+    yield "friction.block_ground", scenario.friction.block_ground.static
+    for left, others in scenario.pairs.items():
+        for right, pair in others.items():
+            if pair.friction is not None:
+                yield keys.format_key(("pairs", left, right, "friction")), pair.friction.static
+
+
+def _varied_frictions(scenario: Scenario) -> Iterator[tuple[str, float]]:
+    """Yield the largest bare value of each friction that the sweep varies."""
+    for key, values in {} if scenario.sweep is None else scenario.sweep.vary.items():
+        parts = keys.parse_key(key)
+        if "friction" not in (parts[0], *parts[3:4]) or parts[-1] in ("kinetic_ratio", "transition_speed"):
+            continue
+        match values:
+            case Uniform(angle=False):
+                yield key, values.high
+            case Normal(angle=False):
+                yield key, values.mean
+            case tuple():
+                bare = [float(value) for value in values if isinstance(value, int | float)]
+                yield from ((key, max(bare)) for _ in bare[:1])
