@@ -10,7 +10,7 @@ from blocksim.cli.output import note, replacement
 from blocksim.cli.progress import counting
 from blocksim.simulation.own_files import is_film, refuse_foreign
 from blocksim.study.stored_run import stored_run
-from blocksim.view.animation import Look, Pace, draw_film, writer_of
+from blocksim.view.animation import Look, Pace, draw_animation, writer_of
 from blocksim.view.paint import paint_named
 from blocksim.view.support import support_of
 
@@ -43,15 +43,15 @@ def animate_command(
     if out is not None:
         writer_of(out)
     stored = stored_run(run)
-    film = out or Path(f"{stored.scenario.name}.gif")
-    refuse_foreign(film, is_film, overwrite=overwrite)
+    animation = out or Path(f"{stored.scenario.name}.gif")
+    refuse_foreign(animation, is_film, overwrite=overwrite)
     support = support_of(stored.scenario)
-    older = replacement(film)
+    older = replacement(animation)
     look = Look(width, trails, stored.scenario.name, forces, paint_named(colour, stored.frames, stored.scenario))
     with counting("frames", quiet=quiet) as on_picture:
-        count, beyond = draw_film(stored.frames, film, Pace(speed, fps), look, support, on_picture)
+        count, beyond = draw_animation(stored.frames, animation, Pace(speed, fps), look, support, on_picture)
     if stored.remark:
         note(stored.remark)
     if not quiet:
         gone = f"; {beyond} of {len(stored.frames.names)} blocks fly out of the window" if beyond else ""
-        note(f"animation: {film} ({older}{count} frames{gone})")
+        note(f"animation: {animation} ({older}{count} frames{gone})")

@@ -22,7 +22,7 @@ from blocksim.study.reporting import report_on
 from blocksim.study.sensitivity_methods import METHODS
 from blocksim.study.stored_run import stored_run
 from blocksim.study.sweep_table import SweepResult
-from blocksim.view.animation import Look, Pace, draw_film
+from blocksim.view.animation import Look, Pace, draw_animation
 from blocksim.view.paint import paint_named
 from blocksim.view.paper import MILLIMETRES_PER_INCH, Paper
 from blocksim.view.support import support_of
@@ -84,7 +84,7 @@ def animate(  # noqa: PLR0913 - one argument for each option of the command
     path = Path(f"{stored.scenario.name}.gif" if out is None else out)
     refuse_foreign(path, is_film, overwrite=overwrite)
     look = Look(width, trails, stored.scenario.name, forces, paint_named(colour, stored.frames, stored.scenario))
-    draw_film(stored.frames, path, Pace(speed, fps), look, support_of(stored.scenario))
+    draw_animation(stored.frames, path, Pace(speed, fps), look, support_of(stored.scenario))
     return path
 
 

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 from blocksim.view import style
+from blocksim.view.animation_files import write_gif, write_mp4
 from blocksim.view.forces import WithContacts, draw_forces, force_scale
-from blocksim.view.gif import write_gif
 from blocksim.view.ground import Canvas, draw_ruler
 from blocksim.view.moments import Floats, FramesLike, Indices, drawable_frames
-from blocksim.view.mp4 import write_mp4
 from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import Page, depth_of, finish_panel, page_for
 from blocksim.view.scene import draw_blocks, draw_standing
@@ -58,7 +57,7 @@ class Look:
     paint: Paint | None = None
 
 
-def draw_film(
+def draw_animation(
     frames: WithContacts,
     path: Path | str,
     pace: Pace | None = None,
@@ -76,15 +75,15 @@ def draw_film(
     path = Path(path)
     write = writer_of(path)
     chosen, seconds = timed(frames, drawable_frames(frames), pace or Pace())
-    film = Film(frames, support or Support(), look or Look())
+    animation = Animation(frames, support or Support(), look or Look())
 
     def pictures() -> Iterator[Pixels]:
         for number, frame in enumerate(chosen, start=1):
-            yield film.picture(int(frame))
+            yield animation.picture(int(frame))
             on_picture(number, len(chosen))
 
     write(path, pictures(), seconds)
-    return len(chosen), int((~film.seen).sum())
+    return len(chosen), int((~animation.seen).sum())
 
 
 def writer_of(path: Path) -> Writer:
@@ -117,7 +116,7 @@ def timed(frames: FramesLike, drawable: Indices, pace: Pace) -> tuple[Indices, F
     return drawable[nearest], seconds
 
 
-class Film:
+class Animation:
     """Draws one frame after the other on the same page; fixed parts are drawn once."""
 
     def __init__(self, frames: WithContacts, support: Support, look: Look) -> None:

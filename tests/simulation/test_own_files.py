@@ -21,8 +21,7 @@ from blocksim.simulation.own_files import (
     is_vtkhdf,
     refuse_foreign,
 )
-from blocksim.view.gif import write_gif
-from blocksim.view.mp4 import write_mp4
+from blocksim.view.animation_files import write_gif, write_mp4
 from blocksim.view.style import save_figure, styled_figure
 
 ALL: tuple[IsOwn, ...] = (is_picture, is_film, is_report, is_bench, is_vtkhdf, is_table("time_s", "block"))

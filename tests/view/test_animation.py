@@ -14,8 +14,8 @@ from blocksim.errors import InvalidInputError, OutputError, UnavailableError
 from blocksim.scenario import load_scenario
 from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.frames import Frames
-from blocksim.view.animation import Film, Look, Pace, Pixels, draw_film, timed
-from blocksim.view.gif import ticks
+from blocksim.view.animation import Animation, Look, Pace, Pixels, draw_animation, timed
+from blocksim.view.animation_files import ticks
 from blocksim.view.paint import PAINTS
 from blocksim.view.style import BLOCK_COLOURS
 from blocksim.view.support import Support
@@ -31,9 +31,9 @@ def colour(index: int) -> list[int]:
     return [round(255 * part) for part in to_rgb(BLOCK_COLOURS[index])]
 
 
-def pixel_of(film: Film, picture: Pixels, x: float, y: float) -> list[int]:
+def pixel_of(animation: Animation, picture: Pixels, x: float, y: float) -> list[int]:
     """Return the colour at a place (mm) of the scene."""
-    column, row = film.canvas.scene.transform((x, y))
+    column, row = animation.canvas.scene.transform((x, y))
     return [int(part) for part in picture[len(picture) - 1 - int(row), int(column)]]
 
 
@@ -46,38 +46,40 @@ def near_the_centre(frames: Frames, frame: int, block: int) -> tuple[float, floa
 @pytest.mark.parametrize("support", [Support(), MOVING, Support(tilt=0.2)], ids=["level", "moving", "tilted"])
 def test_blocks_are_where_they_were_recorded(support: Support, trails: bool) -> None:
     frames = toppling(2)
-    film = Film(frames, support, Look(width=400, trails=trails))
+    animation = Animation(frames, support, Look(width=400, trails=trails))
     for frame in (0, 20, 39, 0):  # any order
-        picture = film.picture(frame)
+        picture = animation.picture(frame)
         for block in range(2):
-            assert pixel_of(film, picture, *near_the_centre(frames, frame, block)) == colour(block)
+            assert pixel_of(animation, picture, *near_the_centre(frames, frame, block)) == colour(block)
 
 
 def test_a_picture_does_not_depend_on_those_before() -> None:
-    film = Film(toppling(3), MOVING, SMALL)
-    first = film.picture(0)
-    film.picture(30)
-    assert np.array_equal(film.picture(0), first)
+    animation = Animation(toppling(3), MOVING, SMALL)
+    first = animation.picture(0)
+    animation.picture(30)
+    assert np.array_equal(animation.picture(0), first)
 
 
 def test_trails_are_drawn_for_few_blocks_unless_somebody_decides() -> None:
-    assert Film(toppling(3), Support(), SMALL).has_trails
-    assert not Film(toppling(31), Support(), SMALL).has_trails
-    without, with_trails = (Film(toppling(1), Support(), Look(240, trails=one)).picture(39) for one in (False, True))
+    assert Animation(toppling(3), Support(), SMALL).has_trails
+    assert not Animation(toppling(31), Support(), SMALL).has_trails
+    without, with_trails = (
+        Animation(toppling(1), Support(), Look(240, trails=one)).picture(39) for one in (False, True)
+    )
     assert not np.array_equal(without, with_trails)
 
 
 def test_a_moving_support_moves() -> None:
     frames = toppling(1)
     frames.x[:], frames.y[:], frames.angle[:] = 0.0, 0.025, 0.0
-    still, moving = (Film(frames, support, Look(240, trails=False)) for support in (Support(), MOVING))
+    still, moving = (Animation(frames, support, Look(240, trails=False)) for support in (Support(), MOVING))
     assert np.array_equal(still.picture(10)[60:], still.picture(39)[60:])  # but for the time
     assert not np.array_equal(moving.picture(10)[60:], moving.picture(39)[60:])
 
 
 @pytest.mark.parametrize("width", [200, 401, 1234])
 def test_sides_are_even_and_the_width_is_the_one_asked_for(width: int) -> None:
-    height, across, _ = Film(toppling(60), Support(), Look(width)).picture(0).shape
+    height, across, _ = Animation(toppling(60), Support(), Look(width)).picture(0).shape
     assert height % 2 == across % 2 == 0
     assert abs(across - width) <= 1
 
@@ -85,7 +87,7 @@ def test_sides_are_even_and_the_width_is_the_one_asked_for(width: int) -> None:
 def test_a_tower_stays_within_the_page() -> None:
     frames = toppling(1)
     frames.y[:, 0] = np.linspace(3.0, 0.0, len(frames))
-    height, width, _ = Film(frames, Support(), SMALL).picture(0).shape
+    height, width, _ = Animation(frames, Support(), SMALL).picture(0).shape
     assert height < 1.6 * width
 
 
@@ -105,7 +107,7 @@ def test_uneven_frames_are_shown_at_their_times() -> None:
     assert chosen.tolist() == [0, 1, 2, 2, 3, 3]
 
 
-def test_a_single_frame_is_a_film() -> None:
+def test_a_single_frame_is_an_animation() -> None:
     frames = toppling(1)
     chosen, seconds = timed(frames, np.array([3]), FAST)
     assert chosen.tolist() == [3]
@@ -114,24 +116,24 @@ def test_a_single_frame_is_a_film() -> None:
 
 def test_gif_plays_as_long_as_it_should(tmp_path: Path) -> None:
     path = tmp_path / "film.gif"
-    assert draw_film(toppling(3), path, Pace(0.5, 30.0), SMALL) == (37, 0)
-    with GifImageFile(path) as film:
+    assert draw_animation(toppling(3), path, Pace(0.5, 30.0), SMALL) == (37, 0)
+    with GifImageFile(path) as animation:
         length = 0
-        for index in range(film.n_frames):
-            film.seek(index)
-            length += film.info["duration"]
-        assert film.info["loop"] == 0
-        assert film.width == 240
+        for index in range(animation.n_frames):
+            animation.seek(index)
+            length += animation.info["duration"]
+        assert animation.info["loop"] == 0
+        assert animation.width == 240
     assert length == pytest.approx(1000 * (36 / 30 + 1.5), abs=10)
 
 
 def test_gif_shows_the_blocks_in_their_own_colours(tmp_path: Path) -> None:
     frames = toppling(6)
-    draw_film(frames, tmp_path / "film.gif", FAST, Look(400))
-    drawn = Film(frames, Support(), Look(400))
-    with GifImageFile(tmp_path / "film.gif") as film:
-        film.seek(film.n_frames - 1)
-        last = np.asarray(film.convert("RGB"))
+    draw_animation(frames, tmp_path / "film.gif", FAST, Look(400))
+    drawn = Animation(frames, Support(), Look(400))
+    with GifImageFile(tmp_path / "film.gif") as animation:
+        animation.seek(animation.n_frames - 1)
+        last = np.asarray(animation.convert("RGB"))
     for block in range(6):
         assert pixel_of(drawn, last, *near_the_centre(frames, -1, block)) == colour(block)
     assert last[0, 0].tolist() == [255, 255, 255]
@@ -139,7 +141,7 @@ def test_gif_shows_the_blocks_in_their_own_colours(tmp_path: Path) -> None:
 
 def test_the_same_run_gives_the_same_gif(tmp_path: Path) -> None:
     for name in ("first", "second"):
-        draw_film(toppling(3), tmp_path / f"{name}.gif", FAST, SMALL)
+        draw_animation(toppling(3), tmp_path / f"{name}.gif", FAST, SMALL)
     assert (tmp_path / "first.gif").read_bytes() == (tmp_path / "second.gif").read_bytes()
 
 
@@ -154,15 +156,15 @@ def test_mp4_can_be_read_back(tmp_path: Path) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="MP4 needs the extra video")
     path = tmp_path / "film.mp4"
     frames = toppling(2)
-    draw_film(frames, path, FAST, Look(301, title="film"))
+    draw_animation(frames, path, FAST, Look(301, title="animation"))
     reader = ffmpeg.read_frames(str(path))
     told = next(reader)
     pictures = list(reader)
-    film = Film(frames, Support(), Look(301))
-    assert told["size"] == film.picture(0).shape[1::-1]
+    animation = Animation(frames, Support(), Look(301))
+    assert told["size"] == animation.picture(0).shape[1::-1]
     assert len(pictures) == 6 + 15  # seven, the last one of them for 1.5 s
-    last = np.frombuffer(pictures[-1], np.uint8).reshape(film.picture(0).shape)
-    found = pixel_of(film, last, *near_the_centre(frames, -1, 1))
+    last = np.frombuffer(pictures[-1], np.uint8).reshape(animation.picture(0).shape)
+    found = pixel_of(animation, last, *near_the_centre(frames, -1, 1))
     assert np.abs(np.subtract(found, colour(1))).max() < 16  # as lossy as MP4 is
     assert [one.name for one in tmp_path.iterdir()] == ["film.mp4"]
 
@@ -191,7 +193,7 @@ def test_a_film_that_is_not_whole_is_not_kept(
 ) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", Stopping(in_the_middle=in_the_middle))
     with pytest.raises(OutputError, match=r"film\.mp4: cannot be written: ffmpeg stopped before the end"):
-        draw_film(toppling(1), tmp_path / "film.mp4", FAST, SMALL)
+        draw_animation(toppling(1), tmp_path / "film.mp4", FAST, SMALL)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -204,7 +206,7 @@ def test_the_system_s_ffmpeg_writes_mp4_where_the_package_is_missing(
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))
     path = tmp_path / "film.mp4"
-    draw_film(toppling(2), path, FAST, SMALL)
+    draw_animation(toppling(2), path, FAST, SMALL)
     written, seconds = package.count_frames_and_secs(str(path))
     assert written == 6 + 15
     assert seconds == pytest.approx(2.1, abs=0.01)
@@ -220,7 +222,7 @@ def test_a_film_that_the_system_s_ffmpeg_does_not_finish_is_not_kept(
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:/usr/bin:/bin")
     with pytest.raises(OutputError, match=r"film\.mp4: cannot be written: ffmpeg stopped before the end"):
-        draw_film(toppling(1), tmp_path / "film.mp4", FAST, SMALL)
+        draw_animation(toppling(1), tmp_path / "film.mp4", FAST, SMALL)
     assert [one.name for one in tmp_path.iterdir()] == ["bin"]
 
 
@@ -229,16 +231,16 @@ def test_a_film_is_coloured_like_the_other_pictures(name: str) -> None:
     frames = toppling(2)
     frames.vx[:, 1] *= 2.0
     paint = PAINTS[name](frames, load_scenario(SCENARIOS / "slope.toml"))
-    film = Film(frames, Support(), Look(width=400, trails=False, paint=paint))
+    animation = Animation(frames, Support(), Look(width=400, trails=False, paint=paint))
     for block in range(2):
-        found = pixel_of(film, film.picture(20), *near_the_centre(frames, 20, block))
+        found = pixel_of(animation, animation.picture(20), *near_the_centre(frames, 20, block))
         assert found == [round(255 * part) for part in to_rgb(paint.fills(20)[block])]
 
 
 def test_one_far_flyer_does_not_make_the_structure_small() -> None:
     near, far = toppling(60), toppling(60)
     far.x[-1, 59] += 5.0
-    films = [Film(frames, Support(), SMALL) for frames in (near, far)]
+    films = [Animation(frames, Support(), SMALL) for frames in (near, far)]
     assert films[1].page.points_per_mm > 0.9 * films[0].page.points_per_mm
     assert np.flatnonzero(~films[1].seen).tolist() == [59]
     assert films[0].seen.all()
@@ -247,33 +249,33 @@ def test_one_far_flyer_does_not_make_the_structure_small() -> None:
 def test_debris_of_a_collapse_and_each_of_few_blocks_stay_in_the_window() -> None:
     frames = toppling(60)
     frames.x[-1] += np.linspace(0.0, 1.0, 60)  # spread out, without a gap
-    assert Film(frames, Support(), SMALL).seen.all()
+    assert Animation(frames, Support(), SMALL).seen.all()
     few = toppling(3)
     few.x[-1, 2] += 0.1
-    assert Film(few, Support(), SMALL).seen.all()
+    assert Animation(few, Support(), SMALL).seen.all()
 
 
 def test_missing_package_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setenv("PATH", "")
     with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[video\]'"):
-        draw_film(toppling(1), tmp_path / "film.mp4", FAST, SMALL)
+        draw_animation(toppling(1), tmp_path / "film.mp4", FAST, SMALL)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_trouble_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match=r"'.avi' unsupported format; use .gif or .mp4"):
-        draw_film(toppling(1), tmp_path / "film.avi")
+        draw_animation(toppling(1), tmp_path / "film.avi")
     with pytest.raises(InvalidInputError, match="at most 10000: raise --speed or lower --fps"):
-        draw_film(toppling(1), tmp_path / "film.gif", Pace(1e-6, 30.0))
+        draw_animation(toppling(1), tmp_path / "film.gif", Pace(1e-6, 30.0))
     with pytest.raises(InvalidInputError, match="at most 50 frames per second"):
-        draw_film(toppling(1), tmp_path / "film.gif", Pace(1.0, 60.0), SMALL)
+        draw_animation(toppling(1), tmp_path / "film.gif", Pace(1.0, 60.0), SMALL)
     with pytest.raises(OutputError, match="cannot be written: No such file"):
-        draw_film(toppling(1), tmp_path / "none" / "film.gif", FAST, SMALL)
+        draw_animation(toppling(1), tmp_path / "none" / "film.gif", FAST, SMALL)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_hostile_names_are_text() -> None:
     frames = replace(toppling(len(HOSTILE)), names=HOSTILE)
     for title in HOSTILE:
-        assert Film(frames, Support(), Look(800, title=title)).picture(0).shape[1] == 800
+        assert Animation(frames, Support(), Look(800, title=title)).picture(0).shape[1] == 800

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.contacts import Contacts, borne, empty_rows
-from blocksim.view.animation import Look, Pace, draw_film
+from blocksim.view.animation import Look, Pace, draw_animation
 from blocksim.view.forces import FORCES, ForceScale, arrows, contacts_of, force_scale, rounded
 from blocksim.view.kinds import KINDS
 from blocksim.view.support import Support
@@ -102,13 +102,13 @@ def test_missing_contacts_are_reported_with_what_to_do(tmp_path: Path, kind: str
     assert list(tmp_path.iterdir()) == []
 
 
-def test_film_with_forces_differs_and_one_of_a_run_without_is_refused(tmp_path: Path) -> None:
+def test_animation_with_forces_differs_and_one_of_a_run_without_is_refused(tmp_path: Path) -> None:
     frames, pace = pressed(toppling(2, steps=4)), Pace(1.0, 5.0)
-    draw_film(frames, tmp_path / "with.gif", pace, Look(240, forces=True))
-    draw_film(frames, tmp_path / "without.gif", pace, Look(240))
+    draw_animation(frames, tmp_path / "with.gif", pace, Look(240, forces=True))
+    draw_animation(frames, tmp_path / "without.gif", pace, Look(240))
     assert (tmp_path / "with.gif").read_bytes() != (tmp_path / "without.gif").read_bytes()
     with pytest.raises(InvalidInputError, match="stored no contacts"):
-        draw_film(toppling(2), tmp_path / "none.gif", pace, Look(240, forces=True))
+        draw_animation(toppling(2), tmp_path / "none.gif", pace, Look(240, forces=True))
     assert not (tmp_path / "none.gif").exists()
 
 
