@@ -14,11 +14,10 @@ from blocksim.study.rows import FINISHED
 from blocksim.study.stored_run import find_run
 from blocksim.study.sweep_folder import PLAN, case_folder
 from blocksim.study.sweep_table import is_sweep
-from blocksim.view.report.packing import MOST_BYTES
 from blocksim.view.report.page import write_report
-from blocksim.view.report.stored import StoredRun, read_stored
-from blocksim.view.report.subjects import Subject, run_subject
-from blocksim.view.report.sweeps import SweepTable, read_sweep_table, sweep_subject
+from blocksim.view.report.player import MOST_BYTES
+from blocksim.view.report.runs import PartialRun, Subject, read_stored, run_subject
+from blocksim.view.report.sweeps import CaseTable, read_sweep_table, sweep_subject
 
 MEMBERS = 50  # of a sweep in one page
 
@@ -60,7 +59,7 @@ def _folder(place: Path) -> Path:
     return find_run(place)
 
 
-def _compared(run: StoredRun, experiment: Path | None) -> tuple[dict[str, object] | None, tuple[str, ...]]:
+def _compared(run: PartialRun, experiment: Path | None) -> tuple[dict[str, object] | None, tuple[str, ...]]:
     """Return the comparison of a finished run, or why there is none though there is a measurement."""
     try:
         table = _measured(run.scenario, experiment)
@@ -127,12 +126,12 @@ def _plan(place: Path) -> tuple[Scenario | None, tuple[str, ...]]:
         return None, (str(error),)
 
 
-def _kept(table: SweepTable) -> Mapping[str, Path]:
+def _kept(table: CaseTable) -> Mapping[str, Path]:
     """Return the folders of the members that have frames, by case, in the order of the table."""
     return dict(_folders(table))
 
 
-def _folders(table: SweepTable) -> Iterator[tuple[str, Path]]:
+def _folders(table: CaseTable) -> Iterator[tuple[str, Path]]:
     for case in table.column("case"):
         folder = case_folder(table.folder, case)
         if folder is not None and (folder / files.FRAMES).is_file():

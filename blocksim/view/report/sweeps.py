@@ -11,7 +11,7 @@ from typing import Any
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
 from blocksim.scenario.bounded_read import MEGABYTE, read_limited
-from blocksim.view.report.subjects import Subject
+from blocksim.view.report.runs import Subject
 
 TABLE = "sweep.csv"
 MOST_BYTES = 200 * MEGABYTE  # of the table
@@ -23,7 +23,7 @@ MOST_VALUES = 400_000  # of blocks in the page; a sweep of 10 000 cases shows 13
 
 
 @dataclass(frozen=True)
-class SweepTable:
+class CaseTable:
     """The rows of sweep.csv as texts, by column."""
 
     folder: Path
@@ -49,7 +49,7 @@ class SweepTable:
         return [row[place] for row in self.rows]
 
 
-def read_sweep_table(folder: Path) -> SweepTable:
+def read_sweep_table(folder: Path) -> CaseTable:
     """Return the table of a sweep's folder; rows that are cut off are left out. Raises InvalidInputError."""
     path = folder / TABLE
     try:
@@ -61,7 +61,7 @@ def read_sweep_table(folder: Path) -> SweepTable:
     if not lines or not set(lines[0]) >= NEEDED:
         message = f"{path}: not the table of a sweep: no columns case and status"
         raise InvalidInputError(message)
-    return SweepTable(folder, lines[0], tuple(line for line in lines[1:] if len(line) == len(lines[0])))
+    return CaseTable(folder, lines[0], tuple(line for line in lines[1:] if len(line) == len(lines[0])))
 
 
 COLUMN_OF = {"x": "x_mm", "rotation": "rotation_deg"}
@@ -70,7 +70,7 @@ COLUMN_OF = {"x": "x_mm", "rotation": "rotation_deg"}
 
 def sweep_subject(  # noqa: PLR0913 - the parts of a sweep
     key: str,
-    table: SweepTable,
+    table: CaseTable,
     scenario: Scenario | None,
     members: Mapping[str, str],
     problems: Sequence[str] = (),
@@ -111,7 +111,7 @@ def _limits(judged: Mapping[str, Any]) -> dict[str, list[float]]:
     return {f"{row['block']}.{COLUMN_OF[row['quantity']]}": list(row["limits"]) for row in rows}
 
 
-def _columns(table: SweepTable, blocks: Sequence[str]) -> list[dict[str, Any]]:
+def _columns(table: CaseTable, blocks: Sequence[str]) -> list[dict[str, Any]]:
     """Return names, roles and values; a column whose values are all numbers has numbers, an empty cell is null."""
     ends = [f"{block}{suffix}" for block in blocks for suffix in (".x_mm", ".rotation_deg")]
     roles = {"varied": table.varied, "case": HEAD, "outcome": TAIL, "block": ends}
@@ -141,7 +141,7 @@ def _number(text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _summary(table: SweepTable, members: int) -> list[tuple[str, str]]:
+def _summary(table: CaseTable, members: int) -> list[tuple[str, str]]:
     cases = len(table.rows)
     finished = table.column("status").count("finished")
     judged = [value for value in table.column("inside") if value]

@@ -1,16 +1,24 @@
-"""Frames as text that a page can carry: thinned where there are too many, rounded where they are large."""
+"""Data of the player: frames as text that a page can carry, contact forces, and the surroundings of the blocks.
+
+Frames are thinned where there are too many, and rounded where they are large. Lengths in millimetres.
+"""
 
 import base64
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.scenario import Scenario
 from blocksim.simulation.contacts import Contacts
 from blocksim.simulation.frames import Frames
+from blocksim.view import style
 from blocksim.view.forces import force_scale, pushing_up
 from blocksim.view.moments import Indices, drawable_frames
+from blocksim.view.support import support_of
+from blocksim.view.window import MILLIMETRES, extent_of
 
 Floats = NDArray[np.float64]
 
@@ -21,6 +29,10 @@ LEVELS = 65_535  # steps of a rounded value
 SHORT_BYTES = 2
 CONTACT_BYTES = 16  # of a contact in a frame
 CHANNELS = {"x": "mm", "y": "mm", "rotation": "deg", "vx": "mm/s", "vy": "mm/s", "spin": "deg/s"}
+
+ENDLESS_WIDTHS = 20.0  # of the shown part; how far level ground is drawn to either side
+
+ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)
@@ -35,11 +47,11 @@ class Packed:
     @property
     def notes(self) -> list[str]:
         """Losses of thinning and rounding, in sentences."""
-        told = [f"{name} {error:.1g} {CHANNELS[name]}" for name, error in self.errors.items()]
+        errors = [f"{name} {error:.1g} {CHANNELS[name]}" for name, error in self.errors.items()]
         thinned = "all" if self.kept == self.recorded else "evenly thinned"
         return [
             f"{self.kept} of {self.recorded} recorded frames are in this page ({thinned}).",
-            f"Largest rounding error of a value: {', '.join(told)}.",
+            f"Largest rounding error of a value: {', '.join(errors)}.",
         ]
 
 
@@ -138,3 +150,53 @@ def _listed(values: Floats) -> list[float]:
 
 def _text(values: NDArray[Any]) -> str:
     return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+
+
+def scene_data(frames: Frames, scenario: Scenario, kept: Indices) -> dict[str, Any]:
+    """Return everything but the frames that the player needs, as plain values for JSON."""
+    support = support_of(scenario)
+    extent = extent_of(frames, kept, support)
+    reach = ENDLESS_WIDTHS * (extent.width + extent.height) / MILLIMETRES
+    fixed = support.fixed or (False,) * len(frames.names)
+    return {
+        "extent": [extent.left, extent.right, extent.bottom, extent.top],
+        "tilt": support.tilt,
+        "ground": (MILLIMETRES * support.line(reach)).round(4).tolist(),
+        "walls": [[MILLIMETRES * end for end in (wall.x0, wall.y0, wall.x1, wall.y1)] for wall in support.walls],
+        "offset": (MILLIMETRES * support.offset(frames.time[kept])).round(4).tolist() if support.motion else None,
+        "fixed": [bool(flag) for flag in fixed],
+        "colours": list(style.BLOCK_COLOURS),
+        "particles": _particles(frames, scenario),
+    }
+
+
+def _particles(frames: Frames, scenario: Scenario) -> dict[str, Any] | None:
+    """Return the outlines by particles, one for each pair of sides, and which of them every block has."""
+    sides = np.stack([frames.size_x, frames.size_y], axis=-1)
+    kinds, which = np.unique(sides, axis=0, return_inverse=True)
+    outlines = [(MILLIMETRES * boundary_particles(scenario, *map(float, kind))).round(4).tolist() for kind in kinds]
+    return {"outlines": outlines, "which": which.ravel().tolist()} if any(outlines) else None
+
+
+def boundary_particles(scenario: Scenario, size_x: float, size_y: float) -> Floats:
+    """Return the particles along the edges of a block of these sides (m), in its own axes (m), (k, 2); drawn only.
+
+    The sides are divided as when the world is built: equal intervals, none longer than the spacing. Discs lie inset by
+    half of it, the rows of the kernel model on the edge itself; the surface model has none.
+    """
+    contact = scenario.contact
+    if contact.model == "surface":
+        return np.zeros((0, 2))
+    inset = 0.0 if contact.model == "kernel" else 0.5 * contact.particle_spacing
+    half = np.array([0.5 * size_x - inset, 0.5 * size_y - inset])
+    corners = half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    counts = [_intervals(2.0 * float(side), contact.particle_spacing) for side in (*half, *half)]
+    sides = [
+        start + (end - start) * (np.arange(count) / count)[:, None]
+        for start, end, count in zip(corners, np.roll(corners, -1, axis=0), counts, strict=True)
+    ]
+    return np.concatenate(sides)
+
+
+def _intervals(side: float, spacing: float) -> int:
+    return max(1, math.ceil(side / spacing * (1.0 - ROUND_OFF)))

@@ -1,16 +1,24 @@
-"""Parts of a report as plain values for templates and scripts: runs here, sweeps in `sweeps`."""
+"""Runs in a report: what can be read of their folders, as plain values for templates and scripts."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
-from blocksim.errors import InvalidInputError
+from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
+from blocksim.scenario import Scenario, load_stored
+from blocksim.scenario.bounded_read import read_limited
+from blocksim.scenario.document import MAX_BYTES
+from blocksim.simulation import folder as files
+from blocksim.simulation.frames import Frames
 from blocksim.simulation.movement import Movement
-from blocksim.simulation.table import rows_of
-from blocksim.view.report.packing import MOST_BYTES, frame_indices, pack_forces, pack_frames
-from blocksim.view.report.scene import scene_data
-from blocksim.view.report.stored import StoredRun
+from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.summary import Summary, read_summary
+from blocksim.simulation.table import Columns, read_table, rows_of
+from blocksim.view.report.player import MOST_BYTES, frame_indices, pack_forces, pack_frames, scene_data
+
+Part = TypeVar("Part")
 
 LEDGER = {  # name in run.json: name in the report
     "kinetic": "kinetic",
@@ -33,6 +41,75 @@ NO_FORCES = "This run has stored no contacts, so their forces cannot be shown; -
 
 
 @dataclass(frozen=True)
+class PartialRun:
+    """The parts of a run that could be read, None for the others.
+
+    `problems` give the reasons, a line each; `damage` are those that are not missing files.
+    """
+
+    folder: Path
+    scenario: Scenario | None
+    scenario_text: str | None
+    summary: Summary | None
+    frames: Frames | None
+    final: Columns | None
+    problems: tuple[str, ...] = ()
+    damage: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The scenario's name; that of the folder where it is not known."""
+        if self.scenario is not None:
+            return self.scenario.name
+        return self.folder.name if self.summary is None else self.summary.name
+
+    @property
+    def status(self) -> str:
+        """`finished`, `failed` or `interrupted`; `unfinished` where the run left no summary."""
+        return "unfinished" if self.summary is None else self.summary.status
+
+
+class _Attempts:
+    """Reads one part after the other and records errors."""
+
+    def __init__(self) -> None:
+        self.problems: list[str] = []
+        self.damage: list[str] = []
+
+    def at(self, read: Callable[[], Part]) -> Part | None:
+        """Return what `read` returns, None where it raises an error of the input."""
+        try:
+            return read()
+        except BlocksimError as error:
+            self.problems.append(str(error))
+            if not isinstance(error, InputMissingError):
+                self.damage.append(str(error))
+            return None
+
+
+def read_stored(folder: Path) -> PartialRun:
+    """Return what a run's folder holds. Raises InvalidInputError where nothing of it can be read."""
+    attempts = _Attempts()
+    scenario = attempts.at(lambda: load_stored(folder / files.SCENARIO))
+    summary = attempts.at(lambda: read_summary(folder / files.SUMMARY))
+    frames = None if scenario is None else attempts.at(lambda: read_frames(folder / files.FRAMES, scenario))
+    final = attempts.at(lambda: read_table(folder / files.FINAL))
+    text = _text(folder)
+    if scenario is None and summary is None and final is None:
+        message = "\n".join([f"{folder}: nothing of this run can be read", *attempts.problems])
+        raise InvalidInputError(message)
+    return PartialRun(folder, scenario, text, summary, frames, final, tuple(attempts.problems), tuple(attempts.damage))
+
+
+def _text(folder: Path) -> str | None:
+    """Return the resolved scenario as it lies in the folder."""
+    try:
+        return read_limited(folder / files.SCENARIO, MAX_BYTES).decode(errors="replace")
+    except BlocksimError:
+        return None
+
+
+@dataclass(frozen=True)
 class Subject:
     """One part of a report: `page` is for the template, `data` for the scripts; `key` ties the two together."""
 
@@ -45,7 +122,7 @@ class Subject:
 
 def run_subject(
     key: str,
-    run: StoredRun,
+    run: PartialRun,
     comparison: Mapping[str, Any] | None = None,
     remarks: tuple[str, ...] = (),
     *,
@@ -82,7 +159,7 @@ def run_subject(
     return Subject(key, "run", run.name, page, {"kind": "run", "name": run.name, "frames": data})
 
 
-def _moving(run: StoredRun, most_bytes: int) -> tuple[dict[str, Any] | None, list[str], list[str]]:
+def _moving(run: PartialRun, most_bytes: int) -> tuple[dict[str, Any] | None, list[str], list[str]]:
     """Return frames and scene for the player, notes on them, and problems with them."""
     if run.frames is None or run.scenario is None:
         return None, [], []
@@ -110,13 +187,13 @@ def _measured(names: Sequence[str], comparison: Mapping[str, Any] | None) -> lis
     ]
 
 
-def _reason(run: StoredRun) -> str:
+def _reason(run: PartialRun) -> str:
     if run.summary is not None:
         return run.summary.reason
     return "no summary: the run was killed, is still running, or its run.json cannot be read"
 
 
-def _summary(run: StoredRun) -> list[tuple[str, str]]:
+def _summary(run: PartialRun) -> list[tuple[str, str]]:
     """Return names and values for people."""
     blocks = [] if run.frames is None else [("blocks", str(len(run.frames.names)))]
     if run.summary is None:
@@ -154,7 +231,7 @@ def _share(value: float) -> str:
     return f"{value:.1e}" if math.isfinite(value) else "unknown"
 
 
-def _ledger(run: StoredRun) -> list[tuple[str, str]]:
+def _ledger(run: PartialRun) -> list[tuple[str, str]]:
     if run.summary is None:
         return []
     values = run.summary.energy_J.model_dump()
@@ -167,7 +244,7 @@ def _joule(value: float) -> str:
     return f"{value:.6g}".replace("-", "−") if math.isfinite(value) else "–"
 
 
-def _provenance(run: StoredRun) -> list[tuple[str, str]]:
+def _provenance(run: PartialRun) -> list[tuple[str, str]]:
     if run.summary is None:
         return []
     told = run.summary

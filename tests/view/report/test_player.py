@@ -1,4 +1,4 @@
-"""Frames as text: what comes back, how far it is off, and what is left out."""
+"""Frames as text: what comes back, how far it is off, what is left out; particles lie where the world has them."""
 
 import base64
 from dataclasses import replace
@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.view.report import packing
-from blocksim.view.report.packing import pack, pack_frames
-from tests.view.report.folders import write_run
+from blocksim.scenario import load_scenario
+from blocksim.view.report import player
+from blocksim.view.report.player import boundary_particles, pack, pack_frames
+from blocksim.world.build import build_world
+from tests.view.report.folders import SCENARIOS, write_run
 
 
 def unpacked(part: dict[str, object]) -> np.ndarray:
@@ -23,7 +25,7 @@ def unpacked(part: dict[str, object]) -> np.ndarray:
 @pytest.mark.parametrize(("most", "kind"), [(1000, "f4"), (10, "u2")])
 def test_told_error_is_the_largest_one(monkeypatch: pytest.MonkeyPatch, most: int, kind: str) -> None:
     values = np.random.default_rng(1).normal(0.0, 100.0, (50, 7))
-    monkeypatch.setattr(packing, "EXACT_VALUES", most)
+    monkeypatch.setattr(player, "EXACT_VALUES", most)
     part, error = pack(values)
     assert part["type"] == kind
     assert np.abs(unpacked(part) - values.ravel()).max() == pytest.approx(error)
@@ -31,7 +33,7 @@ def test_told_error_is_the_largest_one(monkeypatch: pytest.MonkeyPatch, most: in
 
 
 def test_equal_values_can_be_rounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(packing, "EXACT_VALUES", 0)
+    monkeypatch.setattr(player, "EXACT_VALUES", 0)
     part, error = pack(np.full((3, 2), 4.5))
     assert unpacked(part).tolist() == [4.5] * 6
     assert error == 0.0
@@ -66,3 +68,18 @@ def test_thousand_blocks_and_many_frames_stay_below_the_limit(tmp_path: Path) ->
     size = sum(len(part["data"]) for part in packed.data["channels"].values())
     assert 300 < packed.kept < 1700
     assert size < 17_000_000
+
+
+def test_surface_model_has_none() -> None:
+    assert len(boundary_particles(load_scenario(SCENARIOS / "three_blocks.toml"), 0.05, 0.025)) == 0
+
+
+@pytest.mark.parametrize("model", ["particles", "kernel"])
+def test_particles_are_those_of_the_world(model: str) -> None:
+    scenario = load_scenario(SCENARIOS / "three_blocks_particles.toml", {"contact.model": model})
+    world = build_world(scenario)
+    body = world.bodies[0]
+    own = world.particles[int(body.first_particle) : int(body.first_particle + body.particle_count)]
+    expected = np.unique(np.stack([own.x, own.y], axis=-1).round(9), axis=0)
+    drawn = boundary_particles(scenario, 2.0 * float(body.half_x), 2.0 * float(body.half_y))
+    assert np.unique(drawn.round(9), axis=0) == pytest.approx(expected)
