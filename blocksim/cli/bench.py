@@ -20,7 +20,7 @@ from blocksim.errors import OutputError
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.own_files import is_bench, is_picture, refuse_foreign
 from blocksim.verification.verify import number
-from blocksim.view.paper import OWN, Paper
+from blocksim.view.layout import OWN, Paper
 from blocksim.view.work_precision import draw_work_precision, refuse_small_page
 
 COLUMNS = ("quantity", "unit", "median", "smallest", "largest")

@@ -10,7 +10,7 @@ import typer
 from blocksim.cli import completion
 
 if TYPE_CHECKING:
-    from blocksim.view.paper import Paper
+    from blocksim.view.layout import Paper
 
 SIZE = re.compile(r"([0-9]+(?:\.[0-9]*)?)\s*[x×]\s*([0-9]+(?:\.[0-9]*)?)\s*(mm|cm|in|px)?")
 INCHES = {"mm": 1.0 / 25.4, "cm": 1.0 / 2.54, "in": 1.0}
@@ -62,7 +62,7 @@ def page_size(text: object) -> PageSize:
 
 def paper_of(size: PageSize | None, dots: float | None) -> "Paper":
     """Return the page for --size and --dpi. Raises BadParameter for more than MOST_PIXELS."""
-    from blocksim.view.paper import Paper
+    from blocksim.view.layout import Paper
     from blocksim.view.style import DOTS_PER_INCH
 
     resolution = dots or float(DOTS_PER_INCH)

@@ -23,8 +23,8 @@ from blocksim.study.sensitivity_methods import METHODS
 from blocksim.study.stored_run import stored_run
 from blocksim.study.sweep_table import SweepResult
 from blocksim.view.animation import Look, Pace, draw_animation
+from blocksim.view.layout import MILLIMETRES_PER_INCH, Paper
 from blocksim.view.paint import paint_named
-from blocksim.view.paper import MILLIMETRES_PER_INCH, Paper
 from blocksim.view.support import support_of
 
 Place = Path | str | Result | SweepResult

@@ -17,14 +17,12 @@ from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import is_sweep
 from blocksim.view.curves import Choice
-from blocksim.view.kinds import FINAL, HISTORY, STRIP, kind_named
+from blocksim.view.kinds import FINAL, HISTORY, STRIP, SWEEP_KINDS, Kind, kind_for, run_kind
+from blocksim.view.layout import OWN, Paper
 from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.paint import paint_named
-from blocksim.view.paper import OWN, Paper
 from blocksim.view.style import picture_suffix
 from blocksim.view.support import support_of
-from blocksim.view.sweeps.kind import Kind
-from blocksim.view.sweeps.kinds import KINDS, kind_for
 from blocksim.view.tornado import Bars, draw_tornado
 
 if TYPE_CHECKING:
@@ -123,10 +121,10 @@ def _kind_named(name: str) -> Kind:
     if name == TORNADO:
         message = f"a {TORNADO} is drawn from a table of indices: blocksim sensitivity SCENARIO --out TABLE.csv"
         raise InvalidInputError(message)
-    if name not in KINDS:
-        message = f"--kind {name}: unknown kind, {did_you_mean_or_list(name, [*KINDS, TORNADO])}"
+    if name not in SWEEP_KINDS:
+        message = f"--kind {name}: unknown kind, {did_you_mean_or_list(name, [*SWEEP_KINDS, TORNADO])}"
         raise InvalidInputError(message)
-    return KINDS[name]
+    return SWEEP_KINDS[name]
 
 
 def _panel(result: "Convergence", study: "Study", unit: str) -> Panel:
@@ -208,7 +206,7 @@ def draw_run(  # noqa: PLR0913 - what a picture is made of
     `ready` is called with the path before anything is drawn and may refuse it. Raises InvalidInputError for an unknown
     kind or format and options that mean nothing for it, what `stored_run` raises, OutputError.
     """
-    draw = kind_named(kind)
+    draw = run_kind(kind)
     refuse(asked.beside(kind), f"this picture is of kind {kind}")
     stored = stored_run(run)
     scenario = stored.scenario

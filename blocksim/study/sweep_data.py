@@ -17,14 +17,13 @@ from blocksim.scenario.models.variation import Normal, Uniform
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import read_sweep
-from blocksim.view.series import Typed
-from blocksim.view.sweeps.found import FoundSweep, Input, Measured
+from blocksim.view.sweeps.data import Input, Measured, SweepData, Typed
 
 Floats = NDArray[np.float64]
 LARGEST = 1e30  # of inputs (SI) and of places (mm) that are drawn
 
 
-def read_sweep_data(folder: Path, experiment: Path | None = None) -> FoundSweep:
+def read_sweep_data(folder: Path, experiment: Path | None = None) -> SweepData:
     """Return what a sweep's folder holds, beside the scenario's experiment or another table.
 
     Raises InputMissingError or InvalidInputError: where files are missing or damaged, no case has finished, or the
@@ -41,7 +40,7 @@ def read_sweep_data(folder: Path, experiment: Path | None = None) -> FoundSweep:
     x_mm, rotation_deg = (_columns(members, quantity) for quantity in ("x", "rotation"))
     _refuse_cut(members, finished & ~np.isfinite(x_mm + rotation_deg).all(axis=1))
     path = experiment or (None if scenario.experiment is None else scenario.experiment.table)
-    return FoundSweep(
+    return SweepData(
         title=scenario.description or scenario.name,
         mode="" if scenario.sweep is None else scenario.sweep.mode,
         inputs=_inputs(scenario, table),

@@ -28,9 +28,9 @@ from blocksim.view.curves import (
     panels_named,
 )
 from blocksim.view.forces import contacts_of
+from blocksim.view.layout import OWN, Paper
 from blocksim.view.moments import Floats, Indices, drawable_frames
 from blocksim.view.paint import Paint, by_block
-from blocksim.view.paper import OWN, Paper
 from blocksim.view.strip import MeasuredTable
 from blocksim.view.support import Support
 from blocksim.view.totals import (

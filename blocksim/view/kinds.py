@@ -1,16 +1,19 @@
-"""The kinds of pictures of a run, by name."""
+"""The kinds of pictures of runs and of sweeps, by name; a kind is one file and one line here."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
 from blocksim.view.strip import draw_strip
+from blocksim.view.sweeps import histogram, lines, matrix, outcome_map
+from blocksim.view.sweeps.data import SweepData
 
 STRIP, FINAL, HISTORY = "strip", "final", "history"
-# Each draws frames to a path, with title, measured table and support; a kind is one file and one line here.
-KINDS: dict[str, Callable[..., None]] = {
+# Each draws frames to a path, with title, measured table and support.
+RUN_KINDS: dict[str, Callable[..., None]] = {
     STRIP: draw_strip,
     FINAL: draw_final,
     HISTORY: draw_history,
@@ -18,11 +21,36 @@ KINDS: dict[str, Callable[..., None]] = {
 MOST_SLIPS = 2
 
 
-def kind_named(name: str) -> Callable[..., None]:
+@dataclass(frozen=True)
+class Kind:
+    """A kind of picture of a sweep: which sweeps it cannot show or suits best, and its drawing.
+
+    `draw` raises InvalidInputError for an unknown picture format and OutputError when the file cannot be written.
+    """
+
+    refusal: Callable[[SweepData], str]  # why it cannot show a sweep; empty where it can
+    suits: Callable[[SweepData], bool]
+    draw: Callable[..., None]  # (sweep, path, paper = OWN)
+
+
+SWEEP_KINDS = {  # by default the first that suits a sweep is drawn
+    "lines": Kind(lines.refusal, lines.suits, lines.draw),
+    "map": Kind(outcome_map.refusal, outcome_map.suits, outcome_map.draw),
+    "matrix": Kind(matrix.refusal, matrix.suits, matrix.draw),
+    "histogram": Kind(histogram.refusal, histogram.suits, histogram.draw),
+}
+
+
+def run_kind(name: str) -> Callable[..., None]:
     """Return what draws pictures of a kind. Raises InvalidInputError for an unknown one."""
-    if name not in KINDS:
-        meant = nearest(name, KINDS, MOST_SLIPS)
-        hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join(KINDS)}"
+    if name not in RUN_KINDS:
+        meant = nearest(name, RUN_KINDS, MOST_SLIPS)
+        hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join(RUN_KINDS)}"
         message = f"--kind {name}: unknown kind for a run, {hint}"
         raise InvalidInputError(message)
-    return KINDS[name]
+    return RUN_KINDS[name]
+
+
+def kind_for(sweep: SweepData) -> Kind:
+    """Return the first kind that suits a sweep."""
+    return next(kind for kind in SWEEP_KINDS.values() if not kind.refusal(sweep) and kind.suits(sweep))

@@ -9,8 +9,8 @@ import numpy as np
 
 from blocksim.view import style
 from blocksim.view.curves import limits_of
+from blocksim.view.layout import OWN, Paper
 from blocksim.view.moments import Floats
-from blocksim.view.paper import OWN, Paper
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

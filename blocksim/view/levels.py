@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.view import style
-from blocksim.view.paper import OWN, Paper
+from blocksim.view.layout import OWN, Paper
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

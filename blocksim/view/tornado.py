@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.view import style
-from blocksim.view.paper import OWN, Paper
-from blocksim.view.sweeps import layout
-from blocksim.view.sweeps.found import short_names
+from blocksim.view import layout, style
+from blocksim.view.layout import OWN, Paper
+from blocksim.view.sweeps.data import short_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,11 +63,11 @@ def draw_tornado(
     with style.styled_figure(width, height, paper.dots) as figure:
         layout.write_title(figure, title)
         bottom = height - head
-        for panel, told_title, count in zip(panels, titles, rows, strict=True):
-            bottom -= bar * count + layout.LINE * told_title.count("\n")
+        for panel, heading, count in zip(panels, titles, rows, strict=True):
+            bottom -= bar * count + layout.LINE * heading.count("\n")
             axes = layout.add_axes(figure, left, bottom, width - left - 2.0 * layout.EDGE, bar * count)
             _draw_bars(axes, panel)
-            layout.write_text(figure, layout.EDGE, bottom + bar * count + 0.05, told_title)
+            layout.write_text(figure, layout.EDGE, bottom + bar * count + 0.05, heading)
             bottom -= GAP
         place = (layout.EDGE / width, layout.EDGE / height)
         look: dict[str, Any] = {"frameon": False, "borderpad": 0.0, "borderaxespad": 0.0, "labelspacing": 0.25}

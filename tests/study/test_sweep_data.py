@@ -12,14 +12,13 @@ from blocksim.study.plan import Values, with_sweep
 from blocksim.study.sweep import sweep
 from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import prepare
-from blocksim.view.series import value_axis
-from blocksim.view.sweeps.found import FoundSweep
+from blocksim.view.sweeps.data import SweepData, value_axis
 from tests.study.conftest import SCENARIOS
 
 ENDS = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")
 
 
-def stored(nominal: Document, folder: Path, vary: dict[str, Values], rows: list[str], mode: str = "grid") -> FoundSweep:
+def stored(nominal: Document, folder: Path, vary: dict[str, Values], rows: list[str], mode: str = "grid") -> SweepData:
     """Write what a sweep writes, with rows of key values and status, and read it back."""
     base = with_sweep(nominal, vary, mode).build()
     prepare(folder, base, "made-up", overwrite=False)
@@ -47,7 +46,7 @@ def test_values_keep_the_unit_that_was_typed(quick: Document, tmp_path: Path) ->
     folder = sweep(quick, vary, out=tmp_path).folder
     overlap, tilt = read_sweep_data(folder).inputs
     assert [(one.unit, one.typed and one.typed.unit) for one in (overlap, tilt)] == [("m", "cm"), ("rad", "rad")]
-    assert overlap.told(0.009) == "0.9 cm"
+    assert overlap.label(0.009) == "0.9 cm"
     draw_sweep(folder, tmp_path / "map.svg", kind="map")
     drawn = (tmp_path / "map.svg").read_text()
     assert "<!-- structures.0.overlap (cm) -->" in drawn
@@ -74,7 +73,7 @@ def test_friction_angles_are_an_axis_in_degrees(nominal: Document, tmp_path: Pat
     assert value_axis(friction.values, friction.key, friction.unit, typed=friction.typed).label.endswith(
         "block_block (deg)"
     )
-    assert friction.told(friction.values[0]) == "20 deg"
+    assert friction.label(friction.values[0]) == "20 deg"
 
 
 def test_words_become_levels_and_keys_keep_the_order_of_the_table(nominal: Document, tmp_path: Path) -> None:

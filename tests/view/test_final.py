@@ -14,8 +14,8 @@ from blocksim.analysis import load_table
 from blocksim.errors import InvalidInputError, OutputError
 from blocksim.view import final, style
 from blocksim.view.final import draw_final
+from blocksim.view.layout import Paper
 from blocksim.view.paint import by_turn
-from blocksim.view.paper import Paper
 from blocksim.view.support import Support
 from tests.view.made_up import HOSTILE, boxes_of, overlapping, stacked, toppling
 

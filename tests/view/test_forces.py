@@ -12,7 +12,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.simulation.contacts import Contacts, borne, empty_rows
 from blocksim.view.animation import Look, Pace, draw_animation
 from blocksim.view.forces import FORCES, ForceScale, arrows, contacts_of, force_scale, rounded
-from blocksim.view.kinds import KINDS
+from blocksim.view.kinds import RUN_KINDS
 from blocksim.view.support import Support
 from tests.view.made_up import overlapping, pressed, toppling
 
@@ -59,7 +59,7 @@ def test_round_numbers_are_not_larger(value: float, expected: float) -> None:
 @pytest.mark.parametrize("blocks", [1, 3, 7])
 @pytest.mark.parametrize("kind", ["strip", "final"])
 def test_every_panel_has_its_arrows_and_nothing_overlaps(caught: list[Figure], kind: str, blocks: int) -> None:
-    KINDS[kind](pressed(toppling(blocks)), "picture.png", title="forces", forces=True)
+    RUN_KINDS[kind](pressed(toppling(blocks)), "picture.png", title="forces", forces=True)
     (figure,) = caught
     panels = [axes for axes in figure.axes if axes.get_xlabel() == "x (mm)" or axes.get_title(loc="left")]
     assert panels
@@ -72,7 +72,7 @@ def test_every_panel_has_its_arrows_and_nothing_overlaps(caught: list[Figure], k
 
 def test_history_shows_what_the_supports_hold_in_newtons_beside_the_weight(caught: list[Figure]) -> None:
     frames = pressed(toppling(3))
-    KINDS["history"](frames, "picture.png", support=Support(weight=12.0), forces=True)
+    RUN_KINDS["history"](frames, "picture.png", support=Support(weight=12.0), forces=True)
     held = caught[0].axes[5]
     assert held.get_ylabel() == "support force (N)"
     assert frames.contacts is not None
@@ -82,7 +82,7 @@ def test_history_shows_what_the_supports_hold_in_newtons_beside_the_weight(caugh
 
 
 def test_history_cuts_impacts_and_tells_the_largest(caught: list[Figure]) -> None:
-    KINDS["history"](pressed(toppling(3)), "picture.png", support=Support(weight=0.1))
+    RUN_KINDS["history"](pressed(toppling(3)), "picture.png", support=Support(weight=0.1))
     held = caught[0].axes[5]
     assert held.get_ylabel() == "support force (mN)"
     assert held.get_ylim() == pytest.approx((0.0, 300.0))
@@ -91,14 +91,14 @@ def test_history_cuts_impacts_and_tells_the_largest(caught: list[Figure]) -> Non
 
 
 def test_history_of_a_run_without_contacts_has_five_panels(caught: list[Figure]) -> None:
-    KINDS["history"](toppling(3), "picture.png", support=Support(weight=1.0))
+    RUN_KINDS["history"](toppling(3), "picture.png", support=Support(weight=1.0))
     assert len(caught[0].axes) == 5
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", RUN_KINDS)
 def test_missing_contacts_are_reported_with_what_to_do(tmp_path: Path, kind: str) -> None:
     with pytest.raises(InvalidInputError, match=r"stored no contacts.* --set output\.contacts=true"):
-        KINDS[kind](toppling(3), tmp_path / "picture.png", forces=True)
+        RUN_KINDS[kind](toppling(3), tmp_path / "picture.png", forces=True)
     assert list(tmp_path.iterdir()) == []
 
 

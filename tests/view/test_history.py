@@ -13,8 +13,8 @@ from blocksim.scenario.motion import MotionPieces
 from blocksim.view import history, style
 from blocksim.view.curves import LEAST_SPAN, Choice, farthest_blocks
 from blocksim.view.history import draw_history, line_looks
+from blocksim.view.layout import Paper
 from blocksim.view.paint import by_speed
-from blocksim.view.paper import Paper
 from blocksim.view.support import Support
 from blocksim.view.totals import ENERGY_LOOKS, drawn_energies, unit_for
 from tests.view.made_up import HOSTILE, boxes_of, overlapping, toppling

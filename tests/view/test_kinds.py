@@ -1,14 +1,77 @@
-"""Kinds of pictures by name."""
+"""Kinds of pictures by name: which one a sweep gets, and that every kind draws every sweep that it does not refuse."""
 
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
 import pytest
 
-from blocksim.errors import InvalidInputError
-from blocksim.view.kinds import KINDS, kind_named
+from blocksim.errors import InvalidInputError, OutputError
+from blocksim.view.kinds import RUN_KINDS, SWEEP_KINDS, kind_for, run_kind
+from blocksim.view.sweeps.data import Input, SweepData
+from tests.view.sweeps.made_up import grid, made_up, samples
+
+ONE = (Input("gravity", "m/s^2", np.linspace(1.0, 10.0, 8)),)
+MEMBER = tuple(Input(one.key, one.unit, one.values[:1]) for one in samples()[:1])
+SWEEPS = {
+    "one key": (made_up(ONE), "lines"),
+    "a word alone": (made_up(samples()[3:], "list"), "histogram"),
+    "one key, drawn": (made_up(samples(1)[:1], "lhs"), "lines"),
+    "grid": (made_up(grid()), "map"),
+    "grid, some failed": (made_up(grid(), failed=5), "map"),
+    "grid without measurements": (made_up(grid(), measured=False), "map"),
+    "grid in columns": (made_up(grid(3)), "map"),
+    "grid with too many columns": (made_up(grid(6)), "matrix"),
+    "two keys, drawn": (made_up(samples(2)[:2], "sobol"), "map"),
+    "drawn": (made_up(samples(4), "sobol", failed=3), "matrix"),
+    "one member": (made_up(MEMBER, "sobol"), "lines"),
+    "two keys of one member": (made_up(tuple(Input(str(i), "", np.ones(1)) for i in range(2)), "grid"), "lines"),
+}
+DRAWN = [
+    (name, kind) for name, (sweep, _) in SWEEPS.items() for kind in SWEEP_KINDS if not SWEEP_KINDS[kind].refusal(sweep)
+]
 
 
 def test_kinds_are_found_and_misspelt_ones_told() -> None:
-    assert [kind_named(name) for name in KINDS] == list(KINDS.values())
+    assert [run_kind(name) for name in RUN_KINDS] == list(RUN_KINDS.values())
     with pytest.raises(InvalidInputError, match="--kind histroy: unknown kind for a run, did you mean 'history'"):
-        kind_named("histroy")
+        run_kind("histroy")
     with pytest.raises(InvalidInputError, match="choose strip, final, history"):
-        kind_named("pie chart")
+        run_kind("pie chart")
+
+
+@pytest.mark.parametrize(("sweep", "kind"), SWEEPS.values(), ids=SWEEPS)
+def test_a_sweep_gets_the_picture_that_suits_it(sweep: SweepData, kind: str) -> None:
+    assert kind_for(sweep) is SWEEP_KINDS[kind]
+
+
+@pytest.mark.parametrize(("name", "kind"), DRAWN)
+def test_every_kind_draws_what_it_does_not_refuse(tmp_path: Path, name: str, kind: str) -> None:
+    sweep, _ = SWEEPS[name]
+    path = tmp_path / "picture.svg"
+    SWEEP_KINDS[kind].draw(sweep, path)
+    assert ET.parse(path).getroot().tag.endswith("svg")  # noqa: S314 - our own file
+    assert "<!-- made up -->" in path.read_text(encoding="utf-8")
+
+
+def test_refusals_say_what_is_missing() -> None:
+    assert "two numeric inputs" in SWEEP_KINDS["map"].refusal(made_up(ONE))
+    assert "3 keys are varied" in SWEEP_KINDS["lines"].refusal(made_up(grid(3)))
+    assert "(such as 'explicit')" in SWEEP_KINDS["lines"].refusal(made_up(samples()[3:], "list"))
+
+
+@pytest.mark.parametrize("kind", ["map", "matrix", "histogram"])
+def test_same_sweep_gives_the_same_bytes(tmp_path: Path, kind: str) -> None:
+    paths = [tmp_path / f"{name}.png" for name in ("first", "second")]
+    for path in paths:
+        SWEEP_KINDS[kind].draw(made_up(samples(2), "sobol"), path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+@pytest.mark.parametrize("kind", SWEEP_KINDS)
+def test_wrong_files_are_refused(tmp_path: Path, kind: str) -> None:
+    sweep = made_up(grid())
+    with pytest.raises(InvalidInputError, match="unsupported picture format"):
+        SWEEP_KINDS[kind].draw(sweep, tmp_path / "picture.bmp")
+    with pytest.raises(OutputError, match="cannot be written"):
+        SWEEP_KINDS[kind].draw(sweep, tmp_path / "nix" / "picture.png")

@@ -9,8 +9,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError, OutputError
+from blocksim.view.layout import Paper
 from blocksim.view.levels import MOST_BLOCKS, Panel, chosen_blocks, draw_levels, limits_of, refuse_small_page
-from blocksim.view.paper import Paper
 from tests.view.made_up import HOSTILE, overlapping
 
 

@@ -20,7 +20,7 @@ from blocksim.errors import InvalidInputError, OutputError
 from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.contacts import Contacts
 from blocksim.view import strip, style
-from blocksim.view.paper import Paper
+from blocksim.view.layout import Paper
 from blocksim.view.strip import arrangement, draw_strip, measured_ranges, plan, widened
 from blocksim.view.support import Support
 from blocksim.view.window import Extent

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError, OutputError
-from blocksim.view.paper import Paper
+from blocksim.view.layout import Paper
 from blocksim.view.work_precision import (
     SMALLEST_SHARE,
     Curve,

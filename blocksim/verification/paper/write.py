@@ -14,7 +14,7 @@ from blocksim.verification.paper import tables
 from blocksim.verification.paper.laws import bounce_law, bounces, slide_law
 from blocksim.view.final import draw_final
 from blocksim.view.law import draw_law
-from blocksim.view.paper import Paper
+from blocksim.view.layout import Paper
 from blocksim.view.strip import draw_strip
 from blocksim.view.support import support_of
 

@@ -5,12 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.view import style
-from blocksim.view.paper import OWN, Paper
-from blocksim.view.sweeps import layout
-from blocksim.view.sweeps.colours import percent
-from blocksim.view.sweeps.found import Flags, Floats, FoundSweep
-from blocksim.view.sweeps.kind import Kind
+from blocksim.view import layout, style
+from blocksim.view.layout import OWN, Paper
+from blocksim.view.sweeps.data import Flags, Floats, SweepData, percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,17 +25,17 @@ LEAST_BIN_MM = 0.01
 ALL_COLOUR, INSIDE_COLOUR = "#B5D6EA", "#0072B2"
 
 
-def refusal(_sweep: FoundSweep) -> str:
+def refusal(_sweep: SweepData) -> str:
     """Return why a sweep cannot be shown: never."""
     return ""
 
 
-def suits(_sweep: FoundSweep) -> bool:
+def suits(_sweep: SweepData) -> bool:
     """Return True: any sweep may be shown."""
     return True
 
 
-def draw(sweep: FoundSweep, path: Path, paper: Paper = OWN) -> None:
+def draw(sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
     """Draw a panel for each block that moves."""
     blocks = sweep.moving[-MOST_BLOCKS:]
     legend = _entries(sweep)
@@ -76,7 +73,7 @@ def limits_of(x_mm: Floats, others: Floats) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _draw_block(axes: "Axes", sweep: FoundSweep, block: int, room: float) -> None:
+def _draw_block(axes: "Axes", sweep: SweepData, block: int, room: float) -> None:
     """Draw a panel; `room` is that above the bars, over their height."""
     name = sweep.blocks[block]
     x = sweep.x_mm[sweep.finished, block]
@@ -135,7 +132,7 @@ _INTERVAL: dict[str, Any] = {
 }
 
 
-def _entries(sweep: FoundSweep) -> list[Any]:
+def _entries(sweep: SweepData) -> list[Any]:
     """Return the entries of the legend."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
     from matplotlib.patches import Patch  # noqa: PLC0415
@@ -156,6 +153,3 @@ def _caption(x: Floats, limits: tuple[float, float]) -> str:
     beyond = int(((x < limits[0]) | (x > limits[1])).sum())
     told = f", {beyond} beyond the axis" if beyond else ""
     return f"median {np.median(x):.1f} mm{told}"
-
-
-HISTOGRAM = Kind("final x of the blocks, with the repeats and their intervals", refusal, suits, draw)

@@ -1,17 +1,44 @@
-"""Lines: final x of the blocks over one input, a column for each value of a second one."""
+"""Lines: final x of the blocks over one input, a row for each block, a column for each value of a second input."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from textwrap import wrap
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.view.paper import OWN, Paper
-from blocksim.view.series import MOST_COLUMNS, draw_series
-from blocksim.view.sweeps.found import Flags, Floats, FoundSweep, Input
-from blocksim.view.sweeps.kind import Kind
+from blocksim.view import style
+from blocksim.view.layout import OWN, Paper
+from blocksim.view.sweeps.data import (
+    MOST_COLUMNS,
+    STAYS_MM,
+    Flags,
+    Floats,
+    Input,
+    SweepData,
+    Typed,
+    ValueAxis,
+    most_moving,
+    value_axis,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MOST_INPUTS = 2
+WIDTH = 7.6  # inches
+LEFT, RIGHT, HEAD, FOOT = 0.62, 0.15, 0.62, 0.68  # inches
+COLUMN_GAP, ROW_GAP = 0.25, 0.36  # inches
+ROW_HEIGHT = 1.35  # inches
+NARROWEST, LOWEST = 1.0, 0.5  # inches, of a panel on a page whose size was asked for
+TITLE = 0.29  # inches down to the headings
+LINE = 0.155  # inches, of a further line of text
+LETTERS_AN_INCH = 14.5  # in a line below the panels
+LABEL_DEPTH = 0.25  # inches from the panels down to a label that is below all of them
+LEAST_SPAN_MM = 1.0  # of an axis, so that round-off does not look like scatter
+WAVERING = 1.6  # way up and down over range, above which points are not joined
 
 
 @dataclass(frozen=True)
@@ -23,7 +50,7 @@ class Series:
     x_mm: Floats  # (n, b)
 
 
-def refusal(sweep: FoundSweep) -> str:
+def refusal(sweep: SweepData) -> str:
     """Return why a sweep cannot be shown."""
     if len(sweep.inputs) > MOST_INPUTS:
         return f"{len(sweep.inputs)} keys are varied; lines can show one or two"
@@ -33,7 +60,7 @@ def refusal(sweep: FoundSweep) -> str:
     return ""
 
 
-def suits(sweep: FoundSweep) -> bool:
+def suits(sweep: SweepData) -> bool:
     """Return True if all combinations exist, and the columns for the values of the second input are not too many."""
     if refusal(sweep) or (sweep.is_sampled and len(sweep.inputs) > 1):
         return False
@@ -41,7 +68,7 @@ def suits(sweep: FoundSweep) -> bool:
     return other is None or other.count <= MOST_COLUMNS
 
 
-def draw(sweep: FoundSweep, path: Path, paper: Paper = OWN) -> None:
+def draw(sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
     """Draw the lines."""
     axis, _ = _axis_and_other(sweep)
     ranges = {block: ends for block in sweep.blocks if (ends := sweep.measured.range_of(block)) is not None}
@@ -50,13 +77,13 @@ def draw(sweep: FoundSweep, path: Path, paper: Paper = OWN) -> None:
     draw_series(series, sweep.blocks, key, path, sweep.title, ranges, typed=axis.typed, paper=paper)
 
 
-def series_of(sweep: FoundSweep) -> Iterator[Series]:
+def series_of(sweep: SweepData) -> Iterator[Series]:
     """Yield the series of the finished cases, one for each value of the second input of a grid."""
     axis, other = _axis_and_other(sweep)
     groups: list[tuple[str, Flags]] = [("", sweep.finished)]
     if other is not None:
         groups = [
-            (f"{other.key} = {other.told(value)}", sweep.finished & (other.values == value))
+            (f"{other.key} = {other.label(value)}", sweep.finished & (other.values == value))
             for value in np.unique(other.values[sweep.finished])
         ]
     for label, cases in groups:
@@ -64,11 +91,209 @@ def series_of(sweep: FoundSweep) -> Iterator[Series]:
         yield Series(label, axis.values[cases][order], sweep.x_mm[cases][order])
 
 
-def _axis_and_other(sweep: FoundSweep) -> tuple[Input, Input | None]:
+def _axis_and_other(sweep: SweepData) -> tuple[Input, Input | None]:
     """Return the number with the most values, and the other input where both go through all combinations."""
     axis = max((one for one in sweep.inputs if one.is_number), key=lambda one: one.count)
     others = [one for one in sweep.inputs if one is not axis]
     return axis, others[0] if others and sweep.is_grid else None
 
 
-LINES = Kind("final x over one input, one column per value of a second one", refusal, suits, draw)
+def draw_series(  # noqa: PLR0913 - what is drawn, and where
+    series: Sequence[Series],
+    blocks: Sequence[str],
+    key: tuple[str, str],
+    path: Path | str,
+    title: str | None = None,
+    measured: Mapping[str, tuple[float, float]] | None = None,
+    *,
+    typed: Typed | None = None,
+    paper: Paper = OWN,
+) -> None:
+    """Draw final x over a key, given with its SI unit, and write PNG, SVG or PDF; the same input gives the same bytes.
+
+    The axis has the `typed` unit, or where there is none that in which the values are best read.
+    `measured` gives smallest and largest measured x (mm) of some blocks. Raises InvalidInputError for an unknown
+    picture format and OutputError when the file cannot be written.
+    """
+    path = Path(path)
+    style.picture_suffix(path)
+    drawn = list(series)[:MOST_COLUMNS]
+    rows = [(block, blocks[block]) for block in moving_blocks(drawn)]
+    axis = value_axis(np.concatenate([one.values for one in drawn]), *key, typed=typed)
+    page = _page(drawn, rows, axis, paper)
+    count = len(drawn)
+    texts = _legend(len(rows), len(blocks), len(series) - count, is_measured=bool(measured))
+    notes = wrap(texts, max(1, int(LETTERS_AN_INCH * page.width)))
+    page = replace(page, foot=page.foot + (len(notes) - 1) * LINE)
+    others = page.head + page.foot + (len(rows) - 1) * page.gap
+    page = replace(page, row=paper.panel(ROW_HEIGHT, len(rows), others, LOWEST))
+    page = replace(page, height=paper.height(others + len(rows) * page.row))
+    with style.styled_figure(page.width, page.height, paper.dots) as figure:
+        _draw_panels(figure, page, drawn, rows, measured or {})
+        for column, lines in enumerate(page.headings):
+            place = (LEFT + column * (page.panel + COLUMN_GAP)) / page.width, 1.0 - TITLE / page.height
+            figure.text(*place, "\n".join(lines), va="top", weight="bold")
+        if title:
+            shown = style.cut_to(title, (page.width - 0.2) * style.POINTS_PER_INCH, style.TITLE_SIZE)
+            place = 0.1 / page.width, 1.0 - 0.06 / page.height
+            figure.text(*place, shown, va="top", fontsize=style.TITLE_SIZE)
+        figure.text(0.1 / page.width, 0.06 / page.height, "\n".join(notes), color=style.FAINT_INK, va="bottom")
+        style.save_figure(figure, path)
+
+
+@dataclass(frozen=True)
+class _Page:
+    """Widths and heights in inches, and texts that have been broken into lines to fit them."""
+
+    width: float
+    panel: float  # width of a panel
+    axis: ValueAxis
+    label: tuple[str, ...]  # below the panels, once for all where it is wider than one of them
+    headings: tuple[tuple[str, ...], ...]  # above each column
+    captions: tuple[tuple[str, ...], ...]  # above each panel, by row
+    head: float
+    foot: float
+    gap: float
+    row: float = ROW_HEIGHT  # height of a panel
+    height: float = 0.0
+
+
+def _page(series: Sequence[Series], rows: Sequence[tuple[int, str]], axis: ValueAxis, paper: Paper) -> _Page:
+    """Return the page, but for the heights that depend on how many lines stand below all."""
+    count = len(series)
+    sides = LEFT + RIGHT + (count - 1) * COLUMN_GAP
+    width = paper.width(WIDTH, sides + count * NARROWEST)
+    panel = (width - sides) / count
+    label = tuple(style.broken(axis.label, width - LEFT - RIGHT))
+    headings = tuple(tuple(style.broken(one.label, panel, bold=True)) for one in series)
+    captions = captions_of(series, rows, panel * style.POINTS_PER_INCH)
+    more = LINE * (max(text.count("\n") for row in captions for text in row))
+    head = HEAD + LINE * (max(map(len, headings)) - 1) + more
+    foot = FOOT + LINE * (len(label) - 1)
+    return _Page(width, panel, axis, label, headings, captions, head, foot, ROW_GAP + more)
+
+
+def _draw_panels(
+    figure: "Figure",
+    page: _Page,
+    series: Sequence[Series],
+    rows: Sequence[tuple[int, str]],
+    measured: Mapping[str, tuple[float, float]],
+) -> None:
+    """Draw a row of panels for each block, given by number and name, and a column for each series."""
+    joined = all(is_smooth(one.x_mm[:, block]) for one in series for block, _ in rows)
+    for row, (block, name) in enumerate(rows):
+        limits = _limits(series, block, measured.get(name))
+        bottom = page.foot + (len(rows) - 1 - row) * (page.row + page.gap)
+        for column, one in enumerate(series):
+            left = LEFT + column * (page.panel + COLUMN_GAP)
+            size = page.panel / page.width, page.row / page.height
+            axes = figure.add_axes((left / page.width, bottom / page.height, *size))
+            axes.set_ylim(*limits)
+            _draw_band(axes, measured.get(name))
+            _draw_points(axes, one, block, page.axis, joined=joined)
+            _finish(axes, is_log=page.axis.is_log, is_first=column == 0, is_last=row == len(rows) - 1)
+            axes.set_title(page.captions[row][column], loc="left", pad=3.0)
+    _name_axis(figure, page, len(series))
+
+
+def _name_axis(figure: "Figure", page: _Page, columns: int) -> None:
+    """Write the label below every column, or once below all where it is wider than a column."""
+    widest = max(style.width_of(line, style.FONT_SIZE) for line in page.label)
+    if len(page.label) == 1 and widest <= page.panel * style.POINTS_PER_INCH:
+        for axes in figure.axes[-columns:]:
+            axes.set_xlabel(page.label[0], labelpad=2.0)
+        return
+    middle = (LEFT + 0.5 * (page.width - LEFT - RIGHT)) / page.width
+    figure.text(middle, (page.foot - LABEL_DEPTH) / page.height, "\n".join(page.label), ha="center", va="top")
+
+
+def moving_blocks(series: Sequence[Series]) -> list[int]:
+    """Return the blocks to draw, in their order: those whose final x varies most; all are candidates if none does."""
+    return most_moving(np.max([np.ptp(one.x_mm, axis=0) for one in series], axis=0))
+
+
+def is_smooth(values: Floats) -> bool:
+    """Return True if values go up and down so little that a line through them is justified."""
+    spread = float(np.ptp(values))
+    return spread < STAYS_MM or float(np.abs(np.diff(values)).sum()) <= WAVERING * spread
+
+
+def _limits(series: Sequence[Series], block: int, band: tuple[float, float] | None) -> tuple[float, float]:
+    """Return the range of a row's axis (mm), the same for all series."""
+    ends = np.concatenate([one.x_mm[:, block] for one in series] + ([] if band is None else [np.array(band)]))
+    low, high = float(ends.min()), float(ends.max())
+    margin = 0.1 * (high - low) + 0.5 * max(LEAST_SPAN_MM - (high - low), 0.0)
+    return low - margin, high + margin
+
+
+def _draw_points(axes: "Axes", one: Series, block: int, axis: ValueAxis, *, joined: bool) -> None:
+    if axis.is_log:
+        axes.set_xscale("log")
+    axes.plot(
+        axis.shown(one.values),
+        one.x_mm[:, block],
+        color=style.block_colour(block),
+        linestyle="-" if joined else "",
+        linewidth=1.0,
+        marker="o",
+        markersize=4.0,
+        markeredgecolor=style.INK,
+        markeredgewidth=0.4,
+        zorder=3,
+    )
+
+
+def _draw_band(axes: "Axes", band: tuple[float, float] | None) -> None:
+    """Draw the measured range, a line where all repeats are equal."""
+    if band is not None:
+        axes.axhspan(*band, color=style.MEASURED_COLOUR, alpha=0.15, linewidth=0, zorder=0)
+        for end in set(band):
+            axes.axhline(end, color=style.MEASURED_COLOUR, linewidth=style.LINE_WIDTH, zorder=1)
+
+
+def _finish(axes: "Axes", *, is_log: bool, is_first: bool, is_last: bool) -> None:
+    from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter  # noqa: PLC0415 - see style
+
+    axes.spines[["right", "top"]].set_visible(False)
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
+    for side in (axes.xaxis, axes.yaxis):
+        side.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}"))
+        side.set_minor_formatter(NullFormatter())
+    if not is_log:
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]))
+    axes.tick_params(axis="x", labelbottom=is_last)
+    axes.tick_params(axis="y", labelleft=is_first)
+    if is_first:
+        axes.set_ylabel("final x (mm)")
+
+
+def captions_of(series: Sequence[Series], rows: Sequence[tuple[int, str]], room: float) -> tuple[tuple[str, ...], ...]:
+    """Return the text above every panel: block and range in one line where there is room (points), else in two."""
+    told = [[_extent(one.x_mm[:, block]) for one in series] for block, _ in rows]
+    widest = max(style.width_of(extent[0], style.FONT_SIZE) for row in told for extent in row)
+    form = 0 if widest <= style.SURE * room else 1
+    names = [f"block {style.shortened(name, style.MOST_LETTERS)}" for _, name in rows]
+    pairs = [(f"{name}: {extent[form]}", extent[form]) for name, row in zip(names, told, strict=True) for extent in row]
+    if all(style.width_of(line, style.FONT_SIZE) <= style.SURE * room for line, _ in pairs):
+        return tuple(tuple(f"{name}: {one[form]}" for one in row) for name, row in zip(names, told, strict=True))
+    cut = [style.cut_to(name, room, style.FONT_SIZE) for name in names]
+    return tuple(tuple(f"{name}\n{one[form]}" for one in row) for name, row in zip(cut, told, strict=True))
+
+
+def _extent(x: Floats) -> tuple[str, str]:
+    """Return the final places of a block in all runs of a series, in a long and a short form."""
+    apart = f"{np.ptp(x):.2f} mm apart"
+    ends = [f"{end:.2f}".replace("-0.00", "0.00").replace("-", "−") for end in (x.min(), x.max())]
+    return f"{' to '.join(ends)} mm, {apart}", apart
+
+
+def _legend(rows: int, blocks: int, more_series: int, *, is_measured: bool) -> str:
+    texts = ["One point: one run."]
+    if is_measured:
+        texts.append("Band: smallest to largest of the measured repeats.")
+    if rows < blocks:
+        texts.append(f"Not shown: {blocks - rows} of {blocks} blocks, whose final x varies least.")
+    if more_series:
+        texts.append(f"{more_series} more series.")
+    return " ".join(texts)

@@ -7,13 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.view import style
-from blocksim.view.paper import OWN, Paper
-from blocksim.view.series import ValueAxis, value_axis
-from blocksim.view.sweeps import layout
-from blocksim.view.sweeps.colours import percent
-from blocksim.view.sweeps.found import Floats, FoundSweep, Input, short_names
-from blocksim.view.sweeps.kind import Kind
+from blocksim.view import layout, style
+from blocksim.view.layout import OWN, Paper
+from blocksim.view.sweeps.data import Floats, Input, SweepData, ValueAxis, percent, short_names, value_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,18 +49,18 @@ class Variable:
     repeats: Floats | None = None
 
 
-def refusal(sweep: FoundSweep) -> str:
+def refusal(sweep: SweepData) -> str:
     """Return why a sweep cannot be shown: never."""
     del sweep
     return ""
 
 
-def suits(sweep: FoundSweep) -> bool:
+def suits(sweep: SweepData) -> bool:
     """Return True if two or more inputs vary."""
     return len(sweep.inputs) > 1
 
 
-def variables_of(sweep: FoundSweep) -> list[Variable]:
+def variables_of(sweep: SweepData) -> list[Variable]:
     """Return the first inputs and the blocks that move, in this order."""
     inputs = sweep.inputs[:MOST_INPUTS]
     named = zip(inputs, short_names([one.key for one in sweep.inputs])[: len(inputs)], strict=True)
@@ -74,7 +70,7 @@ def variables_of(sweep: FoundSweep) -> list[Variable]:
     ]
 
 
-def draw(sweep: FoundSweep, path: Path, paper: Paper = OWN) -> None:
+def draw(sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
     """Draw the lower half of the matrix, with histograms on its diagonal."""
     variables = variables_of(sweep)
     count, legend = len(variables), _entries(sweep)
@@ -156,7 +152,7 @@ def _in_lines(name: str) -> str:
     return "\n".join(style.broken(name, NAME_ROOM, NAME_FONT))
 
 
-def _of_block(sweep: FoundSweep, block: int) -> Variable:
+def _of_block(sweep: SweepData, block: int) -> Variable:
     x, name = sweep.x_mm[:, block], sweep.blocks[block]
     repeats = sweep.measured.x_mm.get(name)
     ends = np.nanpercentile(x, [RARE, 100.0 - RARE])
@@ -174,7 +170,7 @@ def _around(values: Floats, axis: ValueAxis | None) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _draw_panel(axes: "Axes", sweep: FoundSweep, up: Variable, across: Variable) -> None:
+def _draw_panel(axes: "Axes", sweep: SweepData, up: Variable, across: Variable) -> None:
     if up is across:
         _draw_histogram(axes, sweep, up)
         return
@@ -197,7 +193,7 @@ def _draw_repeats(axes: "Axes", up: Variable, across: Variable) -> None:
                 line(repeat, **REPEAT_LINE)
 
 
-def _draw_histogram(axes: "Axes", sweep: FoundSweep, one: Variable) -> None:
+def _draw_histogram(axes: "Axes", sweep: SweepData, one: Variable) -> None:
     """Draw how many cases have which value, and the same of those that agree, both to the height of the panel."""
     spread = np.geomspace if one.is_log else np.linspace
     edges = spread(*one.limits, BINS + 1)
@@ -230,7 +226,7 @@ def _finish(axes: "Axes", up: Variable, across: Variable, *, is_left: bool, is_l
 
 
 def _number(side: "Axis", one: Variable) -> None:
-    layout.number_axis(side, None if not one.is_log else ValueAxis("", 0.0, 1.0, is_log=True), most=2)
+    layout.number_axis(side, 2, is_log=one.is_log)
     if side is side.axes.xaxis and not one.levels:
         side.set_ticks(_clear_of_the_start(*one.limits, is_log=one.is_log))
     if one.levels:
@@ -251,7 +247,7 @@ def _clear_of_the_start(low: float, high: float, *, is_log: bool) -> list[float]
     return sorted({clear[0], clear[-1]}) if clear else [high]
 
 
-def _entries(sweep: FoundSweep) -> list[Any]:
+def _entries(sweep: SweepData) -> list[Any]:
     """Return the entries of the legend."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
 
@@ -284,6 +280,3 @@ def _legend_place(across: float, height: float) -> dict[str, Any]:
         "handletextpad": 0.3,
         "columnspacing": 1.2,
     }
-
-
-MATRIX = Kind("pairs of inputs and final x, agreeing cases marked", refusal, suits, draw)

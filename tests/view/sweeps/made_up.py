@@ -5,13 +5,13 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.view.sweeps.found import FoundSweep, Input, Measured
+from blocksim.view.sweeps.data import Input, Measured, SweepData
 
 Floats = NDArray[np.float64]
 REPEATS = np.array([71.69, 76.57, 72.70, 73.22, 73.73, 78.53])
 
 
-def made_up(inputs: tuple[Input, ...], mode: str = "grid", failed: int = 0, *, measured: bool = True) -> FoundSweep:
+def made_up(inputs: tuple[Input, ...], mode: str = "grid", failed: int = 0, *, measured: bool = True) -> SweepData:
     """Return a sweep of two blocks: the first stays, the second goes as far as the mean of the inputs' ranks says."""
     count = len(inputs[0].values)
     ranks = np.mean([np.argsort(np.argsort(one.values)) / max(count - 1, 1) for one in inputs], axis=0)
@@ -24,7 +24,7 @@ def made_up(inputs: tuple[Input, ...], mode: str = "grid", failed: int = 0, *, m
     known = Measured(
         {"1": np.full(6, 16.0), "2": REPEATS}, {"1": (15.5, 16.5), "2": (71.69, 78.53)}, {"2": (67.2, 81.6)}, (0, -90)
     )
-    return FoundSweep(
+    return SweepData(
         "made up", mode, inputs, ("1", "2"), x, turns, finished, inside if measured else None,
         known if measured else Measured(),
     )  # fmt: skip

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import numpy as np
 
-from blocksim.view.sweeps.histogram import HISTOGRAM, limits_of
+from blocksim.view.sweeps.histogram import draw, limits_of
 from tests.view.sweeps.made_up import made_up, samples
 
 
 def test_histogram_names_cases_repeats_and_intervals(tmp_path: Path) -> None:
     path = tmp_path / "histogram.svg"
     sweep = made_up(samples(1)[:1], "sobol")
-    HISTOGRAM.draw(sweep, path)
+    draw(sweep, path)
     text = path.read_text(encoding="utf-8")
     for told in ("final x of block 2 (mm)", "all 50 cases", "6 repeats and their range", "next test (95 %)"):
         assert f"<!-- {told} -->" in text
@@ -21,7 +21,7 @@ def test_histogram_names_cases_repeats_and_intervals(tmp_path: Path) -> None:
 
 def test_histogram_without_measurements_names_cases_only(tmp_path: Path) -> None:
     path = tmp_path / "histogram.svg"
-    HISTOGRAM.draw(made_up(samples(1)[:1], "sobol", measured=False), path)
+    draw(made_up(samples(1)[:1], "sobol", measured=False), path)
     text = path.read_text(encoding="utf-8")
     assert "all 50 cases" in text
     assert "repeats" not in text

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
-from blocksim.view.sweeps.matrix import MATRIX, MOST_INPUTS, variables_of
+from blocksim.view.sweeps.matrix import MOST_INPUTS, draw, variables_of
 from tests.view.sweeps.made_up import REPEATS, grid, made_up, samples
 
 
 def test_matrix_names_inputs_blocks_and_marks(tmp_path: Path) -> None:
     path = tmp_path / "matrix.svg"
-    MATRIX.draw(made_up(samples(3), "sobol", failed=5), path)
+    draw(made_up(samples(3), "sobol", failed=5), path)
     text = path.read_text(encoding="utf-8")
     for told in ("key_0", "key_2", "scheme", "nonsmooth", "x of 2 (mm)", "repeats", "failed (10 %)"):
         assert f"<!-- {told} -->" in text
@@ -20,7 +20,7 @@ def test_matrix_names_inputs_blocks_and_marks(tmp_path: Path) -> None:
 
 def test_matrix_without_measurements_marks_nothing(tmp_path: Path) -> None:
     path = tmp_path / "matrix.svg"
-    MATRIX.draw(made_up(samples(2), "sobol", measured=False), path)
+    draw(made_up(samples(2), "sobol", measured=False), path)
     text = path.read_text(encoding="utf-8")
     assert "repeats" not in text
     assert "<!-- finished -->" in text

@@ -1,17 +1,30 @@
-"""Data of a picture of a sweep: the inputs of every case, and the final places of its blocks."""
+"""A sweep as its pictures need it: inputs with their units and axes, final places of the blocks, measurements."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from blocksim.view.series import Typed, most_moving, scale_of
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 QUARTER = 90.0  # deg
 RARE = 5.0  # percent of run-outs at either end that do not make a block worth drawing
+MOST_ROWS, MOST_COLUMNS = 4, 4
+STAYS_MM = 0.01  # a block whose final x varies less than this is not drawn beside others
+DECADES = 30.0  # largest over smallest value from which an axis is logarithmic
+NARROW = 1e-2  # span over middle below which an axis shows distances from the middle
+LEAST_READABLE = 0.01  # in the typed unit: smaller distances from the middle have a prefix of SI instead
+PREFIXED = ("m", "s", "Pa")
+PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+
+
+class Typed(NamedTuple):
+    """The unit in which the user has typed values of a key, and what one of it is in SI."""
+
+    unit: str
+    worth: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +48,7 @@ class Input:
         """How many values differ."""
         return len(np.unique(self.values))
 
-    def told(self, value: float) -> str:
+    def label(self, value: float) -> str:
         """Return a value as it stands in a label, in the typed unit or else that in which all are best read."""
         if self.levels:
             return self.levels[int(value)]
@@ -59,7 +72,7 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False)
-class FoundSweep:
+class SweepData:
     """n cases of a sweep with k inputs and b blocks; numbers of cases that did not finish are NaN."""
 
     title: str
@@ -102,7 +115,7 @@ def short_names(keys: Sequence[str]) -> list[str]:
     return [next(end for end in mine if sum(end in others for others in ends) == 1 or end == mine[-1]) for mine in ends]
 
 
-def told_outcome(outcome: tuple[int, ...], most: int = 6) -> str:
+def outcome_label(outcome: tuple[int, ...], most: int = 6) -> str:
     """Write a class: the rotations of a few blocks, or how many of many have turned."""
     if len(outcome) <= most:
         return "/".join(f"{turn}°".replace("-", "−") for turn in outcome)
@@ -112,3 +125,73 @@ def told_outcome(outcome: tuple[int, ...], most: int = 6) -> str:
 def _ends(key: str) -> list[str]:
     parts = key.split(".")
     return [".".join(parts[start:]) for start in reversed(range(len(parts)))]
+
+
+def percent(share: float) -> str:
+    """Write a share, never rounded to 0 or 100 % unless exact."""
+    if 0.0 < share < 0.01:  # noqa: PLR2004 - one percent
+        return f"{100.0 * share:.2g} %"
+    return f"{min(round(100.0 * share), 99 if share < 1.0 else 100)} %"
+
+
+@dataclass(frozen=True)
+class ValueAxis:
+    """Scale of the values of a key: `(value - middle) * factor`."""
+
+    label: str
+    middle: float
+    factor: float
+    is_log: bool
+
+    def shown(self, values: Floats) -> Floats:
+        """Return the numbers on the axis."""
+        return (values - self.middle) * self.factor
+
+
+def most_moving(spread: Floats) -> list[int]:
+    """Return the blocks to draw by how much their final x varies (mm, (b,))."""
+    candidates = [int(block) for block in np.argsort(-spread, kind="stable")]
+    moving = [block for block in candidates if spread[block] >= STAYS_MM]
+    return sorted((moving or candidates)[:MOST_ROWS])
+
+
+def value_axis(values: Floats, key: str, unit: str, *, is_even: bool = False, typed: Typed | None = None) -> ValueAxis:
+    """Return the axis for values of a key: over decades (not if spaced evenly), around their middle, or plain."""
+    low, high = float(values.min()), float(values.max())
+    factor, shown = scale_of(max(abs(low), abs(high)), unit, typed)
+    if low > 0.0 and high >= DECADES * low and not is_even:
+        factor, shown = (1.0, unit) if typed is None else (factor, shown)
+        return ValueAxis(f"{key}{_bracketed(shown)}", 0.0, factor, is_log=True)
+    middle = float(np.median(np.unique(values)))
+    if 0.0 < high - low < NARROW * abs(middle):
+        half = max(high - middle, middle - low)
+        other, around = scale_of(abs(middle), unit, typed)
+        is_readable = typed is not None and half / typed.worth >= LEAST_READABLE
+        factor, shown = scale_of(half, unit, typed if is_readable else None)
+        return ValueAxis(
+            f"{key} − {middle * other:.9g}{_spaced(around)}{_bracketed(shown)}", middle, factor, is_log=False
+        )
+    return ValueAxis(f"{key}{_bracketed(shown)}", 0.0, factor, is_log=False)
+
+
+def scale_of(size: float, unit: str, typed: Typed | None = None) -> tuple[float, str]:
+    """Return factor and unit for values in SI: as typed, else as values of this size are best read."""
+    if typed is not None:
+        return 1.0 / typed.worth, typed.unit
+    if unit == "rad":
+        return 180.0 / np.pi, "°"
+    power = 3 * int(np.floor(np.log10(size) / 3.0)) if size > 0.0 else 0
+    if unit in PREFIXED:
+        power = min(max(power, min(PREFIXES)), max(PREFIXES))
+        return 10.0**-power, PREFIXES[power] + unit
+    if power in {-3, 0, 3}:
+        return 1.0, unit
+    return 10.0**-power, f"10^{power} {unit}".strip()
+
+
+def _spaced(unit: str) -> str:
+    return f" {unit}" if unit else ""
+
+
+def _bracketed(unit: str) -> str:
+    return f" ({unit})" if unit else ""

@@ -6,14 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.view import style
-from blocksim.view.paper import OWN, Paper
-from blocksim.view.series import MOST_COLUMNS, ValueAxis, value_axis
-from blocksim.view.sweeps import layout
-from blocksim.view.sweeps.cells import Plane, draw_panel, mark_failed
-from blocksim.view.sweeps.colours import Classes, classes_of, run_out_scale
-from blocksim.view.sweeps.found import Flags, Floats, FoundSweep, Input
-from blocksim.view.sweeps.kind import Kind
+from blocksim.view import layout, style
+from blocksim.view.layout import OWN, Paper
+from blocksim.view.sweeps.cells import Classes, Plane, classes_of, draw_panel, mark_failed, run_out_scale
+from blocksim.view.sweeps.data import MOST_COLUMNS, Flags, Floats, Input, SweepData, ValueAxis, value_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +31,7 @@ FEWEST = 3  # values of an input that is an axis
 class _Map:
     """Contents and layout."""
 
-    sweep: FoundSweep
+    sweep: SweepData
     x: Input
     y: Input
     columns: tuple[tuple[str, Flags], ...]  # heading, and the cases (n,)
@@ -93,7 +89,7 @@ class _Map:
         return LEFT + RIGHT + len(self.columns) * self.panel_width + (len(self.columns) - 1) * COLUMN_GAP
 
 
-def suits(sweep: FoundSweep) -> bool:
+def suits(sweep: SweepData) -> bool:
     """Return True if two inputs can be axes and the others, at most one, columns."""
     axes = _axes_of(sweep)
     if refusal(sweep):
@@ -103,12 +99,12 @@ def suits(sweep: FoundSweep) -> bool:
     return spread and len(others) <= 1 and all(one.count <= MOST_COLUMNS for one in others)
 
 
-def refusal(sweep: FoundSweep) -> str:
+def refusal(sweep: SweepData) -> str:
     """Return why a sweep cannot be shown."""
     return "a map needs two numeric inputs" if len(_axes_of(sweep)) < AXES else ""
 
 
-def draw(sweep: FoundSweep, path: Path, paper: Paper = OWN) -> None:
+def draw(sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
     """Draw the map. Samples over more than two inputs are seen along all others."""
     found = _map_of(sweep, paper)
     classes = classes_of(sweep)
@@ -131,12 +127,12 @@ def draw(sweep: FoundSweep, path: Path, paper: Paper = OWN) -> None:
         style.save_figure(figure, path)
 
 
-def _axes_of(sweep: FoundSweep) -> tuple[Input, ...]:
+def _axes_of(sweep: SweepData) -> tuple[Input, ...]:
     """Return the two inputs with the most values; of equal ones the first."""
     return tuple(sorted((one for one in sweep.inputs if one.is_number), key=lambda one: -one.count)[:AXES])
 
 
-def _map_of(sweep: FoundSweep, paper: Paper) -> _Map:
+def _map_of(sweep: SweepData, paper: Paper) -> _Map:
     x, y = axes = _axes_of(sweep)
     others = [one for one in sweep.inputs if one not in axes and one.count <= MOST_COLUMNS]
     everything = np.ones(len(sweep.finished), dtype=bool)
@@ -144,7 +140,7 @@ def _map_of(sweep: FoundSweep, paper: Paper) -> _Map:
     if others:
         name = others[0].key.rpartition(".")[2]
         values = np.unique(others[0].values)
-        columns = [(f"{name} = {others[0].told(value)}", others[0].values == value) for value in values]
+        columns = [(f"{name} = {others[0].label(value)}", others[0].values == value) for value in values]
     shown = tuple(value_axis(one.values, one.key, one.unit, is_even=one.is_even, typed=one.typed) for one in axes)
     return _Map(sweep, x, y, tuple(columns), sweep.moving[-MOST_BLOCKS:], (shown[0], shown[1]), paper)
 
@@ -165,8 +161,8 @@ def _draw_row(
         plane = found.plane(cases)
         draw_panel(axes, plane, numbers[cases], look, None if agrees is None else agrees[cases])
         mark_failed(axes, plane, ~found.sweep.finished[cases])
-        layout.number_axis(axes.xaxis, found.axes[0], most=4)
-        layout.number_axis(axes.yaxis, found.axes[1], most=4)
+        layout.number_axis(axes.xaxis, 4, is_log=found.axes[0].is_log)
+        layout.number_axis(axes.yaxis, 4, is_log=found.axes[1].is_log)
         axes.tick_params(axis="y", labelleft=cases is found.columns[0][1])
 
 
@@ -191,7 +187,7 @@ def _draw_bar(axes: "Axes", colours: Any, norm: Any, band: tuple[float, float] |
 
     bar = Colorbar(axes, ScalarMappable(norm, colours), spacing="proportional", extendfrac=0.06)
     bar.ax.minorticks_off()
-    layout.number_axis(bar.ax.yaxis, most=5)
+    layout.number_axis(bar.ax.yaxis)
     low, high = np.clip(band or (0.0, 0.0), norm.vmin, norm.vmax)
     if low < high:
         axes.fill_between([0.55, 1.0], low, high, color=style.MEASURED_COLOUR, linewidth=0.0)
@@ -269,6 +265,3 @@ def _notes(found: _Map) -> list[str]:
     if hidden:
         texts.append(f"{len(hidden)} other input{' varies' if len(hidden) == 1 else 's vary'}.")
     return texts
-
-
-MAP = Kind("run-outs and outcomes over two inputs", refusal, suits, draw)

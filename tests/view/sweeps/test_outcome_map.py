@@ -5,16 +5,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.view.paper import OWN
-from blocksim.view.sweeps.cells import edges_of, on_grid, outline_of
-from blocksim.view.sweeps.colours import CLASS_COLOURS, OTHER_COLOUR, classes_of, percent, run_out_scale
-from blocksim.view.sweeps.found import FoundSweep, Input
-from blocksim.view.sweeps.map import MAP, _map_of
+from blocksim.view.layout import OWN
+from blocksim.view.sweeps.cells import (
+    CLASS_COLOURS,
+    OTHER_COLOUR,
+    classes_of,
+    edges_of,
+    on_grid,
+    outline_of,
+    run_out_scale,
+)
+from blocksim.view.sweeps.data import Input, SweepData, percent
+from blocksim.view.sweeps.outcome_map import _map_of, draw
 from tests.view.sweeps.made_up import grid, made_up, samples
 
 
-def texts_of(sweep: FoundSweep, folder: Path) -> str:
-    MAP.draw(sweep, folder / "map.svg")
+def texts_of(sweep: SweepData, folder: Path) -> str:
+    draw(sweep, folder / "map.svg")
     return (folder / "map.svg").read_text(encoding="utf-8")
 
 
@@ -89,7 +96,7 @@ def test_measured_class_comes_first_and_rare_ones_are_taken_together() -> None:
     turns = np.column_stack([np.zeros(count), -90.0 * np.array([2, 2, 2, 1, 3, 4, 5, 6])])
     made = made_up((Input("gravity", "", np.arange(1.0, count + 1.0)),), failed=0)
     classes = classes_of(
-        FoundSweep(made.title, "grid", made.inputs, made.blocks, made.x_mm, turns, made.finished, None, made.measured)
+        SweepData(made.title, "grid", made.inputs, made.blocks, made.x_mm, turns, made.finished, None, made.measured)
     )
     assert classes.labels[0] == "0°/−90° (measured): 12 %"
     assert classes.labels[1] == "0°/−180°: 38 %"

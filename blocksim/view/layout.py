@@ -1,21 +1,66 @@
-"""Places on a figure in inches from its lower left corner, and common parts of pictures of sweeps."""
+"""Layout of a page: its size and dots per inch, and places on it in inches from its lower left corner."""
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from blocksim.errors import InvalidInputError
 from blocksim.view import style
-from blocksim.view.series import ValueAxis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
+MILLIMETRES_PER_INCH = 25.4
 COLUMN_WIDTH, PAGE_WIDTH = 3.54, 7.2  # inches: one column of a journal's page, and both
 EDGE = 0.08  # inches, between text and the figure's edge
 TITLE_LINE, TITLE_GAP = 0.19, 0.12  # inches
 WIDE_LETTER = 0.56  # of the font size, a mean of letters
 MANY = 5  # numbers along an axis
 LINE = 0.145  # inches, of a row of text
+
+
+@dataclass(frozen=True)
+class Paper:
+    """Width and height of a picture (inches), None for the picture's own, and its dots per inch, None for 150.
+
+    Letters and lines keep their size: a smaller page has smaller panels.
+    """
+
+    size: tuple[float, float] | None = None
+    dots: float | None = None
+
+    def width(self, own: float, least: float = 0.0) -> float:
+        """Return the width (inches). Raises InvalidInputError where the page is narrower than `least`."""
+        if self.size is None:
+            return own
+        if self.size[0] < least:
+            raise InvalidInputError(self._refusal("wide", least))
+        return self.size[0]
+
+    def height(self, own: float) -> float:
+        """Return the height (inches)."""
+        return own if self.size is None else self.size[1]
+
+    def panel(self, own: float, count: int, others: float, least: float) -> float:
+        """Return the height (inches) of each of `count` panels in addition to `others` inches of text, axes and gaps.
+
+        Raises InvalidInputError where panels would be lower than `least`.
+        """
+        if self.size is None:
+            return own
+        height = (self.size[1] - others) / count
+        if height < least:
+            raise InvalidInputError(self._refusal("high", others + count * least))
+        return height
+
+    def _refusal(self, side: str, least: float) -> str:
+        width, height = (MILLIMETRES_PER_INCH * side for side in self.size or (0.0, 0.0))
+        needed = MILLIMETRES_PER_INCH * least
+        return f"--size {width:.4g}x{height:.4g} mm is too small for this picture: at least {needed:.0f} mm {side}"
+
+
+OWN = Paper()
 
 
 def add_axes(figure: "Figure", left: float, bottom: float, width: float, height: float) -> "Axes":
@@ -43,13 +88,13 @@ def write_title(figure: "Figure", title: str) -> None:
         write_text(figure, EDGE, up - EDGE - number * TITLE_LINE, line, va="top", fontsize=style.TITLE_SIZE)
 
 
-def number_axis(side: "Axis", shown: ValueAxis | None = None, most: int = MANY) -> None:
+def number_axis(side: "Axis", most: int = MANY, *, is_log: bool = False) -> None:
     """Write plain numbers along an axis."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter  # noqa: PLC0415 - see style
 
     side.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}".replace("-", "−")))
     side.set_minor_formatter(NullFormatter())
-    if shown is None or not shown.is_log:
+    if not is_log:
         side.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10]))
 
 
