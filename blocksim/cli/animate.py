@@ -12,7 +12,7 @@ from blocksim.simulation.own_files import is_film, refuse_foreign
 from blocksim.study.stored_run import stored_run
 from blocksim.view.animation import Look, Pace, draw_animation, writer_of
 from blocksim.view.paint import paint_named
-from blocksim.view.support import support_of
+from blocksim.view.run_data import support_of
 
 
 def animate_command(

@@ -25,7 +25,7 @@ from blocksim.study.sweep_table import SweepResult
 from blocksim.view.animation import Look, Pace, draw_animation
 from blocksim.view.layout import MILLIMETRES_PER_INCH, Paper
 from blocksim.view.paint import paint_named
-from blocksim.view.support import support_of
+from blocksim.view.run_data import support_of
 
 Place = Path | str | Result | SweepResult
 T = TypeVar("T")

@@ -16,13 +16,13 @@ from blocksim.study.stored_run import stored_run
 from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import is_sweep
-from blocksim.view.curves import Choice
+from blocksim.view.history_panels import Choice
 from blocksim.view.kinds import FINAL, HISTORY, STRIP, SWEEP_KINDS, Kind, kind_for, run_kind
 from blocksim.view.layout import OWN, Paper
 from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.paint import paint_named
+from blocksim.view.run_data import support_of
 from blocksim.view.style import picture_suffix
-from blocksim.view.support import support_of
 from blocksim.view.tornado import Bars, draw_tornado
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """Pictures of runs. Importing this room is cheap: matplotlib is loaded when the first picture is drawn."""
 
-from blocksim.view.moments import FramesLike
+from blocksim.view.run_data import FramesLike
 from blocksim.view.strip import MeasuredTable, draw_strip
 
 __all__ = ["FramesLike", "MeasuredTable", "draw_strip"]

@@ -12,12 +12,10 @@ from blocksim.errors import InvalidInputError
 from blocksim.view import style
 from blocksim.view.animation_files import write_gif, write_mp4
 from blocksim.view.forces import WithContacts, draw_forces, force_scale
-from blocksim.view.ground import Canvas, draw_ruler
-from blocksim.view.moments import Floats, FramesLike, Indices, drawable_frames
 from blocksim.view.paint import Paint, by_block, draw_key
-from blocksim.view.panel import Page, depth_of, finish_panel, page_for
+from blocksim.view.panel import Canvas, Page, depth_of, draw_ruler, finish_panel, page_for
+from blocksim.view.run_data import Floats, FramesLike, Indices, Support, drawable_frames
 from blocksim.view.scene import draw_blocks, draw_standing
-from blocksim.view.support import Support
 from blocksim.view.window import MILLIMETRES, extent_of, together
 
 if TYPE_CHECKING:

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING
 
 from blocksim.view import style
 from blocksim.view.forces import ForceScale, WithContacts, draw_forces, force_scale
-from blocksim.view.ground import Canvas, draw_ruler
 from blocksim.view.labels import LINE, SPACE, Label, arranged, depth, draw_label, labels_of, lines_of, row_height
 from blocksim.view.layout import OWN, Paper
-from blocksim.view.moments import FramesLike, Indices, drawable_frames, moments_at
 from blocksim.view.paint import Paint, by_block, draw_key
-from blocksim.view.panel import Page, depth_of, finish_panel, page_for
+from blocksim.view.panel import Canvas, Page, depth_of, draw_ruler, finish_panel, page_for
+from blocksim.view.run_data import FramesLike, Indices, Support, drawable_frames, moments_at
 from blocksim.view.scene import draw_centres, draw_scene
 from blocksim.view.strip import MeasuredTable, widened
-from blocksim.view.support import Support
 from blocksim.view.window import extent_of
 
 if TYPE_CHECKING:

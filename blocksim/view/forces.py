@@ -12,8 +12,8 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.contacts import Contacts, Rows, forces_on_a
 from blocksim.view import style
-from blocksim.view.ground import Canvas
-from blocksim.view.moments import Floats, FramesLike
+from blocksim.view.panel import Canvas
+from blocksim.view.run_data import Floats, FramesLike
 from blocksim.view.window import MILLIMETRES
 
 if TYPE_CHECKING:

@@ -1,62 +1,22 @@
-"""Ground and walls of one moment, where they were at the start, and a ruler along tilted ground. Millimetres."""
+"""Ground and walls of one moment, and where they were at the start. Millimetres."""
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from blocksim.scenario import PlacedSegment
 from blocksim.scenario.segments import TOLERANCE
 from blocksim.view import style
-from blocksim.view.moments import Floats
-from blocksim.view.support import Support
-from blocksim.view.window import MILLIMETRES, Extent, parts_within, turned
+from blocksim.view.panel import GROUND_THICKNESS, Canvas
+from blocksim.view.run_data import Floats, Support
+from blocksim.view.window import MILLIMETRES, parts_within
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.transforms import Transform
-
-GROUND_THICKNESS = 5.0  # points, below the lowest ground
 WALL_THICKNESS = 4.0  # points; less than the ground, which covers the feet of walls
 WALLS, GROUND, START, SHIFT = 0.5, 0.6, 0.7, 3.0  # order of drawing; blocks are at 1, lines at 2
 START_LINE: dict[str, Any] = {"colors": style.FAINT_INK, "linewidths": style.LINE_WIDTH, "linestyles": [(0, (3, 2))]}
 LEAST_SHIFT = 0.7  # points; what moved less is at the start's place to the eye
 ARROW_LENGTH = 3.0  # points; a displacement along the ground gets an arrow from here on
-RULER_EDGE = 10.0  # points; no number is nearer to the edge of a panel
-TICK_SPACING = 36.0  # points along the ruler
-TICK_LENGTH = 2.5  # points
-RULER_HEIGHT = 14.0  # points, with the numbers
 MOST_ALIGNED = -0.8  # cosine between two walls that turn back so sharply that a mitre would be a needle
-
-
-@dataclass(frozen=True)
-class Canvas:
-    """Canvas of one moment: axes in the picture's millimetres, all on one scale."""
-
-    axes: "Axes"
-    extent: Extent
-    points_per_mm: float
-
-    @cached_property
-    def scene(self) -> "Transform":
-        """From the scene's millimetres to the paper."""
-        from matplotlib.transforms import Affine2D  # noqa: PLC0415 - see style
-
-        return Affine2D().rotate(self.extent.tilt) + self.axes.transData
-
-    @property
-    def floor(self) -> float:
-        """Where the drawn ground ends (mm, scene)."""
-        return self.extent.base - GROUND_THICKNESS / self.points_per_mm
-
-    def box(self) -> tuple[Floats, Floats]:
-        """Return lower left and upper right (mm, scene) of all that can be seen, and a little more."""
-        sides, ends = (self.extent.left, self.extent.right), (self.extent.lowest, self.extent.top)
-        corners = turned(np.array([[x, y] for x in sides for y in ends]), -self.extent.tilt)
-        more = 0.1 * (self.extent.width + self.extent.height)
-        low, high = corners.min(axis=0) - more, corners.max(axis=0) + more
-        return np.array([low[0], self.floor]), high
 
 
 def draw_support(canvas: Canvas, support: Support, offset: Floats) -> None:
@@ -111,24 +71,6 @@ def draw_shift(canvas: Canvas, support: Support, offset: Floats, x: float) -> No
         arrowprops={"arrowstyle": "->", "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 5.0, "color": style.INK},
         zorder=SHIFT,
     )
-
-
-def draw_ruler(canvas: Canvas, depth: float) -> None:
-    """Draw numbers of x (mm) along tilted ground, `depth` (points) below its lowest part."""
-    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - see style
-
-    y = canvas.extent.base - depth / canvas.points_per_mm
-    low, high = canvas.extent.span(y)
-    edge = RULER_EDGE / canvas.points_per_mm
-    room = (high - low) * canvas.points_per_mm
-    locator = MaxNLocator(nbins=max(2, int(room / TICK_SPACING)), steps=[1, 2, 5, 10])
-    tick = TICK_LENGTH / canvas.points_per_mm
-    canvas.axes.plot([low, high], [y, y], color=style.FAINT_INK, linewidth=style.LINE_WIDTH, transform=canvas.scene)
-    ticks = [float(x) for x in locator.tick_values(low, high) if low + edge <= x <= high - edge]
-    for x in ticks:
-        colour, width = style.FAINT_INK, style.LINE_WIDTH
-        canvas.axes.plot([x, x], [y - tick, y], color=colour, linewidth=width, transform=canvas.scene)
-        _number(canvas, x, y - 1.6 * tick, " mm" if x == ticks[-1] else "")
 
 
 def ground_line(support: Support, canvas: Canvas) -> Floats:
@@ -188,17 +130,3 @@ def _fill(canvas: Canvas, outline: Floats, zorder: float) -> None:
     seen = Path(np.concatenate([outline, outline[:1]]), closed=True).clip_to_bbox(Bbox(np.stack(canvas.box())))
     patch = PathPatch(seen, facecolor=style.GROUND_COLOUR, linewidth=0.0, zorder=zorder, transform=canvas.scene)
     canvas.axes.add_artist(patch)
-
-
-def _number(canvas: Canvas, x: float, y: float, unit: str) -> None:
-    """Write a number, with its unit if any, below (x, y), along the ground."""
-    canvas.axes.text(
-        x,
-        y,
-        f"{x:g}{unit}".replace("-", "−"),
-        rotation=float(np.degrees(canvas.extent.tilt)),
-        rotation_mode="anchor",
-        ha="center",
-        va="top",
-        transform=canvas.scene,
-    )

@@ -11,7 +11,9 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.contacts import Contacts
 from blocksim.view import style
-from blocksim.view.curves import (
+from blocksim.view.forces import contacts_of
+from blocksim.view.history_panels import (
+    BESIDE,
     CONTACTS,
     ENERGY,
     FORCE,
@@ -19,30 +21,25 @@ from blocksim.view.curves import (
     MOTIONS,
     USUAL,
     Choice,
+    Entries,
     HistoryFrames,
     Motion,
     Seen,
     blocks_named,
-    farthest_blocks,
-    limits_of,
-    panels_named,
-)
-from blocksim.view.forces import contacts_of
-from blocksim.view.layout import OWN, Paper
-from blocksim.view.moments import Floats, Indices, drawable_frames
-from blocksim.view.paint import Paint, by_block
-from blocksim.view.strip import MeasuredTable
-from blocksim.view.support import Support
-from blocksim.view.totals import (
-    BESIDE,
-    Entries,
     draw_contacts,
     draw_energies,
     draw_force,
     draw_ground,
     drawn_energies,
+    farthest_blocks,
+    limits_of,
+    panels_named,
     support_force,
 )
+from blocksim.view.layout import OWN, Paper
+from blocksim.view.paint import Paint, by_block
+from blocksim.view.run_data import Floats, Indices, Support, drawable_frames
+from blocksim.view.strip import MeasuredTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

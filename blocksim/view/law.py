@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.view import style
-from blocksim.view.curves import limits_of
+from blocksim.view.history_panels import limits_of
 from blocksim.view.layout import OWN, Paper
-from blocksim.view.moments import Floats
+from blocksim.view.run_data import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.view import style
-from blocksim.view.moments import Floats, FramesLike, drawable_frames
+from blocksim.view.run_data import Floats, FramesLike, drawable_frames
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

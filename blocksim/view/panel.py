@@ -1,15 +1,55 @@
-"""One panel of a picture of blocks: its x axis, the rows below its ground, and a page that holds nothing else."""
+"""One panel of a picture of blocks: canvas, x axis, ruler of tilted ground, and a page that holds nothing else."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from blocksim.view import style
-from blocksim.view.ground import GROUND_THICKNESS, RULER_HEIGHT, Canvas
-from blocksim.view.window import Extent
+from blocksim.view.run_data import Floats
+from blocksim.view.window import Extent, turned
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.transforms import Transform
+
+GROUND_THICKNESS = 5.0  # points, below the lowest ground
+RULER_EDGE = 10.0  # points; no number is nearer to the edge of a panel
+TICK_SPACING = 36.0  # points along the ruler
+TICK_LENGTH = 2.5  # points
+RULER_HEIGHT = 14.0  # points, with the numbers
 TICK_ROOM = 0.4  # inches along the axis for one number
 ROW_HEIGHT = 9.0  # points, of one row of measured ranges
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """Canvas of one moment: axes in the picture's millimetres, all on one scale."""
+
+    axes: "Axes"
+    extent: Extent
+    points_per_mm: float
+
+    @cached_property
+    def scene(self) -> "Transform":
+        """From the scene's millimetres to the paper."""
+        from matplotlib.transforms import Affine2D  # noqa: PLC0415 - see style
+
+        return Affine2D().rotate(self.extent.tilt) + self.axes.transData
+
+    @property
+    def floor(self) -> float:
+        """Where the drawn ground ends (mm, scene)."""
+        return self.extent.base - GROUND_THICKNESS / self.points_per_mm
+
+    def box(self) -> tuple[Floats, Floats]:
+        """Return lower left and upper right (mm, scene) of all that can be seen, and a little more."""
+        sides, ends = (self.extent.left, self.extent.right), (self.extent.lowest, self.extent.top)
+        corners = turned(np.array([[x, y] for x in sides for y in ends]), -self.extent.tilt)
+        more = 0.1 * (self.extent.width + self.extent.height)
+        low, high = corners.min(axis=0) - more, corners.max(axis=0) + more
+        return np.array([low[0], self.floor]), high
 
 
 @dataclass(frozen=True)
@@ -78,3 +118,35 @@ def finish_panel(canvas: Canvas, size: tuple[float, float], *, labelled: bool) -
     axes.spines["bottom"].set_visible(not extent.tilt)
     if labelled:
         axes.set_xlabel("x (mm)", labelpad=1.0)
+
+
+def draw_ruler(canvas: Canvas, depth: float) -> None:
+    """Draw numbers of x (mm) along tilted ground, `depth` (points) below its lowest part."""
+    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - see style
+
+    y = canvas.extent.base - depth / canvas.points_per_mm
+    low, high = canvas.extent.span(y)
+    edge = RULER_EDGE / canvas.points_per_mm
+    room = (high - low) * canvas.points_per_mm
+    locator = MaxNLocator(nbins=max(2, int(room / TICK_SPACING)), steps=[1, 2, 5, 10])
+    tick = TICK_LENGTH / canvas.points_per_mm
+    canvas.axes.plot([low, high], [y, y], color=style.FAINT_INK, linewidth=style.LINE_WIDTH, transform=canvas.scene)
+    ticks = [float(x) for x in locator.tick_values(low, high) if low + edge <= x <= high - edge]
+    for x in ticks:
+        colour, width = style.FAINT_INK, style.LINE_WIDTH
+        canvas.axes.plot([x, x], [y - tick, y], color=colour, linewidth=width, transform=canvas.scene)
+        _write_number(canvas, x, y - 1.6 * tick, " mm" if x == ticks[-1] else "")
+
+
+def _write_number(canvas: Canvas, x: float, y: float, unit: str) -> None:
+    """Write a number, with its unit if any, below (x, y), along the ground."""
+    canvas.axes.text(
+        x,
+        y,
+        f"{x:g}{unit}".replace("-", "−"),
+        rotation=float(np.degrees(canvas.extent.tilt)),
+        rotation_mode="anchor",
+        ha="center",
+        va="top",
+        transform=canvas.scene,
+    )

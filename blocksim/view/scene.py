@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.view import style
-from blocksim.view.ground import Canvas, draw_shift, draw_start, draw_support
-from blocksim.view.moments import Floats, FramesLike
+from blocksim.view.ground import draw_shift, draw_start, draw_support
 from blocksim.view.paint import Paint, by_block
-from blocksim.view.support import Support
+from blocksim.view.panel import Canvas
+from blocksim.view.run_data import Floats, FramesLike, Support
 from blocksim.view.window import MILLIMETRES
 
 Flags = NDArray[np.bool_]

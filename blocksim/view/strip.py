@@ -10,13 +10,11 @@ import numpy as np
 
 from blocksim.view import style
 from blocksim.view.forces import ForceScale, WithContacts, draw_forces, force_scale
-from blocksim.view.ground import Canvas, draw_ruler
 from blocksim.view.layout import OWN, Paper
-from blocksim.view.moments import FramesLike, Indices, drawable_frames, moments_at, moments_by_motion
 from blocksim.view.paint import Paint, by_block, draw_key
-from blocksim.view.panel import ROW_HEIGHT, depth_of, finish_panel, room_below
+from blocksim.view.panel import ROW_HEIGHT, Canvas, depth_of, draw_ruler, finish_panel, room_below
+from blocksim.view.run_data import FramesLike, Indices, Support, drawable_frames, moments_at, moments_by_motion
 from blocksim.view.scene import MeasuredRange, draw_centres, draw_measured, draw_scene, readable_scale
-from blocksim.view.support import Support
 from blocksim.view.window import MILLIMETRES, Extent, extent_of
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario.segments import ENDLESS
-from blocksim.view.moments import Floats, FramesLike, Indices
-from blocksim.view.support import Support
+from blocksim.view.run_data import Floats, FramesLike, Indices, Support
 
 Flags = NDArray[np.bool_]
 MILLIMETRES = 1e3  # per metre

@@ -17,8 +17,8 @@ from blocksim.simulation.frames import Frames
 from blocksim.view.animation import Animation, Look, Pace, Pixels, draw_animation, timed
 from blocksim.view.animation_files import ticks
 from blocksim.view.paint import PAINTS
+from blocksim.view.run_data import Support
 from blocksim.view.style import BLOCK_COLOURS
-from blocksim.view.support import Support
 from tests.view.made_up import HOSTILE, toppling
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"

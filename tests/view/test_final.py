@@ -16,7 +16,7 @@ from blocksim.view import final, style
 from blocksim.view.final import draw_final
 from blocksim.view.layout import Paper
 from blocksim.view.paint import by_turn
-from blocksim.view.support import Support
+from blocksim.view.run_data import Support
 from tests.view.made_up import HOSTILE, boxes_of, overlapping, stacked, toppling
 
 TABLE = load_table(Path(final.__file__).parents[2] / "scenarios" / "experiments" / "three_blocks.csv")

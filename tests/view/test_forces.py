@@ -13,7 +13,7 @@ from blocksim.simulation.contacts import Contacts, borne, empty_rows
 from blocksim.view.animation import Look, Pace, draw_animation
 from blocksim.view.forces import FORCES, ForceScale, arrows, contacts_of, force_scale, rounded
 from blocksim.view.kinds import RUN_KINDS
-from blocksim.view.support import Support
+from blocksim.view.run_data import Support
 from tests.view.made_up import overlapping, pressed, toppling
 
 SCALE = ForceScale(mm_per_newton=10.0, longest=35.0)

@@ -8,17 +8,15 @@ from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedSegment
 from blocksim.view.ground import (
-    GROUND_THICKNESS,
     WALL_THICKNESS,
-    Canvas,
-    draw_ruler,
     draw_shift,
     draw_start,
     draw_support,
     wall_outlines,
 )
+from blocksim.view.panel import GROUND_THICKNESS, Canvas, draw_ruler
+from blocksim.view.run_data import Support
 from blocksim.view.style import styled_figure
-from blocksim.view.support import Support
 from blocksim.view.window import Extent, turned
 
 Floats = NDArray[np.float64]

@@ -11,12 +11,11 @@ from blocksim.analysis import load_table
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.motion import MotionPieces
 from blocksim.view import history, style
-from blocksim.view.curves import LEAST_SPAN, Choice, farthest_blocks
 from blocksim.view.history import draw_history, line_looks
+from blocksim.view.history_panels import ENERGY_LOOKS, LEAST_SPAN, Choice, drawn_energies, farthest_blocks, unit_for
 from blocksim.view.layout import Paper
 from blocksim.view.paint import by_speed
-from blocksim.view.support import Support
-from blocksim.view.totals import ENERGY_LOOKS, drawn_energies, unit_for
+from blocksim.view.run_data import Support
 from tests.view.made_up import HOSTILE, boxes_of, overlapping, toppling
 
 TABLE = load_table(Path(history.__file__).parents[2] / "scenarios" / "experiments" / "three_blocks.csv")

@@ -16,8 +16,8 @@ from PIL import Image
 from blocksim.view import style
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
+from blocksim.view.run_data import Support
 from blocksim.view.strip import draw_strip
-from blocksim.view.support import Support
 from blocksim.view.sweeps.outcome_map import draw
 from blocksim.view.tornado import Bars, draw_tornado
 from tests.view.made_up import pressed, toppling

@@ -10,10 +10,10 @@ from matplotlib.path import Path as MatplotlibPath
 from numpy.typing import NDArray
 
 from blocksim.scenario.motion import MotionPieces
-from blocksim.view.ground import Canvas
+from blocksim.view.panel import Canvas
+from blocksim.view.run_data import Support
 from blocksim.view.scene import corners, draw_scene, readable_scale
 from blocksim.view.style import GROUND_COLOUR, block_colour, styled_figure
-from blocksim.view.support import Support
 from blocksim.view.window import extent_of
 
 Floats = NDArray[np.float64]

@@ -21,8 +21,8 @@ from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.contacts import Contacts
 from blocksim.view import strip, style
 from blocksim.view.layout import Paper
+from blocksim.view.run_data import Support
 from blocksim.view.strip import arrangement, draw_strip, measured_ranges, plan, widened
-from blocksim.view.support import Support
 from blocksim.view.window import Extent
 from tests.view.made_up import overlapping
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedSegment
 from blocksim.scenario.motion import MotionPieces
+from blocksim.view.run_data import Support
 from blocksim.view.scene import corners
-from blocksim.view.support import Support
 from blocksim.view.window import Extent, extent_of, parts_within, turned
 
 Floats = NDArray[np.float64]

@@ -15,8 +15,8 @@ from blocksim.verification.paper.laws import bounce_law, bounces, slide_law
 from blocksim.view.final import draw_final
 from blocksim.view.law import draw_law
 from blocksim.view.layout import Paper
+from blocksim.view.run_data import support_of
 from blocksim.view.strip import draw_strip
-from blocksim.view.support import support_of
 
 PANELS = 11  # of Figure 4
 PAPER = Paper(dots=110.0)

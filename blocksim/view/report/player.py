@@ -16,8 +16,7 @@ from blocksim.simulation.contacts import Contacts
 from blocksim.simulation.frames import Frames
 from blocksim.view import style
 from blocksim.view.forces import force_scale, pushing_up
-from blocksim.view.moments import Indices, drawable_frames
-from blocksim.view.support import support_of
+from blocksim.view.run_data import Indices, drawable_frames, support_of
 from blocksim.view.window import MILLIMETRES, extent_of
 
 Floats = NDArray[np.float64]
