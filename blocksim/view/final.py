@@ -120,9 +120,9 @@ def _tried(
     """Return the page for a panel; `below` are the height (inches) of the key of colours and the scale of forces."""
     key, scale = below
     labels = tuple(arranged(labels_of(frames, frame, page, measured), page))
-    told = _legend(labels, is_labelled=lines_of(labels) <= MOST_LINES)
-    told = told if scale is None else f"{told}\n{scale.told}"
-    notes = tuple(line for part in told.split("\n") for line in wrap(part, int(LETTERS_AN_INCH * page.width)))
+    text = _legend(labels, is_labelled=lines_of(labels) <= MOST_LINES)
+    text = text if scale is None else f"{text}\n{scale.explanation}"
+    notes = tuple(line for part in text.split("\n") for line in wrap(part, int(LETTERS_AN_INCH * page.width)))
     foot = FOOT + (len(notes) - 1) * LINE / style.POINTS_PER_INCH + key
     sheet = Sheet(page, labels, notes, 0.0, foot)
     return replace(sheet, height=page.height + sheet.room + foot)

@@ -51,7 +51,7 @@ class ForceScale:
     longest: float
 
     @property
-    def told(self) -> str:
+    def explanation(self) -> str:
         """Explanation of the arrows for the reader."""
         most = self.longest / self.mm_per_newton
         return f"Arrows: contact forces, drawn on the upper block; {self.example} long, capped at {most:.3g} N."

@@ -36,7 +36,7 @@ from blocksim.view.history_panels import (
     panels_named,
     support_force,
 )
-from blocksim.view.layout import OWN, Paper
+from blocksim.view.layout import OWN, Paper, write_heading
 from blocksim.view.paint import Paint, by_block
 from blocksim.view.run_data import Floats, Indices, Support, drawable_frames
 from blocksim.view.strip import MeasuredTable
@@ -182,8 +182,8 @@ def _panel_height(paper: Paper, names: Sequence[str], foot: float, blocks: int) 
     """Return the height of a panel (inches); names of many blocks need room before the next text at the side."""
     legend = LEGEND + blocks * LINE
     first = next((row for row, name in enumerate(names) if name in MOTIONS), 0)
-    told = next((row for row, name in enumerate(names) if row > first and name not in {*MOTIONS, CONTACTS}), len(names))
-    own = max(PANEL, (legend + GAP) / (told - first) - GAP)
+    end = next((row for row, name in enumerate(names) if row > first and name not in {*MOTIONS, CONTACTS}), len(names))
+    own = max(PANEL, (legend + GAP) / (end - first) - GAP)
     return paper.panel(own, len(names), HEAD + (len(names) - 1) * GAP + foot, LOWEST)
 
 
@@ -284,10 +284,7 @@ def _finish(panels: dict[str, "Axes"], drawing: _Drawing) -> None:
 
 def _draw_texts(figure: "Figure", title: str | None, legend: str) -> None:
     width, height = (float(size) for size in figure.get_size_inches())
-    if title:
-        place = 0.12 / width, 1.0 - 0.08 / height
-        room = (width - 0.24) * style.POINTS_PER_INCH
-        figure.text(*place, style.cut_to(title, room, style.TITLE_SIZE), va="top", fontsize=style.TITLE_SIZE)
+    write_heading(figure, title, 0.12, 0.08)
     figure.text(0.12 / width, 0.06 / height, legend, color=style.FAINT_INK, va="bottom")
 
 

@@ -29,7 +29,6 @@ LEAST_SPAN = 0.05  # mm, degrees, mm/s, degrees/s: an axis never shows less, so 
 
 MOST_WEIGHTS = 3.0  # of all blocks: forces of supports beyond that are cut, those of impacts are far beyond
 SMALL_SHARE = 1e-3  # of the largest energy; what stays below is not drawn
-LEAST_ANGLE = 0.05  # degrees; motion closer to x is along x
 ENERGIES = {  # how entries of the ledger are drawn together
     "kinetic": ("kinetic",),
     "potential": ("potential",),
@@ -261,7 +260,5 @@ def draw_ground(axes: "Axes", time: Floats, support: Support) -> None:
     axes.plot(time, moved, color=style.INK, linewidth=1.0)
     axes.set_ylim(*limits_of(moved))
     axes.set_ylabel("ground (mm)")
-    turn = float(np.degrees(np.arctan2(*support.direction[::-1])))
-    along = "along x" if abs(turn) < LEAST_ANGLE else f"at {turn:.3g}° to x".replace("-", "−")
-    text = f"displacement of\nthe ground {along}" if support.motion is not None else "at rest"
+    text = f"displacement of\nthe ground {support.way}" if support.motion is not None else "at rest"
     axes.text(1.04, 1.0, text, transform=axes.transAxes, va="top")

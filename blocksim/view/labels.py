@@ -101,17 +101,17 @@ def row_height(labels: Sequence[Label]) -> float:
 
 def _label(lines: tuple[str, ...], middle: float, page: Page, measured: tuple[float, float, float] | None) -> Label:
     """Return a label that stays on the page."""
-    told, bar, ends = "", None, [middle]
+    text, bar, ends = "", None, [middle]
     if measured is not None:
         smallest, mean, largest = measured
-        told = f"measured {mean:.2f} [{smallest:.2f}, {largest:.2f}]".replace("-", "−")
+        text = f"measured {mean:.2f} [{smallest:.2f}, {largest:.2f}]".replace("-", "−")
         places = _page_x(page, np.array([[x, page.extent.base] for x in measured]))
         bar = float(places[0]), float(places[1]), float(places[2])
         ends += [bar[0] - CAP, bar[2] + CAP]
-    half = _half(lines, told)
+    half = _half(lines, text)
     room = page.panel_width * style.POINTS_PER_INCH
-    text = min(max(middle, half), max(room - half, half))
-    return Label(lines, text, min([text - half, *ends]), max([text + half, *ends]), 0, bar, told)
+    place = min(max(middle, half), max(room - half, half))
+    return Label(lines, place, min([place - half, *ends]), max([place + half, *ends]), 0, bar, text)
 
 
 def _half(lines: Sequence[str], measured: str) -> float:

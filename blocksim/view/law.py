@@ -9,7 +9,7 @@ import numpy as np
 
 from blocksim.view import style
 from blocksim.view.history_panels import limits_of
-from blocksim.view.layout import OWN, Paper
+from blocksim.view.layout import OWN, Paper, write_heading
 from blocksim.view.run_data import Floats
 
 if TYPE_CHECKING:
@@ -74,9 +74,7 @@ def draw_law(law: Law, path: Path | str, title: str, paper: Paper = OWN) -> None
         _finish(below, law, f"difference ({law.unit})", law.difference[np.isfinite(law.difference)], inside * width)
         above.tick_params(labelbottom=False)
         below.set_xlabel("time (s)", labelpad=2.0)
-        room = (width - 0.24) * style.POINTS_PER_INCH
-        shown = style.cut_to(title, room, style.TITLE_SIZE)
-        figure.text(0.12 / width, 1.0 - 0.08 / height, shown, va="top", fontsize=style.TITLE_SIZE)
+        write_heading(figure, title, 0.12, 0.08)
         style.save_figure(figure, path)
 
 

@@ -88,6 +88,14 @@ def write_title(figure: "Figure", title: str) -> None:
         write_text(figure, EDGE, up - EDGE - number * TITLE_LINE, line, va="top", fontsize=style.TITLE_SIZE)
 
 
+def write_heading(figure: "Figure", title: str | None, side: float, top: float = 0.06) -> None:
+    """Write a title in one line, cut where it is too long, `side` and `top` inches from the edges of the figure."""
+    if title:
+        across, up = (float(size) for size in figure.get_size_inches())
+        shown = style.cut_to(title, (across - 2.0 * side) * style.POINTS_PER_INCH, style.TITLE_SIZE)
+        figure.text(side / across, 1.0 - top / up, shown, va="top", fontsize=style.TITLE_SIZE)
+
+
 def number_axis(side: "Axis", most: int = MANY, *, is_log: bool = False) -> None:
     """Write plain numbers along an axis."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter  # noqa: PLC0415 - see style

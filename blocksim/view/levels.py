@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from blocksim.view import style
-from blocksim.view.layout import OWN, Paper
+from blocksim.view.layout import OWN, Paper, write_heading
+from blocksim.view.run_data import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +27,6 @@ MOST_BLOCKS = 4
 LARGEST: dict[str, Any] = {"color": style.INK, "linewidth": 2.5, "alpha": 0.25}
 NUMBER_ROOM = 0.5  # inches, for a number below an axis
 DISTANCE, SHORT_DISTANCE = "distance from the finest level (mm)", "distance (mm)"
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -90,10 +89,7 @@ def draw_levels(
             axes.tick_params(axis="y", which="both", labelleft=index == 0)
         has_room = style.width_of(DISTANCE, style.FONT_SIZE) <= page.row * style.POINTS_PER_INCH
         figure.axes[0].set_ylabel(DISTANCE if has_room else SHORT_DISTANCE)
-        if title:
-            top = 1.0 - 0.06 / page.height
-            title = style.cut_to(title, (page.width - 0.24) * style.POINTS_PER_INCH, style.TITLE_SIZE)
-            figure.suptitle(title, x=0.12 / page.width, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE)
+        write_heading(figure, title, 0.12)
         figure.legend(handles=_legend(panels[0].blocks, shown), loc="lower left", ncols=page.columns, frameon=False)
         style.save_figure(figure, path)
 

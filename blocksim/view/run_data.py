@@ -14,6 +14,7 @@ from blocksim.scenario.segments import wall_segments
 
 PRINTED_DIGITS = 3  # of a time in s
 PRINTED = 0.000501  # s; half of the last digit of a printed time, and round-off
+LEAST_ANGLE = 0.05  # degrees; motion closer to x is along x
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
@@ -143,6 +144,12 @@ class Support:
     direction: tuple[float, float] = (1.0, 0.0)
     motion: MotionPieces | None = None
     weight: float = 0.0
+
+    @property
+    def way(self) -> str:
+        """The direction of motion in words."""
+        turn = float(np.degrees(np.arctan2(*self.direction[::-1])))
+        return "along x" if abs(turn) < LEAST_ANGLE else f"at {turn:.3g}° to x".replace("-", "−")
 
     def displacement(self, times: Floats) -> Floats:
         """Return the displacement (m) along `direction` at these times (s)."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from blocksim.view import style
 from blocksim.view.forces import ForceScale, WithContacts, draw_forces, force_scale
-from blocksim.view.layout import OWN, Paper
+from blocksim.view.layout import OWN, Paper, write_heading
 from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import ROW_HEIGHT, Canvas, depth_of, draw_ruler, finish_panel, room_below
 from blocksim.view.run_data import FramesLike, Indices, Support, drawable_frames, moments_at, moments_by_motion
@@ -34,7 +34,6 @@ WIDEST_IN_FOURS, WIDEST_IN_PAIRS = 2.5, 6.0  # width over height, so that a pane
 LOW_ENOUGH = 1.6  # width over height from which four rows of pairs fit on a page
 NARROWEST = 0.35  # width over height
 LEAST_MOVED = 0.005  # mm; less is zero in two decimals
-LEAST_ANGLE = 0.05  # degrees; motion closer to x is along x
 RANGE_GAP = 0.06  # part of the width that two measured ranges in one row keep apart
 
 
@@ -274,10 +273,7 @@ def _draw_forces(figure: "Figure", frames: WithContacts, chosen: Indices, layout
 
 def _draw_texts(figure: "Figure", layout: Layout, title: str | None, notes: Sequence[str]) -> None:
     side = SIDE / layout.width
-    if title:
-        top = 1.0 - 0.06 / layout.height
-        shown = style.cut_to(title, (layout.width - 2.0 * SIDE) * style.POINTS_PER_INCH, style.TITLE_SIZE)
-        figure.suptitle(shown, x=side, y=top, ha="left", va="top", fontsize=style.TITLE_SIZE)
+    write_heading(figure, title, SIDE)
     figure.text(side, 0.05 / layout.height, "\n".join(notes), color=style.FAINT_INK, va="bottom")
 
 
@@ -300,14 +296,12 @@ def _legend(ranges: Sequence[MeasuredRange], support: Support, scale: ForceScale
     if any(support.fixed):
         texts.append("Grey: fixed.")
     if support.motion is not None:
-        turn = float(np.degrees(np.arctan2(*support.direction[::-1])))
-        along = "along x" if abs(turn) < LEAST_ANGLE else f"at {turn:.3g}° to x".replace("-", "−")
-        texts.append(f"The support moves {along}; dashes and arrow: from where it was at the start.")
+        texts.append(f"The support moves {support.way}; dashes and arrow: from where it was at the start.")
     if support.tilt:
         angle = f"{float(np.degrees(support.tilt)):.3g}°".replace("-", "−")
         texts.append(f"The ground is tilted by {angle}, gravity points down; x along the ground in mm.")
     if ranges:
         texts.append("Last panel: simulated centres marked on the ground, measured mean and range below it.")
     if scale is not None:
-        texts.append(scale.told)
+        texts.append(scale.explanation)
     return " ".join(texts)

@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from blocksim.view import layout, style
 from blocksim.view.layout import OWN, Paper
-from blocksim.view.sweeps.data import short_names
+from blocksim.view.sweeps.data import Floats, short_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +22,6 @@ MOST_KEYS, MOST_PANELS = 10, 8
 MOST_INTERVAL = 0.6  # of the longest bar, that an axis makes room for
 BEYOND: dict[str, Any] = {"linestyle": "", "marker": ">", "markersize": 3.0, "color": style.INK, "clip_on": False}
 MAIN_COLOUR, FIRST_COLOUR = "#B5D6EA", "#0072B2"
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +45,8 @@ def draw_tornado(
     """
     path = Path(path)
     style.picture_suffix(path)
-    told = [panel for panel in panels if np.any(panel.values)] or list(panels)
-    panels = [replace(panel, keys=tuple(map(broken, short_names(panel.keys)))) for panel in told[:MOST_PANELS]]
+    varying = [panel for panel in panels if np.any(panel.values)] or list(panels)
+    panels = [replace(panel, keys=tuple(map(broken, short_names(panel.keys)))) for panel in varying[:MOST_PANELS]]
     left = _room_for_keys(panels)
     width = paper.width(layout.COLUMN_WIDTH, left + NARROWEST)
     titles = ["\n".join(style.broken(panel.title, width - 2.0 * layout.EDGE)) for panel in panels]

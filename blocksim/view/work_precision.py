@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from blocksim.view import style
-from blocksim.view.layout import OWN, Paper
+from blocksim.view.layout import OWN, Paper, write_heading
+from blocksim.view.run_data import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,7 +24,6 @@ DASHES = ("-", (0, (4, 2)), (0, (1, 1.5)))
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")  # as in style, the well visible ones
 MANY_DECADES = 100.0  # ratio of the ends of an axis
 SMALLEST_SHARE = 1e-4  # of the largest error: what is less is drawn there
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -83,10 +82,7 @@ def draw_work_precision(
             anchor = (left / page.width, 0.04 / page.height)
             handles = axes.get_legend_handles_labels()
             figure.legend(*handles, loc="lower left", bbox_to_anchor=anchor, ncols=page.columns, frameon=False)
-        if title:
-            place = {"x": 0.12 / page.width, "y": 1.0 - 0.06 / page.height}
-            title = style.cut_to(title, (page.width - 0.24) * style.POINTS_PER_INCH, style.TITLE_SIZE)
-            figure.suptitle(title, **place, ha="left", va="top", fontsize=style.TITLE_SIZE)
+        write_heading(figure, title, 0.12)
         style.save_figure(figure, path)
 
 

@@ -43,7 +43,7 @@ def test_scale_is_that_of_usual_forces_not_of_impacts() -> None:
     frames.contacts.rows["normal_force"][:5] = 1e6
     assert force_scale(frames).mm_per_newton == pytest.approx(scale.mm_per_newton, rel=0.1)
     assert scale.longest == pytest.approx(2.0 * 0.6 * 41.0)
-    assert "5 N is 20.4 mm long, capped at 12.1 N" in scale.told
+    assert "5 N is 20.4 mm long, capped at 12.1 N" in scale.explanation
 
 
 def test_run_without_a_single_contact_has_a_scale() -> None:

@@ -16,12 +16,9 @@ from blocksim.simulation.contacts import Contacts
 from blocksim.simulation.frames import Frames
 from blocksim.view import style
 from blocksim.view.forces import force_scale, pushing_up
-from blocksim.view.run_data import Indices, drawable_frames, support_of
+from blocksim.view.run_data import Floats, Indices, drawable_frames, support_of
 from blocksim.view.window import MILLIMETRES, extent_of
 
-Floats = NDArray[np.float64]
-
-MILLI = 1e3
 EXACT_VALUES = 200_000  # up to so many values are kept as 32-bit floats
 MOST_BYTES = 12_000_000  # of the frames of one run, before they become text, which takes a third more
 LEVELS = 65_535  # steps of a rounded value
@@ -62,13 +59,13 @@ def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
     data = {
         "time": pack(frames.time[kept], exact=True)[0],
         "names": list(frames.names),
-        "size_x": _listed(MILLI * frames.size_x),
-        "size_y": _listed(MILLI * frames.size_y),
+        "size_x": _listed(MILLIMETRES * frames.size_x),
+        "size_y": _listed(MILLIMETRES * frames.size_y),
         "start_angle": _listed(np.degrees(frames.start_angle)),
         "channels": {name: part for name, (part, _) in packed.items()},
         "energy": {name: pack(values[kept], exact=True)[0] for name, values in frames.energy.items()},
         "contact_count": pack(frames.contact_count[kept], exact=True)[0],
-        "largest_overlap": pack(MILLI * frames.largest_overlap[kept], exact=True)[0],
+        "largest_overlap": pack(MILLIMETRES * frames.largest_overlap[kept], exact=True)[0],
     }
     return Packed(data, len(kept), len(frames), {name: error for name, (_, error) in packed.items()})
 
@@ -90,12 +87,12 @@ def pack_forces(frames: Frames, kept: Indices, tilt: float) -> dict[str, Any] | 
         return None
     rows, ends = _of_frames(frames.contacts, kept)
     forces, scale = pushing_up(rows, tilt), force_scale(frames)
-    columns = {"x": MILLI * rows["x"], "y": MILLI * rows["y"], "fx": forces[:, 0], "fy": forces[:, 1]}
+    columns = {"x": MILLIMETRES * rows["x"], "y": MILLIMETRES * rows["y"], "fx": forces[:, 0], "fy": forces[:, 1]}
     return {
         "ends": ends,
         "scale": float(f"{scale.mm_per_newton:.5g}"),
         "longest": float(f"{scale.longest:.5g}"),
-        "told": scale.told,
+        "told": scale.explanation,
         **{name: pack(values, exact=True)[0] for name, values in columns.items()},
     }
 
@@ -133,7 +130,7 @@ def _thinned(drawable: Indices, blocks: int, most_bytes: int, more: int) -> Indi
 
 
 def _channels(frames: Frames, kept: Indices) -> dict[str, Floats]:
-    lengths = {name: MILLI * getattr(frames, name)[kept] for name in ("x", "y", "vx", "vy")}
+    lengths = {name: MILLIMETRES * getattr(frames, name)[kept] for name in ("x", "y", "vx", "vy")}
     turns = {"rotation": np.degrees(frames.rotation[kept]), "spin": np.degrees(frames.spin[kept])}
     return {name: {**lengths, **turns}[name] for name in CHANNELS}
 

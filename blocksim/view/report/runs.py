@@ -171,7 +171,7 @@ def _moving(run: PartialRun, most_bytes: int) -> tuple[dict[str, Any] | None, li
     scene = scene_data(run.frames, run.scenario, kept)
     forces = pack_forces(run.frames, kept, scene["tilt"])
     found = packed.data["energy"]
-    energy = {told: found[name] for name, told in LEDGER.items() if name in found}
+    energy = {label: found[name] for name, label in LEDGER.items() if name in found}
     notes = [*packed.notes, NO_FORCES if forces is None else forces["told"]]
     return {**packed.data, "energy": energy, "scene": scene, "forces": forces}, notes, []
 
@@ -199,15 +199,18 @@ def _summary(run: PartialRun) -> list[tuple[str, str]]:
     if run.summary is None:
         last = [] if run.frames is None else [("recorded until", f"{run.frames.time[-1]:.4g} s")]
         return [*blocks, *last]
-    told = run.summary
+    summary = run.summary
     return [
         *blocks,
-        *_movement(told.movement),
-        ("simulated time", f"{told.simulated_time_s:.4g} s"),
-        ("steps", f"{told.steps} of {told.time_step_s:.3g} s"),
-        ("solver time", f"{told.solver_seconds:.2f} s on {told.threads} thread{'s' if told.threads > 1 else ''}"),
-        ("relative energy error", _share(told.energy_J.relative_residual)),
-        *(("warning", warning) for warning in told.warnings),
+        *_movement(summary.movement),
+        ("simulated time", f"{summary.simulated_time_s:.4g} s"),
+        ("steps", f"{summary.steps} of {summary.time_step_s:.3g} s"),
+        (
+            "solver time",
+            f"{summary.solver_seconds:.2f} s on {summary.threads} thread{'s' if summary.threads > 1 else ''}",
+        ),
+        ("relative energy error", _share(summary.energy_J.relative_residual)),
+        *(("warning", warning) for warning in summary.warnings),
     ]
 
 
@@ -247,6 +250,6 @@ def _joule(value: float) -> str:
 def _provenance(run: PartialRun) -> list[tuple[str, str]]:
     if run.summary is None:
         return []
-    told = run.summary
-    hashes = [("run", told.run), ("scenario", told.scenario_hash), ("final state", told.final_state_sha256)]
-    return [("ended at", told.ended_at), *hashes, *told.environment.items(), *told.sha256.items()]
+    summary = run.summary
+    hashes = [("run", summary.run), ("scenario", summary.scenario_hash), ("final state", summary.final_state_sha256)]
+    return [("ended at", summary.ended_at), *hashes, *summary.environment.items(), *summary.sha256.items()]

@@ -151,5 +151,5 @@ def _entries(sweep: SweepData) -> list[Any]:
 
 def _caption(x: Floats, limits: tuple[float, float]) -> str:
     beyond = int(((x < limits[0]) | (x > limits[1])).sum())
-    told = f", {beyond} beyond the axis" if beyond else ""
-    return f"median {np.median(x):.1f} mm{told}"
+    rest = f", {beyond} beyond the axis" if beyond else ""
+    return f"median {np.median(x):.1f} mm{rest}"

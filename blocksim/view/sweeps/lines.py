@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blocksim.view import style
-from blocksim.view.layout import OWN, Paper
+from blocksim.view.layout import OWN, Paper, write_heading
 from blocksim.view.sweeps.data import (
     MOST_COLUMNS,
     STAYS_MM,
@@ -133,10 +133,7 @@ def draw_series(  # noqa: PLR0913 - what is drawn, and where
         for column, lines in enumerate(page.headings):
             place = (LEFT + column * (page.panel + COLUMN_GAP)) / page.width, 1.0 - TITLE / page.height
             figure.text(*place, "\n".join(lines), va="top", weight="bold")
-        if title:
-            shown = style.cut_to(title, (page.width - 0.2) * style.POINTS_PER_INCH, style.TITLE_SIZE)
-            place = 0.1 / page.width, 1.0 - 0.06 / page.height
-            figure.text(*place, shown, va="top", fontsize=style.TITLE_SIZE)
+        write_heading(figure, title, 0.1)
         figure.text(0.1 / page.width, 0.06 / page.height, "\n".join(notes), color=style.FAINT_INK, va="bottom")
         style.save_figure(figure, path)
 
@@ -270,15 +267,17 @@ def _finish(axes: "Axes", *, is_log: bool, is_first: bool, is_last: bool) -> Non
 
 def captions_of(series: Sequence[Series], rows: Sequence[tuple[int, str]], room: float) -> tuple[tuple[str, ...], ...]:
     """Return the text above every panel: block and range in one line where there is room (points), else in two."""
-    told = [[_extent(one.x_mm[:, block]) for one in series] for block, _ in rows]
-    widest = max(style.width_of(extent[0], style.FONT_SIZE) for row in told for extent in row)
+    extents = [[_extent(one.x_mm[:, block]) for one in series] for block, _ in rows]
+    widest = max(style.width_of(extent[0], style.FONT_SIZE) for row in extents for extent in row)
     form = 0 if widest <= style.SURE * room else 1
     names = [f"block {style.shortened(name, style.MOST_LETTERS)}" for _, name in rows]
-    pairs = [(f"{name}: {extent[form]}", extent[form]) for name, row in zip(names, told, strict=True) for extent in row]
+    pairs = [
+        (f"{name}: {extent[form]}", extent[form]) for name, row in zip(names, extents, strict=True) for extent in row
+    ]
     if all(style.width_of(line, style.FONT_SIZE) <= style.SURE * room for line, _ in pairs):
-        return tuple(tuple(f"{name}: {one[form]}" for one in row) for name, row in zip(names, told, strict=True))
+        return tuple(tuple(f"{name}: {one[form]}" for one in row) for name, row in zip(names, extents, strict=True))
     cut = [style.cut_to(name, room, style.FONT_SIZE) for name in names]
-    return tuple(tuple(f"{name}\n{one[form]}" for one in row) for name, row in zip(cut, told, strict=True))
+    return tuple(tuple(f"{name}\n{one[form]}" for one in row) for name, row in zip(cut, extents, strict=True))
 
 
 def _extent(x: Floats) -> tuple[str, str]:

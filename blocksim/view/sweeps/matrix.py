@@ -257,8 +257,8 @@ def _entries(sweep: SweepData) -> list[Any]:
         entries.append(Line2D([], [], **dot, color=INSIDE["color"], markersize=3.0, label="finished"))
     else:
         share = percent(float(sweep.inside.mean()))
-        told = f"in all measured ranges ({share} of {len(sweep.finished)})"
-        entries.append(Line2D([], [], **dot, color=INSIDE["color"], markersize=3.5, label=told))
+        label = f"in all measured ranges ({share} of {len(sweep.finished)})"
+        entries.append(Line2D([], [], **dot, color=INSIDE["color"], markersize=3.5, label=label))
         entries.append(Line2D([], [], **dot, color=OUTSIDE["color"], markersize=2.5, label="others"))
     if not sweep.finished.all():
         failed = f"failed ({percent(1.0 - float(sweep.finished.mean()))})"
