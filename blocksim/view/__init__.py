@@ -1,4 +1,4 @@
-"""Pictures of runs. Importing this room is cheap: matplotlib is loaded when the first picture is drawn."""
+"""Pictures, animations, reports. Importing this room is cheap: matplotlib is loaded when the first picture is drawn."""
 
 from blocksim.view.run_data import FramesLike
 from blocksim.view.strip import MeasuredTable, draw_strip

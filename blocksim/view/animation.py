@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Pixels = NDArray[np.uint8]  # (height, width, 3), red, green, blue
 Writer = Callable[[Path, Iterator[Pixels], Floats], None]
 
-WRITERS: dict[str, Writer] = {".gif": write_gif, ".mp4": write_mp4}  # by suffix; a format is one file and a line here
+WRITERS: dict[str, Writer] = {".gif": write_gif, ".mp4": write_mp4}  # by suffix; one function and one line a format
 DOTS_PER_INCH = 100.0  # letters of 11 pixels
 MARGINS = 0.15, 0.50, 0.42  # inches: at the sides, above and below the panel
 HIGHEST = 1.25  # height of the panel over its width
