@@ -36,7 +36,7 @@ from blocksim.view.history_panels import (
     panels_named,
     support_force,
 )
-from blocksim.view.layout import OWN, Paper, write_heading
+from blocksim.view.layout import OWN, Paper, plain_numbers, write_heading
 from blocksim.view.paint import Paint, by_block
 from blocksim.view.run_data import Floats, Indices, Support, drawable_frames
 from blocksim.view.strip import MeasuredTable
@@ -266,7 +266,7 @@ def _draw_measured(axes: "Axes", drawing: _Drawing, motion: Motion, measured: Me
 def _finish(panels: dict[str, "Axes"], drawing: _Drawing) -> None:
     """Name the coloured blocks at their first panel, write plain numbers, give all panels one axis of time."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
-    from matplotlib.ticker import FuncFormatter, MaxNLocator  # noqa: PLC0415
+    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415
 
     first = next((axes for name, axes in panels.items() if name in MOTIONS), None)
     if drawing.shown and first is not None:
@@ -279,7 +279,7 @@ def _finish(panels: dict[str, "Axes"], drawing: _Drawing) -> None:
     for name, axes in panels.items():
         axes.set_xlim(start, start + 1.04 * max(end - start, 1e-9))
         axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10], integer=name == CONTACTS))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}".replace("-", "−")))
+        plain_numbers(axes.yaxis)
 
 
 def _draw_texts(figure: "Figure", title: str | None, legend: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from blocksim.view import style
 from blocksim.view.history_panels import limits_of
-from blocksim.view.layout import OWN, Paper, write_heading
+from blocksim.view.layout import OWN, Paper, plain_numbers, write_heading
 from blocksim.view.run_data import Floats
 
 if TYPE_CHECKING:
@@ -80,8 +80,6 @@ def draw_law(law: Law, path: Path | str, title: str, paper: Paper = OWN) -> None
 
 def _finish(axes: "Axes", law: Law, label: str, values: Floats, inside: float) -> None:
     """Set limits and texts of a panel, `inside` inches wide."""
-    from matplotlib.ticker import FuncFormatter  # noqa: PLC0415 - see style
-
     for mark in law.marks:
         axes.axvline(mark, color=style.FAINT_INK, linewidth=0.5, zorder=0)
     axes.spines[["right", "top"]].set_visible(False)
@@ -90,4 +88,4 @@ def _finish(axes: "Axes", law: Law, label: str, values: Floats, inside: float) -
     axes.set_ylim(low, high)
     axes.yaxis.set_label_coords(-0.52 / inside, 0.5)
     axes.set_ylabel(label)
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}".replace("-", "−")))
+    plain_numbers(axes.yaxis)

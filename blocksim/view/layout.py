@@ -96,11 +96,18 @@ def write_heading(figure: "Figure", title: str | None, side: float, top: float =
         figure.text(side / across, 1.0 - top / up, shown, va="top", fontsize=style.TITLE_SIZE)
 
 
-def number_axis(side: "Axis", most: int = MANY, *, is_log: bool = False) -> None:
-    """Write plain numbers along an axis."""
-    from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter  # noqa: PLC0415 - see style
+def plain_numbers(side: "Axis") -> None:
+    """Write numbers along an axis as they are, with a proper minus sign, and not in powers of ten."""
+    from matplotlib.ticker import FuncFormatter  # noqa: PLC0415 - see style
 
     side.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}".replace("-", "−")))
+
+
+def number_axis(side: "Axis", most: int = MANY, *, is_log: bool = False) -> None:
+    """Write plain numbers along an axis."""
+    from matplotlib.ticker import MaxNLocator, NullFormatter  # noqa: PLC0415 - see style
+
+    plain_numbers(side)
     side.set_minor_formatter(NullFormatter())
     if not is_log:
         side.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10]))
