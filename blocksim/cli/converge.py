@@ -93,7 +93,8 @@ def converge_command(
         picture_suffix(path)
         if picture:
             refuse_small_page(len(refinements_of(ready, chosen)), paper)
-            refuse_foreign(path, is_picture, overwrite=overwrite)
+            if out is not None or path.parent.exists():  # the usual folder is made with the picture
+                refuse_foreign(path, is_picture, overwrite=overwrite)
         tell_compilation(kernels_of(ready), quiet=silent)
         result = converge(
             ready,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
 from blocksim.kernels.arrays import PAIRS_FULL, REACHED
+from blocksim.kernels.watch import Watched
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.frames import Frames
@@ -169,12 +170,16 @@ class Ensemble:
         self.codes = np.zeros(len(ends), dtype=np.int64)
         every = [scenarios[number].output.every for number in stack.numbers]
         self.periods = [*map(steps_per_frame, every, self.time_steps)]
-        self.moves = FirstMoves(self.placed, self._positions(self.scenes, slice(None)), self.periods)
+        start = self._positions(self.scenes, slice(None))
+        self.moves = FirstMoves(self.placed, start)
+        steps, places = np.zeros(len(ends), dtype=np.int64), np.zeros_like(start)
+        reach, thresholds = self.moves.shapes.reach, self.moves.thresholds
+        self.watched = Watched(np.array(self.periods), steps, places, start, reach, thresholds)
 
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
         nobody = np.zeros(0, dtype=np.int64)  # compiles, before there are threads
-        self.scheme.advance_members(self.scenes, nobody, self.last_steps, self.starts, self.codes, self.moves.watched)
+        self.scheme.advance_members(self.scenes, nobody, self.last_steps, self.starts, self.codes, self.watched)
         count = len(self.codes)
         chunk = min(CHUNK, -(-count // threads))
         list(pool.map(self._advance, (np.arange(i, min(i + chunk, count)) for i in range(0, count, chunk))))
@@ -186,7 +191,7 @@ class Ensemble:
         while members.size:
             done = next_energy_check(done, self.bodies)
             np.minimum(self.last_steps, done, out=stops)
-            self.scheme.advance_members(self.scenes, members, stops, rows, self.codes, self.moves.watched)
+            self.scheme.advance_members(self.scenes, members, stops, rows, self.codes, self.watched)
             rows = np.zeros_like(self.starts)  # what is measured at the start of a later call
             members = members[(self.codes[members] == REACHED) & (self.last_steps[members] > done)]
             members = members[[self._adds_up(m) for m in members.tolist()]]
@@ -208,7 +213,7 @@ class Ensemble:
 
         Those whose list of pairs is full continue alone.
         """
-        self.moves.take(self.time_steps)
+        self.moves.take(self.watched.steps, self.watched.places, self.time_steps)
         which = [m for m, code in enumerate(self.codes) if self.moves.found[m] is None and code != PAIRS_FULL]
         steps = self.scenes.world.clock["steps"][which, 0].tolist()
         times = [step * self.time_steps[m] for m, step in zip(which, steps, strict=True)]
@@ -240,9 +245,7 @@ class Ensemble:
     def _measured(self) -> NDArray[np.float64]:
         """Return rows as `measured` of the scheme names them: a call that goes to no further step only measures."""
         rows, nowhere = np.zeros_like(self.starts), np.zeros_like(self.codes)
-        self.scheme.advance_members(
-            self.scenes, np.arange(len(rows)), nowhere, rows, nowhere.copy(), self.moves.watched
-        )
+        self.scheme.advance_members(self.scenes, np.arange(len(rows)), nowhere, rows, nowhere.copy(), self.watched)
         return rows
 
     def _run_alone(self, m: int, start: float) -> Ended:

@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from blocksim.kernels.watch import Watched
 from blocksim.scenario import PlacedBody
 from blocksim.simulation.table import MILLI, Columns
 
@@ -129,23 +128,22 @@ def _with_way_there(manner: Manner, first: FirstMove | None) -> Manner:
 class FirstMoves:
     """The first moves in m scenes with the same number b of blocks, advanced together."""
 
-    def __init__(self, placed: Sequence[Sequence[PlacedBody]], start: Floats, periods: Sequence[float]) -> None:
-        """Take the blocks of every scene, where they begin, (m, 3, b): x, y (m), angle (rad), and steps per frame."""
+    def __init__(self, placed: Sequence[Sequence[PlacedBody]], start: Floats) -> None:
+        """Take the blocks of every scene and where they begin, (m, 3, b): x, y (m), angle (rad)."""
         self.placed, self.start = placed, start
         self.shapes = _shapes_of([body for bodies in placed for body in bodies]).split(len(placed))
         self.found: list[FirstMove | None] = [None] * len(placed)
-        thresholds = np.where(self.shapes.is_free, MOVED_SHARE * self.shapes.shortest, np.inf)
-        steps = np.zeros(len(placed), dtype=np.int64)
-        self.watched = Watched(
-            np.array(periods, dtype=np.float64), steps, np.zeros_like(start), start, self.shapes.reach, thresholds
-        )
-        """For compiled code."""
 
-    def take(self, time_steps: Sequence[float]) -> None:
-        """Take what compiled code has seen, given the length of a step (s) of every scene."""
-        which = np.flatnonzero(self.watched.steps).tolist()
-        times = [int(self.watched.steps[m]) * time_steps[m] for m in which]
-        self.see(which, self.watched.places[which], times, threshold=1.0 - ROUND_OFF)
+    @property
+    def thresholds(self) -> Floats:
+        """Distance (m) of every block, (m, b), beyond which it has moved; infinite for fixed ones."""
+        return np.where(self.shapes.is_free, MOVED_SHARE * self.shapes.shortest, np.inf)
+
+    def take(self, steps: NDArray[np.int64], places: Floats, time_steps: Sequence[float]) -> None:
+        """Take what compiled code has found: steps (m,), zero for none, places then (m, 3, b); steps in s."""
+        which = np.flatnonzero(steps).tolist()
+        times = [int(steps[m]) * time_steps[m] for m in which]
+        self.see(which, places[which], times, threshold=1.0 - ROUND_OFF)
 
     def see(self, scenes: list[int], position: Floats, times: list[float], *, threshold: float = 1.0) -> None:
         """Examine some scenes, at positions (k, 3, b) and times (s); those that have moved before stay as they are."""
