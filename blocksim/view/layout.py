@@ -63,6 +63,18 @@ class Paper:
 OWN = Paper()
 
 
+@dataclass(frozen=True)
+class PanelPage:
+    """A page with panels side by side and a legend below, in inches."""
+
+    width: float
+    height: float
+    panel: float  # width of a panel
+    row: float  # its height
+    foot: float
+    columns: int  # of the legend
+
+
 def add_axes(figure: "Figure", left: float, bottom: float, width: float, height: float) -> "Axes":
     """Return axes at a place given in inches."""
     across, up = (float(size) for size in figure.get_size_inches())

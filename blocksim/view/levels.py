@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.view import style
-from blocksim.view.layout import OWN, Paper, write_heading
+from blocksim.view.layout import OWN, PanelPage, Paper, write_heading
 from blocksim.view.run_data import Floats
 
 if TYPE_CHECKING:
@@ -43,18 +43,6 @@ class Panel:
     tolerance_mm: float
     own: float
     recommended: float | None
-
-
-@dataclass(frozen=True)
-class _Page:
-    """Inches."""
-
-    width: float
-    height: float
-    panel: float  # width of a panel
-    row: float  # its height
-    foot: float
-    columns: int  # of the legend
 
 
 def draw_levels(
@@ -99,13 +87,13 @@ def refuse_small_page(panels: int, paper: Paper) -> None:
     _page(panels, MOST_BLOCKS, paper)
 
 
-def _page(panels: int, blocks: int, paper: Paper) -> _Page:
+def _page(panels: int, blocks: int, paper: Paper) -> PanelPage:
     sides = LEFT + (panels - 1) * GAP + RIGHT
     width = paper.width(sides + panels * PANEL_WIDTH, sides + panels * NARROWEST)
     columns = int(width / LEGEND_ENTRY)
     foot = FOOT + LEGEND_ROW * -(-(blocks + 1) // columns)
     row = paper.panel(PANEL_HEIGHT, 1, HEAD + foot, LOWEST)
-    return _Page(width, paper.height(HEAD + row + foot), (width - sides) / panels, row, foot, columns)
+    return PanelPage(width, paper.height(HEAD + row + foot), (width - sides) / panels, row, foot, columns)
 
 
 def limits_of(panels: Sequence[Panel], others: Sequence[float]) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.view import style
-from blocksim.view.layout import OWN, Paper, write_heading
+from blocksim.view.layout import OWN, PanelPage, Paper, write_heading
 from blocksim.view.run_data import Floats
 
 if TYPE_CHECKING:
@@ -49,18 +49,6 @@ class Panel:
     meaning: str = ""  # label of that line
 
 
-@dataclass(frozen=True)
-class _Page:
-    """Inches."""
-
-    width: float
-    height: float
-    panel: float  # width of a panel
-    row: float  # its height
-    foot: float
-    columns: int  # of a legend
-
-
 def draw_work_precision(
     panels: Sequence[Panel], path: Path | str, title: str | None = None, paper: Paper = OWN
 ) -> None:
@@ -91,14 +79,14 @@ def refuse_small_page(panels: int, paper: Paper) -> None:
     _page(panels, MOST_CURVES, paper)
 
 
-def _page(panels: int, curves: int, paper: Paper) -> _Page:
+def _page(panels: int, curves: int, paper: Paper) -> PanelPage:
     sides = LEFT + (panels - 1) * GAP + RIGHT
     width = paper.width(sides + panels * PANEL_WIDTH, sides + panels * NARROWEST)
     panel = (width - sides) / panels
     columns = int((panel + GAP) / LEGEND_ENTRY)
     foot = FOOT + LEGEND_ROW * -(-curves // columns)
     row = paper.panel(PANEL_HEIGHT, 1, HEAD + foot, LOWEST)
-    return _Page(width, paper.height(HEAD + row + foot), panel, row, foot, columns)
+    return PanelPage(width, paper.height(HEAD + row + foot), panel, row, foot, columns)
 
 
 def floor_of(panel: Panel) -> float:
