@@ -169,12 +169,12 @@ class Ensemble:
         self.starts = np.zeros((len(ends), len(self.scheme.measured)))
         self.codes = np.zeros(len(ends), dtype=np.int64)
         every = [scenarios[number].output.every for number in stack.numbers]
-        self.periods = [*map(steps_per_frame, every, self.time_steps)]
+        periods = np.array([*map(steps_per_frame, every, self.time_steps)])
         start = self._positions(self.scenes, slice(None))
         self.moves = FirstMoves(self.placed, start)
         steps, places = np.zeros(len(ends), dtype=np.int64), np.zeros_like(start)
         reach, thresholds = self.moves.shapes.reach, self.moves.thresholds
-        self.watched = Watched(np.array(self.periods), steps, places, start, reach, thresholds)
+        self.watched = Watched(periods, steps, places, start, reach, thresholds)
 
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
@@ -203,10 +203,10 @@ class Ensemble:
     def _next_stop(self, m: int, done: int) -> int:
         """Return where a member stops next that is advanced alone; frames count only until something has moved."""
         look = self._next_look(m, done)
-        return look if self.moves.found[m] else min(look, next_frame(done, self.periods[m]))
+        return look if self.moves.found[m] else min(look, next_frame(done, self.watched.periods[m]))
 
     def _is_frame(self, m: int, step: int) -> bool:
-        return step > 0 and next_frame(step - 1, self.periods[m]) == step
+        return step > 0 and next_frame(step - 1, self.watched.periods[m]) == step
 
     def _see_ends(self) -> None:
         """Find what moved first in members without a frame in which anything had: the end is one too.
