@@ -5,20 +5,18 @@ import sys
 import typing
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from blocksim.scenario.keys import options
+from blocksim.scenario.keys import options, si_unit
 from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
 from blocksim.scenario.models.motion import MOTIONS
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES, Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
-from blocksim.scenario.quantities import Quantity
 from blocksim.scenario.structures import KINDS, Structure
 
 BEGIN = "<!-- keys: written by `make readme` -->"
@@ -73,7 +71,7 @@ def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
             key = 'sweep."KEY"'
         where = f" ({note})" if note else ""
         default = f"`{info.default.static}`" if model is Friction else _default(info)
-        yield f"| `{key}`{where} | {_unit(info)} | {default} | {info.description} |"
+        yield f"| `{key}`{where} | {si_unit(info)} | {default} | {info.description} |"
 
 
 def _is_table(info: FieldInfo) -> bool:
@@ -83,18 +81,6 @@ def _is_table(info: FieldInfo) -> bool:
     optional = len(parts) > 1 and any(isinstance(part, type) and issubclass(part, BaseModel) for part in parts)
     has_numbers = re.search(r"\b(float|int)\b", str(info.annotation)) is not None
     return (is_model and not has_numbers) or optional or "Any" in str(info.annotation)
-
-
-def _unit(info: FieldInfo) -> str:
-    found = next((part for part in _parts(info.annotation, info.metadata) if isinstance(part, Quantity)), None)
-    return found.kind.unit if found is not None else ""
-
-
-def _parts(annotation: Any, metadata: list[Any]) -> Iterator[Any]:
-    yield from metadata
-    for part in typing.get_args(annotation):
-        yield part
-        yield from _parts(part, [])
 
 
 def _default(info: FieldInfo) -> str:

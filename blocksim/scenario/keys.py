@@ -4,13 +4,14 @@ import functools
 import re
 import tomllib
 import types
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
 from blocksim.scenario.models.base import Table
 from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.quantities import Kind, Quantity
 
 KeyPath = tuple[str | int, ...]
 """Path in a scenario, such as ("structures", 0, "overlap")."""
@@ -168,6 +169,20 @@ def _tag(table: type[Table]) -> str:
 def kinds_of(table: type[Table]) -> tuple[str, ...]:
     """Return the words that distinguish this table from its alternatives."""
     return get_args(table.model_fields[_tag(table)].annotation)
+
+
+def si_unit(info: FieldInfo) -> str:
+    """Return the SI unit of the values of a field, empty for plain numbers and words."""
+    kinds = (mark.kind if isinstance(mark, Quantity) else mark for mark in _marks(info.annotation, info.metadata))
+    return next((kind.unit for kind in kinds if isinstance(kind, Kind)), "")
+
+
+def _marks(annotation: Any, metadata: Iterable[Any]) -> Iterator[Any]:
+    """Yield the annotations of a type expression, those inside alternatives too."""
+    yield from metadata
+    for part in get_args(annotation):
+        yield part
+        yield from _marks(part, [])
 
 
 def options(annotation: Any) -> Iterator[Any]:

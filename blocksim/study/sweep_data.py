@@ -12,7 +12,7 @@ from blocksim.analysis.members import Members
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario import quantities as q
-from blocksim.scenario.keys import KeyPath, field_at, follow, parse_key
+from blocksim.scenario.keys import KeyPath, field_at, follow, parse_key, si_unit
 from blocksim.scenario.models.variation import Normal, Uniform
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
 from blocksim.study.sweep_folder import PLAN
@@ -142,5 +142,4 @@ def unit_of(scenario: Scenario, key: str) -> str:
     for part in parse_key(key):
         path = (*path, int(part) if isinstance(follow(data, path), list | tuple) else part)
     field = field_at(path, data)
-    marks = () if field is None else field.metadata
-    return next((mark.kind.unit for mark in marks if isinstance(mark, q.Quantity)), "")
+    return "" if field is None else si_unit(field)

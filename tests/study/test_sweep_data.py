@@ -57,9 +57,9 @@ def test_values_keep_the_unit_that_was_typed(quick: Document, tmp_path: Path) ->
     assert "<!-- ground.tilt = 0.01 rad -->" in drawn
 
 
-def test_refined_spacing_is_drawn_with_its_unit(scenario: Scenario) -> None:
-    units = {key: unit_of(scenario, key) for key in ("contact.particle_spacing", "time.safety")}
-    assert units == {"contact.particle_spacing": "m", "time.safety": ""}
+def test_refined_spacing_and_step_are_drawn_with_their_units(scenario: Scenario) -> None:
+    units = {key: unit_of(scenario, key) for key in ("contact.particle_spacing", "time.safety", "time.step")}
+    assert units == {"contact.particle_spacing": "m", "time.safety": "", "time.step": "s"}
 
 
 def test_friction_angles_are_an_axis_in_degrees(nominal: Document, tmp_path: Path) -> None:

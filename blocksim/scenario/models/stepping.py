@@ -32,7 +32,7 @@ def _step(value: object) -> object:
 
 
 _STEP_SCHEMA: dict[str, Any] = {"anyOf": [{"const": "auto"}, *_STEP.json_schema()["anyOf"]]}
-Step = Annotated[float | Literal["auto"], BeforeValidator(_step), WithJsonSchema(_STEP_SCHEMA)]
+Step = Annotated[float | Literal["auto"], q.TIME, BeforeValidator(_step), WithJsonSchema(_STEP_SCHEMA)]
 
 
 class Time(Table):
