@@ -20,6 +20,7 @@ EDGE_INSET = 0.86  # where the mark of the upper side runs, as a part of half th
 NAME_ROOM = 0.85, 0.7  # width and height for a block's name, as parts of its smaller side
 LETTERS = 100  # of a name; longer ones have no room anywhere
 FIXED_HATCH = "////"
+HALO = 2.0  # points around a name, so that paths of centres do not strike through it
 LEAST_HATCHED = 12.0  # points; on smaller blocks hatching is a few stray lines
 
 
@@ -129,6 +130,8 @@ def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags,
 def _draw_names(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags, fills: Sequence[str]) -> None:
     """Write the names of free and of fixed blocks, of either kind only where there is room for all."""
     places = corners(frames, frame).mean(axis=1)
+    from matplotlib.patheffects import withStroke  # noqa: PLC0415 - see style
+
     fonts = _label_fonts(frames, canvas.points_per_mm)
     for kind in (fixed, ~fixed):
         if not all(fonts[kind]):
@@ -145,6 +148,7 @@ def _draw_names(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags, fi
                 va="center_baseline",
                 clip_on=True,
                 transform=canvas.scene,
+                path_effects=[withStroke(linewidth=HALO, foreground=fill)],
                 bbox={"facecolor": fill, "linewidth": 0.0, "pad": 0.8} if fixed[index] else None,
             )
 
