@@ -19,6 +19,7 @@ from blocksim.scenario.units import Dimension
 
 _NUMBER = r"[+-]?(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _TEXT = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
+_DECIMAL_COMMA = re.compile(r"\s*([+-]?[0-9]+),([0-9]+)(?![0-9]*,)(.*)", re.DOTALL)
 _MAX_LENGTH = 80
 _MAX_SHOWN = 40
 LEAST, MOST = 1e-18, 1e30
@@ -197,6 +198,10 @@ def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
     `wanted` only decides which unit is suggested for a misspelt one.
     """
     found = _TEXT.fullmatch(text) if len(text) <= _MAX_LENGTH else None
+    comma = _DECIMAL_COMMA.fullmatch(text) if len(text) <= _MAX_LENGTH else None
+    if comma:
+        message = f'write a decimal point: "{comma[1]}.{comma[2]}{comma[3]}"'
+        raise ValueError(message)
     if wanted is NUMBER and (found is None or found[2] is None):
         message = "write a number without quotes"
         raise ValueError(message)

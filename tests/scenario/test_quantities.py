@@ -1,6 +1,7 @@
 """Quantities: numbers and texts to SI floats, exactly."""
 
 import math
+import re
 from typing import Any
 
 import pytest
@@ -144,3 +145,14 @@ def test_places_may_be_round_off() -> None:
         assert Quantity(LENGTH, at_least=0.0).read(abs(value)) == abs(value)
     with pytest.raises(PydanticCustomError, match="is too large to compute with"):
         Quantity(LENGTH).read(-1e31)
+
+
+@pytest.mark.parametrize(("text", "wanted"), [("0,5 s", '"0.5 s"'), ("-1,25mm", '"-1.25mm"')])
+def test_a_decimal_comma_is_answered_with_the_decimal_point(text: str, wanted: str) -> None:
+    with pytest.raises(ValueError, match="write a decimal point: " + re.escape(wanted)):
+        parse_quantity(text)
+
+
+def test_thousands_with_commas_are_not_taken_for_decimal_commas() -> None:
+    with pytest.raises(ValueError, match="not a unit"):
+        parse_quantity("1,000,000 mm", LENGTH)
