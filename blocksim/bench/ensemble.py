@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from blocksim.bench.measurement import Findings, Number, Setting, repeated
-from blocksim.bench.scenes import FRICTION, Table, three_blocks
-from blocksim.bench.stepping import Stepping
+from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeated
+from blocksim.bench.scenes import FRICTION, Stepping, Table, three_blocks
 from blocksim.scenario.structures.base import draws
 from blocksim.simulation.ensemble import Ensemble, run_ensemble
 from blocksim.simulation.schemes import build_stacks
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
 
     from blocksim.scenario import Scenario
 
-QUICK = "8 members instead of 256"
 MEMBERS, QUICK_MEMBERS = 256, 8
 SCATTER = 0.1  # of both coefficients of friction, uniform
 SEED = 1
@@ -86,3 +84,6 @@ def _numbers(way: Way, members: Sequence[Scenario], repeats: int) -> Iterable[Nu
     found = [rates(members, threads, repeats) for threads in THREADS]
     for number in (found[0][0], *(clock for _, clock in found)):
         yield Number(f"{way.scheme}: {number.quantity}", number.unit, number.samples)
+
+
+ENSEMBLE = Measurement("ensemble", "many collapses together", measure, quick="8 members instead of 256")

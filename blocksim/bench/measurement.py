@@ -1,14 +1,17 @@
-"""Definition of a measurement of speed, and its result: numbers with their samples."""
+"""A measurement of speed: its definition, its run, its numbers with their samples, and the whole as data."""
 
 from __future__ import annotations
 
+import json
 import statistics
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
+    from blocksim.bench.machine import Machine
     from blocksim.view.work_precision import Panel
 
 REPEATS = 5
@@ -42,6 +45,11 @@ class Number:
         """Return True if there is a spread at all."""
         return len(self.samples) > 1
 
+    def to_dict(self) -> dict[str, object]:
+        """Return it for programs."""
+        names = ("quantity", "unit", "median", "smallest", "largest")
+        return {**{name: getattr(self, name) for name in names}, "samples": list(self.samples)}
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -69,6 +77,46 @@ class Measurement:
     title: str
     measure: Callable[[Setting], Findings]
     quick: str  # what the quick size leaves out
+
+    def run(self, setting: Setting) -> Outcome:
+        """Run it."""
+        began = time.perf_counter()
+        findings = self.measure(setting)
+        return Outcome(self, setting, findings, time.perf_counter() - began)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Result of a measurement, and its duration."""
+
+    measurement: Measurement
+    setting: Setting
+    findings: Findings
+    seconds: float
+
+    @property
+    def shortened(self) -> str:
+        """What was left out; empty for the full size."""
+        return self.measurement.quick if self.setting.quick else ""
+
+    def to_dict(self) -> dict[str, object]:
+        """Return it for programs; nothing is rounded."""
+        return {
+            "name": self.measurement.name,
+            "title": self.measurement.title,
+            "shortened": self.shortened,
+            "seconds": round(self.seconds, 2),
+            "numbers": [one.to_dict() for one in self.findings.numbers],
+            "notes": list(self.findings.notes),
+            "details": [dict(one) for one in self.findings.details],
+        }
+
+
+def report(machine: Machine, outcomes: Sequence[Outcome]) -> dict[str, object]:
+    """Return everything for programs; numbers that are not finite become None, as JSON has none."""
+    found = {"machine": machine.to_dict(), "measurements": [outcome.to_dict() for outcome in outcomes]}
+    plain: dict[str, object] = json.loads(json.dumps(found), parse_constant=lambda _: None)
+    return plain
 
 
 def repeated(quantity: str, unit: str, sample: Callable[[], float], repeats: int) -> Number:

@@ -1,11 +1,13 @@
-"""The scenes that are measured, made here so that they need no file."""
+"""The scenes that are measured, made here so that they need no file, and the steps of the non-smooth scheme."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario.models.stepping import Nonsmooth
 
 Table = Mapping[str, object]
 
@@ -17,6 +19,31 @@ RESTITUTION = 0.2
 WALL_RESTITUTION = 0.1
 PUSH = 1.0  # m/s, of the upper edge of a wall
 LOW_COURSES = "height"  # `upright` of the wall that non-smooth engines are compared on: bricks of 32 x 25 mm
+SUBSTEPS = 4
+UNTIL_SOLVED = int(Nonsmooth.model_fields["velocity_sweeps"].default)
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """A step and its parts; each is solved to the default tolerance, or gone through as often as `sweeps` says."""
+
+    step: float  # s
+    substeps: int = SUBSTEPS
+    sweeps: int = UNTIL_SOLVED
+
+    @property
+    def setting(self) -> str:
+        """For people."""
+        return f"step {1e3 * self.step:g} ms / {self.substeps}"
+
+    @property
+    def keys(self) -> dict[str, float]:
+        """Its keys of [time], all of them numbers."""
+        return {"step": self.step, "substeps": self.substeps, "velocity_sweeps": self.sweeps}
+
+    def time(self, **more: object) -> dict[str, object]:
+        """Return the table [time], with more keys."""
+        return {"scheme": "nonsmooth", **self.keys, **more}
 
 
 def three_blocks(contact: Table | None = None, time: Table | None = None, friction: Table = FRICTION) -> Scenario:

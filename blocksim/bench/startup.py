@@ -9,12 +9,11 @@ import tempfile
 import time
 from pathlib import Path
 
-from blocksim.bench.measurement import Findings, Number, Setting, repeated
+from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeated
 from blocksim.bench.scenes import three_blocks
 from blocksim.errors import BlocksimError
 from blocksim.scenario import scenario_to_toml
 
-QUICK = "no compilation into an empty cache"
 MAIN = "from blocksim.cli.app import main; main()"
 COMPILE = "from blocksim.simulation.compilation import compile_kernels; compile_kernels()"
 CACHE = "BLOCKSIM_CACHE_DIR"
@@ -59,3 +58,6 @@ def _seconds(code: str, *arguments: str, **environment: str) -> float:
         told = done.stderr.strip().splitlines() or ["no message"]
         raise StartError(f"blocksim {' '.join(arguments)}: exit code {done.returncode}: {told[-1]}")
     return seconds
+
+
+START_UP = Measurement("start-up", "starting the command", measure, quick="no compilation into an empty cache")

@@ -1,30 +1,35 @@
-"""Two threads on one wall: their speed-up over one, and that small walls do not become slower."""
+"""Two threads on one wall, by both schemes: their speed-up over one, and that small walls do not become slower."""
 
 from __future__ import annotations
 
+import functools
 import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from blocksim.bench.measurement import Findings, Number, Setting
-from blocksim.bench.scenes import pushed_wall
-from blocksim.bench.timing import Rerun
-from blocksim.bench.walls import Size
+from blocksim.bench.measurement import Findings, Measurement, Number, Setting
+from blocksim.bench.walls import Size, explicit_wall, nonsmooth_wall
 from blocksim.simulation.schemes import SCHEMES
 from blocksim.simulation.team import ALONE, Team, useful_threads
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
-QUICK = "walls of 100 and 400 blocks, a tenth of the steps"
-SIZES = (Size(10, 10), Size(20, 10), Size(40, 25), Size(125, 80))
-QUICK_SIZES = (Size(10, 10), Size(25, 16))
+    from blocksim.bench.timing import Rerun
+
 THREADS = 2
-BLOCK_STEPS = 2_000_000  # of one sample
-QUICK_BLOCK_STEPS = 200_000
-MOST_STEPS = 5000
 STIFFNESS_SCALE = 1e-3  # a wall of a hundred blocks has fallen by then; softer ones would overlap too far
-LEAST_BODIES = SCHEMES["explicit"].least_bodies
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Walls of a scheme, and how far they are advanced for one sample; the quick size second."""
+
+    scheme: str
+    wall: Callable[[Size], Rerun]
+    sizes: tuple[tuple[Size, ...], tuple[Size, ...]]
+    block_steps: tuple[int, int]
+    most_steps: tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -42,17 +47,16 @@ class Case:
         return useful_threads(THREADS, self.blocks, self.least_bodies)
 
 
-def measure(setting: Setting) -> Findings:
-    """Advance walls with one thread and with two, in turns."""
-    cases = [_case(size, setting) for size in (QUICK_SIZES if setting.quick else SIZES)]
+def measure(plan: Plan, setting: Setting) -> Findings:
+    """Advance walls with one thread and with two, in turns, from the start: the smaller they are, the longer."""
+    block_steps, most_steps = plan.block_steps[setting.quick], plan.most_steps[setting.quick]
+    least = SCHEMES[plan.scheme].least_bodies
+    cases = [
+        Case(plan.wall(size), size.blocks, min(most_steps, block_steps // size.blocks), least)
+        for size in plan.sizes[setting.quick]
+    ]
     numbers = [number for case in cases for number in compared(case, setting.repeats)]
     return Findings(tuple(numbers), notes=notes(cases))
-
-
-def _case(size: Size, setting: Setting) -> Case:
-    steps = min(MOST_STEPS, (QUICK_BLOCK_STEPS if setting.quick else BLOCK_STEPS) // size.blocks)
-    scene = Rerun(pushed_wall(size.columns, size.rows, contact={"stiffness_scale": STIFFNESS_SCALE}))
-    return Case(scene, size.blocks, steps, LEAST_BODIES)
 
 
 def compared(case: Case, repeats: int) -> Iterable[Number]:
@@ -83,3 +87,31 @@ def _seconds(scene: Rerun, team: Team, steps: int) -> float:
     began = time.perf_counter()
     scene.advance(steps, team)
     return time.perf_counter() - began
+
+
+ON_SPRINGS = Plan(
+    "explicit",
+    functools.partial(explicit_wall, stiffness_scale=STIFFNESS_SCALE),
+    sizes=((Size(10, 10), Size(20, 10), Size(40, 25), Size(125, 80)), (Size(10, 10), Size(25, 16))),
+    block_steps=(2_000_000, 200_000),
+    most_steps=(5000, 5000),
+)
+RIGID = Plan(
+    "nonsmooth",
+    nonsmooth_wall,
+    sizes=((Size(10, 10), Size(20, 10), Size(40, 25), Size(90, 56)), (Size(8, 5), Size(40, 25))),
+    block_steps=(1_000_000, 1_000_000),
+    most_steps=(1000, 20),
+)
+EXPLICIT = Measurement(
+    "threads",
+    "two threads on one wall",
+    functools.partial(measure, ON_SPRINGS),
+    quick="walls of 100 and 400 blocks, a tenth of the steps",
+)
+NONSMOOTH = Measurement(
+    "nonsmooth-threads",
+    "two threads on one wall, non-smooth",
+    functools.partial(measure, RIGID),
+    quick="walls of 40 and 1000 blocks, 20 steps",
+)

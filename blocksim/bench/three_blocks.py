@@ -1,32 +1,103 @@
-"""The three blocks: time of a step, and time to an answer that finer settings do not change."""
+"""The three blocks: time of a step, and time to an answer that finer settings do not change, by both schemes."""
 
 from __future__ import annotations
 
-from blocksim.bench.levels import CLOSE, Level, settled, solved
-from blocksim.bench.measurement import Findings, Number, Setting, repeated
-from blocksim.bench.scenes import three_blocks
+import itertools
+import statistics
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from blocksim.bench.ensemble import MEMBERS, QUICK_MEMBERS, rates
+from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeated
+from blocksim.bench.scenes import RESTITUTION, Stepping, three_blocks
 from blocksim.bench.timing import Rerun
 from blocksim.simulation.loop import last_step_of
 
-QUICK = "0.01 s instead of 0.4 s at full stiffness, converged answer against a hundredth of the stiffness"
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from blocksim.scenario import Scenario
+
+CLOSE = 0.2e-3  # m
 DURATION, QUICK_DURATION = 0.4, 0.01  # s
 SCALES = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0)
 QUICK_SCALES = (1e-4, 1e-3, 1e-2)
 SAFETIES = (0.1, 0.05)
+ONE_SWEEP = Stepping(1e-3, substeps=1, sweeps=1)  # enough without restitution
+STEPS = (1e-3, 5e-4, 2e-4, 1e-4)  # s
+QUICK_STEPS = (1e-3, 5e-4)
+SUBSTEPS = (1, 2, 4)
+FINEST, QUICK_FINEST = 1e-5, 2e-4  # s
 
 
-def measure(setting: Setting) -> Findings:
-    """Measure both."""
+@dataclass(frozen=True)
+class Level:
+    """One way to compute the collapse."""
+
+    setting: Mapping[str, float]  # its keys of the scenario
+    centres: NDArray[np.float64]  # (2, 3) m, at rest
+    seconds: tuple[float, ...]  # CPU time of every repeat
+    steps: int
+
+    @property
+    def told(self) -> str:
+        """For people."""
+        return ", ".join(f"{name} {value:g}" for name, value in self.setting.items())
+
+    @property
+    def median(self) -> float:
+        """CPU seconds."""
+        return statistics.median(self.seconds)
+
+    def off(self, other: Level) -> float:
+        """Return the largest distance (m) between final positions of a block by this and another way."""
+        return float(np.hypot(*(self.centres - other.centres)).max())
+
+    def number(self, quantity: str) -> Number:
+        """Return its CPU time for the table."""
+        return Number(quantity, "CPU ms", tuple(1e3 * one for one in self.seconds))
+
+    def detail(self, finest: Level) -> dict[str, object]:
+        """Return it for programs."""
+        return {
+            **self.setting,
+            "steps": self.steps,
+            "off_mm": 1e3 * self.off(finest),
+            "cpu_ms": 1e3 * self.median,
+            "x_mm": [1e3 * x for x in self.centres[0].tolist()],
+        }
+
+
+def settled(levels: Sequence[Level], finest: Level) -> list[Level]:
+    """Return the levels, coarse to fine, that are close to the finest, all finer ones too: one can be so by chance."""
+    return list(itertools.takewhile(lambda level: level.off(finest) <= CLOSE, reversed(levels)))
+
+
+def solved(setting: Mapping[str, float], scenario: Scenario, repeats: int) -> Level:
+    """Run until the blocks rest."""
+    scene = Rerun(scenario)
+    last = last_step_of(scenario.time.end, scene.step)
+    runs = [scene.run(last) for _ in range(repeats)]
+    bodies = runs[-1].bodies  # every run ends with the same bits
+    return Level(setting, np.array([bodies.x, bodies.y]), tuple(run.seconds for run in runs), runs[-1].steps)
+
+
+def measure_explicit(setting: Setting) -> Findings:
+    """Measure a step at full stiffness, and the cheapest collapse that greater stiffnesses confirm."""
     scales = QUICK_SCALES if setting.quick else SCALES
-    rows = [[_solved(scale, safety, setting.repeats) for scale in scales] for safety in SAFETIES]
+    rows = [[_explicit(scale, safety, setting.repeats) for scale in scales] for safety in SAFETIES]
     levels = [level for row in rows for level in row]
     finest = levels[-1]
     close = [level for row in rows for level in settled(row, finest)]
     cheapest = min(close, key=lambda level: level.median)
     numbers = (
         _step_time(setting),
-        Number("time to a converged answer", "CPU ms", tuple(1e3 * one for one in cheapest.seconds)),
-        Number("the stiffest run, its measure", "CPU ms", tuple(1e3 * one for one in finest.seconds)),
+        cheapest.number("time to a converged answer"),
+        finest.number("the stiffest run, its measure"),
     )
     note = (
         f"converged: here and at all greater stiffnesses, centres at rest within {1e3 * CLOSE:g} mm of the stiffest "
@@ -43,6 +114,62 @@ def _step_time(setting: Setting) -> Number:
     return repeated("a step", "ns", lambda: 1e9 * scene.run(last).seconds / last, setting.repeats)
 
 
-def _solved(scale: float, safety: float, repeats: int) -> Level:
+def _explicit(scale: float, safety: float, repeats: int) -> Level:
     scenario = three_blocks(contact={"stiffness_scale": scale}, time={"safety": safety})
     return solved({"stiffness_scale": scale, "safety": safety}, scenario, repeats)
+
+
+def measure_nonsmooth(setting: Setting) -> Findings:
+    """Measure a collapse without restitution in few long steps, and one with restitution that finer steps confirm."""
+    without = _nonsmooth(ONE_SWEEP, 0.0, setting)
+    steps, finest_step = (QUICK_STEPS, QUICK_FINEST) if setting.quick else (STEPS, FINEST)
+    finest = _nonsmooth(Stepping(finest_step, substeps=1), RESTITUTION, setting)
+    rows = [[_nonsmooth(Stepping(step, parts), RESTITUTION, setting) for step in steps] for parts in SUBSTEPS]
+    close = [level for row in rows for level in settled(row, finest)] or [finest]
+    cheapest = min(close, key=lambda level: level.median)
+    members = QUICK_MEMBERS if setting.quick else MEMBERS
+    numbers = (*_alone_and_among(members, 0.0, without), *_alone_and_among(members, RESTITUTION, cheapest))
+    told = (
+        f"e = 0: {without.told}, {without.steps} steps, blocks 2 and 3 at x = {_places(without)}; all runs until rest; "
+        f"alone includes one call from Python; among many: {members} equal members"
+    )
+    converged = (
+        f"e = {RESTITUTION:g}: {cheapest.told}, {cheapest.steps} steps, blocks 2 and 3 at x = {_places(cheapest)}; the "
+        f"cheapest of {len(close)} settings that are, as all with shorter steps, within {1e3 * CLOSE:g} mm of "
+        f"{finest.told}; itself off by {1e3 * cheapest.off(finest):.2f} mm"
+    )
+    details = [level.detail(finest) for row in rows for level in row]
+    details += [finest.detail(finest), without.detail(without)]
+    return Findings(numbers, notes=(told, converged), details=tuple(details))
+
+
+def _nonsmooth(stepping: Stepping, restitution: float, setting: Setting) -> Level:
+    return solved(stepping.keys, three_blocks({"restitution": restitution}, stepping.time()), setting.repeats)
+
+
+def _places(level: Level) -> str:
+    _, two, three = 1e3 * level.centres[0]
+    return f"{two:.2f} and {three:.2f} mm"
+
+
+def _alone_and_among(members: int, restitution: float, level: Level) -> Iterable[Number]:
+    name = f"e = {restitution:g}"
+    scenario = three_blocks({"restitution": restitution}, {"scheme": "nonsmooth", **level.setting})
+    together, _ = rates([scenario] * members, 1, len(level.seconds))
+    yield level.number(f"{name}: alone")
+    yield Number(f"{name}: among many", "CPU ms", tuple(1e3 / one for one in together.samples))
+    yield Number(f"{name}: collapses a second and core", "1/s", together.samples)
+
+
+EXPLICIT = Measurement(
+    "three-blocks",
+    "collapse of the three blocks",
+    measure_explicit,
+    quick="0.01 s instead of 0.4 s at full stiffness, converged answer against a hundredth of the stiffness",
+)
+NONSMOOTH = Measurement(
+    "nonsmooth-blocks",
+    "collapse of the three blocks, non-smooth",
+    measure_nonsmooth,
+    quick="8 members instead of 256, coarse steps against one that is not much finer",
+)

@@ -14,8 +14,11 @@ from blocksim.simulation.team import ALONE, Team
 from blocksim.world.scenes import arrays_of
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from blocksim.kernels.arrays import World
     from blocksim.scenario import Scenario
+    from blocksim.simulation.outcome import Outcome
     from blocksim.simulation.schemes import AnyScene
 
 
@@ -30,6 +33,7 @@ class Timed(NamedTuple):
 
     scene: AnyScene
     seconds: float
+    outcome: Outcome
 
     @property
     def world(self) -> World:
@@ -53,9 +57,11 @@ class Rerun:
     It starts again in the same memory: where arrays lie changes times by some per cent.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        """Build the scene and keep its state."""
-        self.scene, _ = ALONE.advance(build_scene(scenario), 0)
+    def __init__(self, scenario: Scenario, shift: NDArray[np.float64] | float = 0.0) -> None:
+        """Build the scene with its blocks shifted along x (m), and keep its state."""
+        scene = build_scene(scenario)
+        scene.world.bodies.x[:-1] += shift
+        self.scene, _ = ALONE.advance(scene, 0)
         self._arrays = arrays_of(self.scene)
         self._saved = [array.copy() for array in self._arrays]
 
@@ -74,20 +80,28 @@ class Rerun:
 
         Raises RunFailedError: the time of a failed run is meaningless.
         """
+        timed = self.attempt(last_step)
+        _refuse_failed(timed.outcome)
+        return timed
+
+    def attempt(self, last_step: int) -> Timed:
+        """Do the same, but return a failed run too."""
         self.restore()
         began = time.process_time()
-        scene = self.advance(last_step)
-        return Timed(scene, time.process_time() - began)
+        scene, status = ALONE.advance(self.scene, last_step)
+        return Timed(scene, time.process_time() - began, BY_CODE[status])
 
     def restore(self) -> None:
         """Go back to the start."""
         for array, saved in zip(self._arrays, self._saved, strict=True):
             np.copyto(array, saved)
 
-    def advance(self, last_step: int, team: Team = ALONE) -> AnyScene:
+    def advance(self, last_step: int, team: Team) -> None:
         """Continue from the present state. Raises RunFailedError."""
-        scene, status = team.advance(self.scene, last_step)
-        outcome = BY_CODE[status]
-        if not outcome.is_finished:
-            raise RunFailedError(f"a run that was to be timed failed: {outcome.reason}")
-        return scene
+        _, status = team.advance(self.scene, last_step)
+        _refuse_failed(BY_CODE[status])
+
+
+def _refuse_failed(outcome: Outcome) -> None:
+    if not outcome.is_finished:
+        raise RunFailedError(f"a run that was to be timed failed: {outcome.reason}")

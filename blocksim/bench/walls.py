@@ -1,20 +1,19 @@
-"""Pushed walls of 100 to 100 000 blocks: time of a step, memory, and how both grow with the number of blocks."""
+"""Pushed walls by both schemes: time of a step or substep, memory, how they grow with the blocks, and a whole fall."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from blocksim.bench.measurement import Findings, Number, Setting, repeated, single
-from blocksim.bench.scenes import pushed_wall
+from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeated, single
+from blocksim.bench.scenes import LOW_COURSES, Stepping, pushed_wall
 from blocksim.bench.timing import Rerun
+from blocksim.simulation.loop import last_step_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-QUICK = "walls of 100 and 400 blocks, 150 steps instead of 300"
 
 
 class Size(NamedTuple):
@@ -29,28 +28,41 @@ class Size(NamedTuple):
         return self.columns * self.rows
 
 
-class Sized(Protocol):
-    """A wall, and the time of its step."""
-
-    @property
-    def size(self) -> Size:
-        """Blocks in it."""
-
-    @property
-    def step_time(self) -> float:
-        """Time (ns) of one step of the whole wall."""
-
-
 SIZES = (Size(10, 10), Size(40, 25), Size(125, 80), Size(400, 250))
 QUICK_SIZES = (Size(10, 10), Size(25, 16))
 STIFFNESS_SCALE = 1e-4  # long steps, so that blocks move and pair lists are updated, as in a whole collapse
 STEPS, QUICK_STEPS = 300, 150
 FEWEST_BLOCKS = 3000  # of one sample: smaller walls are advanced several times
+RIGID_SIZES = (Size(40, 25), Size(90, 56), Size(180, 112))
+QUICK_RIGID_SIZES = (Size(8, 5), Size(16, 10))
+END = 1.0  # s, of the first wall; where it ends is known
+COMMON, QUICK_END = 0.5, 0.1  # s, of all walls
+USUAL = Stepping(1e-3)
+
+
+def explicit_wall(size: Size, stiffness_scale: float = STIFFNESS_SCALE) -> Rerun:
+    """Return the wall on springs, at its start."""
+    return Rerun(pushed_wall(*size, contact={"stiffness_scale": stiffness_scale}))
+
+
+def nonsmooth_wall(size: Size) -> Rerun:
+    """Return the wall of the non-smooth scheme, at its start."""
+    return Rerun(pushed_wall(*size, time=USUAL.time(), upright=LOW_COURSES))
+
+
+def growth(sizes: Sequence[Size], block_times: Sequence[Number]) -> float:
+    """Return the exponent that fits time per step over number of blocks best, both in logarithms.
+
+    `block_times` are those of a step and block, in any unit.
+    """
+    blocks = [size.blocks for size in sizes]
+    times = [one.median * count for one, count in zip(block_times, blocks, strict=True)]
+    return float(np.polyfit(np.log(blocks), np.log(times), 1)[0])
 
 
 @dataclass(frozen=True)
 class Wall:
-    """Result for one size."""
+    """Result for one size on springs."""
 
     size: Size
     times: Number  # ns per block and step
@@ -58,41 +70,39 @@ class Wall:
     rebuilds: int
     duration: float  # s simulated
 
-    @property
-    def step_time(self) -> float:
-        """Time (ns) of one step of the whole wall."""
-        return self.times.median * self.size.blocks
+    def detail(self) -> dict[str, object]:
+        """Return it for programs."""
+        return {
+            "blocks": self.size.blocks,
+            **self.size._asdict(),
+            "ns_per_block_and_step": self.times.median,
+            "bytes_per_block": self.bytes_a_block,
+            "rebuilds": self.rebuilds,
+            "simulated_s": self.duration,
+        }
 
 
-def measure(setting: Setting) -> Findings:
+def measure_explicit(setting: Setting) -> Findings:
     """Measure all sizes from the same start, over the same time."""
-    walls = [_measured(size, setting) for size in (QUICK_SIZES if setting.quick else SIZES)]
+    sizes = QUICK_SIZES if setting.quick else SIZES
+    walls = [_explicit(size, setting) for size in sizes]
+    times = [wall.times for wall in walls]
     numbers = (
-        *(wall.times for wall in walls),
-        *(single(f"{_named(wall.size)}, memory", "bytes/block", wall.bytes_a_block) for wall in walls),
-        single("growth exponent of a step's time", "", growth(walls)),
+        *times,
+        *(single(f"{wall.times.quantity}, memory", "bytes/block", wall.bytes_a_block) for wall in walls),
+        single("growth exponent of a step's time", "", growth(sizes, times)),
     )
     first = walls[0]
     note = (
         f"running bond, pushed with 1 m/s y/H, restitution 0.1, stiffness_scale {STIFFNESS_SCALE:g}, the first "
         f"{1e3 * first.duration:.1f} ms, {first.rebuilds} to {walls[-1].rebuilds} pair list updates"
     )
-    return Findings(numbers, notes=(note,), details=tuple(_detail(wall) for wall in walls))
+    return Findings(numbers, notes=(note,), details=tuple(wall.detail() for wall in walls))
 
 
-def growth(walls: Sequence[Sized]) -> float:
-    """Return the exponent that fits time per step over number of blocks best, both in logarithms."""
-    blocks = np.log([wall.size.blocks for wall in walls])
-    return float(np.polyfit(blocks, np.log([wall.step_time for wall in walls]), 1)[0])
-
-
-def _named(size: Size) -> str:
-    return f"{size.blocks} blocks"
-
-
-def _measured(size: Size, setting: Setting) -> Wall:
+def _explicit(size: Size, setting: Setting) -> Wall:
     steps = QUICK_STEPS if setting.quick else STEPS
-    scene = Rerun(pushed_wall(size.columns, size.rows, contact={"stiffness_scale": STIFFNESS_SCALE}))
+    scene = explicit_wall(size)
     rounds = max(1, FEWEST_BLOCKS // size.blocks)
     rebuilds: list[int] = []
 
@@ -101,17 +111,96 @@ def _measured(size: Size, setting: Setting) -> Wall:
         rebuilds.append(int(runs[-1].world.clock[0].rebuilds))
         return 1e9 * sum(run.seconds for run in runs) / (rounds * steps * size.blocks)
 
-    times = repeated(_named(size), "ns/block/step", sample, setting.repeats)
+    times = repeated(f"{size.blocks} blocks", "ns/block/step", sample, setting.repeats)
     return Wall(size, times, scene.bytes / size.blocks, rebuilds[-1] - 1, steps * scene.step)
 
 
-def _detail(wall: Wall) -> dict[str, object]:
-    return {
-        "blocks": wall.size.blocks,
-        "columns": wall.size.columns,
-        "rows": wall.size.rows,
-        "ns_per_block_and_step": wall.times.median,
-        "bytes_per_block": wall.bytes_a_block,
-        "rebuilds": wall.rebuilds,
-        "simulated_s": wall.duration,
-    }
+@dataclass(frozen=True)
+class RigidWall:
+    """Result for one size with rigid contacts."""
+
+    size: Size
+    seconds: tuple[float, ...]  # CPU time of every repeat
+    steps: int
+    rebuilds: int  # of the pair list
+    sweeps: int  # of the velocity pass, over all substeps
+    mean_x: float  # m, of all centres at the end
+    mean_y: float  # m
+
+    @property
+    def substeps(self) -> int:
+        """Substeps of the run."""
+        return self.steps * USUAL.substeps
+
+    @property
+    def times(self) -> Number:
+        """Time of a block and substep."""
+        share = 1e9 / (self.substeps * self.size.blocks)
+        name = f"{self.size.blocks} blocks, a substep"
+        return Number(name, "ns/block", tuple(share * one for one in self.seconds))
+
+    def detail(self) -> dict[str, object]:
+        """Return it for programs."""
+        return {
+            "blocks": self.size.blocks,
+            **self.size._asdict(),
+            "cpu_s": self.times.median * self.size.blocks * 1e-9 * self.substeps,
+            "ns_per_block_and_substep": self.times.median,
+            "rebuilds": self.rebuilds,
+            "sweeps_per_substep": self.sweeps / self.substeps,
+            "mean_x_m": self.mean_x,
+            "mean_y_m": self.mean_y,
+        }
+
+
+def measure_nonsmooth(setting: Setting) -> Findings:
+    """Measure all sizes from the same start, over the same time, and the smallest over its whole collapse."""
+    end, common = (QUICK_END, QUICK_END) if setting.quick else (END, COMMON)
+    sizes = QUICK_RIGID_SIZES if setting.quick else RIGID_SIZES
+    whole = _nonsmooth(sizes[0], end, setting.repeats)
+    walls = [_nonsmooth(size, common, setting.repeats) for size in sizes]
+    times = [wall.times for wall in walls]
+    name = f"{whole.size.blocks} blocks"
+    numbers = (
+        Number(f"{name}, {end:g} s", "CPU s", whole.seconds),
+        Number(f"{name}, {end:g} s, a substep", "ns/block", whole.times.samples),
+        *times,
+        single("growth exponent of a substep's time", "", growth(sizes, times)),
+        single(f"{name}, mean x at {end:g} s", "mm", 1e3 * whole.mean_x),
+        single(f"{name}, mean y at {end:g} s", "mm", 1e3 * whole.mean_y),
+    )
+    first, last = walls[0], walls[-1]
+    note = (
+        f"running bond of 32 x 25 mm, pushed with 1 m/s y/H, restitution 0.1, {USUAL.setting}; a substep and growth: "
+        f"the first {common:g} s of every wall (a smaller part of higher walls has fallen), {first.rebuilds} to "
+        f"{last.rebuilds} pair list updates, {first.sweeps / first.substeps:.2f} to "
+        f"{last.sweeps / last.substeps:.2f} velocity sweeps a substep"
+    )
+    return Findings(numbers, notes=(note,), details=tuple(wall.detail() for wall in (whole, *walls)))
+
+
+def _nonsmooth(size: Size, end: float, repeats: int) -> RigidWall:
+    scene = nonsmooth_wall(size)
+    last = last_step_of(end, scene.step)
+    runs = [scene.run(last) for _ in range(repeats)]
+    bodies, scene_at_end = runs[-1].bodies, runs[-1].scene  # every run ends with the same bits
+    return RigidWall(
+        size,
+        tuple(run.seconds for run in runs),
+        last,
+        rebuilds=int(scene_at_end.world.clock[0].rebuilds),
+        sweeps=int(scene_at_end.contacts.stepping[0].sweeps),
+        mean_x=float(bodies.x.mean()),
+        mean_y=float(bodies.y.mean()),
+    )
+
+
+EXPLICIT = Measurement(
+    "walls", "pushed walls", measure_explicit, quick="walls of 100 and 400 blocks, 150 steps instead of 300"
+)
+NONSMOOTH = Measurement(
+    "nonsmooth-walls",
+    "pushed walls, non-smooth",
+    measure_nonsmooth,
+    quick="walls of 40 and 160 blocks for 0.1 s",
+)

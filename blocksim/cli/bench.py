@@ -8,11 +8,9 @@ from typing import Annotated
 
 import typer
 
-from blocksim.bench.bench import Outcome, report, run_measurement
 from blocksim.bench.machine import Machine, this_machine
-from blocksim.bench.measurement import REPEATS, Measurement, Number, Setting
+from blocksim.bench.measurement import REPEATS, Measurement, Number, Outcome, Setting, report
 from blocksim.bench.measurements import chosen
-from blocksim.bench.peers.packages import require_all
 from blocksim.cli import options
 from blocksim.cli.compiling import tell_compilation
 from blocksim.cli.output import answer, note, print_json, table_lines
@@ -66,7 +64,6 @@ def bench_command(
         raise typer.BadParameter("--size and --dpi are for the picture that --peers draws")
     wanted = chosen(names or [], peers=peers)
     if peers:
-        require_all()
         refuse_small_page(len(wanted), paper)
     _refuse_present(out, peers=peers, overwrite=overwrite)
     machine = this_machine()
@@ -99,7 +96,7 @@ def _run(measurements: Sequence[Measurement], setting: Setting, *, quiet: bool) 
     for position, measurement in enumerate(measurements, start=1):
         if not quiet:
             note(f"{position}/{len(measurements)} {measurement.name}: {measurement.title} ...")
-        yield run_measurement(measurement, setting)
+        yield measurement.run(setting)
 
 
 def _show(
@@ -155,8 +152,8 @@ def _tell_end(machine: Machine, outcomes: list[Outcome]) -> None:
     for outcome in outcomes:
         for text in outcome.findings.notes:
             note(f"{outcome.measurement.name}: {text}")
-        if outcome.setting.quick:
-            note(f"{outcome.measurement.name} shortened: {outcome.measurement.quick}")
+        if outcome.shortened:
+            note(f"{outcome.measurement.name} shortened: {outcome.shortened}")
     for text in machine.lines():
         note(text)
     note(f"{sum(outcome.seconds for outcome in outcomes):.0f} s")

@@ -1,19 +1,35 @@
-"""Our own measurements, at their quick sizes."""
+"""Our own measurements, at their quick sizes: what they run and what they tell."""
 
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from blocksim.bench import ensemble, startup, threads, three_blocks, walls
+from blocksim.bench import ensemble, startup, three_blocks, walls
 from blocksim.bench.measurement import Setting, single
+from blocksim.bench.measurements import chosen
 from blocksim.bench.startup import StartError
+from blocksim.bench.three_blocks import CLOSE, Level, settled
 
 QUICK = Setting(quick=True, repeats=2)
 
 
+def level(scale: float, x: float) -> Level:
+    """Return one whose third block ends at x (m)."""
+    return Level({"scale": scale}, np.array([[0.0, 0.0, x], [0.0, 0.0, 0.0]]), (3.0, 1.0, 2.0), 10)
+
+
+def test_levels_count_as_converged_from_where_all_finer_ones_agree() -> None:
+    levels = [level(1e-4, 0.9 * CLOSE), level(1e-3, 2.0 * CLOSE), level(1e-2, -0.9 * CLOSE), level(1.0, 0.0)]
+    assert [one.setting["scale"] for one in settled(levels, levels[-1])] == [1.0, 1e-2]
+    told = levels[1].detail(levels[-1])
+    assert (levels[1].told, told["scale"], told["steps"], told["cpu_ms"]) == ("scale 0.001", 1e-3, 10, 2000.0)
+    assert told["off_mm"] == pytest.approx(0.4)
+
+
 def test_three_blocks_tell_the_cheapest_converged_setting() -> None:
-    found = three_blocks.measure(QUICK)
+    found = three_blocks.EXPLICIT.measure(QUICK)
     step, answer, stiffest = found.numbers
     assert all(len(one.samples) == 2 for one in found.numbers)
     assert 20.0 < step.median < 1e5
@@ -25,12 +41,26 @@ def test_three_blocks_tell_the_cheapest_converged_setting() -> None:
     assert "stiffness_scale 0.001" in found.notes[0]
 
 
+def test_rigid_blocks_tell_times_alone_and_among_many_and_a_setting_that_finer_ones_confirm() -> None:
+    found = three_blocks.NONSMOOTH.measure(QUICK)
+    names = ["alone", "among many", "collapses a second and core"]
+    assert [one.quantity for one in found.numbers] == [f"e = {e}: {name}" for e in ("0", "0.2") for name in names]
+    assert all(len(one.samples) == 2 and one.median > 0.0 for one in found.numbers)
+    assert found.numbers[4].samples == pytest.approx([1e3 / one for one in found.numbers[5].samples])
+    *levels, finest, without = found.details
+    assert (len(levels), finest["step"], finest["off_mm"]) == (6, 2e-4, 0.0)
+    assert "settings that are, as all with shorter steps, within 0.2 mm" in found.notes[1]
+    assert (without["step"], without["substeps"], without["velocity_sweeps"]) == (1e-3, 1, 1)
+    x = np.array(without["x_mm"])
+    assert np.abs(x - [16.0, 67.03, 128.78]).max() < 0.25  # where one sweep without restitution puts them
+    assert f"at x = {x[1]:.2f} and" in found.notes[0]
+
+
 def test_ensemble_tells_its_rates_by_both_schemes_and_its_members_differ() -> None:
-    found = ensemble.measure(QUICK)
+    found = ensemble.ENSEMBLE.measure(QUICK)
     names = ["a second and core", "a second, 1 thread", "a second, 2 threads"]
-    assert [one.quantity for one in found.numbers] == [
-        f"{way}: {name}" for way in ("explicit", "nonsmooth") for name in names
-    ]
+    schemes = ("explicit", "nonsmooth")
+    assert [one.quantity for one in found.numbers] == [f"{scheme}: {name}" for scheme in schemes for name in names]
     assert all(len(one.samples) == 2 and one.median > 1.0 for one in found.numbers)
     for way in ensemble.WAYS:
         members = ensemble.scattered(5, way)
@@ -38,8 +68,8 @@ def test_ensemble_tells_its_rates_by_both_schemes_and_its_members_differ() -> No
         assert {scenario.time.scheme for scenario in members} == {way.scheme}
 
 
-def test_walls_tell_time_memory_and_growth() -> None:
-    found = walls.measure(QUICK)
+def test_walls_on_springs_tell_time_memory_and_growth() -> None:
+    found = walls.EXPLICIT.measure(QUICK)
     assert [one.quantity for one in found.numbers[:2]] == ["100 blocks", "400 blocks"]
     assert all(20.0 < one.median < 1e5 for one in found.numbers[:2])
     assert all(800.0 < one.median < 2000.0 for one in found.numbers[2:4])
@@ -47,32 +77,39 @@ def test_walls_tell_time_memory_and_growth() -> None:
     assert {row["rebuilds"] for row in found.details} != {0}  # making pair lists is part of what is timed
 
 
-def test_threads_tell_their_time_and_by_how_much_they_are_faster_and_leave_small_walls_alone() -> None:
-    found = threads.measure(QUICK)
-    assert [one.quantity for one in found.numbers] == [
-        "100 blocks, 2 threads",
-        "100 blocks, speed-up",
-        "400 blocks, 2 threads",
-        "400 blocks, speed-up",
-    ]
+def test_rigid_walls_tell_times_growth_and_where_the_first_one_ends() -> None:
+    found = walls.NONSMOOTH.measure(QUICK)
+    whole, share, small, large, exponent, x, y = found.numbers
+    names = ["40 blocks, 0.1 s", "40 blocks, a substep", "160 blocks, a substep"]
+    assert [one.quantity for one in (whole, small, large)] == names
+    assert share.median == pytest.approx(1e9 * whole.median / (100 * 4 * 40))
+    assert math.isfinite(exponent.median)
+    assert 100.0 < x.median < 250.0  # mm; the wall is 272 mm long
+    assert 0.0 < y.median < 62.5  # mm: lower than it stood
+    assert all(float(str(row["sweeps_per_substep"])) >= 1.0 for row in found.details)
+
+
+def test_growth_is_the_exponent_of_the_time_of_a_whole_step() -> None:
+    times = [single("", "ns", 5.0 * size.blocks**0.25) for size in walls.SIZES]  # of a block
+    assert walls.growth(walls.SIZES, times) == pytest.approx(1.25)
+
+
+@pytest.mark.parametrize(("name", "small", "large"), [("threads", 100, 400), ("nonsmooth-threads", 40, 1000)])
+def test_threads_tell_by_how_much_they_are_faster_and_leave_small_walls_alone(
+    name: str, small: int, large: int
+) -> None:
+    (measurement,) = chosen([name])
+    found = measurement.measure(QUICK)
+    told = [f"{count} blocks, {what}" for count in (small, large) for what in ("2 threads", "speed-up")]
+    assert [one.quantity for one in found.numbers] == told
     assert all(len(one.samples) == 2 and math.isfinite(one.median) and one.median > 0.0 for one in found.numbers)
-    assert found.notes[1].startswith("walls of 100 blocks always use one thread")
-
-
-def test_growth_is_the_exponent_of_a_power_law() -> None:
-    found = [
-        walls.Wall(size, single("", "ns", 5.0 * size.blocks**0.25), 1.0, 0, 1.0) for size in walls.SIZES
-    ]  # ns per block and step, so the time of a step goes with the power 1.25
-    assert walls.growth(found) == pytest.approx(1.25)
+    assert found.notes[1].startswith(f"walls of {small} blocks always use one thread")
 
 
 def test_starts_are_timed_in_processes_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    version, run = startup.measure(Setting(quick=True, repeats=1)).numbers
+    version, run = startup.START_UP.measure(Setting(quick=True, repeats=1)).numbers
     assert 0.01 < version.median < run.median
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_start_that_fails_is_reported() -> None:
     with pytest.raises(StartError, match=r"rnu: exit code 2: .*No such command 'rnu'"):
         startup._seconds(startup.MAIN, "rnu")

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.bench.scenes import LOW_COURSES, pushed_wall, three_blocks
+from blocksim.bench.scenes import LOW_COURSES, UNTIL_SOLVED, Stepping, pushed_wall, three_blocks
 from blocksim.scenario import load_scenario, place_bodies
+from blocksim.scenario.models.stepping import Nonsmooth
 
 NOMINAL = Path(__file__).parents[2] / "scenarios" / "three_blocks_nominal.toml"
 
@@ -18,11 +19,13 @@ def test_three_blocks_are_those_of_the_scenario_that_ships() -> None:
         assert getattr(ours, table) == getattr(shipped, table), table
 
 
-def test_keys_of_contact_and_time_can_be_given() -> None:
-    scenario = three_blocks(contact={"stiffness_scale": 0.01}, time={"end": 0.4, "stop_at_rest": False})
-    assert scenario.contact.stiffness_scale == 0.01
-    assert (scenario.time.end, scenario.time.stop_at_rest) == (0.4, False)
-    assert scenario.contact.restitution == three_blocks().contact.restitution
+def test_a_stepping_is_what_the_scenario_gets() -> None:
+    time = three_blocks(time=Stepping(2e-3, substeps=3, sweeps=5).time(end=0.5)).time
+    assert isinstance(time, Nonsmooth)
+    assert (time.step, time.substeps, time.velocity_sweeps, time.end) == (2e-3, 3, 5, 0.5)
+    default = three_blocks(time={"scheme": "nonsmooth"}).time
+    assert isinstance(default, Nonsmooth)
+    assert Stepping(1e-3).sweeps == UNTIL_SOLVED == default.velocity_sweeps
 
 
 def test_a_wall_is_pushed_in_proportion_to_height() -> None:

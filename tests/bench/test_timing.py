@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blocksim.bench.scenes import pushed_wall, three_blocks
+from blocksim.bench.scenes import three_blocks
 from blocksim.bench.timing import Rerun, RunFailedError
 
 SOFT = {"stiffness_scale": 1e-4}
@@ -19,6 +19,8 @@ def test_every_run_starts_from_the_same_state() -> None:
     assert x[2] > 0.12  # block 3 has fallen
     assert np.array_equal(scene.run(last).bodies.x, x)
     assert scene.run(1).bodies.x[2] < 0.061
+    world = scene.scene.world
+    assert scene.bytes > world.bodies.nbytes + world.pairs.nbytes + world.contacts.nbytes
 
 
 def test_a_run_ends_where_the_blocks_rest() -> None:
@@ -30,9 +32,3 @@ def test_a_run_that_breaks_off_is_reported_and_not_timed() -> None:
     scene = Rerun(three_blocks(contact={**SOFT, "max_overlap": 1e-6}))
     with pytest.raises(RunFailedError, match="overlap"):
         scene.run(1000)
-
-
-def test_bytes_are_those_of_all_arrays() -> None:
-    scene = Rerun(pushed_wall(4, 3, contact=SOFT))
-    world = scene.scene.world
-    assert scene.bytes > world.bodies.nbytes + world.pairs.nbytes + world.contacts.nbytes

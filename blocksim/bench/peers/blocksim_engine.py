@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.bench.peers.scene import Final, Scene
+from blocksim.bench.peers.engine import Final, Scene, timed
+from blocksim.bench.timing import Rerun
 from blocksim.simulation.loop import last_step_of
-from blocksim.simulation.outcome import BY_CODE
-from blocksim.simulation.schemes import build_scene
 from blocksim.simulation.team import ALONE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from blocksim.bench.stepping import Stepping
+    from blocksim.bench.scenes import Stepping
 
 CALLS = 1000  # that are timed with nothing to do
+Table = dict[str, object]
 
 
 class Blocksim(ABC):
@@ -31,15 +30,9 @@ class Blocksim(ABC):
     def setting(self) -> str:
         """For people."""
 
-    @property
     @abstractmethod
-    def contact(self) -> Mapping[str, object]:
-        """Keys of [contact]."""
-
-    @property
-    @abstractmethod
-    def time(self) -> Mapping[str, object]:
-        """Keys of [time]."""
+    def tables(self) -> tuple[Table, Table]:
+        """Return keys of [contact] and of [time]."""
 
     def calls(self, scene: Scene) -> int:  # noqa: ARG002 - others have one a step
         """Return how often Python calls the engine for a scene."""
@@ -50,26 +43,19 @@ class Blocksim(ABC):
 
         A run that fails, as when soft blocks overlap too far, ends at positions that are NaN.
         """
-        times = {**self.time, "end": scene.end, "stop_at_rest": False}
-        own = build_scene(scene.make(contact=self.contact, time=times))
-        own.world.bodies.x[:-1] += scene.shift
-        last = last_step_of(scene.end, float(own.world.controls[0].step))
-        own, _ = ALONE.advance(own, 0)
-        began = time.process_time()
-        own, status = ALONE.advance(own, last)
-        seconds = time.process_time() - began
-        found = np.array([own.world.bodies.x[:-1], own.world.bodies.y[:-1]])
-        if not BY_CODE[status].is_finished:
-            found[:] = np.nan
-        return Final(found[0], found[1], seconds)
+        start = self._started(scene, {"end": scene.end, "stop_at_rest": False})
+        run = start.attempt(last_step_of(scene.end, start.step))
+        places = np.array([run.bodies.x, run.bodies.y])
+        x, y = places if run.outcome.is_finished else np.full_like(places, np.nan)
+        return Final(x, y, run.seconds)
 
     def call_time(self, scene: Scene) -> float:
         """Return the seconds that a call from Python costs where there is nothing to compute."""
-        own, _ = ALONE.advance(build_scene(scene.make(contact=self.contact, time=self.time)), 0)
-        began = time.process_time()
-        for _ in range(CALLS):
-            own, _ = ALONE.advance(own, 0)
-        return (time.process_time() - began) / CALLS
+        return timed(ALONE.advance, (self._started(scene, {}).scene, 0), CALLS) / CALLS
+
+    def _started(self, scene: Scene, more: Mapping[str, object]) -> Rerun:
+        contact, time = self.tables()
+        return Rerun(scene.make(contact=contact, time={**time, **more}), scene.shift)
 
 
 @dataclass(frozen=True)
@@ -84,15 +70,9 @@ class Explicit(Blocksim):
         """For people."""
         return f"stiffness {self.scale:g}"
 
-    @property
-    def contact(self) -> Mapping[str, object]:
-        """Stiffness."""
-        return {"stiffness_scale": self.scale}
-
-    @property
-    def time(self) -> Mapping[str, object]:
-        """Step."""
-        return {"safety": self.safety}
+    def tables(self) -> tuple[Table, Table]:
+        """Return stiffness and step."""
+        return {"stiffness_scale": self.scale}, {"safety": self.safety}
 
 
 @dataclass(frozen=True)
@@ -106,12 +86,6 @@ class Nonsmooth(Blocksim):
         """For people."""
         return self.stepping.setting
 
-    @property
-    def contact(self) -> Mapping[str, object]:
-        """Nothing."""
-        return {}
-
-    @property
-    def time(self) -> Mapping[str, object]:
-        """Step, parts and sweeps."""
-        return self.stepping.time(force_step=True)
+    def tables(self) -> tuple[Table, Table]:
+        """Return step, parts and sweeps."""
+        return {}, self.stepping.time(force_step=True)

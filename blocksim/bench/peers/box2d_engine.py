@@ -11,14 +11,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from blocksim.bench.peers.packages import loaded
-from blocksim.bench.peers.stepper import Stepper
+from blocksim.bench.peers.engine import Stepper, loaded
 from blocksim.bench.scenes import FRICTION
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.bench.peers.scene import Scene
+    from blocksim.bench.peers.engine import Scene
 
 UNITS = 200.0  # a metre
 GRAVITY = 9.81  # m/s2

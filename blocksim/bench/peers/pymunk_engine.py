@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from blocksim.bench.peers.packages import loaded
-from blocksim.bench.peers.stepper import Stepper
+from blocksim.bench.peers.engine import Stepper, loaded
 from blocksim.bench.scenes import FRICTION
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.bench.peers.scene import Scene
+    from blocksim.bench.peers.engine import Scene
 
 # Overlap that is left alone so that contacts last. The default of 0.1 is a tenth of a pixel; here it would be 0.1 m.
 SLOP = 1e-6  # m

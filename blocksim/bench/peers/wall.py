@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from blocksim.bench.measurement import Findings, Number, Setting, single
-from blocksim.bench.peers.packages import require_all
-from blocksim.bench.peers.scene import Final, Scene, Series, Solver
+from blocksim.bench.measurement import Findings, Measurement, Number, Setting, single
+from blocksim.bench.peers.engine import Final, Scene, Series, Solver
 from blocksim.bench.peers.series import wall_racers, wall_series
 from blocksim.bench.scenes import LOW_COURSES, WALL_RESTITUTION, pushed_wall
 from blocksim.scenario.structures.base import draws
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-QUICK = "a wall of 40 blocks for 0.1 s instead of 1000 for 1 s, two levels"
 JITTER = 1e-6  # m
 SEED = 2
 ROUNDS = 3  # of engines in turns, at most
@@ -79,7 +77,6 @@ def distances(one: Final, two: Final) -> tuple[float, float]:
 
 def measure(setting: Setting) -> Findings:
     """Measure all engines; one run a level, as each takes seconds to a minute."""
-    require_all()
     size = SMALL if setting.quick else FULL
     computed = [_computed(series, size) for series in wall_series(quick=setting.quick)]
     numbers = [number for one in computed for number in _numbers(one)]
@@ -160,3 +157,11 @@ def _details(one: Computed) -> list[dict[str, object]]:
         }
         for solver, final, change in zip(one.series.levels, one.finals, changes, strict=True)
     ]
+
+
+WALL = Measurement(
+    "wall",
+    "pushed wall, also by pymunk and Box2D",
+    measure,
+    quick="a wall of 40 blocks for 0.1 s instead of 1000 for 1 s, two levels",
+)

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.bench.measurement import Findings, Number, Setting, single
+from blocksim.bench.measurement import Findings, Measurement, Number, Setting, single
 from blocksim.bench.peers.blocksim_engine import Nonsmooth
 from blocksim.bench.peers.box2d_engine import Box2D, empty_world
-from blocksim.bench.peers.packages import require_all
+from blocksim.bench.peers.engine import Final, Scene, Series, Solver, call_time
 from blocksim.bench.peers.pymunk_engine import Pymunk, empty_space
-from blocksim.bench.peers.scene import Final, Scene, Series, Solver
 from blocksim.bench.peers.series import BOX2D, NONSMOOTH, PYMUNK, three_blocks_series
-from blocksim.bench.peers.stepper import call_time
-from blocksim.bench.scenes import RESTITUTION, Table, three_blocks
-from blocksim.bench.stepping import Stepping
+from blocksim.bench.scenes import RESTITUTION, Stepping, Table, three_blocks
 from blocksim.scenario.structures.base import draws
 from blocksim.view.work_precision import Curve, Panel
 
@@ -26,7 +24,6 @@ if TYPE_CHECKING:
 
     from blocksim.scenario import Scenario
 
-QUICK = "2 starts and three coarse levels of each engine, against a level that is not much finer"
 STARTS, QUICK_STARTS = 16, 2
 JITTER = 1e-6  # m
 SEED = 1
@@ -45,7 +42,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Answer:
-    """The cheapest setting of a series whose error is small, of which all finer ones' are too."""
+    """The cheapest setting of a series whose error is small, of which all finer ones' are too: not right by chance."""
 
     series: Series
     level: Level | None  # None where there is none
@@ -73,19 +70,8 @@ def starts(count: int, restitution: float = RESTITUTION) -> list[Scene]:
     return [Scene(make, JITTER * (2.0 * row - 1.0), restitution, END) for row in draws(SEED, count, 3)]
 
 
-def measure(setting: Setting) -> Findings:
-    """Measure all engines with the restitution of the paper's blocks."""
-    return measured(setting, RESTITUTION)
-
-
-def measure_without_restitution(setting: Setting) -> Findings:
-    """Measure all engines where they agree on the answer."""
-    return measured(setting, 0.0)
-
-
-def measured(setting: Setting, restitution: float) -> Findings:
+def measure(restitution: float, setting: Setting) -> Findings:
     """Measure all engines."""
-    require_all()
     scenes = starts(QUICK_STARTS if setting.quick else STARTS, restitution)
     references: dict[str, list[Final]] = {}
     curves, answers, details = [], [], []
@@ -115,14 +101,8 @@ def _level(solver: Solver, scenes: list[Scene], references: list[Final]) -> Leve
 
 
 def _answer(series: Series, levels: list[Level]) -> Answer:
-    close = settled(levels)
-    return Answer(series, min(close, key=lambda level: float(np.median(level.seconds)), default=None))
-
-
-def settled(levels: list[Level]) -> list[Level]:
-    """Return the levels whose error is small, all finer ones' too: coarse steps can be right by chance."""
     close = itertools.takewhile(lambda level: float(np.median(level.off)) <= CLOSE, reversed(levels))
-    return list(close)
+    return Answer(series, min(close, key=lambda level: float(np.median(level.seconds)), default=None))
 
 
 def _calls(scene: Scene) -> dict[str, float]:
@@ -179,3 +159,14 @@ def _detail(series: Series, level: Level) -> dict[str, object]:
         "cpu_s": float(np.median(level.seconds)),
         "cpu_seconds": level.seconds.tolist(),
     }
+
+
+PAPER = Measurement(
+    "three-blocks",
+    "three blocks to within 0.2 mm, also by pymunk and Box2D",
+    functools.partial(measure, RESTITUTION),
+    quick="2 starts and three coarse levels of each engine, against a level that is not much finer",
+)
+WITHOUT_RESTITUTION = Measurement(
+    "three-blocks-e0", "the same without restitution", functools.partial(measure, 0.0), quick=PAPER.quick
+)
