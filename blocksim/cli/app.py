@@ -5,18 +5,18 @@ import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from blocksim.cli.interrupts import take_interrupts
+from blocksim.cli.process import leave_all, take_interrupts
 from blocksim.errors import ExitCode
 
 if TYPE_CHECKING:
-    from blocksim.cli.application import app as app  # noqa: PLC0414 - found when first asked for, as in blocksim
+    from blocksim.cli.commands import app as app  # noqa: PLC0414 - found when first asked for, as in blocksim
 
 
 def __getattr__(name: str) -> Any:
     if name != "app":
         message = f"module '{__name__}' has no attribute '{name}'"
         raise AttributeError(message)
-    return import_module("blocksim.cli.application").app
+    return import_module("blocksim.cli.commands").app
 
 
 def main() -> None:
@@ -25,8 +25,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without ± is no reason to fail
-    from blocksim.cli.application import app
-    from blocksim.cli.collector import leave_all
+    from blocksim.cli.commands import app
     from blocksim.cli.failures import tell_internal_error
 
     try:

@@ -2,18 +2,18 @@
 
 import json
 import math
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from blocksim.bench.machine import Machine, this_machine
-from blocksim.bench.measurement import REPEATS, Measurement, Number, Outcome, Setting, report
+from blocksim.bench.measurement import REPEATS, Number, Outcome, Setting, report
 from blocksim.bench.measurements import chosen
 from blocksim.cli import options
-from blocksim.cli.compiling import tell_compilation
-from blocksim.cli.output import answer, note, print_json, table_lines
+from blocksim.cli.output import grouped_lines, note, show
+from blocksim.cli.prepare import tell_compilation
+from blocksim.cli.progress import one_by_one
 from blocksim.errors import OutputError
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.own_files import is_bench, is_picture, refuse_foreign
@@ -70,7 +70,8 @@ def bench_command(
     tell_compilation("surface", quiet=silent)
     outcomes: list[Outcome] = []
     try:
-        outcomes.extend(_run(wanted, Setting(quick, repeats), quiet=silent))
+        told = one_by_one(wanted, lambda one: f"{one.name}: {one.title}", quiet=silent)
+        outcomes.extend(one.run(Setting(quick, repeats)) for one in told)
     finally:  # also when stopped: minutes of measuring must not be lost; the list has what was measured
         if outcomes:
             _show(machine, outcomes, out, paper, as_json=as_json, quiet=silent)
@@ -91,14 +92,6 @@ def _picture(out: Path | None) -> Path:
     return PICTURE if out is None else out.with_suffix(".png")
 
 
-def _run(measurements: Sequence[Measurement], setting: Setting, *, quiet: bool) -> Iterator[Outcome]:
-    """Run measurements one after the other and report which one is running."""
-    for position, measurement in enumerate(measurements, start=1):
-        if not quiet:
-            note(f"{position}/{len(measurements)} {measurement.name}: {measurement.title} ...")
-        yield measurement.run(setting)
-
-
 def _show(
     machine: Machine, outcomes: list[Outcome], out: Path | None, paper: Paper, *, as_json: bool, quiet: bool
 ) -> None:
@@ -106,10 +99,11 @@ def _show(
     if out is not None:
         write_text(out, json.dumps(data, indent=2) + "\n")
     picture = _draw(outcomes, _picture(out), paper)
-    if as_json:
-        print_json(data)
-    else:
-        answer("\n".join(_lines(outcomes)))
+    groups = (
+        (f"{one.measurement.name}: {one.measurement.title}", [_cells(number) for number in one.findings.numbers])
+        for one in outcomes
+    )
+    show(grouped_lines(COLUMNS, groups, left=2), data, as_json=as_json)
     if not quiet:
         _tell_end(machine, outcomes)
         for path in (out, picture):
@@ -123,19 +117,6 @@ def _draw(outcomes: list[Outcome], path: Path, paper: Paper) -> Path | None:
         return None
     draw_work_precision(panels, path, title="Accuracy for computing time, each engine against itself", paper=paper)
     return path
-
-
-def _lines(outcomes: list[Outcome]) -> list[str]:
-    """Return one table with a line above the numbers of every measurement."""
-    rows = [_cells(one) for outcome in outcomes for one in outcome.findings.numbers]
-    head, rule, *lines = table_lines(COLUMNS, rows, left=2)
-    found = [head, rule]
-    for outcome in outcomes:
-        found.append(f"{outcome.measurement.name}: {outcome.measurement.title}")
-        count = len(outcome.findings.numbers)
-        found += lines[:count]
-        lines = lines[count:]
-    return found
 
 
 def _cells(one: Number) -> tuple[str, ...]:

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.compiling import tell_compilation
-from blocksim.cli.output import answer, note, number, print_json, table_lines
+from blocksim.cli.output import note, number, show, table_lines
+from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.vary import read_variations
 from blocksim.errors import ExitCode
 from blocksim.scenario import Document
@@ -86,10 +86,7 @@ def calibrate_command(
         overwrite=overwrite,
         on_trial=(lambda *_: None) if silent else _telling(),
     )
-    if as_json:
-        print_json(_data(found))
-    else:
-        answer("\n".join(_lines(found)))
+    show(_lines(found), _data(found), as_json=as_json)
     if not silent:
         _tell_end(found)
     raise typer.Exit(ExitCode.SUCCESS if found.found else ExitCode.OUTSIDE)

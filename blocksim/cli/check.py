@@ -10,7 +10,7 @@ import typer
 
 from blocksim.cli import options
 from blocksim.cli.output import GAP, answer, duration, note, number, print_json, table_lines, width_of_screen
-from blocksim.cli.scenario import read_scenario, warn_of_values
+from blocksim.cli.prepare import read_scenario, warn_of_values
 from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
 from blocksim.study.rows import check_experiment

@@ -1,4 +1,4 @@
-"""The table of all commands, and a group that imports a command only when it is called.
+"""The command `blocksim`: its options, and the table of its subcommands, each imported only when it is called.
 
 So `blocksim --help` need not wait for numba, pandas and HDF5, and `blocksim check` not for matplotlib.
 """
@@ -6,34 +6,33 @@ So `blocksim --help` need not wait for numba, pandas and HDF5, and `blocksim che
 import re
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from blocksim.cli.collector import loading
+from blocksim import __version__
 from blocksim.cli.failures import told
-from blocksim.cli.interrupts import clearing_up
-from blocksim.cli.outside import add_outside
+from blocksim.cli.process import clearing_up, loading
 from blocksim.errors import InputMissingError
 
-COMMANDS = {  # name: module in this folder, function in it, first line of its help
-    "run": ("run", "run_command", "Simulate a scenario and show where the blocks end."),
-    "compare": ("compare", "compare_command", "Compare runs with measured repeats."),
-    "check": ("check", "check_command", "Validate a scenario and summarise it."),
-    "sweep": ("sweep", "sweep_command", "Run a scenario many times with some keys varied."),
-    "calibrate": ("calibrate", "calibrate_command", "Fit inputs to measured repeats, within their priors."),
-    "sensitivity": ("sensitivity", "sensitivity_command", "Show which inputs decide where the blocks end."),
-    "converge": ("converge", "converge_command", "Refine step, stiffness and spacing until the run-out converges."),
-    "verify": ("verify", "verify_command", "Run the verification cases and show the table."),
-    "verify-run": ("verify_run", "verify_run_command", "Run stored results again and check bitwise reproducibility."),
-    "bench": ("bench", "bench_command", "Measure speed and memory, and show the table."),
-    "plot": ("plot", "plot_command", "Draw a run, a sweep or a table of sensitivities."),
-    "animate": ("animate", "animate_command", "Show a run as an animation, GIF or MP4."),
-    "export": ("export", "export_command", "Write all frames of a run as CSV or VTKHDF."),
-    "report": ("report", "report_command", "Write runs and sweeps into one HTML file."),
-    "new": ("new", "new_command", "Write a commented scenario, sweep or table from a template."),
-    "schema": ("schema", "schema_command", "Print the JSON Schema of scenario files, for editors."),
+COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command in verify_run.py
+    "run": "Simulate a scenario and show where the blocks end.",
+    "compare": "Compare runs with measured repeats.",
+    "check": "Validate a scenario and summarise it.",
+    "sweep": "Run a scenario many times with some keys varied.",
+    "calibrate": "Fit inputs to measured repeats, within their priors.",
+    "sensitivity": "Show which inputs decide where the blocks end.",
+    "converge": "Refine step, stiffness and spacing until the run-out converges.",
+    "verify": "Run the verification cases and show the table.",
+    "verify-run": "Run stored results again and check bitwise reproducibility.",
+    "bench": "Measure speed and memory, and show the table.",
+    "plot": "Draw a run, a sweep or a table of sensitivities.",
+    "animate": "Show a run as an animation, GIF or MP4.",
+    "export": "Write all frames of a run as CSV or VTKHDF.",
+    "report": "Write runs and sweeps into one HTML file.",
+    "new": "Write a commented scenario, sweep or table from a template.",
+    "schema": "Print the JSON Schema of scenario files, for editors.",
 }
 
 GROUPS = {  # heads of the list in `blocksim --help`
@@ -42,6 +41,8 @@ GROUPS = {  # heads of the list in `blocksim --help`
     "Study": ("sweep", "calibrate", "sensitivity", "converge"),
     "Check": ("check", "compare", "verify", "verify-run", "bench"),
 }
+WITH_SCENARIOS = set(COMMANDS) - {"verify", "verify-run", "bench", "new", "schema"}
+"""Commands that read scenario files, directly or with results, and so have the option --allow-outside."""
 UsageError: Any = typer.BadParameter.__mro__[1]
 """Mistake of usage; typer exports this class under no name."""
 HELP = {"help_option_names": ["-h", "--help"]}
@@ -55,7 +56,7 @@ class CommandGroup(TyperGroup):
         width = max(map(len, COMMANDS))
         for head, names in GROUPS.items():
             with formatter.section(head):
-                formatter.write_dl([(name.ljust(width), COMMANDS[name][2]) for name in names])
+                formatter.write_dl([(name.ljust(width), COMMANDS[name]) for name in names])
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
         """Import the command that the user named."""
@@ -93,19 +94,73 @@ def _refuse_no_folder() -> None:
 
 def loaded(name: str) -> Any:
     """Return the command of a name, ready to be called."""
-    module, function, summary = COMMANDS[name]
+    module = name.replace("-", "_")
     with loading(), clearing_up(wanted=False):
-        command = getattr(import_module(f"blocksim.cli.{module}"), function)
+        function = getattr(import_module(f"blocksim.cli.{module}"), f"{module}_command")
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
-    alone.command(name, short_help=summary, context_settings=HELP)(command)
-    return add_outside(name, typer.main.get_command(alone))
+    alone.command(name, short_help=COMMANDS[name], context_settings=HELP)(function)
+    command: Any = typer.main.get_command(alone)
+    if name in WITH_SCENARIOS:
+        command.params.append(_allow_outside())
+    return command
+
+
+def _allow_outside() -> Any:
+    """Let typer make the option --allow-outside, as it makes all others."""
+    alone = typer.Typer(add_completion=False)
+    alone.command()(_asked)
+    return next(param for param in typer.main.get_command(alone).params if param.name == "allow_outside")
+
+
+def _allow(context: typer.Context, asked: bool) -> None:
+    from blocksim.scenario.path_policy import reaching
+
+    if asked:
+        context.with_resource(reaching(anywhere=True))
+
+
+def _asked(
+    allow_outside: Annotated[
+        bool,
+        typer.Option(
+            "--allow-outside",
+            callback=_allow,
+            expose_value=False,
+            help="Allow tables outside the scenario's folder and the current one.",
+        ),
+    ] = False,
+) -> None:
+    """Stand for a command that has the option."""
 
 
 def _listed() -> None:
     """Stand for a command in the list of all commands."""
 
 
-def add_commands(app: typer.Typer) -> None:
-    """List all commands in an application whose group is a CommandGroup."""
-    for name, (_, _, summary) in COMMANDS.items():
-        app.command(name, help=summary)(_listed)
+def _print_version(asked: bool) -> None:
+    if asked:
+        print(f"blocksim {__version__}")  # noqa: T201 - this is the answer
+        raise typer.Exit
+
+
+app = typer.Typer(
+    cls=CommandGroup,
+    name="blocksim",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings=HELP,
+    help="Simulate collapses of rigid blocks and compare them with measurements.",
+    epilog="Start with: blocksim new wall my_wall; blocksim run my_wall.toml",
+)
+for _name, _summary in COMMANDS.items():
+    app.command(_name, help=_summary)(_listed)
+
+
+@app.callback()
+def common(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Take the options of the command itself."""

@@ -9,9 +9,8 @@ import typer
 
 from blocksim.analysis.judgement import THRESHOLD, U_NUM, Settings
 from blocksim.cli import options
-from blocksim.cli.judgement import judgement_lines, meanings
-from blocksim.cli.output import answer, print_json
-from blocksim.cli.verdict import comparison_table, verdict_lines
+from blocksim.cli.output import show
+from blocksim.cli.verdicts import comparison_table, judgement_lines, meanings, verdict_lines
 from blocksim.errors import ExitCode
 from blocksim.study.compare import compare_run, compare_sweep
 from blocksim.study.stored_run import find_run
@@ -61,18 +60,12 @@ def compare_command(
     """
     settings = Settings(threshold, u_num)
     judged = [_judge(run, experiment, settings) for run in runs]
-    if as_json:
-        print_json([one.data for one in judged])
-    else:
-        answer("\n\n".join(_text(one, headed=not quiet or len(judged) > 1) for one in judged))
+    texts = ("\n".join(one.lines if quiet and len(judged) == 1 else (one.head, *one.lines)) for one in judged)
+    show(["\n\n".join(texts)], [one.data for one in judged], as_json=as_json)
     raise typer.Exit(ExitCode.SUCCESS if all(one.inside for one in judged) else ExitCode.OUTSIDE)
 
 
 compare_command.__doc__ = inspect.cleandoc(compare_command.__doc__ or "").replace("{meanings}", meanings())
-
-
-def _text(one: Judged, *, headed: bool) -> str:
-    return "\n".join([one.head, *one.lines] if headed else one.lines)
 
 
 def _judge(place: Path, experiment: Path | None, settings: Settings) -> Judged:

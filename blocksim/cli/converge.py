@@ -12,9 +12,8 @@ import numpy as np
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.compiling import tell_compilation
-from blocksim.cli.output import answer, note, number, print_json, table_lines
-from blocksim.cli.scenario import read_scenario
+from blocksim.cli.output import note, number, show, table_lines
+from blocksim.cli.prepare import read_scenario, tell_compilation
 from blocksim.errors import ExitCode
 from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.folder import RESULTS
@@ -105,10 +104,8 @@ def converge_command(
             on_run=(lambda *_: None) if silent else _tell_run,
         )
         drawn = path if picture and draw_convergence(result, ready, path, paper) else None
-    if as_json:
-        print_json(_data(result, drawn))
-    else:
-        answer("\n".join(_answer_lines(result, _command(result, scenario, settings or []))))
+    lines = _answer_lines(result, _command(result, scenario, settings or []))
+    show(lines, _data(result, drawn), as_json=as_json)
     if drawn is not None and not silent:
         note(f"picture: {drawn}")
     raise typer.Exit(ExitCode.NUMERICAL_FAILURE if result.failed else ExitCode.SUCCESS)

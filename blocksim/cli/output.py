@@ -8,6 +8,7 @@ import shutil
 import sys
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from typing import TextIO
 
@@ -51,6 +52,14 @@ def print_json(data: object) -> None:
     answer(json.dumps(_finite(data), indent=2, default=str))
 
 
+def show(lines: Iterable[str], data: object, *, as_json: bool) -> None:
+    """Print the answer for people, or its data for programs."""
+    if as_json:
+        print_json(data)
+    else:
+        answer("\n".join(lines))
+
+
 def _finite(data: object) -> object:
     if isinstance(data, float):
         return data if math.isfinite(data) else None
@@ -86,6 +95,16 @@ def table_lines(columns: Sequence[str], rows: Iterable[Sequence[str]], left: int
         return GAP.join((*texts, *numbers)).rstrip()
 
     return [line(columns), GAP.join("─" * width for width in widths), *map(line, cells)]
+
+
+def grouped_lines(
+    columns: Sequence[str], groups: Iterable[tuple[str, Sequence[Sequence[str]]]], left: int = 1
+) -> list[str]:
+    """Return one table of the rows of all groups, with a line above those of each."""
+    groups = list(groups)
+    head, rule, *lines = table_lines(columns, [row for _, rows in groups for row in rows], left)
+    left_over = iter(lines)
+    return [head, rule, *(line for name, rows in groups for line in (name, *islice(left_over, len(rows))))]
 
 
 def _fitted(text: str, width: int) -> str:

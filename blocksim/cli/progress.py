@@ -1,9 +1,9 @@
 """Progress of a run: a live line on a terminal, a plain line now and then elsewhere."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from rich.console import Console
 
@@ -12,6 +12,7 @@ from blocksim.cli.output import note
 if TYPE_CHECKING:  # stored results are shown without the solver
     from blocksim.simulation import Progress as Where
 
+T = TypeVar("T")
 PLAIN_SECONDS = 2.0
 LIVE_SECONDS = 0.1
 
@@ -42,6 +43,14 @@ def counting(what: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
             yield show
     else:
         yield _plain_count(what)
+
+
+def one_by_one(items: Sequence[T], told: Callable[[T], str], *, quiet: bool) -> Iterator[T]:
+    """Yield items that take long and report which one is under way."""
+    for position, item in enumerate(items, start=1):
+        if not quiet:
+            note(f"{position}/{len(items)} {told(item)} ...")
+        yield item
 
 
 @contextmanager

@@ -7,11 +7,10 @@ from itertools import islice
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.compiling import tell_compilation
-from blocksim.cli.output import answer, note, number, print_json, table_lines
+from blocksim.cli.output import note, number, show, table_lines
+from blocksim.cli.prepare import read_scenario, tell_compilation, warn_of_values
 from blocksim.cli.progress import watching
-from blocksim.cli.scenario import read_scenario, warn_of_values
-from blocksim.cli.verdict import comparison_table, verdict_lines
+from blocksim.cli.verdicts import comparison_table, verdict_lines
 from blocksim.simulation import Result
 from blocksim.simulation.checkpoint_policy import CHECKPOINT_SECONDS, CheckpointPolicy
 from blocksim.simulation.folder import default_folder
@@ -97,12 +96,9 @@ def show_result(result: Result, *, as_json: bool, quiet: bool) -> None:
     """Print the final table, with the measured ranges if the scenario names an experiment."""
     if not quiet:
         _tell_end(result)
-    if as_json:
-        print_json(
-            {"folder": str(result.folder), "final": rows_of(result.columns), "summary": result.summary.model_dump()}
-        )
-    else:
-        answer("\n".join(_answer_lines(result)))
+    summary = result.summary.model_dump()
+    data = {"folder": str(result.folder), "final": rows_of(result.columns), "summary": summary}
+    show(_answer_lines(result), data, as_json=as_json)
     if result.status != FINISHED:
         note(f"{result.name}: {result.status}: {result.reason}; partial results are in {result.folder}")
         note(_way_on(result))

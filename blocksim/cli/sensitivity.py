@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.compiling import tell_compilation
-from blocksim.cli.output import answer, note, number, print_json, table_lines
+from blocksim.cli.output import note, number, show, table_lines
+from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.progress import counting
 from blocksim.cli.vary import read_variations
 from blocksim.errors import InvalidInputError, OutputExistsError
@@ -83,10 +83,7 @@ def sensitivity_command(
         found = sensitivity(bare, plan, METHODS[method.value], samples=samples, seed=seed, on_member=on_member)
     if out is not None:
         write_text(out, _csv(found))
-    if as_json:
-        print_json(_data(found))
-    else:
-        answer("\n".join(_lines(found)))
+    show(_lines(found), _data(found), as_json=as_json)
     if not silent:
         _tell_end(found, out)
 

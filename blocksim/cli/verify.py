@@ -1,17 +1,17 @@
 """blocksim verify: run the verification cases and print their table."""
 
-from collections.abc import Iterator, Sequence
 from enum import StrEnum
 from typing import Annotated
 
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.compiling import tell_compilation
-from blocksim.cli.output import answer, note, print_json, table_lines
+from blocksim.cli.output import grouped_lines, note, show
+from blocksim.cli.prepare import tell_compilation
+from blocksim.cli.progress import one_by_one
 from blocksim.errors import ExitCode
 from blocksim.simulation.compilation import kernel_set
-from blocksim.verification.case import Case, Row, Setting, Verdict
+from blocksim.verification.case import Row, Setting, Verdict
 from blocksim.verification.cases import chosen, left_out, refuse_springs
 from blocksim.verification.verify import (
     Outcome,
@@ -70,43 +70,19 @@ def verify_command(
     tell_compilation(kernel_set(setting.scheme, setting.model), quiet=silent)
     outcomes: list[Outcome] = []
     try:
-        outcomes.extend(_run(wanted, setting, quiet=silent))
+        cases_told = one_by_one(wanted, lambda case: f"{case.id} {case.title}", quiet=silent)
+        outcomes.extend(run_case(case, setting) for case in cases_told)
     finally:  # also when stopped: minutes of measuring must not be lost; the list has what was measured
         if outcomes:
-            _show(outcomes, as_json=as_json, quiet=quiet)
+            data = [row for outcome in outcomes for row in outcome.to_dicts()]
+            groups = ((_heading(outcome), [_cells(row) for row in outcome.rows]) for outcome in outcomes)
+            show(grouped_lines(COLUMNS, groups), data, as_json=as_json)
+        if outcomes and not silent:
+            _tell_end(outcomes)
     if not (silent or cases):
         _tell_left_out(setting)
     inside = all(outcome.inside for outcome in outcomes)
     raise typer.Exit(ExitCode.SUCCESS if inside else ExitCode.OUTSIDE)
-
-
-def _run(cases: Sequence[Case], setting: Setting, *, quiet: bool) -> Iterator[Outcome]:
-    """Run cases one after the other and report which one is running."""
-    for position, case in enumerate(cases, start=1):
-        if not quiet:
-            note(f"{position}/{len(cases)} {case.id} {case.title} ...")
-        yield run_case(case, setting)
-
-
-def _show(outcomes: list[Outcome], *, as_json: bool, quiet: bool) -> None:
-    if as_json:
-        print_json([row for outcome in outcomes for row in outcome.to_dicts()])
-        return
-    answer("\n".join(_lines(outcomes)))
-    if not quiet:
-        _tell_end(outcomes)
-
-
-def _lines(outcomes: list[Outcome]) -> list[str]:
-    """Return one table with a line above the rows of every case."""
-    rows = [_cells(row) for outcome in outcomes for row in outcome.rows]
-    head, rule, *lines = table_lines(COLUMNS, rows)
-    found = [head, rule]
-    for outcome in outcomes:
-        found.append(_heading(outcome))
-        found += lines[: len(outcome.rows)]
-        lines = lines[len(outcome.rows) :]
-    return found
 
 
 def _heading(outcome: Outcome) -> str:

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.compiling import tell_compilation
-from blocksim.cli.output import answer, note, print_json
+from blocksim.cli.output import note, show
+from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.progress import watching
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedEarlyError
 from blocksim.simulation.compilation import kernels_of
@@ -60,10 +60,7 @@ def verify_run_command(
     """
     silent = quiet or as_json
     verified = [_verified(place, threads, sample, seed, silent=silent) for place in places]
-    if as_json:
-        print_json([one.data for one in verified])
-    else:
-        answer("\n".join(line for one in verified for line in one.lines))
+    show((line for one in verified for line in one.lines), [one.data for one in verified], as_json=as_json)
     raise typer.Exit(max(one.code for one in verified))  # of several the most severe: 65, 66 before 1 before 0
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from blocksim.cli.collector import loading
+from blocksim.cli.process import loading
 
 
 @pytest.fixture(autouse=True)

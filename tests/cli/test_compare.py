@@ -15,7 +15,7 @@ from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import ExperimentTable, Measurement
 from blocksim.analysis.metrics import METRICS
 from blocksim.analysis.metrics.metric import BLOCK
-from blocksim.cli.verdict import verdict_lines
+from blocksim.cli.verdicts import verdict_lines
 from tests.cli.conftest import SOFT, Command
 
 TABLE = "scenarios/experiments/three_blocks.csv"

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.cli import compiling
 from blocksim.cli.output import note, number, print_json, table_lines
+from blocksim.cli.prepare import tell_compilation
+from blocksim.simulation import compilation
 
 
 def test_columns_line_up() -> None:
@@ -50,9 +51,9 @@ def test_notes_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> No
 def test_compiled_solver_that_cannot_be_kept_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(compiling, "is_compiled", lambda _: False)
-    monkeypatch.setattr(compiling, "compile_kernels", lambda _: 30.0)
-    monkeypatch.setattr("blocksim.cli.compiling.jit.cache_folder", lambda: Path("/disk/blocksim/0123"))
-    compiling.tell_compilation("surface", quiet=False)
+    monkeypatch.setattr(compilation, "is_compiled", lambda _: False)
+    monkeypatch.setattr(compilation, "compile_kernels", lambda _: 30.0)
+    monkeypatch.setattr("blocksim.kernels.jit.cache_folder", lambda: Path("/disk/blocksim/0123"))
+    tell_compilation("surface", quiet=False)
     told = capsys.readouterr().err.splitlines()
     assert told[-1].startswith("/disk/blocksim/0123: the compiled solver cannot be stored there; free some space")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.cli.outside import WITH_SCENARIOS
+from blocksim.cli.commands import WITH_SCENARIOS
 from tests.cli.conftest import SCENARIOS, Command
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from blocksim.cli import progress, reporter
+from blocksim.cli import progress, sweep_output
 from blocksim.cli.progress import counting
-from blocksim.cli.reporter import reporting
+from blocksim.cli.sweep_output import reporting
 from tests.cli.conftest import Command
 
 
@@ -16,7 +16,7 @@ from tests.cli.conftest import Command
 def terminal(monkeypatch: pytest.MonkeyPatch) -> StringIO:
     """Have a terminal in place of standard error."""
     screen = StringIO()
-    for module in (progress, reporter):
+    for module in (progress, sweep_output):
         monkeypatch.setattr(module, "Console", lambda **_: Console(file=screen, force_terminal=True, width=80))
     return screen
 

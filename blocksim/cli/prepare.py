@@ -1,10 +1,11 @@
-"""Reading a scenario for a command, so that mistakes found later also point into the file."""
+"""What comes before a run: reading the scenario, so that later mistakes also point into the file, and compiling."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from blocksim.cli.output import note
+from blocksim.cli.process import loading
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.findings import Finding
@@ -28,3 +29,22 @@ def warn_of_values(scenario: Scenario) -> None:
     """Warn of values that are allowed but implausible."""
     for text in implausible_values(scenario):
         note(f"warning: {text}")
+
+
+def tell_compilation(kernels: str, *, quiet: bool) -> None:
+    """Compile a set of kernels unless that is done, and report it: it is not part of a run."""
+    from blocksim.kernels import jit
+    from blocksim.simulation.compilation import compile_kernels, is_compiled
+
+    if is_compiled(kernels):
+        with loading():
+            compile_kernels(kernels)
+        return
+    if quiet:
+        compile_kernels(kernels)
+        return
+    note("Compiling the solver, once after installation (less than a minute) ...")
+    note(f"Compiled in {compile_kernels(kernels):.0f} s.")
+    if not is_compiled(kernels):
+        folder = jit.cache_folder() or jit.cache_root()
+        note(f"{folder}: the compiled solver cannot be stored there; free some space, or set BLOCKSIM_CACHE_DIR")
