@@ -70,6 +70,11 @@ test-long: $(DEV_STAMP) ## Full sizes: verification, kills, resumed runs, fuzz, 
 test-nojit: $(DEV_STAMP) ## Run the tests of the kernels as plain Python, without the compiler
 	NUMBA_DISABLE_JIT=1 $(VENV_PYTHON) -m pytest $(ON_ALL_CORES) tests/kernels
 
+.PHONY: golden
+golden: $(DEV_STAMP) ## Write the texts that tests expect, tests/**/golden/*.txt, as they are printed; read git diff then
+	@$(COMPILE)
+	$(VENV_PYTHON) -m pytest -n 0 --update-golden $(TESTS)
+
 .PHONY: faults
 faults: $(DEV_STAMP) ## Put deliberate faults into the code, one at a time: does make test notice every one of them?
 	@$(COMPILE)

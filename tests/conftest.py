@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["PaperBlock", "Simulation"]  # defined elsewhere, used by all tests
 
+pytest_plugins = ["tests.golden", "pytester"]  # texts kept in files; pytester for the tests of that
+
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 
 

@@ -1,0 +1,164 @@
+"""Golden files: a text that has changed, a section too many or too few fails; only an update writes."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.golden import ROOT, normalised, parsed, rendered
+
+TESTS = """
+import pytest
+@pytest.mark.parametrize("word", ["a", "b"])
+def test_word(golden, word):
+    golden(f"{word}   \\n\\n  end")
+def test_paths(golden, tmp_path):
+    golden(f"{tmp_path}/run.h5 after 3.25 s", rules=["times"])
+    golden("two", "second")
+def test_without_text():
+    pass
+"""
+GOLDEN = """\
+=== test_word[a]
+a
+
+  end
+
+=== test_word[b]
+b
+
+  end
+
+=== test_paths
+TMP/run.h5 after TIME
+
+=== test_paths / second
+two
+"""
+
+
+@pytest.fixture
+def case(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
+    """Return a folder with tests of golden texts, and the golden file that goes with them."""
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    pytester.makepyfile(test_texts=TESTS)
+    (pytester.mkdir("golden") / "texts.txt").write_text(GOLDEN)
+    return pytester
+
+
+def printed(case: pytest.Pytester, *options: str, passed: int = 0, failed: int = 0, errors: int = 0) -> str:
+    """Run the tests of a folder and return what pytest printed."""
+    result = case.runpytest_inprocess("-p", "tests.golden", "-p", "no:cacheprovider", *options)
+    result.assert_outcomes(passed=passed, failed=failed, errors=errors)
+    return result.stdout.str()
+
+
+def edit(case: pytest.Pytester, old: str, new: str) -> None:
+    """Replace a piece of the golden file."""
+    assert GOLDEN.count(old) == 1
+    (case.path / "golden" / "texts.txt").write_text(GOLDEN.replace(old, new))
+
+
+def test_texts_that_are_as_expected_pass_and_nothing_is_written(case: pytest.Pytester) -> None:
+    printed(case, passed=4)
+    assert (case.path / "golden" / "texts.txt").read_text() == GOLDEN
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("b\n\n  end", "B\n\n  end", "golden/texts.txt: test_word[[]b[]]*-B*+b*   end*`make golden` accepts*"),
+        ("=== test_word[b]\nb\n\n  end\n", "", "no section 'test_word[[]b[]]'; `make golden` would write"),
+    ],
+)
+def test_another_text_and_a_missing_one_fail_and_are_not_written(
+    case: pytest.Pytester, old: str, new: str, told: str
+) -> None:
+    edit(case, old, new)
+    before = (case.path / "golden" / "texts.txt").read_text()
+    text = printed(case, passed=3, failed=1)
+    assert Path(text.replace("\n", " ").replace("/", "|")).match(f"*{told.replace('/', '|')}*")
+    assert "Traceback" not in text
+    assert (case.path / "golden" / "texts.txt").read_text() == before
+
+
+def test_a_missing_file_fails_all_of_its_tests(case: pytest.Pytester) -> None:
+    (case.path / "golden" / "texts.txt").unlink()
+    printed(case, passed=1, failed=3)
+    assert not (case.path / "golden" / "texts.txt").exists()
+
+
+def test_a_section_that_its_test_does_not_use_fails(case: pytest.Pytester) -> None:
+    edit(case, "/ second\ntwo\n", "/ second\ntwo\n\n=== test_paths / third\nthree\n")
+    assert "unused sections, which `make golden` removes: test_paths / third" in printed(case, passed=4, errors=1)
+
+
+@pytest.mark.parametrize("options", [[], ["-n", "2"]])
+def test_a_section_of_no_test_fails_once(case: pytest.Pytester, options: list[str]) -> None:
+    edit(case, "/ second\ntwo\n", "/ second\ntwo\n\n=== test_word[c]\nc\n")
+    told = printed(case, *options, passed=3, errors=1)
+    assert "sections of no test, which `make golden` removes: test_word[c]" in told
+
+
+def test_parts_of_a_file_run_without_complaints_of_the_rest(case: pytest.Pytester) -> None:
+    edit(case, "/ second\ntwo\n", "/ second\ntwo\n\n=== test_word[c]\nc\n")
+    printed(case, "test_texts.py::test_word", passed=2)
+
+
+def test_a_failed_test_is_not_blamed_for_the_texts_that_it_did_not_reach(case: pytest.Pytester) -> None:
+    edit(case, "after TIME", "before TIME")
+    assert "unused" not in printed(case, passed=3, failed=1)
+
+
+def test_two_texts_of_one_name_fail(case: pytest.Pytester) -> None:
+    case.makepyfile(test_texts=TESTS.replace('"two", "second"', '"two"'))
+    edit(case, "\n=== test_paths / second\ntwo\n", "")
+    assert "two texts for 'test_paths'; give them names" in printed(case, passed=3, failed=1)
+
+
+def test_an_update_writes_changed_texts_and_removes_old_ones(case: pytest.Pytester) -> None:
+    edit(case, "/ second\ntwo\n", "/ third\nthree\n\n=== test_gone\ngone\n")
+    edited = (case.path / "golden" / "texts.txt").read_text().replace("  end\n\n=== test_word[b]", "=== test_word[b]")
+    (case.path / "golden" / "texts.txt").write_text(edited)
+    assert "differences written: " in printed(case, "--update-golden", passed=3)
+    assert (case.path / "golden" / "texts.txt").read_text() == GOLDEN
+    assert "all golden files are as the tests print" in printed(case, "--update-golden", passed=3)
+
+
+def test_an_update_keeps_the_texts_of_tests_that_fail_or_do_not_run(case: pytest.Pytester) -> None:
+    case.makepyfile(test_texts=TESTS.replace('golden("two", "second")', "assert False").replace("{word}", "{word}!"))
+    printed(case, "--update-golden", "test_texts.py::test_paths", failed=1)
+    assert (case.path / "golden" / "texts.txt").read_text() == GOLDEN
+
+
+def test_an_update_by_several_processes_is_refused(case: pytest.Pytester) -> None:
+    result = case.runpytest_inprocess("-p", "tests.golden", "--update-golden", "-n", "2")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+
+
+@pytest.mark.parametrize(
+    ("rule", "text", "left"),
+    [
+        ("times", "12 steps in 3.1 s, 20 ms each, 1e-05 s", "12 steps in TIME, TIME each, TIME"),
+        ("dates", "at 2026-11-22T19:51:26+00:00, until 2026-11-23", "at DATE, until DATE"),
+        ("sizes", "3 files, 1.5 MB", "3 files, SIZE"),
+        ("versions", "numba 0.68.1, blocksim 1.2.0.dev3, 7 cores", "numba VERSION, blocksim VERSION, 7 cores"),
+        ("hashes", "sha256 0123456789abcdef, 1234", "sha256 HASH, 1234"),
+    ],
+)
+def test_rules_replace_what_varies_and_nothing_else(rule: str, text: str, left: str) -> None:
+    assert normalised(text, [rule]) == left
+    assert normalised(text) == text
+
+
+def test_lines_like_headings_and_headings_twice_are_refused() -> None:
+    with pytest.raises(ValueError, match="begins as headings"):
+        rendered({"a": "text\n=== b"})
+    with pytest.raises(ValueError, match="two sections"):
+        parsed("=== a\n1\n=== a\n2\n")
+
+
+def test_every_golden_file_lies_beside_tests_that_use_it() -> None:
+    for file in (ROOT / "tests").rglob("golden/*.txt"):
+        tests = file.parents[1] / f"test_{file.stem}.py"
+        assert tests.exists(), f"{file}: its tests are gone"
+        assert "golden" in tests.read_text(), f"{file}: its tests do not use it"
