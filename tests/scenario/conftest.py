@@ -7,6 +7,7 @@ import pytest
 
 from blocksim.errors import BlocksimError
 from blocksim.scenario import load_scenario
+from tests.golden import Golden
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
@@ -33,6 +34,8 @@ count = 3
 
 Overrides = Mapping[str, object] | Sequence[str]
 Refusal = Callable[..., tuple[int, str]]
+Edit = str | tuple[str, str]  # what is added to the valid scenario, or a piece of it and what takes its place
+Refused = Callable[[Edit], None]
 
 
 @pytest.fixture
@@ -63,14 +66,21 @@ def refusal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Refusal:
     return load
 
 
+def edited(edit: Edit) -> str:
+    """Return the valid scenario with an edit."""
+    if isinstance(edit, str):
+        return f"{VALID}\n{edit}\n"
+    assert VALID.count(edit[0]) == 1
+    return VALID.replace(*edit)
+
+
 @pytest.fixture
-def refusal_of_edit(refusal: Refusal) -> Refusal:
-    """Load the valid scenario with one piece of text replaced (None: something added at the end)."""
+def refused(refusal: Refusal, golden: Golden) -> Refused:
+    """Load the valid scenario with an edit: it must be refused with the message of the golden file and exit code 65."""
 
-    def load(old: str | None, new: str) -> tuple[int, str]:
-        if old is None:
-            return refusal(VALID + new)
-        assert VALID.count(old) == 1
-        return refusal(VALID.replace(old, new))
+    def check(edit: Edit) -> None:
+        code, message = refusal(edited(edit))
+        assert code == 65
+        golden(message)
 
-    return load
+    return check
