@@ -28,13 +28,15 @@ ROOT = Path(__file__).parents[1]
 HEAD = "=== "
 SLASH = " / "
 
-# What differs from run to run and may be left out of a text, by the names that tests ask for it with.
-RULES = {
+# What differs from run to run and may be left out of a text, by the names that tests ask for it with. The last one
+# keeps nine digits of numbers, as mathematical functions may end in other bits elsewhere.
+RULES: dict[str, tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]] = {
     "times": (re.compile(r"\b\d+(?:\.\d+)?(?:e-?\d+)? (?:us|ms|s|min|h)\b"), "TIME"),
     "dates": (re.compile(r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?(?:\.\d+)?(?:Z|[+-]\d\d:?\d\d)?)?"), "DATE"),
     "sizes": (re.compile(r"\b\d+(?:\.\d+)? (?:B|kB|KB|KiB|MB|MiB|GB|GiB)\b"), "SIZE"),
     "versions": (re.compile(r"\b\d+\.\d+(?:\.\d+)*(?:(?:a|b|rc|\.dev|\.post)\d+)?\b"), "VERSION"),
     "hashes": (re.compile(r"\b[0-9a-f]{12,64}\b"), "HASH"),
+    "digits": (re.compile(r"\b\d+\.\d+(?:e[+-]?\d+)?\b"), lambda found: f"{float(found[0]):.9g}"),
 }
 
 Sections = dict[str, str]  # texts by the headings of their sections
@@ -51,8 +53,8 @@ def normalised(text: str, rules: Sequence[str] = (), folders: Mapping[str, Path]
     """Return a text without blank ends of lines, with folders and what rules say replaced by words."""
     for word, folder in (folders or {}).items():
         text = text.replace(str(folder), word)
-    for pattern, word in (RULES[rule] for rule in rules):
-        text = pattern.sub(word, text)
+    for pattern, instead in (RULES[rule] for rule in rules):
+        text = pattern.sub(instead, text)
     return "\n".join(line.rstrip() for line in text.split("\n")).strip("\n")
 
 

@@ -1,6 +1,5 @@
 """blocksim animate: animations of finished and killed runs."""
 
-import sys
 from pathlib import Path
 
 import pytest
@@ -27,34 +26,6 @@ def test_killed_run_is_shown_and_told(blocksim: Command, copied: Path) -> None:
     answer = blocksim("animate", copied, *QUICK, "--out", "film.gif")
     assert answer.code == 0
     assert "this run was killed or is still running" in answer.err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "told"),
-    [
-        (["--out", "film.avi"], 65, "'.avi' unsupported format; use .gif or .mp4"),
-        (["--out", "nix/film.gif", *QUICK], 74, "nix/film.gif: cannot be written"),
-        (["--speed", "0.00001"], 65, "raise --speed or lower --fps"),
-        (["--fps", "60"], 65, "a GIF shows at most 50 frames per second"),
-        (["--speed", "0"], 2, "--speed"),
-        (["--width", "3"], 2, "--width"),
-    ],
-)
-def test_mistakes_are_reported(blocksim: Command, finished: Path, arguments: list[str], code: int, told: str) -> None:
-    answer = blocksim("animate", finished, *arguments)
-    assert answer.code == code
-    assert told in answer.err
-    assert {path.name for path in Path().iterdir()} == {"scenarios"}
-
-
-def test_missing_package_for_mp4_is_reported(
-    blocksim: Command, finished: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    monkeypatch.setenv("PATH", "")
-    answer = blocksim("animate", finished, "--out", "film.mp4")
-    assert answer.code == 69
-    assert "pip install 'blocksim[video]'" in answer.err
 
 
 def test_mp4_is_written(blocksim: Command, finished: Path) -> None:

@@ -71,35 +71,6 @@ def test_a_stop_keeps_what_was_measured(blocksim: Command) -> None:
     assert len(json.loads(Path("bench.json").read_text(encoding="utf-8"))["measurements"]) == 1
 
 
-def test_an_unknown_name_is_reported(blocksim: Command) -> None:
-    answer = blocksim("bench", "fisrt")
-    assert (answer.code, answer.out) == (2, "")
-    assert answer.err == ("bench: NAME 'fisrt': no such measurement, did you mean 'first'? Choose: first, stop\n")
-
-
-def test_a_place_that_cannot_be_written_is_reported_before_anything_is_measured(blocksim: Command) -> None:
-    for out in ("nix/bench.json", "scenarios"):
-        answer = blocksim("bench", "stop", "--out", out)
-        assert (answer.code, answer.out) == (74, "")
-        assert answer.err.startswith(f"{out}: cannot be written: ")
-
-
-@pytest.mark.parametrize(("command", "name"), [("bench", "mine.json"), ("converge", "mine.png")])
-def test_a_file_of_others_is_refused_before_anything_is_measured(blocksim: Command, command: str, name: str) -> None:
-    Path(name).write_text("years of work")
-    what = "first" if command == "bench" else "scenarios/three_blocks_nominal.toml"
-    answer = blocksim(command, what, "--out", name)
-    assert (answer.code, answer.out, answer.err) == (73, "", f"{name}: already exists; rerun with --overwrite\n")
-    assert Path(name).read_text() == "years of work"
-
-
-def test_peers_without_their_packages_name_the_extra(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pymunk", None)
-    answer = blocksim("bench", "--peers")
-    assert (answer.code, answer.out) == (69, "")
-    assert "pip install 'blocksim[bench]'" in answer.err
-
-
 def test_peers_draw_a_picture_beside_the_file(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     panel = Panel("made up", "error (mm)", (Curve("a", "a", np.ones(2), np.ones(2)),))
     findings = Findings((single("time", "CPU ms", 1.0),), panel=panel)
@@ -116,9 +87,3 @@ def test_peers_draw_a_picture_beside_the_file(blocksim: Command, monkeypatch: py
     assert (small.code, small.out) == (65, "")  # nothing was measured
     assert blocksim("bench", "--peers", "drawn", "--size", "400x300px", "--dpi", 80).code == 0
     assert struct.unpack(">II", Path("work_precision.png").read_bytes()[16:24]) == (400, 300)
-
-
-def test_size_of_a_picture_that_is_not_drawn_is_refused(blocksim: Command) -> None:
-    answer = blocksim("bench", "walls", "--dpi", 80)
-    assert (answer.code, answer.out) == (2, "")
-    assert "--peers" in answer.err

@@ -2,7 +2,6 @@
 
 import json
 import signal
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -112,58 +111,6 @@ def test_more_trials_continue_where_fewer_ended(slide: Slide) -> None:
     told = slide(*many, "--trials", 20, "--out", "one.toml", "--resume", "--overwrite")
     assert told.code == 0
     assert Path("one.toml").read_text() == Path("other.toml").read_text()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "told"),
-    [
-        ((*SCATTER,), 65, "nothing to fit: give --fit KEY=FROM:TO"),
-        ((*FIT,), 65, "no input scatter: give --scatter"),
-        (("--fit", "friction.block_gruond=0.2:0.5"), 65, "did you mean 'block_ground'?"),
-        (("--fit", f"{FRICTION}=0.2 mm:0.5 mm"), 65, f"--fit {FRICTION}=0.2 mm:0.5 mm"),
-        (("--fit", f"{FRICTION}=0.5:0.2"), 65, "from = 0.5 is not below to = 0.2"),
-        (("--fit", f"{FRICTION}=0.2"), 65, "a prior is a range: write KEY=FROM:TO"),
-        (("--fit", f"{FRICTION}=0.2+-0.1"), 65, "a prior is a range: write KEY=FROM:TO"),
-        (("--fit", FRICTION), 65, f"--fit {FRICTION}: write KEY="),
-        ((*FIT, *FIT), 65, f"--fit {FRICTION}: given twice"),
-        ((*FIT, "--fit", f"{FRICTION}.kinetic=0.1:0.2"), 65, "which is fitted too"),
-        (
-            (*FIT, "--scatter", f"{FRICTION}.static=0.3:0.4"),
-            65,
-            "which is fitted; scatter friction.block_ground itself",
-        ),
-        ((*FIT, "--scatter", f"{FRICTION}=0.3,0.4"), 65, "must be a distribution, not a list"),
-        ((*FIT, "--scatter", f"{SPEED}=0.5 mm+-0.1 mm"), 65, "is a length"),
-        ((*FIT, *SCATTER, "--experiment", "missing.csv"), 66, "missing.csv: no such file"),
-        ((*FIT, *SCATTER, "--out", "."), 73, "this is a folder"),
-        ((*FIT, *SCATTER, "--trials", 0), 2, "Invalid value"),
-    ],
-)
-def test_wrong_wishes_are_reported_and_leave_nothing_behind(
-    slide: Slide, tmp_path: Path, arguments: tuple[object, ...], code: int, told: str
-) -> None:
-    before = sorted(tmp_path.rglob("*"))
-    answer = slide(*arguments)
-    assert (answer.code, answer.out) == (code, "")
-    assert told in answer.err
-    assert "Traceback" not in answer.err
-    assert sorted(tmp_path.rglob("*")) == before
-
-
-def test_scenario_without_an_experiment_is_reported(blocksim: Command) -> None:
-    answer = blocksim("calibrate", "scenarios/slide.toml", *FIT, *SCATTER)
-    assert answer.code == 66
-    assert "names no experiment; give a table with --experiment" in answer.err
-
-
-@pytest.mark.parametrize("package", ["optuna", "scipy.stats"])
-def test_missing_package_names_the_extra(slide: Slide, monkeypatch: pytest.MonkeyPatch, package: str) -> None:
-    for name in [name for name in sys.modules if f"{name}.".startswith(f"{package}.")]:
-        monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, package, None)
-    answer = slide(*FIT, *SCATTER, *SHORT)
-    assert (answer.code, answer.out) == (69, "")
-    assert "pip install 'blocksim[study]'" in answer.err
 
 
 def test_scatter_of_the_scenario_is_the_default_and_stays_in_the_file(slide: Slide, tmp_path: Path) -> None:

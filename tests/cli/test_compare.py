@@ -1,7 +1,6 @@
 """blocksim compare: what it takes, what it says, and its exit code."""
 
 import json
-import sys
 from math import sqrt
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,6 @@ from scipy import stats
 
 from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import ExperimentTable, Measurement
-from blocksim.analysis.metrics import METRICS
-from blocksim.analysis.metrics.metric import BLOCK
 from blocksim.cli.verdicts import verdict_lines
 from tests.cli.conftest import SOFT, Command
 
@@ -83,42 +80,6 @@ def test_other_table_can_be_given(blocksim: Command, finished: Path, tmp_path: P
     assert answer.code == 0
     assert "blocks '1', '3' are not in wide.csv; they are not compared" in answer.out
     assert [line.split()[0] for line in answer.out.splitlines()[3:5]] == ["2", "blocks"]  # no rows without a number
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "told"),
-    [
-        (["nix"], 66, "nix: no such run folder or scenario file"),
-        (["empty"], 66, "no finished run in this folder"),
-        (["scenarios/tower.toml"], 66, "first: blocksim run scenarios/tower.toml"),
-        (["scenarios/experiments/three_blocks.csv"], 65, "three_blocks.csv"),
-        (["copied", "--experiment", "nix.csv"], 66, "nix.csv: no such file"),
-        (["copied", "--experiment", "scenarios/tower.toml"], 65, "scenarios/tower.toml:"),
-    ],
-)
-def test_wrong_places_are_reported(
-    blocksim: Command, copied: Path, tmp_path: Path, arguments: list[str], code: int, told: str
-) -> None:
-    assert copied.is_dir()
-    (tmp_path / "empty").mkdir()
-    answer = blocksim("compare", *arguments)
-    assert (answer.code, answer.out) == (code, "")
-    assert told in answer.err
-
-
-@pytest.mark.parametrize("name", ["run.json", "final.csv", "scenario.toml", "experiment.csv"])
-@pytest.mark.parametrize("content", [None, b"", b"rubbish", b"\x00\xff\xfe"])
-def test_damaged_run_is_reported_with_its_file(
-    blocksim: Command, copied: Path, name: str, content: bytes | None
-) -> None:
-    if content is None:
-        (copied / name).unlink()
-    else:
-        (copied / name).write_bytes(content)
-    answer = blocksim("compare", copied)
-    assert answer.code in {65, 66}
-    assert name in answer.err
-    assert answer.out == ""
 
 
 def test_run_without_experiment_asks_for_a_table(blocksim: Command) -> None:
@@ -216,39 +177,3 @@ def test_known_statistics_come_back(blocksim: Command, tmp_path: Path) -> None:
     both = np.cov(repeats) / 6 + np.cov([second, third]) / 5
     assert numbers("joint", "T2") == pytest.approx([difference @ np.linalg.inv(both) @ difference], abs=1e-6)
     assert numbers("outcome", "share") == [0.8, 0.2]
-
-
-def test_help_explains_every_number_in_a_line(blocksim: Command) -> None:
-    lines = blocksim("compare", "--help").out.splitlines()
-    assert max(map(len, lines)) <= 80
-    for metric in METRICS.values():
-        assert f"  {metric.name}: {metric.meaning}" in lines
-        for column in set(metric.columns) - set(BLOCK):
-            assert f"    {column.name:<13} {column.meaning}" in lines
-
-
-def test_missing_scipy_stops_sweeps_and_not_runs(
-    blocksim: Command, made_up: Path, finished: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "scipy.special", None)
-    answer = blocksim("compare", made_up, "--experiment", "own.csv")
-    assert (answer.code, answer.out) == (69, "")
-    assert "pip install 'blocksim[study]'" in answer.err
-    assert blocksim("compare", finished).code == 1
-
-
-@pytest.mark.parametrize("option", ["--threshold", "--u-num"])
-@pytest.mark.parametrize("value", ["nan", "-1", "inf"])
-def test_wrong_numbers_for_a_sweep_are_refused(blocksim: Command, made_up: Path, option: str, value: str) -> None:
-    answer = blocksim("compare", made_up, "--experiment", "own.csv", option, value)
-    assert answer.code in {2, 65}
-    assert answer.out == ""
-    assert option in answer.err
-
-
-def test_sweep_without_experiment_asks_for_a_table(blocksim: Command) -> None:
-    vary = ("--vary", "time.end=0.001,0.002", "--jobs", 1)
-    assert blocksim("sweep", "scenarios/slide.toml", *vary, "--out", "out").code == 0
-    answer = blocksim("compare", "out")
-    assert answer.code == 66
-    assert "--experiment" in answer.err

@@ -93,31 +93,6 @@ def test_failing_scenario_is_76_and_draws_nothing(blocksim: Command) -> None:
     assert "picture" not in answer.err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "told"),
-    [
-        (
-            ["--study", "spacing"],
-            65,
-            'nothing to study: the particle spacing has no effect on contact.model = "surface"',
-        ),
-        (["--study", "speed"], 2, "'speed' is not one of"),
-        (["--levels", 1], 2, "levels"),
-        (["--tolerance", 0], 65, "the tolerance must be above 0 mm"),
-        (["--out", "levels.bmp"], 65, "'.bmp' unsupported picture format"),
-        (["--set", "time.step=1 s"], 65, "--set time.step=1 s: 1 s is above the largest safe step"),
-        (["--set", "time.stap=1"], 65, "did you mean 'step'?"),
-    ],
-)
-def test_mistakes_are_reported_before_anything_runs(
-    blocksim: Command, arguments: list[object], code: int, told: str
-) -> None:
-    answer = blocksim(*SLIDE, *arguments)
-    assert (answer.code, answer.out) == (code, "")
-    assert told in answer.err
-    assert {path.name for path in Path().iterdir()} == {"scenarios"}
-
-
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_ctrl_c_ends_all_runs_with_75(process: Process, tmp_path: Path, jobs: int) -> None:
     compile_kernels()  # into the cache on disk, so that the process starts at once

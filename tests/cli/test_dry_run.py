@@ -53,8 +53,3 @@ def test_cases_that_cannot_be_simulated_are_reported_of(blocksim: Command) -> No
 def test_unbalanced_sobol_points_are_remarked_on(blocksim: Command) -> None:
     answer = blocksim(*PLAN, "--vary", f"{KINETIC}=0.2:0.3", "--mode", "sobol", "--samples", 10)
     assert (answer.code, answer.err) == (0, "10 Sobol points are not balanced; 8 or 16 are\n")
-
-
-def test_a_plan_with_mistakes_is_refused_as_without_dry_run(blocksim: Command) -> None:
-    assert blocksim(*PLAN).code == 65
-    assert blocksim(*PLAN, "--vary", "gravty=1,2").code == 65

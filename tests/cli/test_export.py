@@ -4,7 +4,6 @@ import csv
 from pathlib import Path
 
 import h5py
-import pytest
 
 from tests.cli.conftest import SOFT, Command
 
@@ -33,38 +32,6 @@ def test_killed_run_is_exported_and_told(blocksim: Command, copied: Path) -> Non
     answer = blocksim("export", copied, "--out", "frames.csv")
     assert answer.code == 0
     assert "this run was killed or is still running" in answer.err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "told"),
-    [
-        (["--format", "xlsx"], 65, "--format xlsx: unsupported format; use csv or vtkhdf"),
-        (["--out", "nix/frames.csv"], 74, "nix/frames.csv: cannot be written"),
-    ],
-)
-def test_mistakes_are_reported(blocksim: Command, finished: Path, arguments: list[str], code: int, told: str) -> None:
-    answer = blocksim("export", finished, *arguments)
-    assert answer.code == code
-    assert told in answer.err
-    assert {path.name for path in Path().iterdir()} == {"scenarios"}
-
-
-def test_files_of_the_run_are_not_replaced(blocksim: Command, copied: Path) -> None:
-    before = (copied / "final.csv").read_bytes()
-    answer = blocksim("export", copied, "--out", copied / "final.csv")
-    assert answer.code == 73
-    assert "final.csv: belongs to the run" in answer.err
-    assert (copied / "final.csv").read_bytes() == before
-
-
-@pytest.mark.parametrize("content", [None, b"", b"rubbish" * 100])
-def test_damaged_frames_are_reported(blocksim: Command, copied: Path, content: bytes | None) -> None:
-    (copied / "run.h5").unlink()
-    if content is not None:
-        (copied / "run.h5").write_bytes(content)
-    answer = blocksim("export", copied)
-    assert answer.code == (66 if content is None else 65)
-    assert "run.h5" in answer.err
 
 
 def test_contacts_get_a_file_beside_where_they_are_stored(blocksim: Command, tmp_path: Path) -> None:

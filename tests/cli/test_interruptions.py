@@ -189,24 +189,6 @@ def test_sweep_around_a_case_that_blows_up_continues(blocksim: Command, tmp_path
     assert "the fastest is block " in rows[2]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "what"),
-    [
-        (["--resume", "--overwrite"], "--resume: cannot be combined with --overwrite"),
-        (["--wall-time", "3"], 'the unit is missing, write it as in "2 s"'),
-        (["--wall-time", "0 s"], "is too small; a time above 0"),
-        (["--checkpoint-time", "3 mm"], "is a length"),
-        (["--checkpoint-every", "soon"], "is not a time"),
-        (["--checkpoint-steps", "0"], "should be greater than or equal to 1"),
-    ],
-)
-def test_mistakes_of_usage_are_2(blocksim: Command, tmp_path: Path, arguments: list[str], what: str) -> None:
-    answer = blocksim(*LONG, *arguments)
-    assert answer.code == 2
-    assert what in " ".join(answer.err.split())
-    assert not (tmp_path / "results").exists()
-
-
 def test_results_that_cannot_fit_are_reported_before_the_start(blocksim: Command, tmp_path: Path) -> None:
     answer = blocksim("run", NOMINAL, "--set", "output.every=1e-9", "--set", "time.end=1e6", "--out", "out")
     assert answer.code == 74

@@ -63,31 +63,3 @@ def test_a_full_disk_leaves_no_half_file(blocksim: Command, monkeypatch: pytest.
     answer = blocksim("new", "stack", "mine")
     assert (answer.code, answer.err) == (74, "mine.toml: cannot be written: No space left on device\n")
     assert not Path("mine.toml").exists()
-
-
-def test_a_file_that_is_there_stays_as_it_is(blocksim: Command) -> None:
-    Path("mine.toml").write_text("precious")
-    answer = blocksim("new", "stack", "mine.toml")
-    assert (answer.code, answer.out) == (73, "")
-    assert answer.err == "mine.toml: already exists; choose another name\n"
-    assert Path("mine.toml").read_text() == "precious"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "told"),
-    [
-        (("stak", "mine"), 2, "unknown kind 'stak', did you mean 'stack'?"),
-        (("xyz", "mine"), 2, "unknown kind 'xyz', use one of dominoes, experiment, "),
-        (("stack", "a b"), 2, '"a b" is not a name'),
-        (("stack", ".toml"), 2, "is not a name"),
-        (("stack", "no/where"), 73, "no/where.toml: cannot be created: No such file or directory"),
-    ],
-)
-def test_wrong_arguments_are_reported(
-    blocksim: Command, tmp_path: Path, arguments: tuple[str, str], code: int, told: str
-) -> None:
-    before = sorted(tmp_path.rglob("*"))
-    answer = blocksim("new", *arguments)
-    assert answer.code == code
-    assert told in " ".join(answer.err.split())
-    assert sorted(tmp_path.rglob("*")) == before

@@ -2,9 +2,6 @@
 
 from pathlib import Path
 
-import pytest
-
-from blocksim.cli.commands import WITH_SCENARIOS
 from tests.cli.conftest import SCENARIOS, Command
 
 
@@ -20,8 +17,3 @@ def test_a_table_outside_is_refused_unless_asked_for(blocksim: Command, tmp_path
     assert "--allow-outside" in refused.err
     assert blocksim("check", scenario, "--quiet", "--allow-outside").code == 0
     assert blocksim("check", scenario, "--quiet").code == 65, "asked for once, allowed ever after"
-
-
-@pytest.mark.parametrize("command", sorted(WITH_SCENARIOS))
-def test_every_command_that_reads_scenarios_has_the_option(blocksim: Command, command: str) -> None:
-    assert "--allow-outside" in blocksim(command, "--help").out

@@ -87,46 +87,6 @@ def test_the_folder_alone_tells_what_the_blocks_stand_on(blocksim: Command) -> N
     assert "<!-- support 0.00 mm -->" in texts
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "told"),
-    [
-        (["--out", "strip.bmp"], 65, "'.bmp' unsupported picture format"),
-        (["--out", "nix/strip.png"], 74, "nix/strip.png: cannot be written"),
-        (["--times", "0,x"], 2, "'x' is not a time; give"),
-        (["--at", "5 furlongs"], 2, "'5 furlongs' is not a time; give"),
-        (["--size", "10 by 20"], 2, "'10 by 20' is not a picture size"),
-        (["--size", "5x3000mm"], 2, "20 to 2000 mm"),
-        (["--size", "40x30mm"], 65, "--size 40x30 mm is too small for this picture"),
-        (["--size", "2000x2000mm", "--dpi", "300"], 2, "million pixels"),
-        (["--colour", "mood"], 2, "'mood' is unknown; choose block, material, speed, turn"),
-        (["--block", ","], 2, "give one name or several"),
-        (["--block", "1"], 65, "--block selects the blocks of a run's history, but this picture is of kind strip"),
-        (["--kind", "history", "--block", "7"], 65, "--block 7: no such block in this run, its 3 blocks are 1, 2, 3"),
-        (["--kind", "history", "--at", "0"], 65, "--at selects frames of a run's strip or final picture"),
-        (["--kind", "history", "--colour", "speed"], 65, "coloured by block or material"),
-        (["--kind", "finel"], 65, "--kind finel: unknown kind for a run, did you mean 'final'?"),
-        (["--kind", "final", "--frames", "4"], 65, "--frames sets the number of panels of a run's strip"),
-        (["--times", "0,99"], 65, "outside the recorded span"),
-        (["--experiment", "nix.csv"], 66, "nix.csv: no such file"),
-    ],
-)
-def test_mistakes_are_reported(blocksim: Command, finished: Path, arguments: list[str], code: int, told: str) -> None:
-    answer = blocksim("plot", finished, *arguments)
-    assert answer.code == code
-    assert told in answer.err
-    assert {path.name for path in Path().iterdir()} == {"scenarios"}
-
-
-@pytest.mark.parametrize("content", [None, b"", b"rubbish" * 100])
-def test_damaged_frames_are_reported(blocksim: Command, copied: Path, content: bytes | None) -> None:
-    (copied / "run.h5").unlink()
-    if content is not None:
-        (copied / "run.h5").write_bytes(content)
-    answer = blocksim("plot", copied)
-    assert answer.code == (66 if content is None else 65)
-    assert "run.h5" in answer.err
-
-
 SWEEP = ("sweep", "scenarios/three_blocks_nominal.toml", *SOFT, "--set", "time.end=0.01", "--jobs", 1, "--out", "swept")
 
 

@@ -145,25 +145,3 @@ def test_run_that_was_killed_is_played_as_far_as_it_came(blocksim: Command, tmp_
     assert blocksim("report", "run").code == 0
     assert "unfinished" in REPORT.read_text(encoding="utf-8")
     assert data_of(REPORT)["frames"] is not None
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "told"),
-    [
-        (["nix"], 66, "nix: no such run folder"),
-        (["run", "--experiment", "nix.csv"], 66, "nix.csv: no such file"),
-        (["run", "--out", "nix/report.html"], 74, "cannot be written"),
-        (["empty"], 65, "nothing of this run can be read"),
-        (["broken"], 65, "no columns case and status"),
-    ],
-)
-def test_mistakes_are_reported(blocksim: Command, tmp_path: Path, arguments: list[str], code: int, told: str) -> None:
-    write_run(tmp_path / "run", count=3)
-    (tmp_path / "empty").mkdir()
-    (tmp_path / "empty" / "run.h5").write_bytes(b"")
-    (tmp_path / "broken").mkdir()
-    (tmp_path / "broken" / "sweep.csv").write_text("a,b\n1,2\n", encoding="utf-8")
-    answer = blocksim("report", *arguments)
-    assert answer.code == code
-    assert told in answer.err
-    assert not REPORT.exists()

@@ -88,36 +88,6 @@ def test_failed_run_is_reported_kept_and_76(blocksim: Command) -> None:
     assert blocksim(*RUN, "--set", "contact.max_overlap=1e-9", "--out", "out").code == 73
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "told"),
-    [
-        (["run", "nix.toml"], 66, "nix.toml: no such file"),
-        (["run", "scenarios"], 66, "this is a folder"),
-        (["run", "broken.toml"], 65, "broken.toml:1: "),
-        ([*RUN, "--set", "friction.block_blok=1"], 65, "did you mean 'block_block'?"),
-        ([*RUN, "--set", "time.step=1e-3"], 65, "--set time.step=1e-3: 0.001 s is above the largest safe step"),
-        ([*RUN, "--set", "experiment.table=nix.csv"], 65, "no such file"),
-        ([*RUN, "--set", "experiment.table=../tests/bad.csv"], 65, "no such file"),
-        ([*RUN, "--out", "broken.toml"], 73, "broken.toml: cannot be created"),
-        ([*RUN, "--out", "broken.toml/x"], 73, "broken.toml/x: cannot be created: broken.toml is a file, not a folder"),
-        ([*RUN, "--out", "foreign"], 73, "holds files that are not a blocksim run (thesis.tex)"),
-        ([*RUN, "--out", "foreign", "--overwrite"], 73, "holds files that are not a blocksim run (thesis.tex)"),
-    ],
-)
-def test_mistakes_are_reported_and_leave_nothing_behind(
-    blocksim: Command, tmp_path: Path, arguments: list[str], code: int, told: str
-) -> None:
-    (tmp_path / "broken.toml").write_text("schema = 2\n")
-    (tmp_path / "foreign").mkdir()
-    (tmp_path / "foreign" / "thesis.tex").write_text("years of work")
-    before = sorted(tmp_path.rglob("*"))
-    answer = blocksim(*arguments)
-    assert answer.code == code
-    assert told in answer.err
-    assert answer.out == ""
-    assert sorted(tmp_path.rglob("*")) == before
-
-
 def test_experiment_of_other_blocks_is_reported_before_the_run(blocksim: Command, tmp_path: Path) -> None:
     shutil.copytree(SCENARIOS, tmp_path / "mine")
     table = tmp_path / "mine" / "experiments" / "three_blocks.csv"
@@ -169,21 +139,6 @@ def test_experiment_taken_out_of_the_scenario_is_compared_no_more(blocksim: Comm
     assert not (tmp_path / "out" / "experiment.csv").exists()
 
 
-@pytest.mark.parametrize(
-    "setting",
-    ["time.end=1e30", "time.step=1e-18", "contact.stiffness_scale=1e30", "time.safety=1e-18"],
-)
-def test_steps_that_cannot_be_counted_are_reported(blocksim: Command, setting: str) -> None:
-    answer = blocksim("check", "scenarios/three_blocks.toml", "--set", setting)
-    assert answer.code == 65
-    assert "cannot be divided into steps" in answer.err
-
-
-@pytest.mark.parametrize("setting", ["time.rest_hold=1e30", "time.end=1e-15", 'contact.particle_spacing="1 nm"'])
-def test_extreme_but_meaningful_values_are_valid(blocksim: Command, setting: str) -> None:
-    assert blocksim("check", "scenarios/three_blocks.toml", "--set", setting).code == 0
-
-
 WALL = """schema = 1
 name = "wall"
 materials.aluminium = { unit_weight = "26.7 kN/m^3", young_modulus = "69 GPa", poisson_ratio = 0.3 }
@@ -204,13 +159,6 @@ def test_threads_change_nothing_but_the_time(blocksim: Command) -> None:
     assert (one["threads"], two["threads"]) == (1, 2)
     for name in ("final_state_sha256", "run", "scenario_hash", "energy_J", "steps"):
         assert one[name] == two[name], name
-
-
-def test_threads_are_at_least_one(blocksim: Command) -> None:
-    answer = blocksim(*RUN, "--threads", "0")
-    assert answer.code == 2
-    assert "--threads" in answer.err
-    assert "greater than or equal to 1" in answer.err
 
 
 def test_more_threads_than_cores_are_a_warning(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:

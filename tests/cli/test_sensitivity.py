@@ -2,7 +2,6 @@
 
 import csv
 import json
-import sys
 from pathlib import Path
 
 import pytest
@@ -52,43 +51,8 @@ def test_distributions_of_the_scenario_are_the_default(blocksim: Command, tmp_pa
     assert "friction.block_ground" in answer.out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "told"),
-    [
-        ((), 65, "nothing to vary: give --vary KEY=FROM:TO"),
-        (("--vary", "friction.block_gruond=0.3:0.4"), 65, "did you mean 'block_ground'?"),
-        (("--vary", "friction.block_ground=0.4:0.3"), 65, "from = 0.4 is not below to = 0.3"),
-        (("--vary", "bodies.0.velocity.0=1 mm:2 mm"), 65, "--vary bodies.0.velocity.0=1 mm:2 mm"),
-        (("--vary", "friction.block_ground=0.3:0.4:5"), 65, "count belongs to the modes"),
-        ((*VARY, "--samples", 1), 65, "1 trajectories are too few"),
-        ((*VARY, "--out", "scenarios"), 73, "it is a folder"),
-        ((*VARY, "--out", "nowhere/indices.csv"), 73, "no such folder"),
-        ((*VARY, "--method", "fast"), 2, "Invalid value"),
-    ],
-)
-def test_wrong_wishes_are_reported_and_leave_nothing_behind(
-    blocksim: Command, tmp_path: Path, arguments: tuple[object, ...], code: int, told: str
-) -> None:
-    before = sorted(tmp_path.rglob("*"))
-    answer = blocksim(*SLIDE, *arguments)
-    assert (answer.code, answer.out) == (code, "")
-    assert told in answer.err
-    assert sorted(tmp_path.rglob("*")) == before
-
-
 def test_table_is_not_overwritten_unless_asked(blocksim: Command) -> None:
     Path("indices.csv").write_text("mine")
     assert blocksim(*SLIDE, *VARY, "--samples", 2, "--out", "indices.csv").code == 73
     assert Path("indices.csv").read_text() == "mine"
     assert blocksim(*SLIDE, *VARY, "--samples", 2, "--out", "indices.csv", "--overwrite").code == 0
-
-
-@pytest.mark.parametrize("method", ["morris", "sobol"])
-def test_missing_package_names_the_extra(blocksim: Command, monkeypatch: pytest.MonkeyPatch, method: str) -> None:
-    for name in [name for name in sys.modules if f"{name}.".startswith("SALib.")]:
-        monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "SALib", None)
-    answer = blocksim(*SLIDE, *VARY, "--method", method)
-    assert (answer.code, answer.out) == (69, "")
-    assert "sensitivity needs the package SALib" in answer.err
-    assert "pip install 'blocksim[study]'" in answer.err

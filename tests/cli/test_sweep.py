@@ -4,8 +4,6 @@ import csv
 import json
 from pathlib import Path
 
-import pytest
-
 from blocksim.cli.sweep_output import short_names
 from tests.cli.conftest import SCENARIOS, SOFT, Command
 
@@ -85,39 +83,6 @@ def test_log_spacing_and_units_on_the_command_line(blocksim: Command) -> None:
     assert "6/6 finished: stiffness_scale = 0.01, tilt = 2 deg" in answer.err
 
 
-@pytest.mark.parametrize(
-    ("vary", "told"),
-    [
-        ("friction.block_blok=1,2", "--vary friction.block_blok=1,2: unknown key, did you mean 'block_block'?"),
-        (KINETIC, f"--vary {KINETIC}: write KEY=a,b,c, KEY=from:to:count, KEY=from:to or KEY=mean+-sd"),
-        ("=1,2", "write KEY=a,b,c"),
-        (f"{KINETIC}=", "write KEY=a,b,c"),
-        (f"{KINETIC}=0.1:x:3", f"--vary {KINETIC}=0.1:x:3: "),
-        (f"{KINETIC}=0.1:0.2:0", "count 0 is not a whole number"),
-        (f"{KINETIC}=0.1:0.2:2.5", "count 2.5 is not a whole number"),
-        (f"{KINETIC}=,", '"" is not'),
-        (f"{KINETIC}=[0.1", '"[0.1" is not'),
-        (f"{KINETIC}=0.8,0.9", "none of the 2 cases can be simulated"),
-        ("friction.block_block.transition_speed=5 mm/s,1 m", "is a length"),
-        ("schema=1,2", "schema cannot be varied"),
-    ],
-)
-def test_wrong_variation_is_65_and_leaves_nothing_behind(
-    blocksim: Command, tmp_path: Path, vary: str, told: str
-) -> None:
-    before = sorted(tmp_path.rglob("*"))
-    answer = blocksim(*SHORT, "--vary", vary)
-    assert (answer.code, answer.out) == (65, "")
-    assert told in answer.err
-    assert sorted(tmp_path.rglob("*")) == before
-
-
-def test_nothing_to_vary_is_reported(blocksim: Command) -> None:
-    answer = blocksim(*SHORT)
-    assert answer.code == 65
-    assert "nothing to vary: give --vary KEY=VALUES" in answer.err
-
-
 def test_many_rows_and_columns_are_cut_and_counted(blocksim: Command) -> None:
     answer = blocksim(
         "sweep", "scenarios/tower.toml", *SOFT, "--set", "time.end=1e-5", "--jobs", 1, "--out", "out",
@@ -145,12 +110,6 @@ def test_short_keys_are_the_shortest_ends_that_differ() -> None:
         "stiffness_scale",
         "end",
     ]
-
-
-def test_key_given_twice_is_reported(blocksim: Command) -> None:
-    answer = blocksim(*SHORT, "--vary", "gravity=1,2", "--vary", "gravity=3,4")
-    assert answer.code == 65
-    assert answer.err == "--vary gravity: given twice; list all its values once\n"
 
 
 def test_failures_are_listed_up_to_a_few(blocksim: Command) -> None:
@@ -182,33 +141,6 @@ def test_shards_are_merged_and_missing_ones_named(blocksim: Command) -> None:
     assert len(rows()) == 5
 
 
-@pytest.mark.parametrize(
-    ("options", "code", "told"),
-    [
-        (("--shard", "2/2"), 65, "--shard 2/2: write I/N"),
-        (("--shard", "0/2", "--overwrite"), 65, "a shard cannot overwrite"),
-        (("--executor", "dask"), 65, "--scheduler tcp://HOST:PORT"),
-        (("--executor", "thread"), 2, "Invalid value for '--executor'"),
-        (("--merge", "out"), 2, "leave the scenario out"),
-        (("--jobs", "0"), 2, "--jobs"),
-    ],
-)
-def test_options_that_do_not_go_together_are_reported(
-    blocksim: Command, tmp_path: Path, options: tuple[str, ...], code: int, told: str
-) -> None:
-    before = sorted(tmp_path.rglob("*"))
-    answer = blocksim(*RIGID, "--vary", f"{KINETIC}=0.1,0.2", *options)
-    assert answer.code == code
-    assert told in answer.err
-    assert sorted(tmp_path.rglob("*")) == before
-
-
-def test_scenario_is_needed_unless_shards_are_merged(blocksim: Command) -> None:
-    answer = blocksim("sweep")
-    assert answer.code == 2
-    assert "a scenario file is needed, or --merge DIR" in answer.err
-
-
 SAMPLED = ("--vary", f"{KINETIC}=0.1:0.3", "--vary", "structures.0.overlap=10 mm+-0.1 mm", "--mode", "lhs")
 
 
@@ -223,20 +155,6 @@ def test_samples_from_the_command_line(blocksim: Command) -> None:
     assert [row.split(",")[:3] for row in Path("again/sweep.csv").read_text().splitlines()] == [
         row.split(",")[:3] for row in first.splitlines()
     ]
-
-
-def test_mistakes_in_sampling_options_are_reported_together(blocksim: Command) -> None:
-    answer = blocksim(*SHORT, *SAMPLED, "--vary", "time.end=1 s+-1 mm", "--samples", 0, "--seed", -1)
-    assert (answer.code, answer.out) == (65, "")
-    assert "--samples: 0 is not a whole number from 1 to 1000000" in answer.err
-    assert "--seed: -1 is not a whole number" in answer.err
-    assert '--vary time.end=1 s+-1 mm: mean "1 s" and sd "1 mm" are not of one kind' in answer.err
-
-
-def test_a_range_without_a_count_needs_a_sampled_mode(blocksim: Command) -> None:
-    answer = blocksim(*SHORT, "--vary", f"{KINETIC}=0.1:0.3")
-    assert answer.code == 65
-    assert "a distribution needs one of the modes lhs, sobol and normal" in answer.err
 
 
 def test_a_table_of_cases(blocksim: Command) -> None:

@@ -87,12 +87,6 @@ def test_a_stop_keeps_what_was_measured(blocksim: Command, monkeypatch: pytest.M
     assert "stopped" in answer.err
 
 
-def test_an_unknown_case_is_reported(blocksim: Command) -> None:
-    answer = blocksim("verify", "V2", "V99")
-    assert answer.code == 65
-    assert answer.err == "V99: no such case; choose V1 to V24\n"
-
-
 def test_rigid_contacts_say_that_they_are_and_what_is_left_out(
     blocksim: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -106,17 +100,3 @@ def test_rigid_contacts_say_that_they_are_and_what_is_left_out(
     assert "V2" not in answer.out
     assert "left out: V2 (rigid blocks have no stiffness" in answer.err
     assert "1 of 1 cases inside" in answer.err
-
-
-@pytest.mark.parametrize(
-    ("options", "reason"),
-    [
-        (["V2", "V5"], "not for --scheme nonsmooth: V2 (rigid blocks"),
-        (["V5", "--law", "hertz-mindlin"], "--law hertz-mindlin needs springs"),
-        (["V5", "--model", "kernel"], "--model kernel needs springs"),
-    ],
-)
-def test_what_rigid_contacts_do_not_have_is_wrong_usage(blocksim: Command, options: list[str], reason: str) -> None:
-    answer = blocksim("verify", *options, "--scheme", "nonsmooth")
-    assert (answer.code, answer.out) == (2, "")
-    assert reason in answer.err

@@ -204,11 +204,6 @@ def test_one_damaged_folder_does_not_hide_the_others(blocksim: Command, finished
     assert answer.out.splitlines()[1].startswith(f"{finished}: bit-identical")
 
 
-def test_place_without_a_run_is_reported(blocksim: Command) -> None:
-    answer = blocksim("verify-run", "nowhere")
-    assert (answer.code, answer.out) == (66, "nowhere: missing\n")
-
-
 def test_nothing_is_written(blocksim: Command, finished: Path) -> None:
     before = {path: path.stat().st_mtime_ns for path in (finished, *finished.iterdir())}
     blocksim("verify-run", finished, "--quiet")
