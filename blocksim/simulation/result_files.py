@@ -113,13 +113,18 @@ def _leftover(name: str) -> re.Pattern[str]:
     return re.compile(rf"\.{re.escape(name)}\.(?:new|[a-z0-9_]{{8}}(?:{suffix})?)")
 
 
+def origin_of(plan: str) -> str:
+    """Return the name of the summary beside a resolved scenario, of a run or of a study."""
+    return SUMMARY if plan == SCENARIO else Path(plan).with_suffix(".json").name
+
+
 def copies(folder: Path, plan: str = SCENARIO) -> frozenset[str]:
     """Return the names of the copies of tables that belong to a folder.
 
-    Those are what run.json (of a sweep: sweep.json) has listed, as long as nobody has changed them; where it lists none
-    (a folder of 0.1, or of a run that was killed), those that the resolved scenario names.
+    Those are what run.json (of a sweep sweep.json, and so on) has listed, as long as nobody has changed them; where it
+    lists none (a folder of 0.1, or of a run that was killed), those that the resolved scenario names.
     """
-    listed, named = _listed(folder / f"{'run' if plan == SCENARIO else 'sweep'}.json"), _named(folder / plan)
+    listed, named = _listed(folder / origin_of(plan)), _named(folder / plan)
     present = (name for name in COPIES if _is_plain_file(folder / name))
     return frozenset(name for name in present if _belongs(folder / name, listed.get(name), is_named=name in named))
 

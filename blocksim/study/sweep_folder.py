@@ -1,9 +1,10 @@
-"""The folder of a sweep: whose it is, what it came from, and that nothing in it is lost by mistake."""
+"""The folder of a sweep, or of a search: whose it is, what it came from, and that nothing in it is lost by mistake."""
 
 import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -23,27 +24,65 @@ from blocksim.simulation.result_files import (
     is_resolved,
     is_written,
     keep_scenario,
+    origin_of,
     read_tables,
     refuse_foreign_copies,
 )
 from blocksim.study.progress import is_in_use
 
 PLAN = "sweep.toml"
-ORIGIN = "sweep.json"
 CASES = "cases"
-HEAD = b"# Sweep "
 SHARD = r"(?:-\d+-of-\d+)?"
-KINDS: dict[str, Kind] = {  # of results, by the pattern of their names; shards have files of their own
-    rf"sweep{SHARD}\.csv": begins(b"case,"),
-    rf"manifest{SHARD}\.jsonl": grows_from(b'{"number":'),
-    rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
-    r"sweep\.json": begins(b'{\n  "began_at": "'),
-}
-LEFTOVER = re.compile(r"\.(sweep[-\w]*\.csv|sweep\.json|sweep\.toml)\..*")
+
+
+@dataclass(frozen=True)
+class FolderKind:
+    """What distinguishes the folders of one kind of study."""
+
+    what: str  # a sweep
+    command: str
+    plan: str  # resolved scenario with what is varied, written first
+    head: bytes  # of the plan
+    results: Mapping[str, Kind]  # kinds of content by the patterns of their names
+    leftover: re.Pattern[str]  # names of what is left of them when their writer was killed
+
+    @property
+    def origin(self) -> str:
+        """Name of the file that says what the study came from."""
+        return origin_of(self.plan)
+
+    def kind_of(self, name: str) -> Kind | None:
+        """Return the kind of content that a file of this name has, None for a file that is no result."""
+        return next((kind for pattern, kind in self.results.items() if re.fullmatch(pattern, name)), None)
+
+    def is_ours(self, path: Path) -> bool:
+        """Return True for a file that a study has written, or left half written when it was killed."""
+        kind = self.kind_of(path.name)
+        if kind is not None:
+            return is_written(path, {path.name: kind}, self.plan)
+        named = self.leftover.fullmatch(path.name)
+        return named is not None and is_leftover(path.name, (named[1],)) and path.is_file()
+
+
+MANIFESTS: Mapping[str, Kind] = {rf"manifest{SHARD}\.jsonl": grows_from(b'{"number":')}
+ORIGINS = begins(b'{\n  "began_at": "')
+SWEEP = FolderKind(
+    what="a sweep",
+    command="blocksim sweep FILE",
+    plan=PLAN,
+    head=b"# Sweep ",
+    results={  # shards have files of their own
+        rf"sweep{SHARD}\.csv": begins(b"case,"),
+        **MANIFESTS,
+        rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
+        r"sweep\.json": ORIGINS,
+    },
+    leftover=re.compile(r"\.(sweep[-\w]*\.csv|sweep\.json|sweep\.toml)\..*"),
+)
 
 
 class Origin(BaseModel, frozen=True):
-    """The entries of sweep.json: versions, machine and command of whoever began the sweep, and how cases were drawn."""
+    """What sweep.json begins with: versions and machine of whoever began the study, and how cases were drawn."""
 
     began_at: str
     mode: str | None = None
@@ -52,27 +91,27 @@ class Origin(BaseModel, frozen=True):
     sha256: dict[str, str] = {}  # of the copies of tables, as they were written
 
 
-def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool) -> None:
+def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: FolderKind = SWEEP) -> None:
     """Make the folder and write the plan into it. Raises OutputExistsError when something else is there."""
-    head = f"{HEAD.decode()}{name}. To run it again: blocksim sweep FILE\n"
+    head = f"{kind.head.decode()}{name}. To run it again: {kind.command}\n"
     tables = read_tables(base)
     try:
         make_folder(folder)
-        _make_free(folder, head.encode(), tables, overwrite=overwrite)
+        _make_free(folder, head.encode(), tables, kind, overwrite=overwrite)
     except OSError as error:
         message = f"{folder}: cannot be created: {error.strerror}"
         raise OutputExistsError(message) from error
-    keep_scenario(base, tables, folder, PLAN, head)
-    _keep_origin(folder, base, tables)
+    keep_scenario(base, tables, folder, kind.plan, head)
+    _keep_origin(folder, base, tables, kind)
 
 
-def _keep_origin(folder: Path, base: Scenario, tables: Mapping[str, bytes]) -> None:
-    """Write sweep.json where there is none: whoever continues with a sweep did not begin it; renew its checksums."""
-    known = read_origin(folder)
+def _keep_origin(folder: Path, base: Scenario, tables: Mapping[str, bytes], kind: FolderKind) -> None:
+    """Write it where there is none: whoever continues with a study did not begin it; renew its checksums."""
+    known = read_origin(folder, kind)
     sums = {name: hashlib.sha256(content).hexdigest() for name, content in tables.items()}
     if known is None or known.sha256 != sums:
         origin = (known or _origin_of(base)).model_copy(update={"sha256": sums})
-        write_text(folder / ORIGIN, origin.model_dump_json(indent=2) + "\n")
+        write_text(folder / kind.origin, origin.model_dump_json(indent=2) + "\n")
 
 
 def _origin_of(base: Scenario) -> Origin:
@@ -86,62 +125,51 @@ def _origin_of(base: Scenario) -> Origin:
     )
 
 
-def read_origin(folder: Path) -> Origin | None:
-    """Return what a sweep came from, None where it is older than this file. Raises InvalidInputError."""
-    path = folder / ORIGIN
+def read_origin(folder: Path, kind: FolderKind = SWEEP) -> Origin | None:
+    """Return what a study came from, None where it is older than this file. Raises InvalidInputError."""
+    path = folder / kind.origin
     try:
         return Origin.model_validate_json(read_limited(path, MEGABYTE))
     except InputMissingError:
         return None
     except ValidationError as error:
-        message = f"{path}: not the plan of a sweep: {str(error).splitlines()[0]}"
+        message = f"{path}: not the plan of {kind.what}: {str(error).splitlines()[0]}"
         raise InvalidInputError(message) from None
 
 
-def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], *, overwrite: bool) -> None:
-    """Raise OutputExistsError where the folder is not free; with `overwrite` remove what an older sweep has written."""
-    present = [path for path in sorted(folder.iterdir()) if not is_leftover(path.name, (PLAN,))]
+def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: FolderKind, *, overwrite: bool) -> None:
+    """Raise OutputExistsError where the folder is not free; with `overwrite` remove what an older study has written."""
+    present = [path for path in sorted(folder.iterdir()) if not is_leftover(path.name, (kind.plan,))]
     if not present:
         return
-    if not is_resolved(folder / PLAN) or not read_head(folder / PLAN, len(HEAD)).startswith(HEAD):
-        message = f"{folder}: holds files that are not a sweep; choose another folder with --out"
+    if not is_resolved(folder / kind.plan) or read_head(folder / kind.plan, len(kind.head)) != kind.head:
+        message = f"{folder}: holds files that are not {kind.what}; choose another folder with --out"
         raise OutputExistsError(message)
-    is_same = read_head(folder / PLAN, len(head)) == head
+    is_same = read_head(folder / kind.plan, len(head)) == head
     if not (overwrite or is_same):
-        message = f"{folder}: contains another sweep; --overwrite replaces it, --out DIR writes elsewhere"
+        which = kind.what.replace("a ", "another ", 1)
+        message = f"{folder}: contains {which}; --overwrite replaces it, --out DIR writes elsewhere"
         raise OutputExistsError(message)
-    _refuse_foreign(present)
-    refuse_foreign_copies(tables, folder, PLAN)
+    _refuse_foreign(present, kind)
+    refuse_foreign_copies(tables, folder, kind.plan)
     if overwrite:
-        _empty(folder)
+        _empty(folder, kind)
 
 
-def _refuse_foreign(present: Sequence[Path]) -> None:
+def _refuse_foreign(present: Sequence[Path], kind: FolderKind) -> None:
     """Raise OutputExistsError where a file of somebody else has the name of a result."""
-    foreign = next((path for path in present if _kind_of(path.name) and not _is_ours(path)), None)
+    foreign = next((path for path in present if kind.kind_of(path.name) and not kind.is_ours(path)), None)
     if foreign is not None:
-        message = f"{foreign}: changed since the sweep wrote it; move it away, or write elsewhere with --out DIR"
+        whose = kind.what.replace("a ", "the ", 1)
+        message = f"{foreign}: changed since {whose} wrote it; move it away, or write elsewhere with --out DIR"
         raise OutputExistsError(message)
 
 
-def _kind_of(name: str) -> Kind | None:
-    return next((kind for pattern, kind in KINDS.items() if re.fullmatch(pattern, name)), None)
-
-
-def _is_ours(path: Path) -> bool:
-    """Return True for a file that a sweep has written, or left half written when it was killed."""
-    kind = _kind_of(path.name)
-    if kind is not None:
-        return is_written(path, {path.name: kind}, PLAN)
-    named = LEFTOVER.fullmatch(path.name)
-    return named is not None and is_leftover(path.name, (named[1],)) and path.is_file()
-
-
-def _empty(folder: Path) -> None:
-    """Remove the results of a sweep, unless somebody is writing them; whatever else lies there stays."""
-    results = [path for path in folder.iterdir() if path.name != PLAN and _is_ours(path)]
+def _empty(folder: Path, kind: FolderKind) -> None:
+    """Remove the results of a study, unless somebody is writing them; whatever else lies there stays."""
+    results = [path for path in folder.iterdir() if path.name != kind.plan and kind.is_ours(path)]
     if any(is_in_use(path) for path in results if path.suffix == ".jsonl"):
-        message = f"{folder}: a sweep is running here; wait for it, or write elsewhere with --out DIR"
+        message = f"{folder}: {kind.what} is running here; wait for it, or write elsewhere with --out DIR"
         raise OutputExistsError(message)
     for path in results:
         path.unlink()
