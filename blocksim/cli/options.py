@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -111,6 +112,24 @@ Colour = Annotated[
     typer.Option(
         "--colour", "--color", parser=colour_name, metavar="BY", help="Colour blocks by block, material, speed or turn."
     ),
+]
+
+
+class Executor(StrEnum):
+    """What runs the cases of a study."""
+
+    ENSEMBLE = "ensemble"
+    PROCESSES = "processes"
+    DASK = "dask"
+
+
+ExecutorName = Annotated[
+    Executor | None,
+    typer.Option(help="ensemble: in this process (default); processes: a case that crashes stops no other."),
+]
+Jobs = Annotated[int | None, typer.Option(min=1, metavar="N", help="Threads or processes (default: one per core).")]
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster, such as tcp://host:8786.")
 ]
 Settings = Annotated[
     list[str] | None,

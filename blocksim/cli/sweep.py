@@ -22,14 +22,6 @@ from blocksim.study.sweep import merge as merge_shards
 from blocksim.study.sweep_table import SweepResult
 
 
-class Executor(StrEnum):
-    """What runs the cases."""
-
-    ENSEMBLE = "ensemble"
-    PROCESSES = "processes"
-    DASK = "dask"
-
-
 class Mode(StrEnum):
     """How values are combined."""
 
@@ -59,16 +51,9 @@ def sweep_command(
     samples: Annotated[int | None, typer.Option(metavar="N", help="Number of cases to draw (default: 128).")] = None,
     seed: Annotated[int | None, typer.Option(metavar="S", help="Random seed (default: 0).")] = None,
     settings: options.Settings = None,
-    executor: Annotated[
-        Executor | None,
-        typer.Option(help="ensemble: in this process (default); processes: a case that crashes stops no other."),
-    ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Threads or processes (default: one per core).")
-    ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster, such as tcp://host:8786.")
-    ] = None,
+    executor: options.ExecutorName = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
     shard: Annotated[
         str | None, typer.Option(metavar="I/N", help="Run only cases I, I + N, ... (job arrays); then --merge.")
     ] = None,
