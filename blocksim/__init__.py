@@ -8,8 +8,9 @@
 True
 
 Scenarios: `load` (a file or dictionaries), `replace` (change keys, validated). Runs: `run`, `open_run`; a result has
-`final`, `frames`, `to_frame()`, `to_xarray()`. Studies: `sweep`, `open_sweep`, `calibrate`, `sensitivity`, `converge`.
-Judging: `compare`. Looking: `plot`, `animate`, `report`. Functions have the options of the command of the same name.
+`final`, `frames`, `to_frame()`, `to_xarray()`. Studies: `sweep`, `open_sweep`, `limit`, `calibrate`, `sensitivity`,
+`converge`. Judging: `compare`. Looking: `plot`, `animate`, `report`. Functions have the options of the command of the
+same name.
 """
 
 from importlib import import_module
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from blocksim.study.api import animate, calibrate, plot, report, sensitivity
     from blocksim.study.compare import compare
     from blocksim.study.converge import converge
+    from blocksim.study.limit import limit
     from blocksim.study.run import open_run, run
     from blocksim.study.sweep import sweep
     from blocksim.study.sweep_table import read_sweep as open_sweep
@@ -31,6 +33,7 @@ __all__ = [
     "calibrate",
     "compare",
     "converge",
+    "limit",
     "load",
     "open_run",
     "open_sweep",
@@ -48,6 +51,7 @@ _HOMES = {
     "calibrate": ("blocksim.study.api", "calibrate"),
     "compare": ("blocksim.study.compare", "compare"),
     "converge": ("blocksim.study.converge", "converge"),
+    "limit": ("blocksim.study.limit", "limit"),
     "load": ("blocksim.scenario", "load_scenario"),
     "open_run": ("blocksim.study.run", "open_run"),
     "open_sweep": ("blocksim.study.sweep_table", "read_sweep"),

@@ -21,6 +21,7 @@ COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command
     "compare": "Compare runs with measured repeats.",
     "check": "Validate a scenario and summarise it.",
     "sweep": "Run a scenario many times with some keys varied.",
+    "limit": "Find the value of a key at which the structure falls.",
     "calibrate": "Fit inputs to measured repeats, within their priors.",
     "sensitivity": "Show which inputs decide where the blocks end.",
     "converge": "Refine step, stiffness and spacing until the run-out converges.",
@@ -38,7 +39,7 @@ COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command
 GROUPS = {  # heads of the list in `blocksim --help`
     "Run": ("new", "run", "schema"),
     "Look": ("plot", "animate", "report", "export"),
-    "Study": ("sweep", "calibrate", "sensitivity", "converge"),
+    "Study": ("sweep", "limit", "calibrate", "sensitivity", "converge"),
     "Check": ("check", "compare", "verify", "verify-run", "bench"),
 }
 WITH_SCENARIOS = set(COMMANDS) - {"verify", "verify-run", "bench", "new", "schema"}

@@ -1,0 +1,183 @@
+"""blocksim limit: the values of a key between which the structure stands and falls."""
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from blocksim.cli import options
+from blocksim.cli.output import answer, note, number, print_json, table_lines
+from blocksim.cli.prepare import tell_compilation, warn_of_values
+from blocksim.cli.vary import read_variations
+from blocksim.errors import ExitCode
+from blocksim.scenario import Document
+from blocksim.simulation.compilation import kernels_of
+from blocksim.study.criterion import DEFAULT, Verdict
+from blocksim.study.limit import LimitResult, OnRun, find_limit
+from blocksim.study.limit_plan import OPTION, TOLERANCE, is_soft, read_limit, variants
+from blocksim.study.limit_search import Change, Number
+from blocksim.study.rows import MOVEMENT, Row
+
+SHARE = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(%?)")
+PERCENT = 100.0
+OUTCOME, MOVER, MOVED, DISPLACEMENT, TURN = MOVEMENT
+HEADS = ("verdict", "outcome", "first moved", "at s", "moved mm", "turned °")
+
+
+def _share(text: object) -> float:
+    """Return a share that is written as 0.1% or 0.001. Raises BadParameter, a mistake of usage."""
+    found = SHARE.fullmatch(str(text).strip())
+    if found is None:
+        raise typer.BadParameter(f"{str(text)[:40]!r} is not a share; write it as in 0.1% or 0.001")
+    try:
+        value = float(found[1])
+    except ValueError:
+        raise typer.BadParameter(f"{found[1]!r} is not a number") from None
+    return value / PERCENT if found[2] else value
+
+
+def limit_command(
+    scenario: options.ScenarioPath,
+    vary: Annotated[
+        list[str],
+        typer.Option(
+            OPTION,
+            metavar="KEY=FROM:TO",
+            help="The key and its range. KEY=FROM:TO:COUNT scans COUNT values first (default: 9); :log at the end "
+            "spaces them logarithmically.",
+        ),
+    ],
+    stands: Annotated[
+        str,
+        typer.Option(
+            metavar="CONDITIONS",
+            help='What counts as standing, such as "moved < 5 mm", "turned < 10 deg" or "outcome != fell"; several '
+            "with commas.",
+        ),
+    ] = DEFAULT,
+    to: Annotated[
+        float, typer.Option(metavar="SHARE", parser=_share, help="Width of a bracket, relative to the value.")
+    ] = TOLERANCE,
+    both_laws: Annotated[
+        bool, typer.Option("--both-laws", help="Search with springs and with rigid contacts, and compare.")
+    ] = False,
+    stiffer: Annotated[
+        bool, typer.Option("--stiffer", help="Search once more with springs ten times as stiff, and compare.")
+    ] = False,
+    settings: options.Settings = None,
+    executor: options.ExecutorName = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder to write (default: results/NAME/limit-HASH).")
+    ] = None,
+    overwrite: options.Overwrite = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Find the value of a key at which the structure falls.
+
+    Scans the range, as there may be more than one change, and then narrows every change between neighbours to a
+    bracket. A run that fails is told as such. The same command again, also after a kill, does no run twice. Exit code
+    1: nothing changes within the range.
+
+    Example: blocksim limit scenarios/tilting_wall.toml --vary ground.tilt=20deg:40deg
+    """
+    silent = quiet or as_json
+    document = Document.read(scenario).with_settings(settings or [])
+    given = read_variations(vary, OPTION)
+    plans = {
+        name: read_limit(one, given, stands=stands, tolerance=to)
+        for name, one in variants(document, both_laws=both_laws, stiffer=stiffer).items()
+    }
+    if not silent:
+        warn_of_values(document.build())
+    found = {}
+    for name, plan in plans.items():
+        base = plan.scenario_at(plan.span.low)
+        tell_compilation(kernels_of(base), quiet=silent)
+        if not silent and is_soft(base) and not stiffer:
+            note(f"warning: stiffness scale {base.contact.stiffness_scale:g} may shift the limit; see --stiffer")
+        found[name] = find_limit(
+            plan,
+            executor=None if executor is None else executor.value,
+            jobs=jobs,
+            scheduler=scheduler,
+            out=None if out is None else out / _folder(name) if len(plans) > 1 else out,
+            overwrite=overwrite,
+            on_run=(lambda *_: None) if silent else _telling(plan.shown),
+        )
+    if as_json:
+        print_json([{"contacts": name, "folder": str(one.folder), **one.to_dict()} for name, one in found.items()])
+    else:
+        answer("\n\n".join("\n".join(_lines(name, one)) for name, one in found.items()))
+        _compare(found)
+    if not silent:
+        for one in found.values():
+            note(f"{len(one.rows)} runs, {one.run} of them now: {one.folder / 'limit.csv'}")
+    raise typer.Exit(ExitCode.SUCCESS if all(one.changes for one in found.values()) else ExitCode.OUTSIDE)
+
+
+def _folder(name: str) -> str:
+    """Return a name of a variant that needs no quotes in a shell."""
+    return re.sub(r"[^a-z0-9.]+", "-", name)
+
+
+def _telling(shown: Callable[[Number], str]) -> OnRun:
+    def tell(value: Number, verdict: Verdict, row: Row) -> None:
+        note(f"{shown(value)}: {verdict.value} ({row['reason']})")
+
+    return tell
+
+
+def _lines(name: str, found: LimitResult) -> list[str]:
+    """Return both sides of every change, and what that comes to."""
+    plan = found.plan
+    title = f'{plan.key}, {name}: stands means "{plan.criterion.text}"'
+    if not found.changes:
+        only = next(iter(found.verdicts.values()))
+        span = f"{plan.shown(plan.span.low)} to {plan.shown(plan.span.high)}"
+        return [title, f"no change from {span}: {only.value} at all {len(found.rows)} values"]
+    heads = (f"value {plan.unit}".rstrip(), *HEADS)
+    sides = [side for one in found.changes for side in ((one.low, one.below), (one.high, one.above))]
+    rows = [_cells(value, verdict, found.rows[value]) for value, verdict in dict.fromkeys(sides)]
+    return [title, "", *table_lines(heads, rows, left=4), "", *(_told(found, one) for one in found.changes)]
+
+
+def _cells(value: Number, verdict: Verdict, row: Row) -> list[str]:
+    if verdict is Verdict.FAILED:
+        return [f"{value:.8g}", verdict.value, str(row["reason"]).splitlines()[0], *("",) * 4]
+    moved = row.get(MOVED)
+    first = "" if row.get(MOVER) is None else f"block {row[MOVER]}"
+    return [
+        f"{value:.8g}",
+        verdict.value,
+        str(row[OUTCOME]),
+        first,
+        "" if moved is None else number(float(str(moved)), 3),
+        number(float(str(row[DISPLACEMENT]))),
+        number(float(str(row[TURN]))),
+    ]
+
+
+def _told(found: LimitResult, change: Change[Verdict]) -> str:
+    shown = found.plan.shown
+    width = (change.high - change.low) / max(abs(change.low), abs(change.high))
+    below = f"{change.below.value} up to {shown(change.low)}"
+    return f"{below}, {change.above.value} from {shown(change.high)} (bracket {width:.2%})"
+
+
+def _compare(found: Mapping[str, LimitResult]) -> None:
+    """Report how far the limits of several laws lie apart, where they have as many."""
+    if len(found) < 2:  # noqa: PLR2004 - two to compare
+        return
+    (first, one), *others = found.items()
+    for name, other in others:
+        if len(one.limits) != len(other.limits):
+            answer(f"\n{first} has {len(one.limits)} limits, {name} {len(other.limits)}")
+            continue
+        for mine, its in zip(one.limits, other.limits, strict=True):
+            middle, theirs = 0.5 * (mine.low + mine.high), 0.5 * (its.low + its.high)
+            answer(f"\n{name} against {first}: {(theirs - middle) / abs(middle):+.2%} (middles of the brackets)")

@@ -1,0 +1,104 @@
+"""What counts as standing: conditions on the end of a run, such as "moved < 5 mm, outcome != fell".
+
+Conditions are joined by commas, and all of them must hold. `moved` is the largest displacement of a centre from start
+to end, `turned` the largest rotation; `outcome` is one of stands, rocked back, slid, fell (see
+`blocksim.simulation.movement`), several of them with "|" between.
+
+A run that meets all conditions and yet moves at its end is undecided where its fastest block would go farther than the
+condition allows (without one for `moved`: a hundredth of its way counts) within another tenth of the simulated time.
+"""
+
+import math
+import operator
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import quantities as q
+from blocksim.scenario.spelling import did_you_mean_or_list
+from blocksim.simulation.movement import Manner
+from blocksim.study.rows import FINISHED, MOVEMENT
+
+DEFAULT = "outcome = stands | rocked back"
+FORM = re.compile(r"\s*([a-z]+)\s*(<=|>=|!=|=|<|>)\s*(.*?)\s*")
+OUTCOME, _, _, DISPLACEMENT, TURN = MOVEMENT
+NUMBERS: dict[str, tuple[str, q.Kind, float]] = {  # word: column of a row, kind, units of the column in one of SI
+    "moved": (DISPLACEMENT, q.LENGTH, 1e3),
+    "turned": (TURN, q.ANGLE, math.degrees(1.0)),
+}
+BELOW: dict[str, Callable[[float, float], bool]] = {"<": operator.lt, "<=": operator.le}
+ABOVE: dict[str, Callable[[float, float], bool]] = {">": operator.gt, ">=": operator.ge}
+WORDS = (*NUMBERS, OUTCOME)
+
+
+class Verdict(StrEnum):
+    """What a run says about the structure."""
+
+    STANDS = "stands"
+    FALLS = "falls"
+    UNDECIDED = "undecided"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """All conditions; `text` is how they were written."""
+
+    text: str
+    conditions: tuple[Callable[[Mapping[str, object]], bool], ...]
+
+    def verdict(self, row: Mapping[str, object]) -> Verdict:
+        """Judge a row of a sweep."""
+        if row["status"] != FINISHED:
+            return Verdict.FAILED
+        return Verdict.STANDS if all(holds(row) for holds in self.conditions) else Verdict.FALLS
+
+
+def read_criterion(text: str) -> Criterion:
+    """Read conditions. Raises InvalidInputError for anything else, with what may be written."""
+    return Criterion(text, tuple(_condition(part) for part in text.split(",")))
+
+
+def _condition(text: str) -> Callable[[Mapping[str, object]], bool]:
+    found = FORM.fullmatch(text)
+    if found is None:
+        raise _mistake(text, 'write for example "moved < 5 mm" or "outcome != fell"')
+    word, sign, value = found.groups()
+    if word == OUTCOME:
+        return _outcome(text, sign, value)
+    if word not in NUMBERS:
+        raise _mistake(text, f"unknown quantity '{word}', {did_you_mean_or_list(word, WORDS)}")
+    return _number(text, word, sign, value)
+
+
+def _outcome(text: str, sign: str, value: str) -> Callable[[Mapping[str, object]], bool]:
+    named = {part.strip() for part in value.split("|")}
+    known = {manner.value for manner in Manner}
+    unknown = sorted(named - known)
+    if unknown:
+        raise _mistake(text, f"unknown outcome '{unknown[0]}', {did_you_mean_or_list(unknown[0], sorted(known))}")
+    if sign not in ("=", "!="):
+        raise _mistake(text, "an outcome is compared with = or !=")
+    allowed = named if sign == "=" else known - named
+    return lambda row: row[OUTCOME] in allowed
+
+
+def _number(text: str, word: str, sign: str, value: str) -> Callable[[Mapping[str, object]], bool]:
+    column, kind, units = NUMBERS[word]
+    compare = {**BELOW, **ABOVE}.get(sign)
+    if compare is None:
+        raise _mistake(text, f"{word} is compared with <, <=, > or >=")
+    try:
+        number, dimension = q.parse_quantity(value, kind)
+    except ValueError as error:
+        raise _mistake(text, str(error)) from None
+    if dimension != kind.dimension:
+        raise _mistake(text, f'{kind.name} is needed, such as "{kind.example}"')
+    limit = number * units
+    return lambda row: compare(float(str(row[column])), limit)
+
+
+def _mistake(text: str, why: str) -> InvalidInputError:
+    return InvalidInputError(f"--stands {text.strip() or '(empty)'}: {why}")

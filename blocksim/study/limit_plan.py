@@ -1,0 +1,172 @@
+"""What `limit` searches: one key between two values, the criterion, and the scenario at each value."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from blocksim.errors import BlocksimError, InvalidInputError
+from blocksim.scenario import Document, Scenario, scenario_hash
+from blocksim.scenario.keys import field_at, follow, options, parse_key
+from blocksim.scenario.models.stepping import SCHEMES
+from blocksim.scenario.models.variation import Uniform
+from blocksim.scenario.units import parse_unit
+from blocksim.simulation.provenance import HASH_DIGITS, code_hash
+from blocksim.study.criterion import Criterion, read_criterion
+from blocksim.study.limit_search import Number, Span
+from blocksim.study.plan import Values, Variations, varied
+
+SCANNED = 9
+MOST_SCANNED = 1000
+TOLERANCE = 1e-3
+LEAST_TOLERANCE = 1e-9
+OPTION = "--vary"
+SOFT = 0.1  # contact.stiffness_scale below which springs shift limits by more than a percent
+RATIO = 10.0  # of stiffness between a search and its repetition
+SPRINGS = "explicit"
+NAMES = {SPRINGS: "springs", "nonsmooth": "rigid contacts"}
+STIFFNESS = "contact.stiffness_scale"
+
+
+@dataclass(frozen=True)
+class LimitPlan:
+    """One search."""
+
+    document: Document  # without what varies
+    key: str
+    unit: str  # as typed; empty for plain numbers
+    span: Span
+    criterion: Criterion
+    tolerance: float  # of a bracket, relative to its ends
+
+    def value(self, number: Number) -> object:
+        """Return a value of the range as a scenario takes it."""
+        if self.span.is_whole:
+            return int(number)
+        return f"{number:.12g} {self.unit}" if self.unit else number
+
+    def shown(self, number: Number) -> str:
+        """Return a value for people."""
+        return f"{number:.7g} {self.unit}".rstrip()
+
+    def scenario_at(self, number: Number) -> Scenario:
+        """Return the scenario at a value. Raises ScenarioError where the value does not go with the others."""
+        return self.document.with_values({self.key: self.value(number)}).build()
+
+    @property
+    def name(self) -> str:
+        """A hash of everything that decides the answer."""
+        ends = [self.key, self.unit, *vars(self.span).values(), self.criterion.text, self.tolerance]
+        text = json.dumps([scenario_hash(self.document.build()), ends, code_hash()])
+        return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
+
+
+def read_limit(
+    document: Document,
+    vary: Mapping[str, Values] | Variations,
+    *,
+    stands: str,
+    tolerance: float = TOLERANCE,
+) -> LimitPlan:
+    """Return the plan of a search.
+
+    Raises ScenarioError for a key or range that the scenario cannot have, InvalidInputError for a wrong criterion or
+    tolerance, and where more or less than one key is given.
+    """
+    criterion = read_criterion(stands)
+    if not LEAST_TOLERANCE <= tolerance < 1.0:
+        message = f"a bracket of {tolerance:g} of the value cannot be reached; give {LEAST_TOLERANCE:g} up to below 1"
+        raise InvalidInputError(message)
+    given = vary if isinstance(vary, Variations) else Variations.of(vary)
+    if len(given.tables) != 1:
+        message = f"a limit is searched along one key, not {len(given.tables)}: give {OPTION} KEY=FROM:TO once"
+        raise InvalidInputError(message)
+    key, table = next(iter(given.tables.items()))
+    bare = replace(document, data={name: entry for name, entry in document.data.items() if name != "sweep"})
+    if not isinstance(table, Mapping) or not {"from", "to"} <= set(table):
+        message = f"{OPTION} {given.texts[key]}: a range is needed, as in {key}=FROM:TO or {key}=FROM:TO:COUNT"
+        raise InvalidInputError(message)
+    count = _count(table.get("count", SCANNED))
+    ends = {name: value for name, value in table.items() if name != "count"}
+    values = varied(bare, Variations({key: ends}, given.texts), OPTION, "sobol").vary[key]
+    assert isinstance(values, Uniform)  # noqa: S101 - it has two ends
+    plan = LimitPlan(bare, key, _unit(values), _span(bare, key, values, table, count), criterion, tolerance)
+    _refuse_wrong_ends(plan)
+    return plan
+
+
+def _count(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 2 <= value <= MOST_SCANNED:  # noqa: PLR2004
+        message = f"{value} values cannot be scanned; a whole number from 2 to {MOST_SCANNED} is needed"
+        raise InvalidInputError(message)
+    return value
+
+
+def _unit(values: Uniform) -> str:
+    return values.unit or ("rad" if values.angle else "")
+
+
+def _span(document: Document, key: str, values: Uniform, table: Mapping[str, Any], count: int) -> Span:
+    """Return the range in the typed unit; of a key that takes whole numbers only, every one of them that fits."""
+    unit = _unit(values)
+    factor = float(parse_unit(unit).factor) if unit else 1.0
+    low, high = (float(f"{end / factor:.12g}") for end in (values.low, values.high))
+    is_whole = _takes_whole(document, key) and all(type(table[end]) is int for end in ("from", "to"))
+    scanned = min(count, int(high - low) + 1) if is_whole else count
+    return Span(low, high, scanned, is_log=values.scale == "log", is_whole=is_whole)
+
+
+def _takes_whole(document: Document, key: str) -> bool:
+    data = document.build().model_dump(by_alias=True, exclude={"sweep"})
+    path: tuple[str | int, ...] = ()
+    for part in parse_key(key):
+        path = (*path, int(part) if isinstance(follow(data, path), list | tuple) else part)
+    field = field_at(path, data)
+    return field is not None and int in options(field.annotation) and float not in options(field.annotation)
+
+
+def _refuse_wrong_ends(plan: LimitPlan) -> None:
+    """Raise InvalidInputError where the scenario cannot be built at either end."""
+    for number in (plan.span.low, plan.span.high):
+        try:
+            plan.scenario_at(number)
+        except BlocksimError as error:
+            message = f"{plan.key} = {plan.shown(number)}: {str(error).splitlines()[0]}"
+            raise InvalidInputError(message) from error
+
+
+def variants(document: Document, *, both_laws: bool = False, stiffer: bool = False) -> dict[str, Document]:
+    """Return the scenarios whose limits are compared, by what distinguishes them.
+
+    With `both_laws` springs and rigid contacts; with `stiffer` springs once more, ten times as stiff. Raises
+    InvalidInputError where there are no springs to make stiffer.
+    """
+    present = document.build()
+    laws = {NAMES[name]: with_scheme(document, name) for name in SCHEMES} if both_laws else {}
+    chosen = laws or {NAMES[present.time.scheme]: document}
+    if not stiffer:
+        return chosen
+    springs = chosen.get(NAMES[SPRINGS])
+    if springs is None:
+        raise InvalidInputError("rigid contacts have no stiffness: --stiffer is for springs (time.scheme explicit)")
+    scale = RATIO * present.contact.stiffness_scale
+    return {**chosen, f"springs, stiffness scale {scale:g}": springs.with_values({STIFFNESS: scale})}
+
+
+def is_soft(scenario: Scenario) -> bool:
+    """Return True where springs are so soft that limits may shift by more than a percent."""
+    return scenario.time.scheme == SPRINGS and scenario.contact.stiffness_scale < SOFT
+
+
+def with_scheme(document: Document, scheme: str) -> Document:
+    """Return the document with a stepping scheme; of [time], what the present one alone knows is left out.
+
+    So is the step, where the scheme is another one: its scale is that of the scheme.
+    """
+    table = document.data.get("time")
+    present = dict(table) if isinstance(table, Mapping) else {}
+    others = set() if present.get("scheme", SPRINGS) == scheme else {"step", "force_step"}
+    known = set(SCHEMES[scheme].model_fields) - others
+    kept = {key: value for key, value in present.items() if key in known}
+    return replace(document, data={**document.data, "time": {**kept, "scheme": scheme}})

@@ -1,0 +1,80 @@
+"""The search for the values of a key at which what a run says changes: which values to try next, from those known.
+
+First a scan of evenly spaced values, as there may be more than one change; then every pair of neighbours with different
+verdicts is divided in three, until it is as narrow as wanted. Two values a round and change, not one: they run side by
+side, and four rounds narrow a bracket 81 times. What is tried depends on the answers of whole rounds
+alone, so neither on the number of threads nor on when a search was stopped and resumed.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Generic, TypeVar
+
+Answer = TypeVar("Answer")
+DIGITS = 12  # of a value that is tried: what people read is what was run
+PARTS = 3
+FLOOR = 1e-6  # of the range: brackets about zero get no narrower
+Number = float  # in the unit of the range
+
+
+@dataclass(frozen=True)
+class Span:
+    """The range of a key in the unit in which it was typed, and how many values are scanned first."""
+
+    low: float
+    high: float
+    count: int
+    is_log: bool = False
+    is_whole: bool = False
+
+    def scanned(self) -> list[Number]:
+        """Return the values of the first round, ends included; whole numbers each once."""
+        return list(dict.fromkeys(self._at(i / (self.count - 1)) for i in range(self.count)))
+
+    def between(self, low: Number, high: Number) -> list[Number]:
+        """Return the values that divide a bracket, without its ends."""
+        inner = Span(low, high, PARTS + 1, self.is_log, self.is_whole).scanned()
+        return [value for value in inner if low < value < high]
+
+    def _at(self, share: float) -> Number:
+        if share in (0.0, 1.0):
+            value = self.high if share else self.low
+        elif self.is_log:
+            value = self.low * (self.high / self.low) ** share
+        else:
+            value = self.low + (self.high - self.low) * share
+        return float(round(value)) if self.is_whole else float(f"{value:.{DIGITS}g}")
+
+    def is_narrow(self, low: Number, high: Number, tolerance: float) -> bool:
+        """Return True if a bracket is as narrow as wanted, relative to its ends; of whole numbers: neighbours."""
+        if self.is_whole:
+            return high - low <= 1.0
+        size = max(abs(low), abs(high), FLOOR * (self.high - self.low) / tolerance)
+        return high - low <= tolerance * size or not self.between(low, high)
+
+
+@dataclass(frozen=True)
+class Change(Generic[Answer]):
+    """Two neighbours among the values that were tried, with different answers."""
+
+    low: Number
+    high: Number
+    below: Answer
+    above: Answer
+
+
+def changes_in(known: Mapping[Number, Answer]) -> list[Change[Answer]]:
+    """Return all changes between neighbours, from the smallest value up."""
+    return [
+        Change(low, high, known[low], known[high]) for low, high in pairwise(sorted(known)) if known[low] != known[high]
+    ]
+
+
+def next_values(span: Span, known: Mapping[Number, Answer], tolerance: float) -> list[Number]:
+    """Return the values to try next; none when every change is as narrow as wanted."""
+    scan = [value for value in span.scanned() if value not in known]
+    if scan:
+        return scan
+    wide = (one for one in changes_in(known) if not span.is_narrow(one.low, one.high, tolerance))
+    return [value for one in wide for value in span.between(one.low, one.high)]

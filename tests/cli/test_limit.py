@@ -1,0 +1,90 @@
+"""blocksim limit: what it prints, its exit codes, and a kill."""
+
+import json
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Command, Process
+from tests.golden import Golden
+
+WALL = ("limit", "scenarios/tilting_wall.toml")
+TILT = ("--vary", "ground.tilt=20deg:40deg")
+FELL = ("--stands", "outcome != fell")
+ROUGH = ("--to", "5%", "--out", "out")
+
+
+def test_the_dry_wall_falls_where_limit_analysis_says_in_at_most_25_runs(blocksim: Command, golden: Golden) -> None:
+    answer = blocksim(*WALL, *TILT, *FELL, "--out", "out")
+    assert answer.code == 0
+    title, _, heads, *_ = lines = answer.out.splitlines()
+    golden(f"{title}\n{heads}")
+    assert lines[-1].startswith("stands up to 32.")
+    data = json.loads(blocksim(*WALL, *TILT, *FELL, "--out", "out", "--json").out)
+    assert data[0]["runs"] <= 25
+    (change,) = data[0]["changes"]
+    assert 32.37 < change["low"] < change["high"] < 32.74  # atan 0.634 to atan 0.643
+
+
+def test_both_laws_are_compared(blocksim: Command, golden: Golden) -> None:
+    soft = ("--set", "contact.stiffness_scale=0.001", "--set", "time.end=0.5 s")
+    answer = blocksim(*WALL, "--vary", "ground.tilt=0 deg:40 deg:3", *ROUGH, "--both-laws", *soft)
+    assert answer.code == 0
+    assert "rigid contacts against springs: " in answer.out
+    assert max(map(len, answer.out.splitlines())) <= 80
+    assert {path.name for path in Path("out").iterdir()} == {"springs", "rigid-contacts"}
+    golden(answer.err.split("\n")[0])
+
+
+def test_nothing_that_changes_is_exit_code_1(blocksim: Command, golden: Golden) -> None:
+    answer = blocksim(*WALL, "--vary", "ground.tilt=1deg:2deg:2", *ROUGH)
+    assert answer.code == 1
+    golden(answer.out)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "--vary ground.tilt=20:40",
+        "--vary ground.tilt=20deg,40deg",
+        "--vary ground.titl=20deg:40deg",
+        "--vary ground.tilt=40deg:20deg",
+        "--vary ground.tilt=20deg:95deg",
+        "--vary ground.tilt=20deg:40deg --vary gravity=1:2",
+        "--vary ground.tilt=20deg:40deg --to 5",
+        "--vary ground.tilt=20deg:40deg --to much",
+        "--vary ground.tilt=20deg:40deg --stands fell",
+        "--vary ground.tilt=20deg:40deg --stiffer",
+        "--vary structures.0.left=0:1",
+    ],
+)
+def test_mistakes_are_shown_and_leave_nothing(
+    blocksim: Command, golden: Golden, tmp_path: Path, arguments: str
+) -> None:
+    answer = blocksim(*WALL, *arguments.split(), "--out", "out")
+    assert answer.out == ""
+    assert not (tmp_path / "out").exists()
+    golden(f"exit code {answer.code}\n{answer.err}")
+
+
+@pytest.mark.long
+def test_a_search_killed_again_and_again_ends_as_one_that_was_not(
+    blocksim: Command, process: Process, tmp_path: Path
+) -> None:
+    slow = (*WALL, *TILT, *FELL, "--set", "time.stop_at_rest=false", "--jobs", 1)
+    assert blocksim(*slow, "--out", "whole").code == 0
+    whole = json.loads((tmp_path / "whole" / "limit.json").read_text())
+    for _ in range(20):
+        running = process(*slow, "--out", "killed")
+        time.sleep(1.2)
+        running.send_signal(signal.SIGKILL)
+        running.communicate()
+    answer = blocksim(*slow, "--out", "killed")
+    assert answer.code == 0
+    killed = json.loads((tmp_path / "killed" / "limit.json").read_text())
+    assert killed["changes"] == whole["changes"]
+    lines = (tmp_path / "killed" / "manifest.jsonl").read_text().splitlines()
+    values = [json.loads(line)["values"] for line in lines]
+    assert len(values) == len(set(values)) == whole["runs"]

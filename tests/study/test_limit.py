@@ -1,0 +1,149 @@
+"""The search for a limit by real runs: closed forms, resuming, and what lies in the folder."""
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError, StoppedEarlyError
+from blocksim.scenario import Document
+from blocksim.study.criterion import Verdict
+from blocksim.study.limit import limit
+from blocksim.study.limit_plan import variants
+
+FRICTION = 0.38
+SLENDER, SQUAT = (0.02, 0.1), (0.1, 0.05)  # m
+TILT = {"ground.tilt": {"from": "5 deg", "to": "40 deg"}}
+
+
+def block_on_a_slope(size: tuple[float, float], **time: object) -> dict[str, Any]:
+    width, height = size
+    return {
+        "schema": 1,
+        "name": "slope",
+        "materials": {"stone": {"density": 2500, "young_modulus": "30 GPa", "poisson_ratio": 0.2}},
+        "blocks": {"b": {"width": width, "height": height, "length": 0.1, "material": "stone"}},
+        "bodies": [{"block": "b", "x": 0, "y": 0.5 * height}],
+        "friction": {"block_ground": FRICTION},
+        "contact": {"restitution": 0},
+        "time": {"scheme": "nonsmooth", "end": 1.0, **time},
+    }
+
+
+@pytest.mark.parametrize(
+    ("size", "degrees", "outcome"),
+    [
+        (SQUAT, math.degrees(math.atan(FRICTION)), "slid"),
+        (SLENDER, math.degrees(math.atan2(*SLENDER)), "fell"),
+    ],
+)
+def test_a_block_on_a_slope_slides_at_its_friction_angle_or_topples_about_its_edge(
+    tmp_path: Path, size: tuple[float, float], degrees: float, outcome: str
+) -> None:
+    found = limit(block_on_a_slope(size), TILT, out=tmp_path / "limit")
+    (change,) = found.limits
+    assert change.low == pytest.approx(degrees, rel=2e-3)
+    assert change.high == pytest.approx(degrees, rel=2e-3)
+    assert change.high - change.low <= 1e-3 * change.high
+    assert (change.below, change.above) == (Verdict.STANDS, Verdict.FALLS)
+    assert found.rows[change.high]["outcome"] == outcome
+    assert len(found.rows) <= 25
+
+
+def test_a_search_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_nothing_twice(tmp_path: Path) -> None:
+    whole = limit(block_on_a_slope(SQUAT), TILT, out=tmp_path / "whole")
+    for at in (1, 5, 10, 13):
+        seen: list[float] = []
+
+        def stop(value: float, _: Verdict, __: Mapping[str, object], seen: list[float] = seen, at: int = at) -> None:
+            seen.append(value)
+            if len(seen) == at:  # not again when it goes on
+                raise KeyboardInterrupt
+
+        folder = tmp_path / f"stopped-{at}"
+        with pytest.raises(StoppedEarlyError, match="rerun the command to finish"):
+            limit(block_on_a_slope(SQUAT), TILT, out=folder, jobs=1, on_run=stop)
+        again = limit(block_on_a_slope(SQUAT), TILT, out=folder, on_run=stop)
+        assert sorted(seen) == sorted(whole.rows)
+        assert again.run == len(whole.rows) - at
+        assert (folder / "limit.csv").read_bytes() == (tmp_path / "whole" / "limit.csv").read_bytes()
+        assert again.changes == whole.changes
+    assert limit(block_on_a_slope(SQUAT), TILT, out=tmp_path / "whole").run == 0
+
+
+def test_the_folder_holds_the_answer_for_programs_and_the_scenario(tmp_path: Path) -> None:
+    found = limit(block_on_a_slope(SQUAT), TILT, out=tmp_path, tolerance=0.1)
+    data = json.loads((tmp_path / "limit.json").read_text())
+    assert (data["key"], data["unit"], data["runs"]) == ("ground.tilt", "deg", len(found.rows))
+    assert data["changes"][0]["above"]["outcome"] == "slid"
+    assert data["environment"]["blocksim"]
+    assert (tmp_path / "limit.csv").read_text().startswith("value [deg],verdict,outcome,")
+    assert Document.read(tmp_path / "limit.toml").build().name == "slope"
+
+
+def test_another_search_or_file_is_not_replaced_unasked(tmp_path: Path) -> None:
+    limit(block_on_a_slope(SQUAT), TILT, out=tmp_path, tolerance=0.1)
+    (tmp_path / "notes.txt").write_text("mine")
+    other = block_on_a_slope(SLENDER)
+    with pytest.raises(OutputExistsError, match="contains another limit; --overwrite replaces it"):
+        limit(other, TILT, out=tmp_path, tolerance=0.1)
+    limit(other, TILT, out=tmp_path, tolerance=0.1, overwrite=True)
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+    (tmp_path / "limit.csv").write_text("a table of somebody else")
+    with pytest.raises(OutputExistsError, match=r"limit\.csv: changed since the limit wrote it"):
+        limit(other, TILT, out=tmp_path, tolerance=0.1, overwrite=True)
+
+
+def test_whole_numbers_of_blocks_are_searched_as_such(tmp_path: Path) -> None:
+    leaning = block_on_a_slope(SQUAT) | {
+        "bodies": [],
+        "structures": [{"kind": "staircase", "block": "b", "count": 2, "overlap": "81 mm"}],
+    }
+    found = limit(leaning, {"structures.0.count": {"from": 2, "to": 9}}, out=tmp_path, tolerance=1e-3)
+    # shifted by 19 mm each, the blocks above the lowest have their centre at n 19 mm/2: beyond its edge for n = 6
+    (change,) = found.limits
+    assert (change.low, change.high) == (5.0, 6.0)
+    assert found.rows[6.0]["outcome"] == "fell"
+
+
+def test_values_that_do_not_go_with_the_others_are_told_and_not_taken_for_falling(tmp_path: Path) -> None:
+    low = block_on_a_slope(SQUAT) | {
+        "bodies": [{"block": "b", "x": 0, "y": 0.025}, {"block": "b", "x": 0.15, "y": 0.025}]
+    }
+    found = limit(low, {"bodies.1.x": {"from": 0.15, "to": 0.2, "count": 2}}, out=tmp_path)
+    assert not found.changes
+    with pytest.raises(InvalidInputError, match="bodies 1 and 2 overlap"):
+        limit(low, {"bodies.1.x": {"from": 0.05, "to": 0.2}}, out=tmp_path / "other")
+    assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.parametrize(
+    ("vary", "error", "why"),
+    [
+        ({}, InvalidInputError, "one key, not 0"),
+        ({"gravity": [1.0, 2.0]}, InvalidInputError, "a range is needed"),
+        ({"gravity": {"from": 1.0, "to": 2.0, "count": 1}}, InvalidInputError, "1 values cannot be scanned"),
+        ({"gravity": {"mean": 1.0, "sd": 2.0}}, InvalidInputError, "a range is needed"),
+        ({"gravty": {"from": 1.0, "to": 2.0}}, ScenarioError, "did you mean 'gravity'"),
+    ],
+)
+def test_what_is_no_range_of_one_key_is_refused_before_anything_is_written(
+    tmp_path: Path, vary: dict[str, Any], error: type[Exception], why: str
+) -> None:
+    with pytest.raises(error, match=why):
+        limit(block_on_a_slope(SQUAT), vary, out=tmp_path / "limit")
+    assert not (tmp_path / "limit").exists()
+
+
+def test_both_laws_are_the_same_scene_without_what_only_one_of_them_knows() -> None:
+    document = Document.from_mapping(block_on_a_slope(SQUAT, substeps=2, step=1e-3))
+    both = {name: one.build() for name, one in variants(document, both_laws=True, stiffer=True).items()}
+    assert list(both) == ["springs", "rigid contacts", "springs, stiffness scale 10"]
+    assert both["rigid contacts"] == document.build()
+    assert both["springs"].time.scheme == "explicit"
+    assert both["springs"].time.step == "auto"
+    with pytest.raises(InvalidInputError, match="rigid contacts have no stiffness"):
+        variants(document, stiffer=True)
