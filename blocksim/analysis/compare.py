@@ -21,7 +21,7 @@ from math import inf, isfinite, nan, sqrt
 from typing import TYPE_CHECKING, Any
 
 from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, Statistics, quoted
-from blocksim.analysis.student import quantile
+from blocksim.analysis.intervals import CONFIDENCE, quantile
 from blocksim.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 ROTATION_TOLERANCE = 5.0  # deg, either side of the measured mean
 READING = 0.5  # mm, uncertainty of one reading of a position
-CONFIDENCE = 0.95
 
 
 class Verdict(StrEnum):
@@ -97,7 +96,7 @@ class Comparison:
 
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON; a missing number is None."""
-        rows = [{key: _plain(value) for key, value in asdict(row).items()} for row in self.rows]
+        rows = [{key: plain(value) for key, value in asdict(row).items()} for row in self.rows]
         return {
             "inside": self.inside,
             "experiment": self.source,
@@ -200,8 +199,10 @@ def _row_without_data(block: str, quantity: str, value: float) -> ComparisonRow:
     return ComparisonRow(block, quantity, unit, simulated=value, n=0, verdict=Verdict.NO_DATA, **unknown)
 
 
-def _plain(value: object) -> object:
+def plain(value: object) -> object:
     """Return what JSON can carry."""
+    if isinstance(value, tuple):
+        return [plain(end) for end in value]
     if isinstance(value, Verdict):
         return value.value
     return None if isinstance(value, float) and not isfinite(value) else value

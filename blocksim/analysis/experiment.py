@@ -6,10 +6,10 @@ from math import fsum, isfinite, nan, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from blocksim.analysis.units import unit_factor
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.csv_table import Cell, Table, raise_problems, read_table
 from blocksim.scenario.spelling import suggestion
+from blocksim.scenario.units import unit_factor
 
 if TYPE_CHECKING:
     import pandas as pd

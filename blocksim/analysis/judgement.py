@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf
 from typing import TYPE_CHECKING
 
-from blocksim.analysis.experiment import ExperimentTable, Statistics
+from blocksim.analysis.compare import plain
+from blocksim.analysis.experiment import ExperimentTable
 from blocksim.analysis.members import Failure, Members
 from blocksim.analysis.metrics import METRICS
-from blocksim.analysis.metrics.metric import Evidence, Findings, Metric, Value
+from blocksim.analysis.metrics.metric import Evidence, Findings, Metric, shown_name
 from blocksim.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -108,26 +109,16 @@ def _incomplete(evidence: Evidence) -> list[str]:
     """Report measured quantities of which finished members have no value."""
     finished = int(evidence.members.finished.sum())
     return [
-        f"{finished - pair.known.size} finished members have no {_named(pair.measured)}: they count as outside"
+        f"{finished - pair.known.size} finished members have no {shown_name(pair)}: they count as outside"
         for pair in evidence.pairs
         if pair.known.size < finished
     ]
-
-
-def _named(measured: Statistics) -> str:
-    return f"{measured.quantity} of block {measured.block}"
 
 
 def _told(metric: Metric, found: Findings) -> dict[str, object]:
     return {
         "meaning": metric.meaning,
         "columns": {column.name: column.meaning for column in metric.columns},
-        "rows": [{name: _plain(value) for name, value in row.items()} for row in found.rows],
+        "rows": [{name: plain(value) for name, value in row.items()} for row in found.rows],
         "messages": list(found.messages),
     }
-
-
-def _plain(value: Value) -> object:
-    if isinstance(value, tuple):
-        return [_plain(end) for end in value]
-    return None if isinstance(value, float) and not isfinite(value) else value

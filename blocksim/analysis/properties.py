@@ -6,9 +6,9 @@ from math import inf, pi
 from pathlib import Path
 from types import MappingProxyType
 
-from blocksim.analysis.units import unit_factor
 from blocksim.scenario.csv_table import Cell, Table, raise_problems, read_table
 from blocksim.scenario.spelling import suggestion
+from blocksim.scenario.units import unit_factor
 
 COLUMNS = ("property", "unit", "value")
 

@@ -211,3 +211,17 @@ def _fits(name: str, other: str, expression: str, dimension: Dimension) -> bool:
         return parse_unit(re.sub(rf"\b{re.escape(name)}\b", other, expression)).dimension == dimension
     except UnitError:
         return False
+
+
+def unit_factor(unit: str, target: str) -> float | None:
+    """Return how many `target` one `unit` is, or None when it is unknown or of another kind.
+
+    `"1"` means a pure number. Angles are a separate kind: a pure number is not an angle.
+    """
+    if "1" in (unit, target):
+        return 1.0 if unit == target else None
+    try:
+        one, other = parse_unit(unit), parse_unit(target)
+    except UnitError:
+        return None
+    return float(one.factor / other.factor) if one.dimension == other.dimension else None

@@ -35,7 +35,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from blocksim.analysis.proportion import interval
+from blocksim.analysis.intervals import interval
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.extras import loaded
 from blocksim.scenario.bounded_read import read_head

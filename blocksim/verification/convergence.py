@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.analysis import closed_forms as forms
+from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, absolute, at_least
 from blocksim.verification.collapse import LONGEST, collapse
 from blocksim.verification.resting import CONTACT_RADIUS

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.analysis.domino_train import Dominoes, wave_speed
 from blocksim.verification.case import Row, Setting, relative
+from blocksim.verification.domino_train import Dominoes, wave_speed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

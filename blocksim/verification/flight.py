@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.analysis import closed_forms as forms
+from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, absolute, farthest, relative
 from blocksim.verification.scene import HEIGHT, Simulation
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.analysis import closed_forms as forms
+from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, absolute, relative
 from blocksim.verification.scene import HEIGHT, WIDTH, PaperBlock, Simulation
 from blocksim.verification.throws import POLL, Throw, Thrower

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import cos, hypot, sin
 from typing import TYPE_CHECKING
 
-from blocksim.analysis import closed_forms as forms
+from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, relative
 
 if TYPE_CHECKING:

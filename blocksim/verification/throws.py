@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.analysis import closed_forms as forms
 from blocksim.simulation.schemes import build_scene, scheme_of
+from blocksim.verification import closed_forms as forms
 from blocksim.verification.scene import HEIGHT, WIDTH
 from blocksim.world.scenes import arrays_of
 

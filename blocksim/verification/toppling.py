@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import cos, degrees, radians, sin
 from typing import TYPE_CHECKING
 
-from blocksim.analysis import closed_forms as forms
+from blocksim.verification import closed_forms as forms
 from blocksim.verification.bisection import limit
 from blocksim.verification.case import Row, Setting, absolute, count, relative
 from blocksim.verification.scene import HEIGHT, WIDTH

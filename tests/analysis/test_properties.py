@@ -1,12 +1,12 @@
 """The table of sizes and materials."""
 
-from math import radians, tan
+from math import radians
 from pathlib import Path
 
 import pytest
 
 from blocksim.analysis.properties import load_properties
-from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.errors import InvalidInputError
 
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks_properties.csv"
 HEADER = "property,unit,value\n"
@@ -28,11 +28,6 @@ def test_table_1_and_the_sizes_arrive_in_si() -> None:
         },
         rel=1e-14,
     )
-
-
-def test_measured_friction_angle_and_coefficient_agree() -> None:
-    values = load_properties(SHIPPED).values
-    assert round(tan(values["ground_friction_angle"]), 2) == values["friction_block_ground"]
 
 
 def test_properties_cannot_be_changed_by_accident() -> None:
@@ -102,8 +97,3 @@ def test_a_broken_table_is_explained_where_it_is_broken(
     with pytest.raises(InvalidInputError) as caught:
         load_properties("table.csv")
     assert str(caught.value) == message
-
-
-def test_a_missing_table_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputMissingError, match="no such file"):
-        load_properties(tmp_path / "none.csv")

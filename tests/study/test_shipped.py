@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from blocksim.analysis import Verdict, closed_forms
+from blocksim.analysis import Verdict
 from blocksim.analysis.compare import Comparison
 from blocksim.scenario import Document, load_scenario
 from blocksim.simulation import Frames, Result
 from blocksim.study.compare import compare_run
 from blocksim.study.plan import cases_of
 from blocksim.study.run import run
+from blocksim.verification import closed_forms
 from tests.study.conftest import SCENARIOS
 
 HALF_HEIGHT = 0.0125  # m

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from blocksim.analysis import closed_forms as forms
+from blocksim.verification import closed_forms as forms
 
 if TYPE_CHECKING:
     from tests.conftest import PaperBlock, Start

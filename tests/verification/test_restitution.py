@@ -6,7 +6,7 @@ from math import radians
 
 import pytest
 
-from blocksim.analysis import closed_forms as forms
+from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Setting
 from blocksim.verification.flight import SPACINGS
 from blocksim.verification.restitution import LANDINGS

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.analysis.compare import CONFIDENCE
+from blocksim.analysis.intervals import CONFIDENCE, quantile
 from blocksim.analysis.metrics.metric import (
     BLOCK,
     Column,
@@ -31,7 +31,6 @@ from blocksim.analysis.metrics.metric import (
     Row,
     shown_name,
 )
-from blocksim.analysis.student import quantile
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

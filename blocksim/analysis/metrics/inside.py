@@ -1,13 +1,29 @@
-"""The test of the paper, [minimum, maximum] of the repeats, for every member, and its significance.
+"""Members inside two intervals: the measured limits, and the prediction interval for the next test.
 
-The next repeat of the experiment is, in rank, equally likely to fall into each of the n + 1 gaps between n repeats,
-so it lies between the smallest and the largest with probability (n - 1)/(n + 1), whatever the distribution (at least
-that, where equal values are possible). Of several such tests at once only bounds are known without their dependence:
-at most the smallest of the probabilities, at least 1 - the sum of the complements (Bonferroni).
+The measured limits are the test of the paper, [minimum, maximum] of the repeats. Its significance: the next repeat of
+the experiment is, in rank, equally likely to fall into each of the n + 1 gaps between n repeats, so it lies between the
+smallest and the largest with probability (n - 1)/(n + 1), whatever the distribution (at least that, where equal values
+are possible). Of several such tests at once only bounds are known without their dependence: at most the smallest of the
+probabilities, at least 1 - the sum of the complements (Bonferroni).
+
+For normal scatter the prediction interval is mean +- t_(n-1, 0.975) s sqrt(1 + 1/n). Equal repeats give none: their
+scatter is not zero, only below the reading.
 """
 
-from blocksim.analysis.metrics.metric import BLOCK, Column, Evidence, Findings, Form, Interval, Metric, Pair, Row
-from blocksim.analysis.proportion import interval
+from blocksim.analysis.compare import prediction_half_width
+from blocksim.analysis.intervals import interval
+from blocksim.analysis.metrics.metric import (
+    BLOCK,
+    Column,
+    Evidence,
+    Findings,
+    Form,
+    Interval,
+    Metric,
+    Pair,
+    Row,
+    shown_name,
+)
 
 ALL = "all"
 
@@ -26,7 +42,7 @@ def repeat_passes_all(counts: list[int]) -> Interval | float | None:
     return chances[0] if len(chances) == 1 else (least, min(chances))
 
 
-def _find(evidence: Evidence) -> Findings:
+def _find_inside(evidence: Evidence) -> Findings:
     total = evidence.members.count
     ranged = [pair.measured.n for pair in evidence.pairs if _has_range(pair)]
     rows = [_row(pair, total) for pair in evidence.pairs]
@@ -52,6 +68,23 @@ def _has_range(pair: Pair) -> bool:
     return pair.limits == (pair.measured.minimum, pair.measured.maximum)
 
 
+def _find_predicted(evidence: Evidence) -> Findings:
+    lengths = [pair for pair in evidence.pairs if pair.is_length]
+    rows = tuple(_predicted(pair, evidence.members.count) for pair in lengths if pair.scatters)
+    without = [f"{shown_name(pair)}: repeats without scatter predict nothing" for pair in lengths if not pair.scatters]
+    return Findings(rows, tuple(without))
+
+
+def _predicted(pair: Pair, total: int) -> Row:
+    half = prediction_half_width(pair.measured.s, pair.measured.n)
+    ends = (pair.measured.mean - half, pair.measured.mean + half)
+    return {**pair.head, "prediction": ends, **_share(int(pair.between(ends).sum()), total)}
+
+
+SHARE = (
+    Column("share", "share", Form.SHARE, "inside / of", 1),
+    Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability", 1),
+)
 INSIDE = Metric(
     "inside",
     "members inside the measured limits, by the rules for single runs",
@@ -60,9 +93,20 @@ INSIDE = Metric(
         Column("limits", "limits", Form.NUMBER, "limits of inside, as for a single run"),
         Column("inside", "inside", Form.COUNT, "members inside; failed ones count as outside"),
         Column("of", "", Form.COUNT, "all members, failed ones included"),
-        Column("share", "share", Form.SHARE, "inside / of", 1),
-        Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability", 1),
+        *SHARE,
         Column("repeat_passes", "repeat", Form.SHARE, "probability that the next repeat is inside: (n-1)/(n+1)", 0),
     ),
-    _find,
+    _find_inside,
+)
+PREDICTION = Metric(
+    "prediction",
+    "members inside the 95 % prediction interval for the next test (mm)",
+    (
+        *BLOCK,
+        Column("prediction", "next test", Form.NUMBER, "mean +- t s sqrt(1 + 1/n) of the n repeats"),
+        Column("inside", "inside", Form.COUNT, "members in it; failed ones count as outside"),
+        Column("of", "of", Form.COUNT, "all members, failed ones included"),
+        *SHARE,
+    ),
+    _find_predicted,
 )

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from blocksim.analysis.compare import CONFIDENCE
+from blocksim.analysis.intervals import CONFIDENCE
 from blocksim.analysis.metrics.metric import (
     Column,
     Evidence,

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from blocksim.analysis.intervals import interval, lower_bound
 from blocksim.analysis.metrics.metric import Column, Evidence, Findings, Form, Metric, Row, complete_repeats, listed
-from blocksim.analysis.proportion import interval, lower_bound
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.analysis import closed_forms as forms
 from blocksim.scenario import Scenario
 from blocksim.simulation.result import Result
+from blocksim.verification import closed_forms as forms
 from blocksim.view.law import Law
 
 Floats = NDArray[np.float64]

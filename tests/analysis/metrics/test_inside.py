@@ -1,10 +1,12 @@
-"""Shares inside the measured limits, and what passing is worth."""
+"""Shares inside the measured limits, what passing is worth, and the prediction interval for the next test."""
 
 from math import nan
 
 import numpy as np
 import pytest
+from scipy import stats
 
+from blocksim.analysis.compare import prediction_half_width
 from blocksim.analysis.metrics.inside import repeat_passes, repeat_passes_all
 from tests.analysis.metrics.conftest import found_by
 
@@ -12,22 +14,20 @@ X, ANGLE = ("a", "x"), ("a", "rotation")
 
 
 def test_ends_count_as_inside_and_failed_members_as_outside() -> None:
-    found = found_by("inside", {X: [1.0, 3.0, 2.0, 0.99, 2.0]}, {X: [3.0, 1.0]}, ["finished"] * 4 + ["failed"])
+    """So does a member without the block."""
+    statuses = ["finished"] * 5 + ["failed"]
+    found = found_by("inside", {X: [1.0, 3.0, 2.0, 0.99, nan, 2.0]}, {X: [3.0, 1.0]}, statuses)
     row, everything = found.rows
-    assert (row["inside"], row["of"], row["share"]) == (3, 5, 0.6)
+    assert (row["inside"], row["of"], row["share"]) == (3, 6, 0.5)
     assert row["limits"] == (1.0, 3.0)
-    assert everything["share"] == 0.6
-    assert found.messages == ("shares are of all 5 members; 1 did not finish and count as outside",)
+    assert everything["share"] == 0.5
+    assert found.messages == ("shares are of all 6 members; 1 did not finish and count as outside",)
 
 
 def test_inside_in_everything_needs_the_same_member_inside_everywhere() -> None:
     found = found_by("inside", {X: [1.0, 2.0, 9.0], ANGLE: [0.0, -90.0, -90.0]}, {X: [1, 3], ANGLE: [-90, -90]})
     assert [row["inside"] for row in found.rows] == [2, 2, 1]
     assert found.rows[-1]["block"] == "all"
-
-
-def test_member_without_a_block_is_outside() -> None:
-    assert found_by("inside", {X: [1.0, nan, 2.0]}, {X: [1, 3]}).rows[0]["inside"] == 2
 
 
 def test_one_repeat_and_equal_repeats_are_judged_at_the_reading_as_a_single_run_is() -> None:
@@ -56,3 +56,25 @@ def test_bounds_for_several_tests_are_reached_by_dependent_ones() -> None:
     assert repeat_passes_all([2, 2, 2]) == pytest.approx((0.0, 1 / 3))
     # upper bound: three times the same quantity; lower bound: failures that exclude each other
     assert repeat_passes_all([6, 9]) == pytest.approx((1 - 2 / 7 - 2 / 10, 5 / 7))
+
+
+def test_prediction_of_two_repeats_by_hand() -> None:
+    # repeats 0, 2: mean 1, s = sqrt 2, t_1 = tan(0.475 pi): 1 -+ t sqrt 2 sqrt 1.5
+    half = np.tan(0.475 * np.pi) * np.sqrt(3.0)
+    found = found_by("prediction", {X: [1 - half + 1e-9, 1 + half + 1e-9, 1.0]}, {X: [0, 2]})
+    assert found.rows[0]["prediction"] == pytest.approx((1 - half, 1 + half), abs=1e-6)
+    assert (found.rows[0]["inside"], found.rows[0]["of"]) == (2, 3)
+
+
+def test_one_more_test_of_a_normal_experiment_falls_inside_19_times_in_20() -> None:
+    tests = np.random.default_rng(11).normal(50.0, 3.0, (1_000, 7))
+    means, scatters = tests[:, :6].mean(axis=1), tests[:, :6].std(axis=1, ddof=1)
+    hits = np.abs(tests[:, 6] - means) <= [prediction_half_width(s, 6) for s in scatters.tolist()]
+    assert stats.binomtest(int(hits.sum()), 1_000, 0.95).pvalue > 0.001
+
+
+@pytest.mark.parametrize("repeats", [[3.0], [3.0, 3.0]])
+def test_repeats_without_scatter_predict_nothing(repeats: list[float]) -> None:
+    found = found_by("prediction", {X: [3.0]}, {X: repeats})
+    assert found.rows == ()
+    assert found.messages == ("x of block a: repeats without scatter predict nothing",)

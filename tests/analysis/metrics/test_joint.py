@@ -60,15 +60,9 @@ def test_units_and_mixtures_of_the_positions_do_not_matter() -> None:
     assert hotelling_of(repeats @ mixture, members @ mixture) == pytest.approx(hotelling_of(repeats, members), rel=1e-9)
 
 
-def test_p_value_and_critical_value_say_the_same() -> None:
-    found = hotelling_of(CROSS * 0.5, [[1.0, 1.5]])
-    at_limit = stats.f.sf(found.critical * found.F / found.T2, found.dof_1, found.dof_2)
-    assert at_limit == pytest.approx(0.05, abs=1e-9)
-
-
 @pytest.mark.parametrize(("members", "scatter"), [(10, 1.0), (10, 5.0), (100, 0.3)])
 def test_equal_means_are_refused_in_5_percent_of_experiments(members: int, scatter: float) -> None:
-    random, trials = np.random.default_rng(members), 3_000
+    random, trials = np.random.default_rng(members), 1_000
     shape = np.array([[1.0, 0.8], [0.0, 0.6]])  # correlated repeats
     refused = sum(
         hotelling_of(random.normal(size=(6, 2)) @ shape, scatter * random.normal(size=(members, 2))).p_value < 0.05
@@ -78,8 +72,10 @@ def test_equal_means_are_refused_in_5_percent_of_experiments(members: int, scatt
 
 
 def test_row_names_what_went_into_it() -> None:
-    members = {ONE: [16.0, 16.0], TWO: [2.0, 2.0], THREE: [3.0, 5.0]}
-    repeats = {ONE: [16, 16, 16, 16, 16], TWO: [1, 2, 3, nan, 5], THREE: [4, 4, 5, 6, 3]}
+    """Angles are left out."""
+    angle = ("1", "rotation")
+    members = {ONE: [16.0, 16.0], angle: [1.0, 2.0], TWO: [2.0, 2.0], THREE: [3.0, 5.0]}
+    repeats = {ONE: [16] * 5, angle: [1, 2, 3, 4, 5], TWO: [1, 2, 3, nan, 5], THREE: [4, 4, 5, 6, 3]}
     found = found_by("joint", members, repeats)
     row = found.rows[0]
     assert (row["positions"], row["repeats"], row["members"]) == ("2 x, 3 x", 4, 2)
@@ -118,7 +114,3 @@ def test_what_cannot_be_computed_is_said(
     assert found.rows == ()
     assert found.messages[-1].startswith("not computed: ")
     assert told in found.messages[-1]
-
-
-def test_angles_are_left_out() -> None:
-    assert found_by("joint", {("1", "rotation"): [1.0]}, {("1", "rotation"): [1, 2, 3]}).rows == ()

@@ -56,10 +56,6 @@ def test_without_measured_rotations_all_blocks_make_the_class() -> None:
     assert found.messages == ("blocks: 1, 2",)
 
 
-def test_member_that_lacks_a_block_has_an_unknown_turn() -> None:
-    assert found_by("outcome", {ONE: [0.0], TWO: [nan]}, {ONE: [0], TWO: [0]}).rows[0]["outcome"] == "0, ?"
-
-
 def test_sweep_without_rotations_has_no_outcomes() -> None:
     found = found_by("outcome", {("1", "x"): [3.0]}, {("1", "x"): [3.0]})
     assert (found.rows, found.messages) == ((), ("not computed: the sweep has no rotations",))

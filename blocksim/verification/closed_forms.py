@@ -5,7 +5,7 @@ velocities after and before an impact (Eq. 11).
 """
 
 from dataclasses import dataclass
-from math import atan, atan2, cos, hypot, pi, sin, sqrt, tan
+from math import atan, atan2, cos, hypot, sin, sqrt, tan
 
 import numpy as np
 
@@ -26,29 +26,15 @@ def fall_time(height: float, gravity: float = GRAVITY) -> float:
     return sqrt(2.0 * height / gravity)
 
 
-def rebound_speed(height: float, restitution: float, impacts: int, gravity: float = GRAVITY) -> float:
-    """Return the upward speed (m/s) just after impact number `impacts` of a body dropped from `height` (m).
-
-    It arrives with sqrt(2 g h0) and every impact multiplies the speed by e.
-    """
-    return sqrt(2.0 * gravity * height) * restitution**impacts
-
-
-def rebound_height(time: float, height: float, restitution: float, impacts: int, gravity: float = GRAVITY) -> float:
-    """Return the height (m) at `time` (s) after impact number `impacts`: v t - g t^2/2, v the rebound speed.
-
-    This is the meaning of Eq. 10, second form; see `remaining_rise` for the equation as printed.
-    """
-    return rebound_speed(height, restitution, impacts, gravity) * time - fall_distance(time, gravity)
-
-
 def remaining_rise(time: float, height: float, restitution: float, impacts: int, gravity: float = GRAVITY) -> float:
-    """Return (v - g t)^2/(2 g) (m), Eq. 10, second form, as printed.
+    """Return (v - g t)^2/(2 g) (m), Eq. 10, second form, as printed, at `time` (s) after impact number `impacts`.
 
-    With the speed v - g t at that moment this is how far the body will STILL rise, not how high it is: it is
-    largest at the impact and zero at the apex. Height and remaining rise add up to the apex height.
+    v = sqrt(2 g h0) e^p is the upward speed just after that impact. With the speed v - g t at that moment this is how
+    far the body will STILL rise, not how high it is: it is largest at the impact and zero at the apex. Height and
+    remaining rise add up to the apex height.
     """
-    return (rebound_speed(height, restitution, impacts, gravity) - gravity * time) ** 2 / (2.0 * gravity)
+    speed = sqrt(2.0 * gravity * height) * restitution**impacts
+    return (speed - gravity * time) ** 2 / (2.0 * gravity)
 
 
 def apex_height(height: float, restitution: float, impacts: int) -> float:
@@ -133,15 +119,6 @@ def hertz_static_overlap(mass: float, modulus: float, radius: float, gravity: fl
     return float((3.0 * mass * gravity / (8.0 * modulus * sqrt(radius))) ** (2.0 / 3.0))
 
 
-def equal_offset_limit(count: int, width: float) -> float:
-    """Return the largest offset (m) of each block from the one below that stands: width/count.
-
-    Above the lowest block lie count - 1 blocks whose common centre is offset by count d/2 from its centre,
-    and must not pass its edge at width/2. The interfaces above carry fewer blocks and are safer.
-    """
-    return width / count
-
-
 def harmonic_offsets(count: int, width: float) -> tuple[float, ...]:
     """Return the overhang (m) of each block over its support, topmost first: width/(2 i), i = 1 ... count.
 
@@ -149,11 +126,6 @@ def harmonic_offsets(count: int, width: float) -> tuple[float, ...]:
     overhang.
     """
     return tuple(width / (2.0 * index) for index in range(1, count + 1))
-
-
-def harmonic_overhang(count: int, width: float) -> float:
-    """Return the largest overhang (m) of `count` blocks, one on each level, beyond a table's edge."""
-    return float(sum(harmonic_offsets(count, width)))
 
 
 # Impacts of one corner on the ground (normal along y, tangent along x)
@@ -234,19 +206,3 @@ def housner_ratio(width: float, height: float) -> float:
     Angular momentum about the new corner is kept: I w' = (I - 2 m R^2 sin^2 alpha) w with I = 4 m R^2/3.
     """
     return 1.0 - 1.5 * sin(toppling_slope(width, height)) ** 2
-
-
-# Solids
-
-
-def rectangle_inertia(mass: float, width: float, height: float) -> float:
-    """Return the moment of inertia (kg m^2) of a uniform rectangle about its centre: m (w^2 + h^2)/12."""
-    return mass * (width**2 + height**2) / 12.0
-
-
-def friction_coefficient(angle: float) -> float:
-    """Return the friction coefficient of a measured friction angle (rad): its tangent."""
-    if not 0.0 <= angle < pi / 2.0:
-        message = f"a friction angle lies between 0 and a right angle, not at {angle} rad"
-        raise ValueError(message)
-    return tan(angle)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from blocksim.analysis.units import unit_factor
+from blocksim.scenario.units import unit_factor
 
 
 @pytest.mark.parametrize(

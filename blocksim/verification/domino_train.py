@@ -10,7 +10,7 @@ Lengths in units of h, time in units of sqrt(h/g); angles from the vertical.
 """
 
 from dataclasses import dataclass
-from math import asin, atan, cos, sin, sqrt
+from math import asin, cos, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,8 +92,3 @@ def wave_speed(dominoes: Dominoes, first: int, last: int, spin: float) -> float:
     """Return the speed of the wave between two collisions, in units of sqrt(g h)."""
     times = collision_times(dominoes, last, spin)
     return (last - first) * (dominoes.gap + dominoes.thickness) / float(times[last - 1] - times[first - 1])
-
-
-def balance_angle(dominoes: Dominoes) -> float:
-    """Return the angle (rad) at which a domino stands on its edge: arctan d/h."""
-    return atan(dominoes.thickness)
