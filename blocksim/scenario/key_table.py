@@ -54,8 +54,13 @@ def key_table() -> str:
 
 def with_key_table(text: str) -> str:
     """Return a README with the table between the two marks replaced by the present one."""
-    marked = re.compile(f"{re.escape(BEGIN)}.*{re.escape(END)}", re.DOTALL)
-    return marked.sub(lambda _: f"{BEGIN}\n{key_table()}\n{END}", text)
+    return with_part(text, BEGIN, key_table(), END)
+
+
+def with_part(text: str, begin: str, part: str, end: str) -> str:
+    """Return a page with what stands between two marks replaced."""
+    marked = re.compile(f"{re.escape(begin)}.*{re.escape(end)}", re.DOTALL)
+    return marked.sub(lambda _: f"{begin}\n{part}\n{end}", text)
 
 
 def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:

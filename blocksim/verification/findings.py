@@ -6,9 +6,8 @@ the quick ones and compare them with the table.
 """
 
 import json
-import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,8 +15,10 @@ from typing import Any
 from blocksim import __version__
 from blocksim.analysis.compare import Verdict
 from blocksim.scenario import load_scenario
+from blocksim.scenario.key_table import with_part
 from blocksim.study.compare import compare_run
 from blocksim.study.run import run
+from blocksim.verification.reference import markdown
 
 BEGIN = "<!-- findings: written by `make findings` -->"
 END = "<!-- end of findings -->"
@@ -83,26 +84,22 @@ def measured(finding: Finding) -> dict[str, Any]:
 def table(stored: Sequence[dict[str, Any]]) -> str:
     """Return the kept findings as Markdown, in the order of FINDINGS."""
     by_command = {row["command"]: row for row in stored}
-    rows = [line for finding in FINDINGS for line in _line(finding, by_command.get(finding.command))]
-    return "\n".join([f"| {' | '.join(HEADS)} |", f"|{' --- |' * len(HEADS)}", *rows])
+    return markdown(HEADS, [_cells(one, row) for one in FINDINGS if (row := by_command.get(one.command)) is not None])
 
 
-def _line(finding: Finding, row: dict[str, Any] | None) -> Iterator[str]:
-    if row is None:
-        return
+def _cells(finding: Finding, row: dict[str, Any]) -> list[str]:
     cells = [
         f"{x:.2f} ({beyond:.2f} {'too far' if far else 'short'})" if beyond else f"{x:.2f}"
         for x, beyond, far in zip(row["x_mm"], row["beyond_mm"], row["long"], strict=True)
     ]
     everything = [*(f"block {block}" for block in BLOCKS), "rotations"]
     inside = "all" if row["inside"] == everything else ", ".join(row["inside"])
-    yield f"| {' | '.join([finding.title, f'`{finding.command}`', *cells, inside])} |"
+    return [finding.title, f"`{finding.command}`", *cells, inside]
 
 
 def with_table(text: str, stored: Sequence[dict[str, Any]]) -> str:
     """Return a page with the table between the two marks replaced."""
-    marked = re.compile(f"{re.escape(BEGIN)}.*{re.escape(END)}", re.DOTALL)
-    return marked.sub(lambda _: f"{BEGIN}\n{table(stored)}\n{END}", text)
+    return with_part(text, BEGIN, table(stored), END)
 
 
 def main(arguments: Sequence[str]) -> None:

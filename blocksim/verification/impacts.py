@@ -1,22 +1,27 @@
-"""V5 and V6: one corner on the ground; V16: two free blocks against each other."""
+"""V4 restitution of flat and corner impacts, V5 and V6 one corner on the ground, V16 two free blocks that collide."""
 
 from __future__ import annotations
 
-from math import cos, radians, sin
+from itertools import product
+from math import atan2, cos, radians, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from blocksim.verification import closed_forms as forms
-from blocksim.verification.case import Row, Setting, absolute, relative
+from blocksim.verification.case import Row, Setting, absolute, farthest, relative
+from blocksim.verification.flight import SPACINGS
 from blocksim.verification.scene import HEIGHT, WIDTH, PaperBlock, Simulation
-from blocksim.verification.throws import POLL, Throw, Thrower
+from blocksim.verification.throws import GOLDEN, POLL, Throw, Thrower
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
+ASKED = tuple(tenth / 10 for tenth in range(11))
+SPEEDS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # m/s
+LANDINGS = {"flat": 0.0, "corner": atan2(WIDTH, HEIGHT)}  # rad; the centre comes down upon the corner
 TILT = radians(30.0)
 FALLING = forms.Motion(0.0, -1.0, 0.0)
 STICKING = 2.0  # friction coefficient
@@ -24,6 +29,25 @@ EXACT = 1e-9  # m/s, rad/s: rigid impacts are those of the closed forms
 COLLISION_STEPS = 20_000
 COLLISION_END = 4e-3  # s, of rigid blocks
 REBOUNDS, REBOUND = (0.2, 0.8), 1e-3  # restitutions; off them by, as arms are those before the last step
+
+
+def restitution(setting: Setting) -> Iterator[Row]:
+    """Throw a block at 7 speeds for 11 restitutions at 4 spacings; the farthest off counts."""
+    spacings = setting.distinct(SPACINGS[1:2] if setting.quick else SPACINGS)
+    for landing, angle in LANDINGS.items():
+        errors: dict[float, list[float]] = {asked: [] for asked in ASKED}
+        for asked, spacing, (number, speed) in product(ASKED, spacings, enumerate(SPEEDS)):
+            thrower = Thrower(setting, asked, speed, contact={"particle_spacing": spacing}, time=no_threshold(setting))
+            body = thrower.throw(Throw(angle, phase=(GOLDEN * (number + 1 + 10 * asked)) % 1.0))
+            errors[asked].append(float(body.vy) / speed - asked)
+        worst = farthest(0.0, [error for asked in ASKED[1:] for error in errors[asked]])
+        yield absolute(f"{landing}, e ≥ 0.1, off by", "", 0.0, worst, 0.01)
+        yield absolute(f"{landing}, e = 0, rebound", "", 0.0, farthest(0.0, errors[0.0]), 0.01)
+
+
+def no_threshold(setting: Setting) -> dict[str, object]:
+    """Return the key of [time] that lets the slowest impacts rebound too; springs have no such threshold."""
+    return {"restitution_threshold": 0.0} if setting.rigid else {}
 
 
 def first_look(setting: Setting) -> int:

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from blocksim.scenario.key_table import with_part
 from blocksim.simulation.atomic import write_text
 from blocksim.verification.case import Case, Row, Setting, Verdict
 from blocksim.verification.cases import CASES, chosen, left_out
@@ -53,45 +54,45 @@ def _number(value: float | None) -> float:
 
 def table(stored: Stored) -> str:
     """Return the tables as Markdown: with the reasons for misses of models and for cases left out."""
-    lines = _heads(["case", "quantity", "expected", "tolerance", *COLUMNS])
-    lines += [line for case in CASES for line in _case_lines(stored, case)]
-    return "\n".join([*lines, *_remarks(stored), "", *_rigid_table(stored)])
+    heads = ("case", "quantity", "expected", "tolerance", *COLUMNS)
+    lines = markdown(heads, [cells for case in CASES for cells in _case_cells(stored, case)])
+    return "\n".join([lines, *_remarks(stored), "", *_rigid_table(stored)])
 
 
-def _heads(heads: Sequence[str]) -> list[str]:
-    return [f"| {' | '.join(heads)} |", f"|{' --- |' * len(heads)}"]
+def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table as Markdown."""
+    head, *lines = (f"| {' | '.join(cells)} |" for cells in (heads, *rows))
+    return "\n".join([head, f"|{' --- |' * len(heads)}", *lines])
 
 
 def _rigid_table(stored: Stored) -> Iterator[str]:
     scheme = SETTINGS[RIGID].scheme
-    yield from [f"Rigid contacts, `blocksim verify --scheme {scheme}`:", "", *_heads(RIGID_HEADS)]
-    for case in chosen([], scheme):
-        yield from _rigid_lines(stored, case)
+    yield from [f"Rigid contacts, `blocksim verify --scheme {scheme}`:", ""]
+    yield markdown(RIGID_HEADS, [cells for case in chosen([], scheme) for cells in _rigid_cells(stored, case)])
     yield from ["", f"Left out: {'; '.join(left_out(scheme))}."]
 
 
-def _rigid_lines(stored: Stored, case: Case) -> Iterator[str]:
+def _rigid_cells(stored: Stored, case: Case) -> Iterator[list[str]]:
     name = f"{case.id} {case.title}"
     for row in stored_rows(stored, RIGID, case):
         quantity = f"{row.quantity}, {row.unit}" if row.unit else row.quantity
-        yield f"| {' | '.join([name, quantity, expected_text(row), tolerance_text(row), _cell(row)])} |"
+        yield [name, quantity, expected_text(row), tolerance_text(row), _cell(row)]
         name = ""
 
 
-def _case_lines(stored: Stored, case: Case) -> Iterator[str]:
+def _case_cells(stored: Stored, case: Case) -> Iterator[list[str]]:
     columns = [{row.quantity: row for row in stored_rows(stored, head, case)} for head in COLUMNS]
     name = f"{case.id} {case.title}"
     for quantity, row in columns[0].items():
         others = [column.get(quantity) for column in columns]
         laws = [other for other in others[:2] if other is not None]
-        cells = [
+        yield [
             name,
             f"{quantity}, {row.unit}" if row.unit else quantity,
             " / ".join(dict.fromkeys(expected_text(other) for other in laws)),
             " / ".join(dict.fromkeys(tolerance_text(other) for other in laws)),
             *(_cell(other) for other in others),
         ]
-        yield f"| {' | '.join(cells)} |"
         name = ""
 
 
@@ -114,8 +115,7 @@ def _missed(stored: Stored, head: str, setting: Setting) -> Iterator[str]:
 
 def with_table(text: str, stored: Stored) -> str:
     """Return a README with the table between the two marks replaced."""
-    marked = re.compile(f"{re.escape(BEGIN)}.*{re.escape(END)}", re.DOTALL)
-    return marked.sub(lambda _: f"{BEGIN}\n{table(stored)}\n{END}", text)
+    return with_part(text, BEGIN, table(stored), END)
 
 
 def read_store(path: Path) -> Stored:
@@ -126,17 +126,10 @@ def read_store(path: Path) -> Stored:
 
 def write_store(path: Path, stored: Stored) -> None:
     """Keep results; one row a line, numbers that are not finite as null."""
-    text = json.dumps(_finite(stored), indent=1, ensure_ascii=False, allow_nan=False)
+    finite = json.loads(json.dumps(stored), parse_constant=lambda _: None)
+    text = json.dumps(finite, indent=1, ensure_ascii=False, allow_nan=False)
     folded = re.sub(r"\{\n\s+\"quantity\".*?\}", lambda row: " ".join(row.group().split()), text, flags=re.DOTALL)
     write_text(path, folded + "\n")
-
-
-def _finite(data: Any) -> Any:
-    if isinstance(data, float):
-        return data if abs(data) < float("inf") else None
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    return [_finite(value) for value in data] if isinstance(data, list) else data
 
 
 def main(arguments: Sequence[str]) -> None:

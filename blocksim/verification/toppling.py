@@ -7,12 +7,11 @@ from math import cos, degrees, radians, sin
 from typing import TYPE_CHECKING
 
 from blocksim.verification import closed_forms as forms
-from blocksim.verification.bisection import limit
 from blocksim.verification.case import Row, Setting, absolute, count, relative
 from blocksim.verification.scene import HEIGHT, WIDTH
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 ROUGH = 2.0  # friction coefficient at which no slope of this chart lets a block slide before it topples
 BRACKET = radians(1.0)  # either way of the expected limit
@@ -115,3 +114,16 @@ def slips(setting: Setting, friction: float) -> bool:
     wall = {"x": -WALL / 2, "y": LADDER / 2, "width": WALL, "height": LADDER, "fixed": True}
     scene = setting.start([rod, wall], friction=0.0, ground_friction=friction)
     return bool(abs(scene.to_time(1.0).bodies[0].angle - rod["angle"]) > SLIPPED)
+
+
+def limit(outcome: Callable[[float], bool], low: float, high: float, halvings: int) -> float:
+    """Return where an outcome changes, by bisection: the middle of the last interval.
+
+    NaN where `outcome` is not False at `low` and True at `high`.
+    """
+    if outcome(low) or not outcome(high):
+        return float("nan")
+    for _ in range(halvings):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if outcome(middle) else (middle, high)
+    return 0.5 * (low + high)

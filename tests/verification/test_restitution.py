@@ -9,7 +9,7 @@ import pytest
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Setting
 from blocksim.verification.flight import SPACINGS
-from blocksim.verification.restitution import LANDINGS
+from blocksim.verification.impacts import LANDINGS
 from blocksim.verification.scene import HEIGHT, WIDTH
 from blocksim.verification.throws import GOLDEN, Throw, Thrower, kinetic_energy
 

@@ -11,6 +11,7 @@ from blocksim.analysis.experiment import ExperimentTable
 from blocksim.scenario import Scenario
 from blocksim.simulation.result import Result
 from blocksim.verification.paper.laws import Bounce
+from blocksim.verification.reference import markdown
 
 PAPER_X = {"1": "16", "2": "76.05", "3": "about 130"}  # mm, section 3.3 of the paper
 SIGNS = {Verdict.INSIDE: "✓", Verdict.OUTSIDE: "✗", Verdict.NO_DATA: ""}
@@ -35,7 +36,7 @@ def properties_table(printed: Mapping[str, float], scenario: Scenario) -> str:
     for name, (label, unit) in PRINTED.items():
         factor = FACTORS[unit]
         rows.append((label, f"{printed[name] * factor:.4g}", f"{used[name] * factor:.4g}", unit))
-    return markdown(("property", "printed", f"`{scenario.name}`", "unit"), rows)
+    return _table(("property", "printed", f"`{scenario.name}`", "unit"), rows)
 
 
 def edges_table(edges: ExperimentTable, runs: Sequence[Result]) -> str:
@@ -45,7 +46,7 @@ def edges_table(edges: ExperimentTable, runs: Sequence[Result]) -> str:
         for quantity in ("left", "right")
         for block in edges.blocks
     ]
-    return markdown((*_repeats_heads(edges), *(f"`{run.name}`" for run in runs)), rows)
+    return _table((*_repeats_heads(edges), *(f"`{run.name}`" for run in runs)), rows)
 
 
 def centres_table(centres: ExperimentTable, runs: Sequence[Result]) -> str:
@@ -57,7 +58,7 @@ def centres_table(centres: ExperimentTable, runs: Sequence[Result]) -> str:
         cells = [_verdict_cell(one.get((block, "x"))) for one in judged]
         rows.append((*row, PAPER_X.get(block, ""), *cells))
     heads = (*_repeats_heads(centres), "the paper's simulation", *(f"`{run.name}`" for run in runs))
-    return markdown(heads, rows)
+    return _table(heads, rows)
 
 
 def rotations_table(centres: ExperimentTable, runs: Sequence[Result]) -> str:
@@ -68,7 +69,7 @@ def rotations_table(centres: ExperimentTable, runs: Sequence[Result]) -> str:
         (f"block {block}", f"{mean:.0f}", *(_verdict_cell(one.get((block, "rotation"))) for one in judged))
         for block, mean in measured.items()
     ]
-    return markdown(("block", "measured, all repeats", *(f"`{run.name}`" for run in runs)), rows)
+    return _table(("block", "measured, all repeats", *(f"`{run.name}`" for run in runs)), rows)
 
 
 def bounces_table(bounces: Sequence[Bounce]) -> str:
@@ -78,19 +79,12 @@ def bounces_table(bounces: Sequence[Bounce]) -> str:
         for one in bounces
     ]
     heads = ("impact p", "h_p by Eq. 12, mm", "simulated, mm", "t_p by Eq. 12, ms", "simulated, ms")
-    return markdown(heads, rows)
+    return _table(heads, rows)
 
 
-def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a table; the minus sign of numbers is a proper one."""
-    lines = [f"| {' | '.join(heads)} |", f"|{' --- |' * len(heads)}"]
-    lines += [f"| {' | '.join(row)} |".replace("| -", "| −") for row in rows]
-    return "\n".join(lines)
-
-
-def all_inside(run: Result, centres: ExperimentTable) -> bool:
-    """Return whether all measured quantities of a run's blocks are inside the measured ranges."""
-    return all(row.verdict is not Verdict.OUTSIDE for row in _judged(run, centres).values())
+    return markdown(heads, [[f"−{cell[1:]}" if cell.startswith("-") else cell for cell in row] for row in rows])
 
 
 def _repeats_heads(table: ExperimentTable) -> tuple[str, ...]:

@@ -1,5 +1,9 @@
-"""All of it in one folder: README.md with the tables, and the pictures that it shows."""
+"""All of it in one folder: README.md with the tables, and the pictures that it shows.
 
+`python -m blocksim.verification.paper.write FOLDER` runs the shipped scenarios first.
+"""
+
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -121,3 +125,7 @@ def _finished(path: Path, settings: Mapping[str, object]) -> Result:
 
 def _picture(name: str, text: str) -> str:
     return f"![{text}]({name})"
+
+
+if __name__ == "__main__":
+    write_paper(Path(sys.argv[1]), Path("scenarios"))

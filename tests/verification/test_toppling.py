@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from blocksim.verification.bisection import limit
+from blocksim.verification.toppling import limit
 
 
 def test_limit_is_found_to_half_of_the_last_interval() -> None:
