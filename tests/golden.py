@@ -35,7 +35,8 @@ RULES: dict[str, tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]] =
     "dates": (re.compile(r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?(?:\.\d+)?(?:Z|[+-]\d\d:?\d\d)?)?"), "DATE"),
     "sizes": (re.compile(r"\b\d+(?:\.\d+)? (?:B|kB|KB|KiB|MB|MiB|GB|GiB)\b"), "SIZE"),
     "versions": (re.compile(r"\b\d+\.\d+(?:\.\d+)*(?:(?:a|b|rc|\.dev|\.post)\d+)?\b"), "VERSION"),
-    "hashes": (re.compile(r"\b[0-9a-f]{12,64}\b"), "HASH"),
+    "hashes": (re.compile(r"(?<!\.)\b[0-9a-f]{12,64}\b"), "HASH"),
+    "numbers": (re.compile(r"\b\d+\.\d+(?:e[+-]?\d+)?\b"), "NUMBER"),
     "digits": (re.compile(r"\b\d+\.\d+(?:e[+-]?\d+)?\b"), lambda found: f"{float(found[0]):.9g}"),
 }
 

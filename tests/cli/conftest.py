@@ -93,6 +93,19 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def finished_sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Give the folder of a sweep over three keys, eight short cases; not to be changed."""
+    folder = tmp_path_factory.mktemp("swept") / "sweep"
+    vary = [word for key in ("gravity", "time.rest_speed", "time.rest_hold") for word in ("--vary", f"{key}=1,2")]
+    scenario = str(SCENARIOS / "three_blocks_nominal.toml")
+    result = CliRunner().invoke(
+        app, ["sweep", scenario, *SOFT, "--set", "time.end=0.01", *vary, "--jobs", "1", "--out", str(folder), "-q"]
+    )
+    assert result.exit_code == 0, result.output
+    return folder
+
+
 @pytest.fixture
 def copied(finished: Path, tmp_path: Path) -> Path:
     """Give a copy of the finished run, to be damaged."""

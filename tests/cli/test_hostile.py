@@ -5,16 +5,14 @@ import json
 import os
 import shutil
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
 
 import pandas as pd
 import pytest
 
-from blocksim.scenario import Document
-from blocksim.study.sweep import sweep
-from tests.cli.conftest import SCENARIOS, SOFT, Command
+from tests.cli.conftest import SOFT, Command
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"
 PRIVATE = "hunter2 = my mother's maiden name, and more of it"
@@ -35,18 +33,10 @@ def _no_waiting() -> Iterator[None]:
     signal.signal(signal.SIGALRM, before)
 
 
-@pytest.fixture(scope="module")
-def _swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Give a sweep of two short cases; not to be changed."""
-    scenario = Document.read(SCENARIOS / "three_blocks_nominal.toml")
-    short = scenario.with_values({"time.end": 0.01, "contact.stiffness_scale": 0.001})
-    return sweep(short, {"gravity": [9.0, 10.0]}, out=tmp_path_factory.mktemp("swept") / "sweep", jobs=1).folder
-
-
 @pytest.fixture
-def swept(_swept: Path, tmp_path: Path) -> Path:
+def swept(finished_sweep: Path, tmp_path: Path) -> Path:
     """Give a copy of the sweep."""
-    return Path(shutil.copytree(_swept, tmp_path / "swept"))
+    return Path(shutil.copytree(finished_sweep, tmp_path / "swept"))
 
 
 @pytest.mark.parametrize(
@@ -84,41 +74,47 @@ def test_a_pipe_of_the_shell_is_reported_how_to_be_read(blocksim: Command) -> No
     os.close(writing)
 
 
-@pytest.mark.parametrize("command", ["compare", "report"])
-@pytest.mark.parametrize("name", ["scenario.toml", "run.json", "final.csv", "run.h5"])
-def test_a_pipe_in_a_run_is_not_waited_for(blocksim: Command, copied: Path, command: str, name: str) -> None:
-    (copied / name).unlink()
-    os.mkfifo(copied / name)
-    answer = blocksim(command, copied)
-    assert answer.code in ({1} if (command, name) == ("compare", "run.h5") else {65, 66}), answer
-
-
-@pytest.mark.parametrize("command", ["compare", "report"])
-@pytest.mark.parametrize("name", ["sweep.csv", "sweep.toml"])
-def test_a_pipe_in_a_sweep_is_not_waited_for(blocksim: Command, swept: Path, command: str, name: str) -> None:
-    (swept / name).unlink()
-    os.mkfifo(swept / name)
-    answer = blocksim(command, swept)
-    assert answer.code in {0, 65, 66}, answer  # without its table a sweep is none, and a report can do without the plan
-
-
 def tells(*answers: object) -> bool:
     """Return True where it is in answers, or in any file that was written here."""
     written = [path.read_bytes() for path in Path().iterdir() if path.is_file() and not path.is_symlink()]
     return any(b"hunter2" in text for text in written) or any("hunter2" in str(answer) for answer in answers)
 
 
+@pytest.fixture(params=["pipe", "link to a private file"])
+def put(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], None]:
+    """Put a pipe, or a link, in place of a file."""
+
+    def replace(path: Path) -> None:
+        path.unlink()
+        if request.param == "pipe":
+            os.mkfifo(path)
+            return
+        private = tmp_path_factory.mktemp("home") / "private"
+        private.write_text(PRIVATE)
+        path.symlink_to(private)
+
+    return replace
+
+
 @pytest.mark.parametrize("command", ["compare", "report"])
 @pytest.mark.parametrize("name", ["scenario.toml", "run.json", "final.csv", "run.h5", "experiment.csv"])
-def test_a_link_in_a_run_is_not_followed(
-    blocksim: Command, copied: Path, tmp_path_factory: pytest.TempPathFactory, command: str, name: str
+def test_pipes_and_links_in_a_run_are_not_read(
+    blocksim: Command, copied: Path, put: Callable[[Path], None], command: str, name: str
 ) -> None:
-    private = tmp_path_factory.mktemp("home") / "private"
-    private.write_text(PRIVATE)
-    (copied / name).unlink()
-    (copied / name).symlink_to(private)
+    put(copied / name)
     answer = blocksim(command, copied)
-    assert answer.code == (1 if (command, name) == ("compare", "run.h5") else 65), answer
+    assert answer.code in ({1} if (command, name) == ("compare", "run.h5") else {65, 66}), answer
+    assert not tells(answer)
+
+
+@pytest.mark.parametrize("command", ["compare", "report"])
+@pytest.mark.parametrize("name", ["sweep.csv", "sweep.toml"])
+def test_pipes_and_links_in_a_sweep_are_not_read(
+    blocksim: Command, swept: Path, put: Callable[[Path], None], command: str, name: str
+) -> None:
+    put(swept / name)
+    answer = blocksim(command, swept)
+    assert answer.code in {0, 65, 66}, answer  # without its table a sweep is none, and a report can do without the plan
     assert not tells(answer)
 
 
@@ -132,22 +128,8 @@ def test_a_table_that_a_stored_scenario_names_is_no_link_even_within_reach(block
     assert "links in result folders are not followed" in answer.err
 
 
-@pytest.mark.parametrize("command", ["compare", "report"])
-@pytest.mark.parametrize("name", ["sweep.csv", "sweep.toml"])
-def test_a_link_in_a_sweep_is_not_followed(
-    blocksim: Command, swept: Path, tmp_path_factory: pytest.TempPathFactory, command: str, name: str
-) -> None:
-    private = tmp_path_factory.mktemp("home") / "private"
-    private.write_text(PRIVATE)
-    (swept / name).unlink()
-    (swept / name).symlink_to(private)
-    answer = blocksim(command, swept)
-    assert answer.code in {0, 65}, answer  # a report can do without the plan
-    assert not tells(answer)
-
-
 def test_cases_of_a_sweep_that_are_links_are_left_out(blocksim: Command, swept: Path, copied: Path) -> None:
-    first, second = pd.read_csv(swept / "sweep.csv", dtype={"case": str})["case"]
+    first, second, *_ = pd.read_csv(swept / "sweep.csv", dtype={"case": str})["case"]
     shutil.copytree(copied, swept / "cases" / first)
     (swept / "cases" / second).symlink_to(copied)
     assert blocksim("report", swept, "--out", "page.html").code == 0
