@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import ScenarioError
-from blocksim.scenario import Document, Scenario, load_scenario, scenario_from_mapping
-from blocksim.scenario.models.stepping import Explicit
+from blocksim.scenario import Document, Scenario, load_scenario, scenario_from_mapping, scenario_to_toml
+from tests.golden import Golden
 
 
 @pytest.fixture
@@ -40,32 +40,8 @@ def test_python_data_mean_the_same_as_the_file(file: Path, valid_text: str) -> N
     assert scenario_from_mapping(tomllib.loads(valid_text)) == load_scenario(file)
 
 
-def test_the_defaults_are_the_documented_ones(file: Path) -> None:
-    scenario = load_scenario(file)
-    assert scenario.gravity == 9.81
-    assert (scenario.friction.block_block.static, scenario.friction.block_block.kinetic) == (0.31, 0.31)
-    assert (scenario.friction.block_ground.static, scenario.friction.block_ground.kinetic) == (0.38, 0.38)
-    assert scenario.friction.block_ground.transition_speed == 0.005
-    assert (scenario.contact.model, scenario.contact.law) == ("surface", "linear")
-    assert (scenario.contact.restitution.block_block, scenario.contact.restitution.block_ground) == (0.2, 0.2)
-    assert scenario.contact.stiffness_scale == 1.0
-    assert scenario.contact.normal_stiffness is scenario.contact.shear_stiffness_ratio is None
-    assert scenario.contact.shear_damping_ratio is scenario.contact.max_overlap is scenario.contact.skin is None
-    assert (scenario.contact.contact_radius, scenario.contact.particle_spacing) == (0.001, 0.001)
-    assert (scenario.contact.smoothing_length, scenario.contact.kernel) == (None, "wendland-c2")
-    assert scenario.ground.profile is None
-    assert scenario.motion is None
-    assert (scenario.walls, scenario.pairs) == ((), {})
-    assert isinstance(scenario.time, Explicit)
-    assert (scenario.time.end, scenario.time.step, scenario.time.safety) == (2.0, "auto", 0.05)
-    assert (scenario.time.stop_at_rest, scenario.time.rest_speed, scenario.time.rest_hold) == (
-        True,
-        1e-4,
-        0.05,
-    )
-    assert scenario.output.every == 0.001
-    assert scenario.experiment is None
-    assert scenario.sweep is None
+def test_the_defaults_are_the_documented_ones(file: Path, golden: Golden) -> None:
+    golden(scenario_to_toml(load_scenario(file)))
 
 
 @pytest.mark.parametrize(

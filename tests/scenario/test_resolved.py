@@ -1,5 +1,6 @@
 """The resolved file means the same to the last bit, and the hash tells scenarios apart."""
 
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -174,87 +175,49 @@ def test_the_experiment_table_can_be_renamed(tmp_path: Path) -> None:
     assert experiment.table == tmp_path / "copy.csv"
 
 
-HASHED = {
-    "name": "other",
-    "gravity": 9.8,
-    "materials.m.density": 2.0,
-    "materials.m.young_modulus": 2.0,
-    "materials.m.poisson_ratio": 0.1,
-    "blocks.b.width": 2.0,
-    "blocks.b.height": 2.0,
-    "blocks.b.length": 2.0,
-    "blocks.b.upright": "length",
-    "blocks.b.along": "length",
-    "blocks.b.material": "n",
-    "structures.0.block": "c",
-    "structures.0.kind": "staircase",
-    "structures.0.count": 2,
-    "structures.0.left": 0.1,
-    "structures.0.bottom": 0.1,
-    "structures.0.offset": 0.1,
-    "structures.0.velocity": [1, 0],
-    "structures.0.shear_velocity": 1,
-    "bodies.0.block": "c",
-    "bodies.0.x": 11,
-    "bodies.0.y": 11,
-    "bodies.0.angle": "1 deg",
-    "bodies.0.velocity": [0, 1],
-    "bodies.0.spin": 1,
-    "bodies.0.fixed": True,
-    "bodies.0.name": "x",
-    "ground.tilt": "1 deg",
-    "ground.material": "n",
-    "ground.profile": [[0, 0], [1, 0]],
-    "walls.0.from": [-12, 0],
-    "walls.0.to": [-9, 0],
-    "walls.0.material": "n",
-    "friction.block_block.static": 0.32,
-    "friction.block_block.kinetic": 0.1,
-    "friction.block_block.kinetic_ratio": 0.5,
-    "friction.block_block.transition_speed": 0.1,
-    "friction.block_ground.static": 0.39,
-    "friction.block_ground.kinetic": 0.1,
-    "friction.block_ground.kinetic_ratio": 0.5,
-    "friction.block_ground.transition_speed": 0.1,
-    "motion.amplitude": 0.1,
-    "motion.frequency": 2,
-    "motion.phase": "1 deg",
-    "motion.direction": "1 deg",
-    "motion.start": 0.1,
-    "motion.duration": 8,
-    "motion.ramp": 0.5,
-    "pairs.m.n.friction.static": 0.32,
-    "pairs.m.n.friction.kinetic": 0.1,
-    "pairs.m.n.friction.kinetic_ratio": 0.5,
-    "pairs.m.n.friction.transition_speed": 0.1,
-    "pairs.m.n.restitution": 0.1,
-    "pairs.m.n.normal_stiffness": 1.0,
-    "pairs.m.n.shear_stiffness_ratio": 0.82,
-    "pairs.m.n.shear_damping_ratio": 0.1,
-    "contact.model": "kernel",
-    "contact.law": "hertz-mindlin",
-    "contact.restitution.block_block": 0.1,
-    "contact.restitution.block_ground": 0.1,
-    "contact.stiffness_scale": 0.1,
-    "contact.normal_stiffness": 1.0,
-    "contact.shear_stiffness_ratio": 0.82,
-    "contact.shear_damping_ratio": 0.1,
-    "contact.max_overlap": 0.1,
-    "contact.skin": 0.1,
-    "contact.contact_radius": 0.1,
-    "contact.particle_spacing": 0.1,
-    "contact.smoothing_length": 0.1,
-    "contact.kernel": "cubic-spline",
-    "time.end": 1.0,
-    "time.step": 1e-6,
-    "time.safety": 0.1,
-    "time.force_step": True,
-    "time.stop_at_rest": False,
-    "time.rest_speed": 1.0,
-    "time.rest_hold": 1.0,
-    "output.every": 1.0,
-    "output.contacts": True,
-}
+OTHER_VALUES = """
+name = "other"
+gravity = 9.8
+materials.m = { density = 2.0, young_modulus = 2.0, poisson_ratio = 0.1 }
+blocks.b = { width = 2.0, height = 2.0, length = 2.0, upright = "length", along = "length", material = "n" }
+structures.0 = { block = "c", kind = "staircase", count = 2, left = 0.1, bottom = 0.1, offset = 0.1 }
+structures.0.velocity = [1, 0]
+structures.0.shear_velocity = 1
+bodies.0 = { block = "c", x = 11, y = 11, angle = "1 deg", velocity = [0, 1], spin = 1, fixed = true, name = "x" }
+ground = { tilt = "1 deg", material = "n", profile = [[0, 0], [1, 0]] }
+walls.0 = { from = [-12, 0], to = [-9, 0], material = "n" }
+friction.block_block = { static = 0.32, kinetic = 0.1, kinetic_ratio = 0.5, transition_speed = 0.1 }
+friction.block_ground = { static = 0.39, kinetic = 0.1, kinetic_ratio = 0.5, transition_speed = 0.1 }
+motion = { amplitude = 0.1, frequency = 2, phase = "1 deg", direction = "1 deg", start = 0.1, duration = 8, ramp = 0.5 }
+pairs.m.n = { restitution = 0.1, normal_stiffness = 1.0, shear_stiffness_ratio = 0.82, shear_damping_ratio = 0.1 }
+pairs.m.n.friction = { static = 0.32, kinetic = 0.1, kinetic_ratio = 0.5, transition_speed = 0.1 }
+contact.model = "kernel"
+contact.law = "hertz-mindlin"
+contact.restitution = { block_block = 0.1, block_ground = 0.1 }
+contact.stiffness_scale = 0.1
+contact.normal_stiffness = 1.0
+contact.shear_stiffness_ratio = 0.82
+contact.shear_damping_ratio = 0.1
+contact.max_overlap = 0.1
+contact.skin = 0.1
+contact.contact_radius = 0.1
+contact.particle_spacing = 0.1
+contact.smoothing_length = 0.1
+contact.kernel = "cubic-spline"
+time = { end = 1.0, step = 1e-6, safety = 0.1, force_step = true, stop_at_rest = false, rest_speed = 1, rest_hold = 1 }
+output = { every = 1.0, contacts = true }
+"""
+
+
+def flat(table: dict[str, Any], path: str = "") -> dict[str, Any]:
+    """Return values by dotted keys."""
+    found: dict[str, Any] = {}
+    for key, entry in table.items():
+        found |= flat(entry, f"{path}{key}.") if isinstance(entry, dict) else {path + key: entry}
+    return found
+
+
+HASHED = {key: value for line in OTHER_VALUES.splitlines() for key, value in flat(tomllib.loads(line)).items()}
 SINGLE_CHOICE = {"schema", "time.scheme", "materials.m.unit_weight", "motion.kind"}
 
 
