@@ -68,13 +68,17 @@ def stacked(blocks: int) -> Frames:
 
 def texts_of(figure: Figure) -> list[Text]:
     """Return the texts of a figure that can be seen, numbers of axes and legends included."""
-    texts = list(figure.texts)
-    for axes in figure.axes:
-        legend = axes.get_legend()
-        titles = [child for child in axes.get_children() if isinstance(child, Text)]  # and what else is written there
-        texts += [*titles, *(legend.get_texts() if legend else [])]
-        if axes.axison:
-            texts += [*_of_axis(axes, "x"), *_of_axis(axes, "y")]
+    texts = [text for text in figure.texts if text.get_text() and text.get_visible()]
+    return texts + [text for axes in figure.axes for text in texts_in(axes)]
+
+
+def texts_in(axes: Axes) -> list[Text]:
+    """Return the texts of axes that can be seen."""
+    legend = axes.get_legend()
+    texts = [child for child in axes.get_children() if isinstance(child, Text)]  # titles and what else is written there
+    texts += legend.get_texts() if legend else []
+    if axes.axison:
+        texts += [*_of_axis(axes, "x"), *_of_axis(axes, "y")]
     return [text for text in texts if text.get_text() and text.get_visible()]
 
 

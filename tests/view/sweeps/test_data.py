@@ -29,8 +29,22 @@ def test_blocks_that_stay_are_not_worth_drawing() -> None:
     assert made_up((Input("gravity", "", np.arange(4.0)),)).moving == [1]
 
 
-def test_values_are_reported_with_their_units_and_words_as_they_are() -> None:
-    assert Input("gravity", "m/s^2", np.array([9.81])).label(9.81) == "9.81 m/s^2"
+@pytest.mark.parametrize(
+    ("key", "unit", "value", "expected"),
+    [
+        ("gravity", "m/s^2", 9.81, "9.81 m/s^2"),
+        ("gravity", "", 5.0, "5"),
+        ("structures.0.overlap", "m", 0.009, "9 mm"),
+        ("ground.tilt", "rad", np.radians(-5.0), "−5 °"),
+    ],
+)
+def test_values_are_reported_in_the_unit_in_which_they_are_best_read(
+    key: str, unit: str, value: float, expected: str
+) -> None:
+    assert Input(key, unit, np.array([0.1 * value, value])).label(value) == expected
+
+
+def test_words_are_reported_as_they_are() -> None:
     assert Input("time.scheme", "", np.array([0.0, 1.0]), ("explicit", "nonsmooth")).label(1.0) == "nonsmooth"
 
 

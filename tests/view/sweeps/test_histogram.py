@@ -1,31 +1,8 @@
-"""Histograms: their axis, what they count, and what they name."""
-
-from pathlib import Path
+"""Histograms: how far their axis reaches."""
 
 import numpy as np
 
-from blocksim.view.sweeps.histogram import draw, limits_of
-from tests.view.sweeps.made_up import made_up, samples
-
-
-def test_histogram_names_cases_repeats_and_intervals(tmp_path: Path) -> None:
-    path = tmp_path / "histogram.svg"
-    sweep = made_up(samples(1)[:1], "sobol")
-    draw(sweep, path)
-    text = path.read_text(encoding="utf-8")
-    for told in ("final x of block 2 (mm)", "all 50 cases", "6 repeats and their range", "next test (95 %)"):
-        assert f"<!-- {told} -->" in text
-    assert sweep.inside is not None
-    assert f"<!-- all inside ({100 * int(sweep.inside.sum()) // 50} %) -->" in text
-
-
-def test_histogram_without_measurements_names_cases_only(tmp_path: Path) -> None:
-    path = tmp_path / "histogram.svg"
-    draw(made_up(samples(1)[:1], "sobol", measured=False), path)
-    text = path.read_text(encoding="utf-8")
-    assert "all 50 cases" in text
-    assert "repeats" not in text
-    assert "all inside" not in text
+from blocksim.view.sweeps.histogram import limits_of
 
 
 def test_axis_leaves_out_the_rarest_run_outs_but_nothing_measured() -> None:

@@ -1,6 +1,4 @@
-"""Maps: cells where they belong, what agrees outlined, everything named."""
-
-from pathlib import Path
+"""Maps: cells where they belong, what agrees outlined, classes and colours."""
 
 import numpy as np
 import pytest
@@ -16,41 +14,8 @@ from blocksim.view.sweeps.cells import (
     run_out_scale,
 )
 from blocksim.view.sweeps.data import Input, SweepData, percent
-from blocksim.view.sweeps.outcome_map import _map_of, draw
-from tests.view.sweeps.made_up import grid, made_up, samples
-
-
-def texts_of(sweep: SweepData, folder: Path) -> str:
-    draw(sweep, folder / "map.svg")
-    return (folder / "map.svg").read_text(encoding="utf-8")
-
-
-def test_map_names_axes_blocks_classes_and_columns(tmp_path: Path) -> None:
-    text = texts_of(made_up(grid(3), failed=5), tmp_path)
-    for told in (
-        "friction.block_block.static",
-        "contact.stiffness_scale",
-        "final x of block 2 (mm)",
-        "final rotations of all blocks",
-        "upright = level2",
-        "failed: 5 %",
-    ):
-        assert f"<!-- {told} -->" in text
-    assert "0°/−90° (measured): " in text
-    assert "final x of block 1" not in text  # it stays
-    assert "Outlined: inside the measured range" in text
-
-
-def test_map_without_measurements_outlines_nothing(tmp_path: Path) -> None:
-    text = texts_of(made_up(grid(), measured=False), tmp_path)
-    assert "Outlined" not in text
-    assert "(measured)" not in text
-
-
-def test_map_of_samples_says_that_other_inputs_vary_too(tmp_path: Path) -> None:
-    text = texts_of(made_up(samples(4)[:4], "sobol"), tmp_path)
-    assert "One dot: one run." in text
-    assert "2 other inputs" in text
+from blocksim.view.sweeps.outcome_map import _map_of
+from tests.view.sweeps.made_up import grid, made_up
 
 
 def test_numbers_stand_in_the_cells_of_their_inputs() -> None:

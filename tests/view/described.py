@@ -1,0 +1,75 @@
+"""Figures in words, for golden files: what is written, how far axes reach, where lines and areas are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.collections import Collection, LineCollection
+from matplotlib.colors import to_hex
+
+from tests.view.made_up import texts_in
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.text import Text
+
+MOST = 6  # lines and colours that are told one by one
+
+
+def described(figure: Figure) -> str:
+    """Return a figure as text, with numbers of four digits: the page in inches, all else in the units of its axes."""
+    page = figure.get_size_inches()
+    lines = [f"page {_numbers(page)} in", *_written(figure.texts)]
+    for axes in figure.axes:
+        place = _numbers(np.array(axes.get_position().bounds) * [*page, *page])
+        x, y = (_numbers(limits) for limits in (axes.get_xlim(), axes.get_ylim()))
+        lines += [f"axes at {place} in: {axes.get_xscale()} x {x}, {axes.get_yscale()} y {y}"]
+        lines += [*_written(texts_in(axes)), *(f"  {line}" for line in _drawn(axes))]
+    return "\n".join(lines)
+
+
+def _written(texts: Iterable[Text]) -> list[str]:
+    words = [repr(text.get_text())[1:-1] for text in texts if text.get_text()]
+    return [f"  {' | '.join(words)}"] if words else []
+
+
+def _drawn(axes: Axes) -> list[str]:
+    told = [
+        f"line {to_hex(line.get_color())} {line.get_linestyle()} {line.get_marker()}: {_way(line.get_xydata())}"
+        for line in axes.lines[:MOST]
+    ]
+    if len(axes.lines) > MOST:
+        told.append(f"{len(axes.lines) - MOST} more lines")
+    told += [_parts(one) for one in axes.collections if one.get_paths() and len(np.atleast_2d(one.get_offsets()))]
+    return told + [f"{type(one).__name__}" for one in axes.patches]
+
+
+def _parts(parts: Collection) -> str:
+    """Return how many parts a collection has, their colours and the box that they fill; dots: that of their places."""
+    paths, places = parts.get_paths(), np.atleast_2d(np.ma.filled(parts.get_offsets(), np.nan))
+    points = places if len(places) > 1 else np.concatenate([path.vertices for path in paths])
+    colours = parts.get_edgecolor() if isinstance(parts, LineCollection) else parts.get_facecolor()
+    names = list(dict.fromkeys(to_hex(colour) for colour in np.asarray(colours)))
+    shown = " ".join(names[:MOST]) + f" and {len(names) - MOST} more" * (len(names) > MOST)
+    points = points[np.isfinite(points).all(axis=1)]
+    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else ((), ())
+    count = len(places) if len(places) > 1 else len(paths)
+    return f"{count} {type(parts).__name__} {shown} in {_numbers([*low, *high])}"
+
+
+def _way(points: Any) -> str:
+    """Return the first and the last point, and the box around all of them."""
+    places = np.asarray(points, dtype=float)
+    if len(places) < 2:
+        return f"{len(places)} point at {_numbers(places.ravel())}"
+    low, high = np.nanmin(places, axis=0), np.nanmax(places, axis=0)
+    box = f", in {_numbers([*low, *high])}" if len(places) > 2 else ""
+    return f"{len(places)} points, {_numbers(places[0])} to {_numbers(places[-1])}{box}"
+
+
+def _numbers(values: Iterable[Any]) -> str:
+    return "(" + ", ".join(f"{0.0 if abs(value) < 1e-9 else value:.4g}" for value in map(float, values)) + ")"

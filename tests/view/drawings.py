@@ -1,0 +1,203 @@
+"""Every kind of picture, drawn from made-up data: (path, paper) of each by name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from blocksim.analysis import load_table
+from blocksim.scenario.motion import MotionPieces
+from blocksim.view.final import draw_final
+from blocksim.view.history import draw_history
+from blocksim.view.history_panels import Choice
+from blocksim.view.kinds import SWEEP_KINDS
+from blocksim.view.levels import Panel, draw_levels
+from blocksim.view.paint import by_speed, by_turn
+from blocksim.view.run_data import Support
+from blocksim.view.strip import draw_strip
+from blocksim.view.sweeps.lines import Series, draw_series
+from blocksim.view.tornado import Bars, draw_tornado
+from blocksim.view.work_precision import Curve, draw_work_precision
+from blocksim.view.work_precision import Panel as Work
+from tests.view.made_up import HOSTILE, pressed, stacked, toppling
+from tests.view.sweeps.made_up import grid, made_up, samples
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from blocksim.simulation.frames import Frames
+    from blocksim.view.layout import Paper
+    from blocksim.view.sweeps.data import SweepData
+
+    Drawing = Callable[[Path, Paper], None]
+
+TABLE = load_table(Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks.csv")
+RUN: dict[str, Any] = {"title": "a run", "measured": TABLE}
+KEYS = ("contact.restitution", "friction.block_block.static", "friction.block_ground.static")
+PIECES = MotionPieces(np.array([0.0, 0.3, 1.0]), np.array([[0.0, 0.0, 0.1, 0.0], [0.009, 0.0, 0.0, 0.0]]), 0.0)
+MOVING = Support(motion=PIECES, direction=(np.cos(0.3), np.sin(0.3)), fixed=(True, False, False), weight=12.0)
+STEP = Support(profile=((0.05, 0.0), (0.05, -0.05)), fixed=(True, False, False))
+TILTED = Support(tilt=-0.2)
+LEGEND = ("total", "alone")
+
+
+def panel(blocks: int = 3, levels: int = 4, size_mm: float = 1.0, **more: Any) -> Panel:
+    """Return distances that fall by ten from level to level and grow with the block; the first block stays."""
+    off = size_mm * 10.0 ** -np.arange(levels)[:, None] * np.arange(blocks) / max(blocks - 1, 1)
+    off[-1] = 0.0
+    made = Panel(
+        title="time step",
+        key="time.safety",
+        verdict="converged",
+        values=np.array([0.1 * 0.5**level for level in range(levels)]),
+        blocks=tuple(f"b{number}" for number in range(blocks)),
+        off_mm=off,
+        largest_off_mm=off.max(axis=1),
+        tolerance_mm=0.1,
+        own=0.05,
+        recommended=0.025,
+    )
+    return replace(made, **more)
+
+
+LONG = panel(3, 9, title="velocity tolerance", key="time.velocity_tolerance", verdict="not yet converged")
+
+
+def work() -> list[Work]:
+    """Return curves of three codes, and one of a single point."""
+    seconds = np.array([1e-3, 1e-2, 1e-1, 1.0])
+    curves = [
+        Curve(label, group, seconds, factor * 1e-2 / seconds, 5e-3 / seconds, 2e-2 / seconds)
+        for label, group, factor in (("fast", "one", 1.0), ("faster", "one", 0.5), ("slow", "two", 1.0))
+    ]
+    bare = Work("wall", "change (mm)", (Curve("heap", "three", np.ones(1), np.ones(1)),))
+    return [Work("stairs", "error (mm)", tuple(curves), 0.2, "enough"), bare]
+
+
+def series(blocks: int, label: str = "", runs: int = 11) -> Series:
+    """Return blocks of which the first stays and every further one goes farther with the value."""
+    values = np.linspace(9.999e-3, 10.001e-3, runs)
+    return Series(label, values, 70.0 + np.linspace(-1.0, 1.0, runs)[:, None] * np.arange(blocks))
+
+
+def bars() -> list[Bars]:
+    """Return total and own effects on three results, of which one does not vary."""
+    known, unknown = np.array([0.1, 0.2, np.nan]), np.array([0.1, 1e5, 0.02])
+    one = Bars("x of block 2", KEYS, np.array([0.2, 0.7, 0.1]), known, np.array([0.1, -0.05, 0.0]))
+    other = Bars("x of block 3", KEYS, np.array([0.1, 0.7, 0.2]), unknown)
+    return [Bars("x of block 1", KEYS, np.zeros(3), np.zeros(3)), one, other]
+
+
+def of_run(draw: Callable[..., None], frames: Frames, **values: Any) -> Drawing:
+    return lambda path, paper: draw(frames, path, paper=paper, **{**RUN, **values})
+
+
+def of_sweep(kind: str, sweep: SweepData) -> Drawing:
+    return partial(SWEEP_KINDS[kind].draw, sweep)
+
+
+def failed() -> Frames:
+    """Return a run whose last frame is no number."""
+    frames = toppling(2, steps=7)
+    frames.x[-1] = np.nan
+    return frames
+
+
+def riding() -> Frames:
+    """Return a block that stays where it is on a moving support."""
+    frames = toppling(1)
+    frames.x[:, 0], frames.y[:, 0] = MOVING.offset(frames.time).T + np.array([[0.0], [0.025]])
+    frames.angle[:] = 0.0
+    return frames
+
+
+def far() -> Frames:
+    """Return many blocks of which one goes far."""
+    frames = toppling(20)
+    frames.x[-1, 7] += 1.0
+    return frames
+
+
+def spun() -> Frames:
+    """Return many blocks of which five have turned by more than half a turn."""
+    frames = toppling(1000)
+    frames.angle[-1, :5] = -10.0
+    return frames
+
+
+def odd(blocks: int) -> Frames:
+    """Return blocks with names that nobody expects."""
+    return replace(toppling(blocks), names=HOSTILE[:blocks])
+
+
+ODD = ("W" * 200, *HOSTILE)
+CHOICE = Choice(("displacement", "energy"), ("3",))
+DRAWINGS: dict[str, Drawing] = {
+    "strip": of_run(draw_strip, toppling(3)),
+    "strip at chosen times": of_run(draw_strip, toppling(3, steps=61), times=[0.1, 0.3]),
+    "strip at the end": of_run(draw_strip, toppling(2), times=[0.6]),
+    "strip on a step": of_run(draw_strip, toppling(3), support=STEP),
+    "strip on a moving support": of_run(draw_strip, toppling(3, steps=61), support=MOVING, times=[0.0, 0.1, 0.3]),
+    "strip of a ride": of_run(draw_strip, riding(), support=replace(MOVING, fixed=())),
+    "strip on tilted ground": of_run(draw_strip, toppling(1), support=TILTED),
+    "strip on steep moving ground": of_run(draw_strip, toppling(3), support=Support(tilt=-0.9, motion=PIECES)),
+    "strip of a tower": of_run(draw_strip, stacked(12), title=None),
+    "strip with forces": of_run(draw_strip, pressed(toppling(7)), forces=True),
+    "strip with odd names": of_run(draw_strip, odd(3), title="100 % $x_1$"),
+    "final": of_run(draw_final, toppling(3)),
+    "final of a tower": of_run(draw_final, stacked(10)),
+    "final on tilted ground": of_run(draw_final, toppling(10), support=TILTED),
+    "final of a high tower": of_run(draw_final, stacked(24), support=TILTED),
+    "final at a moment": of_run(draw_final, toppling(3, steps=61), times=[0.3]),
+    "final of a failed run": of_run(draw_final, failed()),
+    "final of many": of_run(draw_final, toppling(1000)),
+    "final of many, by turn": of_run(draw_final, spun(), paint=by_turn(spun())),
+    "final that nobody measured": of_run(draw_final, replace(toppling(2), names=("a", "b"))),
+    "final with forces, by speed": of_run(draw_final, pressed(toppling(3)), forces=True, paint=by_speed(toppling(3))),
+    "final with odd names": of_run(draw_final, odd(7), title="<b>" * 100),
+    "history": of_run(draw_history, toppling(3)),
+    "history of twenty": of_run(draw_history, far()),
+    "history of fixed blocks": of_run(draw_history, toppling(2), support=Support(fixed=(True, True))),
+    "history of a failed run": of_run(draw_history, failed()),
+    "history of a shaken run": of_run(draw_history, pressed(toppling(3)), support=MOVING, forces=True),
+    "history of impacts": of_run(draw_history, pressed(toppling(3)), support=Support(weight=0.1)),
+    "history seen from the ground": of_run(
+        draw_history, toppling(3), support=MOVING, choice=replace(CHOICE, relative=True)
+    ),
+    "history of chosen panels": of_run(draw_history, toppling(20), support=MOVING, choice=CHOICE),
+    "history with many names": of_run(
+        draw_history, toppling(20), choice=Choice(("x", "energy"), tuple(map(str, range(1, 13))))
+    ),
+    "history with odd names": of_run(draw_history, odd(6), title=HOSTILE[0] * 20),
+    "levels": lambda path, paper: draw_levels([panel()], path, title="slide", measured={"b1": 7.0}, paper=paper),
+    "levels of three studies": lambda path, paper: draw_levels([LONG] * 3, path, title="slide", paper=paper),
+    "work": lambda path, paper: draw_work_precision(work(), path, title="engines " * 30, paper=paper),
+    "levels with odd names": lambda path, paper: draw_levels(
+        [replace(panel(8), blocks=ODD)] * 3, path, title=ODD[0], measured=dict.fromkeys(ODD, 7.0), paper=paper
+    ),
+    "tornado": lambda path, paper: draw_tornado(bars(), LEGEND, path, "Which inputs matter", paper),
+    "series": lambda path, paper: draw_series(
+        [series(3, "e = 0.3"), series(3, "e = 0.5")], ("1", "2", "brick"), ("overlap", "m"), path, title="jitter",
+        measured={"2": (60.0, 75.0)}, paper=paper,
+    ),
+    "narrow series": lambda path, paper: draw_series(
+        [series(3, f"friction.block_block.kinetic = 0.{number}") for number in range(4)], ("1", "2", "3"),
+        ("gravity", ""), path, paper=paper,
+    ),
+    "series with odd names": lambda path, paper: draw_series(
+        [series(8, name) for name in ODD[:4]], ODD, (f"blocks.{ODD[0]}.width", "m"), path, title=ODD[1],
+        measured={ODD[2]: (1.0, 2.0)}, paper=paper,
+    ),
+    "lines": of_sweep("lines", made_up(grid())),
+    "map": of_sweep("map", made_up(grid(3), failed=5)),
+    "map without measurements": of_sweep("map", made_up(grid(), measured=False)),
+    "map of samples": of_sweep("map", made_up(samples(4)[:4], "sobol")),
+    "matrix": of_sweep("matrix", made_up(samples(3), "sobol", failed=5)),
+    "matrix without measurements": of_sweep("matrix", made_up(samples(2), "sobol", measured=False)),
+    "histogram": of_sweep("histogram", made_up(samples(1)[:1], "sobol")),
+    "histogram without measurements": of_sweep("histogram", made_up(samples(1)[:1], "sobol", measured=False)),
+}  # fmt: skip

@@ -1,0 +1,117 @@
+"""What is true of every picture: what it shows, nothing covered or cut, its page, its bytes, and clear refusals."""
+
+from __future__ import annotations
+
+import struct
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+import pytest
+
+from blocksim.errors import InvalidInputError, OutputError
+from blocksim.view.layout import OWN, Paper
+from tests.view.described import described
+from tests.view.drawings import DRAWINGS
+from tests.view.made_up import overlapping
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tests.golden import Golden
+
+KINDS = {
+    "strip": "svg",
+    "final": "pdf",
+    "history": "png",
+    "levels": "svg",
+    "work": "png",
+    "tornado": "png",
+    "series": "png",
+    "lines": "svg",
+    "map": "png",
+    "matrix": "svg",
+    "histogram": "pdf",
+}
+SIZES = {
+    "strip": ((4.0, 8.0), (10.0, 3.5), (3.2, 15.0)),
+    "final": ((3.2, 4.6), (12.0, 9.0)),
+    "history": ((6.0, 8.0),),
+    "levels": ((3.5, 2.5), (12.0, 9.0)),
+    "levels of three studies": ((8.0, 3.0),),
+    "work": ((6.0, 2.6),),
+    "tornado": ((5.0, 6.0),),
+    "lines": ((7.0, 8.0),),
+    "map": ((9.0, 9.0),),
+    "matrix": ((9.0, 9.0),),
+    "histogram": ((5.0, 8.0),),
+}
+
+
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_picture_shows_what_it_should_and_no_text_is_covered_or_cut(
+    caught: list[Figure], golden: Golden, name: str
+) -> None:
+    DRAWINGS[name](Path("picture.png"), OWN)
+    (figure,) = caught
+    assert overlapping(figure) == []
+    golden(described(figure))
+
+
+@pytest.mark.parametrize(("name", "suffix"), KINDS.items())
+def test_same_data_give_the_same_bytes_of_a_valid_file(tmp_path: Path, name: str, suffix: str) -> None:
+    first, second = (tmp_path / f"{number}.{suffix.upper()}" for number in (1, 2))
+    DRAWINGS[name](first, OWN)
+    with mpl.rc_context({"axes.facecolor": "red", "font.size": 20.0, "savefig.bbox": "tight"}):
+        DRAWINGS[name](second, OWN)
+        assert mpl.rcParams["font.size"] == 20.0
+    assert first.read_bytes() == second.read_bytes()
+    if suffix == "svg":
+        assert ET.parse(first).getroot().tag.endswith("svg")  # noqa: S314 - our own file
+    else:
+        assert first.read_bytes().startswith({"png": b"\x89PNG\r\n\x1a\n", "pdf": b"%PDF-"}[suffix])
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_odd_names_can_be_written(tmp_path: Path, suffix: str) -> None:
+    DRAWINGS["final with odd names"](tmp_path / f"final.{suffix}", OWN)
+    assert (tmp_path / f"final.{suffix}").stat().st_size > 1000
+
+
+def test_png_has_150_dots_an_inch_or_those_asked_for(tmp_path: Path) -> None:
+    for name, paper in (("own", OWN), ("asked", Paper((6.0, 8.0), 100.0))):
+        DRAWINGS["strip"](tmp_path / f"{name}.png", paper)
+    own, asked = (struct.unpack(">II", (tmp_path / f"{name}.png").read_bytes()[16:24]) for name in ("own", "asked"))
+    assert own[0] == 1500
+    assert asked == (600, 800)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_formats_and_places_that_cannot_be_written_are_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InvalidInputError, match=r"'\.bmp' unsupported picture format; use \.png, \.svg, \.pdf"):
+        DRAWINGS[name](tmp_path / "picture.bmp", OWN)
+    with pytest.raises(OutputError, match="cannot be written: No such file or directory"):
+        DRAWINGS[name](tmp_path / "none" / "picture.png", OWN)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("name", "size"), [(name, size) for name, sizes in SIZES.items() for size in sizes])
+def test_page_has_the_size_that_was_asked_for_and_everything_lies_on_it(
+    caught: list[Figure], name: str, size: tuple[float, float]
+) -> None:
+    DRAWINGS[name](Path("picture.png"), Paper(size))
+    (figure,) = caught
+    assert figure.get_size_inches().tolist() == pytest.approx(list(size))
+    assert overlapping(figure) == []
+    boxes = [axes.get_position() for axes in figure.axes]
+    assert min(min(box.x0, box.y0, 1.0 - box.x1, 1.0 - box.y1) for box in boxes) >= 0.0
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_page_that_is_too_small_is_refused_before_anything_is_drawn(caught: list[Figure], name: str) -> None:
+    for size, side in (((0.5, 9.0), "wide"), ((6.0, 0.4), "high")):
+        told = rf"--size .* mm is too small for this picture: at least \d+ mm {side}"
+        with pytest.raises(InvalidInputError, match=told):
+            DRAWINGS[name](Path("picture.png"), Paper(size))
+    assert caught == []
