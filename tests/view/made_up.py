@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from blocksim.simulation.contacts import SUPPORT, Contacts, empty_rows
 from blocksim.simulation.frames import Frames
@@ -22,29 +22,47 @@ HOSTILE = (
 )
 
 
+def blocks_at(
+    x: ArrayLike,
+    y: ArrayLike = 0.0,
+    angle: ArrayLike = 0.0,
+    *,
+    time: ArrayLike | None = None,
+    size: tuple[float, float] = (0.032, 0.050),
+) -> Frames:
+    """Return frames of blocks at these places (steps, blocks), or of one block (steps); a second apart, at rest."""
+    x, y, angle = np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in (x, y, angle)))
+    x, y, angle = (one.reshape(len(x), -1).copy() for one in (x, y, angle))
+    steps, blocks = x.shape
+    return Frames(
+        step=np.arange(steps),
+        time=np.arange(steps, dtype=float) if time is None else np.array(time),
+        x=x,
+        y=y,
+        angle=angle,
+        vx=np.zeros_like(x),
+        vy=np.zeros_like(x),
+        spin=np.zeros_like(x),
+        energy={},
+        contact_count=np.full(steps, 2.0),
+        largest_overlap=np.zeros(steps),
+        names=tuple(str(number + 1) for number in range(blocks)),
+        size_x=np.full(blocks, size[0]),
+        size_y=np.full(blocks, size[1]),
+        start_angle=np.zeros(blocks),
+    )
+
+
 def toppling(blocks: int, steps: int = 40, end: float = 0.6) -> Frames:
     """Return blocks in rows of ten that turn to the right, the later the further up; 32 x 50 mm each."""
     time = np.linspace(0.0, end, steps)
     row, column = np.divmod(np.arange(blocks), 10)
     share = (time[:, None] / end) ** 2
-    zeros = np.zeros((steps, blocks))
-    return Frames(
-        step=np.arange(steps),
-        time=time,
-        x=0.040 * column + 0.06 * share * (row + 1),
-        y=0.025 + 0.05 * row * (1.0 - share),
-        angle=-0.5 * np.pi * share * np.ones(blocks),
-        vx=zeros + 0.25,
-        vy=zeros - 0.5,
-        spin=zeros - 0.125,
-        energy={"kinetic": time, "potential": 3.0 - time, "friction": 0.0 * time, "dashpot": 0.5 * time, "elf": time},
-        contact_count=np.full(steps, 2.0),
-        largest_overlap=np.zeros(steps),
-        names=tuple(str(number + 1) for number in range(blocks)),
-        size_x=np.full(blocks, 0.032),
-        size_y=np.full(blocks, 0.050),
-        start_angle=np.zeros(blocks),
-    )
+    x, y = 0.040 * column + 0.06 * share * (row + 1), 0.025 + 0.05 * row * (1.0 - share)
+    frames = blocks_at(x, y, -0.5 * np.pi * share * np.ones(blocks), time=time)
+    frames.vx[:], frames.vy[:], frames.spin[:] = 0.25, -0.5, -0.125
+    energy = {"kinetic": time, "potential": 3.0 - time, "friction": 0.0 * time, "dashpot": 0.5 * time, "elf": time}
+    return replace(frames, energy=energy)
 
 
 def pressed(frames: Frames, force: float = 2.0) -> Frames:

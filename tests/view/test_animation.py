@@ -19,6 +19,7 @@ from blocksim.view.animation_files import ticks
 from blocksim.view.paint import PAINTS
 from blocksim.view.run_data import Support
 from blocksim.view.style import BLOCK_COLOURS
+from tests.golden import Golden
 from tests.view.made_up import HOSTILE, toppling
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -53,13 +54,6 @@ def test_blocks_are_where_they_were_recorded(support: Support, trails: bool) -> 
             assert pixel_of(animation, picture, *near_the_centre(frames, frame, block)) == colour(block)
 
 
-def test_a_picture_does_not_depend_on_those_before() -> None:
-    animation = Animation(toppling(3), MOVING, SMALL)
-    first = animation.picture(0)
-    animation.picture(30)
-    assert np.array_equal(animation.picture(0), first)
-
-
 def test_trails_are_drawn_for_few_blocks_unless_somebody_decides() -> None:
     assert Animation(toppling(3), Support(), SMALL).has_trails
     assert not Animation(toppling(31), Support(), SMALL).has_trails
@@ -78,17 +72,14 @@ def test_a_moving_support_moves() -> None:
 
 
 @pytest.mark.parametrize("width", [200, 401, 1234])
-def test_sides_are_even_and_the_width_is_the_one_asked_for(width: int) -> None:
-    height, across, _ = Animation(toppling(60), Support(), Look(width)).picture(0).shape
-    assert height % 2 == across % 2 == 0
-    assert abs(across - width) <= 1
-
-
-def test_a_tower_stays_within_the_page() -> None:
-    frames = toppling(1)
-    frames.y[:, 0] = np.linspace(3.0, 0.0, len(frames))
-    height, width, _ = Animation(frames, Support(), SMALL).picture(0).shape
-    assert height < 1.6 * width
+def test_sides_are_even_the_width_is_the_one_asked_for_and_a_tower_stays_within_the_page(width: int) -> None:
+    high = toppling(1)
+    high.y[:, 0] = np.linspace(3.0, 0.0, len(high))
+    for frames in (toppling(60), high):
+        height, across, _ = Animation(frames, Support(), Look(width)).picture(0).shape
+        assert height % 2 == across % 2 == 0
+        assert abs(across - width) <= 1
+        assert height < 1.6 * across
 
 
 def test_pictures_are_even_in_time_and_the_last_frame_is_shown_and_held() -> None:
@@ -101,48 +92,31 @@ def test_pictures_are_even_in_time_and_the_last_frame_is_shown_and_held() -> Non
     assert seconds[-1] > 1.0
 
 
-def test_uneven_frames_are_shown_at_their_times() -> None:
+def test_uneven_frames_are_shown_at_their_times_and_a_single_one_is_an_animation() -> None:
     frames = replace(toppling(1, steps=4), time=np.array([0.0, 0.1, 0.11, 0.5]))
-    chosen, _ = timed(frames, np.arange(4), Pace(1.0, 10.0))
-    assert chosen.tolist() == [0, 1, 2, 2, 3, 3]
-
-
-def test_a_single_frame_is_an_animation() -> None:
-    frames = toppling(1)
+    assert timed(frames, np.arange(4), Pace(1.0, 10.0))[0].tolist() == [0, 1, 2, 2, 3, 3]
     chosen, seconds = timed(frames, np.array([3]), FAST)
     assert chosen.tolist() == [3]
     assert len(seconds) == 1
 
 
-def test_gif_plays_as_long_as_it_should(tmp_path: Path) -> None:
-    path = tmp_path / "film.gif"
-    assert draw_animation(toppling(3), path, Pace(0.5, 30.0), SMALL) == (37, 0)
-    with GifImageFile(path) as animation:
-        length = 0
+def test_gif_plays_as_long_as_it_should_in_the_blocks_own_colours_with_the_same_bytes(tmp_path: Path) -> None:
+    frames, look, paths = toppling(6), Look(400), [tmp_path / f"{number}.gif" for number in (1, 2)]
+    for path in paths:
+        assert draw_animation(frames, path, Pace(0.5, 30.0), look) == (37, 0)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    length = 0
+    with GifImageFile(paths[0]) as animation:
         for index in range(animation.n_frames):
             animation.seek(index)
             length += animation.info["duration"]
         assert animation.info["loop"] == 0
-        assert animation.width == 240
-    assert length == pytest.approx(1000 * (36 / 30 + 1.5), abs=10)
-
-
-def test_gif_shows_the_blocks_in_their_own_colours(tmp_path: Path) -> None:
-    frames = toppling(6)
-    draw_animation(frames, tmp_path / "film.gif", FAST, Look(400))
-    drawn = Animation(frames, Support(), Look(400))
-    with GifImageFile(tmp_path / "film.gif") as animation:
-        animation.seek(animation.n_frames - 1)
         last = np.asarray(animation.convert("RGB"))
+    assert length == pytest.approx(1000 * (36 / 30 + 1.5), abs=10)
+    drawn = Animation(frames, Support(), look)
     for block in range(6):
         assert pixel_of(drawn, last, *near_the_centre(frames, -1, block)) == colour(block)
     assert last[0, 0].tolist() == [255, 255, 255]
-
-
-def test_the_same_run_gives_the_same_gif(tmp_path: Path) -> None:
-    for name in ("first", "second"):
-        draw_animation(toppling(3), tmp_path / f"{name}.gif", FAST, SMALL)
-    assert (tmp_path / "first.gif").read_bytes() == (tmp_path / "second.gif").read_bytes()
 
 
 def test_ticks_add_up_where_a_picture_is_no_whole_number_of_them() -> None:
@@ -237,22 +211,14 @@ def test_a_film_is_coloured_like_the_other_pictures(name: str) -> None:
         assert found == [round(255 * part) for part in to_rgb(paint.fills(20)[block])]
 
 
-def test_one_far_flyer_does_not_make_the_structure_small() -> None:
-    near, far = toppling(60), toppling(60)
+def test_one_far_flyer_leaves_the_window_and_debris_and_each_of_few_blocks_stay_in_it() -> None:
+    near, far, spread, few = toppling(60), toppling(60), toppling(60), toppling(3)
     far.x[-1, 59] += 5.0
-    films = [Animation(frames, Support(), SMALL) for frames in (near, far)]
-    assert films[1].page.points_per_mm > 0.9 * films[0].page.points_per_mm
-    assert np.flatnonzero(~films[1].seen).tolist() == [59]
-    assert films[0].seen.all()
-
-
-def test_debris_of_a_collapse_and_each_of_few_blocks_stay_in_the_window() -> None:
-    frames = toppling(60)
-    frames.x[-1] += np.linspace(0.0, 1.0, 60)  # spread out, without a gap
-    assert Animation(frames, Support(), SMALL).seen.all()
-    few = toppling(3)
+    spread.x[-1] += np.linspace(0.0, 1.0, 60)  # without a gap
     few.x[-1, 2] += 0.1
-    assert Animation(few, Support(), SMALL).seen.all()
+    films = [Animation(frames, Support(), SMALL) for frames in (near, far, spread, few)]
+    assert films[1].page.points_per_mm > 0.9 * films[0].page.points_per_mm
+    assert [np.flatnonzero(~film.seen).tolist() for film in films] == [[], [59], [], []]
 
 
 def test_missing_package_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -263,15 +229,22 @@ def test_missing_package_names_the_extra(tmp_path: Path, monkeypatch: pytest.Mon
     assert list(tmp_path.iterdir()) == []
 
 
-def test_trouble_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match=r"'.avi' unsupported format; use .gif or .mp4"):
-        draw_animation(toppling(1), tmp_path / "film.avi")
-    with pytest.raises(InvalidInputError, match="at most 10000: raise --speed or lower --fps"):
-        draw_animation(toppling(1), tmp_path / "film.gif", Pace(1e-6, 30.0))
-    with pytest.raises(InvalidInputError, match="at most 50 frames per second"):
-        draw_animation(toppling(1), tmp_path / "film.gif", Pace(1.0, 60.0), SMALL)
-    with pytest.raises(OutputError, match="cannot be written: No such file"):
-        draw_animation(toppling(1), tmp_path / "none" / "film.gif", FAST, SMALL)
+@pytest.mark.parametrize(
+    ("name", "pace", "error"),
+    [
+        ("film.avi", FAST, InvalidInputError),
+        ("film.gif", Pace(1e-6, 30.0), InvalidInputError),
+        ("film.gif", Pace(1.0, 60.0), InvalidInputError),
+        ("none/film.gif", FAST, OutputError),
+    ],
+    ids=["format", "too many", "too fast", "no folder"],
+)
+def test_what_cannot_be_drawn_or_written_is_refused(
+    tmp_path: Path, golden: Golden, name: str, pace: Pace, error: type[Exception]
+) -> None:
+    with pytest.raises(error) as caught:
+        draw_animation(toppling(1), tmp_path / name, pace, SMALL)
+    golden(str(caught.value))
     assert list(tmp_path.iterdir()) == []
 
 

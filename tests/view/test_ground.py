@@ -40,14 +40,9 @@ def wall(
     start: tuple[float, float], end: tuple[float, float], *, extends: tuple[bool, bool] = (False, False)
 ) -> PlacedSegment:
     """Return a wall between two points in mm."""
-    return PlacedSegment(
-        *(1e-3 * start[0], 1e-3 * start[1], 1e-3 * end[0], 1e-3 * end[1]),
-        material=None,
-        extends_start=extends[0],
-        extends_end=extends[1],
-        touches_start=False,
-        touches_end=False,
-    )
+    ends = {"extends_start": extends[0], "extends_end": extends[1], "touches_start": False, "touches_end": False}
+    x0, y0, x1, y1 = (1e-3 * place for place in (*start, *end))
+    return PlacedSegment(x0, y0, x1, y1, material=None, **ends)
 
 
 def is_solid(drawn: Canvas, x: float, y: float) -> bool:
@@ -71,25 +66,23 @@ def test_the_solid_is_below_the_displaced_profile(offset: tuple[float, float]) -
     drawn = canvas()
     draw_support(drawn, STEP, np.array(offset))
     corner, top = 20.0 + offset[0], offset[1]
-    assert is_solid(drawn, corner - 1.0, top - 1.0)
-    assert not is_solid(drawn, corner - 1.0, top + 1.0)
-    assert not is_solid(drawn, corner + 1.0, top - 1.0)
-    assert is_solid(drawn, corner + 1.0, top - 41.0)
-    assert is_solid(drawn, -100.0, top - 1.0)
-    assert is_solid(drawn, 100.0, top - 41.0)
+    for x, y, expected in (
+        (corner - 1.0, top - 1.0, True),
+        (corner - 1.0, top + 1.0, False),
+        (corner + 1.0, top - 1.0, False),
+        (corner + 1.0, top - 41.0, True),
+        (-100.0, top - 1.0, True),
+        (100.0, top - 41.0, True),
+    ):
+        assert is_solid(drawn, x, y) == expected, (x, y)
 
 
-def test_the_ground_ends_a_little_below_its_lowest_part() -> None:
+def test_the_ground_ends_a_little_below_its_lowest_part_and_its_line_where_the_picture_does() -> None:
     drawn = canvas()
     draw_support(drawn, STEP, NOWHERE)
     floor = -40.0 - GROUND_THICKNESS / SCALE
     assert is_solid(drawn, 0.0, floor + 0.1)
     assert not is_solid(drawn, 0.0, floor - 0.1)
-
-
-def test_the_surface_is_lined_as_far_as_the_picture_goes_and_not_for_ever() -> None:
-    drawn = canvas()
-    draw_support(drawn, STEP, NOWHERE)
     left, riser, right = lines_of(drawn)
     assert riser.tolist() == [pytest.approx([20.0, 0.0]), pytest.approx([20.0, -40.0])]
     assert -200.0 < left[0, 0] <= -100.0
@@ -111,47 +104,38 @@ def test_a_wall_is_solid_on_the_right_hand_only_and_moves_with_the_ground() -> N
     drawn = canvas()
     draw_support(drawn, Support(walls=(wall((50.0, 0.0), (50.0, 30.0)),)), np.array([10.0, 0.0]))
     depth = WALL_THICKNESS / SCALE
-    assert is_solid(drawn, 60.0 + 0.5 * depth, 20.0)
-    assert not is_solid(drawn, 60.0 - 0.1, 20.0)
-    assert not is_solid(drawn, 60.0 + 1.1 * depth, 20.0)
+    solid = [is_solid(drawn, 60.0 + x, y) for x, y in ((0.5 * depth, 20.0), (-0.1, 20.0), (1.1 * depth, 20.0))]
+    assert solid == [True, False, False]
     assert not is_solid(drawn, 60.0 + 0.5 * depth, 31.0)
     assert lines_of(drawn)[-1].tolist() == [pytest.approx([60.0, 0.0]), pytest.approx([60.0, 30.0])]
 
 
-def test_walls_that_join_are_mitred() -> None:
+def test_walls_that_join_are_mitred_without_needles() -> None:
     valley = (wall((0.0, 10.0), (0.0, 0.0)), wall((0.0, 0.0), (10.0, 0.0)))
     down, level = wall_outlines(valley, 2.0)
     assert down[2].tolist() == level[3].tolist() == pytest.approx([-2.0, -2.0])
     edge = (wall((0.0, 0.0), (0.0, 10.0)), wall((0.0, 10.0), (10.0, 10.0)))
     up, roof = wall_outlines(edge, 2.0)
     assert up[2].tolist() == roof[3].tolist() == pytest.approx([2.0, 8.0])
-
-
-def test_free_ends_are_square_and_covered_ones_reach_into_what_covers_them() -> None:
-    free, covered = (wall_outlines((wall((0.0, 0.0), (0.0, 10.0), extends=ends),), 2.0)[0] for ends in ENDS)
-    assert free.tolist() == [pytest.approx(point) for point in ([0, 0], [0, 10], [2, 10], [2, 0])]
-    assert covered[3].tolist() == pytest.approx([2.0, -2.0])
-    assert covered[2].tolist() == pytest.approx([2.0, 10.0])
-
-
-ENDS = ((False, False), (True, False))
-
-
-def test_walls_that_turn_back_sharply_get_no_needle() -> None:
     there_and_back = (wall((0.0, 0.0), (100.0, 0.0)), wall((100.0, 0.0), (0.0, 5.0)))
     assert np.concatenate(wall_outlines(there_and_back, 2.0))[:, 0].max() < 105.0
 
 
-def test_the_start_is_dashed_where_it_can_be_told_from_the_present() -> None:
+@pytest.mark.parametrize(("is_covered", "below"), [(False, 0.0), (True, -2.0)])
+def test_free_ends_are_square_and_covered_ones_reach_into_what_covers_them(is_covered: bool, below: float) -> None:
+    (outline,) = wall_outlines((wall((0.0, 0.0), (0.0, 10.0), extends=(is_covered, False)),), 2.0)
+    assert outline.tolist() == [pytest.approx(point) for point in ([0, 0], [0, 10], [2, 10], [2, below])]
+
+
+@pytest.mark.parametrize(("offset", "heights"), [((10.0, 0.0), [0.0]), ((0.0, 10.0), [-40.0, 0.0]), ((0.1, 0.1), [])])
+def test_the_start_is_dashed_where_it_can_be_told_from_the_present(
+    offset: tuple[float, float], heights: list[float]
+) -> None:
     drawn = canvas()
-    draw_start(drawn, STEP, np.array([10.0, 0.0]), NO_OUTLINES)
-    assert [line.tolist() for line in lines_of(drawn)] == [[pytest.approx([20.0, 0.0]), pytest.approx([20.0, -40.0])]]
-    raised = canvas()
-    draw_start(raised, STEP, np.array([0.0, 10.0]), NO_OUTLINES)
-    assert sorted({float(line[0, 1]) for line in lines_of(raised)}) == pytest.approx([-40.0, 0.0])
-    resting = canvas()
-    draw_start(resting, STEP, np.array([0.1, 0.1]), NO_OUTLINES)
-    assert lines_of(resting) == []
+    draw_start(drawn, STEP, np.array(offset), NO_OUTLINES)
+    assert sorted({float(line[0, 1]) for line in lines_of(drawn)}) == pytest.approx(heights)
+    if len(heights) == 1:
+        assert [line.tolist() for line in lines_of(drawn)] == [[pytest.approx([20.0, 0]), pytest.approx([20.0, -40.0])]]
 
 
 def test_an_arrow_in_the_ground_shows_how_far_it_has_moved() -> None:

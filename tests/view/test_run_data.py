@@ -1,17 +1,16 @@
 """A run as its pictures need it: frames even in the way, times found, supports as the scenario has them."""
 
-from dataclasses import dataclass, field
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_to_toml
+from blocksim.simulation.frames import Frames
 from blocksim.view.run_data import Support, drawable_frames, moments_at, moments_by_motion, path_travelled, support_of
-
-Floats = NDArray[np.float64]
+from tests.view.made_up import blocks_at
 
 SCENE: dict[str, object] = {
     "schema": 1,
@@ -26,26 +25,9 @@ SCENE: dict[str, object] = {
 }
 
 
-@dataclass
-class OneBlock:
-    """Frames of one unit square at the given places."""
-
-    time: Floats
-    x: Floats
-    angle: Floats
-    y: Floats = field(init=False)
-    size_x: Floats = field(default_factory=lambda: np.array([1.0]))
-    size_y: Floats = field(default_factory=lambda: np.array([1.0]))
-    names: tuple[str, ...] = ("1",)
-
-    def __post_init__(self) -> None:
-        self.y = np.zeros_like(self.x)
-
-
-def moving(places: list[float], angles: list[float] | None = None) -> OneBlock:
-    x = np.array(places)[:, None]
-    angle = np.zeros_like(x) if angles is None else np.array(angles)[:, None]
-    return OneBlock(time=np.array([0.1 * step for step in range(len(places))]), x=x, angle=angle)
+def moving(places: list[float], angles: list[float] | None = None) -> Frames:
+    """Return frames of a unit square, 0.1 s apart."""
+    return blocks_at(places, 0.0, angles or 0.0, time=0.1 * np.arange(len(places)), size=(1.0, 1.0))
 
 
 def test_panels_are_even_in_the_way_and_not_in_time() -> None:
@@ -55,15 +37,11 @@ def test_panels_are_even_in_the_way_and_not_in_time() -> None:
     assert (chosen[0], chosen[-1]) == (0, 153)
 
 
-def test_turning_on_the_spot_counts_as_motion() -> None:
-    frames = moving([0.0] * 5, [0.0, 0.0, 0.5, 1.0, 1.0])
-    path = path_travelled(frames, drawable_frames(frames))
+def test_turning_on_the_spot_counts_as_motion_and_going_back_does_not_cancel() -> None:
+    turning, returning = moving([0.0] * 5, [0.0, 0.0, 0.5, 1.0, 1.0]), moving([0.0, 1.0, 0.0])
+    path = path_travelled(turning, drawable_frames(turning))
     assert list(path) == pytest.approx([0.0, 0.0, np.sqrt(0.125), np.sqrt(0.5), np.sqrt(0.5)])
-
-
-def test_going_back_and_forth_does_not_cancel() -> None:
-    frames = moving([0.0, 1.0, 0.0])
-    assert path_travelled(frames, drawable_frames(frames))[-1] == 2.0
+    assert path_travelled(returning, drawable_frames(returning))[-1] == 2.0
 
 
 def test_riding_on_a_moving_support_is_no_way() -> None:
@@ -95,10 +73,8 @@ def test_a_failed_run_is_drawn_as_far_as_it_has_numbers() -> None:
 def test_a_run_without_a_number_or_a_block_is_refused() -> None:
     with pytest.raises(InvalidInputError, match="no frame to draw"):
         drawable_frames(moving([float("nan")]))
-    nobody = moving([0.0])
-    nobody.names = ()
     with pytest.raises(InvalidInputError, match="no block to draw"):
-        drawable_frames(nobody)
+        drawable_frames(replace(moving([0.0]), names=()))
 
 
 def test_times_find_their_nearest_frames_in_the_order_given() -> None:

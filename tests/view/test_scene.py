@@ -1,6 +1,6 @@
 """Where blocks are drawn."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,35 +10,16 @@ from matplotlib.path import Path as MatplotlibPath
 from numpy.typing import NDArray
 
 from blocksim.scenario.motion import MotionPieces
+from blocksim.simulation.frames import Frames
 from blocksim.view.panel import Canvas
 from blocksim.view.run_data import Support
 from blocksim.view.scene import corners, draw_scene, readable_scale
 from blocksim.view.style import GROUND_COLOUR, block_colour, styled_figure
 from blocksim.view.window import extent_of
+from tests.view.made_up import blocks_at
 
-Floats = NDArray[np.float64]
-
-
-@dataclass
-class Frames:
-    time: Floats
-    x: Floats
-    y: Floats
-    angle: Floats
-    size_x: Floats
-    size_y: Floats
-    names: tuple[str, ...]
-
-
-FRAMES = Frames(
-    time=np.array([0.0, 1.0]),
-    x=np.array([[0.1], [0.2]]),
-    y=np.array([[0.025], [0.016]]),
-    angle=np.array([[0.0], [-np.pi / 2]]),
-    size_x=np.array([0.032]),
-    size_y=np.array([0.050]),
-    names=("1",),
-)
+FRAMES = blocks_at([0.1, 0.2], [0.025, 0.016], [0.0, -np.pi / 2])
+PAIR = replace(blocks_at([[0.1, 0.2]], 0.025), names=("pier", "2"))
 
 
 def test_a_block_turned_clockwise_lies_on_its_right_side() -> None:
@@ -68,23 +49,12 @@ def drawn(frames: Frames, support: Support, points_per_mm: float = 1.0) -> Canva
     return canvas
 
 
-PAIR = Frames(
-    time=np.array([0.0]),
-    x=np.array([[0.1, 0.2]]),
-    y=np.array([[0.025, 0.025]]),
-    angle=np.zeros((1, 2)),
-    size_x=np.array([0.032, 0.032]),
-    size_y=np.array([0.050, 0.050]),
-    names=("pier", "2"),
-)
-
-
 def blocks_of(canvas: Canvas) -> list[PolyCollection]:
     """Return what is drawn for fixed and for free blocks."""
     return [artist for artist in canvas.axes.collections if isinstance(artist, PolyCollection)]
 
 
-def points(path: MatplotlibPath) -> Floats:
+def points(path: MatplotlibPath) -> NDArray[np.float64]:
     """Return the points (mm) of a path."""
     return np.asarray(path.vertices, dtype=float)
 
@@ -114,15 +84,7 @@ def test_a_fixed_block_s_long_name_does_not_take_the_others_names_away() -> None
 
 
 def test_a_moving_fixed_block_is_dashed_where_it_was() -> None:
-    frames = Frames(
-        time=np.array([0.0, 1.0]),
-        x=np.array([[0.1], [0.11]]),
-        y=np.full((2, 1), 0.025),
-        angle=np.zeros((2, 1)),
-        size_x=np.array([0.032]),
-        size_y=np.array([0.050]),
-        names=("1",),
-    )
+    frames = blocks_at([0.1, 0.11], 0.025)
     motion = MotionPieces(np.array([0.0, 1.0]), np.array([[0.0, 0.01, 0.0, 0.0]]), 0.01)
     dashed = drawn(frames, Support(fixed=(True,), motion=motion)).axes.collections[1]
     assert dashed.get_zorder() < 1.0  # under the blocks

@@ -1,40 +1,20 @@
 """Which part of the plane a strip shows."""
 
-from dataclasses import dataclass, field
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedSegment
 from blocksim.scenario.motion import MotionPieces
+from blocksim.simulation.frames import Frames
 from blocksim.view.run_data import Support
 from blocksim.view.scene import corners
 from blocksim.view.window import Extent, extent_of, parts_within, turned
-
-Floats = NDArray[np.float64]
-
-
-@dataclass
-class Frames:
-    """One block of 32 x 50 mm at the given places (m) and angles, a second apart."""
-
-    x: Floats
-    y: Floats
-    angle: Floats
-    time: Floats = field(init=False)
-    size_x: Floats = field(default_factory=lambda: np.array([0.032]))
-    size_y: Floats = field(default_factory=lambda: np.array([0.050]))
-    names: tuple[str, ...] = ("1",)
-
-    def __post_init__(self) -> None:
-        self.time = np.arange(len(self.x), dtype=float)
+from tests.view.made_up import blocks_at
 
 
 def frames(*places: tuple[float, float, float]) -> Frames:
-    """Return frames of one block at these x, y (m) and angles (rad)."""
-    x, y, angle = np.array(places).T[:, :, None]
-    return Frames(x, y, angle)
+    """Return frames of one block of 32 x 50 mm at these x, y (m) and angles (rad)."""
+    return blocks_at(*np.array(places).T)
 
 
 def window(shown: Frames, support: Support | None = None) -> Extent:
@@ -42,41 +22,21 @@ def window(shown: Frames, support: Support | None = None) -> Extent:
 
 
 def wall(x0: float, y0: float, x1: float, y1: float) -> PlacedSegment:
-    return PlacedSegment(
-        x0,
-        y0,
-        x1,
-        y1,
-        material=None,
-        extends_start=False,
-        extends_end=False,
-        touches_start=True,
-        touches_end=True,
-    )
+    ends = {"extends_start": False, "extends_end": False, "touches_start": True, "touches_end": True}
+    return PlacedSegment(x0, y0, x1, y1, material=None, **ends)
 
 
 FALLING = frames((0.1, 0.025, 0.0), (0.2, 0.016, -np.pi / 2))
 
 
-def test_the_scene_is_as_large_as_the_corners_with_one_margin() -> None:
+def test_the_scene_holds_every_corner_of_every_frame_with_one_margin_and_the_ground() -> None:
     extent = window(FALLING)
-    points = np.concatenate([corners(FALLING, 0)[0], corners(FALLING, 1)[0]])
-    margins = [
-        points[:, 0].min() - extent.left,
-        extent.right - points[:, 0].max(),
-        extent.top - points[:, 1].max(),
-    ]
-    assert margins == [pytest.approx(margins[0])] * 3
-
-
-def test_the_scene_holds_every_corner_of_every_frame_and_the_ground() -> None:
-    extent = window(FALLING)
-    assert extent.left < 84.0
-    assert extent.right > 225.0
-    assert extent.bottom < 0.0
-    assert extent.top > 50.0
-    assert extent.width < 1.2 * (225 - 84)
-    assert extent.base == 0.0
+    points = np.concatenate([corners(FALLING, frame)[0] for frame in (0, 1)])
+    (left, _), (right, top) = points.min(axis=0), points.max(axis=0)
+    margin = left - extent.left
+    assert [extent.right - right, extent.top - top] == [pytest.approx(margin)] * 2
+    assert 0.0 < margin < 0.1 * (right - left)
+    assert extent.bottom < extent.base == 0.0
 
 
 def test_the_ground_below_a_block_is_shown_however_deep_but_no_other() -> None:
@@ -91,27 +51,19 @@ def test_the_ground_below_a_block_is_shown_however_deep_but_no_other() -> None:
     assert falling.bottom < falling.base
 
 
-def test_corners_of_the_ground_are_shown_where_they_are_near() -> None:
+def test_corners_of_the_ground_and_walls_are_shown_where_they_are_near_and_not_elsewhere() -> None:
     block = frames((0.1, 0.025, 0.0))
-    near = window(block, Support(profile=((0.05, 0.01), (0.06, 0.0))))
-    far = window(block, Support(profile=((-5.0, 0.01), (-4.0, 0.0))))
     plain = window(block)
-    assert near.left < 50.0 < plain.left
-    assert far == plain
-
-
-def test_level_ground_within_a_profile_needs_no_room_of_its_own() -> None:
-    block = frames((0.1, 0.025, 0.0))
-    assert window(block, Support(profile=((-300.0, 0.0), (0.1, 0.0), (300.0, 0.0)))) == window(block)
-
-
-def test_near_walls_are_shown_and_far_ones_are_not() -> None:
-    block = frames((0.1, 0.025, 0.0))
+    assert window(block, Support(profile=((0.05, 0.01), (0.06, 0.0)))).left < 50.0 < plain.left
+    for hidden in (
+        Support(profile=((-5.0, 0.01), (-4.0, 0.0))),
+        Support(profile=((-300.0, 0.0), (0.1, 0.0), (300.0, 0.0))),  # level
+        Support(walls=(wall(3.0, 0.0, 3.0, 100.0),)),
+    ):
+        assert window(block, hidden) == plain
     near = window(block, Support(walls=(wall(0.15, 0.0, 0.15, 100.0),)))
-    far = window(block, Support(walls=(wall(3.0, 0.0, 3.0, 100.0),)))
     assert 150.0 < near.right < 200.0
     assert 50.0 < near.top < 250.0  # no more of a high wall than shows that it continues
-    assert far == window(block)
 
 
 def test_a_moving_support_is_shown_wherever_it_comes() -> None:
