@@ -8,6 +8,7 @@ import pytest
 
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InvalidInputError
+from tests.analysis.broken import Mistake, rendered, written
 
 EXPERIMENTS = Path(__file__).parents[2] / "scenarios" / "experiments"
 HEADER = "block,quantity,unit,replicate,value\n"
@@ -102,26 +103,21 @@ def test_table_knows_its_blocks_quantities_and_repeats(centres: ExperimentTable)
 
 def test_units_become_millimetres_and_degrees(tmp_path: Path) -> None:
     rows = "1,x,cm,1,2.5\n1,y,m,1,-0.001\n1,rotation,rad,1,-1.5707963267948966\n1,left,in,1,1\n"
-    table = load_table(write(tmp_path, HEADER + rows))
+    table = load_table(written(tmp_path, HEADER + rows))
     assert list(table.data["value"]) == pytest.approx([25.0, -1.0, -90.0, 25.4], rel=1e-15)
     assert list(table.data["unit"]) == ["mm", "mm", "deg", "mm"]
 
 
-def test_values_already_in_millimetres_keep_their_bits(tmp_path: Path) -> None:
-    table = load_table(write(tmp_path, HEADER + "1,x,mm,1,71.69\n1,rotation,deg,1,-89.9\n"))
-    assert list(table.data["value"]) == [71.69, -89.9]
-
-
 def test_spreadsheet_habits_are_understood(tmp_path: Path) -> None:
     text = '\ufeff# a "note"\r\n\r\nvalue , block,quantity,unit,replicate\r\n 1.5e1, "left, ""L""" ,x,mm, 2\r\n'
-    table = load_table(write(tmp_path, text))
+    table = load_table(written(tmp_path, text))
     assert table.blocks == ('left, "L"',)
     assert list(table.values('left, "L"', "x").items()) == [(2, 15.0)]
     assert table.notes == ('a "note"',)
 
 
 def test_a_single_repeat_has_no_scatter(tmp_path: Path) -> None:
-    statistics = load_table(write(tmp_path, HEADER + "1,x,mm,1,3\n")).statistics()
+    statistics = load_table(written(tmp_path, HEADER + "1,x,mm,1,3\n")).statistics()
     assert list(statistics.columns) == ["block", "quantity", "unit", "mean", "s", "n", "minimum", "maximum"]
     assert np.isnan(statistics["s"].iloc[0])
     assert list(statistics["n"]) == [1]
@@ -130,26 +126,18 @@ def test_a_single_repeat_has_no_scatter(tmp_path: Path) -> None:
 @pytest.mark.parametrize("cell", ["", " ", "NaN", "nan", "NA"])
 def test_a_repeat_without_a_value_is_left_out_and_told(tmp_path: Path, cell: str) -> None:
     rows = f"1,x,mm,1,3\n1,x,mm,2,{cell}\n1,x,mm,3,5\n"
-    path = write(tmp_path, HEADER + rows)
+    path = written(tmp_path, HEADER + rows)
     table = load_table(path)
     assert (list(table.values("1", "x").items()), table.summaries()[0].n) == ([(1, 3.0), (3, 5.0)], 2)
     assert table.messages == (f"{path}: replicate 2 has no x of block '1'",)
-
-
-def test_many_missing_values_are_counted(tmp_path: Path) -> None:
-    table = load_table(write(tmp_path, HEADER + "1,x,mm,1,3\n1,x,mm,2,\n1,x,mm,3,\n1,x,mm,4,NaN\n"))
+    table = load_table(written(tmp_path, HEADER + rows + f"1,x,mm,4,{cell}\n1,x,mm,5,\n2,x,mm,2,7\n"))
     assert table.messages[0].endswith("replicate 2 has no x of block '1' (and 2 more such rows)")
-
-
-def test_a_repeat_whose_row_is_absent_is_no_mistake(tmp_path: Path) -> None:
-    table = load_table(write(tmp_path, HEADER + "1,x,mm,1,3\n2,x,mm,1,4\n2,x,mm,2,5\n"))
-    assert [row.n for row in table.summaries()] == [1, 2]
-    assert table.messages == ()
+    assert [row.n for row in table.summaries()] == [2, 1]  # a row that is absent is no mistake
 
 
 def test_blocks_that_a_run_lacks_are_shown_where_they_are_first_named(tmp_path: Path) -> None:
     rows = "# source\n1,x,mm,1,3\nleft,x,mm,1,4\n9,x,mm,1,4\n9,x,mm,2,4\n"
-    table = load_table(write(tmp_path, HEADER + rows))
+    table = load_table(written(tmp_path, HEADER + rows))
     with pytest.raises(InvalidInputError) as caught:
         table.refuse_unknown(("1", "2"), "the run")
     path = tmp_path / "table.csv"
@@ -163,156 +151,58 @@ def test_blocks_that_a_run_lacks_are_shown_where_they_are_first_named(tmp_path: 
     )
 
 
-def write(folder: Path, text: str) -> Path:
-    path = folder / "table.csv"
-    path.write_bytes(text.encode())
-    return path
-
-
-GOOD = "1,x,mm,1,16\n"
-BROKEN = {
-    "unit of another kind": (
-        HEADER + "1,x,kg,1,16\n",
-        ("table.csv:2: unit: 'kg' is not the unit of a length; write mm, cm or m\n    2 | 1,x,kg,1,16\n      |     ^^"),
-    ),
-    "unit that does not exist": (
-        HEADER + "1,x,millimetrs,1,16\n",
-        (
-            "table.csv:2: unit: 'millimetrs' is not the unit of a length; write mm, cm or m\n"
-            "    2 | 1,x,millimetrs,1,16\n"
-            "      |     ^^^^^^^^^^"
-        ),
-    ),
-    "no unit": (
-        HEADER + "1,rotation,,1,16\n",
-        "table.csv:2: unit: no unit; write deg or rad\n    2 | 1,rotation,,1,16\n      |            ^",
-    ),
-    "pure number as an angle": (
-        HEADER + "1,rotation,1,1,16\n",
-        (
-            "table.csv:2: unit: '1' is not the unit of an angle; write deg or rad\n"
-            "    2 | 1,rotation,1,1,16\n"
-            "      |            ^"
-        ),
-    ),
-    "unit that would take pint hours": (
-        HEADER + "1,x,mm**9**9**9,1,16\n",
-        (
-            "table.csv:2: unit: 'mm**9**9**9' is not the unit of a length; write mm, cm or m\n"
-            "    2 | 1,x,mm**9**9**9,1,16\n"
-            "      |     ^^^^^^^^^^^"
-        ),
-    ),
-    "word for a number": (
-        HEADER + "1,x,mm,1,about 16\n",
-        (
-            "table.csv:2: value: 'about 16' is not a number, write it as 71.69 or 7.169e1\n"
-            "    2 | 1,x,mm,1,about 16\n"
-            "      |          ^^^^^^^^"
-        ),
-    ),
+NO_NUMBER = "is not a number, write it as 71.69 or 7.169e1"
+NO_REPEAT = "is not a repeat number; count repeats as 1, 2, 3, ..."
+QUANTITIES = "allowed: x, y, rotation, left, right"
+LENGTH, ANGLE = "is not the unit of a length; write mm, cm or m", "is not the unit of an angle; write deg or rad"
+BROKEN: dict[str, tuple[str, *tuple[Mistake, ...]]] = {
+    "unit of another kind": ("1,x,kg,1,16", (2, "unit", f"'kg' {LENGTH}", "kg")),
+    "unit that does not exist": ("1,x,millimetrs,1,16", (2, "unit", f"'millimetrs' {LENGTH}", "millimetrs")),
+    "no unit": ("1,rotation,,1,16", (2, "unit", "no unit; write deg or rad", ",1,16")),
+    "pure number as an angle": ("1,rotation,1,2,16", (2, "unit", f"'1' {ANGLE}", "1,2")),
+    "unit that would take pint hours": ("1,x,mm**9**9**9,1,16", (2, "unit", f"'mm**9**9**9' {LENGTH}", "mm**9**9**9")),
+    "word for a number": ("1,x,mm,1,about 16", (2, "value", f"'about 16' {NO_NUMBER}", "about 16")),
     "no value in any repeat": (
-        HEADER + "1,x,mm,1,nan\n1,x,mm,2,\n2,x,mm,1,3\n",
-        ("table.csv:2: value: block '1', x has no value in any replicate\n    2 | 1,x,mm,1,nan\n      |          ^^^"),
+        "1,x,mm,1,nan\n1,x,mm,2,\n2,x,mm,1,3",
+        (2, "value", "block '1', x has no value in any replicate", "nan"),
     ),
-    "dash for a missing value": (
-        HEADER + "1,x,mm,1,-\n",
-        (
-            "table.csv:2: value: '-' is not a number, write it as 71.69 or 7.169e1\n"
-            "    2 | 1,x,mm,1,-\n"
-            "      |          ^"
-        ),
-    ),
+    "dash for a missing value": ("1,x,mm,1,-", (2, "value", f"'-' {NO_NUMBER}", "-")),
     "missing value given twice": (
-        HEADER + "1,x,mm,1,3\n1,x,mm,1,\n",
-        (
-            "table.csv:3: replicate: block '1', x, replicate 1 is already given in line 2\n"
-            "    3 | 1,x,mm,1,\n"
-            "      |        ^"
-        ),
+        "1,x,mm,1,3\n1,x,mm,1,",
+        (3, "replicate", "block '1', x, replicate 1 is already given in line 2", "1"),
     ),
-    "infinite after reading": (
-        HEADER + "1,x,mm,1,1e999\n",
-        "table.csv:2: value: '1e999' is too large\n    2 | 1,x,mm,1,1e999\n      |          ^^^^^",
-    ),
-    "too far away": (
-        HEADER + "1,x,m,1,1e7\n",
-        (
-            "table.csv:2: value: '1e7' is too large, at most 1e+09 mm or degrees\n"
-            "    2 | 1,x,m,1,1e7\n"
-            "      |         ^^^"
-        ),
-    ),
+    "infinite after reading": ("1,x,mm,1,1e999", (2, "value", "'1e999' is too large", "1e999")),
+    "too far away": ("1,x,m,1,1e7", (2, "value", "'1e7' is too large, at most 1e+09 mm or degrees", "1e7")),
     "mistyped quantity": (
-        HEADER + "1,rotaton,deg,1,16\n",
-        (
-            "table.csv:2: quantity: unknown quantity 'rotaton', did you mean 'rotation'?\n"
-            "    2 | 1,rotaton,deg,1,16\n"
-            "      |   ^^^^^^^"
-        ),
+        "1,rotaton,deg,1,16",
+        (2, "quantity", "unknown quantity 'rotaton', did you mean 'rotation'?", "rotaton"),
     ),
-    "foreign quantity": (
-        HEADER + "1,mass,kg,1,16\n",
-        (
-            "table.csv:2: quantity: unknown quantity 'mass', allowed: x, y, rotation, left, right\n"
-            "    2 | 1,mass,kg,1,16\n"
-            "      |   ^^^^"
-        ),
-    ),
-    "repeat is no number": (
-        HEADER + "1,x,mm,first,16\n",
-        (
-            "table.csv:2: replicate: 'first' is not a repeat number; count repeats as 1, 2, 3, ...\n"
-            "    2 | 1,x,mm,first,16\n"
-            "      |        ^^^^^"
-        ),
-    ),
-    "repeat zero": (
-        HEADER + "1,x,mm,0,16\n",
-        (
-            "table.csv:2: replicate: '0' is not a repeat number; count repeats as 1, 2, 3, ...\n"
-            "    2 | 1,x,mm,0,16\n"
-            "      |        ^"
-        ),
-    ),
-    "nameless block": (
-        HEADER + " ,x,mm,1,16\n",
-        "table.csv:2: block: the block has no name\n    2 |  ,x,mm,1,16\n      |  ^",
-    ),
+    "foreign quantity": ("1,mass,kg,1,16", (2, "quantity", f"unknown quantity 'mass', {QUANTITIES}", "mass")),
+    "repeat is no number": ("1,x,mm,first,16", (2, "replicate", f"'first' {NO_REPEAT}", "first")),
+    "repeat zero": ("1,x,mm,0,16", (2, "replicate", f"'0' {NO_REPEAT}", "0")),
+    "nameless block": (" ,x,mm,1,16", (2, "block", "the block has no name", ",x")),
+    "long name": ("b" * 101 + ",x,mm,1,16", (2, "block", "the name has 101 characters, at most 100", "b" * 101)),
+    "no rows": ("", (1, "", "the table has a header and no rows", HEADER.strip())),
     "measured twice": (
-        HEADER + GOOD + "2,x,mm,1,70\n1,x,cm,1,1.7\n",
-        (
-            "table.csv:4: replicate: block '1', x, replicate 1 is already given in line 2\n"
-            "    4 | 1,x,cm,1,1.7\n"
-            "      |        ^"
-        ),
+        "1,x,mm,1,16\n2,x,mm,1,70\n1,x,cm,1,17",
+        (4, "replicate", "block '1', x, replicate 1 is already given in line 2", "1,17"),
     ),
     "several mistakes, by line": (
-        HEADER + "1,x,mm,1,a\n1,z,mm,2,b\n1,x,mm\n",
-        (
-            "table.csv:2: value: 'a' is not a number, write it as 71.69 or 7.169e1\n"
-            "    2 | 1,x,mm,1,a\n"
-            "      |          ^\n"
-            "table.csv:3: quantity: unknown quantity 'z', allowed: x, y, rotation, left, right\n"
-            "    3 | 1,z,mm,2,b\n"
-            "      |   ^\n"
-            "table.csv:3: value: 'b' is not a number, write it as 71.69 or 7.169e1\n"
-            "    3 | 1,z,mm,2,b\n"
-            "      |          ^\n"
-            "table.csv:4: 3 cells where the header has 5 columns\n"
-            "    4 | 1,x,mm\n"
-            "      | ^^^^^^"
-        ),
+        "1,x,mm,1,a\n1,z,mm,2,b\n1,x,mm",
+        (2, "value", f"'a' {NO_NUMBER}", "a"),
+        (3, "quantity", f"unknown quantity 'z', {QUANTITIES}", "z"),
+        (3, "value", f"'b' {NO_NUMBER}", "b"),
+        (4, "", "3 cells where the header has 5 columns", "1,x,mm"),
     ),
 }
 
 
-@pytest.mark.parametrize(("text", "message"), BROKEN.values(), ids=BROKEN.keys())
+@pytest.mark.parametrize(("rows", "mistakes"), [(rows, told) for rows, *told in BROKEN.values()], ids=BROKEN.keys())
 def test_a_broken_table_is_explained_where_it_is_broken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, message: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: str, mistakes: list[Mistake]
 ) -> None:
-    write(tmp_path, text)
+    written(tmp_path, HEADER + rows)
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InvalidInputError) as caught:
         load_table("table.csv")
-    assert str(caught.value) == message
+    assert str(caught.value) == rendered(HEADER + rows, mistakes)

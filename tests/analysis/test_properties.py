@@ -7,6 +7,7 @@ import pytest
 
 from blocksim.analysis.properties import load_properties
 from blocksim.errors import InvalidInputError
+from tests.analysis.broken import Mistake, rendered, written
 
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks_properties.csv"
 HEADER = "property,unit,value\n"
@@ -36,64 +37,30 @@ def test_properties_cannot_be_changed_by_accident() -> None:
         values["width"] = 1.0  # type: ignore[index]
 
 
-BROKEN = {
-    "mistyped": (
-        "widht,mm,32\n",
-        ("table.csv:2: property: unknown property 'widht', did you mean 'width'?\n    2 | widht,mm,32\n      | ^^^^^"),
-    ),
+BROKEN: dict[str, tuple[str, Mistake]] = {
+    "mistyped": ("widht,mm,32", (2, "property", "unknown property 'widht', did you mean 'width'?", "widht")),
     "unit": (
-        "unit_weight,kg/m^3,26.7\n",
-        (
-            "table.csv:2: unit: 'kg/m^3' is not a unit of unit_weight, write for example N/m^3\n"
-            "    2 | unit_weight,kg/m^3,26.7\n"
-            "      |             ^^^^^^"
-        ),
+        "unit_weight,kg/m^3,26.7",
+        (2, "unit", "'kg/m^3' is not a unit of unit_weight, write for example N/m^3", "kg/m^3"),
     ),
-    "no unit": (
-        "width,,32\n",
-        ("table.csv:2: unit: nothing is not a unit of width, write for example m\n    2 | width,,32\n      |       ^"),
-    ),
-    "number": (
-        "width,mm,32mm\n",
-        (
-            "table.csv:2: value: '32mm' is not a number, write it as 71.69 or 7.169e1\n"
-            "    2 | width,mm,32mm\n"
-            "      |          ^^^^"
-        ),
-    ),
+    "no unit": ("width,,32", (2, "unit", "nothing is not a unit of width, write for example m", ",32")),
+    "number": ("width,mm,32mm", (2, "value", "'32mm' is not a number, write it as 71.69 or 7.169e1", "32mm")),
     "impossible": (
-        "poisson_ratio,1,0.5\n",
-        (
-            "table.csv:2: value: 0.5 is impossible, it must be above -1 and below 0.5\n"
-            "    2 | poisson_ratio,1,0.5\n"
-            "      |                 ^^^"
-        ),
+        "poisson_ratio,1,0.5",
+        (2, "value", "0.5 is impossible, it must be above -1 and below 0.5", "0.5"),
     ),
-    "negative": (
-        "width,mm,-32\n",
-        (
-            "table.csv:2: value: -0.032 m is impossible, it must be above 0 m\n"
-            "    2 | width,mm,-32\n"
-            "      |          ^^^"
-        ),
-    ),
-    "twice": (
-        "width,mm,32\nwidth,mm,33\n",
-        "table.csv:3: property: 'width' is given twice\n    3 | width,mm,33\n      | ^^^^^",
-    ),
-    "empty": (
-        "",
-        ("table.csv:1: the table has a header and no rows\n    1 | property,unit,value\n      | ^^^^^^^^^^^^^^^^^^^"),
-    ),
+    "negative": ("width,mm,-32", (2, "value", "-0.032 m is impossible, it must be above 0 m", "-32")),
+    "twice": ("width,mm,32\nwidth,mm,33", (3, "property", "'width' is given twice", "width")),
+    "empty": ("", (1, "", "the table has a header and no rows", HEADER.strip())),
 }
 
 
-@pytest.mark.parametrize(("rows", "message"), BROKEN.values(), ids=BROKEN.keys())
+@pytest.mark.parametrize(("rows", "mistake"), BROKEN.values(), ids=BROKEN.keys())
 def test_a_broken_table_is_explained_where_it_is_broken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: str, message: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: str, mistake: Mistake
 ) -> None:
-    (tmp_path / "table.csv").write_text(HEADER + rows)
+    written(tmp_path, HEADER + rows)
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InvalidInputError) as caught:
         load_properties("table.csv")
-    assert str(caught.value) == message
+    assert str(caught.value) == rendered(HEADER + rows, [mistake])

@@ -137,8 +137,7 @@ def test_blocksim_is_called_once_a_run_and_the_others_once_a_step() -> None:
     assert 0.0 < Nonsmooth(Stepping(1e-3)).call_time(scene) < 0.01
 
 
-@pytest.mark.parametrize("quick", [False, True])
-@pytest.mark.parametrize("restitution", [0.0, 0.2])
+@pytest.mark.parametrize(("restitution", "quick"), [(0.0, False), (0.2, True)])
 def test_every_engine_has_one_finest_setting_finer_than_its_levels(restitution: float, quick: bool) -> None:
     series = three_blocks_series(restitution, quick=quick)
     assert {one.engine for one in series} == {"pymunk", "Box2D", "explicit", "non-smooth"}

@@ -10,7 +10,6 @@ import pytest
 from blocksim.kernels.arrays import AT_REST
 from blocksim.verification.case import Setting
 from blocksim.verification.collapse import BEFORE_FIRST_IMPACT, FINAL, collapse, staircase
-from blocksim.verification.symmetry import distance, states
 
 if TYPE_CHECKING:
     from tests.conftest import Start
@@ -35,10 +34,3 @@ def test_soft_blocks_come_to_rest_where_stiff_ones_do() -> None:
     for block, x, tolerance, angle in FINAL:
         assert 1e3 * scene.bodies[block - 1].x == pytest.approx(x, abs=tolerance)
         assert np.degrees(scene.bodies[block - 1].angle) == pytest.approx(angle, abs=0.5)
-
-
-def test_order_of_blocks_in_the_file_does_not_matter() -> None:
-    usual, other = states(Setting(), staircase()), states(Setting(), staircase((1, 2, 0)))
-    back = np.argsort((1, 2, 0))
-    assert distance(usual[0], other[0][back]) < 1e-9
-    assert distance(usual[1], other[1][back]) < 5e-5

@@ -1,4 +1,4 @@
-"""Restitution beyond case V4: the phase of a step at which a contact begins, and the particle spacing."""
+"""Impacts beyond V3 to V6 and V16: the phase of a step at which a contact begins, and the particle spacing."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import pytest
 
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Setting
-from blocksim.verification.flight import SPACINGS
-from blocksim.verification.impacts import LANDINGS
+from blocksim.verification.flight import SPACINGS, dropped
+from blocksim.verification.impacts import COLLISION_STEPS, LANDINGS, collision
 from blocksim.verification.scene import HEIGHT, WIDTH
 from blocksim.verification.throws import GOLDEN, Throw, Thrower, kinetic_energy
 
@@ -38,6 +38,12 @@ def test_particle_spacing_changes_no_bit_of_an_impact(landing: str) -> None:
     assert len(states) == 1
 
 
+def test_particle_spacing_changes_no_bit_of_a_bounce() -> None:
+    falls = [dropped(Setting(), spacing).to_time(0.15) for spacing in SPACINGS]
+    assert len({fall.bodies.tobytes() for fall in falls}) == 1
+    assert falls[0].bodies[0].vy > 0.0
+
+
 @pytest.mark.parametrize("law", BOTH)
 @pytest.mark.parametrize("speed", [0.1, 1.0, 10.0])
 @pytest.mark.parametrize("e", [0.3, 0.5, 0.8, 1.0])
@@ -60,3 +66,13 @@ def test_corner_beside_the_centre_leaves_with_the_asked_speed(e: float) -> None:
     body = Thrower(Setting(), e).throw(Throw(TILT))
     arm = forms.lowest_corner(WIDTH, HEIGHT, TILT)[0]
     assert body.vy + body.spin * arm == pytest.approx(e, abs=0.003)
+
+
+@pytest.mark.parametrize("law", BOTH)
+@pytest.mark.parametrize("e", [0.0, 0.2, 1.0])
+def test_the_two_blocks_meet_and_lose_energy(law: str, e: float) -> None:
+    scene = collision(Setting(law=law), e)
+    before = scene.kinetic
+    scene.to_step(COLLISION_STEPS)
+    assert scene.bodies[0].vx < 0.6
+    assert scene.kinetic < before

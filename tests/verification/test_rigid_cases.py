@@ -115,25 +115,19 @@ def rows_missed(wrong: Wrong, case_id: str) -> list[Row]:
     return missed(run_case(case, wrong))
 
 
+CASES_OF = {
+    ("restitution", 0.95): ("V3", "V4", "V5", "V16"),
+    ("ground_friction", 1.03): ("V7", "V8", "V9", "V10", "V17"),
+    ("ground_friction", 0.0): ("V12",),
+    ("ground_friction", 0.01): ("V18",),
+    ("friction", 1.2): ("V22",),
+    ("gravity", 1.01): ("V1", "V24"),
+    ("gravity", 1.03): ("V11",),
+}
+
+
 @pytest.mark.parametrize(
-    ("name", "factor", "case_id"),
-    [
-        ("restitution", 0.95, "V3"),
-        ("restitution", 0.95, "V4"),
-        ("restitution", 0.95, "V5"),
-        ("restitution", 0.95, "V16"),
-        ("ground_friction", 1.03, "V7"),
-        ("ground_friction", 1.03, "V8"),
-        ("ground_friction", 1.03, "V9"),
-        ("ground_friction", 1.03, "V10"),
-        ("ground_friction", 1.03, "V17"),
-        ("ground_friction", 0.0, "V12"),
-        ("ground_friction", 0.01, "V18"),
-        ("friction", 1.2, "V22"),
-        ("gravity", 1.01, "V1"),
-        ("gravity", 1.03, "V11"),
-        ("gravity", 1.01, "V24"),
-    ],
+    ("name", "factor", "case_id"), [(*key, case) for key, ids in CASES_OF.items() for case in ids]
 )
 def test_a_wrong_number_is_noticed(name: str, factor: float, case_id: str) -> None:
     assert rows_missed(Wrong(scheme="nonsmooth", name=name, factor=factor), case_id)
