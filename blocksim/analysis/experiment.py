@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.csv_table import Cell, Table, raise_problems, read_table
-from blocksim.scenario.spelling import suggestion
+from blocksim.scenario.spelling import listed, suggestion
 from blocksim.scenario.units import unit_factor
 
 if TYPE_CHECKING:
@@ -148,8 +148,7 @@ class ExperimentTable:
 
 def quoted(names: Sequence[str]) -> str:
     """List names for a message, a long list cut short."""
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(f"'{name}'" for name in names[:MOST_NAMES]) + more
+    return listed([f"'{name}'" for name in names], MOST_NAMES)
 
 
 def _frame(rows: Iterable[Any]) -> "pd.DataFrame":

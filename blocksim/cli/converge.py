@@ -15,6 +15,7 @@ from blocksim.cli import options
 from blocksim.cli.output import note, number, show, table_lines
 from blocksim.cli.prepare import read_scenario, tell_compilation
 from blocksim.errors import ExitCode
+from blocksim.scenario.spelling import listed
 from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.folder import RESULTS
 from blocksim.simulation.own_files import is_picture, refuse_foreign
@@ -200,10 +201,9 @@ def _flips(study: Study) -> list[str]:
     lines = []
     for before, level in pairwise(study.levels):
         if level.flipped:
-            named = ", ".join(map(_short, level.flipped[:MOST_BLOCKS]))
-            more = f" and {len(level.flipped) - MOST_BLOCKS} more" if len(level.flipped) > MOST_BLOCKS else ""
+            named = listed(list(map(_short, level.flipped)), MOST_BLOCKS)
             blocks = "block" if len(level.flipped) == 1 else "blocks"
-            lines.append(f"outcome differs between {before.value:g} and {level.value:g}: {blocks} {named}{more}")
+            lines.append(f"outcome differs between {before.value:g} and {level.value:g}: {blocks} {named}")
     return lines
 
 

@@ -1,4 +1,4 @@
-"""Known words that a misspelt one may mean."""
+"""Words in messages: lists that are cut short, and known words that a misspelt one may mean."""
 
 import difflib
 from collections.abc import Iterable, Sequence
@@ -9,6 +9,12 @@ MIN_BEGINNING = 3
 MAX_COMPARED = 1000
 """Known words that a misspelt one is compared with; a file of a million mistakes must not take minutes."""
 MAX_LISTED = 10
+
+
+def listed(names: Sequence[object], most: int) -> str:
+    """Return names separated by commas; of more than `most` the first, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(map(str, names[:most])) + more
 
 
 def nearest(word: str, candidates: Iterable[str], most: int) -> str | None:

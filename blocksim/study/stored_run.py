@@ -10,6 +10,7 @@ from pathlib import Path
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, load_stored
+from blocksim.scenario.spelling import listed
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.stores.hdf5_reader import read_frames
@@ -74,13 +75,8 @@ def _instead(place: Path) -> str:
     below = sorted({path.parents[1] for path in place.glob(f"*/*/{files.DONE}")})
     for found, told in ((begun, "but an unfinished run"), (sweeps, "but a sweep"), (below, "but runs of scenarios")):
         if found:
-            return f"no finished run in this folder, {told}: {_listed(found)}"
+            return f"no finished run in this folder, {told}: {listed(found, MOST_FOLDERS)}"
     return "no finished run in this folder; blocksim run SCENARIO makes one"
-
-
-def _listed(folders: Sequence[Path]) -> str:
-    more = len(folders) - MOST_FOLDERS
-    return ", ".join(map(str, folders[:MOST_FOLDERS])) + (f" and {more} more" if more > 0 else "")
 
 
 @dataclass(frozen=True)

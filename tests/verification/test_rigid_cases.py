@@ -126,9 +126,7 @@ CASES_OF = {
 }
 
 
-@pytest.mark.parametrize(
-    ("name", "factor", "case_id"), [(*key, case) for key, ids in CASES_OF.items() for case in ids]
-)
+@pytest.mark.parametrize(("name", "factor", "case_id"), [(*key, case) for key, ids in CASES_OF.items() for case in ids])
 def test_a_wrong_number_is_noticed(name: str, factor: float, case_id: str) -> None:
     assert rows_missed(Wrong(scheme="nonsmooth", name=name, factor=factor), case_id)
 

@@ -27,7 +27,6 @@ from blocksim.analysis.metrics.metric import (
     Pair,
     Row,
     complete_repeats,
-    listed,
     shown_name,
 )
 from blocksim.extras import loaded
@@ -96,7 +95,7 @@ def _find(evidence: Evidence) -> Findings:
     members = np.column_stack([pair.values for pair in chosen])
     members = members[np.isfinite(members).all(axis=1)]
     if incomplete:
-        messages.append(f"left out, as not all positions were measured: replicate {listed(incomplete)}")
+        messages.append(f"left out, as not all positions were measured: replicate {incomplete}")
     complaint = _complaint(repeats, members)
     found = None if complaint else hotelling(repeats, members)
     if found is None:

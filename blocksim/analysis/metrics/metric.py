@@ -11,6 +11,7 @@ import numpy as np
 from blocksim.analysis.compare import limits
 from blocksim.analysis.experiment import MOST_NAMES, ExperimentTable, Statistics
 from blocksim.analysis.members import Members
+from blocksim.scenario.spelling import listed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -139,15 +140,11 @@ def shown_name(pair: Pair) -> str:
     return f"{pair.measured.quantity} of block {pair.measured.block}"
 
 
-def complete_repeats(pairs: Sequence[Pair]) -> "tuple[NDArray[np.float64], list[int]]":
-    """Return the replicates in which all p pairs were measured, shape (n, p), and the numbers of the others."""
+def complete_repeats(pairs: Sequence[Pair]) -> "tuple[NDArray[np.float64], str]":
+    """Return the replicates in which all p pairs were measured, shape (n, p), and a list of the others."""
     every = sorted({replicate for pair in pairs for replicate in pair.repeats})
     complete = [replicate for replicate in every if all(replicate in pair.repeats for pair in pairs)]
     rows = [[pair.repeats[replicate] for pair in pairs] for replicate in complete]
-    return np.array(rows, dtype=float).reshape(len(rows), len(pairs)), sorted(set(every) - set(complete))
-
-
-def listed(replicates: Sequence[int]) -> str:
-    """Return numbers of replicates for a message, a long list cut short."""
-    more = f" and {len(replicates) - MOST_NAMES} more" if len(replicates) > MOST_NAMES else ""
-    return ", ".join(map(str, replicates[:MOST_NAMES])) + more
+    return np.array(rows, dtype=float).reshape(len(rows), len(pairs)), listed(
+        sorted(set(every) - set(complete)), MOST_NAMES
+    )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blocksim.analysis.intervals import interval, lower_bound
-from blocksim.analysis.metrics.metric import Column, Evidence, Findings, Form, Metric, Row, complete_repeats, listed
+from blocksim.analysis.metrics.metric import Column, Evidence, Findings, Form, Metric, Row, complete_repeats
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,7 +45,7 @@ def _find(evidence: Evidence) -> Findings:
     order = sorted({*found, *seen}, key=lambda name: (-found[name], -seen[name], name))
     messages = ["blocks: " + ", ".join(blocks)]
     if incomplete:
-        messages.append(f"left out, as not all rotations were measured: replicate {listed(incomplete)}")
+        messages.append(f"left out, as not all rotations were measured: replicate {incomplete}")
     if seen:
         messages.append("at least: one-sided 95 % limit of the measured share")
     return Findings(tuple(_row(name, found, seen) for name in order), tuple(messages))
