@@ -36,6 +36,7 @@ RULES: dict[str, tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]] =
     "sizes": (re.compile(r"\b\d+(?:\.\d+)? (?:B|kB|KB|KiB|MB|MiB|GB|GiB)\b"), "SIZE"),
     "versions": (re.compile(r"\b\d+\.\d+(?:\.\d+)*(?:(?:a|b|rc|\.dev|\.post)\d+)?\b"), "VERSION"),
     "hashes": (re.compile(r"(?<!\.)\b[0-9a-f]{12,64}\b"), "HASH"),
+    "counts": (re.compile(r"\b\d+(?= (?:frames|steps|stored|now)\b)"), "COUNT"),
     "numbers": (re.compile(r"\b\d+\.\d+(?:e[+-]?\d+)?\b"), "NUMBER"),
     "digits": (re.compile(r"\b\d+\.\d+(?:e[+-]?\d+)?\b"), lambda found: f"{float(found[0]):.9g}"),
 }

@@ -142,6 +142,7 @@ def test_an_update_by_several_processes_is_refused(case: pytest.Pytester) -> Non
         ("dates", "at 2026-11-22T19:51:26+00:00, until 2026-11-23", "at DATE, until DATE"),
         ("sizes", "3 files, 1.5 MB", "3 files, SIZE"),
         ("versions", "numba 0.68.1, blocksim 1.2.0.dev3, 7 cores", "numba VERSION, blocksim VERSION, 7 cores"),
+        ("counts", "all 302 frames, 20 stored, exit code 65", "all COUNT frames, COUNT stored, exit code 65"),
         ("numbers", "row 4 by -0.5 mm, 1.2e-07 s", "row 4 by -NUMBER mm, NUMBER s"),
         ("digits", "0.3333333333333333, -1.0000000000000002e-07, 12.5, 31", "0.333333333, -1e-07, 12.5, 31"),
         ("hashes", "sha256 0123456789abcdef, 1234", "sha256 HASH, 1234"),

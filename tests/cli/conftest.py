@@ -14,6 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from blocksim.cli.app import app
+from tests.view.report.folders import write_run
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SOFT = ("--set", "contact.stiffness_scale=0.001")
@@ -90,6 +91,14 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
         app, ["run", str(SCENARIOS / "three_blocks_nominal.toml"), *SOFT, "--out", str(folder), "--quiet"]
     )
     assert result.exit_code == 0, result.output
+    return folder
+
+
+@pytest.fixture(scope="session")
+def made_up_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Give the folder of a run with made-up motion, whose numbers no solver decides; not to be changed."""
+    folder = tmp_path_factory.mktemp("made_up") / "run"
+    write_run(folder)
     return folder
 
 

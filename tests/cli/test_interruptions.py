@@ -20,7 +20,7 @@ from tests.sizes import in_all
 NOMINAL = "scenarios/three_blocks_nominal.toml"
 LONG = ("run", NOMINAL, *SOFT, "--set", "time.end=10", "--set", "time.stop_at_rest=false", "--quiet")
 OFTEN = ("--checkpoint-every", "50 ms")
-OTHERS = [pytest.param(number, marks=pytest.mark.long) for number in (signal.SIGTERM, signal.SIGUSR1)]
+OTHERS = [pytest.param(number, marks=pytest.mark.long) for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)]
 Wanted = dict[str, object]
 
 
@@ -130,8 +130,13 @@ def test_stopped_run_continues_to_the_same_bits(
     _, err = running.communicate(timeout=PATIENCE)
     assert time.monotonic() - sent < 10.0
     assert running.returncode == 75
-    assert f"stopped by {number.name}" in err
-    assert "continue with --resume (checkpoint at step " in err
+    assert (
+        f"interrupted: stopped by {number.name}; partial results are in out\ncontinue with --resume (checkpoint" in err
+    )
+    assert "Traceback" not in err
+    assert told(tmp_path / "out")["status"] == "interrupted"
+    assert frames_in(tmp_path / "out") > 1
+    assert not (tmp_path / "out" / "done.json").exists()
     step = told(tmp_path / "out")["steps"]
     running = process(*LONG, "--out", "out", "--resume")
     running.communicate(timeout=PATIENCE)

@@ -20,7 +20,7 @@ MEASURED = "block,quantity,unit,replicate,value\nblock,x,mm,1,41\nblock,x,mm,2,4
 
 
 @pytest.fixture
-def place(blocksim: Command, finished: Path, finished_sweep: Path, tmp_path: Path) -> Path:
+def place(blocksim: Command, made_up_run: Path, finished_sweep: Path, tmp_path: Path) -> Path:
     """Give a folder with a run, a sweep, tables, broken scenarios and files of other people."""
     slide = (SCENARIOS / "slide.toml").read_text()
     texts = {
@@ -39,7 +39,7 @@ def place(blocksim: Command, finished: Path, finished_sweep: Path, tmp_path: Pat
     for name, text in texts.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
-    (tmp_path / "run").symlink_to(finished)
+    (tmp_path / "run").symlink_to(made_up_run)
     (tmp_path / "sweep").symlink_to(finished_sweep)
     assert blocksim("--version").code == 0
     return tmp_path

@@ -32,45 +32,62 @@ def test_without_experiment_the_answer_is_where_the_blocks_end(blocksim: Command
     assert answer.err == ""
 
 
-def test_finished_run_is_shown_again(blocksim: Command) -> None:
+def test_finished_run_is_shown_again_quietly_and_as_json(blocksim: Command) -> None:
     first, second = blocksim(*RUN), blocksim(*RUN)
-    assert second.code == 0
-    assert second.out == first.out
+    assert (second.code, second.out) == (0, first.out)
     assert second.err.startswith("already computed; rerun with --overwrite: results/three_blocks_nominal/")
+    for again in ((), ("--overwrite",)):
+        quiet = blocksim(*RUN, "--quiet", *again)
+        assert (quiet.out, quiet.err) == (first.out, "")
+        answer = blocksim(*RUN, "--json", *again)
+        data = json.loads(answer.out)
+        assert (answer.err, data["summary"]["status"]) == ("", "finished")
+        assert [row["block"] for row in data["final"]] == ["1", "2", "3"]
+        assert Path(data["folder"], "done.json").is_file()
     assert "already computed" not in blocksim(*RUN, "--overwrite").err
 
 
-@pytest.mark.parametrize("name", ["run.h5", "final.csv"])
+@pytest.mark.parametrize("name", ["run.json", "final.csv", "run.h5"])
 @pytest.mark.parametrize("resume", [(), ("--resume",)])
-def test_finished_run_that_was_cut_is_no_result(blocksim: Command, name: str, resume: tuple[str, ...]) -> None:
-    slide = ("run", "scenarios/slide.toml", "--set", "contact.stiffness_scale=0.01", "--out", "out", "--quiet")
-    assert blocksim(*slide).code == 0
-    path = Path("out") / name
-    os.truncate(path, path.stat().st_size // 2)
-    answer = blocksim(*slide, *resume)
+def test_finished_run_that_was_cut_is_no_result(
+    blocksim: Command, copied: Path, name: str, resume: tuple[str, ...]
+) -> None:
+    os.truncate(copied / name, (copied / name).stat().st_size // 2)
+    answer = blocksim(*RUN, "--out", "copied", *resume)
     assert (answer.code, answer.out) == (65, "")
-    assert (
-        answer.err == f"{path}: does not have the checksum in run.json: changed since the run; rerun with --overwrite\n"
-    )
-    assert blocksim(*slide, "--overwrite").code == 0
-    assert blocksim(*slide).code == 0
+    changed = "does not have the checksum in run.json: changed since the run; rerun with --overwrite\n"
+    assert answer.err.startswith(f"copied/{name}: {'' if name == 'run.json' else changed}")
+    assert blocksim(*RUN, "--out", "copied", "--overwrite").code == 0
+    assert blocksim(*RUN, "--out", "copied").code == 0
 
 
-def test_quiet_prints_nothing_but_the_answer(blocksim: Command) -> None:
-    loud = blocksim(*RUN)
-    for _ in range(2):
-        answer = blocksim(*RUN, "--quiet")
-        assert (answer.out, answer.err) == (loud.out, "")
+def test_damaged_copy_of_the_scenario_is_written_anew(blocksim: Command, copied: Path) -> None:
+    whole = (copied / "scenario.toml").read_text()
+    (copied / "scenario.toml").write_text(whole[:200])
+    assert blocksim(*RUN, "--out", copied).code == 0
+    assert (copied / "scenario.toml").read_text() == whole
 
 
-def test_json_is_all_there_is(blocksim: Command) -> None:
-    for _ in range(2):
-        answer = blocksim(*RUN, "--json")
-        data = json.loads(answer.out)
-        assert answer.err == ""
-        assert data["summary"]["status"] == "finished"
-        assert [row["block"] for row in data["final"]] == ["1", "2", "3"]
-        assert Path(data["folder"], "done.json").is_file()
+def test_changed_experiment_is_judged_by_and_kept_without_running_again(blocksim: Command, tmp_path: Path) -> None:
+    shutil.copytree(SCENARIOS, tmp_path / "mine")
+    table = tmp_path / "mine" / "experiments" / "three_blocks.csv"
+    scenario = tmp_path / "mine" / "three_blocks_nominal.toml"
+    mine = ("run", "mine/three_blocks_nominal.toml", *SOFT, "--out", "out")
+    whole = table.read_text()
+    table.write_text(whole.replace("\n3,", "\n4,"))
+    refused = blocksim(*mine)
+    assert (refused.code, "measures block '4'" in refused.err, Path("out").exists()) == (65, True, False)
+    table.write_text(whole)
+    assert "[71.69, 78.53]" in blocksim(*mine).out
+    table.write_text(whole.replace("2,x,mm,1,71.69", "2,x,mm,1,60.00"))
+    again = blocksim(*mine)
+    assert "[60.00, 78.53]" in again.out
+    assert again.err.startswith("already computed")
+    assert (tmp_path / "out" / "experiment.csv").read_bytes() == table.read_bytes()
+    assert "[60.00, 78.53]" in blocksim("compare", "out").out
+    scenario.write_text(scenario.read_text().partition("[experiment]")[0])
+    assert "verdict" not in blocksim(*mine).out
+    assert not (tmp_path / "out" / "experiment.csv").exists()
 
 
 def test_failed_run_is_reported_kept_and_76(blocksim: Command) -> None:
@@ -86,57 +103,6 @@ def test_failed_run_is_reported_kept_and_76(blocksim: Command) -> None:
     assert json.loads(Path("out/run.json").read_text())["status"] == "failed"
     assert not Path("out/done.json").exists()
     assert blocksim(*RUN, "--set", "contact.max_overlap=1e-9", "--out", "out").code == 73
-
-
-def test_experiment_of_other_blocks_is_reported_before_the_run(blocksim: Command, tmp_path: Path) -> None:
-    shutil.copytree(SCENARIOS, tmp_path / "mine")
-    table = tmp_path / "mine" / "experiments" / "three_blocks.csv"
-    table.write_text(table.read_text().replace("\n3,", "\n4,"))
-    answer = blocksim("run", "mine/three_blocks_nominal.toml", "--out", "out")
-    assert answer.code == 65
-    assert "measures block '4'" in answer.err
-    assert not (tmp_path / "out").exists()
-
-
-def test_damaged_copy_of_the_scenario_is_written_anew(blocksim: Command, copied: Path) -> None:
-    whole = (copied / "scenario.toml").read_text()
-    (copied / "scenario.toml").write_text(whole[:200])
-    assert blocksim(*RUN, "--out", copied).code == 0
-    assert (copied / "scenario.toml").read_text() == whole
-
-
-@pytest.mark.parametrize("name", ["run.json", "final.csv", "run.h5"])
-def test_damaged_finished_run_is_reported_and_can_be_repeated(blocksim: Command, copied: Path, name: str) -> None:
-    whole = (copied / name).read_bytes()
-    (copied / name).write_bytes(whole[: min(5000, len(whole) // 2)])
-    answer = blocksim(*RUN, "--out", copied)
-    assert answer.code == 65
-    assert name in answer.err
-    assert blocksim(*RUN, "--out", copied, "--overwrite").code == 0
-
-
-def test_changed_experiment_table_is_judged_by_and_kept_without_running_again(
-    blocksim: Command, tmp_path: Path
-) -> None:
-    shutil.copytree(SCENARIOS, tmp_path / "mine")
-    table = tmp_path / "mine" / "experiments" / "three_blocks.csv"
-    mine = ("run", "mine/three_blocks_nominal.toml", *SOFT)
-    assert "[71.69, 78.53]" in blocksim(*mine, "--out", "out").out
-    table.write_text(table.read_text().replace("2,x,mm,1,71.69", "2,x,mm,1,60.00"))
-    again = blocksim(*mine, "--out", "out")
-    assert "[60.00, 78.53]" in again.out
-    assert (tmp_path / "out" / "experiment.csv").read_bytes() == table.read_bytes()
-    assert "[60.00, 78.53]" in blocksim("compare", "out").out
-
-
-def test_experiment_taken_out_of_the_scenario_is_compared_no_more(blocksim: Command, tmp_path: Path) -> None:
-    shutil.copytree(SCENARIOS, tmp_path / "mine")
-    scenario = tmp_path / "mine" / "three_blocks_nominal.toml"
-    mine = ("run", "mine/three_blocks_nominal.toml", *SOFT, "--out", "out")
-    assert "verdict" in blocksim(*mine).out
-    scenario.write_text(scenario.read_text().partition("[experiment]")[0])
-    assert "verdict" not in blocksim(*mine).out
-    assert not (tmp_path / "out" / "experiment.csv").exists()
 
 
 WALL = """schema = 1
