@@ -8,8 +8,10 @@ from blocksim.errors import BlocksimError
 from blocksim.scenario import Document
 from blocksim.study import design as mode
 from blocksim.study.design import Combinations, Together
-from blocksim.study.plan import cases_of, with_sweep
+from blocksim.study.plan import with_sweep
 from blocksim.study.sampling import design_of
+from tests.golden import Golden
+from tests.study.plans import cases, plan_of
 
 
 def test_combinations_go_through_the_last_key_first() -> None:
@@ -42,83 +44,76 @@ def document(nominal: Document, tmp_path: Path) -> Document:
     return Document(data, nominal.source, tmp_path)
 
 
-def told(document: Document, text: str) -> tuple[int, str]:
+def told(document: Document, text: str) -> str:
+    """Return what a user is told of a table with this text."""
     (document.folder / "samples.csv").write_text(text)
     with pytest.raises(BlocksimError) as caught:
         with_sweep(document, None)
-    return int(caught.value.exit_code), str(caught.value)
+    assert caught.value.exit_code == 65
+    return str(caught.value)
 
 
 def test_every_row_is_a_case(document: Document) -> None:
     (document.folder / "samples.csv").write_text(GOOD)
-    read = with_sweep(document, None)
-    sweep = read.build().sweep
-    assert sweep is not None
-    cases = cases_of(read, sweep)
-    assert [tuple(case.settings.values()) for case in cases] == [
+    made = cases(document)
+    assert [tuple(case.settings.values()) for case in made] == [
         ("10.1 mm", 0.19, "nonsmooth", 3),
         ("9.8 mm", 0.21, "nonsmooth", 4),
     ]
-    assert list(cases[0].settings)[:2] == ["structures.0.overlap", "friction.block_block.kinetic"]
-    assert [case.problem for case in cases] == ["", ""]
+    assert list(made[0].settings)[:2] == ["structures.0.overlap", "friction.block_block.kinetic"]
+    assert [case.problem for case in made] == ["", ""]
 
 
 def test_the_design_of_a_table_is_the_same_as_that_of_its_lists(document: Document) -> None:
     (document.folder / "samples.csv").write_text(GOOD)
-    named, listed = document.build().sweep, with_sweep(document, None).build().sweep
-    assert named is not None
-    assert listed is not None
+    named, listed = plan_of(document), plan_of(with_sweep(document, None))
     assert (named.mode, listed.mode) == ("table", "list")
     assert list(design_of(named)) == list(design_of(listed))
 
 
 def test_cells_may_have_units_of_their_own(document: Document) -> None:
     (document.folder / "samples.csv").write_text("structures.0.overlap,ground.tilt\n10 mm,1 deg\n0.9 cm,0\n")
-    sweep = with_sweep(document, None).build().sweep
-    assert sweep is not None
-    assert sweep.vary == {"structures.0.overlap": ("10 mm", "0.9 cm"), "ground.tilt": ("1 deg", 0)}
+    assert plan_of(with_sweep(document, None)).vary == {
+        "structures.0.overlap": ("10 mm", "0.9 cm"),
+        "ground.tilt": ("1 deg", 0),
+    }
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("gravity,gravty\n1,2\n", "1: unknown key, did you mean 'gravity'?"),
-        ("gravity,name\n1,2\n", "1: name cannot be varied"),
-        ("gravity,a..b\n1,2\n", '1: "a..b" is not a dotted key'),
-        ("gravity,\n1,2\n", "1: this column has no name"),
-        ("gravity,gravity\n1,2\n", "1: column given twice"),
-        ("gravity,gravity [m/s^2]\n1,2\n", "1: key given twice"),
-        ("gravity [m/ss]\n1\n", "1: unknown unit 'ss'"),
-        ("gravity []\n1\n", "1: the unit is missing"),
-        ("gravity\n", "1: no row follows the header; every row is one case"),
-        ("# nothing\n", "the table is empty"),
-        ("gravity\n1\n2,3\n", "3: 2 cells where the header has 1 columns"),
-        ("gravity,time.end\n1,\n", "2: time.end: this cell is empty"),
-        ('time.end\n"[1, 2]"\n', "2: time.end: a cell holds one value, not a list"),
-        ("time.end\n{a = 1}\n", "2: time.end: a cell holds one value, not a table"),
-        ("gravity [m/s^2]\n1\nx\n", "3: gravity [m/s^2]: 'x' is not a number"),
-        ("gravity [mm]\n1\n", '2: gravity [mm]: "1 mm" is a length; an acceleration of at least 0'),
-        ("contact.restitution\n0.1\n1.5\n", "3: contact.restitution: 1.5 is too large"),
-        ("contact.restitution\n0.1\nnan\n", "3: contact.restitution: nan is not a finite number"),
-        ("time.scheme\nexplicit\nnonsmoth\n", '3: time.scheme: "nonsmoth" is unknown, did you mean'),
-        ("blocks.brick.material\nsteel\n", '2: blocks.brick.material: unknown material "steel"'),
-    ],
-)
-def test_mistakes_are_shown_where_they_are(document: Document, text: str, message: str) -> None:
-    code, found = told(document, text)
-    assert code == 65
-    assert found.startswith(str(document.folder / "samples.csv"))
-    assert message in found
+WRONG = [
+    "gravity,gravty\n1,2\n",
+    "gravity,name\n1,2\n",
+    "gravity,a..b\n1,2\n",
+    "gravity,\n1,2\n",
+    "gravity,gravity\n1,2\n",
+    "gravity,gravity [m/s^2]\n1,2\n",
+    "gravity [m/ss]\n1\n",
+    "gravity []\n1\n",
+    "gravity\n",
+    "# nothing\n",
+    "gravity\n1\n2,3\n",
+    "gravity,time.end\n1,\n",
+    'time.end\n"[1, 2]"\n',
+    "time.end\n{a = 1}\n",
+    "gravity [m/s^2]\n1\nx\n",
+    "gravity [mm]\n1\n",
+    "contact.restitution\n0.1\n1.5\n",
+    "contact.restitution\n0.1\nnan\n",
+    "time.scheme\nexplicit\nnonsmoth\n",
+    "blocks.brick.material\nsteel\n",
+]
 
 
-def test_mistakes_in_a_table_are_reported_together(document: Document) -> None:
-    _, found = told(document, "contact.restitution,time.end [mm],graviti\n2,1,1\n0.1,1,1\n3,1,1\n")
-    assert found.count("samples.csv:") == 5
+def test_mistakes_are_shown_where_they_are(document: Document, golden: Golden) -> None:
+    golden("\n".join(told(document, text) for text in WRONG))
+
+
+def test_mistakes_in_a_table_are_reported_together(document: Document, golden: Golden) -> None:
+    golden(told(document, "contact.restitution,time.end [mm],graviti\n2,1,1\n0.1,1,1\n3,1,1\n"))
 
 
 def test_a_wrong_number_far_down_is_found(document: Document, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mode, "MOST_TRIED", 3)
-    _, found = told(document, "contact.restitution\n" + "".join(f"{k / 1000}\n" for k in range(1, 400)) + "1.5\n0.1\n")
+    found = told(document, "contact.restitution\n" + "".join(f"{k / 1000}\n" for k in range(1, 400)) + "1.5\n0.1\n")
     assert "samples.csv:401: contact.restitution: 1.5 is too large" in found
 
 

@@ -15,6 +15,7 @@ from blocksim.study import run as single
 from blocksim.study.compare import compare_run
 from blocksim.study.run import run
 from blocksim.study.stored_run import find_run
+from tests.golden import Golden
 from tests.study.conftest import SCENARIOS
 
 if TYPE_CHECKING:
@@ -119,59 +120,39 @@ def test_status_in_run_json_counts(copy: Path) -> None:
         compare_run(copy)
 
 
-def test_scenario_without_its_run_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputMissingError, match=r"first: blocksim run .*tower\.toml"):
-        find_run(SCENARIOS / "tower.toml")
-
-
-def test_scenario_run_with_other_values_names_the_newest_of_those_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_scenario_without_its_run_says_what_to_do_or_which_run_there_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, golden: Golden
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    tower = SCENARIOS / "tower.toml"
+    golden(refused(tower), "none")
     values = {"time.end": 0.001, "contact.stiffness_scale": 0.001}
-    kept = blocksim.run(blocksim.load(SCENARIOS / "tower.toml", values), out="results/tower/other")
-    assert kept.folder is not None
-    with pytest.raises(InputMissingError, match=r"runs with other values .* the newest: results/tower/other"):
-        find_run(SCENARIOS / "tower.toml")
+    blocksim.run(blocksim.load(tower, values), out="results/tower/other")
+    golden(refused(tower), "with other values")
 
 
-def test_folder_that_holds_a_sweep_only_names_the_sweep(tmp_path: Path) -> None:
-    (tmp_path / "sweep-a").mkdir()
-    (tmp_path / "sweep-a" / "sweep.csv").touch()
-    with pytest.raises(InputMissingError, match=r"no finished run in this folder, but a sweep: .*sweep-a"):
-        find_run(tmp_path)
+def refused(path: Path) -> str:
+    """Return why there is no run to be found."""
+    with pytest.raises((InputMissingError, InvalidInputError)) as caught:
+        find_run(path)
+    return str(caught.value)
 
 
-def test_folder_above_results_names_those_that_hold_runs(tmp_path: Path) -> None:
-    for name in ("quay", "wall"):
-        (tmp_path / name / "a1").mkdir(parents=True)
-        (tmp_path / name / "a1" / "done.json").touch()
-    with pytest.raises(InputMissingError, match=r"no finished run in this folder, but runs .*: .*/quay, .*/wall$"):
-        find_run(tmp_path)
-
-
-def test_folder_whose_only_run_was_stopped_names_that_run(tmp_path: Path) -> None:
-    (tmp_path / "a1").mkdir()
-    (tmp_path / "a1" / "run.h5").touch()
-    with pytest.raises(InputMissingError, match=r"no finished run in this folder, but an unfinished run: .*/a1$"):
-        find_run(tmp_path)
-
-
-def test_sweep_in_place_of_a_run_is_called_a_sweep(tmp_path: Path) -> None:
-    (tmp_path / "sweep.csv").touch()
-    with pytest.raises(InputMissingError, match="this is a sweep, not a run"):
-        find_run(tmp_path)
-
-
-def test_table_in_place_of_a_run_is_called_a_table(tmp_path: Path) -> None:
-    (tmp_path / "measured.csv").write_text("block,quantity,unit,replicate,value\n1,x,mm,1,16\n")
-    with pytest.raises(InvalidInputError, match=r"measured\.csv: this is a table, not a run"):
-        find_run(tmp_path / "measured.csv")
-
-
-def test_folder_without_a_run_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(InputMissingError, match="no finished run in this folder"):
-        find_run(tmp_path)
-    with pytest.raises(InputMissingError, match="no such run folder or scenario file"):
-        find_run(tmp_path / "nix")
+@pytest.mark.parametrize(
+    ("files", "place"),
+    [
+        (["sweep-a/sweep.csv"], ""),
+        (["quay/a1/done.json", "wall/a1/done.json"], ""),
+        (["a1/run.h5"], ""),
+        (["sweep.csv"], ""),
+        (["measured.csv"], "measured.csv"),
+        ([], ""),
+        ([], "nix"),
+    ],
+    ids=["sweep below", "results above", "stopped run", "sweep", "table", "empty", "nothing"],
+)
+def test_folder_without_a_run_says_what_it_is(tmp_path: Path, golden: Golden, files: list[str], place: str) -> None:
+    for name in files:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("block,quantity,unit,replicate,value\n1,x,mm,1,16\n" * name.startswith("measured"))
+    golden(refused(tmp_path / place))

@@ -11,8 +11,8 @@ from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.simulation import simulate_into
 from blocksim.study.stored_run import stored_run
-
-SCENARIOS = Path(__file__).parents[2] / "scenarios"
+from tests.golden import Golden
+from tests.study.conftest import SCENARIOS
 
 
 @pytest.fixture
@@ -23,30 +23,24 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
-def test_a_finished_run_needs_no_remark(folder: Path) -> None:
-    stored = stored_run(folder)
-    assert stored.remark == ""
-    assert stored.scenario.name == "bounce"
-    assert len(stored.frames) == 5
-
-
-def test_newest_of_several_runs_is_named(folder: Path) -> None:
-    assert stored_run(folder.parent).remark == ""
+def test_newest_of_several_finished_runs_is_named_and_one_needs_no_remark(folder: Path) -> None:
+    stored = stored_run(folder.parent)
+    assert (stored.remark, stored.scenario.name, len(stored.frames)) == ("", "bounce", 5)
     shutil.copytree(folder, folder.parent / "older")
     os.utime(folder.parent / "older" / "done.json", (0.0, 0.0))
     assert stored_run(folder.parent).remark == f"{folder.parent}: the newest of 2 runs is taken: {folder}"
     assert stored_run(folder).remark == ""
 
 
-def test_what_did_not_finish_is_reported(folder: Path) -> None:
+def test_what_did_not_finish_is_reported(folder: Path, golden: Golden) -> None:
     summary = json.loads((folder / "run.json").read_text())
-    for status, told in (("failed", "this run has failed (why)"), ("interrupted", "this run was interrupted (why)")):
+    for status in ("failed", "interrupted"):
         (folder / "run.json").write_text(json.dumps({**summary, "status": status, "reason": "why"}))
-        assert stored_run(folder).remark == f"{folder}: {told}; its 5 frames end at 0.002002 s"
+        golden(stored_run(folder).remark, status)
     (folder / "run.json").write_text("{")
-    assert "run.json of this run is damaged" in stored_run(folder).remark
+    golden(stored_run(folder).remark, "damaged")
     (folder / "run.json").unlink()
-    assert "this run was killed or is still running" in stored_run(folder).remark
+    golden(stored_run(folder).remark, "gone")
 
 
 def test_missing_and_damaged_frames_are_reported(folder: Path) -> None:

@@ -5,25 +5,27 @@ import os
 import signal
 from multiprocessing import active_children
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.scenario import Document, load_scenario
-from blocksim.study.plan import with_sweep
+from blocksim.study.plan import Values, with_sweep
 from blocksim.study.progress import Manifest, Shard
 from blocksim.study.rows import MOVEMENT
 from blocksim.study.run import run
 from blocksim.study.sweep import sweep
 from blocksim.study.sweep_folder import prepare
 from blocksim.study.sweep_table import read_sweep
+from tests.golden import Golden
 from tests.study.conftest import SCENARIOS
 
 KINETIC = "friction.block_block.kinetic"
 END = "time.end"
 OVERLAP = "contact.max_overlap"
-TWO = {KINETIC: [0.2, 0.25]}
+TWO: dict[str, Values] = {KINETIC: [0.2, 0.25]}
 ROCKING = {
     "schema": 1,
     "name": "rocking",
@@ -67,12 +69,6 @@ def test_rows_distinguish_what_rocked_back_from_what_stands(keep_cases: bool, tm
     assert table["first_moved_s"][1] == pytest.approx(0.01, abs=1e-5)  # the first frame
 
 
-def test_columns_are_values_outcome_verdict_and_ends(quick: Document, tmp_path: Path) -> None:
-    table = sweep(quick, TWO, out=tmp_path).table
-    ends = [f"{block}.{name}" for block in "123" for name in ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")]
-    assert list(table.columns) == ["case", KINETIC, "status", "reason", "seconds", "inside", *MOVEMENT, *ends]
-
-
 def test_cases_are_drawn_as_the_command_draws_them(quick: Document, tmp_path: Path) -> None:
     drawn = {KINETIC: {"from": 0.2, "to": 0.25}}
     tables = [
@@ -85,39 +81,31 @@ def test_cases_are_drawn_as_the_command_draws_them(quick: Document, tmp_path: Pa
     assert not tables[0].equals(tables[2])
 
 
-def test_folder_holds_plan_table_and_manifest(quick: Document, tmp_path: Path) -> None:
+def test_folder_holds_plan_table_and_manifest_and_the_plan_repeats_the_sweep(quick: Document, tmp_path: Path) -> None:
     result = sweep(quick, TWO, out=tmp_path)
     files = {"sweep.toml", "sweep.json", "sweep.csv", "manifest.jsonl", "timings.csv", "experiment.csv"}
     assert {path.name for path in tmp_path.iterdir()} == files
+    ends = [f"{block}.{name}" for block in "123" for name in ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")]
+    assert list(result.table.columns) == ["case", KINETIC, "status", "reason", "seconds", "inside", *MOVEMENT, *ends]
     pd.testing.assert_frame_equal(read_sweep(tmp_path).table, result.table, check_exact=True)
     timings = pd.read_csv(tmp_path / "timings.csv")
     assert timings["case"].tolist() == result.table["case"].tolist()
     assert (timings["seconds"] > 0.0).all()
-
-
-def test_kept_cases_are_runs(nominal: Document, tmp_path: Path) -> None:
-    short = nominal.with_values({END: 0.01})
-    result = sweep(short, TWO, out=tmp_path, jobs=1, keep_cases=True)
-    assert sorted(result.table["case"]) == sorted(path.name for path in (tmp_path / "cases").iterdir())
-    case = tmp_path / "cases" / result.table["case"][1]
-    assert (case / "run.h5").is_file()
-    scenario = load_scenario(case / "scenario.toml")
-    assert scenario.friction.block_block.kinetic == 0.25
-    assert scenario.sweep is None
-
-
-def test_equal_cases_are_kept_in_one_folder(quick: Document, tmp_path: Path) -> None:
-    table = sweep(quick, {END: [0.01, "10 ms", "0.01 s"]}, jobs=2, out=tmp_path, keep_cases=True).table
-    assert len(list((tmp_path / "cases").iterdir())) == 1
-    assert table["status"].tolist() == ["finished"] * 3
-    assert len(set(table["case"])) == 1
-
-
-def test_plan_is_a_scenario_that_repeats_the_sweep(quick: Document, tmp_path: Path) -> None:
-    first = sweep(quick, TWO, out=tmp_path)
     again = sweep(tmp_path / "sweep.toml", out=tmp_path)
-    assert again.table["case"].tolist() == first.table["case"].tolist()
+    assert again.table["case"].tolist() == result.table["case"].tolist()
     assert len(lines(tmp_path)) == 2
+
+
+def test_kept_cases_are_runs_in_a_folder_for_each_different_one(quick: Document, tmp_path: Path) -> None:
+    vary: dict[str, Values] = {END: [0.01, "10 ms", 0.005]}
+    result = sweep(quick, vary, out=tmp_path, jobs=2, keep_cases=True)
+    assert result.table["status"].tolist() == ["finished"] * 3
+    cases = result.table["case"].tolist()
+    assert sorted({*cases}) == sorted(path.name for path in (tmp_path / "cases").iterdir())
+    assert cases[0] == cases[1] != cases[2]
+    assert (tmp_path / "cases" / cases[2] / "run.h5").is_file()
+    scenario = load_scenario(tmp_path / "cases" / cases[2] / "scenario.toml")
+    assert (scenario.time.end, scenario.sweep) == (0.005, None)
 
 
 def test_default_folder_is_named_by_what_is_varied(
@@ -160,56 +148,48 @@ def test_first_failure_ends_a_sweep_that_is_to_fail_fast(quick: Document, tmp_pa
     assert len(lines(tmp_path)) == 64
 
 
-def test_overwrite_runs_everything_again(quick: Document, tmp_path: Path) -> None:
-    sweep(quick, TWO, out=tmp_path)
-    before = (tmp_path / "timings.csv").read_text()
-    sweep(quick, TWO, out=tmp_path, overwrite=True)
-    assert len(lines(tmp_path)) == 2
-    assert (tmp_path / "timings.csv").read_text() != before
-
-
-def test_impossible_case_has_a_row_with_the_reason(quick: Document, tmp_path: Path) -> None:
-    result = sweep(quick, {KINETIC: [0.9, 0.2, 0.8]}, out=tmp_path)
-    assert result.table["status"].tolist() == ["invalid", "finished", "invalid"]
+def test_impossible_case_and_one_that_cannot_be_built_have_rows_with_the_reason(
+    nominal: Document, tmp_path: Path
+) -> None:
+    vary: dict[str, Values] = {KINETIC: [0.9, 0.2], "time.step": ["auto", 1e-2]}
+    result = sweep(nominal.with_values({END: 0.01}), vary, out=tmp_path)
+    assert result.table["status"].tolist() == ["invalid", "invalid", "finished", "failed"]
     assert "above static friction" in result.table["reason"][0]
-    assert result.failed == 2
-    assert len(lines(tmp_path)) == 3
+    assert "step" in result.table["reason"][3]
+    assert (result.failed, len(lines(tmp_path))) == (3, 4)
 
 
-def test_case_that_cannot_be_built_does_not_end_the_others(nominal: Document, tmp_path: Path) -> None:
-    short = nominal.with_values({END: 0.01})
-    result = sweep(short, {"time.step": ["auto", 1e-2, 1e-6]}, out=tmp_path)
-    assert result.table["status"].tolist() == ["finished", "failed", "finished"]
-    assert "step" in result.table["reason"][1]
+def content(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
 
 
-def test_other_sweep_in_the_folder_is_not_mixed_in(quick: Document, tmp_path: Path) -> None:
+def test_other_sweep_in_the_folder_is_not_mixed_in_and_overwriting_runs_everything_again(
+    quick: Document, tmp_path: Path
+) -> None:
     sweep(quick, TWO, out=tmp_path)
-    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    before = content(tmp_path)
     with pytest.raises(OutputExistsError, match="contains another sweep; --overwrite"):
         sweep(quick, {KINETIC: [0.1]}, out=tmp_path)
-    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+    assert content(tmp_path) == before
+    sweep(quick, TWO, out=tmp_path, overwrite=True)
+    assert len(lines(tmp_path)) == 2
+    assert (tmp_path / "timings.csv").read_bytes() != before[tmp_path / "timings.csv"]
     result = sweep(quick, {KINETIC: [0.1]}, out=tmp_path, overwrite=True)
     assert result.table[KINETIC].tolist() == [0.1]
 
 
 @pytest.mark.parametrize("overwrite", [False, True])
-def test_sweep_that_is_running_is_left_alone(quick: Document, tmp_path: Path, overwrite: bool) -> None:
-    sweep(quick, TWO, out=tmp_path)
-    running = Manifest(tmp_path / "manifest.jsonl")
-    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    with pytest.raises(OutputExistsError, match="running"):
-        sweep(quick, TWO, out=tmp_path, overwrite=overwrite)
+def test_running_sweep_and_foreign_folder_are_left_alone(quick: Document, tmp_path: Path, overwrite: bool) -> None:
+    sweep(quick, TWO, out=tmp_path / "sweep")
+    running = Manifest(tmp_path / "sweep" / "manifest.jsonl")
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "thesis.tex").write_text("years of work")
+    for name, told in (("sweep", "running"), ("thesis", "not a sweep")):
+        before = content(tmp_path / name)
+        with pytest.raises(OutputExistsError, match=told):
+            sweep(quick, TWO, out=tmp_path / name, overwrite=overwrite)
+        assert content(tmp_path / name) == before
     running.close()
-    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
-
-
-@pytest.mark.parametrize("overwrite", [False, True])
-def test_foreign_folder_is_left_alone(quick: Document, tmp_path: Path, overwrite: bool) -> None:
-    (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(OutputExistsError, match="not a sweep"):
-        sweep(quick, TWO, out=tmp_path, overwrite=overwrite)
-    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
 MINE = {
@@ -226,14 +206,14 @@ def test_overwriting_a_sweep_leaves_all_that_it_did_not_write(quick: Document, t
     short = quick.with_values({END: 0.01})
     first = sweep(short, TWO, out=tmp_path, keep_cases=True, jobs=1).table["case"]
     (tmp_path / "cases" / first[0] / "remarks.txt").write_text("this one looks odd")
-    kept = {path: path.read_bytes() for path in (tmp_path / "cases" / first[0]).iterdir()}
+    kept = content(tmp_path / "cases" / first[0])
     (tmp_path / "cases" / "mine").mkdir()
     for name, text in MINE.items():
         (tmp_path / name).write_text(text)
     again = sweep(short, {KINETIC: [0.1]}, out=tmp_path, overwrite=True)
     assert again.table[KINETIC].tolist() == [0.1]
     assert {name: (tmp_path / name).read_text() for name in MINE} == MINE
-    assert {path: path.read_bytes() for path in (tmp_path / "cases" / first[0]).iterdir()} == kept
+    assert content(tmp_path / "cases" / first[0]) == kept
     assert not (tmp_path / "cases" / first[1]).exists()
 
 
@@ -255,27 +235,31 @@ def test_a_file_of_a_person_in_the_place_of_a_result_stays(
     folder = tmp_path / "sweep"
     prepare(folder, with_sweep(quick, TWO, None).build(), "0123", overwrite=False)
     (folder / name).write_text(text)
-    before = {path: path.read_bytes() for path in folder.iterdir()}
+    before = content(folder)
     with pytest.raises(OutputExistsError, match="not a sweep" if name == "sweep.toml" else name):
         prepare(folder, with_sweep(quick, TWO, None).build(), "0123", overwrite=overwrite)
-    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+    assert content(folder) == before
 
 
-def test_mistake_leaves_no_folder(quick: Document, tmp_path: Path) -> None:
-    wrong = [
-        ({"friction.block_blok": [1]}, {}, "unknown key"),
-        (None, {}, "nothing to vary"),
-        ({"experiment.table": ["a.csv"]}, {}, "experiment.table"),
-        (TWO, {"executor": "ensembel"}, "did you mean 'ensemble'"),
-        (TWO, {"executor": "dask"}, "address of a scheduler"),
-        (TWO, {"executor": "ensemble", "keep_cases": True}, "needs the executor processes"),
-        (TWO, {"scheduler": "tcp://localhost:1", "executor": "processes"}, "needs the executor dask"),
-        (TWO, {"scheduler": "tcp://localhost:1", "keep_cases": True}, "not with a scheduler"),
-        (TWO, {"shard": Shard(0, 2), "overwrite": True}, "cannot overwrite"),
-    ]
-    for vary, options, told in wrong:
-        with pytest.raises(InvalidInputError, match=told):
-            sweep(quick, vary, out=tmp_path / "sweep", **options)  # type: ignore[arg-type]
+WRONG: dict[str, tuple[dict[str, Values] | None, dict[str, Any]]] = {
+    "key": ({"friction.block_blok": [1]}, {}),
+    "nothing": (None, {}),
+    "table": ({"experiment.table": ["a.csv"]}, {}),
+    "executor": (TWO, {"executor": "ensembel"}),
+    "dask alone": (TWO, {"executor": "dask"}),
+    "cases of ensembles": (TWO, {"executor": "ensemble", "keep_cases": True}),
+    "scheduler of processes": (TWO, {"scheduler": "tcp://localhost:1", "executor": "processes"}),
+    "cases of a cluster": (TWO, {"scheduler": "tcp://localhost:1", "keep_cases": True}),
+    "overwriting shard": (TWO, {"shard": Shard(0, 2), "overwrite": True}),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_mistake_is_reported_and_leaves_no_folder(quick: Document, tmp_path: Path, golden: Golden, name: str) -> None:
+    vary, options = WRONG[name]
+    with pytest.raises(InvalidInputError) as caught:
+        sweep(quick, vary, out=tmp_path / "sweep", **options)
+    golden(str(caught.value))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -316,14 +300,11 @@ def test_sweep_without_experiment_has_no_share(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "a,b\n1,2\n", "case,status\n1,2\n1,2,3,4\n"])
-def test_rubbish_for_a_sweep_table_is_refused(tmp_path: Path, text: str) -> None:
+def test_rubbish_for_a_sweep_table_and_a_missing_one_are_refused(tmp_path: Path, text: str) -> None:
+    with pytest.raises(InputMissingError, match="no such file"):
+        read_sweep(tmp_path)
     (tmp_path / "sweep.csv").write_text(text)
     with pytest.raises(InvalidInputError, match=r"sweep\.csv: not the table of a sweep"):
-        read_sweep(tmp_path)
-
-
-def test_missing_sweep_table_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(InputMissingError, match="no such file"):
         read_sweep(tmp_path)
 
 
