@@ -188,7 +188,7 @@ def _notes(scenario: Scenario, runs: _Runs, studies: Iterable[str] | None) -> tu
     """Say what was not studied, and what the numbers cannot mean."""
     notes = []
     if studies is None and not has_particles(scenario):
-        notes.append(f"{effects_note(scenario)}: not studied")
+        notes.append(f"{effects_note(scenario, ['spacing'])}: not studied")
     reasons = {str(row["reason"]) for row in runs.rows.values() if row["status"] == FINISHED}
     if scenario.time.stop_at_rest and "end of simulated time" in reasons:
         notes.append("some runs ended before everything was at rest: their final positions depend on time.end")
@@ -207,7 +207,7 @@ def refinements_of(scenario: Scenario, studies: Iterable[str] | None = None) -> 
         raise InvalidInputError(message)
     chosen = tuple(one for one in _possible(scenario) if one.study in asked)
     if not chosen:
-        raise InvalidInputError(f"nothing to study: {effects_note(scenario)}")
+        raise InvalidInputError(f"nothing to study: {effects_note(scenario, asked)}")
     return chosen
 
 
@@ -223,13 +223,16 @@ def has_particles(scenario: Scenario) -> bool:
     return scenario.contact.model in PARTICLE_MODELS
 
 
-def effects_note(scenario: Scenario) -> str:
-    """Say what is not studied, and why; nothing where all is."""
+def effects_note(scenario: Scenario, asked: Iterable[str]) -> str:
+    """Say what of the asked studies is left out, and why; nothing where none is."""
     if isinstance(scenario.time, Nonsmooth):
         return "contacts are rigid: neither a stiffness nor the particle spacing has an effect"
-    if has_particles(scenario):
-        return "the explicit scheme solves every step exactly and has no tolerance"
-    return f'the particle spacing has no effect on contact.model = "{scenario.contact.model}"'
+    notes = {
+        "spacing": f'the particle spacing has no effect on contact.model = "{scenario.contact.model}"',
+        "tolerance": "the explicit scheme solves every step exactly and has no tolerance",
+    }
+    possible = {one.study for one in _possible(scenario)}
+    return "; ".join(note for name, note in notes.items() if name in asked and name not in possible)
 
 
 def _step(scenario: Scenario, time: Explicit) -> Refinement:
