@@ -32,7 +32,8 @@ def compile_set(name: str, is_open: bool) -> None:
 def _run_smallest(name: str) -> None:
     from blocksim.scenario import scenario_from_mapping  # noqa: PLC0415
     from blocksim.simulation import run_ensemble  # noqa: PLC0415
-    from blocksim.simulation.compilation import CHANGES, PARTICLES, SMALLEST_SCENE, compile_kernels  # noqa: PLC0415
+    from blocksim.simulation.compilation import CHANGES, SMALLEST_SCENE, compile_kernels  # noqa: PLC0415
+    from blocksim.simulation.schemes.explicit import PARTICLES  # noqa: PLC0415
 
     compile_kernels(name)
     if name == PARTICLES:

@@ -22,6 +22,7 @@ from blocksim.kernels.integrate import kinetic_energy, place_all_corners, renew_
 from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
 from blocksim.kernels.shares import add_from_before, divide
 from blocksim.kernels.support import book_support, has_motion, is_support_at_rest, move_support
+from blocksim.kernels.systems import Coupled, Systems, step_systems, survey_systems
 from blocksim.kernels.team import meet
 from blocksim.kernels.travel import look, outruns_lists
 
@@ -53,15 +54,22 @@ def is_supported(bodies: Records, controls: Record) -> bool:
 
 
 @rare_kernel
-def check(world: World) -> int:
+def check(world: World, systems: Systems | None) -> int:
     """Check that the run may continue: finite, no pair too deep in one another, not at rest for the hold time."""
     controls = world.controls[0]
     clock = world.clock[0]
     ledger = world.ledger[0]
     renew_rotations(world.bodies)
-    ledger.travel_work += controls.check_every * controls.step * weights_power(world)
-    ledger.largest_kinetic = max(ledger.largest_kinetic, kinetic_energy(world))
     fastest = fastest_point(world.bodies)
+    kinetic = kinetic_energy(world)
+    power = weights_power(world)
+    if systems is not None:
+        speed, energy, work = survey_systems(systems, world)
+        fastest = max(fastest, speed)
+        kinetic += energy
+        power += work
+    ledger.travel_work += controls.check_every * controls.step * power
+    ledger.largest_kinetic = max(ledger.largest_kinetic, kinetic)
     if math.isinf(fastest):
         return NOT_FINITE
     if clock.ends_at > 0:
@@ -86,7 +94,7 @@ def look_ahead(world: World) -> int:
 
 
 @rare_kernel
-def supervise(world: World, k: int, task: int, step: float) -> int:
+def supervise(world: World, k: int, task: int, step: float, systems: Systems | None) -> int:
     """Let the first thread do something for all while the others wait; return the status code that all go by."""
     meet(world.team)
     if k == 0:
@@ -95,7 +103,7 @@ def supervise(world: World, k: int, task: int, step: float) -> int:
         if task == LOOK:
             world.team[STATUS] = look_ahead(world)
         elif task == CHECK:
-            world.team[STATUS] = check(world)
+            world.team[STATUS] = check(world, systems)
         elif task == MOVE:
             move_support(world, step)
         else:
@@ -165,12 +173,12 @@ def begin_steps(world: World, k: int, step: float) -> bool:
     """Start a step of `step` (s), fix up to which one nothing has to be checked, return whether the run continues."""
     share = world.shares[k]
     if share.steps >= world.clock[0].next_look:
-        share.status = supervise(world, k, LOOK, step)
+        share.status = supervise(world, k, LOOK, step, None)
         if share.status != REACHED:
             return False
     start_all(world.bodies, share.first_body, share.last_body, step)
     if has_motion(world.controls[0]):
-        supervise(world, k, MOVE, step)
+        supervise(world, k, MOVE, step, None)
         return True
     meet(world.team)
     if share.is_started != 0:
@@ -179,14 +187,14 @@ def begin_steps(world: World, k: int, step: float) -> bool:
 
 
 @rare_kernel
-def end_steps(world: World, k: int, step: float) -> bool:
+def end_steps(world: World, k: int, step: float, systems: Systems | None) -> bool:
     """Look at what has to be looked at after some steps; return whether the run continues."""
     share = world.shares[k]
     if has_motion(world.controls[0]):
-        supervise(world, k, BOOK, step)
+        supervise(world, k, BOOK, step, None)
     if share.steps == share.next_check:
         share.next_check += world.controls[0].check_every
-        share.status = supervise(world, k, CHECK, step)
+        share.status = supervise(world, k, CHECK, step, systems)
     if has_ended(world.clock[0], share.steps) and share.status != NOT_FINITE:
         share.status = OVERLAP_LIMIT
     return share.status == REACHED
@@ -201,10 +209,11 @@ def goes_further(clock: Record, share: Record) -> bool:
 
 
 @rare_kernel
-def march(world: World, last_step: int, k: int, team: Integers | None) -> int:
+def march(world: World, last_step: int, k: int, team: Integers | None, systems: Systems | None) -> int:
     """Be thread k of those that step a world until `last_step`, or until something ends the run.
 
-    Without a `team`, which is world.team, what threads exchange is not compiled: a first run is for one thread.
+    Without a `team`, which is world.team, what threads exchange is not compiled: a first run is for one thread. With
+    further `systems` steps do not follow upon one another: each begins when all bodies have ended the one before.
     """
     open_call(world, k, last_step)
     share = world.shares[k]
@@ -217,13 +226,16 @@ def march(world: World, last_step: int, k: int, team: Integers | None) -> int:
             share.until = clock.ends_at
         share.steps += share.is_started
         share.is_started = 1
+        if systems is not None:
+            share.until = share.steps
+            step_systems(systems, world, k, step)
         goes_on = share.steps < share.until
         if team is not None:
             exchange_forces(world, k, step)
         forces_within(world, share, step, goes_on)
         note_depth(clock, share)
         meet(world.team)
-        if not goes_on and not end_steps(world, k, step):
+        if not goes_on and not end_steps(world, k, step, systems):
             break
     return close_call(world, k)
 
@@ -232,7 +244,7 @@ def march(world: World, last_step: int, k: int, team: Integers | None) -> int:
 def march_alone(world: World, last_step: int) -> int:
     """Step a world with one thread; see advance."""
     world.team[TEAM_SIZE] = 1
-    return march(world, last_step, 0, None)
+    return march(world, last_step, 0, None, None)
 
 
 @entry_kernel
@@ -247,7 +259,7 @@ def advance_in_team(world: World, last_step: int, k: int) -> int:
 
     Every thread comes with work space of its own (points, matrices, before, action) and shares all other arrays.
     """
-    return march(world, last_step, k, world.team)
+    return march(world, last_step, k, world.team, None)
 
 
 def advance(world: World, last_step: int) -> int:
@@ -259,3 +271,16 @@ def advance(world: World, last_step: int) -> int:
     call again.
     """
     return int(advance_alone(world, last_step))
+
+
+@entry_kernel
+def advance_coupled_alone(scene: Coupled, last_step: int) -> int:
+    """Step a world and further systems with one thread; see advance."""
+    scene.world.team[TEAM_SIZE] = 1
+    return march(scene.world, last_step, 0, None, scene.systems)
+
+
+@entry_kernel
+def advance_coupled_in_team(scene: Coupled, last_step: int, k: int) -> int:
+    """Be thread k of those that advance a world and further systems together; see advance_in_team."""
+    return march(scene.world, last_step, k, scene.world.team, scene.systems)

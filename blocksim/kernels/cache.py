@@ -14,10 +14,11 @@ import logging
 import pickle
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from numba import types as numba_types
 from numba.core import serialize
 from numba.core.caching import FunctionCache
 
@@ -27,6 +28,7 @@ DIGEST_BYTES = hashlib.sha256().digest_size
 NAME_DIGITS = 16
 SUFFIX = ".nbc"
 
+types: Any = numba_types
 dumps: Any = serialize.dumps  # comes without type hints
 
 log = logging.getLogger("blocksim")  # a line on standard error, unless somebody wants it elsewhere
@@ -78,11 +80,28 @@ class KernelCache(FunctionCache):
     def _key(self, sig: Any, codegen: Any) -> tuple[object, ...]:
         """Return what a version is compiled for: types, processor, bytecode; and all other sources."""
         index_key: Any = self._index_key
-        return (self.stamp, *index_key(sig, codegen))
+        return (self.stamp, *_sources(sig), *index_key(sig, codegen))
 
     def _path(self, key: tuple[object, ...]) -> Path:
         digest = hashlib.sha256(repr(key).encode()).hexdigest()[:NAME_DIGITS]
         return self.folder / f"{self.name}.{digest}{SUFFIX}"
+
+
+def _sources(sig: Any) -> Iterator[tuple[str, int, int]]:
+    """Yield file, time and size of what declares systems outside the package: their kernels are compiled in here."""
+    for one in sorted({one.__module__ for one in _named_tuples(sig) if not one.__module__.startswith("blocksim.")}):
+        source = Path(sys.modules[one].__file__ or "")
+        state = source.stat()
+        yield str(source), state.st_mtime_ns, state.st_size
+
+
+def _named_tuples(kinds: Any) -> Iterator[type]:
+    """Yield the classes of all named tuples among types of arguments, and inside them."""
+    for kind in kinds:
+        if isinstance(kind, types.BaseNamedTuple):
+            yield kind.instance_class
+        if isinstance(kind, types.BaseTuple):
+            yield from _named_tuples(kind.types)
 
 
 def _read(path: Path) -> bytes | None:

@@ -8,6 +8,7 @@ import math
 from typing import NamedTuple
 
 from blocksim.kernels.arrays import Floats, Integers, Records
+from blocksim.kernels.frame_times import next_frame
 from blocksim.kernels.jit import rare_kernel
 
 
@@ -22,20 +23,14 @@ class Watched(NamedTuple):
     thresholds: Floats  # (m, b) m, infinite for fixed blocks
 
 
-@rare_kernel
-def next_frame(done: int, period: float) -> int:
-    """Return the next step with a frame after `done` steps, given the steps (not rounded) between two frames."""
-    number = int(done / period)
-    while round(number * period) <= done:
-        number += 1
-    return round(number * period)
+step_of_next = rare_kernel(next_frame)
 
 
 @rare_kernel
 def frame_to_watch(watched: Watched, m: int, done: int) -> int:
     """Return the next step with a frame of a member that has not moved yet, zero where none is of interest."""
     is_watched = watched.periods[m] > 0.0 and watched.steps[m] == 0
-    return next_frame(done, watched.periods[m]) if is_watched else 0
+    return step_of_next(done, watched.periods[m]) if is_watched else 0
 
 
 @rare_kernel

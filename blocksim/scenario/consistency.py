@@ -90,6 +90,9 @@ def unfit_choices(scenario: Scenario) -> Iterator[Finding]:
 
     Numbers of springs and dashpots are not refused, so that a scenario can be run by both schemes; they have no effect.
     """
+    for name in () if scenario.time.has_systems else scenario.systems:
+        message = f"{name} need another scheme: {shown(scenario.time.scheme)} advances blocks and supports only"
+        yield Finding((name,), message, at="key", relation=True)
     if not isinstance(scenario.time, Nonsmooth):
         return
     for name in SPRING_CHOICES:

@@ -14,6 +14,7 @@ from blocksim.scenario.models.stepping import SCHEMES, scheme_of
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.spelling import did_you_mean, nearest, similar_word
 from blocksim.scenario.structures import KINDS
+from blocksim.scenario.systems import HELD, SYSTEMS
 
 TWO_VALUES = "two values are needed, one along x and one along y"
 MAX_FINDINGS = 200
@@ -69,8 +70,12 @@ def _finding(entry: ErrorDetails, data: object) -> Finding:
 def _path(loc: Sequence[str | int]) -> KeyPath:
     """Drop what pydantic adds to the path of the file: the tag of a union, and the sweep's inner table."""
     path = tuple(loc)
+    if path[:1] == (HELD,):
+        return path[1:]
     if path[:1] == ("structures",):
         return (*path[:2], *path[3:])
+    if path[:1] == ("time",) and path[1:2] not in [(scheme,) for scheme in SCHEMES]:
+        return path  # of a scheme that is none of the union
     if path[:1] in (("motion",), ("time",)):
         return (*path[:1], *path[2:])
     return (path[0], *path[2:]) if path[:2] == ("sweep", "vary") else path
@@ -112,7 +117,7 @@ def _unknown_key(path: KeyPath, data: object) -> Finding:
 
 def _table_with(word: str) -> str:
     """Return the table of the scenario that has a key, where exactly one has it; empty otherwise."""
-    tables = ((name, table_at((name,), {})) for name in keys_of(Scenario) if name not in NAMED)
+    tables = ((name, table_at((name,), {})) for name in keys_of(Scenario) if name not in NAMED and name not in SYSTEMS)
     having = [name for name, table in tables if table is not None and word in keys_of(table)]
     return having[0] if len(having) == 1 else ""
 

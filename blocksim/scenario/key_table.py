@@ -18,6 +18,7 @@ from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES, Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import KINDS, Structure
+from blocksim.scenario.systems import HELD, SYSTEMS
 
 BEGIN = "<!-- keys: written by `make readme` -->"
 END = "<!-- end of keys -->"
@@ -47,6 +48,7 @@ def key_table() -> str:
         ("output", Output),
         ("experiment", Experiment),
         ("sweep", Sweep),
+        *SYSTEMS.items(),
     ]
     rows = [row for prefix, model in sections for row in _rows(prefix, model)]
     return "\n".join([HEAD, *rows])
@@ -69,7 +71,7 @@ def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
     told = next((base.model_fields for base in (Structure, Time) if issubclass(model, base) and model is not base), {})
     for name, info in model.model_fields.items():
         has_rows_of_its_own = _is_table(info) and model not in {Friction, Pair, Sweep} and name != "provenance"
-        if name == "kind" or name in told or has_rows_of_its_own:
+        if name == "kind" or info.alias == HELD or name in told or has_rows_of_its_own:
             continue
         key = f"{place}.{info.alias or name}" if place else (info.alias or name)
         if model is Sweep and name == "vary":

@@ -11,7 +11,9 @@ from pydantic.fields import FieldInfo
 
 from blocksim.scenario.models.base import Table
 from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.stepping import SCHEMES, Time
 from blocksim.scenario.quantities import Kind, Quantity
+from blocksim.scenario.systems import HELD, SYSTEMS
 
 KeyPath = tuple[str | int, ...]
 """Path in a scenario, such as ("structures", 0, "overlap")."""
@@ -115,7 +117,7 @@ def field_at(path: Sequence[str | int], data: object) -> FieldInfo | None:
 
 def is_known(path: Sequence[str | int], data: object) -> bool:
     """Return True if the models have a place for this path (what has a name or number must be in `data`)."""
-    named = NAMED.get(path[0], 0)
+    named = 2 if path[0] in SYSTEMS else NAMED.get(path[0], 0)
     if named and follow(data, path[:named]) is MISSING:
         return False
     if len(path) <= named:
@@ -130,9 +132,21 @@ def keys_of(table: type[Table]) -> tuple[str, ...]:
     return tuple(str(key) for key in _fields(table))
 
 
-@functools.cache
 def _fields(table: type[Table]) -> dict[str | int, FieldInfo]:
-    return {info.alias or name: info for name, info in table.model_fields.items()}
+    return {**_own_fields(table), **_system_fields()} if table is Scenario else _own_fields(table)
+
+
+@functools.cache
+def _own_fields(table: type[Table]) -> dict[str | int, FieldInfo]:
+    return {info.alias or name: info for name, info in table.model_fields.items() if info.alias != HELD}
+
+
+def _system_fields() -> dict[str | int, FieldInfo]:
+    """Return the fields of the tables of all systems."""
+    return {
+        name: FieldInfo(annotation=tuple[table, ...], default=(), description=table.__doc__)  # type: ignore[valid-type]
+        for name, table in SYSTEMS.items()
+    }
 
 
 def _inside(annotation: object, part: str | int, node: object) -> object:
@@ -151,6 +165,7 @@ def _inside(annotation: object, part: str | int, node: object) -> object:
 def _table(annotation: object, node: object) -> type[Table] | None:
     tables = [option for option in options(annotation) if isinstance(option, type) and issubclass(option, Table)]
     if len(tables) > 1:
+        tables = [*SCHEMES.values()] if issubclass(tables[0], Time) else tables
         return next((table for table in tables if _word(table, node) in kinds_of(table)), None)
     return tables[0] if tables else None
 

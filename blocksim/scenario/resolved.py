@@ -17,6 +17,7 @@ from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Time
 from blocksim.scenario.models.study import Sweep
 from blocksim.scenario.quantities import ANGLE, Quantity
+from blocksim.scenario.systems import HELD
 
 HEADER = "# Resolved by blocksim: all values as used, in SI units (m, kg, s, N, Pa), angles in rad.\n"
 SCHEME = "time.scheme"
@@ -80,6 +81,8 @@ def _plain(table: BaseModel) -> dict[str, Any]:
         return {key: _value(entry) for key, entry in table.as_table().items()}
     fields = type(table).model_fields
     entries = {info.alias or name: _field(info, getattr(table, name)) for name, info in fields.items()}
+    systems = entries.pop(HELD, None)
+    entries |= systems if isinstance(systems, dict) else {}
     if isinstance(table, PairFriction) and table.kinetic_ratio is not None:
         entries["kinetic"] = None
     return {key: entry for key, entry in entries.items() if entry is not None}

@@ -62,12 +62,20 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
     yield from _below_ground(scenario, origins, bodies)
     yield from _in_walls(scenario, origins, bodies)
     yield from _overlaps(origins, bodies)
+    yield from _unfit_systems(scenario)
 
 
 def _ends(bodies: Sequence[PlacedBody], name: str) -> tuple[float, float]:
     """Return the smallest and the largest value of a number of all bodies."""
     values = list(map(attrgetter(name), bodies))
     return min(values), max(values)
+
+
+def _unfit_systems(scenario: Scenario) -> Iterator[Finding]:
+    """Find what the tables of further systems say themselves."""
+    for name, tables in scenario.systems.items():
+        for number, table in enumerate(tables):
+            yield from (Finding((name, number, key), message) for key, message in table.impossible(scenario))
 
 
 def _too_many(scenario: Scenario) -> Iterator[Finding]:

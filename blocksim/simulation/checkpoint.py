@@ -25,7 +25,7 @@ from blocksim.simulation.atomic import writing
 from blocksim.simulation.provenance import code_hashes, code_version, machine
 from blocksim.simulation.schemes import AnyScene
 from blocksim.world.free_memory import available_bytes, readable
-from blocksim.world.scenes import arrays_of
+from blocksim.world.scenes import arrays_of, with_parts
 
 FORMAT: Literal["blocksim checkpoint 1"] = "blocksim checkpoint 1"
 COPIES = 3  # of the content, while it is read: the file, its arrays, the scene
@@ -146,7 +146,7 @@ def _filled(part: Any, arrays: Iterator[tuple[ArrayType, NDArray[np.uint8]]], pa
         return None
     if isinstance(part, np.ndarray):
         return _array_like(part, *next(arrays), path)
-    return type(part)(*(_filled(one, arrays, path) for one in part))
+    return with_parts(part, [_filled(one, arrays, path) for one in part])
 
 
 def _array_like(built: NDArray[Any], kind: ArrayType, content: NDArray[np.uint8], path: Path) -> NDArray[Any]:

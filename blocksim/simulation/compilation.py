@@ -9,11 +9,12 @@ from blocksim.errors import OutputError
 from blocksim.kernels import jit
 from blocksim.kernels.watch import Watched
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.simulation.schemes import AnyScene, build_scene, measured_row, scheme_of
+from blocksim.simulation.schemes import SCHEMES, AnyScene, build_scene, measured_row, scheme_of
+from blocksim.simulation.schemes.explicit import PARTICLES, SURFACE
+from blocksim.simulation.schemes.nonsmooth import RIGID
 from blocksim.simulation.team import ALONE
 from blocksim.world.scenes import stack_of_one
 
-SURFACE, PARTICLES, RIGID = "surface", "with-particles", "nonsmooth"  # sets of machine code
 CHANGES: dict[str, dict[str, object]] = {  # in the smallest scene, so that it needs them
     SURFACE: {},
     PARTICLES: {"contact": {"model": "kernel", "particle_spacing": 0.1}},  # the code serves all models with particles
@@ -36,9 +37,7 @@ def kernels_of(scenario: Scenario) -> str:
 
 def kernel_set(scheme: str, model: str) -> str:
     """Return which set of kernels a stepping scheme with a contact model needs."""
-    if scheme != "explicit":
-        return RIGID
-    return SURFACE if model == "surface" else PARTICLES
+    return SCHEMES[scheme].kernels(model)
 
 
 @functools.cache
@@ -59,8 +58,14 @@ def compile_kernels(kernels: str = SURFACE) -> float:
     return time.perf_counter() - began
 
 
+def compile_systems(scenario: Scenario) -> None:
+    """Compile what a scenario with systems beside blocks and supports needs as well, for these systems."""
+    if scenario.systems:
+        measured_row(ALONE.advance(build_scene(scenario), 0)[0])
+
+
 def _compile(kernels: str) -> None:
-    scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **CHANGES[kernels]})), 0)
+    scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **CHANGES.get(kernels, {})})), 0)
     measured_row(scene)
     if kernels == RIGID:
         _compile_ensemble(stack_of_one(scene))
@@ -73,6 +78,7 @@ def _compile_ensemble(scenes: AnyScene) -> None:
     scheme, nothing = scheme_of(scenes), np.zeros(0, dtype=np.int64)
     places, lengths = np.zeros((1, 3, 1)), np.zeros((1, 1))
     watched = Watched(np.zeros(1), np.zeros(1, dtype=np.int64), places, places, lengths, lengths)
+    assert scheme.advance_members is not None  # noqa: S101 - of a scheme that has them
     scheme.advance_members(scenes, nothing, nothing, np.zeros((1, len(scheme.measured))), nothing, watched)
 
 

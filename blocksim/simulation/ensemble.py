@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
 from blocksim.kernels.arrays import PAIRS_FULL, REACHED
+from blocksim.kernels.frame_times import next_frame
 from blocksim.kernels.watch import Watched
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.simulation.compilation import compile_kernels, kernels_of
@@ -32,11 +33,12 @@ from blocksim.simulation.ledger import (
 from blocksim.simulation.loop import last_step_of, outcome_of
 from blocksim.simulation.movement import FirstMove, FirstMoves
 from blocksim.simulation.outcome import Outcome, diagnosed
-from blocksim.simulation.recorder import MOTION, POSITION, Rows, frames_from_rows, next_frame, steps_per_frame
-from blocksim.simulation.schemes import AnyScene, build_stacks, measured_row, scheme_of
+from blocksim.simulation.recorder import MOTION, POSITION, Rows, frames_from_rows, steps_per_frame
+from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measured_row, scheme_of
 from blocksim.simulation.table import COLUMNS, Columns, as_frame, final_values
 from blocksim.simulation.team import ALONE
 from blocksim.world.scenes import Refusal, Stack, member, stack_of_one
+from blocksim.world.systems.blocks import blocks_placed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,6 +48,7 @@ MOST_BODIES = 16_384  # of all members of a batch
 CHUNK = 4  # members at most that a thread takes at a time: few enough that all threads end together
 
 Placed = tuple[PlacedBody, ...]
+Steps = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ class MemberEnd:
     @cached_property
     def frames(self) -> Frames:
         """One: the last."""
-        return frames_from_rows(self.placed, self.time_step, self.rows)
+        return frames_from_rows((blocks_placed(self.placed),), self.time_step, self.rows)
 
     @property
     def final(self) -> "pd.DataFrame":
@@ -179,8 +182,11 @@ class Ensemble:
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
         nobody = np.zeros(0, dtype=np.int64)  # compiles, before there are threads
-        self.scheme.advance_members(self.scenes, nobody, self.last_steps, self.starts, self.codes, self.watched)
+        self._advance_members(nobody, self.last_steps, self.starts, self.codes)
         count = len(self.codes)
+        if self.scheme.advance_members is None:
+            self.codes[:] = PAIRS_FULL
+            return
         chunk = min(CHUNK, -(-count // threads))
         list(pool.map(self._advance, (np.arange(i, min(i + chunk, count)) for i in range(0, count, chunk))))
 
@@ -191,10 +197,15 @@ class Ensemble:
         while members.size:
             done = next_energy_check(done, self.bodies)
             np.minimum(self.last_steps, done, out=stops)
-            self.scheme.advance_members(self.scenes, members, stops, rows, self.codes, self.watched)
+            self._advance_members(members, stops, rows, self.codes)
             rows = np.zeros_like(self.starts)  # what is measured at the start of a later call
             members = members[(self.codes[members] == REACHED) & (self.last_steps[members] > done)]
             members = members[[self._adds_up(m) for m in members.tolist()]]
+
+    def _advance_members(self, members: Steps, stops: Steps, rows: NDArray[np.float64], codes: Steps) -> None:
+        """Advance some members in compiled code, where the scheme can."""
+        if self.scheme.advance_members is not None:
+            self.scheme.advance_members(self.scenes, members, stops, rows, codes, self.watched)
 
     def _next_look(self, m: int, done: int) -> int:
         """Return the step at which the energy of a member is checked next, or its last."""
@@ -245,7 +256,7 @@ class Ensemble:
     def _measured(self) -> NDArray[np.float64]:
         """Return rows as `measured` of the scheme names them: a call that goes to no further step only measures."""
         rows, nowhere = np.zeros_like(self.starts), np.zeros_like(self.codes)
-        self.scheme.advance_members(self.scenes, np.arange(len(rows)), nowhere, rows, nowhere.copy(), self.watched)
+        self._advance_members(np.arange(len(rows)), nowhere, rows, nowhere.copy())
         return rows
 
     def _run_alone(self, m: int, start: float) -> Ended:
@@ -282,7 +293,7 @@ class Closing:
     def __init__(self, scenes: AnyScene, placed: list[Placed], measured: NDArray[np.float64]) -> None:
         """Take what is measured (m, e + 2) in the scenes as they are now, as the scheme's `measured`."""
         world, blocks = scenes.world, len(placed[0])
-        self.names = scheme_of(scenes).ledger
+        self.names = ledger_names(scenes)
         self.scenes, self.placed = scenes, placed
         self.measured = measured
         self.motion = np.stack([world.bodies[name][:, :blocks] for name in MOTION], axis=1)  # (m, 6, b)
@@ -290,7 +301,8 @@ class Closing:
         self.time_steps: list[float] = world.controls["step"][:, 0].tolist()
         book = world.ledger[:, 0]
         moved = (book["largest_kinetic"] + book["travel_work"]).tolist()
-        masses = [float(np.sum(mass)) for mass in world.bodies["mass"]]  # one by one: the order decides on a digit
+        further = mass_of_systems(member(scenes, 0))  # in a stack of one, or zero
+        masses = [float(np.sum(mass)) + further for mass in world.bodies["mass"]]  # one by one: the order matters
         self.in_play = [*map(InPlay, masses, moved)]
         self.columns = final_values(self.motion, _shapes(placed)).tolist()
 
@@ -309,7 +321,7 @@ class Closing:
             columns=dict(zip(COLUMNS, (names, *self.columns[m]), strict=True)),
             placed=self.placed[m],
             time_step=self.time_steps[m],
-            rows=Rows(self.steps[m], self.motion[some], self.measured[some], self.names),
+            rows=Rows(self.steps[m], (self.motion[some],), self.measured[some], self.names),
             first_move=first_move,
         )
 

@@ -11,20 +11,13 @@ from numpy.typing import NDArray
 
 from blocksim.extras import loaded
 from blocksim.simulation.contacts import Contacts
+from blocksim.world.systems.blocks import BLOCKS
+from blocksim.world.systems.system import Elements, Present, Track
 
 if TYPE_CHECKING:
     import pandas as pd
 
 EXTRA = "xarray"
-MILLI = 1e3
-QUANTITIES = {  # name of a variable: unit, meaning
-    "x": ("m", "centre along the ground"),
-    "y": ("m", "centre above the ground"),
-    "rotation": ("rad", "angle turned since the start, counter-clockwise positive, not wrapped"),
-    "vx": ("m/s", "velocity along the ground"),
-    "vy": ("m/s", "velocity normal to the ground"),
-    "spin": ("rad/s", "angular velocity"),
-}
 Floats = NDArray[np.float64]
 
 
@@ -48,6 +41,23 @@ class Frames:
     size_y: Floats  # (b,) m
     start_angle: Floats  # (b,) rad, of the body axes as placed
     contacts: Contacts | None = None  # where they were recorded
+    mass: Floats | None = None  # (b,) kg
+    inertia: Floats | None = None  # (b,) kg m2
+    others: tuple[Track, ...] = ()  # systems beside the blocks
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """Every system over time, blocks first."""
+        unknown = np.full(len(self.names), np.nan)
+        shape = (self.size_x, self.size_y, unknown, *(unknown if one is None else one for one in self._inert))
+        start = np.stack([unknown, unknown, self.start_angle, unknown, unknown, unknown])
+        blocks = Present(BLOCKS, Elements(self.names, np.stack(shape), start))
+        values = np.stack([getattr(self, one.name) for one in BLOCKS.quantities], axis=1)
+        return (Track(blocks, values), *self.others)
+
+    @property
+    def _inert(self) -> tuple[Floats | None, Floats | None]:
+        return self.mass, self.inertia
 
     @property
     def rotation(self) -> Floats:
@@ -59,33 +69,34 @@ class Frames:
         return len(self.time)
 
 
-def tidy_table(frames: Frames) -> "pd.DataFrame":
-    """Return one row per frame and block; columns as in the exported CSV: time_s, block, x_mm, … spin_deg_s."""
+def tidy_table(frames: Frames, system: str = BLOCKS.name) -> "pd.DataFrame":
+    """Return one row per frame and block, or element of another system; columns as in the exported CSV.
+
+    Of blocks: time_s, block, x_mm, … kinetic_energy_J. Raises KeyError for a system that is not in the run.
+    """
     import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
 
-    count, blocks = frames.x.shape
-    columns: dict[str, Any] = {"time_s": np.repeat(frames.time, blocks), "block": list(frames.names) * count}
-    columns |= {
-        "x_mm": MILLI * frames.x.ravel(),
-        "y_mm": MILLI * frames.y.ravel(),
-        "rotation_deg": np.degrees(frames.rotation).ravel(),
-        "vx_mm_s": MILLI * frames.vx.ravel(),
-        "vy_mm_s": MILLI * frames.vy.ravel(),
-        "spin_deg_s": np.degrees(frames.spin).ravel(),
-    }
-    return pd.DataFrame(columns)
+    track = {one.system.name: one for one in frames.tracks}[system]
+    count, elements = len(frames), len(track.names)
+    columns: dict[str, Any] = {"time_s": np.repeat(frames.time, elements), track.system.element: [*track.names] * count}
+    return pd.DataFrame(columns | {name: values.ravel() for name, values in track.columns().items()})
 
 
 def data_set(frames: Frames, name: str) -> Any:
     """Return an xarray.Dataset in SI with dimensions time and block, energies over time, units as attributes.
 
-    Raises UnavailableError without the extra `xarray`.
+    Variables of another system begin with its name, and have a dimension of their own. Raises UnavailableError without
+    the extra `xarray`.
     """
     xarray = loaded("xarray", "to_xarray", EXTRA)
-    motion = {
-        key: (("time", "block"), getattr(frames, key), {"units": unit, "long_name": meaning})
-        for key, (unit, meaning) in QUANTITIES.items()
-    }
+    variables: dict[str, Any] = {}
+    coordinates: dict[str, Any] = {"time": ("time", frames.time, {"units": "s"})}
+    for track in frames.tracks:
+        element = track.system.element
+        prefix = "" if track.system is BLOCKS else f"{track.system.name}_"
+        coordinates[element] = (element, list(track.names))
+        for one in track.system.outputs:
+            told = {"units": one.unit, "long_name": one.meaning}
+            variables[prefix + one.name] = (("time", element), one.of(track), told)
     energies = {f"energy_{key}": (("time",), values, {"units": "J"}) for key, values in frames.energy.items()}
-    coordinates = {"time": ("time", frames.time, {"units": "s"}), "block": ("block", list(frames.names))}
-    return xarray.Dataset({**motion, **energies}, coords=coordinates, attrs={"scenario": name})
+    return xarray.Dataset({**variables, **energies}, coords=coordinates, attrs={"scenario": name})

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, computed_field
+from pydantic import BaseModel, BeforeValidator, computed_field, model_validator
 
 if TYPE_CHECKING:
     from blocksim.simulation.schemes import AnyScene
@@ -26,12 +26,13 @@ BODY_STEPS = 200_000  # ... until they cost less than a hundredth of the steps b
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]  # JSON has no NaN
 
 
-class EnergyLedger(BaseModel, frozen=True):
+class EnergyLedger(BaseModel, frozen=True, extra="allow"):
     """All in J. The residual is what total + losses has drifted since the start.
 
     `to_support` is the work done on a support that moves; negative where the support drives the scene. What a scheme
     does not know is zero: springs, dashpots and contacts that break are of the explicit one, impacts and correction
-    (blocksim.kernels.nonsmooth.energy) of the non-smooth one.
+    (blocksim.kernels.nonsmooth.energy) of the non-smooth one. Systems beside the blocks add entries of their own, whose
+    names begin with theirs.
     """
 
     kinetic: Number
@@ -46,6 +47,14 @@ class EnergyLedger(BaseModel, frozen=True):
     to_support: Number = 0.0
     start: Number
     in_play: Number
+    __pydantic_extra__: dict[str, Number]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_computed(cls, data: object) -> object:
+        """Leave out what run.json has beside the entries."""
+        computed = cls.model_computed_fields
+        return {key: one for key, one in data.items() if key not in computed} if isinstance(data, dict) else data
 
     @computed_field  # type: ignore[prop-decorator]  # mypy knows no decorated properties
     @property
@@ -53,7 +62,9 @@ class EnergyLedger(BaseModel, frozen=True):
         """Energy now plus all losses, minus the energy at the start (J)."""
         now = self.kinetic + self.potential + self.stored_normal + self.stored_shear
         lost = self.dashpot + self.friction + self.broken + self.impacts + self.correction + self.to_support
-        return now + lost - self.start
+        further = sum((self.model_extra or {}).values())
+        residual: float = now + lost + further - self.start
+        return residual
 
     @computed_field  # type: ignore[prop-decorator]
     @property
@@ -64,9 +75,9 @@ class EnergyLedger(BaseModel, frozen=True):
 
 def start_energy(scene: "AnyScene") -> float:
     """Return all energy (J) that a scene holds and has lost: constant, if the ledger is complete."""
-    from blocksim.simulation.schemes import measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
+    from blocksim.simulation.schemes import ledger_names, measured_row  # noqa: PLC0415 - numba, not for readers
 
-    return float(measured_row(scene)[: len(scheme_of(scene).ledger)].sum())
+    return float(measured_row(scene)[: len(ledger_names(scene))].sum())
 
 
 class InPlay(NamedTuple):
@@ -78,11 +89,16 @@ class InPlay(NamedTuple):
 
 def energy_ledger(scene: "AnyScene", start: float) -> EnergyLedger:
     """Return the ledger of the present state; `start` is the energy (J) at the start."""
-    from blocksim.simulation.schemes import measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
+    from blocksim.simulation.schemes import (  # noqa: PLC0415 - numba, not for readers
+        ledger_names,
+        mass_of_systems,
+        measured_row,
+    )
 
     book = scene.world.ledger[0]
-    in_play = InPlay(float(np.sum(scene.world.bodies.mass)), float(book.largest_kinetic + book.travel_work))
-    return ledger_of(scheme_of(scene).ledger, measured_row(scene), start, in_play)
+    mass = float(np.sum(scene.world.bodies.mass)) + mass_of_systems(scene)
+    in_play = InPlay(mass, float(book.largest_kinetic + book.travel_work))
+    return ledger_of(ledger_names(scene), measured_row(scene), start, in_play)
 
 
 def ledger_of(names: Sequence[str], row: NDArray[np.float64], start: float, in_play: InPlay) -> EnergyLedger:

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from blocksim.kernels.arrays import REACHED, World
+from blocksim.kernels.arrays import REACHED
 from blocksim.simulation import outcome as ends
 from blocksim.simulation.checkpoint import Position
 from blocksim.simulation.checkpoint_policy import KEEPS_NOTHING, Keeper, Standing
@@ -46,12 +46,12 @@ NOBODY = Attendance()
 
 @dataclass(frozen=True)
 class LoopResult:
-    """The world at the end, why it ended, where the energy went, the seconds spent in compiled code and its threads.
+    """The scene at the end, why it ended, where the energy went, the seconds spent in compiled code and its threads.
 
     `overlap` (m) is the largest one of all contacts at the end.
     """
 
-    world: World
+    scene: AnyScene
     outcome: Outcome
     ledger: EnergyLedger
     solver_seconds: float
@@ -178,4 +178,4 @@ class _Going:
         outcome = ends.interrupted(why) if why else outcome_of(self.status, ledger)
         outcome = diagnosed(outcome, self.status, self.scene, self.recorder.placed)
         overlap = float(measured_row(self.scene)[-1])
-        return LoopResult(self.scene.world, outcome, ledger, self.seconds, self.team.threads, overlap)
+        return LoopResult(self.scene, outcome, ledger, self.seconds, self.team.threads, overlap)

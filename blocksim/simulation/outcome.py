@@ -78,7 +78,19 @@ def diagnosed(outcome: Outcome, code: int, scene: AnyScene, placed: Sequence[Pla
 def _not_finite(scene: AnyScene, names: Sequence[str]) -> str:
     bodies = scene.world.bodies[: len(names)]
     lost = ~np.all([np.isfinite(bodies[name]) for name in MOTION], axis=0)
-    return f"block {names[int(np.argmax(lost))]}" if lost.any() else _fastest(scene, names)
+    if lost.any():
+        return f"block {names[int(np.argmax(lost))]}"
+    return _lost_system(scene) or _fastest(scene, names)
+
+
+def _lost_system(scene: AnyScene) -> str:
+    """Return the first of the further systems that has a number which is not finite; empty where none has."""
+    for system in getattr(scene, "systems", ()):
+        for array in system:
+            fields = [array] if array.dtype.names is None else [array[name] for name in array.dtype.names]
+            if not all(np.isfinite(one).all() for one in fields):
+                return type(system).__name__.lower()
+    return ""
 
 
 def _fastest(scene: AnyScene, names: Sequence[str]) -> str:

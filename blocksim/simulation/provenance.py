@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from blocksim.scenario import Scenario, scenario_hash
 
 if TYPE_CHECKING:
-    from blocksim.kernels.arrays import World
+    from blocksim.simulation.schemes import AnyScene
 
 ROOMS = ("kernels", "scenario", "simulation", "world")  # their code decides the bits of a run
 PACKAGES = ("numpy", "numba", "llvmlite", "pydantic", "h5py", "pandas")  # the first three compile or compute the bits
@@ -49,11 +49,14 @@ def run_hash(scenario: Scenario) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
 
 
-def state_hash(world: "World") -> str:
-    """Return a hash of the bits of all positions and velocities."""
+def state_hash(scene: "AnyScene") -> str:
+    """Return a hash of the bits of all positions and velocities, and of all arrays of further systems."""
     digest = hashlib.sha256()
     for name in ("x", "y", "angle", "vx", "vy", "spin"):
-        digest.update(world.bodies[name][:-1].tobytes())
+        digest.update(scene.world.bodies[name][:-1].tobytes())
+    for system in getattr(scene, "systems", ()):
+        for array in system:
+            digest.update(array.tobytes())
     return digest.hexdigest()
 
 

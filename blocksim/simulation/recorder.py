@@ -8,32 +8,36 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.kernels.frame_times import next_frame
 from blocksim.scenario import PlacedBody
 from blocksim.simulation.contacts import Contacts, joined
 from blocksim.simulation.contacts import Rows as ContactRows
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.movement import Watch
+from blocksim.world.systems.blocks import BLOCKS, blocks_placed
+from blocksim.world.systems.system import Floats, Present, Track
 
 if TYPE_CHECKING:
     from blocksim.simulation.schemes import AnyScene
 
-POSITION = ("x", "y", "angle")
-MOTION = (*POSITION, "vx", "vy", "spin")
+MOTION = tuple(one.name for one in BLOCKS.quantities)
+POSITION = MOTION[:3]
 
 
 class Frame(NamedTuple):
-    """One recorded state of b bodies, SI."""
+    """One recorded state of all systems, SI."""
 
     step: int
-    motion: NDArray[np.float64]  # (6, b) as MOTION
-    measured: NDArray[np.float64]  # as the scheme's `measured`
+    states: tuple[Floats, ...]  # (q, b) of each system, as its `quantities`; blocks first
+    measured: NDArray[np.float64]  # energies, number of contacts, largest overlap
     contacts: ContactRows | None = None  # where they are recorded
 
     def digest(self, before: bytes = b"") -> bytes:
         """Return the SHA-256 of all its bits, and of the digest of the frame before it."""
-        parts = (np.int64(self.step).tobytes(), self.motion.tobytes(), self.measured.tobytes())
+        states = (state.tobytes() for state in self.states)
         contacts = b"" if self.contacts is None else self.contacts.tobytes()
-        return hashlib.sha256(b"".join((before, *parts, contacts))).digest()
+        parts = (before, np.int64(self.step).tobytes(), *states, self.measured.tobytes(), contacts)
+        return hashlib.sha256(b"".join(parts)).digest()
 
 
 class FrameSink(Protocol):
@@ -48,14 +52,6 @@ def steps_per_frame(every: float, step: float) -> float:
     return max(every / step, 1.0)
 
 
-def next_frame(done: int, period: float) -> int:
-    """Return the next step to record after `done` steps, given `steps_per_frame`."""
-    number = int(done / period)
-    while round(number * period) <= done:
-        number += 1
-    return round(number * period)
-
-
 class Recorder:
     """Frames, growing as the run continues; with a sink only the last one, so that long runs need no more memory."""
 
@@ -66,13 +62,15 @@ class Recorder:
         step: float,
         sink: FrameSink | None = None,
         *,
+        others: Sequence[Present] = (),
         contacts: bool = False,
     ) -> None:
         """Record every `every` seconds, at the nearest step of length `step` (s); where there is a `sink`, in there.
 
-        With `contacts` the contacts of every frame are recorded as well.
+        `others` are the systems beside the blocks. With `contacts` the contacts of every frame are recorded as well.
         """
         self.placed = tuple(placed)
+        self.systems = (blocks_placed(placed), *others)
         self.time_step = step
         self.sink = sink
         self.steps_per_frame = steps_per_frame(every, step)
@@ -106,9 +104,10 @@ class Recorder:
         self.ledger = rows.ledger
         self.steps = rows.steps.tolist()
         contacts = [None] * len(self.steps) if rows.contacts is None else rows.contacts.tables()
-        for step, motion in zip(self.steps, rows.motion, strict=True):
+        states = [*zip(*rows.values, strict=True)]
+        for step, (motion, *_) in zip(self.steps, states, strict=True):
             self.watch.see(motion, step * self.time_step)
-        self.held = [Frame(*one) for one in zip(self.steps, rows.motion, rows.measured, contacts, strict=True)]
+        self.held = [Frame(*one) for one in zip(self.steps, states, rows.measured, contacts, strict=True)]
         self.digests = []
         for frame in self.held:
             self._note_digest(frame)
@@ -123,16 +122,15 @@ class Recorder:
 
     def sample(self, scene: "AnyScene") -> None:
         """Add a frame of the present state, unless this step has one already: then look whether that is the same."""
-        from blocksim.simulation.schemes import measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
+        from blocksim.simulation.schemes import ledger_names, measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
 
         step = int(scene.world.clock[0].steps)
         row = measured_row(scene)
-        motion = np.stack([scene.world.bodies[name][: len(self.placed)] for name in MOTION])
-        self.watch.see(motion, step * self.time_step)
-        scheme = scheme_of(scene)
-        self.ledger = scheme.ledger
-        touching = scheme.contacts(scene, len(self.placed)) if self.with_contacts else None
-        frame = Frame(step, motion, row, touching)
+        states = self._states(scene)
+        self.watch.see(states[0], step * self.time_step)
+        self.ledger = ledger_names(scene)
+        touching = scheme_of(scene).contacts(scene, len(self.placed)) if self.with_contacts else None
+        frame = Frame(step, states, row, touching)
         if self.steps and self.steps[-1] >= step:
             self._compare(frame)
             return
@@ -143,6 +141,11 @@ class Recorder:
             self.held.clear()
         self.held.append(frame)
 
+    def _states(self, scene: "AnyScene") -> tuple[Floats, ...]:
+        """Return the state of every system; blocks are in the world."""
+        arrays = (scene.world, *getattr(scene, "systems", ()))
+        return tuple(one.system.state(its, one.count) for one, its in zip(self.systems, arrays, strict=True))
+
     def _compare(self, frame: Frame) -> None:
         """Note a frame that is not the one that was recorded for its step, if any was."""
         place = self.count_until(frame.step) - 1
@@ -152,17 +155,18 @@ class Recorder:
 
     def frames(self) -> Frames:
         """Return all frames that are held: those so far, or, with a sink, the last one."""
-        steps, motion, measured, tables = zip(*self.held, strict=True)
+        steps, states, measured, tables = zip(*self.held, strict=True)
         contacts = joined(tables) if self.with_contacts else None
-        rows = Rows(np.array(steps, dtype=np.int64), np.stack(motion), np.stack(measured), self.ledger, contacts)
-        return frames_from_rows(self.placed, self.time_step, rows)
+        values = tuple(np.stack(one) for one in zip(*states, strict=True))
+        rows = Rows(np.array(steps, dtype=np.int64), values, np.stack(measured), self.ledger, contacts)
+        return frames_from_rows(self.systems, self.time_step, rows)
 
 
 class Rows(NamedTuple):
-    """What n frames of b bodies consist of."""
+    """What n frames of all systems consist of."""
 
     steps: NDArray[np.int64]  # (n,)
-    motion: NDArray[np.float64]  # (n, 6, b) as MOTION
+    values: tuple[Floats, ...]  # (n, q, b) of each system, as its `quantities`; blocks first
     measured: NDArray[np.float64]  # (n, e + 2): energies, number of contacts, largest overlap
     ledger: tuple[str, ...]  # names of the e energies
     contacts: Contacts | None = None  # of all frames
@@ -170,35 +174,30 @@ class Rows(NamedTuple):
     def chosen(self, which: NDArray[np.bool_]) -> "Rows":
         """Return some of the frames."""
         contacts = None if self.contacts is None else self.contacts.chosen(which)
-        return Rows(self.steps[which], self.motion[which], self.measured[which], self.ledger, contacts)
+        values = tuple(one[which] for one in self.values)
+        return Rows(self.steps[which], values, self.measured[which], self.ledger, contacts)
 
 
 def rows_of_frames(frames: Frames) -> Rows:
     """Return what frames consist of: the other way round than `frames_from_rows`."""
-    motion = np.stack([getattr(frames, name) for name in MOTION], axis=1)
     measured = np.stack([*frames.energy.values(), frames.contact_count, frames.largest_overlap], axis=1)
-    return Rows(frames.step, motion, measured, tuple(frames.energy), frames.contacts)
+    values = tuple(track.values for track in frames.tracks)
+    return Rows(frames.step, values, measured, tuple(frames.energy), frames.contacts)
 
 
-def frames_from_rows(placed: Sequence[PlacedBody], time_step: float, rows: Rows) -> Frames:
-    """Return frames of bodies with these steps (s)."""
+def frames_from_rows(systems: Sequence[Present], time_step: float, rows: Rows) -> Frames:
+    """Return frames of systems, blocks first, with these steps (s)."""
     columns = rows.measured.T
-    x, y, angle, vx, vy, spin = rows.motion.swapaxes(0, 1)
+    blocks, *others = (Track(one, values) for one, values in zip(systems, rows.values, strict=True))
     return Frames(
         step=rows.steps,
         time=np.multiply(rows.steps, time_step, dtype=np.float64),
-        x=x,
-        y=y,
-        angle=angle,
-        vx=vx,
-        vy=vy,
-        spin=spin,
+        **{name: blocks[name] for name in (*MOTION, "size_x", "size_y", "mass", "inertia")},
         energy=dict(zip(rows.ledger, columns, strict=False)),
         contact_count=columns[-2],
         largest_overlap=columns[-1],
-        names=tuple(body.name for body in placed),
-        size_x=np.array([body.size_x for body in placed]),
-        size_y=np.array([body.size_y for body in placed]),
-        start_angle=np.array([body.angle for body in placed]),
+        names=blocks.names,
+        start_angle=blocks.at_start("angle"),
         contacts=rows.contacts,
+        others=tuple(others),
     )

@@ -16,7 +16,7 @@ from blocksim.scenario.resolved import deciding_values
 from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint import Origin, Stored, origin_of, read_checkpoint
 from blocksim.simulation.recorder import Recorder, Rows, rows_of_frames
-from blocksim.simulation.stores.hdf5_reader import read_placed
+from blocksim.simulation.stores.hdf5_reader import read_systems
 
 MOST_NAMED = 6  # differences in a message
 NONE = "none"
@@ -69,7 +69,7 @@ def kept_rows(folder: Path, recorder: Recorder) -> Rows:
     Frames after the checkpoint are among them, as the run would only repeat them; that of the moment at which it was
     stopped is not.
     """
-    rows = rows_of_frames(read_placed(folder / files.FRAMES, recorder.placed))
+    rows = rows_of_frames(read_systems(folder / files.FRAMES, recorder.systems))
     return rows.chosen(np.array([recorder.is_output_time(step) for step in rows.steps.tolist()]))
 
 

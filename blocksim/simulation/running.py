@@ -19,7 +19,7 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import sha256_of, write_text
 from blocksim.simulation.checkpoint import origin_of, restored
 from blocksim.simulation.checkpoint_policy import DEFAULTS, NO_PAST, CheckpointPolicy, CheckpointWriter, Past
-from blocksim.simulation.compilation import compile_kernels, kernels_of
+from blocksim.simulation.compilation import compile_kernels, compile_systems, kernels_of
 from blocksim.simulation.folder import CHECKPOINTS, folder_lock
 from blocksim.simulation.ledger import RESIDUAL_PROMISE
 from blocksim.simulation.loop import Attendance, LoopResult, Watcher, last_step_of, run_loop
@@ -28,7 +28,7 @@ from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.result import Result
 from blocksim.simulation.result_files import keep_scenario, read_tables
 from blocksim.simulation.resumption import NEW, Resumption, check_frames, find_resumption, kept_rows, remarks_on
-from blocksim.simulation.schemes import AnyScene, build, scheme_named
+from blocksim.simulation.schemes import AnyScene, build, ledger_names
 from blocksim.simulation.stopping import WallTime, stop_requests
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 from blocksim.simulation.summary import Summary, read_summary
@@ -38,6 +38,7 @@ from blocksim.world.free_memory import readable
 from blocksim.world.memory import file_bytes, is_shorter_than_step, output_count, recorded_contacts
 from blocksim.world.sag import overlap_warning
 from blocksim.world.scenes import Built, arrays_of
+from blocksim.world.systems import others_of
 
 CHECKPOINT_FILES = len(CHECKPOINTS) + 1  # the last one while it is written
 COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION)
@@ -67,7 +68,7 @@ def simulate(
     """
     limit, began = WallTime(wall_time), time.perf_counter()
     built = build(scenario)
-    began += _compiled(kernels_of(scenario))
+    began += _compiled(scenario)
     recorder = _recorder(scenario, built)
     with _attended(built.scene, threads, limit, on_progress) as (team, attendance):
         ended = run_loop(built.scene, recorder, scenario.time.end, team=team, attendance=attendance)
@@ -99,7 +100,7 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
     tables = read_tables(scenario)
     with folder_lock(folder):
         resumption = _resumption(folder, scenario, listener) if resume else NEW
-        began += _compiled(kernels_of(scenario), listener)
+        began += _compiled(scenario, listener)
         limit = WallTime(precautions.wall_time)
         part = Part(scenario, folder, built, resumption)
         toml = part.prepare(tables, overwrite=overwrite or resume)
@@ -109,11 +110,13 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
             return _keep_result(result, part.account(result.summary), folder)
 
 
-def _compiled(kernels: str, listener: Listener = SILENT) -> float:
+def _compiled(scenario: Scenario, listener: Listener = SILENT) -> float:
     """Compile what a run needs and return the seconds it took, which are no part of the run. Raises OutputError."""
     began = time.perf_counter()
+    kernels = kernels_of(scenario)
     listener.on_start(kernels)
     compile_kernels(kernels)
+    compile_systems(scenario)
     return time.perf_counter() - began
 
 
@@ -136,7 +139,7 @@ def _attended(
 
 def _recorder(scenario: Scenario, built: Built) -> Recorder:
     step, output = float(built.scene.world.controls[0].step), scenario.output
-    return Recorder(built.placed, output.every, step, contacts=output.contacts)
+    return Recorder(built.placed, output.every, step, others=others_of(scenario), contacts=output.contacts)
 
 
 class Part:
@@ -166,9 +169,16 @@ class Part:
 
     def run(self, toml: str, precautions: CheckpointPolicy, team: Team, attendance: Attendance) -> LoopResult:
         """Run to the end or an interruption; the file of the frames says `toml`. Raises OutputError."""
-        path, names, kept = self.folder / files.FRAMES, scheme_named(self.scenario).ledger, self.recorder.held
-        contacts = self.scenario.output.contacts
-        with FrameFile(path, self.recorder.placed, self.step, toml, ledger=names, kept=kept, contacts=contacts) as sink:
+        with FrameFile(
+            self.folder / files.FRAMES,
+            self.recorder.placed,
+            self.step,
+            toml,
+            ledger=ledger_names(self.scene),
+            kept=self.recorder.held,
+            others=self.recorder.systems[1:],
+            contacts=self.scenario.output.contacts,
+        ) as sink:
             self.recorder.pour_into(sink)
             files.clear_remains(self.folder, (files.FINAL, files.SUMMARY))  # of the part before
             self.writer = self._writer(sink, precautions)
@@ -234,8 +244,9 @@ def _result(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: 
 
 
 def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Summary:
-    step = float(ended.world.controls[0].step)
-    steps = int(ended.world.clock[0].steps)
+    world = ended.scene.world
+    step = float(world.controls[0].step)
+    steps = int(world.clock[0].steps)
     return Summary(
         name=scenario.name,
         status=ended.outcome.status,
@@ -243,7 +254,7 @@ def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds:
         exit_code=ended.outcome.exit_code,
         run=run_hash(scenario),
         scenario_hash=scenario_hash(scenario),
-        final_state_sha256=state_hash(ended.world),
+        final_state_sha256=state_hash(ended.scene),
         steps=steps,
         time_step_s=step,
         simulated_time_s=steps * step,
@@ -263,7 +274,7 @@ def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResul
     residual, every = ended.ledger.relative_residual, scenario.output.every
     if residual > RESIDUAL_PROMISE:
         yield f"relative energy error {residual:.1e}, above {RESIDUAL_PROMISE:g}"
-    if is_shorter_than_step(every, float(ended.world.controls[0].step)):
+    if is_shorter_than_step(every, float(ended.scene.world.controls[0].step)):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     if isinstance(scenario.time, Nonsmooth) and ended.outcome.is_finished:
         sunk = overlap_warning(ended.overlap, min(min(body.size_x, body.size_y) for body in placed))
@@ -304,4 +315,6 @@ def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
     frames = output_count(steps, scenario.time.end, scenario.output.every) + 2  # the first, and wherever it ends
     bodies, particles = scene.world.bodies.size - 1, scene.world.particles
     contacts = recorded_contacts(bodies, 0 if particles is None else particles.size) if scenario.output.contacts else 0
-    return file_bytes(bodies, frames, contacts) + CHECKPOINT_FILES * sum(array.nbytes for array in arrays_of(scene))
+    further = frames * sum(8 * len(one.system.quantities) * one.count for one in others_of(scenario))
+    arrays = sum(array.nbytes for array in arrays_of(scene))
+    return further + file_bytes(bodies, frames, contacts) + CHECKPOINT_FILES * arrays

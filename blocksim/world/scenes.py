@@ -278,4 +278,9 @@ def arrays_of(scene: Any) -> list[NDArray[Any]]:
 def _each(scene: Any, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Any:
     if isinstance(scene, np.ndarray):
         return change(scene)
-    return None if scene is None else type(scene)(*(_each(part, change) for part in scene))
+    return None if scene is None else with_parts(scene, [_each(part, change) for part in scene])
+
+
+def with_parts(scene: Any, parts: list[Any]) -> Any:
+    """Return a named tuple, or a plain one, of the same type with other parts."""
+    return type(scene)(*parts) if hasattr(scene, "_fields") else tuple(parts)

@@ -27,6 +27,7 @@ from blocksim.scenario.models.stepping import Explicit, Nonsmooth
 from blocksim.world.bounds import Bounds, Kind, fastest_fall, greatest_speed, support_speed
 from blocksim.world.interactions import Interactions
 from blocksim.world.stable_step import ContactBody, ContactStiffness, Load, stable_step, steepest
+from blocksim.world.systems import largest_step
 
 MOST_STEPS = 2**53  # beyond that a step number is no exact float
 TRAVEL_SHARE, TRAVEL_SHARE_OF_PARTICLES = 0.05, 0.01  # of the smallest side, that a block may move in a step
@@ -121,7 +122,7 @@ def choose_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> floa
         try:
             load = expected_load(scenario, bounds)
             limit = admissible_step(bounds, table, scenario.time.safety, scenario.contact.law, load)
-            limit = min(limit, step_of_travel(scenario, bounds, table))
+            limit = min(limit, step_of_travel(scenario, bounds, table), largest_step(scenario))
         except ArithmeticError:  # Python's own powers do not end in infinity
             limit = 0.0
     limit = min(limit, scenario.time.end)

@@ -51,7 +51,7 @@ def _left_open(folder: Path) -> bytes:
     path = folder / "killed.h5"
     with FrameFile(path, place_bodies(scenario), 1e-5, "", ledger=list(frames.energy)) as sink:
         for step, moving, row in zip(frames.step.tolist(), motion, rows, strict=True):
-            sink.append(Frame(step, moving, row))
+            sink.append(Frame(step, (moving,), row))
         sink.commit()
         content = path.read_bytes()
     path.unlink()

@@ -33,16 +33,16 @@ def at_rest(pose: Pose, pairs: int) -> World:
 def test_rest_counts_only_where_it_has_lasted(pose: Pose) -> None:
     world = at_rest(pose, pairs=1)
     most = int(world.controls[0].rest_checks)
-    assert [check(world) for _ in range(most - 1)] == [REACHED] * (most - 1)
+    assert [check(world, None) for _ in range(most - 1)] == [REACHED] * (most - 1)
     world.bodies[0].vx = 1.0  # pushed once more
-    assert check(world) == REACHED
+    assert check(world, None) == REACHED
     world.bodies[0].vx = 0.0
-    assert [check(world) for _ in range(most)] == [REACHED] * (most - 1) + [AT_REST]
+    assert [check(world, None) for _ in range(most)] == [REACHED] * (most - 1) + [AT_REST]
 
 
 def test_block_that_touches_nothing_never_rests(pose: Pose) -> None:
     world = at_rest(pose, pairs=0)
-    assert {check(world) for _ in range(2 * int(world.controls[0].rest_checks))} == {REACHED}
+    assert {check(world, None) for _ in range(2 * int(world.controls[0].rest_checks))} == {REACHED}
 
 
 def touching(pose: Pose, *, depth: float, spring: float = 0.0) -> World:
@@ -70,9 +70,9 @@ def test_smaller_block_of_a_pair_limits_the_overlap(pose: Pose, small: int) -> N
 
 def test_overlap_that_a_step_has_noted_ends_the_run_at_the_check(pose: Pose) -> None:
     world = touching(pose, depth=0.04 * HEIGHT)
-    assert check(world) == REACHED
+    assert check(world, None) == REACHED
     world.clock[0].ends_at = 1
-    assert check(world) == OVERLAP_LIMIT
+    assert check(world, None) == OVERLAP_LIMIT
 
 
 def test_springs_hold_half_of_force_times_way(pose: Pose) -> None:

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.kernels.arrays import BODY, Records, zeros
-from blocksim.kernels.watch import Watched, frame_to_watch, next_frame, watch
-from blocksim.simulation import recorder
+from blocksim.kernels.frame_times import next_frame
+from blocksim.kernels.watch import Watched, frame_to_watch, step_of_next, watch
 from blocksim.simulation.recorder import POSITION
 
 THRESHOLD, REACH = 1e-3, 0.03  # m
@@ -17,7 +17,7 @@ THRESHOLD, REACH = 1e-3, 0.03  # m
 
 @given(st.integers(0, 10**9), st.floats(1.0, 1e6))
 def test_frames_are_those_that_a_recorder_keeps(done: int, period: float) -> None:
-    assert next_frame(done, period) == recorder.next_frame(done, period)
+    assert step_of_next(done, period) == next_frame(done, period)
 
 
 def watched(threshold: float = THRESHOLD) -> Watched:

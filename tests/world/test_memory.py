@@ -38,7 +38,7 @@ def test_the_estimate_of_frames_is_that_of_the_recorder() -> None:
     scenario = load_scenario(SCENARIOS / "dominoes.toml")
     recorder = Recorder(place_bodies(scenario), scenario.output.every, step=1e-6)
     recorder.sample(build_world(scenario))
-    kept = recorder.held[0].motion.nbytes + recorder.held[0].measured.nbytes
+    kept = recorder.held[0].states[0].nbytes + recorder.held[0].measured.nbytes
     size = SceneSize(len(recorder.placed), 0, 0, 1)
     assert size.record_bytes == pytest.approx(memory.COPIES * kept, rel=0.05)
     assert size.record_bytes >= memory.COPIES * kept

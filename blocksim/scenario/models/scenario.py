@@ -2,7 +2,15 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import (
+    BeforeValidator,
+    Field,
+    SerializeAsAny,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+from pydantic.json_schema import SkipJsonSchema
 
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table
@@ -12,6 +20,7 @@ from blocksim.scenario.models.motion import AnyMotion
 from blocksim.scenario.models.stepping import AnyTime, Explicit, Output
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure
+from blocksim.scenario.systems import HELD, SYSTEMS, SystemTable, gathered, read_tables
 
 SCHEMA_VERSION = 1
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -51,9 +60,24 @@ class Scenario(Table):
         description="where values come from: dotted key and text, for calibrated or assumed values",
     )
 
+    systems: SkipJsonSchema[
+        Annotated[dict[str, tuple[SerializeAsAny[SystemTable], ...]], BeforeValidator(read_tables)]
+    ] = Field(default={}, alias="(systems)", description="tables of systems beside blocks and supports, by their name")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_systems(cls, data: object) -> object:
+        return gathered(data)
+
+    @model_serializer(mode="wrap")
+    def _without_systems(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        data: dict[str, Any] = write(self)
+        systems: dict[str, Any] = data.pop(HELD, data.pop("systems", {}))
+        return data | systems
+
     def __repr__(self) -> str:
         """Return a line with the name and the contents; all values are in `scenario_to_toml`."""
-        parts: list[str] = [structure.kind for structure in self.structures]
+        parts: list[str] = [*(structure.kind for structure in self.structures), *self.systems]
         if self.bodies:
             parts.append(f"{len(self.bodies)} single {'body' if len(self.bodies) == 1 else 'bodies'}")
         return f"<Scenario {self.name}: {', '.join(parts)}; scheme {self.time.scheme}>"
@@ -61,4 +85,7 @@ class Scenario(Table):
 
 def json_schema() -> dict[str, Any]:
     """Describe the file for editors and other programs: quantities as SI numbers or as strings with a unit."""
-    return {"$schema": DIALECT, **Scenario.model_json_schema(by_alias=True, mode="validation")}
+    found = Scenario.model_json_schema(by_alias=True, mode="validation")
+    for name, table in SYSTEMS.items():
+        found["properties"][name] = {"type": "array", "items": table.model_json_schema(by_alias=True)}
+    return {"$schema": DIALECT, **found}

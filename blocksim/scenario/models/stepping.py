@@ -1,9 +1,19 @@
 """Time stepping and recording."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    Field,
+    SerializeAsAny,
+    Tag,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WithJsonSchema,
+    WrapValidator,
+)
 
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import OneOf, Table, Whole
@@ -38,6 +48,8 @@ Step = Annotated[float | Literal["auto"], q.TIME, BeforeValidator(_step), WithJs
 class Time(Table):
     """End and step, whatever the scheme."""
 
+    declared_in: ClassVar[str]  # module:name of its blocksim.simulation.schemes.Scheme
+    has_systems: ClassVar[bool] = False  # whether it advances systems beside blocks and supports
     scheme: Annotated[Scheme, _WORDS] = Field(
         default="explicit",
         description="time stepping: explicit (springs and dashpots) or nonsmooth (impulses)",
@@ -53,6 +65,8 @@ class Time(Table):
 class Explicit(Time):
     """Springs and dashpots, resolved by small steps."""
 
+    declared_in = "blocksim.simulation.schemes.explicit:EXPLICIT"
+    has_systems = True
     scheme: Annotated[Literal["explicit"], _WORDS] = Field(default="explicit", description="the scheme of this table")
     safety: q.Safety = Field(default=0.05, description="automatic step as a share of the stability limit, at most 0.1")
 
@@ -60,6 +74,7 @@ class Explicit(Time):
 class Nonsmooth(Time):
     """Impulses between rigid blocks, Newton's restitution and Coulomb's friction; a hundred times longer steps."""
 
+    declared_in = "blocksim.simulation.schemes.nonsmooth:NONSMOOTH"
     scheme: Annotated[Literal["nonsmooth"], _WORDS] = Field(description="the scheme of this table")
     substeps: Annotated[int, Whole(1, MOST_SUBSTEPS)] = Field(
         default=4, description="substeps; contacts are detected once per step and solved in every substep"
@@ -85,12 +100,22 @@ def scheme_of(value: object) -> str:
     return scheme if scheme in SCHEMES else nearest(scheme, SCHEMES, most=MOST_SLIPS) or "explicit"
 
 
-AnyTime = Annotated[
-    Annotated[Explicit, Tag("explicit")] | Annotated[Nonsmooth, Tag("nonsmooth")], Discriminator(scheme_of)
+def _registered(value: object, usual: ValidatorFunctionWrapHandler, info: ValidationInfo) -> object:
+    """Read the table of a scheme that is none of those in the union."""
+    scheme = SCHEMES[scheme_of(value)]
+    return usual(value) if scheme in (Explicit, Nonsmooth) else scheme.model_validate(value, context=info.context)
+
+
+AnyTime = SerializeAsAny[
+    Annotated[
+        Annotated[Explicit, Tag("explicit")] | Annotated[Nonsmooth, Tag("nonsmooth")],
+        Discriminator(scheme_of),
+        WrapValidator(_registered),
+    ]
 ]
 """Any stepping, distinguished by its `scheme`."""
 SCHEMES: dict[str, type[Time]] = {"explicit": Explicit, "nonsmooth": Nonsmooth}
-"""Class by scheme, as written in a scenario."""
+"""Class by scheme, as written in a scenario; a scheme of the user's choice is one line more."""
 
 
 class Output(Table):

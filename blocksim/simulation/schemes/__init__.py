@@ -1,19 +1,38 @@
-"""The stepping schemes; a new one is one file beside this one and one entry in `SCHEMES`."""
+"""The stepping schemes; a new one is one file and one line in `blocksim.scenario.models.stepping.SCHEMES`."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.errors import BlocksimError
+from blocksim.kernels.systems import Coupled, measure_systems, plan_of
 from blocksim.scenario import Scenario
-from blocksim.simulation.schemes.explicit import EXPLICIT
-from blocksim.simulation.schemes.nonsmooth import NONSMOOTH
-from blocksim.simulation.schemes.scheme import AnyScene, Scene, Scheme
+from blocksim.scenario.models.stepping import SCHEMES as TABLES
+from blocksim.simulation.schemes.scheme import COUNTED, AnyScene, Scene, Scheme
 from blocksim.world import scenes
-from blocksim.world.scenes import Built, Refusal, Stack, alike, build_one
+from blocksim.world.coupled import couple
+from blocksim.world.scenes import Built, Refusal, Stack, alike, build_one, stack_of_one
+from blocksim.world.systems import others_of
 
-SCHEMES = {scheme.name: scheme for scheme in (EXPLICIT, NONSMOOTH)}
-"""Scheme as written in a scenario, and what it does."""
+
+class _Schemes(Mapping[str, Scheme]):
+    """Scheme as written in a scenario, and what it does: as the models of `time` declare it."""
+
+    def __getitem__(self, name: str) -> Scheme:
+        module, _, declared = TABLES[name].declared_in.partition(":")
+        scheme: Scheme = getattr(import_module(module), declared)
+        return scheme
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(TABLES)
+
+    def __len__(self) -> int:
+        return len(TABLES)
+
+
+SCHEMES: Mapping[str, Scheme] = _Schemes()
 
 
 def scheme_named(scenario: Scenario) -> Scheme:
@@ -21,9 +40,10 @@ def scheme_named(scenario: Scenario) -> Scheme:
     return SCHEMES[scenario.time.scheme]
 
 
-def scheme_of(scene: AnyScene) -> Scheme:
+def scheme_of(scene: AnyScene | Coupled) -> Scheme:
     """Return the scheme that a scene is of."""
-    return next(scheme for scheme in SCHEMES.values() if isinstance(scene, scheme.scene_type))
+    schemes = (one for scheme in SCHEMES.values() for one in (scheme, scheme.with_systems) if one is not None)
+    return next(scheme for scheme in schemes if isinstance(scene, scheme.scene_type))
 
 
 def build_scene(scenario: Scenario) -> AnyScene:
@@ -34,23 +54,69 @@ def build_scene(scenario: Scenario) -> AnyScene:
 
 def build(scenario: Scenario) -> Built:
     """Return the same scene with the blocks as they were placed."""
-    return build_one(scenario, scheme_named(scenario).construction)
+    built = build_one(scenario, scheme_named(scenario).construction)
+    others = others_of(scenario)
+    return built._replace(scene=couple(scenario, built.scene, others)) if others else built
 
 
 def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
-    """Build the scenes of scenarios at time zero, those of one scheme and shape together."""
-    for places in alike([scenario.time.scheme for scenario in scenarios]):
-        construction = scheme_named(scenarios[places[0]]).construction
-        stacks = scenes.build_stacks([scenarios[i] for i in places], construction)
-        yield from (one.numbered(places) for one in stacks)
+    """Build the scenes of scenarios at time zero, those of one scheme and shape together.
+
+    A scene with systems beside blocks and supports, and one of a scheme without a way to advance members together, is a
+    stack of its own.
+    """
+    for places in alike([_together(scenario) for scenario in scenarios]):
+        some = [scenarios[i] for i in places]
+        if _together(some[0]) is None:
+            yield from (_alone(i, scenarios[i]) for i in places)
+            continue
+        yield from (one.numbered(places) for one in scenes.build_stacks(some, scheme_named(some[0]).construction))
 
 
-def measured_row(scene: AnyScene) -> NDArray[np.float64]:
-    """Return energies (J), number of contacts and largest overlap (m), as `measured` of the scheme names them."""
+def _together(scenario: Scenario) -> str | None:
+    """Return what scenes have in common that are built together; None for those that are not."""
+    scheme = scheme_named(scenario)
+    return None if scenario.systems or scheme.advance_members is None else scheme.name
+
+
+def _alone(number: int, scenario: Scenario) -> Stack | Refusal:
+    try:
+        built = build(scenario)
+    except BlocksimError as error:
+        return Refusal(number, error)
+    return Stack([number], [built.placed], stack_of_one(built.scene))
+
+
+def ledger_names(scene: AnyScene | Coupled) -> tuple[str, ...]:
+    """Return the names of the energies (J) of a scene: those of its scheme, then of its further systems."""
+    names = scheme_of(scene).ledger
+    if not isinstance(scene, Coupled):
+        return names
+    return (*names, *(name for energies in plan_of(scene.systems).energies for name in energies))
+
+
+def measured_row(scene: AnyScene | Coupled) -> NDArray[np.float64]:
+    """Return energies (J) as `ledger_names` has them, number of contacts and largest overlap (m)."""
     scheme = scheme_of(scene)
     row = np.zeros(len(scheme.measured))
     scheme.measure(scene, row)
-    return row
+    if not isinstance(scene, Coupled):
+        return row
+    further = np.concatenate([energies for energies, _ in _measured_systems(scene)])
+    return np.concatenate([row[: -len(COUNTED)], further, row[-len(COUNTED) :]])
+
+
+def mass_of_systems(scene: AnyScene | Coupled) -> float:
+    """Return the mass (kg) of all systems beside the blocks."""
+    return sum((mass for _, mass in _measured_systems(scene)), 0.0) if isinstance(scene, Coupled) else 0.0
+
+
+def _measured_systems(scene: Coupled) -> list[tuple[NDArray[np.float64], float]]:
+    """Return energies (J) and mass (kg) of each system."""
+    counts = [len(names) + 1 for names in plan_of(scene.systems).energies]
+    row = np.zeros(sum(counts))
+    measure_systems(scene, row)
+    return [(part[:-1], float(part[-1])) for part in np.split(row, np.cumsum(counts)[:-1])]
 
 
 __all__ = [
@@ -61,6 +127,8 @@ __all__ = [
     "build",
     "build_scene",
     "build_stacks",
+    "ledger_names",
+    "mass_of_systems",
     "measured_row",
     "scheme_named",
     "scheme_of",

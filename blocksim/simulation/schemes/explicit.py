@@ -1,5 +1,6 @@
 """Springs and dashpots, small explicit steps; contacts as a table of the forces of springs and dashpots now."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from blocksim.kernels.arrays import HALF, World
 from blocksim.kernels.energy import LEDGER_ROW, measure
 from blocksim.kernels.ensemble import advance_members
 from blocksim.simulation.contacts import SUPPORT, UNITS, Rows, empty_rows
+from blocksim.simulation.schemes.coupled import coupled_scheme
 from blocksim.simulation.schemes.scheme import Scheme
 from blocksim.world.build import EXPLICIT as CONSTRUCTION
 from blocksim.world.build import with_more_room, with_threads
@@ -72,7 +74,9 @@ def with_own_work_space(world: World) -> World:
     return world._replace(**{name: getattr(world, name).copy() for name in WORK_SPACE})
 
 
-EXPLICIT = Scheme(
+SURFACE, PARTICLES = "surface", "with-particles"  # sets of machine code
+
+WORLDS = Scheme(
     name="explicit",
     scene_type=World,
     ledger=LEDGER_ROW,
@@ -87,4 +91,6 @@ EXPLICIT = Scheme(
     for_another_thread=with_own_work_space,
     contacts=explicit_contacts,
     measure=measure,
+    kernels=lambda model: SURFACE if model == "surface" else PARTICLES,
 )
+EXPLICIT = replace(WORLDS, with_systems=coupled_scheme(WORLDS))

@@ -47,6 +47,8 @@ def _points(scene: Nonsmooth, manifolds: Any, which: str, along: float) -> Rows:
     return rows
 
 
+RIGID = "nonsmooth"  # set of machine code
+
 NONSMOOTH = Scheme(
     name="nonsmooth",
     scene_type=Nonsmooth,
@@ -62,4 +64,5 @@ NONSMOOTH = Scheme(
     for_another_thread=lambda scene: scene,  # rows are solved in registers
     contacts=nonsmooth_contacts,
     measure=measure_nonsmooth,
+    kernels=lambda _: RIGID,
 )

@@ -13,8 +13,10 @@ import numpy as np
 from blocksim.simulation.atomic import replacing
 from blocksim.simulation.contacts import BODIES, Contacts
 from blocksim.simulation.frames import Frames
+from blocksim.world.systems.blocks import BLOCKS
+from blocksim.world.systems.system import Floats, System, Track
 
-FRAME_COLUMNS = ("time_s", "block", "x_mm", "y_mm", "rotation_deg", "vx_mm_s", "vy_mm_s", "spin_deg_s")
+FRAME_COLUMNS = ("time_s", "block", *(one.column for one in BLOCKS.outputs))
 LENGTHS = {"x_mm": "x", "y_mm": "y", "overlap_mm": "overlap"}
 PLAIN = {
     "normal_x": "normal_x",
@@ -30,13 +32,21 @@ Row = list[float | str]
 
 
 def write_frames_csv(path: Path, frames: Frames) -> int:
-    """Write all frames and return their number.
+    """Write all frames and return their number; every system beside the blocks into a table beside this one.
 
     Rotation is the angle turned since the start, not wrapped. Raises OutputError, and leaves an older file as it was
     then.
     """
-    _write(path, FRAME_COLUMNS, (row for frame in range(len(frames)) for row in _frame_rows(frames, frame)))
+    for track in frames.tracks:
+        columns = track.columns()
+        heads = ("time_s", track.system.element, *columns)
+        _write(table_of(path, track.system), heads, _frame_rows(frames.time, track, [*columns.values()]))
     return len(frames)
+
+
+def table_of(path: Path, system: System) -> Path:
+    """Return the table of a system: that which was named for the blocks, or one beside it."""
+    return path if system is BLOCKS else path.with_name(f"{path.stem}_{system.name}{path.suffix}")
 
 
 def write_contacts_csv(path: Path, frames: Frames, contacts: Contacts) -> int:
@@ -57,19 +67,11 @@ def _write(path: Path, columns: Sequence[str], rows: Iterable[Row]) -> None:
         writer.writerows(rows)
 
 
-def _frame_rows(frames: Frames, frame: int) -> Iterator[Row]:
-    """Yield the rows of one frame, one per block."""
-    time = float(frames.time[frame])
-    columns = (
-        MILLI * frames.x[frame],
-        MILLI * frames.y[frame],
-        np.degrees(frames.rotation[frame]),
-        MILLI * frames.vx[frame],
-        MILLI * frames.vy[frame],
-        np.degrees(frames.spin[frame]),
-    )
-    for name, *values in zip(frames.names, *(column.tolist() for column in columns), strict=True):
-        yield [time, name, *(value if math.isfinite(value) else "" for value in values)]
+def _frame_rows(times: Floats, track: Track, columns: Sequence[Floats]) -> Iterator[Row]:
+    """Yield the rows of all frames, one per element."""
+    for frame, time in enumerate(times.tolist()):
+        for name, *values in zip(track.names, *(column[frame].tolist() for column in columns), strict=True):
+            yield [time, name, *(value if math.isfinite(value) else "" for value in values)]
 
 
 def _contact_rows(frames: Frames, contacts: Contacts, frame: int) -> Iterator[Row]:

@@ -6,19 +6,24 @@ takes no more.
 
 from collections.abc import Iterable
 
-from blocksim.simulation.recorder import MOTION
+from blocksim.world.systems.blocks import BLOCKS as _BLOCKS
+from blocksim.world.systems.system import System
 
-BLOCKS = "particles/blocks"
+PARTICLES = "particles"
+BLOCKS = f"{PARTICLES}/{_BLOCKS.name}"
 OBSERVABLES = "observables"
 COMMITTED = "n_committed"
 STEP = f"{BLOCKS}/step"
 TIME = f"{BLOCKS}/time"
 SCENARIO_TEXT = "parameters/scenario"
 
-MOTION_UNITS = dict(zip(MOTION, ("m", "m", "rad", "m s-1", "m s-1", "rad s-1"), strict=True))
 COUNTED_UNITS = {"contact_count": "1", "largest_overlap": "m"}
-BODY_UNITS = {"size_x": "m", "size_y": "m", "depth": "m", "mass": "kg", "inertia": "kg m2"}
 TEXT_UNIT = "TOML"
+
+
+def places_of(system: System) -> list[str]:
+    """Return the data sets of what frames keep of a system, in the order of its `quantities`."""
+    return [f"{PARTICLES}/{system.name}/{one.name}" for one in system.quantities]
 
 
 def measured_units(ledger: Iterable[str]) -> dict[str, str]:

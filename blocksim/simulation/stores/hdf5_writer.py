@@ -22,9 +22,11 @@ from blocksim.errors import OutputError
 from blocksim.scenario import PlacedBody
 from blocksim.simulation.atomic import sync_file
 from blocksim.simulation.contacts import Rows
-from blocksim.simulation.recorder import MOTION, Frame
+from blocksim.simulation.recorder import Frame
 from blocksim.simulation.stores import hdf5_layout as layout
 from blocksim.simulation.stores.hdf5_contacts import append_contacts, bytes_of_contacts, create_contacts
+from blocksim.world.systems.blocks import blocks_placed
+from blocksim.world.systems.system import Present
 
 FLUSH_SECONDS = 0.25
 MOST_CHUNK_ROWS = 64
@@ -52,30 +54,34 @@ class FrameFile:
         *,
         ledger: Sequence[str],
         kept: Iterable[Frame] = (),
+        others: Sequence[Present] = (),
         contacts: bool = False,
     ) -> None:
         """Create the file with all its data sets, `ledger` names the energies; raises OutputError when that fails.
 
         It begins with the frames that are `kept` from an earlier part of the run. Only with those on the disk it takes
-        the place of an older file. With `contacts` every frame has to bring its contacts.
+        the place of an older file. `others` are the systems beside the blocks. With `contacts` every frame has to bring
+        its contacts.
         """
         self.path = path
+        self.systems = (blocks_placed(placed), *others)
         self.units = layout.measured_units(ledger)
         self.has_contacts = contacts
         self.time_step = time_step
         self.count = 0
-        self.chunk_rows = min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // len(placed)))
+        self.chunk_rows = min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // max(one.count for one in self.systems)))
         self.is_broken = False
         self.waiting: list[Frame] = []
         self.flushed_at = -np.inf
-        self.row_bytes = 8 * (2 + len(MOTION) * len(placed) + len(self.units))
+        numbers = sum(len(one.system.quantities) * one.count for one in self.systems)
+        self.row_bytes = 8 * (2 + numbers + len(self.units))
         unnamed = path.with_name(f".{path.name}.new")
         with self._telling_trouble():
             _try_room(unnamed)
             self.file = h5py.File(unnamed, "w", libver="latest")
             try:
                 self._reserve(len(scenario_toml))
-                self._create(placed, scenario_toml)
+                self._create(scenario_toml)
                 self.file.swmr_mode = True
                 self._begin_with(kept)
                 unnamed.replace(path)
@@ -95,23 +101,25 @@ class FrameFile:
             self.file.close()
         unnamed.unlink(missing_ok=True)
 
-    def _create(self, placed: Sequence[PlacedBody], scenario_toml: str) -> None:
+    def _create(self, scenario_toml: str) -> None:
         h5md = self.file.create_group("h5md")
         h5md.attrs["version"] = np.array([1, 1])
         h5md.create_group("creator").attrs["name"] = "blocksim"
         self.file.create_dataset(layout.COMMITTED, (), dtype=np.int64).attrs["unit"] = "1"
         self._growing(layout.STEP, np.int64, "1")
         self._growing(layout.TIME, np.float64, "s")
-        for name, unit in layout.MOTION_UNITS.items():
-            self._growing(f"{layout.BLOCKS}/{name}", np.float64, unit, len(placed))
+        for present in self.systems:
+            for place, one in zip(layout.places_of(present.system), present.system.quantities, strict=True):
+                self._growing(place, np.float64, one.stored_unit, present.count)
         self.file.create_group(layout.OBSERVABLES, track_order=True)  # readers list the energies as the scheme does
         for name, unit in self.units.items():
             self._growing(f"{layout.OBSERVABLES}/{name}", np.float64, unit)
         if self.has_contacts:
             create_contacts(self.file, self.chunk_rows)
-        for name, unit in layout.BODY_UNITS.items():
-            values = np.array([getattr(body, name) for body in placed])
-            self.file.create_dataset(f"{layout.BLOCKS}/{name}", data=values).attrs["unit"] = unit
+        for present in self.systems:
+            for one, values in zip(present.system.constants, present.elements.constants, strict=True):
+                place = f"{layout.PARTICLES}/{present.system.name}/{one.name}"
+                self.file.create_dataset(place, data=values).attrs["unit"] = one.stored_unit
         text = self.file.create_dataset(layout.SCENARIO_TEXT, data=np.bytes_(scenario_toml.encode()))
         text.attrs["unit"] = layout.TEXT_UNIT
         self.file[layout.STEP].attrs["time_step"] = self.time_step  # s
@@ -150,11 +158,12 @@ class FrameFile:
             os.fsync(self.file.id.get_vfd_handle())
 
     def _write_waiting(self) -> None:
-        steps, motions, rows, _ = zip(*self.waiting, strict=True)
+        steps, states, rows, _ = zip(*self.waiting, strict=True)
         self._put(layout.STEP, np.array(steps))
         self._put(layout.TIME, np.array(steps) * self.time_step)
-        for name, values in zip(MOTION, np.stack(motions, axis=1), strict=True):
-            self._put(f"{layout.BLOCKS}/{name}", values)
+        for present, some in zip(self.systems, zip(*states, strict=True), strict=True):
+            for place, values in zip(layout.places_of(present.system), np.stack(some, axis=1), strict=True):
+                self._put(place, values)
         for name, values in zip(self.units, np.stack(rows, axis=1), strict=True):
             self._put(f"{layout.OBSERVABLES}/{name}", values)
         if self.has_contacts:

@@ -27,7 +27,7 @@ def table_of(step: int) -> Rows:
 def add_frames(sink: FrameFile, first: int, last: int) -> None:
     for step in range(first, last):
         motion, measured = np.full((len(MOTION), 3), float(step)), np.zeros(len(MEASURED))
-        sink.append(Frame(step, motion, measured, table_of(step)))
+        sink.append(Frame(step, (motion,), measured, table_of(step)))
 
 
 def test_what_was_committed_is_there_after_a_kill(soft: Shipped, tmp_path: Path) -> None:

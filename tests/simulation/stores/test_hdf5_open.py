@@ -37,7 +37,7 @@ def killed(scenario: Scenario, tmp_path: Path) -> Path:
     path = tmp_path / "run.h5"
     with FrameFile(tmp_path / "going_on.h5", place_bodies(scenario), 1e-5, "", ledger=("kinetic",)) as sink:
         for step in range(FRAMES):
-            sink.append(Frame(step, np.full((len(MOTION), 1), step), np.ones(3)))
+            sink.append(Frame(step, (np.full((len(MOTION), 1), step),), np.ones(3)))
         sink.commit()
         path.write_bytes((tmp_path / "going_on.h5").read_bytes())
     return path

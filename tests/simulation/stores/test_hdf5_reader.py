@@ -34,7 +34,7 @@ def open_file(path: Path, soft: Shipped) -> FrameFile:
 
 def add_frames(sink: FrameFile, count: int) -> None:
     for step in range(count):
-        sink.append(Frame(step, np.full((len(MOTION), 3), float(step)), np.full(len(MEASURED), float(step))))
+        sink.append(Frame(step, (np.full((len(MOTION), 3), float(step)),), np.full(len(MEASURED), float(step))))
 
 
 def test_every_data_set_says_its_unit(kept: Result) -> None:

@@ -41,7 +41,7 @@ def refusal(scenario: Scenario, tmp_path: Path) -> Callable[[Change], str]:
     path = tmp_path / "run.h5"
     with FrameFile(path, place_bodies(scenario), 1e-5, "", ledger=LEDGER) as sink:
         for step in range(4):
-            sink.append(Frame(step, np.ones((len(MOTION), 2)), np.ones(len(LEDGER) + 2)))
+            sink.append(Frame(step, (np.ones((len(MOTION), 2)),), np.ones(len(LEDGER) + 2)))
 
     def refuse(change: Change) -> str:
         assert len(read_frames(path, scenario)) == 4

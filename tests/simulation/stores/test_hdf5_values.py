@@ -18,7 +18,8 @@ STEP = 1e-6  # s
 def test_every_number_comes_back_under_its_name(soft: Shipped, tmp_path: Path) -> None:
     scheme, scenario = SCHEMES["explicit"], soft()
     random = np.random.default_rng(1)
-    written = [Frame(step, random.random((len(MOTION), 3)), random.random(len(scheme.measured))) for step in (0, 5, 7)]
+    rows = [(random.random((len(MOTION), 3)), random.random(len(scheme.measured))) for _ in range(3)]
+    written = [Frame(step, (motion,), measured) for step, (motion, measured) in zip((0, 5, 7), rows, strict=True)]
     path = tmp_path / "run.h5"
     with FrameFile(path, place_bodies(scenario), STEP, "schema = 1\n", ledger=scheme.ledger) as file:
         for frame in written:
@@ -27,7 +28,7 @@ def test_every_number_comes_back_under_its_name(soft: Shipped, tmp_path: Path) -
     assert back.step.tolist() == [0, 5, 7]
     assert back.time.tolist() == [0.0, 5 * STEP, 7 * STEP]
     for place, name in enumerate(MOTION):
-        np.testing.assert_array_equal(getattr(back, name), [frame.motion[place] for frame in written], err_msg=name)
+        np.testing.assert_array_equal(getattr(back, name), [frame.states[0][place] for frame in written], err_msg=name)
     energies = [*back.energy.values(), back.contact_count, back.largest_overlap]
     assert list(back.energy) == list(scheme.ledger)
     np.testing.assert_array_equal(np.stack(energies, axis=1), [frame.measured for frame in written])
@@ -37,7 +38,7 @@ def test_frames_beyond_what_was_committed_do_not_count(soft: Shipped, tmp_path: 
     scheme, scenario, path = SCHEMES["explicit"], soft(), tmp_path / "run.h5"
     with FrameFile(path, place_bodies(scenario), STEP, "schema = 1\n", ledger=scheme.ledger) as file:
         for step in range(3):
-            file.append(Frame(step, np.zeros((len(MOTION), 3)), np.zeros(len(scheme.measured))))
+            file.append(Frame(step, (np.zeros((len(MOTION), 3)),), np.zeros(len(scheme.measured))))
     with h5py.File(path, "r+") as stored:
         stored["n_committed"][()] = 2  # killed after the third was written, before it was announced
     back = read_frames(path, scenario)

@@ -51,7 +51,7 @@ def write_frames(path: Path, scenario: Scenario, count: int) -> None:
             motion[:3] += speed * step * TIME_STEP * 10.0
             motion[3:] = 10.0 * speed
             measured = np.array([0.1 * step, 5.0 - 0.1 * step, 0.0, 4.0, 1e-5])
-            file.append(Frame(10 * step, motion, measured, contacts_of(motion) if contacts else None))
+            file.append(Frame(10 * step, (motion,), measured, contacts_of(motion) if contacts else None))
 
 
 def contacts_of(motion: NDArray[np.float64]) -> Rows:

@@ -1,0 +1,82 @@
+"""The systems of scenes and how pairs of them act on one another; see blocksim/world/README.md.
+
+A system of the user's choice is one file, and one line in `blocksim.scenario.systems.SYSTEMS`; every pair that can meet
+is one line in `INTERACTIONS`.
+"""
+
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from typing import Any
+
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import Scenario
+from blocksim.scenario.systems import SYSTEMS
+from blocksim.world.systems.blocks import BLOCKS
+from blocksim.world.systems.supports import SUPPORTS
+from blocksim.world.systems.system import Present, System
+
+IN_WORLD = (BLOCKS, SUPPORTS)
+"""Systems of every scene, whose arrays are the world, and whose steps, bounds and energies are the scheme's own."""
+Function = Callable[..., None]
+Interaction = Callable[[], Function] | None
+"""Gives the compiled function of a pair (`blocksim.kernels.systems.Act`); None: nothing happens between the two."""
+
+
+def by_scheme() -> Function:
+    """Stand for contacts that every scheme has in its own steps."""
+    raise NotImplementedError("contacts of blocks and supports are stages of each scheme")
+
+
+INTERACTIONS: dict[tuple[str, str], Interaction] = {
+    (BLOCKS.name, BLOCKS.name): by_scheme,
+    (BLOCKS.name, SUPPORTS.name): by_scheme,
+    (SUPPORTS.name, SUPPORTS.name): None,
+}
+"""By the names of both; a system comes before blocks and supports, whose function gets the world as its partner."""
+
+
+def system_named(name: str) -> System:
+    """Return what the tables of a scenario of this name declare."""
+    module, _, declared = SYSTEMS[name].declared_in.partition(":")
+    found: System = getattr(import_module(module), declared)
+    return found
+
+
+def others_of(scenario: Scenario) -> tuple[Present, ...]:
+    """Return the systems of a scenario beside blocks and supports, in the order in which they are registered."""
+    found = [system_named(name) for name in SYSTEMS if scenario.systems.get(name)]
+    return tuple(Present(system, system.elements(scenario)) for system in found)
+
+
+def largest_step(scenario: Scenario) -> float:
+    """Return the longest step (s) that the systems beside blocks and supports admit; infinite where there are none."""
+    bounds = (present.system.largest_step for present in others_of(scenario))
+    return min((bound(scenario) for bound in bounds if bound is not None), default=float("inf"))
+
+
+def interaction_of(one: System, other: System) -> tuple[bool, Interaction]:
+    """Return whether a pair stands in the table the other way round, and what happens between the two.
+
+    Raises InvalidInputError for a pair that is not modelled.
+    """
+    for is_turned, key in enumerate(((one.name, other.name), (other.name, one.name))):
+        if key in INTERACTIONS:
+            return bool(is_turned), INTERACTIONS[key]
+    message = f"{one.name} and {other.name} cannot be in one scene: what happens between them is not modelled"
+    raise InvalidInputError(message)
+
+
+def acts_of(systems: tuple[System, ...]) -> Iterator[tuple[int, int | None, Any]]:
+    """Yield who acts on whom by which function: numbers of systems, None for blocks and supports.
+
+    Raises as `interaction_of`.
+    """
+    for i, one in enumerate(systems):
+        for other in IN_WORLD:
+            _, interaction = interaction_of(one, other)
+            if interaction is not None:
+                yield i, None, interaction()
+        for j in range(i, len(systems)):
+            is_turned, interaction = interaction_of(one, systems[j])
+            if interaction is not None:
+                yield (j, i, interaction()) if is_turned else (i, j, interaction())

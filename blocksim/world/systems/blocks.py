@@ -1,0 +1,95 @@
+"""Blocks: rigid rectangles that stand in the world of every scheme."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.world.systems.system import Elements, Floats, Indices, Output, Present, Quantity, System, Track, stored
+
+MILLI, DEGREES = 1e3, float(np.degrees(1.0))
+QUANTITIES = (
+    Quantity("x", "m"),  # centre
+    Quantity("y", "m"),
+    Quantity("angle", "rad"),  # of the body axes, counter-clockwise, never wrapped
+    Quantity("vx", "m/s"),
+    Quantity("vy", "m/s"),
+    Quantity("spin", "rad/s"),
+)
+CONSTANTS = (
+    Quantity("size_x", "m"),  # along the body's own axes
+    Quantity("size_y", "m"),
+    Quantity("depth", "m"),
+    Quantity("mass", "kg"),
+    Quantity("inertia", "kg m2"),
+)
+UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+
+
+def rotation(track: Track) -> Floats:
+    """Return the angles turned since the start (rad)."""
+    return np.asarray(track["angle"] - track.at_start("angle"))
+
+
+def kinetic_energy(track: Track) -> Floats:
+    """Return the kinetic energies (J); those of fixed blocks too, which the ledger does not count."""
+    speed_squared = track["vx"] ** 2 + track["vy"] ** 2
+    return np.asarray(0.5 * (track["mass"] * speed_squared + track["inertia"] * track["spin"] ** 2))
+
+
+def corners(track: Track, chosen: Indices) -> Floats:
+    """Return the corners (m) of blocks in some frames, from the lower left one on, (f, b, 4, 2)."""
+    local = UNIT_CORNERS * np.stack([track["size_x"], track["size_y"]], axis=-1)[:, None]
+    angle = track["angle"][chosen]
+    cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    x = track["x"][chosen][..., None] + cosine * local[..., 0] - sine * local[..., 1]
+    y = track["y"][chosen][..., None] + sine * local[..., 0] + cosine * local[..., 1]
+    return np.stack([x, y], axis=-1)
+
+
+def elements_of(placed: Sequence[PlacedBody]) -> Elements:
+    """Return what blocks are that were placed so."""
+    constants = np.array([[getattr(body, one.name) for body in placed] for one in CONSTANTS], dtype=np.float64)
+    start = np.array([[getattr(body, one.name) for body in placed] for one in QUANTITIES], dtype=np.float64)
+    return Elements(tuple(body.name for body in placed), constants, start)
+
+
+def _elements(scenario: Scenario) -> Elements:
+    return elements_of(place_bodies(scenario))
+
+
+def _state(world: Any, count: int) -> Floats:
+    return np.stack([world.bodies[one.name][:count] for one in QUANTITIES])
+
+
+BLOCKS = System(
+    name="blocks",
+    element="block",
+    quantities=QUANTITIES,
+    constants=CONSTANTS,
+    outputs=(
+        Output("x", "m", "centre along the ground", "x_mm", stored("x"), MILLI),
+        Output("y", "m", "centre above the ground", "y_mm", stored("y"), MILLI),
+        Output(
+            "rotation",
+            "rad",
+            "angle turned since the start, counter-clockwise positive, not wrapped",
+            "rotation_deg",
+            rotation,
+            DEGREES,
+        ),
+        Output("vx", "m/s", "velocity along the ground", "vx_mm_s", stored("vx"), MILLI),
+        Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", stored("vy"), MILLI),
+        Output("spin", "rad/s", "angular velocity", "spin_deg_s", stored("spin"), DEGREES),
+        Output("kinetic_energy", "J", "kinetic energy", "kinetic_energy_J", kinetic_energy),
+    ),
+    elements=_elements,
+    state=_state,
+    outlines=corners,
+)
+
+
+def blocks_placed(placed: Sequence[PlacedBody]) -> Present:
+    """Return the blocks of a scene that were placed so."""
+    return Present(BLOCKS, elements_of(placed))

@@ -1,0 +1,149 @@
+"""What a system is to all rooms: declared once, and looped over by recorder, files, ledger, exports and pictures.
+
+See blocksim/world/README.md. Nothing in here needs the compiler: stored runs are read without it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.scenario import Scenario
+
+if TYPE_CHECKING:
+    from blocksim.kernels.systems import Stages
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of every element that frames or files keep."""
+
+    name: str
+    unit: str  # SI, as in "m/s"
+
+    @property
+    def stored_unit(self) -> str:
+        """The unit as H5MD writes it, "m s-1"."""
+        return self.unit.replace("/s", " s-1")
+
+
+@dataclass(frozen=True)
+class Output:
+    """A number of every element that exports, tables and pictures of histories show."""
+
+    name: str
+    unit: str  # SI
+    meaning: str
+    column: str  # in tables, with its unit there
+    of: Callable[["Track"], Floats]  # (n, b), SI
+    factor: float = 1.0  # from SI to the unit of the column
+
+
+@dataclass(frozen=True)
+class Elements:
+    """What the b elements of a system are in one scenario, whatever happens to them."""
+
+    names: tuple[str, ...]
+    constants: Floats  # (c, b), as `constants` of the system
+    start: Floats  # (q, b) at time zero, as `quantities` of the system
+
+
+@dataclass(frozen=True)
+class System:
+    """One kind of thing that fills a scene.
+
+    `arrays` of a scene are what its kernels work on: the world for blocks and supports, else a named tuple of its own.
+    """
+
+    name: str  # in files, the ledger and the table of interactions
+    element: str  # what one of them is called
+    quantities: tuple[Quantity, ...]  # kept of every element in every frame
+    constants: tuple[Quantity, ...]  # kept of every element once
+    outputs: tuple[Output, ...]
+    elements: Callable[[Scenario], Elements]
+    state: Callable[[Any, int], Floats]  # of the arrays of a scene with so many elements, (q, b)
+    outlines: Callable[["Track", Indices], Floats]  # corners (m, counter-clockwise) in some frames, (f, b, k, 2)
+    energies: tuple[str, ...] = ()  # J, that it adds to the ledger
+    build: Callable[[Scenario], Any] | None = None  # its arrays at time zero, where they are not in the world
+    largest_step: Callable[[Scenario], float] | None = None  # s; None: the scheme knows
+    stages: Callable[[], "Stages"] | None = None  # its compiled functions, where they are not those of a scheme
+
+
+@dataclass(frozen=True)
+class Present:
+    """A system in one scene."""
+
+    system: System
+    elements: Elements
+
+    @property
+    def count(self) -> int:
+        """Number of elements."""
+        return len(self.elements.names)
+
+
+@dataclass(frozen=True)
+class Track:
+    """What n frames hold of one system; `track["x"]` is (n, b) for a quantity and (b,) for a constant."""
+
+    present: Present
+    values: Floats  # (n, q, b)
+
+    @property
+    def system(self) -> System:
+        """Whose it is."""
+        return self.present.system
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the elements."""
+        return self.present.elements.names
+
+    def __getitem__(self, name: str) -> Floats:
+        """Return a quantity over time, or a constant. Raises KeyError."""
+        for number, one in enumerate(self.system.quantities):
+            if one.name == name:
+                return np.asarray(self.values[:, number])
+        return self._constant(name, self.present.elements.constants)
+
+    def some(self, chosen: Indices) -> "Track":
+        """Return the same of some frames."""
+        return Track(self.present, self.values[chosen])
+
+    def at_start(self, name: str) -> Floats:
+        """Return a quantity at time zero, (b,)."""
+        numbers = [one.name for one in self.system.quantities]
+        return np.asarray(self.present.elements.start[numbers.index(name)])
+
+    def _constant(self, name: str, constants: Floats) -> Floats:
+        for one, values in zip(self.system.constants, constants, strict=True):
+            if one.name == name:
+                return np.asarray(values)
+        raise KeyError(name)
+
+    def columns(self) -> dict[str, Floats]:
+        """Return what tables show, (n, b) by the name of the column."""
+        return {one.column: one.factor * one.of(self) for one in self.system.outputs}
+
+
+def stored(name: str) -> Callable[[Track], Floats]:
+    """Return an output that is a quantity as it is stored."""
+    return lambda track: track[name]
+
+
+def discs(track: Track, chosen: Indices, radius: Floats, corners: int = 8) -> Floats:
+    """Return outlines (m) of round elements of these radii (m, (b,)) with places x, y in some frames."""
+    angles = 2.0 * np.pi * np.arange(corners) / corners
+    around = radius[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    centres = np.stack([track["x"][chosen], track["y"][chosen]], axis=-1)
+    return np.asarray(centres[:, :, None] + around)
+
+
+def values_of(presents: Sequence[Present], states: Sequence[Sequence[Floats]]) -> list[Floats]:
+    """Return the values (n, q, b) of every system, given its states in each of n frames."""
+    return [np.stack([frame[k] for frame in states]) for k in range(len(presents))]
