@@ -65,7 +65,8 @@ def compile_systems(scenario: Scenario) -> None:
 
 
 def _compile(kernels: str) -> None:
-    scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **CHANGES.get(kernels, {})})), 0)
+    change = CHANGES.get(kernels, {"time": {"scheme": kernels}})  # a scheme beside the usual ones has its own set
+    scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **change})), 0)
     measured_row(scene)
     if kernels == RIGID:
         _compile_ensemble(stack_of_one(scene))

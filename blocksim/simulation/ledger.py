@@ -40,7 +40,7 @@ class EnergyLedger(BaseModel, frozen=True, extra="allow"):
     stored_normal: Number = 0.0
     stored_shear: Number = 0.0
     dashpot: Number = 0.0
-    friction: Number
+    friction: Number = 0.0
     broken: Number = 0.0
     impacts: Number = 0.0
     correction: Number = 0.0
@@ -108,7 +108,7 @@ def ledger_of(names: Sequence[str], row: NDArray[np.float64], start: float, in_p
     m_total g 1 mm.
     """
     entries = dict(zip(names, row.tolist(), strict=False))
-    driven = in_play.moved + abs(entries["to_support"])
+    driven = in_play.moved + abs(entries.get("to_support", 0.0))
     weight = in_play.mass * STANDARD_GRAVITY
     return EnergyLedger(**entries, start=start, in_play=max(driven, weight * SMALLEST_HEIGHT))
 

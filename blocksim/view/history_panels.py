@@ -14,6 +14,8 @@ from blocksim.view.forces import WithContacts, contacts_of
 from blocksim.view.paint import MovingFrames
 from blocksim.view.run_data import Floats, FramesLike, Indices, Support
 from blocksim.view.window import MILLIMETRES
+from blocksim.world.systems.blocks import BLOCKS
+from blocksim.world.systems.system import Output, Track
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,6 +64,11 @@ class HistoryFrames(MovingFrames, Protocol):
     @property
     def spin(self) -> Floats:
         """Angular velocities (rad/s), (n, b)."""
+        ...
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """Every system over time, blocks first."""
         ...
 
 
@@ -148,6 +155,20 @@ MOTIONS: dict[str, Callable[[Seen], Motion]] = {
     "speed": _speed,
     "spin": lambda seen: Motion("spin (°/s)", np.degrees(seen.frames.spin[seen.chosen])),
 }
+
+
+def _shown(output: Output) -> Callable[[Seen], Motion]:
+    """Return the panel of what blocks show beside their motion."""
+
+    def motion(seen: Seen) -> Motion:
+        values = output.of(seen.frames.tracks[0].some(seen.chosen))
+        factor, unit = unit_for(float(np.abs(values).max(initial=0.0)), output.unit)
+        return Motion(f"{output.meaning} ({unit})", factor * values)
+
+    return motion
+
+
+MOTIONS |= {one.name: _shown(one) for one in BLOCKS.outputs if one.name not in MOTIONS}
 PANELS = (*MOTIONS, *SCENE, *GROUPS)
 
 

@@ -11,6 +11,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import PlacedSegment, Scenario, place_bodies
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
 from blocksim.scenario.segments import wall_segments
+from blocksim.world.systems.system import Track
 
 PRINTED_DIGITS = 3  # of a time in s
 PRINTED = 0.000501  # s; half of the last digit of a printed time, and round-off
@@ -58,6 +59,17 @@ class FramesLike(Protocol):
         ...
 
 
+def others_of(frames: FramesLike) -> tuple[Track, ...]:
+    """Return the systems beside the blocks over time; frames that know none have none."""
+    found: tuple[Track, ...] = getattr(frames, "others", ())
+    return found
+
+
+def outlines_of(track: Track, chosen: Indices) -> Floats:
+    """Return the outlines (m) of all elements of a system in some frames, (f, b, k, 2)."""
+    return track.system.outlines(track, chosen)
+
+
 BEYOND_REACH = 1e34
 """Metres or radians: ten thousand times the largest simulated value, and finite as 32-bit millimetres."""
 
@@ -74,6 +86,8 @@ def drawable_frames(frames: FramesLike) -> Indices:
     finite = np.isfinite(frames.time)
     for field in (frames.x, frames.y, frames.angle):
         finite &= (np.abs(field) < BEYOND_REACH).all(axis=1)  # false for what is not finite
+    for track in others_of(frames):
+        finite &= (np.abs(track.values) < BEYOND_REACH).all(axis=(1, 2))
     indices = np.flatnonzero(finite)
     if len(indices) == 0:
         message = "no frame to draw"

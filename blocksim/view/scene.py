@@ -11,8 +11,9 @@ from blocksim.view import style
 from blocksim.view.ground import draw_shift, draw_start, draw_support
 from blocksim.view.paint import Paint, by_block
 from blocksim.view.panel import Canvas
-from blocksim.view.run_data import Floats, FramesLike, Support
+from blocksim.view.run_data import Floats, FramesLike, Support, others_of, outlines_of
 from blocksim.view.window import MILLIMETRES
+from blocksim.world.systems.system import Track
 
 Flags = NDArray[np.bool_]
 UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # counter-clockwise from lower left
@@ -64,12 +65,30 @@ def draw_standing(canvas: Canvas, frames: FramesLike, frame: int, support: Suppo
 
 
 def draw_blocks(canvas: Canvas, frames: FramesLike, frame: int, support: Support, paint: Paint | None = None) -> None:
-    """Draw the blocks of one frame, free and fixed ones, with their names where there is room for all."""
+    """Draw the blocks of one frame, free and fixed ones, with their names where there is room for all.
+
+    Other systems lie below them, each in one colour.
+    """
+    for number, track in enumerate(others_of(frames), start=1):
+        _draw_system(canvas, track, frame, style.block_colour(number))
     fixed = _fixed(frames, support)
     own = (paint or by_block(frames)).fills(frame)
     fills = [style.GROUND_COLOUR if held else fill for held, fill in zip(fixed, own, strict=True)]
     _draw_outlines(canvas, frames, frame, fixed, fills)
     _draw_names(canvas, frames, frame, fixed, fills)
+
+
+def _draw_system(canvas: Canvas, track: Track, frame: int, colour: str) -> None:
+    """Draw the elements of a system in one frame."""
+    from matplotlib.collections import PolyCollection  # noqa: PLC0415 - see style
+
+    (outlines,) = MILLIMETRES * outlines_of(track, np.array([frame]))
+    thin = min(
+        style.LINE_WIDTH, 0.05 * canvas.points_per_mm * float(np.ptp(outlines[:, :, 0], axis=1).min(initial=1.0))
+    )
+    drawn = PolyCollection(list(outlines), facecolors=colour, edgecolors=style.INK, linewidths=thin)
+    drawn.set_transform(canvas.scene)
+    canvas.axes.add_collection(drawn)
 
 
 def _fixed(frames: FramesLike, support: Support) -> Flags:

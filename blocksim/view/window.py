@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario.segments import ENDLESS
-from blocksim.view.run_data import Floats, FramesLike, Indices, Support
+from blocksim.view.run_data import Floats, FramesLike, Indices, Support, others_of, outlines_of
 
 Flags = NDArray[np.bool_]
 MILLIMETRES = 1e3  # per metre
@@ -66,7 +66,7 @@ class Extent:
 def extent_of(
     frames: FramesLike, chosen: Indices, support: Support | None = None, blocks: Flags | None = None
 ) -> Extent:
-    """Return the extent in which no block is cut in any chosen frame, with a small margin.
+    """Return the extent in which no block, and no other system, is cut in any chosen frame, with a small margin.
 
     The ground below every block is shown, and the corners of the ground and the walls that are near. `blocks` (b,)
     selects the blocks that count, by default all.
@@ -75,7 +75,9 @@ def extent_of(
     reached = _reached(frames, chosen, support)
     if blocks is not None:
         reached = reached[:, blocks]
-    low, high = reached.min(axis=(0, 1)), reached.max(axis=(0, 1))
+    others = [turned(outlines_of(one, chosen), support.tilt).reshape(-1, 2) for one in others_of(frames)]
+    reached = np.concatenate([reached.reshape(-1, 2), *others])
+    low, high = reached.min(axis=0), reached.max(axis=0)
     shifts = _extreme_offsets(frames, chosen, support)
     diagonal = float(np.hypot(frames.size_x, frames.size_y).max())
     reach = np.maximum(diagonal, NEAR * (high - low))

@@ -1,6 +1,7 @@
 """A system that only tests know goes through everything that blocks go through, registered by a line a word."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,13 @@ from blocksim.simulation.schemes import build
 from blocksim.simulation.stores.csv_tables import write_frames_csv
 from blocksim.simulation.stores.vtkhdf import write_vtkhdf
 from blocksim.simulation.team import ALONE
+from blocksim.view import style
+from blocksim.view.animation import Animation, Look
+from blocksim.view.run_data import Support, drawable_frames
+from blocksim.view.strip import draw_strip
+from blocksim.view.window import extent_of
 from blocksim.world.systems import INTERACTIONS
-from tests.simulation.masses import MassTable, ground, tie
+from tests.simulation.masses import RADIUS, MassTable, ground, tie
 
 REGISTRATIONS: tuple[tuple[dict[Any, Any], Any, Any], ...] = (
     (SYSTEMS, "masses", MassTable),
@@ -199,3 +205,18 @@ def test_a_pair_cannot_get_other_functions_once_they_are_compiled(monkeypatch: p
     monkeypatch.setitem(INTERACTIONS, ("masses", "blocks"), ground)
     with pytest.raises(ValueError, match="compiled with other functions"):
         build(scene())
+
+
+def test_pictures_show_the_system(tmp_path: Path) -> None:
+    frames = blocksim.run(scene()).frames
+    masses = 1e3 * frames.others[0]["x"][0]
+    extent = extent_of(frames, drawable_frames(frames))
+    assert extent.left < -50.0
+    assert extent.right > masses.max() + 1e3 * RADIUS
+    draw_strip(frames, tmp_path / "with.png")
+    draw_strip(replace(frames, others=()), tmp_path / "without.png")
+    assert (tmp_path / "with.png").read_bytes() != (tmp_path / "without.png").read_bytes()
+    animation = Animation(frames, Support(), Look())
+    colour = [int(style.block_colour(1)[place : place + 2], 16) for place in (1, 3, 5)]
+    first, last = (int((animation.picture(frame) == colour).all(axis=-1).sum()) for frame in (0, len(frames) - 1))
+    assert min(first, last) > 30  # pixels of their colour, which the block does not have
