@@ -22,7 +22,7 @@ from blocksim.study.rows import MOVEMENT, Row
 
 SHARE = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(%?)")
 PERCENT = 100.0
-OUTCOME, MOVER, MOVED, DISPLACEMENT, TURN = MOVEMENT
+OUTCOME, MOVER, MOVED, DISPLACEMENT, TURN, *_ = MOVEMENT
 HEADS = ("verdict", "outcome", "first moved", "at s", "moved mm", "turned °")
 
 
@@ -115,6 +115,8 @@ def limit_command(
         answer("\n\n".join("\n".join(_lines(name, one)) for name, one in found.items()))
         _compare(found)
     if not silent:
+        if any(Verdict.UNDECIDED in one.verdicts.values() for one in found.values()):
+            note("undecided: the run ends while blocks move on; a larger time.end may decide")
         for one in found.values():
             note(f"{len(one.rows)} runs, {one.run} of them now: {one.folder / 'limit.csv'}")
     raise typer.Exit(ExitCode.SUCCESS if all(one.changes for one in found.values()) else ExitCode.OUTSIDE)

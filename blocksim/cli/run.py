@@ -15,6 +15,7 @@ from blocksim.simulation import Result
 from blocksim.simulation.checkpoint_policy import CHECKPOINT_SECONDS, CheckpointPolicy
 from blocksim.simulation.folder import default_folder
 from blocksim.simulation.movement import Movement
+from blocksim.simulation.outcome import REST
 from blocksim.simulation.running import Listener
 from blocksim.simulation.table import rows_of
 from blocksim.study.compare import compare_run
@@ -135,6 +136,14 @@ def _moved(found: Movement) -> str:
     return f"{found.outcome}: largest displacement {far}, rotation {turned}{first}"
 
 
+def _moving(result: Result) -> str:
+    """Return a line for a run that has ended before its blocks were at rest; nothing for others, and for old ones."""
+    end = None if result.summary.movement is None else result.summary.movement.end_speed
+    if end is None or result.summary.reason == REST.reason or end.speed <= result.scenario.time.rest_speed:
+        return ""
+    return f"\nnot at rest: block {end.block} at {end.speed:.2g} m/s"
+
+
 def _tell_end(result: Result) -> None:
     summary = result.summary
     note(f"{result.name}: {result.status} ({result.reason}) at {summary.simulated_time_s:.3f} s of simulated time")
@@ -143,7 +152,7 @@ def _tell_end(result: Result) -> None:
         f"relative energy error {summary.energy_J.relative_residual:.0e}"
     )
     if summary.movement is not None:
-        note(_moved(summary.movement))
+        note(f"{_moved(summary.movement)}{_moving(result)}")
     for text in summary.warnings:
         note(f"warning: {text}")
     note("")

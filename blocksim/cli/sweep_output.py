@@ -23,8 +23,8 @@ EVERY = 2.0  # s
 MOST_ROWS = 40
 MOST_FAILURES = 5
 MOST_MOVERS = 3
-NOT_SHOWN = {"case", "reason", "seconds"}
-OUTCOME, MOVER, MOVED, DISPLACEMENT, TURN = MOVEMENT
+OUTCOME, MOVER, MOVED, DISPLACEMENT, TURN, END_SPEED, MOVES_ON = MOVEMENT
+NOT_SHOWN = {"case", "reason", "seconds", END_SPEED, MOVES_ON}
 SHOWN_LAST = (DISPLACEMENT, TURN, MOVER, MOVED)
 POSITION = ".x_mm"
 NOT_SHOWN_ENDS = ("rotation_deg", "y_mm", "left_mm", "right_mm")
@@ -167,6 +167,9 @@ def _tell_movement(result: SweepResult) -> None:
     counts = ", ".join(f"{count} {name}" for name, count in table[OUTCOME].value_counts().items())
     far, turned = table[DISPLACEMENT].max(), table[TURN].max()
     note(f"{counts}; largest displacement {far:.2f} mm, rotation {turned:.2f}° (start to end)")
+    moving = int(table[MOVES_ON].isin([True, "True"]).sum()) if MOVES_ON in table else 0
+    if moving:
+        note(f"{moving} of {len(table)} cases end while blocks move on; a larger time.end would show where")
     if MOVER in table and table[MOVER].notna().any():
         movers = table[MOVER].value_counts()
         first = ", ".join(f"block {name} in {count}" for name, count in movers.head(MOST_MOVERS).items())

@@ -31,7 +31,7 @@ from blocksim.simulation.ledger import (
     start_energy,
 )
 from blocksim.simulation.loop import last_step_of, outcome_of
-from blocksim.simulation.movement import FirstMove, FirstMoves
+from blocksim.simulation.movement import EndSpeed, FirstMove, FirstMoves, end_speeds
 from blocksim.simulation.outcome import Outcome, diagnosed
 from blocksim.simulation.recorder import MOTION, POSITION, Rows, frames_from_rows, steps_per_frame
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measured_row, scheme_of
@@ -63,6 +63,7 @@ class MemberEnd:
     time_step: float  # s
     rows: Rows = field(repr=False)  # one: the last
     first_move: FirstMove | None = None
+    end_speed: EndSpeed | None = None
 
     @cached_property
     def frames(self) -> Frames:
@@ -305,6 +306,11 @@ class Closing:
         masses = [float(np.sum(mass)) + further for mass in world.bodies["mass"]]  # one by one: the order matters
         self.in_play = [*map(InPlay, masses, moved)]
         self.columns = final_values(self.motion, _shapes(placed)).tolist()
+        support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
+        self.end_speeds = end_speeds(placed, self.motion, support, [self._seconds(m) for m in range(len(placed))])
+
+    def _seconds(self, m: int) -> float:
+        return float(self.steps[m, 0]) * self.time_steps[m]
 
     def end(self, m: int, start: float, code: int, first_move: FirstMove | None) -> MemberEnd:
         """Return the end of one member: energy (J) at the start, status code that it came to, what moved first."""
@@ -317,12 +323,13 @@ class Closing:
         return MemberEnd(
             outcome=outcome,
             ledger=ledger,
-            seconds=int(self.steps[m, 0]) * self.time_steps[m],
+            seconds=self._seconds(m),
             columns=dict(zip(COLUMNS, (names, *self.columns[m]), strict=True)),
             placed=self.placed[m],
             time_step=self.time_steps[m],
             rows=Rows(self.steps[m], (self.motion[some],), self.measured[some], self.names),
             first_move=first_move,
+            end_speed=self.end_speeds[m],
         )
 
 

@@ -9,9 +9,10 @@ shortest side. A scene
     slid         where some block has moved and none has fallen,
     fell         where some block has fallen.
 
-Fixed blocks do not count. A run that `time.end` cuts short is reported as it is then. The first mover is the block that
-has moved in the first frame in which any has (the farthest of several); members of ensembles keep no frames, but are
-looked at when those would be recorded, until one block has moved.
+Fixed blocks do not count. A run that `time.end` cuts short is reported as it is then; it moves on where some block, as
+fast as it is then (relative to the support), would be farther than that hundredth away within another tenth of the
+time. The first mover is the block that has moved in the first frame in which any has (the farthest of several); members
+of ensembles keep no frames, but are looked at when those would be recorded, until one block has moved.
 """
 
 from collections.abc import Sequence
@@ -27,6 +28,7 @@ from blocksim.simulation.table import MILLI, Columns
 
 ROUND_OFF = 1e-9  # between two ways to compute a distance
 MOVED_SHARE = 0.01  # of the shortest side
+FURTHER = 0.1  # of the simulated time
 FALLEN_TURN = np.radians(45.0)
 FALLEN_SHARE = 0.5  # of the shortest side, downwards
 Floats = NDArray[np.float64]
@@ -48,6 +50,14 @@ class FirstMove(NamedTuple):
     time: float
 
 
+class EndSpeed(NamedTuple):
+    """The fastest block at the end, its speed (m/s), and whether it moves on."""
+
+    block: str
+    speed: float
+    moves_on: bool
+
+
 class Movement(BaseModel, frozen=True):
     """The entries of run.json about movement, in frames and at the end; blocks by name."""
 
@@ -58,6 +68,9 @@ class Movement(BaseModel, frozen=True):
     rotated_block: str
     first_mover: str | None = None
     first_moved_s: float | None = None  # time of the first frame in which it had moved
+    fastest_block: str | None = None  # at the end; None in runs of earlier versions
+    fastest_m_s: float | None = None  # its speed relative to the support, or that of its corners by its spin
+    moves_on: bool | None = None
 
     @property
     def first_move(self) -> FirstMove | None:
@@ -65,6 +78,13 @@ class Movement(BaseModel, frozen=True):
         if self.first_mover is None or self.first_moved_s is None:
             return None
         return FirstMove(self.first_mover, self.first_moved_s)
+
+    @property
+    def end_speed(self) -> EndSpeed | None:
+        """The three entries about the end together."""
+        if self.fastest_block is None or self.fastest_m_s is None or self.moves_on is None:
+            return None
+        return EndSpeed(self.fastest_block, self.fastest_m_s, self.moves_on)
 
 
 class _Shapes(NamedTuple):
@@ -102,6 +122,26 @@ def _manner(shapes: _Shapes, way: Floats, drop: Floats, turn: Floats) -> Manner:
     if fallen.any():
         return Manner.FELL
     return Manner.SLID if (_shares(shapes, way, turn) > 1.0).any() else Manner.STANDS
+
+
+def end_speeds(
+    placed: Sequence[Sequence[PlacedBody]], motion: Floats, support: Floats, seconds: Sequence[float]
+) -> list[EndSpeed]:
+    """Return which blocks are fastest at the ends of m scenes with b blocks each.
+
+    `motion` is (m, 6, b) as MOTION, `support` (m, 2) the velocities of ground and walls (m/s), `seconds` how long each
+    was simulated.
+    """
+    shapes = _shapes_of([body for bodies in placed for body in bodies]).split(len(placed))
+    velocity = np.hypot(motion[:, 3] - support[:, :1], motion[:, 4] - support[:, 1:])
+    speed = np.where(shapes.is_free, np.fmax(velocity, np.abs(motion[:, 5]) * shapes.reach), 0.0)
+    ahead = FURTHER * np.asarray(seconds)[:, None] * speed
+    moves_on = np.any(ahead > MOVED_SHARE * shapes.shortest, axis=1).tolist()
+    fastest = np.nanargmax(np.where(np.isnan(speed), -1.0, speed), axis=1).tolist()
+    return [
+        EndSpeed(bodies[block].name, float(speed[m, block]), moves_on[m])
+        for m, (bodies, block) in enumerate(zip(placed, fastest, strict=True))
+    ]
 
 
 def from_start_to_end(
@@ -164,9 +204,11 @@ class Watch:
         self.way, self.turn = np.zeros(len(placed)), np.zeros(len(placed))  # largest so far: m, rad
         self.first: FirstMove | None = None
         self.manner = Manner.STANDS  # in the last frame
+        self.last: tuple[Floats, float] | None = None  # motion and time of it
 
     def see(self, motion: Floats, time: float) -> None:
         """Look at a frame: (6, b) as MOTION, at a time (s)."""
+        self.last = motion, time
         if self.start is None:
             self.start = motion[:3].copy()
         dx, dy, angle = motion[:3] - self.start
@@ -178,8 +220,11 @@ class Watch:
             most = int(np.argmax(shares))
             self.first = FirstMove(self.placed[most].name, time) if shares[most] > 1.0 else None
 
-    def found(self) -> Movement:
-        """Return what was seen."""
+    def found(self, support: tuple[float, float] = (0.0, 0.0)) -> Movement:
+        """Return what was seen, given the velocity (m/s) of ground and walls at the end."""
+        assert self.last is not None  # noqa: S101 - the start is a frame
+        motion, time = self.last
+        (end,) = end_speeds([self.placed], motion[None], np.array([support]), [time])
         far, turned = int(np.argmax(self.way)), int(np.argmax(self.turn))
         return Movement(
             outcome=_with_way_there(self.manner, self.first),
@@ -189,4 +234,7 @@ class Watch:
             rotated_block=self.placed[turned].name,
             first_mover=None if self.first is None else self.first.block,
             first_moved_s=None if self.first is None else self.first.time,
+            fastest_block=end.block,
+            fastest_m_s=end.speed,
+            moves_on=end.moves_on,
         )

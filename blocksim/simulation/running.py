@@ -264,10 +264,15 @@ def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds:
         total_seconds=seconds,
         energy_J=ended.ledger,
         threads=ended.threads,
-        movement=recorder.watch.found(),
+        movement=recorder.watch.found(_velocity_of_support(ended.scene)),
         warnings=tuple(_warnings(scenario, recorder.placed, ended)),
         environment=environment(),
     )
+
+
+def _velocity_of_support(scene: AnyScene) -> tuple[float, float]:
+    ground = scene.world.bodies[-1]
+    return float(ground.vx), float(ground.vy)
 
 
 def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResult) -> Iterator[str]:

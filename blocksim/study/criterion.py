@@ -4,8 +4,7 @@ Conditions are joined by commas, and all of them must hold. `moved` is the large
 to end, `turned` the largest rotation; `outcome` is one of stands, rocked back, slid, fell (see
 `blocksim.simulation.movement`), several of them with "|" between.
 
-A run that meets all conditions and yet moves at its end is undecided where its fastest block would go farther than the
-condition allows (without one for `moved`: a hundredth of its way counts) within another tenth of the simulated time.
+A run that meets all conditions but moves on at its end (as `blocksim.simulation.movement` has it) is undecided.
 """
 
 import math
@@ -23,7 +22,7 @@ from blocksim.study.rows import FINISHED, MOVEMENT
 
 DEFAULT = "outcome = stands | rocked back"
 FORM = re.compile(r"\s*([a-z]+)\s*(<=|>=|!=|=|<|>)\s*(.*?)\s*")
-OUTCOME, _, _, DISPLACEMENT, TURN = MOVEMENT
+OUTCOME, _, _, DISPLACEMENT, TURN, _, MOVES_ON = MOVEMENT
 NUMBERS: dict[str, tuple[str, q.Kind, float]] = {  # word: column of a row, kind, units of the column in one of SI
     "moved": (DISPLACEMENT, q.LENGTH, 1e3),
     "turned": (TURN, q.ANGLE, math.degrees(1.0)),
@@ -53,7 +52,9 @@ class Criterion:
         """Judge a row of a sweep."""
         if row["status"] != FINISHED:
             return Verdict.FAILED
-        return Verdict.STANDS if all(holds(row) for holds in self.conditions) else Verdict.FALLS
+        if not all(holds(row) for holds in self.conditions):
+            return Verdict.FALLS
+        return Verdict.UNDECIDED if row.get(MOVES_ON) else Verdict.STANDS
 
 
 def read_criterion(text: str) -> Criterion:

@@ -19,8 +19,8 @@ from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import PlacedBody, Scenario, Sweep, place_bodies
 from blocksim.scenario import quantities as q
 from blocksim.scenario.units import ANGLE, parse_unit
-from blocksim.simulation.movement import FirstMove, from_start_to_end
-from blocksim.simulation.table import COLUMNS, Columns
+from blocksim.simulation.movement import EndSpeed, FirstMove, from_start_to_end
+from blocksim.simulation.table import COLUMNS, MILLI, Columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +31,7 @@ FINISHED = "finished"
 TABLE = "sweep.csv"
 """Rows of all cases; it makes a folder one of a sweep."""
 X = ".x_mm"
-MOVEMENT = ("outcome", "first_mover", "first_moved_s", "displacement_mm", "turn_deg")
+MOVEMENT = ("outcome", "first_mover", "first_moved_s", "displacement_mm", "turn_deg", "end_speed_mm_s", "moves_on")
 """As in run.json, but displacement and rotation are the largest of all blocks from start to end."""
 KEPT = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")  # of the final table, for every block
 QUARTER = 90.0  # deg
@@ -49,6 +49,7 @@ class Course(NamedTuple):
     reason: str
     seconds: float
     first_move: FirstMove | None
+    end_speed: EndSpeed | None = None
 
 
 def row_of(course: Course, final: Columns, placed: Sequence[PlacedBody]) -> Row:
@@ -56,7 +57,9 @@ def row_of(course: Course, final: Columns, placed: Sequence[PlacedBody]) -> Row:
     row: Row = {"status": course.status, "reason": course.reason, "seconds": course.seconds}
     manner, displacement, rotation = from_start_to_end(placed, final, course.first_move)
     mover, moved = course.first_move or (None, None)
-    row |= dict(zip(MOVEMENT, (manner.value, mover, moved, displacement, rotation), strict=True))
+    _, speed, moves_on = course.end_speed or (None, None, None)
+    values_of = (manner.value, mover, moved, displacement, rotation, None if speed is None else MILLI * speed, moves_on)
+    row |= dict(zip(MOVEMENT, values_of, strict=True))
     for block, *values in zip(final["block"], *(final[name] for name in KEPT), strict=True):
         row |= {f"{block}.{name}": value for name, value in zip(KEPT, values, strict=True)}
     return row

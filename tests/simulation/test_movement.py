@@ -1,5 +1,6 @@
 """How far blocks have moved, in what way, and which first."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -120,3 +121,43 @@ def test_resumed_run_has_seen_what_came_before(tmp_path: Path) -> None:
     resumed = simulate_into(scenario, tmp_path / "run", resume=True).summary
     assert resumed.resumed_from
     assert resumed.movement == whole
+
+
+@pytest.mark.parametrize(
+    ("speed", "spin", "support", "fastest", "moves_on"),
+    [
+        (0.0, 0.0, 0.0, 0.0, False),
+        (0.005, 0.0, 0.0, 0.005, False),  # 0.3 mm in a tenth of 0.6 s; a hundredth of 32 mm is 0.32 mm
+        (0.006, 0.0, 0.0, 0.006, True),
+        (0.2, 0.0, 0.2, 0.0, False),  # it rides on the table
+        (0.0, 0.2, 0.0, 0.1 * math.hypot(0.032, 0.05), True),  # its corners, half a diagonal from the centre
+    ],
+)
+def test_a_block_moves_on_that_would_soon_have_left_its_place(
+    speed: float, spin: float, support: float, fastest: float, *, moves_on: bool
+) -> None:
+    motion = frame()
+    motion[3] = support
+    motion[3, 1], motion[5, 1] = speed, spin
+    watch = Watch(PLACED)
+    watch.see(motion, 0.6)
+    found = watch.found((support, 0.0))
+    assert found.fastest_m_s == pytest.approx(fastest, rel=1e-5)
+    assert found.moves_on is moves_on
+
+
+def test_members_end_as_fast_as_the_same_runs_alone() -> None:
+    changes = ({"time.end": 0.15}, {"time.end": 0.15, "friction.block_ground": 0.2})
+    scenarios = [load_scenario(SCENARIOS / "three_blocks_nominal.toml", {**FALLING, **one}) for one in changes]
+    alone = [simulate(one).summary.movement for one in scenarios]
+    members = [member.end_speed for member in run_ensemble(scenarios)]
+    assert members == [movement.end_speed for movement in alone if movement is not None]
+    assert all(end is not None and end.moves_on for end in members)
+
+
+def test_blocks_on_a_shaking_table_are_as_fast_as_they_move_on_it() -> None:
+    shaking = load_scenario(SCENARIOS / "shaking_table.toml", {"time.end": 0.4, "contact.stiffness_scale": 0.001})
+    movement = simulate(shaking).summary.movement
+    (member,) = run_ensemble([shaking])
+    assert movement is not None
+    assert member.end_speed == movement.end_speed

@@ -48,3 +48,8 @@ def test_a_run_that_failed_neither_stands_nor_falls() -> None:
 def test_what_is_no_condition_is_refused_with_what_may_be_written(text: str, why: str) -> None:
     with pytest.raises(InvalidInputError, match=why):
         read_criterion(text)
+
+
+@pytest.mark.parametrize(("text", "verdict"), [("moved < 5 mm", "undecided"), ("moved < 4 mm", "falls")])
+def test_what_meets_the_conditions_but_moves_on_at_its_end_is_undecided(text: str, verdict: str) -> None:
+    assert read_criterion(text).verdict({**ROW, "moves_on": True}) == verdict

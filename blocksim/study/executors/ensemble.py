@@ -100,7 +100,7 @@ def _row_of(member: MemberEnd | MemberFailure) -> Row:
     """Return the row of a member."""
     if isinstance(member, MemberFailure):
         return row_of_error(member.error)
-    course = Course(member.outcome.status, member.outcome.reason, member.seconds, member.first_move)
+    course = Course(member.outcome.status, member.outcome.reason, member.seconds, member.first_move, member.end_speed)
     return row_of(course, member.columns, member.placed)
 
 
@@ -175,8 +175,9 @@ def _known_row(scenario: Scenario, folder: Path) -> Row | None:
 
 
 def _course(summary: Summary) -> Course:
-    first = None if summary.movement is None else summary.movement.first_move
-    return Course(summary.status, summary.reason, summary.simulated_time_s, first)
+    moved = summary.movement
+    first, end = (None, None) if moved is None else (moved.first_move, moved.end_speed)
+    return Course(summary.status, summary.reason, summary.simulated_time_s, first, end)
 
 
 def _has_ended(folder: Path, summary: Summary) -> bool:
