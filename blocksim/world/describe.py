@@ -13,6 +13,7 @@ from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
 from blocksim.world.bodies import outline_of
 from blocksim.world.bounds import bounds_of
 from blocksim.world.build import build_world
+from blocksim.world.coupled import couple
 from blocksim.world.interactions import ContactClass, contact_classes, pair_of
 from blocksim.world.memory import (
     PROCESS_BYTES,
@@ -27,6 +28,7 @@ from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
 from blocksim.world.particles import particle_count
 from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
+from blocksim.world.systems import others_of
 
 # measured on one core: a step costs about this for every body with its contacts
 SECONDS_PER_BODY_AND_STEP = 75e-9
@@ -131,6 +133,8 @@ def _built(scenario: Scenario, count: int) -> tuple[World, SceneSize | RigidSize
         scene = build_nonsmooth(scenario)
         return scene.world, RigidSize(count, scene.contacts.rows.size)
     world = build_world(scenario)
+    if scenario.systems:
+        couple(scenario, world, others_of(scenario))  # refuses pairs that are not modelled
     slots = world.candidates.shape[1]
     return world, SceneSize(count, world.pairs.size, slots, has_particles=world.particles is not None)
 

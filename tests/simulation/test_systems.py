@@ -27,6 +27,7 @@ from blocksim.view.animation import Animation, Look
 from blocksim.view.run_data import Support, drawable_frames
 from blocksim.view.strip import draw_strip
 from blocksim.view.window import extent_of
+from blocksim.world.describe import describe
 from blocksim.world.systems import INTERACTIONS
 from tests.simulation.masses import RADIUS, MassTable, ground, tie
 
@@ -220,3 +221,10 @@ def test_pictures_show_the_system(tmp_path: Path) -> None:
     colour = [int(style.block_colour(1)[place : place + 2], 16) for place in (1, 3, 5)]
     first, last = (int((animation.picture(frame) == colour).all(axis=-1).sum()) for frame in (0, len(frames) - 1))
     assert min(first, last) > 30  # pixels of their colour, which the block does not have
+
+
+def test_check_refuses_what_a_run_refuses(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert describe(scene()).step > 0.0
+    monkeypatch.delitem(INTERACTIONS, ("masses", "masses"))
+    with pytest.raises(InvalidInputError, match="masses and masses cannot be in one scene"):
+        describe(scene())
