@@ -91,6 +91,11 @@ standard_gravity = 9.80665 * meter / second ** 2 = g0
 """
 """The units that pint knows here; a small registry loads in 10 ms, not 300, and keeps radians apart."""
 
+USUAL_GRAVITY = 9.81
+"""m/s²; the default of scenarios; turns a unit weight into a density, as in the paper, whatever gravity there is."""
+STANDARD_GRAVITY = 9.80665
+"""m/s²; the g of accelerograms, and g0 above."""
+
 COMMON: dict[str, tuple[Fraction, Dimension]] = {
     "m": (Fraction(1), LENGTH),
     "cm": (Fraction(1, 100), LENGTH),

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, computed_field, model_validator
 
+from blocksim.scenario.units import USUAL_GRAVITY
+
 if TYPE_CHECKING:
     from blocksim.simulation.schemes import AnyScene
 
 SMALLEST_HEIGHT = 1e-3  # m; the energy in play is at least that of lifting everything by this much
-STANDARD_GRAVITY = 9.81
 RESIDUAL_LIMIT = 0.05  # of the energy in play; a run beyond this has no meaning
 RESIDUAL_PROMISE = 1e-3  # of the energy in play; beyond this a warning is due
 FIRST_CHECK = 1000  # steps
@@ -109,7 +110,7 @@ def ledger_of(names: Sequence[str], row: NDArray[np.float64], start: float, in_p
     """
     entries = dict(zip(names, row.tolist(), strict=False))
     driven = in_play.moved + abs(entries.get("to_support", 0.0))
-    weight = in_play.mass * STANDARD_GRAVITY
+    weight = in_play.mass * USUAL_GRAVITY
     return EnergyLedger(**entries, start=start, in_play=max(driven, weight * SMALLEST_HEIGHT))
 
 

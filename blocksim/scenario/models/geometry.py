@@ -9,9 +9,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table
-
-STANDARD_GRAVITY = 9.81
-"""m/s²; turns a unit weight into a density, as in the paper, whatever gravity the scenario has."""
+from blocksim.scenario.units import USUAL_GRAVITY
 
 Side = Literal["width", "height", "length"]
 SIDES: tuple[Side, ...] = ("width", "height", "length")
@@ -47,7 +45,7 @@ class Material(Table):
         """Mass per volume in kg/m³."""
         if self.given_density is not None:
             return self.given_density
-        return (self.unit_weight or math.nan) / STANDARD_GRAVITY
+        return (self.unit_weight or math.nan) / USUAL_GRAVITY
 
 
 class Block(Table):

@@ -24,11 +24,10 @@ from blocksim.scenario import quantities as q
 from blocksim.scenario.bounded_read import read_limited
 from blocksim.scenario.csv_table import bare_rows
 from blocksim.scenario.models.base import Table, table_path
+from blocksim.scenario.units import STANDARD_GRAVITY
 
 PIECES_PER_CYCLE = 200
 """The cubic pieces are then off by less than (2 pi/200)^4/384 = 3e-9 of the amplitude."""
-STANDARD_GRAVITY = 9.80665
-"""m/s²; the g of accelerograms."""
 TIME = "time_s"
 COLUMNS: dict[str, tuple[Literal["displacement", "acceleration"], float]] = {
     "displacement_m": ("displacement", 1.0),

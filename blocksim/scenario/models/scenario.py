@@ -21,6 +21,7 @@ from blocksim.scenario.models.stepping import AnyTime, Explicit, Output
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure
 from blocksim.scenario.systems import HELD, SYSTEMS, SystemTable, gathered, read_tables
+from blocksim.scenario.units import USUAL_GRAVITY
 
 SCHEMA_VERSION = 1
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -38,7 +39,7 @@ class Scenario(Table):
     )
     name: Identifier = Field(description="name of the scenario and of its results folder")
     description: str = Field(default="", description="free text")
-    gravity: q.NonNegativeAcceleration = Field(default=9.81, description="acceleration of gravity")
+    gravity: q.NonNegativeAcceleration = Field(default=USUAL_GRAVITY, description="acceleration of gravity")
     materials: dict[str, Material] = Field(description="materials by name, as in [materials.aluminium]")
     blocks: dict[str, Block] = Field(description="blocks by name, as in [blocks.brick]")
     structures: tuple[AnyStructure, ...] = Field(default=(), description="generators of bodies")
