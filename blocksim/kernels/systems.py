@@ -7,21 +7,22 @@ A step calls, between the drift of the blocks and their forces,
     finish     of every system: accelerations and half a kick,
 
 each by all threads, which meet after each. Forces on blocks are added to `fx`, `fy` and `torque` of the bodies, where
-those of their contacts come on top. What a step calls follows from the types of the systems alone: it is written out,
-one call after the other, when the time loop is compiled for these types. So nothing is looked up in a step, and the
-loop of a scene without such systems is compiled without all this.
+those of their contacts come on top. What a step calls follows from the types of the systems alone: all calls are put
+together, one after the other, when the time loop is compiled for these types. So nothing is looked up in a step, and
+the loop of a scene without such systems is compiled without all this.
 
 A function of a system gets the number of its thread, and works on a part of its own (`part_of_thread`); to have the
 same bits for any number of threads it gathers: what acts on one thing is summed up by one thread, in a fixed order.
 """
 
+import functools
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 from numba.extending import overload
 
 from blocksim.kernels.arrays import TEAM_SIZE, Floats, World
-from blocksim.kernels.jit import OPTIONS, config, entry_kernel, kernel
+from blocksim.kernels.jit import OPTIONS, config, entry_kernel, kernel, njit
 from blocksim.kernels.team import meet
 
 Systems = tuple[Any, ...]
@@ -86,55 +87,104 @@ def part_of_thread(count: int, world: World, k: int) -> tuple[int, int]:
     return count * k // size, count * (k + 1) // size
 
 
-class _Text:
-    """A function that is being written out."""
+def _inner(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a part of what a step calls: into its caller, with which it is cached."""
+    compiled: Callable[..., Any] = njit(**OPTIONS, forceinline=True)(function)
+    return compiled
 
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self.names: dict[str, object] = {"meet": meet}
 
-    def name(self, function: object) -> str:
-        self.names[name := f"f{len(self.names)}"] = function
-        return name
+def _both(first: Callable[..., Any], then: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what calls two functions, one after the other; all threads meet between them."""
 
-    def function(self, head: str, *last: str) -> Callable[..., Any]:
-        """Return the function. Only lines from above are executed, and names of ours."""
-        body = "\n    ".join([*self.lines, *last] or ["pass"])
-        exec(f"def {head}:\n    {body}\n", self.names)  # noqa: S102 - our own few lines, with no word from outside
-        return self.names[head.partition("(")[0]]  # type: ignore[return-value]  # just defined
+    def run(systems: Systems, world: World, k: int, step: float) -> None:
+        first(systems, world, k, step)
+        meet(world.team)
+        then(systems, world, k, step)
+
+    return _inner(run)
+
+
+def _of_one(function: Callable[..., Any], i: int) -> Callable[..., Any]:
+    """Return what calls a function of system i."""
+
+    def run(systems: Systems, world: World, k: int, step: float) -> None:
+        function(systems[i], world, k, step)
+
+    return _inner(run)
+
+
+def _of_pair(function: Callable[..., Any], i: int, j: int) -> Callable[..., Any]:
+    """Return what calls the function of systems i and j."""
+
+    def run(systems: Systems, world: World, k: int, step: float) -> None:
+        function(systems[i], systems[j], world, k, step)
+
+    return _inner(run)
+
+
+def _with_world(function: Callable[..., Any], i: int) -> Callable[..., Any]:
+    """Return what calls the function of system i and of blocks or supports."""
+
+    def run(systems: Systems, world: World, k: int, step: float) -> None:
+        function(systems[i], world, world, k, step)
+
+    return _inner(run)
+
+
+def _nothing() -> Callable[..., Any]:
+    def run(_systems: Systems, _world: World, _k: int, _step: float) -> None:
+        pass
+
+    return _inner(run)
 
 
 def _step(wanted: Plan) -> Callable[..., Any]:
-    text = _Text()
-    for number, stages in enumerate(wanted.stages):
-        text.lines.append(f"{text.name(stages.start)}(systems[{number}], world, k, step)")
-    text.lines.append("meet(world.team)")
-    for one, other, function in wanted.acts:
-        partner = "world" if other is None else f"systems[{other}]"
-        text.lines += [f"{text.name(function)}(systems[{one}], {partner}, world, k, step)", "meet(world.team)"]
-    for number, stages in enumerate(wanted.stages):
-        text.lines.append(f"{text.name(stages.finish)}(systems[{number}], world, k, step)")
-    return text.function("run(systems, world, k, step)", "meet(world.team)")
+    """Return all calls of a step, one after the other; threads meet after each."""
+    calls = [_of_one(stages.start, i) for i, stages in enumerate(wanted.stages)]
+    calls += [_with_world(act, i) if j is None else _of_pair(act, i, j) for i, j, act in wanted.acts]
+    calls += [_of_one(stages.finish, i) for i, stages in enumerate(wanted.stages)]
+    return functools.reduce(_both, [*calls, _nothing()])
+
+
+def _survey_both(before: Callable[..., Any], survey: Callable[..., Any], i: int) -> Callable[..., Any]:
+    def run(systems: Systems, world: World) -> tuple[float, float, float]:
+        fastest, kinetic, power = before(systems, world)
+        speed, energy, work = survey(systems[i], world)
+        return max(fastest, speed), kinetic + energy, power + work
+
+    return _inner(run)
 
 
 def _survey(wanted: Plan) -> Callable[..., Any]:
-    text = _Text()
-    text.lines.append("fastest = kinetic = power = 0.0")
-    for number, stages in enumerate(wanted.stages):
-        text.lines += [
-            f"speed, energy, work = {text.name(stages.survey)}(systems[{number}], world)",
-            "fastest, kinetic, power = max(fastest, speed), kinetic + energy, power + work",
-        ]
-    return text.function("run(systems, world)", "return fastest, kinetic, power")
+    def none(_systems: Systems, _world: World) -> tuple[float, float, float]:
+        return 0.0, 0.0, 0.0
+
+    found = _inner(none)
+    for i, stages in enumerate(wanted.stages):
+        found = _survey_both(found, stages.survey, i)
+    return found
+
+
+def _measure_both(before: Callable[..., Any], measure: Callable[..., Any], i: int, place: slice) -> Callable[..., Any]:
+    first, last = place.start, place.stop
+
+    def run(systems: Systems, world: World, row: Floats) -> None:
+        before(systems, world, row)
+        measure(systems[i], world, row[first:last])
+
+    return _inner(run)
 
 
 def _measure(wanted: Plan) -> Callable[..., Any]:
-    text, first = _Text(), 0
-    for number, (stages, names) in enumerate(zip(wanted.stages, wanted.energies, strict=True)):
+    def none(_systems: Systems, _world: World, _row: Floats) -> None:
+        pass
+
+    found, first = _inner(none), 0
+    for i, (stages, names) in enumerate(zip(wanted.stages, wanted.energies, strict=True)):
         last = first + len(names) + 1
-        text.lines.append(f"{text.name(stages.measure)}(systems[{number}], world, row[{first}:{last}])")
+        found = _measure_both(found, stages.measure, i, slice(first, last))
         first = last
-    return text.function("run(systems, world, row)")
+    return found
 
 
 def _written(write: Callable[[Plan], Callable[..., Any]], types: Sequence[type]) -> Callable[..., Any]:
@@ -167,7 +217,9 @@ def _compiled_as(stub: Callable[..., Any], write: Callable[[Plan], Callable[...,
     options: Any = {name: OPTIONS[name] for name in ("error_model", "_nrt")}
 
     def chosen(systems: Any, *_: Any) -> Callable[..., Any]:
-        return _written(write, [*_classes(systems)])
+        written: Any = _written(write, [*_classes(systems)])
+        found: Callable[..., Any] = written.py_func
+        return found
 
     overload(stub, jit_options=options, strict=False)(chosen)
 
