@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from blocksim.simulation.contacts import CONTACT_ROW, UNITS, Contacts, Rows
 from blocksim.simulation.frames import Floats, Frames
+from blocksim.world.systems.system import Quantity, Track
 
 MILLI = 1e3
 MOTION = {  # quantity of a frame: its name in tables, and SI -> that unit
@@ -74,6 +75,8 @@ def _firsts(stored: Frames, now: Frames, count: int) -> list[FirstDifference]:
     ]
     found = [_first_in_motion(stored, now, count, name) for name in MOTION]
     found += [_first_in_scene(stored, count, *one) for one in scene]
+    for old, new in zip(stored.others, now.others, strict=True):
+        found += [_first_in_track(stored, count, old, new, one) for one in old.system.quantities]
     found += [_first_in_contacts(stored, now, count)]
     return [one for one in found if one is not None]
 
@@ -87,6 +90,20 @@ def _first_in_motion(stored: Frames, now: Frames, count: int, name: str) -> Firs
     quantity, unit = MOTION[name]
     values = (unit * float(one[frame, block]) for one in (old, new))
     return FirstDifference(frame, float(stored.time[frame]), stored.names[block], quantity, *values)
+
+
+def _first_in_track(
+    stored: Frames, count: int, before: Track, after: Track, quantity: Quantity
+) -> FirstDifference | None:
+    """Return the first difference in a quantity (SI) of a system beside the blocks."""
+    old, new = before[quantity.name][:count], after[quantity.name][:count]
+    where = np.argwhere(_is_other(old, new))
+    if not where.size:
+        return None
+    frame, element = where[0].tolist()
+    name = f"{before.system.name} {quantity.name} ({quantity.unit})"
+    values = float(old[frame, element]), float(new[frame, element])
+    return FirstDifference(frame, float(stored.time[frame]), before.names[element], name, *values)
 
 
 def _first_in_scene(stored: Frames, count: int, name: str, old: Floats, new: Floats) -> FirstDifference | None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import blocksim
+from blocksim.analysis.bits import differences
 from blocksim.errors import ExitCode, InvalidInputError, ScenarioError
 from blocksim.scenario import Scenario, json_schema, load_scenario, scenario_from_mapping, scenario_to_toml
 from blocksim.scenario.systems import SYSTEMS
@@ -125,6 +126,17 @@ def test_frames_are_kept_and_read_back_with_units(tmp_path: Path) -> None:
         assert file["particles/masses/mass"][:].tolist() == [1.0] * 3
         assert "masses_stored" in file["observables"]
     assert result.summary.energy_J.residual == blocksim.open_run(tmp_path / "run").summary.energy_J.residual
+
+
+def test_a_changed_bit_of_the_system_is_found() -> None:
+    frames = blocksim.run(scene()).frames
+    (masses,) = frames.others
+    values = masses.values.copy()
+    values[3, 1, 2] = np.nextafter(values[3, 1, 2], 1.0)
+    first = differences(frames, replace(frames, others=(replace(masses, values=values),))).first
+    assert first is not None
+    assert (first.frame, first.block, first.quantity) == (3, "m3", "masses y (m)")
+    assert differences(frames, frames).is_none
 
 
 def test_exports_have_a_table_and_cells_of_the_system(tmp_path: Path) -> None:
