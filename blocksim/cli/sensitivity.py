@@ -2,7 +2,6 @@
 
 import csv
 import io
-from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -14,16 +13,14 @@ from blocksim.cli.output import note, number, show, table_lines
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.progress import counting
 from blocksim.cli.vary import read_variations
-from blocksim.errors import InvalidInputError, OutputExistsError
-from blocksim.scenario import Document, Sweep
+from blocksim.errors import OutputExistsError
+from blocksim.scenario import Document
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.compilation import kernels_of
-from blocksim.study.plan import varied
-from blocksim.study.sensitivity import INDICATOR, Indices, Sensitivity, sensitivity
+from blocksim.study.sensitivity import INDICATOR, Indices, Sensitivity, sampled_plan, sensitivity
 from blocksim.study.sensitivity_methods import METHODS
 
 VARY = "--vary"
-MODE = "sobol"
 DIGITS = 3
 SIGNS = {"deg": "°", INDICATOR: ""}
 NOTHING = "nothing to vary: give --vary KEY=FROM:TO, or a [sweep] table with distributions"
@@ -76,8 +73,8 @@ def sensitivity_command(
     silent = quiet or as_json
     _refuse_present(out, overwrite=overwrite)
     document = Document.read(scenario).with_settings(settings or [])
-    plan = _plan(document, vary or [])
-    bare = replace(document, data={key: value for key, value in document.data.items() if key != "sweep"})
+    plan = sampled_plan(document, read_variations(vary or [], VARY), VARY, NOTHING)
+    bare = document.without_sweep()
     tell_compilation(kernels_of(bare.build()), quiet=silent)
     with counting("runs", quiet=silent) as on_member:
         found = sensitivity(bare, plan, METHODS[method.value], samples=samples, seed=seed, on_member=on_member)
@@ -86,14 +83,6 @@ def sensitivity_command(
     show(_lines(found), _data(found), as_json=as_json)
     if not silent:
         _tell_end(found, out)
-
-
-def _plan(document: Document, texts: list[str]) -> Sweep:
-    given = read_variations(texts, VARY)
-    plan = varied(document, given, VARY, MODE) if given.tables else document.build().sweep
-    if plan is None or not plan.is_sampled:
-        raise InvalidInputError(NOTHING)
-    return plan
 
 
 def _refuse_present(out: Path | None, *, overwrite: bool) -> None:

@@ -104,6 +104,10 @@ class Document:
         texts = [(f"--set {clipped(text, 0)[0]}", text) for text in settings]
         return self._with(texts, [functools.partial(_setting, text) for text in settings])
 
+    def without_sweep(self) -> Self:
+        """Leave out the table [sweep]: what a study varies itself."""
+        return replace(self, data={key: entry for key, entry in self.data.items() if key != "sweep"})
+
     def _with(self, texts: Sequence[tuple[str, str]], pairs: Sequence[Callable[[], Pair]]) -> Self:
         """Set one value after the other, and report all that cannot be set."""
         data, overrides, problems = self.data, list(self.overrides), []

@@ -115,6 +115,15 @@ def field_at(path: Sequence[str | int], data: object) -> FieldInfo | None:
     return None if table is None else _fields(table).get(path[-1])
 
 
+def field_of(key: str, scenario: Scenario) -> FieldInfo | None:
+    """Return the field that a dotted key leads to in a scenario, None where it leads to none."""
+    data = scenario.model_dump(by_alias=True, exclude={"sweep"})
+    path: KeyPath = ()
+    for part in parse_key(key):
+        path = (*path, int(part) if isinstance(follow(data, path), list | tuple) else part)
+    return field_at(path, data)
+
+
 def is_known(path: Sequence[str | int], data: object) -> bool:
     """Return True if the models have a place for this path (what has a name or number must be in `data`)."""
     named = 2 if path[0] in SYSTEMS else NAMED.get(path[0], 0)

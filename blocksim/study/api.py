@@ -4,7 +4,6 @@ The commands of the same name build on the same functions; here are the defaults
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -17,7 +16,7 @@ from blocksim.study import calibrate as calibration
 from blocksim.study import sensitivity as analysis
 from blocksim.study.calibrate_plan import read_plan
 from blocksim.study.pictures import RunLook, draw
-from blocksim.study.plan import Values, Variations, varied
+from blocksim.study.plan import Values, Variations
 from blocksim.study.reporting import report_on
 from blocksim.study.sensitivity_methods import METHODS
 from blocksim.study.stored_run import stored_run
@@ -179,8 +178,5 @@ def sensitivity(
         message = f"unknown method {method!r}; choose one of {', '.join(METHODS)}"
         raise InvalidInputError(message)
     document = document_of(scenario)
-    plan = varied(document, Variations.of(vary), "vary", "sobol") if vary else document.build().sweep
-    if plan is None or not plan.is_sampled:
-        raise InvalidInputError(NOTHING)
-    bare = replace(document, data={key: value for key, value in document.data.items() if key != "sweep"})
-    return analysis.sensitivity(bare, plan, METHODS[method], samples=samples, seed=seed)
+    plan = analysis.sampled_plan(document, Variations.of(vary or {}), "vary", NOTHING)
+    return analysis.sensitivity(document.without_sweep(), plan, METHODS[method], samples=samples, seed=seed)

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil, exp, log, log10, sqrt
 from pathlib import Path
 
@@ -201,7 +201,7 @@ def read_plan(
         document = document.with_values({TABLE: said_by_hand(TABLE, str(experiment.absolute()))})
     fits = varied(document, fit, FIT, MODE)
     scattered = _scattered(document, scatter)
-    bare = replace(document, data={key: value for key, value in document.data.items() if key != "sweep"})
+    bare = document.without_sweep()
     base = bare.build()
     if base.experiment is None:
         message = f"{document.source.where}: the scenario names no experiment; give a table with --experiment"

@@ -8,7 +8,7 @@ from typing import Any
 
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import Document, Scenario, scenario_hash
-from blocksim.scenario.keys import field_at, follow, options, parse_key
+from blocksim.scenario.keys import field_of, options
 from blocksim.scenario.models.stepping import SCHEMES
 from blocksim.scenario.models.variation import Uniform
 from blocksim.scenario.units import parse_unit
@@ -83,7 +83,7 @@ def read_limit(
         message = f"a limit is searched along one key, not {len(given.tables)}: give {OPTION} KEY=FROM:TO once"
         raise InvalidInputError(message)
     key, table = next(iter(given.tables.items()))
-    bare = replace(document, data={name: entry for name, entry in document.data.items() if name != "sweep"})
+    bare = document.without_sweep()
     if not isinstance(table, Mapping) or not {"from", "to"} <= set(table):
         message = f"{OPTION} {given.texts[key]}: a range is needed, as in {key}=FROM:TO or {key}=FROM:TO:COUNT"
         raise InvalidInputError(message)
@@ -118,11 +118,7 @@ def _span(document: Document, key: str, values: Uniform, table: Mapping[str, Any
 
 
 def _takes_whole(document: Document, key: str) -> bool:
-    data = document.build().model_dump(by_alias=True, exclude={"sweep"})
-    path: tuple[str | int, ...] = ()
-    for part in parse_key(key):
-        path = (*path, int(part) if isinstance(follow(data, path), list | tuple) else part)
-    field = field_at(path, data)
+    field = field_of(key, document.build())
     return field is not None and int in options(field.annotation) and float not in options(field.annotation)
 
 

@@ -136,7 +136,7 @@ def cases_of(document: Document, sweep: Sweep) -> Cases:
 def _for_cases(document: Document) -> Document:
     """Return the document that cases are made from: no sweep, and tables found, or read, once for all of them."""
     scenario = document.build()
-    data: Mapping[str, object] = {key: entry for key, entry in document.data.items() if key != "sweep"}
+    data = document.without_sweep().data
     if scenario.experiment is not None:
         data = {**data, "experiment": {"table": scenario.experiment.table}}
     if isinstance(scenario.motion, FromTable):

@@ -13,6 +13,7 @@ from blocksim.scenario import Document, Sweep
 from blocksim.scenario.models.variation import Normal, Variation
 from blocksim.simulation.table import Columns
 from blocksim.study.executors.ensemble import Member, run_members
+from blocksim.study.plan import Variations, varied
 from blocksim.study.rows import are_inside, quarter_turns, ranges_of, values_at
 from blocksim.study.sampling import drawn, open_interval
 from blocksim.study.sensitivity_methods import Floats, Method
@@ -20,6 +21,7 @@ from blocksim.study.sensitivity_methods import Floats, Method
 if TYPE_CHECKING:
     import pandas as pd
 
+MODE = "sobol"
 MOST_BLOCKS = 10
 INDICATOR = "share"
 TAIL = 0.005  # of a normal distribution is left out at either end, for methods that go to the ends of the unit cube
@@ -134,6 +136,17 @@ class Sensitivity:
         import pandas as pd  # noqa: PLC0415 - a third of a second that the command does not pay
 
         return pd.DataFrame(list(self.records()))
+
+
+def sampled_plan(document: Document, given: Variations, option: str, nothing: str) -> Sweep:
+    """Return the distributions that are given to an option, or those of the document where none are.
+
+    Raises ScenarioError for mistakes in them, and InvalidInputError with the message `nothing` where there are none.
+    """
+    plan = varied(document, given, option, MODE) if given.tables else document.build().sweep
+    if plan is None or not plan.is_sampled:
+        raise InvalidInputError(nothing)
+    return plan
 
 
 def sensitivity(

@@ -12,7 +12,7 @@ from blocksim.analysis.members import Members
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario import quantities as q
-from blocksim.scenario.keys import KeyPath, field_at, follow, parse_key, si_unit
+from blocksim.scenario.keys import field_of, si_unit
 from blocksim.scenario.models.variation import Normal, Uniform
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
 from blocksim.study.sweep_folder import PLAN
@@ -137,9 +137,5 @@ def _number(value: object) -> float | None:
 
 def unit_of(scenario: Scenario, key: str) -> str:
     """Return the SI unit of a key's values, empty for plain numbers."""
-    data = scenario.model_dump(by_alias=True, exclude={"sweep"})
-    path: KeyPath = ()
-    for part in parse_key(key):
-        path = (*path, int(part) if isinstance(follow(data, path), list | tuple) else part)
-    field = field_at(path, data)
+    field = field_of(key, scenario)
     return "" if field is None else si_unit(field)
