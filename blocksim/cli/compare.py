@@ -12,6 +12,7 @@ from blocksim.cli import options
 from blocksim.cli.output import show
 from blocksim.cli.verdicts import comparison_table, judgement_lines, meanings, verdict_lines
 from blocksim.errors import ExitCode
+from blocksim.scenario.path_policy import near
 from blocksim.study.compare import compare_run, compare_sweep
 from blocksim.study.stored_run import find_run
 from blocksim.study.sweep_table import is_sweep
@@ -76,19 +77,13 @@ def _judge(place: Path, experiment: Path | None, settings: Settings) -> Judged:
 
 def _judge_sweep(place: Path, experiment: Path | None, settings: Settings) -> Judged:
     judgement = compare_sweep(place, experiment, settings)
-    head = f"{place} against {_near(judgement.source)}:"
+    head = f"{place} against {near(judgement.source)}:"
     return Judged(head, tuple(judgement_lines(judgement)), judgement.to_dict(), judgement.inside)
 
 
 def _judge_run(place: Path, experiment: Path | None) -> Judged:
     folder = find_run(place)
     comparison = compare_run(folder, experiment)
-    head = f"{folder} against {_near(comparison.source)}:"
+    head = f"{folder} against {near(comparison.source)}:"
     lines = (*comparison_table(comparison), *verdict_lines(comparison))
     return Judged(head, lines, {"run": str(folder), **comparison.to_dict()}, comparison.inside)
-
-
-def _near(path: str) -> str:
-    """Return a path as seen from here, where it lies below."""
-    here = Path.cwd()
-    return str(Path(path).relative_to(here)) if Path(path).is_relative_to(here) else path

@@ -92,3 +92,9 @@ def _roots(folder: Path) -> Iterator[Path]:
     here = Path.cwd()
     if not Path.home().resolve().is_relative_to(here):
         yield here
+
+
+def near(path: str) -> str:
+    """Return a path as seen from the current folder, where it lies below."""
+    here = Path.cwd()
+    return str(Path(path).relative_to(here)) if Path(path).is_relative_to(here) else path

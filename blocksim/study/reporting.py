@@ -6,20 +6,23 @@ from pathlib import Path
 from blocksim import __version__
 from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import ExperimentTable, load_table
-from blocksim.errors import BlocksimError, InputMissingError, UnavailableError
+from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
 from blocksim.scenario import Scenario, load_stored
+from blocksim.scenario.bounded_read import MEGABYTE
+from blocksim.scenario.path_policy import near
 from blocksim.simulation import folder as files
 from blocksim.study.compare import compare_sweep
-from blocksim.study.rows import FINISHED
+from blocksim.study.rows import FINISHED, TABLE
 from blocksim.study.stored_run import find_run
 from blocksim.study.sweep_folder import PLAN, case_folder
-from blocksim.study.sweep_table import is_sweep
+from blocksim.study.sweep_table import NEEDED, NO_COLUMNS, NO_TABLE, is_sweep, lines_in
 from blocksim.view.report.page import write_report
 from blocksim.view.report.player import MOST_BYTES
 from blocksim.view.report.runs import PartialRun, Subject, read_stored, run_subject
-from blocksim.view.report.sweeps import CaseTable, read_sweep_table, sweep_subject
+from blocksim.view.report.sweeps import CaseTable, sweep_subject
 
 MEMBERS = 50  # of a sweep in one page
+MOST_TABLE_BYTES = 200 * MEGABYTE  # of sweep.csv
 
 
 def report_on(
@@ -68,16 +71,11 @@ def _compared(run: PartialRun, experiment: Path | None) -> tuple[dict[str, objec
         if run.status != FINISHED:
             return None, ("only a finished run is compared with the measurement",)
         found = compare_final(run.final, table)
-        return {**found.to_dict(), "experiment": _near(found.source)}, ()
+        return {**found.to_dict(), "experiment": near(found.source)}, ()
     except BlocksimError as error:
         if experiment is not None:
             raise
         return None, (str(error),)
-
-
-def _near(path: str) -> str:
-    here = Path.cwd()
-    return str(Path(path).relative_to(here)) if Path(path).is_relative_to(here) else path
 
 
 def _measured(scenario: Scenario | None, experiment: Path | None) -> ExperimentTable | None:
@@ -88,7 +86,7 @@ def _measured(scenario: Scenario | None, experiment: Path | None) -> ExperimentT
 
 def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[list[Subject], tuple[str, ...]]:
     """Return a sweep and those of its members that have frames as subjects, and what is damaged in them."""
-    table = read_sweep_table(place)
+    table = _case_table(place)
     scenario, problems = _plan(place)
     judged, remarks = _judged(place, scenario, experiment)
     cases = _kept(table)
@@ -102,6 +100,15 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
     return [sweep, *shown], tuple(text for _, run in found for text in run.damage)
 
 
+def _case_table(folder: Path) -> CaseTable:
+    """Return the table of a sweep's folder; rows that are cut off are left out. Raises InvalidInputError."""
+    path = folder / TABLE
+    columns, *rows = list(filter(None, lines_in(path, MOST_TABLE_BYTES))) or [[]]
+    if not set(columns) >= NEEDED:
+        raise InvalidInputError(f"{path}: {NO_TABLE}: {NO_COLUMNS}")
+    return CaseTable(folder, tuple(columns), tuple(tuple(row) for row in rows if len(row) == len(columns)))
+
+
 def _judged(
     place: Path, scenario: Scenario | None, experiment: Path | None
 ) -> tuple[dict[str, object] | None, tuple[str, ...]]:
@@ -110,7 +117,7 @@ def _judged(
         return None, ()
     try:
         found = compare_sweep(place, experiment)
-        return {**found.to_dict(), "experiment": _near(found.source)}, ()
+        return {**found.to_dict(), "experiment": near(found.source)}, ()
     except BlocksimError as error:
         if experiment is not None and not isinstance(error, UnavailableError):
             raise

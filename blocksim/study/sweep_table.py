@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario.bounded_read import MEGABYTE, refuse_large
+from blocksim.scenario.bounded_read import MEGABYTE, read_limited, refuse_large
 from blocksim.simulation.atomic import writing
 from blocksim.study.plan import Cases
 from blocksim.study.progress import WHOLE, CaseIndex, Shard
@@ -25,6 +25,8 @@ TEXT_COLUMNS = {"case": str, "status": str, "reason": str, "first_mover": str}
 MOST_BYTES = 2000 * MEGABYTE
 """Of sweep.csv: a million cases of a hundred blocks do not fit into most memories."""
 OUTCOME = ("status", "reason", "seconds")
+NEEDED = {"case", "status"}
+NO_TABLE, NO_COLUMNS = "not the table of a sweep", "no columns case and status"
 SOONEST = 2.0  # s between two tables while the sweep runs
 MOST_ROWS = 20  # that a notebook shows
 SHARE = 0.02  # of the time, at most, goes into tables that are soon replaced
@@ -150,6 +152,14 @@ def read_sweep(folder: Path | str) -> SweepResult:
     return result
 
 
+def lines_in(path: Path, most_bytes: int = MOST_BYTES) -> list[list[str]]:
+    """Return the cells of all lines as the texts that stand there. Raises InputMissingError or InvalidInputError."""
+    try:
+        return list(csv.reader(io.StringIO(read_limited(path, most_bytes).decode(), newline="")))
+    except (ValueError, csv.Error) as error:
+        raise InvalidInputError(f"{path}: {NO_TABLE}: {error}") from error
+
+
 def _read(path: Path) -> "pd.DataFrame":
     import pandas as pd  # noqa: PLC0415 - a third of a second that a sweep need not wait for before it begins
 
@@ -157,9 +167,7 @@ def _read(path: Path) -> "pd.DataFrame":
         refuse_large(path, MOST_BYTES)
         table = pd.read_csv(path, dtype=TEXT_COLUMNS)
     except (OSError, ValueError) as error:
-        message = f"{path}: not the table of a sweep: {str(error).strip()}"
-        raise InvalidInputError(message) from error
-    if not {"case", "status"} <= set(table.columns) or table.columns[0] != "case":
-        message = f"{path}: not the table of a sweep: no columns case and status"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{path}: {NO_TABLE}: {str(error).strip()}") from error
+    if not set(table.columns) >= NEEDED or table.columns[0] != "case":
+        raise InvalidInputError(f"{path}: {NO_TABLE}: {NO_COLUMNS}")
     return table

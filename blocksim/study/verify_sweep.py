@@ -10,14 +10,13 @@ from functools import cached_property
 from pathlib import Path
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario.bounded_read import open_regular
 from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.plan import Case, Cases
 from blocksim.study.progress import PATTERN, CaseIndex, read_entries
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, invalid_row, varied_cells
 from blocksim.study.sweep import cases_in, measured_ranges
 from blocksim.study.sweep_folder import case_folder, read_origin, read_plan
-from blocksim.study.sweep_table import OUTCOME
+from blocksim.study.sweep_table import NO_TABLE, OUTCOME, lines_in
 from blocksim.study.verify_run import Origin, RunVerdict, changed_origins, tells_of_code, verify_run
 
 SAMPLE = 16  # rows, where nobody says how many
@@ -104,14 +103,9 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
 
 def _read_table(path: Path) -> tuple[list[str], list[list[str]]]:
     """Return heads and rows as texts: what a person cites. Raises InputMissingError or InvalidInputError."""
-    try:
-        with open_regular(path) as file, io.TextIOWrapper(file, encoding="utf-8", newline="") as text:
-            head, *lines = csv.reader(text)
-    except (OSError, ValueError, csv.Error) as error:
-        message = f"{path}: not the table of a sweep: {error}"
-        raise InvalidInputError(message) from error
+    head, *lines = lines_in(path) or [[]]
     if head[:1] != [CASE] or not set(OUTCOME) <= set(head) or len(set(head)) < len(head):
-        message = f"{path}: not the table of a sweep: its columns are not case, ..., {', '.join(OUTCOME)}, ..."
+        message = f"{path}: {NO_TABLE}: its columns are not case, ..., {', '.join(OUTCOME)}, ..."
         raise InvalidInputError(message)
     short = next((number for number, line in enumerate(lines, start=2) if len(line) != len(head)), None)
     if short is not None:

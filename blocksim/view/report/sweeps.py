@@ -1,23 +1,16 @@
 """Sweeps in a report: the table of sweep.csv, and the members whose frames were kept."""
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
-from blocksim.scenario.bounded_read import MEGABYTE, read_limited
 from blocksim.view.report.runs import Subject
 
-TABLE = "sweep.csv"
-MOST_BYTES = 200 * MEGABYTE  # of the table
 MOVES = ("first_mover", "first_moved_s", "displacement_mm", "turn_deg")
 HEAD, TAIL = ("case",), ("status", "reason", "seconds", "inside", "outcome", *MOVES)
-NEEDED = {"case", "status"}
 OF_BLOCKS = (".x_mm", ".y_mm", ".rotation_deg", ".left_mm", ".right_mm")
 MOST_VALUES = 400_000  # of blocks in the page; a sweep of 10 000 cases shows 13 blocks
 
@@ -47,21 +40,6 @@ class CaseTable:
             return [""] * len(self.rows)
         place = self.columns.index(name)
         return [row[place] for row in self.rows]
-
-
-def read_sweep_table(folder: Path) -> CaseTable:
-    """Return the table of a sweep's folder; rows that are cut off are left out. Raises InvalidInputError."""
-    path = folder / TABLE
-    try:
-        text = read_limited(path, MOST_BYTES).decode()
-        lines = [tuple(line) for line in csv.reader(io.StringIO(text, newline="")) if line]
-    except (ValueError, csv.Error) as error:
-        message = f"{path}: not the table of a sweep: {error}"
-        raise InvalidInputError(message) from error
-    if not lines or not set(lines[0]) >= NEEDED:
-        message = f"{path}: not the table of a sweep: no columns case and status"
-        raise InvalidInputError(message)
-    return CaseTable(folder, lines[0], tuple(line for line in lines[1:] if len(line) == len(lines[0])))
 
 
 COLUMN_OF = {"x": "x_mm", "rotation": "rotation_deg"}
