@@ -4,6 +4,8 @@ import csv
 import json
 from pathlib import Path
 
+import pytest
+
 from blocksim.cli.sweep_output import short_names
 from tests.cli.conftest import SCENARIOS, SOFT, Command
 
@@ -37,21 +39,32 @@ def test_grid_from_the_command_line(blocksim: Command) -> None:
     assert answer.err.splitlines()[-1] == "table: out/sweep.csv"
 
 
-def test_list_mode(blocksim: Command) -> None:
-    vary = ("--vary", f"{KINETIC}=0.2,0.3", "--vary", "time.end=0.01,0.02", "--mode", "list")
-    assert blocksim(*SHORT, *vary).code == 0
-    assert [(row[KINETIC], row["time.end"]) for row in rows()] == [("0.2", "0.01"), ("0.3", "0.02")]
+OWN = '[sweep]\n"friction.block_ground" = { from = 0.3, to = 0.4, count = 3 }\n'
+TABLE = '[sweep]\nmode = "table"\ntable = "cases.csv"\n'
+CASES = "structures.0.overlap [mm],time.scheme\n9,explicit\n10,nonsmooth\n"
 
 
-def test_scenario_with_its_own_sweep_needs_no_flags(blocksim: Command, tmp_path: Path) -> None:
-    text = (SCENARIOS / "slide.toml").read_text()
-    (tmp_path / "mine.toml").write_text(
-        text + '\n[sweep]\n"friction.block_ground" = { from = 0.3, to = 0.4, count = 3 }\n'
-    )
-    answer = blocksim("sweep", "mine.toml", "--out", "out", "--jobs", 1)
-    assert answer.code == 0
-    assert [row["friction.block_ground"] for row in rows()] == ["0.3", "0.35", "0.4"]
-    assert answer.out.splitlines()[0].split()[0] == "block_ground"
+@pytest.mark.parametrize(
+    ("own", "options", "expected"),
+    [
+        (
+            "",
+            ("--vary", f"{KINETIC}=0.2,0.3", "--vary", "time.end=0.01,0.02", "--mode", "list"),
+            {KINETIC: ["0.2", "0.3"], "time.end": ["0.01", "0.02"]},
+        ),
+        (OWN, (), {"friction.block_ground": ["0.3", "0.35", "0.4"]}),
+        (TABLE, (), {"structures.0.overlap [mm]": ["9.0", "10.0"], "time.scheme": ["explicit", "nonsmooth"]}),
+    ],
+    ids=["list", "keys of the scenario", "table of the scenario"],
+)
+def test_cases_are_those_of_the_list_the_scenario_or_its_table(
+    blocksim: Command, own: str, options: tuple[str, ...], expected: dict[str, list[str]]
+) -> None:
+    Path("cases.csv").write_text(CASES)
+    nominal = (SCENARIOS / "three_blocks_nominal.toml").read_text().partition("[experiment]")[0]
+    Path("mine.toml").write_text(f"{nominal}\n{own}")
+    assert blocksim("sweep", "mine.toml", *SHORT[2:], *options).code == 0
+    assert {key: [row[key] for row in rows()] for key in expected} == expected
 
 
 def test_json_and_quiet_tell_nothing_else(blocksim: Command) -> None:
@@ -64,12 +77,6 @@ def test_json_and_quiet_tell_nothing_else(blocksim: Command) -> None:
     assert data["rows"][0]["inside"] is False
     quiet = blocksim(*SHORT, *vary, "--quiet")
     assert (quiet.code, quiet.err, len(quiet.out.splitlines())) == (77, "", 4)
-
-
-def test_failed_case_is_77_and_its_reason_is_reported(blocksim: Command) -> None:
-    answer = blocksim(*SHORT, "--vary", "contact.max_overlap=1e-3,1e-9")
-    assert answer.code == 77
-    assert "1 of 2 cases did not finish; the first: an overlap exceeds contact.max_overlap" in answer.err
 
 
 def test_log_spacing_and_units_on_the_command_line(blocksim: Command) -> None:
@@ -116,7 +123,7 @@ def test_failures_are_listed_up_to_a_few(blocksim: Command) -> None:
     answer = blocksim(*SHORT, "--vary", "contact.max_overlap=1e-3," + ",".join(f"{k}e-9" for k in range(1, 9)))
     assert answer.code == 77
     assert answer.err.count("  failed: max_overlap = ") == 5
-    assert "8 of 9 cases did not finish" in answer.err
+    assert "8 of 9 cases did not finish; the first: an overlap exceeds contact.max_overlap" in answer.err
     assert "  and 3 more; --retry-failed runs them again" in answer.err
 
 
@@ -154,16 +161,4 @@ def test_samples_from_the_command_line(blocksim: Command) -> None:
     blocksim(*SHORT[:-1], "again", *SAMPLED, "--samples", 2, "--seed", 3)
     assert [row.split(",")[:3] for row in Path("again/sweep.csv").read_text().splitlines()] == [
         row.split(",")[:3] for row in first.splitlines()
-    ]
-
-
-def test_a_table_of_cases(blocksim: Command) -> None:
-    Path("cases.csv").write_text("structures.0.overlap [mm],time.scheme\n9,explicit\n10,nonsmooth\n")
-    short = Path("scenarios/three_blocks_nominal.toml").read_text().partition("[experiment]")[0]
-    Path("mine.toml").write_text(short + '\n[sweep]\nmode = "table"\ntable = "cases.csv"\n')
-    answer = blocksim("sweep", "mine.toml", *SHORT[2:])
-    assert answer.code == 0
-    assert [(row["structures.0.overlap [mm]"], row["time.scheme"]) for row in rows()] == [
-        ("9.0", "explicit"),
-        ("10.0", "nonsmooth"),
     ]

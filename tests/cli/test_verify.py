@@ -7,6 +7,7 @@ import pytest
 from blocksim.verification import cases
 from blocksim.verification.case import Case, Row, Setting, absolute
 from tests.cli.conftest import Command
+from tests.golden import Golden
 
 KEYS = {
     "case",
@@ -46,45 +47,38 @@ def test_json_has_every_number_unrounded(blocksim: Command) -> None:
     assert row["measured"] == pytest.approx(row["expected"], rel=1e-3)
 
 
-def test_a_miss_gives_exit_code_1_and_its_reason(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    def measure(_: Setting) -> list[Row]:
-        return [absolute("half", "m", 1.0, 0.5, 0.1), absolute("whole", "m", 1.0, 1.0, 0.1)]
+def missed(_: Setting) -> list[Row]:
+    return [absolute("half", "m", 1.0, 0.5, 0.1), absolute("whole", "m", 1.0, 1.0, 0.1)]
 
-    case = Case("V2", "made up", "nowhere", measure, remarks={"surface": "it is made up"})
-    monkeypatch.setattr(cases, "CASES", (case,))
-    answer = blocksim("verify")
-    assert answer.code == 1
-    assert "−0.5" in answer.out
-    assert "V2 made up: 1 of 2 outside: it is made up" in answer.err
-    assert "0 of 1 cases inside" in answer.err
+
+def shortened(setting: Setting) -> list[Row]:
+    return [absolute("quick", "", 1.0, float(setting.quick), 0.0)]
+
+
+def stopped(_: Setting) -> list[Row]:
+    raise KeyboardInterrupt
+
+
+MADE_UP = {
+    "miss": (Case("V2", "made up", "nowhere", missed, remarks={"surface": "it is made up"}),),
+    "quick": (Case("V2", "made up", "nowhere", shortened, quick="half of it"),),
+    "stop": (Case("V1", "done", "nowhere", missed), Case("V2", "stopped", "nowhere", stopped)),
+}
+
+
+@pytest.mark.parametrize("name", MADE_UP)
+def test_misses_shortened_cases_and_a_stop_are_told(
+    blocksim: Command, golden: Golden, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setattr(cases, "CASES", MADE_UP[name])
+    answer = blocksim("verify", *(["--quick"] if name == "quick" else []))
+    golden(f"exit code {answer.code}\n{answer.out}{answer.err}", rules=["times"])
 
 
 def test_quiet_prints_the_table_only(blocksim: Command) -> None:
     answer = blocksim("verify", "V2", "--quiet")
     assert (answer.code, answer.err) == (0, "")
     assert answer.out.startswith("quantity")
-
-
-def test_quick_says_what_it_leaves_out(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    def measure(setting: Setting) -> list[Row]:
-        return [absolute("quick", "", 1.0, float(setting.quick), 0.0)]
-
-    monkeypatch.setattr(cases, "CASES", (Case("V2", "made up", "nowhere", measure, quick="half of it"),))
-    answer = blocksim("verify", "--quick")
-    assert answer.code == 0
-    assert "V2 shortened: half of it" in answer.err
-
-
-def test_a_stop_keeps_what_was_measured(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    def stop(_: Setting) -> list[Row]:
-        raise KeyboardInterrupt
-
-    done = Case("V1", "done", "nowhere", lambda _: [absolute("half", "m", 1.0, 1.0, 0.1)])
-    monkeypatch.setattr(cases, "CASES", (done, Case("V2", "stopped", "nowhere", stop)))
-    answer = blocksim("verify")
-    assert answer.code == 75
-    assert "half, m" in answer.out
-    assert "stopped" in answer.err
 
 
 def test_rigid_contacts_say_that_they_are_and_what_is_left_out(
