@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -32,10 +33,25 @@ block = "brick"
 count = 3
 """
 
+MATERIAL = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
+BRICK: dict[str, Any] = {"width": 0.2, "height": 0.1, "length": 0.1, "material": "oak"}
+
 Overrides = Mapping[str, object] | Sequence[str]
 Refusal = Callable[..., tuple[int, str]]
 Edit = str | tuple[str, str]  # what is added to the valid scenario, or a piece of it and what takes its place
 Refused = Callable[[Edit], None]
+
+
+def data_of(**tables: object) -> dict[str, Any]:
+    """Return the data of a scenario of one brick on the ground, with other tables."""
+    return {
+        "schema": 1,
+        "name": "a",
+        "materials": {"oak": MATERIAL},
+        "blocks": {"brick": BRICK},
+        "bodies": [{"block": "brick", "x": 0, "y": 0.05}],
+        **tables,
+    }
 
 
 @pytest.fixture

@@ -26,22 +26,13 @@ from blocksim.scenario.motion import (
     motion_pieces,
     spline_slopes,
 )
+from tests.scenario.conftest import data_of
 
-MATERIAL = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
-BRICK = {"width": 0.2, "height": 0.1, "length": 0.1, "material": "oak"}
 END = 3.0
 
 
 def scenario(motion: dict[str, Any] | None, folder: Path = Path(), **tables: object) -> Scenario:
-    data = {
-        "schema": 1,
-        "name": "a",
-        "materials": {"oak": MATERIAL},
-        "blocks": {"brick": BRICK},
-        "bodies": [{"block": "brick", "x": 0, "y": 0.05}],
-        "time": {"end": END},
-        **tables,
-    }
+    data = data_of(time={"end": END}, **tables)
     return scenario_from_mapping(data if motion is None else {**data, "motion": motion}, folder)
 
 

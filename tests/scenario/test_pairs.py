@@ -5,9 +5,7 @@ from typing import Any
 import pytest
 
 from blocksim.scenario import GROUND, Document, PairFriction, Scenario, resolve_pair, scenario_from_mapping
-
-MATERIAL = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
-BRICK = {"width": 1, "height": 1, "length": 1, "material": "oak"}
+from tests.scenario.conftest import MATERIAL, data_of
 
 
 def scenario(**tables: object) -> Scenario:
@@ -15,14 +13,7 @@ def scenario(**tables: object) -> Scenario:
 
 
 def scenario_data(**tables: object) -> dict[str, Any]:
-    return {
-        "schema": 1,
-        "name": "a",
-        "materials": {"oak": MATERIAL, "steel": MATERIAL, "sand": MATERIAL},
-        "blocks": {"brick": BRICK},
-        "bodies": [{"block": "brick", "x": 0, "y": 5}],
-        **tables,
-    }
+    return data_of(materials={"oak": MATERIAL, "steel": MATERIAL, "sand": MATERIAL}, **tables)
 
 
 def static_and_rule(made: Scenario, one: str, other: str, *, ground: bool) -> tuple[float, str]:

@@ -8,6 +8,7 @@ import pytest
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Document, load_scenario, scenario_from_mapping
 from blocksim.scenario.path_policy import reaching
+from tests.scenario.conftest import data_of
 
 TABLE = "block,quantity,unit,replicate,value\n1,x,mm,1,16\n"
 MOTION = "time_s,displacement_mm\n0,0\n0.1,1\n"
@@ -106,14 +107,7 @@ def test_a_document_keeps_what_was_allowed_when_it_was_read(naming: Callable[[st
 
 
 def test_data_from_python_are_held_to_the_same(place: Path) -> None:
-    data = {
-        "schema": 1,
-        "name": "case",
-        "bodies": [{"block": "brick", "x": 0, "y": 0.01}],
-        "materials": {"steel": {"density": 7850, "young_modulus": 210e9, "poisson_ratio": 0.3}},
-        "blocks": {"brick": {"width": 0.04, "height": 0.02, "length": 0.06, "material": "steel"}},
-        "experiment": {"table": str(place / "theirs" / "measured.csv")},
-    }
+    data = data_of(experiment={"table": str(place / "theirs" / "measured.csv")})
     with pytest.raises(ScenarioError, match="leads outside"):
         scenario_from_mapping(data)
     assert scenario_from_mapping(data, allow_outside=True).experiment is not None

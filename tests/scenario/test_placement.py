@@ -8,19 +8,13 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import load_scenario, place_bodies, scenario_from_mapping
+from tests.scenario.conftest import MATERIAL, data_of
 
-MATERIAL = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
 BRICK = {"width": "32 mm", "height": "25 mm", "length": "50 mm", "material": "aluminium"}
 
 
 def scenario_data(**tables: object) -> dict[str, object]:
-    return {
-        "schema": 1,
-        "name": "a",
-        "materials": {"aluminium": MATERIAL},
-        "blocks": {"brick": BRICK},
-        **tables,
-    }
+    return data_of(materials={"aluminium": MATERIAL}, blocks={"brick": BRICK}, **tables)
 
 
 def test_the_three_blocks_stand_as_in_the_experiment() -> None:

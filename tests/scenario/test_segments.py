@@ -11,25 +11,15 @@ from hypothesis import strategies as st
 
 from blocksim.scenario import PlacedSegment, Scenario, place_segments, scenario_from_mapping, surface_height
 from blocksim.scenario.segments import ENDLESS
+from tests.scenario.conftest import data_of
 
 Point = tuple[float, float]
-MATERIAL = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
-BRICK = {"width": 0.1, "height": 0.1, "length": 0.1, "material": "oak"}
 
 
 def scenario(profile: Sequence[Point] | None = None, walls: Sequence[Mapping[str, object]] = ()) -> Scenario:
     ground = {} if profile is None else {"ground": {"profile": profile}}
-    return scenario_from_mapping(
-        {
-            "schema": 1,
-            "name": "a",
-            "materials": {"oak": MATERIAL},
-            "blocks": {"brick": BRICK},
-            "bodies": [{"block": "brick", "x": 0, "y": 500}],
-            "walls": walls,
-            **ground,
-        }
-    )
+    bodies = [{"block": "brick", "x": 0, "y": 500}]
+    return scenario_from_mapping(data_of(bodies=bodies, walls=walls, **ground))
 
 
 def ends(segment: PlacedSegment) -> tuple[Point, Point]:

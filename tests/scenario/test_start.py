@@ -8,21 +8,13 @@ import pytest
 
 from blocksim.errors import ScenarioError
 from blocksim.scenario import place_bodies, scenario_from_mapping
+from tests.scenario.conftest import BRICK, data_of
 
-MATERIAL = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
-BRICK: dict[str, Any] = {"width": 0.2, "height": 0.1, "length": 0.1, "material": "oak"}
 SLOPE = math.atan(0.5)
 
 
 def scenario_data(bodies: Sequence[Mapping[str, object]], **tables: object) -> dict[str, Any]:
-    return {
-        "schema": 1,
-        "name": "a",
-        "materials": {"oak": MATERIAL},
-        "blocks": {"brick": BRICK},
-        "bodies": [{"block": "brick", **body} for body in bodies],
-        **tables,
-    }
+    return data_of(bodies=[{"block": "brick", **body} for body in bodies], **tables)
 
 
 def mistakes(data: dict[str, Any]) -> list[str]:

@@ -7,6 +7,7 @@ import pytest
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Scenario, json_schema, scenario_from_mapping
 from blocksim.simulation.folder import RESULTS, default_folder
+from tests.scenario.conftest import data_of
 
 HOSTILE = (
     *("../../x", "/etc/x", "..", ".", "a/b", "a\\b", "C:x", "", " ", "a b", "-rf", ".hidden", "x" * 101, "x" * 300),
@@ -17,15 +18,7 @@ FINE = ("a", "three_blocks", "7", "a.b-c_D", "CONE", "com10", "nulled.x", "x" * 
 
 
 def scenario_named(name: str) -> Scenario:
-    return scenario_from_mapping(
-        {
-            "schema": 1,
-            "name": name,
-            "bodies": [{"block": "brick", "x": 0, "y": 0.01}],
-            "materials": {"steel": {"density": 7850, "young_modulus": 210e9, "poisson_ratio": 0.3}},
-            "blocks": {"brick": {"width": 0.04, "height": 0.02, "length": 0.06, "material": "steel"}},
-        }
-    )
+    return scenario_from_mapping(data_of(name=name))
 
 
 @pytest.mark.parametrize("name", HOSTILE)
