@@ -13,11 +13,12 @@ from blocksim.kernels.arrays import AT_REST, GROUP, MOTION_PIECE, NOT_FINITE, OV
 from blocksim.kernels.energy import booked
 from blocksim.verification.scene import Simulation
 from blocksim.world.build import build_world
+from tests.kernels.crews import bits
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.kernels.arrays import Records, World
+    from blocksim.kernels.arrays import World
     from tests.conftest import Start
 
 FALLING = {"y": 0.03, "angle": 0.3}
@@ -31,13 +32,21 @@ def with_value(name: str, value: float) -> Callable[[World], None]:
     return change
 
 
-def test_overlap_beyond_a_share_of_the_smallest_side_stops_the_run(start: Start) -> None:
-    small = {**FALLING, "height": 0.01, "y": 0.02}
-    for body, limit in ((FALLING, 0.05 * 0.025), (small, 0.05 * 0.01)):
-        thrown = {**body, "velocity": [0.0, -1.0]}
-        scene = start([thrown], contact={"normal_stiffness": 1e4}).to_time(1.0)
-        assert scene.status == OVERLAP_LIMIT
-        assert limit < scene.measured()[-1] < limit + 2.0 * scene.step
+@pytest.mark.parametrize(
+    ("body", "contact", "limit"),
+    [
+        (FALLING, {}, 0.05 * 0.025),
+        ({**FALLING, "height": 0.01, "y": 0.02}, {}, 0.05 * 0.01),
+        (FALLING, {"max_overlap": 2e-4}, 2e-4),
+    ],
+)
+def test_overlap_beyond_the_limit_or_a_share_of_the_smallest_side_stops_the_run(
+    start: Start, body: dict[str, object], contact: dict[str, object], limit: float
+) -> None:
+    thrown = {**body, "velocity": [0.0, -1.0]}
+    scene = start([thrown], contact={"normal_stiffness": 1e4, **contact}).to_time(1.0)
+    assert scene.status == OVERLAP_LIMIT
+    assert limit < scene.measured()[-1] < limit + 2.0 * scene.step
 
 
 @pytest.mark.usefixtures("compiler")  # the cosine of infinity is an exception in Python, not a number in IEEE
@@ -49,12 +58,6 @@ def test_state_that_is_not_finite_stops_the_run(start: Start, name: str, value: 
     assert scene.time == pytest.approx(1e-4, rel=0.01)
 
 
-def test_overlap_beyond_the_limit_stops_the_run(start: Start) -> None:
-    scene = start([FALLING], contact={"normal_stiffness": 100.0, "max_overlap": 2e-4}).to_time(1.0)
-    assert scene.status == OVERLAP_LIMIT
-    assert 2e-4 < scene.measured()[-1] < 4e-4
-
-
 def test_rest_must_last_before_it_stops_the_run(start: Start) -> None:
     rest = {"stop_at_rest": True, "rest_speed": 2e-2, "rest_hold": 0.02}
     scene = start([{"y": 0.0125}], time=rest, contact=SOFT).to_time(1.0)
@@ -62,16 +65,18 @@ def test_rest_must_last_before_it_stops_the_run(start: Start) -> None:
     assert scene.time == pytest.approx(0.02, abs=1e-3)
 
 
-def test_block_at_the_top_of_its_flight_is_not_at_rest(start: Start) -> None:
-    rest = {"stop_at_rest": True, "rest_speed": 1e-2, "rest_hold": 0.02}
-    scene = start([{"y": 1.0, "velocity": [0.0, 0.1]}], time=rest, contact=SOFT).to_time(0.1)
-    assert scene.status == REACHED
-
-
-def test_spinning_block_is_not_at_rest(start: Start) -> None:
-    rest = {"stop_at_rest": True, "rest_speed": 1e-4, "rest_hold": 0.01}
-    scene = start([{"y": 1.0, "spin": 0.02}], gravity=0.0, time=rest, contact=SOFT).to_time(0.05)
-    assert scene.status == REACHED
+@pytest.mark.parametrize(
+    ("body", "gravity", "speed", "hold"),
+    [
+        ({"y": 1.0, "velocity": [0.0, 0.1]}, 9.81, 1e-2, 0.02),  # at the top of its flight
+        ({"y": 1.0, "spin": 0.02}, 0.0, 1e-4, 0.01),
+    ],
+)
+def test_flying_and_spinning_blocks_are_not_at_rest(
+    start: Start, body: dict[str, object], gravity: float, speed: float, hold: float
+) -> None:
+    rest = {"stop_at_rest": True, "rest_speed": speed, "rest_hold": hold}
+    assert start([body], gravity=gravity, time=rest, contact=SOFT).to_time(5.0 * hold).status == REACHED
 
 
 def test_no_rest_is_looked_for_where_it_must_not_stop_the_run(start: Start) -> None:
@@ -102,10 +107,6 @@ def shake(world: World) -> None:
     pieces.c0, pieces.c1 = (0.0, 4e-3, 0.0), (0.2, -0.2, 0.0)
     world.motion[:] = pieces[0]
     world.controls.motion_x = 1.0
-
-
-def bits(records: Records) -> dict[str, bytes]:
-    return {name: records[name].tobytes() for name in records.dtype.names or ()}
 
 
 @pytest.mark.parametrize("change", [None, shake])

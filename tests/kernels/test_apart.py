@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, pi, sin
+from math import pi
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,25 +17,14 @@ from blocksim.kernels.integrate import renew_rotations
 from blocksim.kernels.models import contact_points
 from blocksim.kernels.steady import CHANGED, UNTOUCHED, steady_forces
 from blocksim.verification.scene import HEIGHT, WIDTH
+from tests.kernels import rectangles
 
 if TYPE_CHECKING:
-    from blocksim.kernels.arrays import Record
     from tests.kernels.conftest import MakeBody, Pose
 
 STEP = 1e-6
-SIGNS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 places = st.floats(-0.05, 0.05)
 angles = st.floats(-4.0, 4.0)
-
-
-def projected_gap(a: Record, b: Record, angle: float) -> float:
-    """Return the gap between the projections of the corners of two bodies on one direction."""
-    axis, spans = np.array([cos(angle), sin(angle)]), []
-    for body in (a, b):
-        c, s = cos(body.angle), sin(body.angle)
-        local = SIGNS * (body.half_x, body.half_y)
-        spans.append((local @ np.array([[c, s], [-s, c]]) + (body.x, body.y)) @ axis)
-    return float(max(spans[1].min() - spans[0].max(), spans[0].min() - spans[1].max()))
 
 
 @given(x=places, y=places, one=angles, two=angles)
@@ -44,7 +33,7 @@ def test_gaps_along_the_four_axes_are_those_of_the_projections(
 ) -> None:
     a, b = make_body(0.3 + x, y, one), make_body(0.3, 0.0, two, width=0.02, height=0.04)
     gaps = [gap_along(axis, a, b, a.x - b.x, a.y - b.y) for axis in range(4)]
-    expected = [projected_gap(a, b, angle) for angle in (two, two + pi / 2, one, one + pi / 2)]
+    expected = [rectangles.gap_along(angle, a, b) for angle in (two, two + pi / 2, one, one + pi / 2)]
     assert gaps == pytest.approx(expected, abs=1e-15)
     pair = pose((0.0, 0.5, 0.0)).pairs[0]
     choose_axis(pair, a, b, a.x - b.x, a.y - b.y, False)

@@ -14,14 +14,15 @@ from blocksim.kernels.arrays import PAIRS_FULL, REACHED, SLOTS
 from blocksim.kernels.broad_phase import rebuild_pairs
 from blocksim.kernels.integrate import place_all_corners
 from blocksim.world.build import empty_lists, with_more_room
+from tests.kernels.crews import bits, listed
+from tests.kernels.rectangles import corners, distances, gap, in_frame
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.kernels.arrays import Record, Records, World
+    from blocksim.kernels.arrays import Record, World
     from tests.conftest import Simulation, Start
 
-SIGNS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 COUNT = 30
 
 
@@ -42,37 +43,16 @@ def scattered(start: Start, seed: int, skin: float) -> Simulation:
     return start(bodies, change=scatter)
 
 
-def corners(body: Record) -> np.ndarray:
-    c, s = np.cos(body.angle), np.sin(body.angle)
-    return np.asarray(SIGNS * (body.half_x, body.half_y) @ np.array([[c, s], [-s, c]]) + (body.x, body.y))
-
-
 def near_corners(owner: Record, other: Record, reach: float) -> list[int]:
-    c, s = np.cos(other.angle), np.sin(other.angle)
-    local = np.abs((corners(owner) - (other.x, other.y)) @ np.array([[c, -s], [s, c]]))
-    return [k for k in range(4) if local[k, 0] <= other.half_x + reach and local[k, 1] <= other.half_y + reach]
-
-
-def gap(one: Record, two: Record) -> float:
-    """Return the largest gap between the projections of the corners on the four face normals."""
-    gaps = []
-    for angle in (one.angle, one.angle + np.pi / 2, two.angle, two.angle + np.pi / 2):
-        a, b = (corners(body) @ (np.cos(angle), np.sin(angle)) for body in (one, two))
-        gaps.append(max(b.min() - a.max(), a.min() - b.max()))
-    return float(max(gaps))
+    beyond = (np.abs(in_frame(corners(owner), other)) - (other.half_x, other.half_y)).max(axis=1)
+    return np.flatnonzero(beyond <= reach).tolist()
 
 
 def distance(one: Record, two: Record) -> float:
     """Return the distance of two rectangles: zero, or that of a corner of one from the other."""
     if gap(one, two) <= 0.0:
         return 0.0
-    shortest = np.inf
-    for owner, other in ((one, two), (two, one)):
-        c, s = np.cos(other.angle), np.sin(other.angle)
-        local = np.abs((corners(owner) - (other.x, other.y)) @ np.array([[c, -s], [s, c]]))
-        outside = np.maximum(local - (other.half_x, other.half_y), 0.0)
-        shortest = min(shortest, float(np.hypot(*outside.T).min()))
-    return shortest
+    return float(min(distances(corners(one), two).min(), distances(corners(two), one).min()))
 
 
 def pairs_by_brute_force(world: World, within: Callable[[Record, Record], float]) -> dict[tuple[int, int], list[int]]:
@@ -93,19 +73,17 @@ def pairs_by_brute_force(world: World, within: Callable[[Record, Record], float]
 @pytest.mark.parametrize("skin", [1e-4, 2e-3, 2e-2])
 @pytest.mark.parametrize("seed", range(2))
 def test_list_misses_no_corner_within_reach_and_has_none_beyond(start: Start, seed: int, skin: float) -> None:
-    world = scattered(start, seed, skin).world
-    while not rebuild_pairs(world):
-        world = with_more_room(world)
+    world = listed(scattered(start, seed, skin).world)
     count = int(world.clock[0].pair_count)
-    listed = {
+    found = {
         (int(pair.a), int(pair.b)): near[: pair.near].tolist()
         for pair, near in zip(world.pairs[:count], world.candidates[:count], strict=True)
     }
-    assert list(listed) == sorted(listed)
-    assert len(listed) > 20
+    assert list(found) == sorted(found)
+    assert len(found) > 20
     needed, allowed = pairs_by_brute_force(world, distance), pairs_by_brute_force(world, gap)
-    assert {pair: listed.get(pair) for pair in needed} == needed
-    assert {pair: allowed.get(pair) for pair in listed} == listed
+    assert {pair: found.get(pair) for pair in needed} == needed
+    assert {pair: allowed.get(pair) for pair in found} == found
 
 
 def test_candidates_that_wait_are_those_that_are_neither_in_contact_nor_a_twin(start: Start) -> None:
@@ -137,11 +115,6 @@ def unstarted(start: Start) -> World:
 def cramped(world: World) -> World:
     """Return an unstarted world with room for one pair."""
     return world._replace(**empty_lists(1, SLOTS, world.before))
-
-
-def bits(records: Records) -> dict[str, bytes]:
-    """Return the bits of all fields; what lies between them is nobody's."""
-    return {name: records[name].tobytes() for name in records.dtype.names or ()}
 
 
 def run(world: World, last_step: int) -> tuple[World, int]:

@@ -146,17 +146,6 @@ def test_two_points_follow_the_definition(
     assert added(points, masses, ratio, BOTH) == pytest.approx(expected, rel=1e-7, abs=1e-9 * size)
 
 
-@pytest.mark.parametrize("parallel", [False, True])
-@given(seed=SEEDS, weight=st.floats(0.5, 1.5))
-def test_closed_form_of_two_equal_points_is_the_general_one(parallel: bool, seed: int, weight: float) -> None:
-    masses = inverse_masses(2, seed, parallel=parallel) + (0.0 if parallel else 2.0) * np.eye(2)
-    points, general = contact_points(2, seed, weight=weight), zeros(1, OPERATOR)[0]
-    alike = operator_of(points, masses, 0.7, BOTH)
-    fill_different(general, 0.7, 0.5 * STEP, masses[0, 0], masses[0, 1], masses[1, 1], points[0], points[1])
-    parts = np.array([[operator.e_one, operator.e_mixed, operator.e_two] for operator in (alike, general)])
-    assert parts[0] == pytest.approx(parts[1], abs=1e-9 * np.abs(parts).max())
-
-
 @pytest.mark.parametrize("sticking", [1, 2])
 @given(seed=SEEDS)
 def test_sliding_point_beside_a_sticking_one_has_no_dashpot(sticking: int, seed: int) -> None:
@@ -197,7 +186,7 @@ def test_renewed_dashpots_are_due_in_both_directions() -> None:
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
-@pytest.mark.parametrize("friction", [0.1, 0.3, 0.5])
+@pytest.mark.parametrize("friction", [0.1, 0.5])
 @pytest.mark.parametrize("restitution", [0.2, 0.5, 0.8])
 def test_corner_that_slides_rebounds_as_asked(start: Start, restitution: float, friction: float, way: float) -> None:
     """With the mass of a corner without friction it left at 0.45 to 0.57 of its speed where 0.5 was asked."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, pi, radians, sin
+from math import cos, hypot, radians, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,48 +23,23 @@ from blocksim.kernels.geometry import (
     to_world,
     turn,
 )
+from tests.kernels.rectangles import corners, distances, turned
+from tests.kernels.rectangles import gap as largest_gap
 
 if TYPE_CHECKING:
     from blocksim.kernels.arrays import Record
     from tests.kernels.conftest import MakeBody
 
-SIGNS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 places = st.floats(-0.06, 0.06)
 sides = st.floats(1e-3, 0.05)
 angles = st.floats(-7.0, 7.0)
 
 
-def corners(body: Record) -> np.ndarray:
-    """Return the corners (4, 2) of a body from its angle."""
-    c, s = cos(body.angle), sin(body.angle)
-    local = SIGNS * (body.half_x, body.half_y)
-    return np.asarray(local @ np.array([[c, s], [-s, c]]) + (body.x, body.y))
-
-
 def points_of(body: Record, count: int = 15) -> np.ndarray:
     """Return a grid of points that fills a body."""
     u, v = np.meshgrid(np.linspace(-1.0, 1.0, count), np.linspace(-1.0, 1.0, count))
-    c, s = cos(body.angle), sin(body.angle)
     local = np.stack([u.ravel() * body.half_x, v.ravel() * body.half_y], axis=1)
-    return np.asarray(local @ np.array([[c, s], [-s, c]]) + (body.x, body.y))
-
-
-def distances(points: np.ndarray, body: Record) -> np.ndarray:
-    """Return the distance of points to a rectangle, zero inside."""
-    c, s = cos(body.angle), sin(body.angle)
-    local = np.abs((points - (body.x, body.y)) @ np.array([[c, -s], [s, c]]))
-    outside = np.maximum(local - (body.half_x, body.half_y), 0.0)
-    return np.asarray(np.hypot(outside[:, 0], outside[:, 1]))
-
-
-def gap_along_axes(one: Record, two: Record) -> float:
-    """Return the largest gap between the projections of the corners on the four face normals."""
-    gaps = []
-    for angle in (one.angle, one.angle + pi / 2, two.angle, two.angle + pi / 2):
-        axis = np.array([cos(angle), sin(angle)])
-        a, b = corners(one) @ axis, corners(two) @ axis
-        gaps.append(max(b.min() - a.max(), a.min() - b.max()))
-    return float(max(gaps))
+    return np.asarray(local @ turned(body) + (body.x, body.y))
 
 
 @given(start=angles, by=st.floats(-1e3, 1e3))
@@ -92,7 +67,7 @@ def test_separation_is_the_largest_gap_and_never_exceeds_the_distance(
     a = make_body(x, y, one)
     b = make_body(0.0, 0.01, two, width=w, height=h)
     gap = separation(a, b)
-    assert gap == pytest.approx(gap_along_axes(a, b), abs=1e-15)
+    assert gap == pytest.approx(largest_gap(a, b), abs=1e-15)
     assert gap == pytest.approx(separation(b, a), abs=1e-15)
     nearest = min(distances(points_of(a), b).min(), distances(points_of(b), a).min())
     assert gap <= nearest + 1e-15

@@ -83,24 +83,20 @@ def copied_kernels(tmp_path: Path) -> Path:
 
 
 @pytest.mark.usefixtures("compiler")
-def test_edited_law_changes_the_results_of_kernels_in_other_files(copied_kernels: Path, tmp_path: Path) -> None:
-    cache = str(tmp_path / "cache")
-    force, *_ = python(PUSH, folder=copied_kernels, BLOCKSIM_CACHE_DIR=cache)
+def test_second_process_takes_kernels_from_the_cache_until_a_law_in_another_file_is_edited(
+    copied_kernels: Path, tmp_path: Path
+) -> None:
+    def run() -> list[str]:
+        return python(PUSH, folder=copied_kernels, BLOCKSIM_CACHE_DIR=str(tmp_path / "cache"))
+
+    first, second = run(), run()
+    assert first[1:3] == ["0", "1"]
+    assert second[1:3] == ["1", "0"]
+    assert first[3].startswith(str(tmp_path / "cache"))
+    assert float(first[0]) == float(second[0]) == pytest.approx(2e3)
     law = copied_kernels / "blocksim" / "kernels" / "laws" / "linear.py"
     law.write_text(law.read_text().replace("return stiffness * depth", "return 3.0 * stiffness * depth"))
-    edited, *_ = python(PUSH, folder=copied_kernels, BLOCKSIM_CACHE_DIR=cache)
-    assert float(force) == pytest.approx(2e3)
-    assert float(edited) == pytest.approx(6e3)
-
-
-@pytest.mark.usefixtures("compiler")
-def test_second_process_takes_compiled_kernels_from_the_cache(copied_kernels: Path, tmp_path: Path) -> None:
-    cache = str(tmp_path / "cache")
-    runs = [python(PUSH, folder=copied_kernels, BLOCKSIM_CACHE_DIR=cache) for _ in range(2)]
-    assert runs[0][1:3] == ["0", "1"]
-    assert runs[1][1:3] == ["1", "0"]
-    assert runs[0][3].startswith(cache)
-    assert runs[0][0] == runs[1][0]
+    assert float(run()[0]) == pytest.approx(6e3)
 
 
 @pytest.fixture
@@ -139,21 +135,13 @@ def test_without_any_writable_folder_kernels_are_compiled_and_not_kept(
     monkeypatch.setattr(tempfile, "tempdir", str(file_in_the_way))
     assert jit.cache_folder() is None
     assert not jit.is_compiled()
+    jit.mark("seen")
+    assert not jit.is_marked("seen")
 
     def double(number: float) -> float:
         return 2.0 * number
 
     assert jit.kernel(double)(3.0) == 6.0
-
-
-@pytest.mark.usefixtures("fresh_folder_choice", "compiler")
-def test_user_is_reported_whether_kernels_have_to_be_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(tmp_path))
-    assert not jit.is_compiled()
-    below = tmp_path / f"{jit.source_hash()}-open" / "kernels"
-    below.mkdir(parents=True)
-    (below / "advance.advance_alone-1.py311.1.nbc").touch()
-    assert jit.is_compiled()
 
 
 def test_compiled_advance_is_found_once_it_has_run(start_shipped: Callable[..., Simulation]) -> None:
@@ -197,23 +185,23 @@ def test_interpreted_kernels_give_what_compiled_ones_give(tmp_path: Path) -> Non
 
 
 @pytest.mark.usefixtures("fresh_folder_choice", "compiler")
-def test_mark_is_found_for_this_source_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_marks_and_compiled_kernels_are_found_for_this_source_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(tmp_path))
+    below = tmp_path / f"{jit.source_hash()}-open" / "kernels"
     assert not jit.is_marked("seen")
+    assert not jit.is_compiled()
     jit.mark("seen")
+    below.mkdir(parents=True)
+    (below / "advance.advance_alone-1.py311.1.nbc").touch()
     assert jit.is_marked("seen")
+    assert jit.is_compiled()
     assert not jit.is_marked("unseen")
     monkeypatch.setattr(jit, "source_hash", lambda: "another")
     jit.cache_folder.cache_clear()
     assert not jit.is_marked("seen")
-
-
-@pytest.mark.usefixtures("fresh_folder_choice", "compiler")
-def test_mark_without_any_writable_folder_does_nothing(file_in_the_way: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(file_in_the_way))
-    monkeypatch.setattr(tempfile, "tempdir", str(file_in_the_way))
-    jit.mark("seen")
-    assert not jit.is_marked("seen")
+    assert not jit.is_compiled()
 
 
 CLOSED = """

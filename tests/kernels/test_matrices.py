@@ -53,12 +53,6 @@ def test_power_of_three_agrees_with_eigenvalues(seed: int, rank: int) -> None:
 
 
 @given(seed=SEEDS)
-def test_power_of_three_squared_is_the_inverse_cube(seed: int) -> None:
-    matrix = positive(3, 3, seed)
-    assert by_jacobi(matrix) @ by_jacobi(matrix) @ matrix @ matrix @ matrix == pytest.approx(np.eye(3), abs=1e-8)
-
-
-@given(seed=SEEDS)
 def test_lower_triangle_times_its_transpose_is_the_matrix(seed: int) -> None:
     matrix, lower = positive(3, 3, seed), np.zeros((3, 3))
     cholesky(matrix, lower)

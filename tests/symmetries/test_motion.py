@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from tests.symmetries.scenes import (
     BEFORE_CHAOS,
     EXPLICIT,
-    GRAVITY,
     RIGID,
     RIGID_STEP,
     ROUND_OFF,
@@ -134,9 +133,3 @@ def test_larger_stack_of_rigid_contacts_moves_alike(examples: int) -> None:
         assert apart(two / np.array([length, length, 1.0, 1.0, 1.0, 1.0]), one) <= allowed(stack, RIGID)
 
     for_all(st.tuples(stacks(), st.integers(-2, 4).filter(bool)), examples, check)
-
-
-def test_gravity_is_what_the_bound_of_rigid_contacts_takes() -> None:
-    stack = Stack(({"x": 0.0, "y": 1.0, "width": 0.02, "height": 0.02, "length": 0.05},), 0.0, 0.3, 0.3)
-    fallen = start(stack, stack.bodies, RIGID).to_time(0.1).state()
-    assert fallen[0, 4] == pytest.approx(-GRAVITY * 0.1)

@@ -35,6 +35,10 @@ def test_stiffness_is_the_slope_of_the_force(law: str, depth: float) -> None:
     assert tangent_stiffness(code, K, depth) == pytest.approx(slope, rel=1e-6)
 
 
+def test_linear_force_is_stiffness_times_overlap() -> None:
+    assert elastic_force(LAW_CODES["linear"], 2e6, 3e-6) == pytest.approx(6.0)
+
+
 @pytest.mark.parametrize("law", LAW_CODES)
 def test_contact_without_overlap_holds_nothing(law: str) -> None:
     assert elastic_force(LAW_CODES[law], K, 0.0) == 0.0

@@ -90,14 +90,6 @@ def test_mirrored_scene_moves_as_the_mirror_shows(start: Start, model: str, law:
 
 @ALL_MODELS
 @BOTH
-def test_order_of_the_bodies_does_not_matter(start: Start, model: str, law: str) -> None:
-    one, other = (start(bodies, gravity=0.0, contact=contact_of(model, law)) for bodies in (COLLIDING, COLLIDING[::-1]))
-    for step in (100, 300):
-        assert other.to_step(step).state()[::-1] == pytest.approx(one.to_step(step).state(), abs=1e-9), step
-
-
-@ALL_MODELS
-@BOTH
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.7, 1.0])
 def test_flat_landing_rebounds_as_asked(start: Start, paper_block: PaperBlock, model: str, law: str, e: float) -> None:
     for speed in (0.05, 2.0):
