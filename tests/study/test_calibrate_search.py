@@ -41,11 +41,9 @@ def test_miss_is_zero_at_the_limit_and_grows_steadily_outwards() -> None:
 
 
 def test_limits_count_as_inside_in_spite_of_rounding() -> None:
-    narrow = Range("1", "x_mm", 71.69, 78.53)
-    for value in (71.69, 78.53):
-        assert miss_of([value], (narrow,)) <= 0.0
-    for value in (math.nextafter(71.69, 0.0), math.nextafter(78.53, 100.0)):
-        assert miss_of([value], (narrow,)) > 0.0
+    narrow = (Range("1", "x_mm", 71.69, 78.53),)
+    assert max(miss_of([value], narrow) for value in (71.69, 78.53)) <= 0.0
+    assert min(miss_of([math.nextafter(at, to)], narrow) for at, to in ((71.69, 0.0), (78.53, 100.0))) > 0.0
 
 
 def test_probability_is_never_outweighed_by_guidance() -> None:
@@ -129,7 +127,7 @@ def test_same_seed_finds_the_same_and_another_seed_something_else(tmp_path: Path
     assert made(tmp_path / "3", FIRST + 4, seed=4)[0] != first[0]
 
 
-@pytest.mark.parametrize("killed_after", [0, 3, FIRST, FIRST + 1, FIRST + 6])
+@pytest.mark.parametrize("killed_after", [0, FIRST, FIRST + 6])
 def test_search_that_died_continues_as_if_it_had_not(tmp_path: Path, killed_after: int) -> None:
     expected = made(tmp_path / "whole", FIRST + 8)
     with pytest.raises(KilledError):

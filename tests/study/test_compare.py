@@ -42,16 +42,11 @@ def test_member_of_a_sweep_is_judged_as_a_run_of_its_own(swept: SweepResult, nom
     assert isinstance(alone, Comparison)
 
 
-def test_verdict_agrees_with_the_column_of_the_sweep(swept: SweepResult) -> None:
-    assert compare_sweep(swept).share_inside == swept.share_inside
-
-
-def test_settings_reach_the_verdict(swept: SweepResult) -> None:
+def test_verdict_agrees_with_the_column_of_the_sweep_and_with_its_settings(swept: SweepResult) -> None:
+    found = compare_sweep(swept)
+    assert found.share_inside == swept.share_inside
+    assert any("not probabilities" in message for message in found.messages)  # chosen members are no sample
     assert compare_sweep(swept, settings=Settings(threshold=0.0)).inside
-
-
-def test_chosen_members_are_no_sample_and_this_is_said(swept: SweepResult) -> None:
-    assert any("not probabilities" in message for message in compare_sweep(swept).messages)
 
 
 def test_table_alone_needs_an_experiment(swept: SweepResult, tmp_path: Path) -> None:

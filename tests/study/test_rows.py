@@ -9,14 +9,15 @@ import pytest
 from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import load_table
 from blocksim.scenario import Document
-from blocksim.study.plan import Values, cases_of, with_sweep
+from blocksim.study.plan import Values, with_sweep
 from blocksim.study.rows import Head, Ranges, heads_of
 from blocksim.study.sweep import sweep
 from blocksim.study.sweep_data import read_sweep_data
 from blocksim.study.verify_sweep import verify_sweep
 from tests.study.conftest import SCENARIOS
+from tests.study.plans import OVERLAP, TILT, cases, plan_of
 
-TILT, OVERLAP, FRICTION = "ground.tilt", "structures.0.overlap", "friction.block_block"
+FRICTION = "friction.block_block"
 
 
 @pytest.mark.parametrize(
@@ -38,22 +39,18 @@ def test_numbers_have_the_unit_that_was_typed(
     nominal: Document, key: str, values: Values, head: str, cells: list[object]
 ) -> None:
     document = with_sweep(nominal, {key: values})
-    plan = document.build().sweep
-    assert plan is not None
-    (column,) = heads_of(plan)
+    (column,) = heads_of(plan_of(document))
     assert str(column) == head
-    assert [column.cell(row[key]) for row in cases_of(document, plan).design] == cells
+    assert [column.cell(row[key]) for row in cases(document).design] == cells
 
 
 def test_drawn_angles_are_numbers_in_the_unit_of_their_range(nominal: Document) -> None:
     document = with_sweep(nominal, {TILT: {"from": "1 deg", "to": "3 deg"}}, "lhs", samples=4)
-    plan = document.build().sweep
-    assert plan is not None
-    (head,) = heads_of(plan)
-    cells = [head.cell(row[TILT]) for row in cases_of(document, plan).design]
+    (head,) = heads_of(plan_of(document))
+    cells = [head.cell(row[TILT]) for row in cases(document).design]
     assert str(head) == "ground.tilt [deg]"
     assert all(isinstance(cell, float) and 1.0 < cell < 3.0 for cell in cells)
-    assert plan.as_table()[TILT] == {"from": "1 deg", "to": "3 deg"}
+    assert plan_of(document).as_table()[TILT] == {"from": "1 deg", "to": "3 deg"}
 
 
 def test_head_is_read_back_and_bare_keys_of_older_tables_too() -> None:

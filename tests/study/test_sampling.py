@@ -54,9 +54,11 @@ def test_uniform_values_fill_their_interval_evenly() -> None:
     assert np.histogram(values, bins=8, range=(2.0, 6.0))[0].tolist() == [1250] * 8
 
 
-def test_values_on_a_logarithmic_scale_fill_every_decade_evenly() -> None:
+def test_values_on_a_logarithmic_scale_fill_every_decade_evenly(nominal: Document) -> None:
     values = numbers(Uniform(0.001, 10.0, "log"))
     assert np.histogram(np.log10(values), bins=4, range=(-3.0, 1.0))[0].tolist() == [2500] * 4
+    sweep = sweep_of(nominal, "grid", {SCALE: {"from": 0.001, "to": 1, "count": 4, "scale": "log"}})
+    assert column(sweep, SCALE) == [0.001, 0.01, 0.1, 1.0]
 
 
 def test_angles_keep_their_unit_and_numbers_twelve_digits() -> None:
@@ -68,11 +70,6 @@ def test_places_at_the_very_ends_give_finite_values() -> None:
     low, high = drawn(Normal(0.0, 1.0), open_interval(np.array([0.0, 1.0])))
     assert -9.0 < float(str(low)) < -8.0
     assert 8.0 < float(str(high)) < 9.0
-
-
-def test_ranges_on_a_logarithmic_scale_are_evenly_spaced_there(nominal: Document) -> None:
-    sweep = sweep_of(nominal, "grid", {SCALE: {"from": 0.001, "to": 1, "count": 4, "scale": "log"}})
-    assert [row[SCALE] for row in design_of(sweep)] == [0.001, 0.01, 0.1, 1.0]
 
 
 UNIT = {"from": 1, "to": 2}  # minus 1: the places themselves
@@ -114,11 +111,11 @@ def test_the_first_two_sobol_dimensions_are_a_net(nominal: Document, seed: int) 
 
 
 def test_unbalanced_numbers_of_sobol_points_are_reported(nominal: Document) -> None:
-    assert remarks(sweep_of(nominal, "sobol", {SCALE: UNIT}, samples=100)) == [
-        "100 Sobol points are not balanced; 64 or 128 are"
+    told = [
+        remarks(sweep_of(nominal, mode, {SCALE: UNIT}, samples=samples))
+        for mode, samples in (("sobol", 100), ("sobol", 64), ("lhs", 100))
     ]
-    assert remarks(sweep_of(nominal, "sobol", {SCALE: UNIT}, samples=64)) == []
-    assert remarks(sweep_of(nominal, "lhs", {SCALE: UNIT}, samples=100)) == []
+    assert told == [["100 Sobol points are not balanced; 64 or 128 are"], [], []]
 
 
 def test_sobol_points_beyond_one_chunk_continue_the_sequence(nominal: Document) -> None:
@@ -172,8 +169,10 @@ def test_keys_added_removed_or_reordered_leave_the_values_of_others(nominal: Doc
 
 
 def test_a_key_added_at_the_end_leaves_the_sobol_points_of_others(nominal: Document) -> None:
-    alone = column(sweep_of(nominal, "sobol", {SCALE: UNIT}, samples=16), SCALE)
-    assert column(sweep_of(nominal, "sobol", {SCALE: UNIT, RATIO: UNIT}, samples=16), SCALE) == alone
+    alone, more = (column(sweep_of(nominal, "sobol", vary, samples=16), SCALE) for vary in (
+        {SCALE: UNIT}, {SCALE: UNIT, RATIO: UNIT}
+    ))  # fmt: skip
+    assert alone == more
 
 
 @pytest.mark.parametrize("mode", ["sobol", "normal"])

@@ -18,13 +18,15 @@ from tests.study.conftest import SCENARIOS
 ENDS = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")
 
 
-def stored(nominal: Document, folder: Path, vary: dict[str, Values], rows: list[str], mode: str = "grid") -> SweepData:
+def stored(
+    nominal: Document, folder: Path, vary: dict[str, Values], rows: list[str], heads: tuple[str, ...] = ()
+) -> SweepData:
     """Write what a sweep writes, with rows of key values and status, and read it back."""
-    base = with_sweep(nominal, vary, mode).build()
-    prepare(folder, base, "made-up", overwrite=False)
-    heads = ["case", *vary, "status", "reason", "seconds", *(f"{block}.{end}" for block in "123" for end in ENDS)]
-    lines = [f"case{number},{row}" for number, row in enumerate(rows)]
-    (folder / "sweep.csv").write_text("\n".join([",".join(heads), *lines, ""]), encoding="utf-8")
+    prepare(folder, with_sweep(nominal, vary).build(), "made-up", overwrite=False)
+    ends = [f"{block}.{end}" for block in "123" for end in ENDS]
+    lines = [",".join(["case", *(heads or vary), "status", "reason", "seconds", *ends])]
+    lines += [f"case{number},{row}" for number, row in enumerate(rows)]
+    (folder / "sweep.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
     return read_sweep_data(folder)
 
 
@@ -47,14 +49,11 @@ def test_values_keep_the_unit_that_was_typed(quick: Document, tmp_path: Path) ->
     overlap, tilt = read_sweep_data(folder).inputs
     assert [(one.unit, one.typed and one.typed.unit) for one in (overlap, tilt)] == [("m", "cm"), ("rad", "rad")]
     assert overlap.label(0.009) == "0.9 cm"
-    draw_sweep(folder, tmp_path / "map.svg", kind="map")
-    drawn = (tmp_path / "map.svg").read_text()
-    assert "<!-- structures.0.overlap (cm) -->" in drawn
-    assert "<!-- ground.tilt (rad) -->" in drawn
-    draw_sweep(folder, tmp_path / "lines.svg", kind="lines")
-    drawn = (tmp_path / "lines.svg").read_text()
-    assert "<!-- structures.0.overlap (cm) -->" in drawn
-    assert "<!-- ground.tilt = 0.01 rad -->" in drawn
+    for kind, second in (("map", "ground.tilt (rad)"), ("lines", "ground.tilt = 0.01 rad")):
+        draw_sweep(folder, tmp_path / f"{kind}.svg", kind=kind)
+        drawn = (tmp_path / f"{kind}.svg").read_text()
+        assert "<!-- structures.0.overlap (cm) -->" in drawn
+        assert f"<!-- {second} -->" in drawn
 
 
 def test_refined_spacing_and_step_are_drawn_with_their_units(scenario: Scenario) -> None:
@@ -63,31 +62,23 @@ def test_refined_spacing_and_step_are_drawn_with_their_units(scenario: Scenario)
 
 
 def test_friction_angles_are_an_axis_in_degrees(nominal: Document, tmp_path: Path) -> None:
-    base = with_sweep(nominal, {"friction.block_block": ["20 deg", "30 deg"]}, "grid").build()
-    prepare(tmp_path, base, "made-up", overwrite=False)
-    heads = ["case", "friction.block_block [deg]", "status", "reason", "seconds"]
-    heads += [f"{block}.{end}" for block in "123" for end in ENDS]
-    lines = [",".join(heads), f"a,20.0,{ended(74.0, 130.0)}", f"b,30.0,{ended(75.0, 131.0)}", ""]
-    (tmp_path / "sweep.csv").write_text("\n".join(lines), encoding="utf-8")
-    (friction,) = read_sweep_data(tmp_path).inputs
-    assert value_axis(friction.values, friction.key, friction.unit, typed=friction.typed).label.endswith(
-        "block_block (deg)"
-    )
+    rows = [f"{angle},{ended(74.0, 130.0)}" for angle in (20.0, 30.0)]
+    vary: dict[str, Values] = {"friction.block_block": ["20 deg", "30 deg"]}
+    (friction,) = stored(nominal, tmp_path, vary, rows, ("friction.block_block [deg]",)).inputs
+    axis = value_axis(friction.values, friction.key, friction.unit, typed=friction.typed)
+    assert axis.label.endswith("block_block (deg)")
     assert friction.label(friction.values[0]) == "20 deg"
 
 
-def test_words_become_levels_and_keys_keep_the_order_of_the_table(nominal: Document, tmp_path: Path) -> None:
-    vary: dict[str, Values] = {"time.scheme": ["explicit", "nonsmooth"], "gravity": [1.0, 2.0]}
-    rows = [f"{word},{g},{ended(74.0, 130.0)}" for word in ("explicit", "nonsmooth") for g in (1.0, 2.0)]
+def test_words_become_levels_and_keys_keep_their_order_but_those_of_one_value(
+    nominal: Document, tmp_path: Path
+) -> None:
+    words, numbers = ["explicit", "nonsmooth"], [1.0, 2.0]
+    vary: dict[str, Values] = {"time.scheme": words, "contact.restitution": [0.1], "gravity": numbers}
+    rows = [f"{word},0.1,{g},{ended(74.0, 130.0)}" for word in words for g in numbers]
     scheme, gravity = stored(nominal, tmp_path, vary, rows).inputs
     assert (scheme.levels, scheme.values.tolist()) == (("explicit", "nonsmooth"), [0.0, 0.0, 1.0, 1.0])
-    assert (gravity.levels, gravity.unit) == ((), "m/s^2")
-
-
-def test_keys_with_one_value_are_no_inputs(nominal: Document, tmp_path: Path) -> None:
-    vary: dict[str, Values] = {"contact.restitution": [0.1], "gravity": [1.0, 2.0]}
-    found = stored(nominal, tmp_path, vary, [f"0.1,{g},{ended(74.0, 130.0)}" for g in (1.0, 2.0)])
-    assert [one.key for one in found.inputs] == ["gravity"]
+    assert (gravity.key, gravity.levels, gravity.unit) == ("gravity", (), "m/s^2")
 
 
 def test_cases_are_inside_by_the_rules_of_compare_and_failed_ones_never(nominal: Document, tmp_path: Path) -> None:

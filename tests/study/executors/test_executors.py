@@ -8,7 +8,7 @@ import pytest
 from blocksim.errors import UnavailableError
 from blocksim.scenario import Document
 from blocksim.study import executors as batches
-from blocksim.study.executors import EXECUTORS, GROWTH, MOST, BatchSize, Setting, Task, executor_named, take
+from blocksim.study.executors import GROWTH, MOST, BatchSize, Setting, Task, executor_named, take
 from blocksim.study.plan import Values
 from blocksim.study.progress import Shard
 from blocksim.study.sweep import merge, sweep
@@ -90,11 +90,6 @@ def test_missing_package_names_the_extra(quick: Document, tmp_path: Path, monkey
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[cluster\]'"):
         sweep(quick, {KINETIC: [0.1]}, out=tmp_path / "out", scheduler="tcp://127.0.0.1:1")
-
-
-def test_every_executor_can_be_loaded() -> None:
-    for name in EXECUTORS:
-        assert callable(executor_named(name).run)
 
 
 def test_batch_grows_with_the_speed_and_never_without_bounds() -> None:
