@@ -61,9 +61,9 @@ def main(arguments: Sequence[str]) -> int:
     """Examine all faults, or those whose name or file has some words; return the exit code."""
     parser = argparse.ArgumentParser(description="Put faults in and see whether the tests notice.")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--only", default="", help="words in the name or the file of a fault")
+    parser.add_argument("--only", default="", help="words in the name, the file or a test of a fault")
     asked = parser.parse_args(arguments)
-    faults = [fault for fault in faults_in(HERE) if asked.only in f"{fault.file} {fault.name}"]
+    faults = [fault for fault in faults_in(HERE) if asked.only in " ".join([fault.file, fault.name, *fault.tests])]
     with pool(asked.jobs) as workers:
         failing = fail_without_fault(workers, [fault for fault in faults if not fault.is_stale])
         if failing:
