@@ -70,7 +70,9 @@ def pairs_of(world: World) -> Any:
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_every_body_and_every_pair_is_in_exactly_one_share(world: World, size: int) -> None:
+def test_every_body_and_every_pair_is_in_exactly_one_share_that_begins_at_a_whole_group(
+    world: World, size: int
+) -> None:
     divide(world, size)
     shares: Any = world.shares[:size]
     for first, last, count in (
@@ -83,12 +85,6 @@ def test_every_body_and_every_pair_is_in_exactly_one_share(world: World, size: i
     for share in shares:
         a = pairs_of(world).a[share.first_pair : share.last_pair]
         assert ((share.first_body <= a) & (a < share.last_body)).all()
-
-
-@pytest.mark.parametrize("size", SIZES)
-def test_shares_begin_at_whole_groups(world: World, size: int) -> None:
-    divide(world, size)
-    for share in world.shares[:size]:
         assert share.first_body % GROUP == 0 or share.first_body == share.last_body == world.bodies.size
 
 

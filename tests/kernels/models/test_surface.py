@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from blocksim.kernels.arrays import CONTACT, CONTACTS, HALF, PAIR, POINT, SLOTS, zeros
 from blocksim.kernels.contact import pair_forces
-from blocksim.kernels.geometry import ground_gap, separation, to_world
+from blocksim.kernels.geometry import ground_gap, separation
 from blocksim.kernels.models.surface import (
     block_points,
     corners_near,
@@ -25,6 +25,7 @@ from blocksim.kernels.models.surface import (
     near_slots,
 )
 from blocksim.kernels.models.twins import CONE_TOLERANCE, corner_signs
+from tests.kernels.rectangles import corners, in_frame
 
 if TYPE_CHECKING:
     from blocksim.kernels.arrays import Record
@@ -35,13 +36,7 @@ W, H = 0.032, 0.025
 
 
 def corner_of(body: Record, corner: int) -> np.ndarray:
-    sx, sy = corner_signs(corner)
-    return np.array(to_world(body, sx * body.half_x, sy * body.half_y))
-
-
-def in_frame(body: Record, point: np.ndarray) -> np.ndarray:
-    dx, dy = point - (body.x, body.y)
-    return np.array([body.cos * dx + body.sin * dy, body.cos * dy - body.sin * dx])
+    return np.asarray(corners(body)[corner])
 
 
 def points_and_twins(a: Record, b: Record, touching: tuple[int, ...] = ()) -> tuple[list[Any], list[int]]:
@@ -80,7 +75,7 @@ def test_every_contact_point_is_a_corner_inside_the_other_block(
         owner, touched = (a, b) if point.slot < 4 else (b, a)
         corner = corner_of(owner, point.slot % 4)
         assert [point.x, point.y] == pytest.approx(corner, abs=1e-15)
-        local = in_frame(touched, corner)
+        local = in_frame(corner, touched)
         outward = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)][point.face])
         half = abs(outward @ (touched.half_x, touched.half_y))
         assert point.depth == pytest.approx(half - outward @ local, abs=1e-15)
@@ -215,7 +210,7 @@ def test_corner_is_near_when_it_lies_in_the_grown_rectangle(
     a, b = make_body(x, y, one), make_body(0.0, 0.0, two)
     expected = []
     for corner in range(4):
-        local = np.abs(in_frame(b, corner_of(a, corner)))
+        local = np.abs(in_frame(corner_of(a, corner), b))
         beyond = float(max(local[0] - b.half_x, local[1] - b.half_y))
         assume(abs(beyond - 0.01) > 1e-12)
         if beyond <= 0.01:
