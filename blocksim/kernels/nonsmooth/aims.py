@@ -4,7 +4,7 @@ from blocksim.kernels.arrays import Record
 from blocksim.kernels.jit import kernel
 from blocksim.kernels.lanes import Lane, Lanes, fields_0, greater, is_all, lesser, load, root, select, store
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
-from blocksim.kernels.nonsmooth.groups import Bodies, restitutions
+from blocksim.kernels.nonsmooth.groups import Bodies
 from blocksim.kernels.nonsmooth.slip import Rows, Slip, slip_of
 
 
@@ -88,7 +88,7 @@ def with_rebounds(
 ) -> tuple[Lanes, Lanes]:
     """Return the targets (m/s) of rows with those of points that rebound, which approach with u."""
     stepping = contacts.stepping[0]
-    restitution = restitutions(contacts, group, lane)
+    restitution = load(lane, group.restitution)
     pull = pulls(row, a, b, stepping)
     after_one = rebound(u.one, load(lane, group.start_one), pull, restitution, stepping)
     after_two = rebound(u.two, load(lane, group.start_two), pull, restitution, stepping)

@@ -35,6 +35,7 @@ ROW = record_type(
 LANE_FLOATS = (
     "nx ny arm_a arm_b width shear_arm_a shear_arm_b gap_one gap_two normal_one normal_two shear "  # as in ROW
     "bend shear_bend "  # as in ROW
+    "friction restitution "  # -: coefficients of kinetic friction and of restitution
     "start_one start_two "  # m: gaps when the substep began
     "target_one target_two"  # m/s: least approach that the velocity pass leaves; -FAR where a point does not count
 )
@@ -44,9 +45,7 @@ GROUP = on_own_lines(
         [(name, np.float64, (WIDTH,)) for name in LANE_FLOATS.split()]
         + [(name, np.uint32, (WIDTH,)) for name in LANE_INDICES.split()]
         + [
-            ("touch", np.uint32),  # place in the table of interactions: of all rows, if they are alike, or of one
             ("count", np.uint8),  # of rows, the others are copies
-            ("are_alike", np.uint8),  # flag: one touch for all
             ("are_simple", np.uint8),  # flag: static friction is the kinetic one
         ],
         align=True,

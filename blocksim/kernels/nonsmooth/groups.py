@@ -16,7 +16,6 @@ from blocksim.kernels.lanes import (
     fields_4,
     fields_8,
     fields_12,
-    four,
     load,
     split,
     store,
@@ -64,36 +63,6 @@ def bodies_at(contacts: Contacts, places: Integers, lane: Lane) -> Bodies:
 def touch_of(contacts: Contacts, group: Record, k: int) -> Record:
     """Return how the bodies of one row of a group interact."""
     return contacts.touches[contacts.rows[group.row[k]].touch]
-
-
-@kernel
-def restitutions(contacts: Contacts, group: Record, lane: Lane) -> Lanes:
-    """Return the restitutions of the rows of a group."""
-    if group.are_alike:
-        one = contacts.touches[group.touch].restitution
-        return four(lane, one, one, one, one)
-    return four(
-        lane,
-        touch_of(contacts, group, 0).restitution,
-        touch_of(contacts, group, 1).restitution,
-        touch_of(contacts, group, 2).restitution,
-        touch_of(contacts, group, 3).restitution,
-    )
-
-
-@kernel
-def kinetic_frictions(contacts: Contacts, group: Record, lane: Lane) -> Lanes:
-    """Return the coefficients of kinetic friction of the rows of a group."""
-    if group.are_alike:
-        one = contacts.touches[group.touch].kinetic_friction
-        return four(lane, one, one, one, one)
-    return four(
-        lane,
-        touch_of(contacts, group, 0).kinetic_friction,
-        touch_of(contacts, group, 1).kinetic_friction,
-        touch_of(contacts, group, 2).kinetic_friction,
-        touch_of(contacts, group, 3).kinetic_friction,
-    )
 
 
 @kernel
@@ -145,16 +114,14 @@ def pack_groups(contacts: Contacts, begin: int, end: int) -> None:
             pack(contacts, group, 0)
         else:
             pack(contacts, group, None)
-        group.touch = contacts.rows[group.row[0]].touch
-        group.are_alike = 1
         group.are_simple = 1
         for lane in range(1 if group.count == 1 else WIDTH):
             row = contacts.rows[group.row[lane]]
             group.a[lane] = row.a
             group.b[lane] = row.b
-            if row.touch != group.touch:
-                group.are_alike = 0
             touch = contacts.touches[row.touch]
+            group.friction[lane] = touch.kinetic_friction
+            group.restitution[lane] = touch.restitution
             if touch.static_friction != touch.kinetic_friction:
                 group.are_simple = 0
 

@@ -24,13 +24,24 @@ from blocksim.kernels.lanes import (
 )
 from blocksim.kernels.nonsmooth.aims import aim, gaps
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
-from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, kinetic_frictions, rows_of, touch_of
+from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, rows_of, touch_of
 from blocksim.kernels.nonsmooth.slip import Rows, slip_of
 from blocksim.kernels.nonsmooth.solve import solve_two
 
 
 @kernel
 def push(
+    contacts: Contacts, group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies, normal: Lanes, second: Lanes
+) -> None:
+    """Change the velocities of the bodies by a normal impulse (N s) in all, of which `second` at point two."""
+    turn = row.width * second
+    turn_a = row.arm_a * normal - turn
+    turn_b = row.arm_b * normal - turn
+    shove(contacts, group, lane, a, b, (row.nx * normal, row.ny * normal, turn_a, turn_b))
+
+
+@kernel
+def push_and_drag(
     contacts: Contacts,
     group: Record,
     lane: Lane,
@@ -41,17 +52,28 @@ def push(
     second: Lanes,
     shear: Lanes,
 ) -> None:
-    """Change the velocities of the bodies by a normal impulse (N s) in all, of which `second` at point two."""
+    """Change the velocities of the bodies by normal impulses, as push does, and by one along the tangent (N s)."""
     px = row.nx * normal - row.ny * shear
     py = row.ny * normal + row.nx * shear
     turn = row.width * second
+    turn_a = row.arm_a * normal - turn + row.shear_arm_a * shear
+    turn_b = row.arm_b * normal - turn + row.shear_arm_b * shear
+    shove(contacts, group, lane, a, b, (px, py, turn_a, turn_b))
+
+
+@kernel
+def shove(
+    contacts: Contacts, group: Record, lane: Lane, a: Bodies, b: Bodies, impulse: tuple[Lanes, Lanes, Lanes, Lanes]
+) -> None:
+    """Change the velocities of the bodies by an impulse: along x and y (N s), its moments about both (N m s)."""
+    px, py, turn_a, turn_b = impulse
     vx = a.vx + a.inverse_mass * px
     vy = a.vy + a.inverse_mass * py
-    spin = a.spin + a.inverse_inertia * (row.arm_a * normal - turn + row.shear_arm_a * shear)
+    spin = a.spin + a.inverse_inertia * turn_a
     write_fields_0(lane, contacts.lines, group.a, a.inverse_mass > 0.0, (vx, vy, spin, a.inverse_mass))
     vx = b.vx - b.inverse_mass * px
     vy = b.vy - b.inverse_mass * py
-    spin = b.spin - b.inverse_inertia * (row.arm_b * normal - turn + row.shear_arm_b * shear)
+    spin = b.spin - b.inverse_inertia * turn_b
     write_fields_0(lane, contacts.lines, group.b, b.inverse_mass > 0.0, (vx, vy, spin, b.inverse_mass))
 
 
@@ -77,7 +99,7 @@ def warm_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     if not is_all(normal <= 0.0):
         a = bodies_at(contacts, group.a, lane)
         b = bodies_at(contacts, group.b, lane)
-        push(contacts, group, lane, rows_of(group, lane), a, b, normal, second, load(lane, group.shear))
+        push_and_drag(contacts, group, lane, rows_of(group, lane), a, b, normal, second, load(lane, group.shear))
 
 
 @kernel
@@ -103,11 +125,11 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     q_two = free_two - (mixed * old_one + two * old_two)
     if is_all((lesser(q_one, q_two) >= 0.0) & (greater(old_one, old_two) <= 0.0)):
         return  # gaps that stay open
-    new_one, new_two = solve_two(k_one, mixed, k_two, q_one, q_two)
+    new_one, new_two = solve_two(lane, k_one, mixed, k_two, q_one, q_two)
     store(lane, group.normal_one, new_one)
     store(lane, group.normal_two, new_two)
     second = new_two - old_two
-    push(contacts, group, lane, row, a, b, new_one - old_one + second, second, 0.0 * second)
+    push(contacts, group, lane, row, a, b, new_one - old_one + second, second)
 
 
 @kernel
@@ -130,7 +152,7 @@ def shear_limit(touch: Record, normal: float, needed: float, mass: float) -> flo
 def shear_limits(contacts: Contacts, group: Record, lane: Lane, normal: Lanes, needed: Lanes, mass: Lanes) -> Lanes:
     """Return the largest shear impulses (N s) of rows; see shear_limit."""
     if group.are_simple:
-        return kinetic_frictions(contacts, group, lane) * normal
+        return load(lane, group.friction) * normal
     n_0, n_1, n_2, n_3 = split(normal)
     s_0, s_1, s_2, s_3 = split(needed)
     m_0, m_1, m_2, m_3 = split(mass)
@@ -178,7 +200,7 @@ def reach(
     bend = share * load(lane, group.bend)
     q_one = slip.one + bend - t_one - one * old_one - mixed * old_two
     q_two = slip.two + bend - t_two - mixed * old_one - two * old_two
-    new_one, new_two = solve_two(one, mixed, two, q_one, q_two)
+    new_one, new_two = solve_two(lane, one, mixed, two, q_one, q_two)
     store(lane, group.normal_one, new_one)
     store(lane, group.normal_two, new_two)
     d_one = new_one - old_one
@@ -200,7 +222,7 @@ def reach(
     shear = lesser(greater(needed, -limit), limit)
     d_shear = shear - old_shear
     store(lane, group.shear, shear)
-    push(contacts, group, lane, row, a, b, normal, d_two, d_shear)
+    push_and_drag(contacts, group, lane, row, a, b, normal, d_two, d_shear)
     return (a.inverse_mass + b.inverse_mass) * greater(greater(abs(d_one), abs(d_two)), abs(d_shear))
 
 

@@ -6,7 +6,7 @@ from blocksim.kernels.lanes import WIDTH, Lane, Lanes, Mask, fields_0, greater, 
 from blocksim.kernels.nonsmooth.aims import gaps, pulls
 from blocksim.kernels.nonsmooth.arrays import FAR, PART, Contacts
 from blocksim.kernels.nonsmooth.clusters import of_row
-from blocksim.kernels.nonsmooth.groups import bodies_at, highest, restitutions, rows_of, total
+from blocksim.kernels.nonsmooth.groups import bodies_at, highest, rows_of, total
 from blocksim.kernels.nonsmooth.passes import taken_by
 from blocksim.kernels.nonsmooth.slip import slip_of
 
@@ -82,7 +82,7 @@ def aim_group(contacts: Contacts, m: int, lane: Lane, is_first: bool) -> Lanes:
     a = bodies_at(contacts, group.a, lane)
     b = bodies_at(contacts, group.b, lane)
     u = slip_of(row, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
-    e = restitutions(contacts, group, lane)
+    e = load(lane, group.restitution)
     bend = stepping.bend_share * load(lane, group.bend)
     pull = pulls(row, a, b, stepping)
     old_one = load(lane, aside.target_one)

@@ -23,6 +23,8 @@ def kick_share(number: int, is_first_step: bool) -> float:
 def bodies_of(contacts: Contacts, k: int, size: int) -> tuple[int, int]:
     """Return the bodies of thread k, from the first to before the last; the ground is nobody's."""
     count = contacts.lines.size - 1
+    if size == 1:
+        return 0, count
     return count * k // size, count * (k + 1) // size
 
 

@@ -28,13 +28,14 @@ G = 9.81
 ON_GROUND = HEIGHT / 2
 
 
-def test_two_points_are_solved_exactly() -> None:
+@pytest.mark.parametrize("lane", [None, 0], ids=["four", "single"])
+def test_two_points_are_solved_exactly(lane: int | None) -> None:
     random = np.random.default_rng(0)
     for _ in range(2000):
         root = random.normal(size=(2, 2))
         k = root @ root.T + 0.01 * np.eye(2)
         q = random.normal(size=2)
-        x = np.array(solve_two(k[0, 0], k[0, 1], k[1, 1], q[0], q[1]))
+        x = np.array(solve_two(lane, k[0, 0], k[0, 1], k[1, 1], q[0], q[1]))
         rest = k @ x + q
         assert x.min() >= 0.0
         assert rest.min() >= -1e-9
