@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.frame_times import next_frame
 from blocksim.scenario import PlacedBody
 from blocksim.simulation.contacts import Contacts, joined
 from blocksim.simulation.contacts import Rows as ContactRows
@@ -84,6 +83,8 @@ class Recorder:
 
     def next_step(self, done: int) -> int:
         """Return the next step to record after `done` steps, wherever those end."""
+        from blocksim.kernels.frame_times import next_frame  # noqa: PLC0415 - kernels, not for readers
+
         return next_frame(done, self.steps_per_frame)
 
     def is_output_time(self, step: int) -> bool:
