@@ -36,7 +36,7 @@ class Settings:
             raise InvalidInputError(message)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Judgement:
     """Results of all metrics by name; `sweep` and `source` are what was compared."""
 
@@ -48,6 +48,12 @@ class Judgement:
     settings: Settings
     findings: Mapping[str, Findings]
     messages: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return a line: sweep, table, share inside and the verdict."""
+        verdict = "inside" if self.inside else "outside"
+        share = f"{self.inside_all} of {self.members} members inside all ranges"
+        return f"<Judgement of {self.sweep} against {self.source}: {share}, {verdict}>"
 
     @property
     def share_inside(self) -> float:

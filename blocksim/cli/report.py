@@ -38,7 +38,7 @@ def report_command(
     Example: blocksim report scenarios/three_blocks.toml --out three_blocks.html
     """
     refuse_foreign(out, is_report, overwrite=overwrite)
-    size, problems = report_on(places, out, experiment, members)
+    size, problems = report_on(places, out, experiment, members, (lambda _: None) if quiet else note)
     if not quiet:
         note(f"report: {out} ({size / MEGABYTE:.1f} MB)")
     if problems:

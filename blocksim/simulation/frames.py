@@ -21,7 +21,7 @@ EXTRA = "xarray"
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Frames:
     """Recorded states in SI; n frames of b bodies. Rotations counter-clockwise positive."""
 
@@ -63,6 +63,11 @@ class Frames:
     def rotation(self) -> Floats:
         """Angle turned since the start, (n, b) rad, never wrapped."""
         return self.angle - self.start_angle
+
+    def __repr__(self) -> str:
+        """Return a line: frames, blocks, the time that they span."""
+        span = f"{self.time[0]:.4g} to {self.time[-1]:.4g} s" if len(self) else "none"
+        return f"<Frames: {len(self)} of {len(self.names)} blocks, {span}>"
 
     def __len__(self) -> int:
         """Return the number of frames."""

@@ -1,6 +1,6 @@
 """Runs and sweeps brought into the form of a report, as `blocksim report` and `blocksim.report` ask for it."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from blocksim import __version__
@@ -13,7 +13,7 @@ from blocksim.scenario.path_policy import near
 from blocksim.simulation import folder as files
 from blocksim.study.compare import compare_sweep
 from blocksim.study.rows import FINISHED, TABLE
-from blocksim.study.stored_run import find_run
+from blocksim.study.stored_run import choice, find_run
 from blocksim.study.sweep_folder import PLAN, case_folder
 from blocksim.study.sweep_table import NEEDED, NO_COLUMNS, NO_TABLE, is_sweep, lines_in
 from blocksim.view.report.page import write_report
@@ -26,18 +26,25 @@ MOST_TABLE_BYTES = 200 * MEGABYTE  # of sweep.csv
 
 
 def report_on(
-    places: Sequence[Path], out: Path, experiment: Path | None = None, members: int = MEMBERS
+    places: Sequence[Path],
+    out: Path,
+    experiment: Path | None = None,
+    members: int = MEMBERS,
+    on_remark: Callable[[str], None] = lambda _: None,
 ) -> tuple[int, list[str]]:
     """Write runs and sweeps into one HTML file; return its size in bytes and what is damaged in them.
 
-    `members` is the maximum number of members of a sweep in the page. Raises what finding and reading them raises, and
-    OutputError.
+    `members` is the maximum number of members of a sweep in the page; `on_remark` hears which of several runs is taken.
+    Raises what finding and reading them raises, and OutputError.
     """
     shown: list[Subject] = []
     problems: list[str] = []
     for place in places:
         key = f"part-{len(shown) + 1}"
         subjects, found = _sweep(key, place, experiment, members) if is_sweep(place) else _run(key, place, experiment)
+        remark = "" if is_sweep(place) else choice(place, _folder(place))
+        if remark:
+            on_remark(remark)
         shown += subjects
         problems += found
     return write_report(shown, out, title=_title(shown), version=__version__), problems

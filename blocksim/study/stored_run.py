@@ -104,10 +104,10 @@ def stored_run(place: Path | str) -> StoredRun:
     """
     folder = find_run(place, needed=(files.SCENARIO, files.FRAMES))
     scenario = load_stored(folder / files.SCENARIO)
-    return StoredRun(folder, scenario, read_frames(folder / files.FRAMES, scenario), _choice(Path(place), folder))
+    return StoredRun(folder, scenario, read_frames(folder / files.FRAMES, scenario), choice(Path(place), folder))
 
 
-def _choice(place: Path, folder: Path) -> str:
+def choice(place: Path, folder: Path) -> str:
     """Say which run was taken where a folder holds several; changed by --set, they have the same name."""
     count = sum(1 for _ in place.glob(f"*/{files.DONE}")) if place.is_dir() and place != folder else 0
     return f"{place}: the newest of {count} runs is taken: {folder}" if count > 1 else ""

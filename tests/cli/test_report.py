@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 import pytest
 
-from tests.cli.conftest import Command
+from tests.cli.conftest import SOFT, Command
 from tests.view.report.folders import write_experiment, write_run, write_sweep
 
 REPORT = Path("report.html")
@@ -145,3 +145,12 @@ def test_run_that_was_killed_is_played_as_far_as_it_came(blocksim: Command, tmp_
     assert blocksim("report", "run").code == 0
     assert "unfinished" in REPORT.read_text(encoding="utf-8")
     assert data_of(REPORT)["frames"] is not None
+
+
+def test_of_several_runs_of_a_scenario_the_report_says_which_it_shows(blocksim: Command) -> None:
+    short = ("run", "scenarios/slide.toml", "--quiet", *SOFT)
+    assert blocksim(*short, "--set", "time.end=0.01").code == 0
+    assert blocksim(*short, "--set", "time.end=0.02").code == 0
+    answer = blocksim("report", "results/slide")
+    assert answer.err.startswith("results/slide: the newest of 2 runs is taken: results/slide/")
+    assert blocksim("report", "results/slide", "--quiet").err == ""
