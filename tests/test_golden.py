@@ -92,7 +92,7 @@ def test_a_section_that_its_test_does_not_use_fails(case: pytest.Pytester) -> No
     assert "unused sections, which `make golden` removes: test_paths / third" in printed(case, passed=4, errors=1)
 
 
-@pytest.mark.parametrize("options", [[], ["-n", "2"]])
+@pytest.mark.parametrize("options", [[], pytest.param(["-n", "2"], marks=pytest.mark.long)])
 def test_a_section_of_no_test_fails_once(case: pytest.Pytester, options: list[str]) -> None:
     edit(case, "/ second\ntwo\n", "/ second\ntwo\n\n=== test_word[c]\nc\n")
     told = printed(case, *options, passed=3, errors=1)
