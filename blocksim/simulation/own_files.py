@@ -132,6 +132,17 @@ def is_table(*columns: str) -> IsOwn:
     return lambda file: file.readline(HEAD_BYTES).rstrip(b"\r\n") == line
 
 
+def is_table_from(*columns: str) -> IsOwn:
+    """Return what recognises a CSV file whose first columns are these: later versions may add some."""
+    line = ",".join(columns).encode()
+
+    def is_own(file: BinaryIO) -> bool:
+        head = file.readline(HEAD_BYTES).rstrip(b"\r\n")
+        return head == line or head.startswith(line + b",")
+
+    return is_own
+
+
 def is_vtkhdf(file: BinaryIO) -> bool:
     """Return True for an export as VTKHDF."""
     try:

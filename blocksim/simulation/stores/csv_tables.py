@@ -17,6 +17,8 @@ from blocksim.world.systems.blocks import BLOCKS
 from blocksim.world.systems.system import Floats, System, Track
 
 FRAME_COLUMNS = ("time_s", "block", *(one.column for one in BLOCKS.outputs))
+FIRST_COLUMNS = FRAME_COLUMNS[:8]
+"""Those of the first version, by which exports are recognised."""
 LENGTHS = {"x_mm": "x", "y_mm": "y", "overlap_mm": "overlap"}
 PLAIN = {
     "normal_x": "normal_x",

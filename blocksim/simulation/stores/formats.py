@@ -8,8 +8,8 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
 from blocksim.simulation.contacts import Contacts
 from blocksim.simulation.frames import Frames
-from blocksim.simulation.own_files import IsOwn, is_table, is_vtkhdf
-from blocksim.simulation.stores.csv_tables import FRAME_COLUMNS, write_contacts_csv, write_frames_csv
+from blocksim.simulation.own_files import IsOwn, is_table_from, is_vtkhdf
+from blocksim.simulation.stores.csv_tables import FIRST_COLUMNS, write_contacts_csv, write_frames_csv
 from blocksim.simulation.stores.vtkhdf import write_vtkhdf
 
 
@@ -23,7 +23,9 @@ class Format(NamedTuple):
 
 # A format is one entry here.
 FORMATS: dict[str, Format] = {
-    "csv": Format(lambda path, frames, _: write_frames_csv(path, frames), is_table(*FRAME_COLUMNS), write_contacts_csv),
+    "csv": Format(
+        lambda path, frames, _: write_frames_csv(path, frames), is_table_from(*FIRST_COLUMNS), write_contacts_csv
+    ),
     "vtkhdf": Format(write_vtkhdf, is_vtkhdf),
 }
 

@@ -1,0 +1,59 @@
+"""What blocks show in tables, exports and histories follows from what frames keep of them."""
+
+import csv
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import blocksim
+from blocksim.simulation import Result
+from blocksim.simulation.frames import data_set, tidy_table
+from blocksim.simulation.own_files import is_table_from
+from blocksim.simulation.stores.csv_tables import FIRST_COLUMNS, write_frames_csv
+from blocksim.simulation.stores.vtkhdf import write_vtkhdf
+from blocksim.view.history_panels import MOTIONS, Seen
+from blocksim.view.run_data import Support, drawable_frames
+
+SCENARIOS = Path(__file__).parents[3] / "scenarios"
+
+
+@pytest.fixture(scope="module")
+def fallen() -> Result:
+    """Run the paper's three blocks."""
+    return blocksim.run(SCENARIOS / "three_blocks.toml")
+
+
+def test_kinetic_energies_of_blocks_add_up_to_that_of_the_ledger(fallen: Result, tmp_path: Path) -> None:
+    frames, blocks = fallen.frames, 3
+    table = tidy_table(frames)["kinetic_energy_J"].to_numpy().reshape(-1, blocks)
+    np.testing.assert_allclose(table.sum(axis=1), frames.energy["kinetic"], rtol=1e-12)
+    assert table.max() > 1e-3
+    write_frames_csv(tmp_path / "run.csv", frames)
+    with (tmp_path / "run.csv").open() as file:
+        exported = [float(row["kinetic_energy_J"]) for row in csv.DictReader(file)]
+    np.testing.assert_array_equal(exported, table.ravel())
+    write_vtkhdf(tmp_path / "run.vtkhdf", frames, fallen.scenario)
+    with h5py.File(tmp_path / "run.vtkhdf") as file:
+        cells = file["VTKHDF/CellData/kinetic_energy_J"][:].reshape(len(frames), -1)
+    np.testing.assert_array_equal(cells[:, :blocks], table)
+    found = data_set(frames, "three")["kinetic_energy"]
+    assert (found.attrs["units"], found.shape) == ("J", table.shape)
+    panel = MOTIONS["kinetic_energy"](Seen(frames, drawable_frames(frames), Support()))
+    assert panel.label == "kinetic energy (mJ)"
+    np.testing.assert_allclose(panel.values, 1e3 * table)
+
+
+def test_masses_that_frames_do_not_know_leave_the_cells_empty(fallen: Result) -> None:
+    unknown = replace(fallen.frames, mass=None, inertia=None)
+    assert tidy_table(unknown)["kinetic_energy_J"].isna().all()
+
+
+@pytest.mark.parametrize(("more", "is_own"), [("", True), (",kinetic_energy_J", True), ("s", False)])
+def test_exports_of_earlier_versions_are_recognised(more: str, is_own: bool) -> None:
+    head = ",".join(FIRST_COLUMNS) + more + "\r\n"
+    assert FIRST_COLUMNS[-1] == "spin_deg_s"
+    assert is_table_from(*FIRST_COLUMNS)(io.BytesIO(head.encode())) is is_own
