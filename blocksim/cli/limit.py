@@ -138,14 +138,17 @@ def _lines(name: str, found: LimitResult) -> list[str]:
     """Return both sides of every change, and what that comes to."""
     plan = found.plan
     title = f'{plan.key}, {name}: stands means "{plan.criterion.text}"'
-    if not found.changes:
-        only = next(iter(found.verdicts.values()))
+    if found.changes:
+        sides = [side for one in found.changes for side in ((one.low, one.below), (one.high, one.above))]
+        told = [_told(found, one) for one in found.changes]
+    else:
+        ends = list(found.verdicts.items())
+        sides = [ends[0], ends[-1]]
         span = f"{plan.shown(plan.span.low)} to {plan.shown(plan.span.high)}"
-        return [title, f"no change from {span}: {only.value} at all {len(found.rows)} values"]
+        told = [f"no change from {span}: {ends[0][1].value} at all {len(ends)} values"]
     heads = (f"value {plan.unit}".rstrip(), *HEADS)
-    sides = [side for one in found.changes for side in ((one.low, one.below), (one.high, one.above))]
     rows = [_cells(value, verdict, found.rows[value]) for value, verdict in dict.fromkeys(sides)]
-    return [title, "", *table_lines(heads, rows, left=4), "", *(_told(found, one) for one in found.changes)]
+    return [title, "", *table_lines(heads, rows, left=4), "", *told]
 
 
 def _cells(value: Number, verdict: Verdict, row: Row) -> list[str]:
