@@ -5,11 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from blocksim.errors import InvalidInputError, OutputExistsError, StoppedEarlyError
+from blocksim.extras import loaded
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.stopping import interruptible
 from blocksim.study.calibrate_plan import Plan, Prior
 from blocksim.study.calibrate_search import (
+    PURPOSE,
     Hit,
     Score,
     Trial,
@@ -28,6 +30,7 @@ MEMBERS = 64
 FRESH_MEMBERS = 512
 WRITTEN = "scenario.toml"
 JOURNAL = ".trials.jsonl"
+NEEDED = ("optuna", "scipy.stats.qmc")  # before anything is written
 OnTrial = Callable[[Trial, Trial, int], None]
 
 
@@ -72,6 +75,8 @@ def calibrate(  # noqa: PLR0913 - one argument for each option of the command
     """
     path = out or files.RESULTS / plan.base.name / f"calibrate-{plan.name()}" / WRITTEN
     journal = path.parent / (path.stem + JOURNAL)
+    for package in NEEDED:
+        loaded(package, PURPOSE)
     prepare(path, journal, resume=resume, overwrite=overwrite)
     best = _searched(plan, journal, trials, on_trial)
     fresh = plan.scatter.fresh_members(best.values, fresh_members if plan.scatter.plan else 1, plan.seed)

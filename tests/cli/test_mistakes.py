@@ -70,15 +70,16 @@ NEEDED = {
 }
 
 
-@pytest.mark.usefixtures("place")
 @pytest.mark.parametrize(("package", "line"), NEEDED.values(), ids=NEEDED)
 def test_missing_packages(
-    blocksim: Command, golden: Golden, monkeypatch: pytest.MonkeyPatch, package: str, line: str
+    blocksim: Command, golden: Golden, monkeypatch: pytest.MonkeyPatch, place: Path, package: str, line: str
 ) -> None:
+    before = contents(place)
     for name in [name for name in sys.modules if f"{name}.".startswith(f"{package}.")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
     monkeypatch.setenv("PATH", "")
     answer = blocksim(*shlex.split(line))
     assert (answer.code, answer.out) == (69, "")
+    assert contents(place) == before
     golden(answer.err)
