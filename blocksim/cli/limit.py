@@ -10,6 +10,7 @@ import typer
 from blocksim.cli import options
 from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.prepare import tell_compilation, warn_of_values
+from blocksim.cli.sweep_output import leaving_unfinished_cases
 from blocksim.cli.vary import read_variations
 from blocksim.errors import ExitCode
 from blocksim.scenario import Document
@@ -100,26 +101,33 @@ def limit_command(
         tell_compilation(kernels_of(base), quiet=silent)
         if not silent and is_soft(base) and not stiffer:
             note(f"warning: stiffness scale {base.contact.stiffness_scale:g} may shift the limit; see --stiffer")
-        found[name] = find_limit(
-            plan,
-            executor=None if executor is None else executor.value,
-            jobs=jobs,
-            scheduler=scheduler,
-            out=None if out is None else out / _folder(name) if len(plans) > 1 else out,
-            overwrite=overwrite,
-            on_run=(lambda *_: None) if silent else _telling(plan.shown),
-        )
+        with leaving_unfinished_cases():
+            found[name] = find_limit(
+                plan,
+                executor=None if executor is None else executor.value,
+                jobs=jobs,
+                scheduler=scheduler,
+                out=None if out is None else out / _folder(name) if len(plans) > 1 else out,
+                overwrite=overwrite,
+                on_run=(lambda *_: None) if silent else _telling(plan.shown),
+            )
+    _show(found, as_json=as_json, quiet=quiet)
+    raise typer.Exit(ExitCode.SUCCESS if all(one.changes for one in found.values()) else ExitCode.OUTSIDE)
+
+
+def _show(found: Mapping[str, LimitResult], *, as_json: bool, quiet: bool) -> None:
+    """Print every search, how far they lie apart, and where the runs are."""
     if as_json:
         print_json([{"contacts": name, "folder": str(one.folder), **one.to_dict()} for name, one in found.items()])
     else:
         answer("\n\n".join("\n".join(_lines(name, one)) for name, one in found.items()))
         _compare(found)
-    if not silent:
-        if any(Verdict.UNDECIDED in one.verdicts.values() for one in found.values()):
-            note("undecided: the run ends while blocks move on; a larger time.end may decide")
-        for one in found.values():
-            note(f"{len(one.rows)} runs, {one.run} of them now: {one.folder / 'limit.csv'}")
-    raise typer.Exit(ExitCode.SUCCESS if all(one.changes for one in found.values()) else ExitCode.OUTSIDE)
+    if quiet or as_json:
+        return
+    if any(Verdict.UNDECIDED in one.verdicts.values() for one in found.values()):
+        note("undecided: the run ends while blocks move on; a larger time.end may decide")
+    for one in found.values():
+        note(f"{len(one.rows)} runs, {one.run} of them now: {one.folder / 'limit.csv'}")
 
 
 def _folder(name: str) -> str:

@@ -1,6 +1,5 @@
 """blocksim sweep: many runs of one scenario."""
 
-import os
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -8,13 +7,12 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from blocksim.cli import options
-from blocksim.cli.output import note, print_json
+from blocksim.cli.output import print_json
 from blocksim.cli.prepare import tell_compilation, warn_of_values
-from blocksim.cli.sweep_output import reporting, short_names, show_estimate, show_sweep
+from blocksim.cli.sweep_output import leaving_unfinished_cases, reporting, short_names, show_estimate, show_sweep
 from blocksim.cli.vary import with_vary
-from blocksim.errors import ExitCode, StoppedEarlyError
+from blocksim.errors import ExitCode
 from blocksim.scenario import Document, Sweep
-from blocksim.study.executors.ensemble import is_still_running
 from blocksim.study.progress import WHOLE, Shard
 from blocksim.study.rows import heads_of
 from blocksim.study.sweep import kernels_for, sweep
@@ -118,17 +116,11 @@ def sweep_command(
 
 
 def _sweep(document: Document, plan: Sweep | None, *, silent: bool, **wanted: Any) -> SweepResult:
-    """Run a sweep; if stopped early, leave without waiting for a case that takes minutes."""
+    """Run a sweep and report its rows."""
     short = short_names(() if plan is None else tuple(plan.vary))
     heads = {} if plan is None else {head.key: head for head in heads_of(plan)}
-    try:
-        with reporting(short, heads, quiet=silent) as on_row:
-            return sweep(document, on_row=on_row, **wanted)
-    except StoppedEarlyError as error:
-        if is_still_running():
-            note(str(error))
-            os._exit(error.exit_code)
-        raise
+    with leaving_unfinished_cases(), reporting(short, heads, quiet=silent) as on_row:
+        return sweep(document, on_row=on_row, **wanted)
 
 
 def _merged(folder: Path, scenario: Path | None, *, allow_missing: bool) -> SweepResult:

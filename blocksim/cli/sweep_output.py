@@ -11,7 +11,9 @@ from rich.console import Console
 
 from blocksim.cli.output import GAP, answer, duration, note, show, table_lines, width_of_screen
 from blocksim.cli.progress import counting
+from blocksim.errors import StoppedEarlyError
 from blocksim.scenario import Document
+from blocksim.study.executors.ensemble import is_still_running
 from blocksim.study.plan import Estimate, estimate
 from blocksim.study.rows import FINISHED, MOVEMENT, Head, Row
 from blocksim.study.sweep_table import SweepResult
@@ -51,6 +53,18 @@ def _estimate_lines(found: Estimate, cores: int) -> list[str]:
     if found.impossible:
         lines.append(f"{found.impossible} of these {found.looked_at} cannot be simulated; the first: {found.reason}")
     return lines
+
+
+@contextmanager
+def leaving_unfinished_cases() -> Iterator[None]:
+    """End the process at once where a study is stopped early, without waiting for a case that takes minutes."""
+    try:
+        yield
+    except StoppedEarlyError as error:
+        if is_still_running():
+            note(str(error))
+            os._exit(error.exit_code)
+        raise
 
 
 @contextmanager

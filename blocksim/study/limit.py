@@ -25,7 +25,7 @@ from blocksim.simulation.result_files import begins
 from blocksim.simulation.stopping import stop_requests
 from blocksim.study import criterion
 from blocksim.study.criterion import Verdict
-from blocksim.study.executors import DEFAULT, WITH_SCHEDULER, Run, Setting, Task, executor_named
+from blocksim.study.executors import Run, Setting, Task, chosen_executor, executor_named
 from blocksim.study.limit_plan import TOLERANCE, LimitPlan, read_limit
 from blocksim.study.limit_search import Change, Number, changes_in, next_values
 from blocksim.study.plan import Values
@@ -162,7 +162,7 @@ def find_limit(  # noqa: PLR0913 - as `limit`
     on_run: OnRun = lambda *_: None,
 ) -> LimitResult:
     """Search as planned; see `limit`."""
-    runner = executor_named(executor or (DEFAULT if scheduler is None else WITH_SCHEDULER))
+    runner = executor_named(chosen_executor(executor, scheduler))
     setting = Setting(jobs or os.cpu_count() or 1, scheduler=scheduler)
     runner.check(setting)
     base = plan.scenario_at(plan.span.low)
@@ -170,7 +170,7 @@ def find_limit(  # noqa: PLR0913 - as `limit`
     folder = Path(out) if out is not None else files.RESULTS / base.name / f"limit-{plan.name}"
     prepare(folder, base, plan.name, overwrite=overwrite, kind=LIMIT)
     compile_kernels(kernels_of(base))
-    with closing(Manifest(folder / MANIFEST)) as manifest:
+    with closing(Manifest(folder / MANIFEST, "limit")) as manifest:
         search = _Search(plan, manifest, runner.run, on_run)
         try:
             with stop_requests() as is_stopped:

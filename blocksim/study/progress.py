@@ -130,7 +130,7 @@ def values_hash(settings: dict[str, object]) -> str:
 class Manifest:
     """A manifest that this process, and no other, appends to."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, what: str = "sweep") -> None:
         """Open the file and keep others out. Raises OutputExistsError where another process has it, and OutputError."""
         self.path = path
         try:
@@ -140,7 +140,7 @@ class Manifest:
             raise OutputError(message) from error
         if not takes_lock(self._file):
             os.close(self._file)
-            message = f"{path.parent}: this sweep is already running; wait for it, or write elsewhere with --out DIR"
+            message = f"{path.parent}: this {what} is already running; wait for it, or write elsewhere with --out DIR"
             raise OutputExistsError(message)
         self.size = os.fstat(self._file).st_size
         if self.size and os.pread(self._file, 1, self.size - 1) != NEWLINE:

@@ -11,7 +11,6 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from multiprocessing import current_process
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,7 +22,7 @@ from blocksim.simulation.compilation import compile_kernels, kernel_set
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.simulation.stopping import stop_requests
 from blocksim.study.design import levels_of
-from blocksim.study.executors import DEFAULT, WITH_FOLDERS, WITH_SCHEDULER, Batch, Run, Setting, Task, executor_named
+from blocksim.study.executors import Batch, Run, Setting, Task, chosen_executor, executor_named
 from blocksim.study.plan import Cases, Values, cases_of, with_sweep
 from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Entry, Manifest, Shard, Timings, values_hash
 from blocksim.study.rows import FINISHED, TABLE, Ranges, Row, check_experiment, invalid_row
@@ -71,7 +70,7 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
 
     A script that has processes started needs the guard `if __name__ == "__main__":`, as they import the script.
     """
-    executor = _chosen(executor, scheduler, keep_cases=keep_cases)
+    executor = chosen_executor(executor, scheduler, keep_cases=keep_cases)
     _refuse_loss(shard, overwrite=overwrite)
     runner = executor_named(executor)
     document = with_sweep(document_of(scenario), vary, mode, samples=samples, seed=seed)
@@ -93,30 +92,6 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
         timings = Timings(folder / shard.file(TIMINGS), executor)
         SweepRun(cases, shard, kept, done, table, timings, on_row).run(runner.run, setting, fail_fast=fail_fast)
     return SweepResult(folder, shard.file(TABLE), len(done.state[shard.slice]))
-
-
-def _chosen(executor: str | None, scheduler: str | None, *, keep_cases: bool) -> str:
-    """Return the executor that the other options ask for. Raises InvalidInputError where they contradict it."""
-    needed = WITH_SCHEDULER if scheduler is not None else WITH_FOLDERS if keep_cases else executor or DEFAULT
-    if keep_cases and WITH_SCHEDULER in {needed, executor}:
-        raise InvalidInputError("folders of cases are kept on this machine only, not with a scheduler")
-    if executor is not None and executor != needed:
-        why = "a scheduler" if scheduler is not None else "keeping the folders of cases"
-        message = f"{why} needs the executor {needed}, not {executor}"
-        executor_named(executor)
-        raise InvalidInputError(message)
-    if needed == WITH_SCHEDULER and scheduler is None:
-        raise InvalidInputError("the executor dask needs the address of a scheduler: --scheduler tcp://HOST:PORT")
-    if needed == WITH_FOLDERS:
-        _refuse_in_worker()
-    return needed
-
-
-def _refuse_in_worker() -> None:
-    """Stop a worker process that runs the user's script again because the script has no main guard."""
-    if getattr(current_process(), "_inheriting", False):
-        message = 'sweep() starts processes that import this script: call it below if __name__ == "__main__":'
-        raise InvalidInputError(message)
 
 
 def _refuse_loss(shard: Shard, *, overwrite: bool) -> None:

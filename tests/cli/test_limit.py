@@ -57,6 +57,8 @@ def test_nothing_that_changes_is_exit_code_1(blocksim: Command, golden: Golden) 
         "--vary ground.tilt=20deg:40deg --to much",
         "--vary ground.tilt=20deg:40deg --stands fell",
         "--vary ground.tilt=20deg:40deg --stiffer",
+        "--vary ground.tilt=20deg:40deg --executor dask",
+        "--vary ground.tilt=20deg:40deg --executor ensemble --scheduler tcp://localhost:1",
         "--vary structures.0.left=0:1",
     ],
 )

@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from blocksim.scenario import Document
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit import limit
 from blocksim.study.limit_plan import variants
+from blocksim.study.progress import MANIFEST, Manifest
 
 FRICTION = 0.38
 SLENDER, SQUAT = (0.02, 0.1), (0.1, 0.05)  # m
@@ -147,3 +149,12 @@ def test_both_laws_are_the_same_scene_without_what_only_one_of_them_knows() -> N
     assert both["springs"].time.step == "auto"
     with pytest.raises(InvalidInputError, match="rigid contacts have no stiffness"):
         variants(document, stiffer=True)
+
+
+def test_a_folder_in_which_another_process_searches_is_left_to_it(tmp_path: Path) -> None:
+    limit(block_on_a_slope(SQUAT), TILT, out=tmp_path, tolerance=0.1)
+    with (
+        closing(Manifest(tmp_path / MANIFEST)),
+        pytest.raises(OutputExistsError, match="this limit is already running"),
+    ):
+        limit(block_on_a_slope(SQUAT), TILT, out=tmp_path, tolerance=0.1)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import takewhile
+from multiprocessing import current_process
 from pathlib import Path
 from typing import NamedTuple
 
@@ -105,3 +106,27 @@ def executor_named(name: str) -> Executor:
         raise InvalidInputError(message)
     module = import_module(EXECUTORS[name])
     return Executor(module.run_tasks, module.check)
+
+
+def chosen_executor(executor: str | None, scheduler: str | None, *, keep_cases: bool = False) -> str:
+    """Return the executor that the other options ask for. Raises InvalidInputError where they contradict it."""
+    needed = WITH_SCHEDULER if scheduler is not None else WITH_FOLDERS if keep_cases else executor or DEFAULT
+    if keep_cases and WITH_SCHEDULER in {needed, executor}:
+        raise InvalidInputError("folders of cases are kept on this machine only, not with a scheduler")
+    if executor is not None and executor != needed:
+        why = "a scheduler" if scheduler is not None else "keeping the folders of cases"
+        message = f"{why} needs the executor {needed}, not {executor}"
+        executor_named(executor)
+        raise InvalidInputError(message)
+    if needed == WITH_SCHEDULER and scheduler is None:
+        raise InvalidInputError("the executor dask needs the address of a scheduler: --scheduler tcp://HOST:PORT")
+    if needed == WITH_FOLDERS:
+        _refuse_in_worker()
+    return needed
+
+
+def _refuse_in_worker() -> None:
+    """Stop a worker process that runs the user's script again because the script has no main guard."""
+    if getattr(current_process(), "_inheriting", False):
+        message = 'sweep() starts processes that import this script: call it below if __name__ == "__main__":'
+        raise InvalidInputError(message)
