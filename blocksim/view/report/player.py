@@ -3,7 +3,6 @@
 Frames are thinned where there are too many, and rounded where they are large. Lengths in millimetres.
 """
 
-import base64
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -16,13 +15,12 @@ from blocksim.simulation.contacts import Contacts
 from blocksim.simulation.frames import Frames
 from blocksim.view import style
 from blocksim.view.forces import force_scale, pushing_up
+from blocksim.view.report.elements import element_bytes, pack_systems
+from blocksim.view.report.packing import EXACT_VALUES, SHORT_BYTES, pack
 from blocksim.view.run_data import Floats, Indices, drawable_frames, support_of
 from blocksim.view.window import MILLIMETRES, extent_of
 
-EXACT_VALUES = 200_000  # up to so many values are kept as 32-bit floats
 MOST_BYTES = 12_000_000  # of the frames of one run, before they become text, which takes a third more
-LEVELS = 65_535  # steps of a rounded value
-SHORT_BYTES = 2
 CONTACT_BYTES = 16  # of a contact in a frame
 CHANNELS = {"x": "mm", "y": "mm", "rotation": "deg", "vx": "mm/s", "vy": "mm/s", "spin": "deg/s"}
 
@@ -66,6 +64,7 @@ def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
         "energy": {name: pack(values[kept], exact=True)[0] for name, values in frames.energy.items()},
         "contact_count": pack(frames.contact_count[kept], exact=True)[0],
         "largest_overlap": pack(MILLIMETRES * frames.largest_overlap[kept], exact=True)[0],
+        "systems": pack_systems(frames, kept),
     }
     return Packed(data, len(kept), len(frames), {name: error for name, (_, error) in packed.items()})
 
@@ -74,7 +73,8 @@ def frame_indices(frames: Frames, most_bytes: int = MOST_BYTES) -> Indices:
     """Return the frames that `pack_frames` keeps."""
     contacts = frames.contacts
     more = 0 if contacts is None else CONTACT_BYTES * len(contacts.rows) // len(contacts)
-    return _thinned(drawable_frames(frames), len(frames.names), most_bytes, more)
+    drawable = drawable_frames(frames)
+    return _thinned(drawable, len(frames.names), most_bytes, more + element_bytes(frames, drawable))
 
 
 def pack_forces(frames: Frames, kept: Indices, tilt: float) -> dict[str, Any] | None:
@@ -103,22 +103,6 @@ def _of_frames(contacts: Contacts, kept: Indices) -> tuple[NDArray[Any], list[in
     return np.concatenate(tables), np.cumsum([len(table) for table in tables]).tolist()
 
 
-def pack(values: Floats, *, exact: bool = False) -> tuple[dict[str, Any], float]:
-    """Return values as base64 text with the range they are rounded in, and the largest error of that.
-
-    Few values, or all with `exact`, become 32-bit floats; many become 16-bit steps between smallest and largest.
-    Values that are not finite stay what they are, or become 0 in steps.
-    """
-    if exact or values.size <= EXACT_VALUES:
-        floats = values.astype("<f4")
-        return {"type": "f4", "data": _text(floats)}, _largest(floats.astype(float) - values)
-    finite = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-    low, high = float(finite.min()), float(finite.max())
-    step = (high - low) / LEVELS or 1.0
-    steps = np.rint((finite - low) / step).astype("<u2")
-    return {"type": "u2", "low": low, "step": step, "data": _text(steps)}, _largest(low + step * steps - values)
-
-
 def _thinned(drawable: Indices, blocks: int, most_bytes: int, more: int) -> Indices:
     """Return evenly chosen frames, first and last included, that fit; each has some bytes in addition to its blocks."""
     values = len(drawable) * blocks * len(CHANNELS)
@@ -135,17 +119,8 @@ def _channels(frames: Frames, kept: Indices) -> dict[str, Floats]:
     return {name: {**lengths, **turns}[name] for name in CHANNELS}
 
 
-def _largest(errors: Floats) -> float:
-    finite = np.abs(errors[np.isfinite(errors)])
-    return float(finite.max()) if finite.size else 0.0
-
-
 def _listed(values: Floats) -> list[float]:
     return [float(f"{value:.7g}") for value in values]
-
-
-def _text(values: NDArray[Any]) -> str:
-    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
 
 
 def scene_data(frames: Frames, scenario: Scenario, kept: Indices) -> dict[str, Any]:

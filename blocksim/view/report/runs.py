@@ -195,7 +195,8 @@ def _reason(run: PartialRun) -> str:
 
 def _summary(run: PartialRun) -> list[tuple[str, str]]:
     """Return names and values for people."""
-    blocks = [] if run.frames is None else [("blocks", str(len(run.frames.names)))]
+    tracks = () if run.frames is None else run.frames.tracks
+    blocks = [(track.system.name, str(len(track.names))) for track in tracks]
     if run.summary is None:
         last = [] if run.frames is None else [("recorded until", f"{run.frames.time[-1]:.4g} s")]
         return [*blocks, *last]

@@ -1,5 +1,6 @@
 """Folders of runs with made-up motion, written by the parts that write real ones; the solver is not needed."""
 
+import base64
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -103,3 +104,11 @@ def write_experiment(path: Path) -> None:
     """Write repeats of the block that `write_sweep` tells of: three of its five finished members are inside."""
     rows = [f"1,{name},{value}" for name, value in (("x,mm,1", 67.0), ("x,mm,2", 69.0), ("rotation,deg,1", -90.0))]
     path.write_text("\n".join(["block,quantity,unit,replicate,value", *rows]) + "\n", encoding="utf-8")
+
+
+def numbers(part: Mapping[str, object]) -> NDArray[np.float64]:
+    """Return the numbers that a page reads from text."""
+    data = base64.b64decode(str(part["data"]))
+    if part["type"] == "f4":
+        return np.frombuffer(data, "<f4").astype(float)
+    return float(str(part["low"])) + float(str(part["step"])) * np.frombuffer(data, "<u2")

@@ -1,6 +1,5 @@
 """Frames as text: what comes back, how far it is off, what is left out; particles lie where the world has them."""
 
-import base64
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,41 +8,16 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
-from blocksim.view.report import player
-from blocksim.view.report.player import boundary_particles, pack, pack_frames
+from blocksim.view.report.player import boundary_particles, pack_frames
 from blocksim.world.build import build_world
-from tests.view.report.folders import SCENARIOS, write_run
-
-
-def unpacked(part: dict[str, object]) -> np.ndarray:
-    data = base64.b64decode(str(part["data"]))
-    if part["type"] == "f4":
-        return np.frombuffer(data, "<f4").astype(float)
-    return float(str(part["low"])) + float(str(part["step"])) * np.frombuffer(data, "<u2")
-
-
-@pytest.mark.parametrize(("most", "kind"), [(1000, "f4"), (10, "u2")])
-def test_told_error_is_the_largest_one(monkeypatch: pytest.MonkeyPatch, most: int, kind: str) -> None:
-    values = np.random.default_rng(1).normal(0.0, 100.0, (50, 7))
-    monkeypatch.setattr(player, "EXACT_VALUES", most)
-    part, error = pack(values)
-    assert part["type"] == kind
-    assert np.abs(unpacked(part) - values.ravel()).max() == pytest.approx(error)
-    assert error <= 0.5 * np.ptp(values) / 65_535 * (1.0 + 1e-9)
-
-
-def test_equal_values_can_be_rounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(player, "EXACT_VALUES", 0)
-    part, error = pack(np.full((3, 2), 4.5))
-    assert unpacked(part).tolist() == [4.5] * 6
-    assert error == 0.0
+from tests.view.report.folders import SCENARIOS, numbers, write_run
 
 
 def test_too_many_frames_are_thinned_and_that_is_reported(tmp_path: Path) -> None:
     frames = write_run(tmp_path / "run", count=41)
     packed = pack_frames(frames, most_bytes=5 * 3 * 6 * 4)
     assert (packed.kept, packed.recorded) == (5, 41)
-    assert unpacked(packed.data["time"]) == pytest.approx(frames.time[[0, 10, 20, 30, 40]])
+    assert numbers(packed.data["time"]) == pytest.approx(frames.time[[0, 10, 20, 30, 40]])
     assert "5 of 41 recorded frames are in this page (evenly thinned)." in packed.notes
 
 

@@ -47,6 +47,7 @@ class Drawing {
     context.fillStyle = colours.stage;
     context.fillRect(0, 0, this.canvas.width, this.canvas.height);
     this.drawSupport(frame);
+    for (const system of this.frames.systems) this.drawSystem(system, frame);
     this.drawBlocks(frame);
     if (options.trails) this.drawTrails();
     if (options.particles) this.drawParticles(frame);
@@ -79,6 +80,25 @@ class Drawing {
     context.strokeStyle = colours.faint;
     context.lineWidth = 1.5 / view.scale;
     context.stroke();
+  }
+
+  // Draws the elements of a system below the blocks, in one path. Those without a shape of their own have all corners.
+  drawSystem({ colour: fill, count, corners, shape, x, y }, frame) {
+    const { context, ratio, view } = this;
+    const path = new Path2D();
+    for (let element = 0; element < count; element += 1) {
+      const at = frame * count + element;
+      for (let corner = 0; corner < corners; corner += 1) {
+        const place = shape ? 2 * ((shape.length > 2 * corners ? element * corners : 0) + corner) : at * corners + corner;
+        const [px, py] = shape ? view.toPixels(x[at] + shape[place], y[at] + shape[place + 1]) : view.toPixels(x[place], y[place]);
+        if (corner) path.lineTo(px, py);
+        else path.moveTo(px, py);
+      }
+      path.closePath();
+    }
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.fillStyle = fill;
+    context.fill(path);
   }
 
   // Draws all blocks: one path for each colour and one for all edges, which takes half the time of a path for each.

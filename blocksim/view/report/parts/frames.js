@@ -11,6 +11,7 @@ class Frames {
     this.energy = Object.entries(data.energy).map(([name, part]) => [name, decode(part)]);
     this.contactCount = decode(data.contact_count);
     for (const [name, part] of Object.entries(data.channels)) this[name] = decode(part);
+    this.systems = data.systems.map((one) => ({ ...one, x: decode(one.x), y: decode(one.y), shape: one.shape && decode(one.shape) }));
     this.forces = data.forces && { ...data.forces, ...Object.fromEntries(["x", "y", "fx", "fy"].map((name) => [name, decode(data.forces[name])])) };
   }
 
