@@ -151,6 +151,7 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
         *_short_interval(scenario, description),
         *_motion(description.motion),
         *_boundary(scenario, description),
+        *(f"{name:<10} {count}, beside the blocks" for name, count in description.systems.items()),
         f"neighbours checked up to {MILLI * description.skin:.3g} mm apart",
     ]
 

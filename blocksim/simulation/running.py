@@ -70,7 +70,7 @@ def simulate(
     built = build(scenario)
     began += _compiled(scenario)
     recorder = _recorder(scenario, built)
-    with _attended(built.scene, threads, limit, on_progress) as (team, attendance):
+    with _attended(built.scene, recorder, threads, limit, on_progress) as (team, attendance):
         ended = run_loop(built.scene, recorder, scenario.time.end, team=team, attendance=attendance)
     return _result(scenario, recorder, ended, time.perf_counter() - began)
 
@@ -104,7 +104,7 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
         limit = WallTime(precautions.wall_time)
         part = Part(scenario, folder, built, resumption)
         toml = part.prepare(tables, overwrite=overwrite or resume)
-        with _attended(part.scene, threads, limit, on_progress) as (team, attendance):
+        with _attended(part.scene, part.recorder, threads, limit, on_progress) as (team, attendance):
             ended = part.run(toml, precautions, team, attendance)
             result = _result(scenario, part.recorder, ended, time.perf_counter() - began)
             return _keep_result(result, part.account(result.summary), folder)
@@ -130,10 +130,11 @@ def _resumption(folder: Path, scenario: Scenario, listener: Listener) -> Resumpt
 
 @contextmanager
 def _attended(
-    scene: AnyScene, threads: int, limit: WallTime, on_progress: Watcher
+    scene: AnyScene, recorder: Recorder, threads: int, limit: WallTime, on_progress: Watcher
 ) -> Iterator[tuple[Team, Attendance]]:
     """Give the threads of a run, and what stops it: a signal, or the limit of wall time."""
-    with stop_requests() as requests, team_for(scene, threads) as team:
+    elements = sum(one.count for one in recorder.systems[1:])  # the first are the blocks
+    with stop_requests() as requests, team_for(scene, threads, elements) as team:
         yield team, Attendance(on_progress, lambda: requests.reason() or limit.reason())
 
 
@@ -320,6 +321,6 @@ def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
     frames = output_count(steps, scenario.time.end, scenario.output.every) + 2  # the first, and wherever it ends
     bodies, particles = scene.world.bodies.size - 1, scene.world.particles
     contacts = recorded_contacts(bodies, 0 if particles is None else particles.size) if scenario.output.contacts else 0
-    further = frames * sum(8 * len(one.system.quantities) * one.count for one in others_of(scenario))
+    values = sum(one.values for one in others_of(scenario))
     arrays = sum(array.nbytes for array in arrays_of(scene))
-    return further + file_bytes(bodies, frames, contacts) + CHECKPOINT_FILES * arrays
+    return file_bytes(bodies, frames, contacts, values) + CHECKPOINT_FILES * arrays

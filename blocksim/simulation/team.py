@@ -17,15 +17,20 @@ START_SECONDS = 60.0
 def useful_threads(threads: int, bodies: int, least_bodies: int = BODIES_A_THREAD) -> int:
     """Return how many of `threads` are of use for a scene; the result is the same for any number, bit for bit.
 
-    `least_bodies` is the scheme's, by default that of the explicit one.
+    `bodies` are blocks and elements of further systems, `least_bodies` is the scheme's, by default that of the explicit
+    one.
     """
     most = 1 if config.DISABLE_JIT else max(1, bodies // least_bodies)
     return min(threads, most)
 
 
-def team_for(scene: AnyScene, threads: int) -> "Team":
-    """Return a team for a scene, of as many of `threads` as are of use. Raises ValueError for less than one."""
-    return Team(useful_threads(threads, scene.world.bodies.size - 1, scheme_of(scene).least_bodies))
+def team_for(scene: AnyScene, threads: int, elements: int = 0) -> "Team":
+    """Return a team of as many of `threads` as are of use for a scene with so many elements of further systems.
+
+    Raises ValueError for less than one.
+    """
+    bodies = scene.world.bodies.size - 1 + elements
+    return Team(useful_threads(threads, bodies, scheme_of(scene).least_bodies))
 
 
 class Team:

@@ -29,6 +29,7 @@ from blocksim.world.particles import particle_count
 from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
 from blocksim.world.systems import others_of
+from blocksim.world.systems.system import Present
 
 # measured on one core: a step costs about this for every body with its contacts
 SECONDS_PER_BODY_AND_STEP = 75e-9
@@ -99,6 +100,7 @@ class Description:
     particles: int  # on all boundaries, corners included
     skin: float  # m, distance up to which bodies are listed as neighbours
     rigid: SagDescription | None  # where contacts are
+    systems: Mapping[str, int]  # elements of each system beside blocks and supports
 
 
 def describe(scenario: Scenario) -> Description:
@@ -110,6 +112,8 @@ def describe(scenario: Scenario) -> Description:
     frames = output_count(steps, scenario.time.end, scenario.output.every) + 1
     particles = _particles(scenario, placed)
     contacts = recorded_contacts(len(placed), particles) if scenario.output.contacts else 0
+    others = others_of(scenario)
+    more = sum(one.count * one.system.cost.memory for one in others)
     return Description(
         bodies=placed,
         pairs=tuple(_pairs(scenario, world, placed)),
@@ -117,13 +121,14 @@ def describe(scenario: Scenario) -> Description:
         step=step,
         steps=steps,
         frames=frames,
-        seconds=steps * _seconds_per_step(scenario, len(placed), particles),
-        bytes=file_bytes(len(placed), frames, contacts),
-        memory=PROCESS_BYTES + size.bytes_needed,  # without frames: into a folder, they are written as they come
+        seconds=steps * (_seconds_per_step(scenario, len(placed), particles) + _seconds_of(others)),
+        bytes=file_bytes(len(placed), frames, contacts, sum(one.values for one in others)),
+        memory=PROCESS_BYTES + size.bytes_needed + more,  # without frames: into a folder, they are written as they come
         frames_at_every_step=is_shorter_than_step(scenario.output.every, step),
         particles=particles,
         skin=float(world.controls[0].skin),
         rigid=_rigid(scenario, placed, world, step),
+        systems={one.system.name: one.count for one in others},
     )
 
 
@@ -148,6 +153,11 @@ def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
         block, particle, more = SECONDS_WITH_PARTICLES[scenario.contact.model]
         return (more if is_crowd else 1.0) * (blocks * block + particles * particle)
     return blocks * (SECONDS_IN_A_CROWD if is_crowd else SECONDS_PER_BODY_AND_STEP)
+
+
+def _seconds_of(others: Sequence[Present]) -> float:
+    """Return what a step of further systems costs (s)."""
+    return sum(one.count * one.system.cost.seconds for one in others)
 
 
 def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, step: float) -> SagDescription | None:

@@ -119,9 +119,9 @@ def is_shorter_than_step(every: float, step: float) -> bool:
     return every < (1.0 - ROUNDING) * step
 
 
-def file_bytes(bodies: int, frames: int, contacts: int = 0) -> int:
-    """Return the bytes that frames with so many contacts each take in a file."""
-    return frames * VALUE * (FRAME_VALUES + MOTION_VALUES * bodies + CONTACT_VALUES * contacts)
+def file_bytes(bodies: int, frames: int, contacts: int = 0, further: int = 0) -> int:
+    """Return the bytes in a file of frames with so many contacts, and values of further systems, each."""
+    return frames * VALUE * (FRAME_VALUES + MOTION_VALUES * bodies + CONTACT_VALUES * contacts + further)
 
 
 def recorded_contacts(bodies: int, particles: int) -> int:

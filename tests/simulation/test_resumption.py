@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 def two_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let as many threads work as are asked for, however few blocks there are."""
 
-    def team(_: AnyScene, threads: int) -> Team:
+    def team(_: AnyScene, threads: int, _elements: int) -> Team:
         return Team(threads)
 
     monkeypatch.setattr("blocksim.simulation.running.team_for", team)

@@ -22,15 +22,21 @@ from blocksim.simulation.outcome import BY_CODE, diagnosed
 from blocksim.simulation.schemes import build
 from blocksim.simulation.stores.csv_tables import write_frames_csv
 from blocksim.simulation.stores.vtkhdf import write_vtkhdf
-from blocksim.simulation.team import ALONE
+from blocksim.simulation.team import ALONE, team_for
 from blocksim.view import style
 from blocksim.view.animation import Animation, Look
+from blocksim.view.report import elements
+from blocksim.view.report.elements import element_bytes
+from blocksim.view.report.player import pack_frames
+from blocksim.view.report.runs import read_stored, run_subject
 from blocksim.view.run_data import Support, drawable_frames
 from blocksim.view.strip import draw_strip
 from blocksim.view.window import extent_of
 from blocksim.world.describe import describe
 from blocksim.world.systems import INTERACTIONS
-from tests.simulation.masses import RADIUS, MassTable, ground, tie
+from blocksim.world.systems.system import Indices, Track, discs
+from tests.simulation.masses import MASSES, RADIUS, MassTable, ground, tie
+from tests.view.report.folders import numbers
 
 REGISTRATIONS: tuple[tuple[dict[Any, Any], Any, Any], ...] = (
     (SYSTEMS, "masses", MassTable),
@@ -243,6 +249,48 @@ def test_pictures_show_the_system(tmp_path: Path) -> None:
     colour = [int(style.block_colour(1)[place : place + 2], 16) for place in (1, 3, 5)]
     first, last = (int((animation.picture(frame) == colour).all(axis=-1).sum()) for frame in (0, len(frames) - 1))
     assert min(first, last) > 30  # pixels of their colour, which the block does not have
+
+
+def test_the_player_gets_every_element(tmp_path: Path) -> None:
+    frames = blocksim.run(scene(), out=tmp_path / "toy").frames
+    (packed,) = pack_frames(frames).data["systems"]
+    (masses,) = frames.others
+    assert (packed["name"], packed["count"], packed["corners"]) == ("masses", 3, 8)
+    for axis in ("x", "y"):
+        np.testing.assert_allclose(numbers(packed[axis]).reshape(-1, 3), 1e3 * masses[axis], rtol=1e-6)
+    assert np.abs(np.hypot(*numbers(packed["shape"]).reshape(8, 2).T) - 1e3 * RADIUS).max() < 1e-6
+    assert element_bytes(frames, drawable_frames(frames)) == 2 * 2 * 3
+    told = dict(run_subject("r1", read_stored(tmp_path / "toy")).page["summary"])
+    assert (told["blocks"], told["masses"]) == ("1", "3")
+
+
+def test_the_player_gets_all_corners_of_elements_that_grow(monkeypatch: pytest.MonkeyPatch) -> None:
+    frames = blocksim.run(scene()).frames
+
+    def growing(track: Track, chosen: Indices) -> np.ndarray:
+        corners = discs(track, chosen, np.full(len(track.names), RADIUS))
+        return corners * (1.0 + np.asarray(chosen)[:, None, None, None])
+
+    monkeypatch.setattr(elements, "outlines_of", growing)
+    (packed,) = pack_frames(frames).data["systems"]
+    assert packed["shape"] is None
+    wanted = 1e3 * growing(frames.others[0], np.arange(len(frames)))
+    np.testing.assert_allclose(numbers(packed["x"]), wanted[..., 0].ravel(), rtol=1e-6)
+    assert element_bytes(frames, drawable_frames(frames)) == 2 * 16 * 3
+
+
+def test_check_counts_the_elements() -> None:
+    few, many = describe(scene()), describe(scene({**THREE, "count": 1000, "spacing": 1e-3}))
+    assert (few.systems, many.systems) == ({"masses": 3}, {"masses": 1000})
+    cost, frames = MASSES.cost, many.frames
+    assert many.seconds - few.seconds == pytest.approx(997 * cost.seconds * many.steps)
+    assert many.bytes - few.bytes == 997 * 8 * 4 * frames
+    assert many.memory - few.memory == 997 * cost.memory
+
+
+def test_threads_are_of_use_for_many_elements() -> None:
+    one = build(scene()).scene
+    assert [team_for(one, 4, elements).threads for elements in (0, 3, 250, 1000)] == [1, 1, 2, 4]
 
 
 def test_check_refuses_what_a_run_refuses(monkeypatch: pytest.MonkeyPatch) -> None:

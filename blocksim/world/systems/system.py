@@ -4,7 +4,7 @@ See blocksim/world/README.md. Nothing in here needs the compiler: stored runs ar
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,6 +54,14 @@ class Elements:
 
 
 @dataclass(frozen=True)
+class Cost:
+    """What an element takes of a run, as `blocksim check` estimates it."""
+
+    seconds: float = 100e-9  # of a step on one core
+    memory: int = 400  # bytes of its arrays
+
+
+@dataclass(frozen=True)
 class System:
     """One kind of thing that fills a scene.
 
@@ -72,6 +80,7 @@ class System:
     build: Callable[[Scenario], Any] | None = None  # its arrays at time zero, where they are not in the world
     largest_step: Callable[[Scenario], float] | None = None  # s; None: the scheme knows
     stages: Callable[[], "Stages"] | None = None  # its compiled functions, where they are not those of a scheme
+    cost: Cost = field(default_factory=Cost)  # of every element, where it is not part of the blocks'
 
 
 @dataclass(frozen=True)
@@ -85,6 +94,11 @@ class Present:
     def count(self) -> int:
         """Number of elements."""
         return len(self.elements.names)
+
+    @property
+    def values(self) -> int:
+        """Number of quantities that a frame keeps."""
+        return self.count * len(self.system.quantities)
 
 
 @dataclass(frozen=True)
