@@ -10,7 +10,7 @@ import typer
 from blocksim.cli import options
 from blocksim.cli.output import note, number, show, table_lines
 from blocksim.cli.prepare import tell_compilation
-from blocksim.cli.vary import read_variations
+from blocksim.cli.vary import RANGE, SPREAD, read_variations
 from blocksim.errors import ExitCode
 from blocksim.scenario import Document
 from blocksim.simulation.compilation import kernels_of
@@ -70,8 +70,8 @@ def calibrate_command(
     silent = quiet or as_json
     plan = read_plan(
         Document.read(scenario).with_settings(settings or []),
-        read_variations(fit or [], FIT),
-        read_variations(scatter or [], SCATTER),
+        read_variations(fit or [], FIT, RANGE),
+        read_variations(scatter or [], SCATTER, SPREAD),
         experiment=experiment,
         members=members,
         seed=seed,

@@ -11,7 +11,7 @@ from blocksim.cli import options
 from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.prepare import tell_compilation, warn_of_values
 from blocksim.cli.sweep_output import leaving_unfinished_cases
-from blocksim.cli.vary import read_variations
+from blocksim.cli.vary import RANGE, read_variations
 from blocksim.errors import ExitCode
 from blocksim.scenario import Document
 from blocksim.simulation.compilation import kernels_of
@@ -88,7 +88,7 @@ def limit_command(
     """
     silent = quiet or as_json
     document = Document.read(scenario).with_settings(settings or [])
-    given = read_variations(vary, OPTION)
+    given = read_variations(vary, OPTION, RANGE)
     plans = {
         name: read_limit(one, given, stands=stands, tolerance=to)
         for name, one in variants(document, both_laws=both_laws, stiffer=stiffer).items()

@@ -12,7 +12,7 @@ from blocksim.cli import options
 from blocksim.cli.output import note, number, show, table_lines
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.progress import counting
-from blocksim.cli.vary import read_variations
+from blocksim.cli.vary import SPREAD, read_variations
 from blocksim.errors import OutputExistsError
 from blocksim.scenario import Document
 from blocksim.simulation.atomic import write_text
@@ -73,7 +73,7 @@ def sensitivity_command(
     silent = quiet or as_json
     _refuse_present(out, overwrite=overwrite)
     document = Document.read(scenario).with_settings(settings or [])
-    plan = sampled_plan(document, read_variations(vary or [], VARY), VARY, NOTHING)
+    plan = sampled_plan(document, read_variations(vary or [], VARY, SPREAD), VARY, NOTHING)
     bare = document.without_sweep()
     tell_compilation(kernels_of(bare.build()), quiet=silent)
     with counting("runs", quiet=silent) as on_member:

@@ -12,6 +12,8 @@ LEAST_ENDS = 2
 LOG = "log"
 PLUS_MINUS = ("+-", "±")
 FORMS = "KEY=a,b,c, KEY=from:to:count, KEY=from:to or KEY=mean+-sd (from:to also with :log at the end)"
+RANGE = "KEY=from:to (also with :log at the end)"
+SPREAD = "KEY=from:to, KEY=mean+-sd or KEY=a,b,c (from:to also with :log at the end)"
 
 
 def with_vary(
@@ -30,9 +32,12 @@ def with_vary(
     return with_sweep(document, given.tables, mode, given.texts, samples=samples, seed=seed)
 
 
-def read_variations(texts: Sequence[str], option: str) -> Variations:
-    """Return the values of each key in such texts, given to an option; raises ScenarioError for any other text."""
-    problems = [Problem(f"{option} {text}", f"write {FORMS}") for text in texts if not _parts(text)]
+def read_variations(texts: Sequence[str], option: str, forms: str = FORMS) -> Variations:
+    """Return the values of each key in such texts, given to an option; raises ScenarioError for any other text.
+
+    `forms` are those that the option takes, as the message for a text without a key or values says them.
+    """
+    problems = [Problem(f"{option} {text}", f"write {forms}") for text in texts if not _parts(text)]
     keys = [key for text in texts for key, _ in _parts(text)]
     problems += [
         Problem(f"{option} {key}", "given twice; list all its values once") for key in keys if keys.count(key) > 1
