@@ -16,6 +16,7 @@ from blocksim.errors import ExitCode
 from blocksim.scenario import Document
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study.criterion import DEFAULT, Verdict
+from blocksim.study.executors import Execution
 from blocksim.study.limit import LimitResult, OnRun, find_limit
 from blocksim.study.limit_plan import OPTION, TOLERANCE, is_soft, read_limit, variants
 from blocksim.study.limit_search import Change, Number
@@ -104,9 +105,7 @@ def limit_command(
         with leaving_unfinished_cases():
             found[name] = find_limit(
                 plan,
-                executor=None if executor is None else executor.value,
-                jobs=jobs,
-                scheduler=scheduler,
+                Execution(None if executor is None else executor.value, jobs, scheduler),
                 out=None if out is None else out / _folder(name) if len(plans) > 1 else out,
                 overwrite=overwrite,
                 on_run=(lambda *_: None) if silent else _telling(plan.shown),

@@ -7,7 +7,6 @@ is called again; it comes to the same answer.
 import csv
 import io
 import json
-import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing
@@ -25,7 +24,7 @@ from blocksim.simulation.result_files import begins
 from blocksim.simulation.stopping import stop_requests
 from blocksim.study import criterion
 from blocksim.study.criterion import Verdict
-from blocksim.study.executors import Run, Setting, Task, chosen_executor, executor_named
+from blocksim.study.executors import Execution, Run, Setting, Task
 from blocksim.study.limit_plan import TOLERANCE, LimitPlan, read_limit
 from blocksim.study.limit_search import Change, Number, changes_in, next_values
 from blocksim.study.plan import Values
@@ -140,38 +139,26 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     OutputExistsError where the folder is not free, UnavailableError, StoppedEarlyError on Ctrl-C.
     """
     plan = read_limit(document_of(scenario), vary, stands=stands, tolerance=tolerance)
-    return find_limit(
-        plan,
-        executor=executor,
-        jobs=jobs,
-        scheduler=scheduler,
-        out=out,
-        overwrite=overwrite,
-        on_run=on_run,
-    )
+    return find_limit(plan, Execution(executor, jobs, scheduler), out=out, overwrite=overwrite, on_run=on_run)
 
 
-def find_limit(  # noqa: PLR0913 - as `limit`
+def find_limit(
     plan: LimitPlan,
+    execution: Execution,
     *,
-    executor: str | None = None,
-    jobs: int | None = None,
-    scheduler: str | None = None,
     out: Path | str | None = None,
     overwrite: bool = False,
     on_run: OnRun = lambda *_: None,
 ) -> LimitResult:
     """Search as planned; see `limit`."""
-    runner = executor_named(chosen_executor(executor, scheduler))
-    setting = Setting(jobs or os.cpu_count() or 1, scheduler=scheduler)
-    runner.check(setting)
+    run, setting = execution.ready()
     base = plan.scenario_at(plan.span.low)
     check_experiment(base)
     folder = Path(out) if out is not None else files.RESULTS / base.name / f"limit-{plan.name}"
     prepare(folder, base, plan.name, overwrite=overwrite, kind=LIMIT)
     compile_kernels(kernels_of(base))
     with closing(Manifest(folder / MANIFEST, "limit")) as manifest:
-        search = _Search(plan, manifest, runner.run, on_run)
+        search = _Search(plan, manifest, run, on_run)
         try:
             with stop_requests() as is_stopped:
                 search.complete(replace(setting, is_stopped=is_stopped))

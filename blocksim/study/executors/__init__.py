@@ -1,5 +1,6 @@
 """What runs the cases of a sweep. A new executor is one module with `check` and `run_tasks`, and one line here."""
 
+import os
 import time
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
@@ -108,6 +109,27 @@ def executor_named(name: str) -> Executor:
     return Executor(module.run_tasks, module.check)
 
 
+@dataclass(frozen=True)
+class Execution:
+    """What a caller says of how runs are to be executed; see `blocksim.study.sweep.sweep`."""
+
+    executor: str | None = None
+    jobs: int | None = None
+    scheduler: str | None = None
+
+    @property
+    def name(self) -> str:
+        """The executor that these ask for. Raises InvalidInputError."""
+        return chosen_executor(self.executor, self.scheduler)
+
+    def ready(self) -> tuple[Run, Setting]:
+        """Return what runs tasks, and its setting. Raises InvalidInputError, UnavailableError."""
+        runner = executor_named(self.name)
+        setting = Setting(self.jobs or os.cpu_count() or 1, scheduler=self.scheduler)
+        runner.check(setting)
+        return runner.run, setting
+
+
 def chosen_executor(executor: str | None, scheduler: str | None, *, keep_cases: bool = False) -> str:
     """Return the executor that the other options ask for. Raises InvalidInputError where they contradict it."""
     needed = WITH_SCHEDULER if scheduler is not None else WITH_FOLDERS if keep_cases else executor or DEFAULT
@@ -128,5 +150,5 @@ def chosen_executor(executor: str | None, scheduler: str | None, *, keep_cases: 
 def _refuse_in_worker() -> None:
     """Stop a worker process that runs the user's script again because the script has no main guard."""
     if getattr(current_process(), "_inheriting", False):
-        message = 'sweep() starts processes that import this script: call it below if __name__ == "__main__":'
+        message = 'worker processes import this script: what starts them belongs below if __name__ == "__main__":'
         raise InvalidInputError(message)

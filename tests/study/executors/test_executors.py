@@ -1,14 +1,15 @@
 """Every executor gives the same rows, in batches of any size, and the table does not tell them apart."""
 
 from collections.abc import Iterator
+from multiprocessing import current_process
 from pathlib import Path
 
 import pytest
 
-from blocksim.errors import UnavailableError
+from blocksim.errors import InvalidInputError, UnavailableError
 from blocksim.scenario import Document
 from blocksim.study import executors as batches
-from blocksim.study.executors import GROWTH, MOST, BatchSize, Setting, Task, executor_named, take
+from blocksim.study.executors import GROWTH, MOST, BatchSize, Execution, Setting, Task, executor_named, take
 from blocksim.study.plan import Values
 from blocksim.study.progress import Shard
 from blocksim.study.sweep import merge, sweep
@@ -110,3 +111,11 @@ def test_tasks_are_taken_as_they_are_needed() -> None:
     assert [task.number for task in take(tasks, 2, lambda: False)] == [0, 1]
     assert take(tasks, 2, lambda: True) == ()
     assert [task.number for task in take(tasks, 9, lambda: False)] == [2, 3, 4]
+
+
+def test_a_script_without_a_main_guard_is_told_so_whatever_study_it_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(current_process(), "_inheriting", True, raising=False)  # as in a worker that imports the script
+    with pytest.raises(
+        InvalidInputError, match=r'^worker processes import this script: .* below if __name__ == "__main'
+    ):
+        Execution("processes").ready()
