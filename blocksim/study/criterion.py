@@ -1,4 +1,4 @@
-"""What counts as standing: conditions on the end of a run, such as "moved < 5 mm, outcome != fell".
+"""What counts as standing, or as failure: conditions on the end of a run, such as "moved < 5 mm, outcome != fell".
 
 Conditions are joined by commas, and all of them must hold. `moved` is the largest displacement of a centre from start
 to end, `turned` the largest rotation; `outcome` is one of stands, rocked back, slid, fell (see
@@ -20,8 +20,9 @@ from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.simulation.movement import Manner
 from blocksim.study.rows import FINISHED, MOVEMENT
 
+STANDS = "--stands"
 DEFAULT = "outcome = stands | rocked back"
-FORM = re.compile(r"\s*([a-z]+)\s*(<=|>=|!=|=|<|>)\s*(.*?)\s*")
+FORM = re.compile(r"\s*([a-z]+)\s*(<=|>=|!=|==?|<|>)\s*(.*?)\s*")
 OUTCOME, _, _, DISPLACEMENT, TURN, _, MOVES_ON = MOVEMENT
 NUMBERS: dict[str, tuple[str, q.Kind, float]] = {  # word: column of a row, kind, units of the column in one of SI
     "moved": (DISPLACEMENT, q.LENGTH, 1e3),
@@ -48,25 +49,33 @@ class Criterion:
     text: str
     conditions: tuple[Callable[[Mapping[str, object]], bool], ...]
 
+    def holds(self, row: Mapping[str, object]) -> bool:
+        """Return True if a row of a finished run meets all conditions."""
+        return all(holds(row) for holds in self.conditions)
+
     def verdict(self, row: Mapping[str, object]) -> Verdict:
         """Judge a row of a sweep."""
         if row["status"] != FINISHED:
             return Verdict.FAILED
-        if not all(holds(row) for holds in self.conditions):
+        if not self.holds(row):
             return Verdict.FALLS
         return Verdict.UNDECIDED if row.get(MOVES_ON) else Verdict.STANDS
 
 
-def read_criterion(text: str) -> Criterion:
-    """Read conditions. Raises InvalidInputError for anything else, with what may be written."""
-    return Criterion(text, tuple(_condition(part) for part in text.split(",")))
+def read_criterion(text: str, option: str = STANDS) -> Criterion:
+    """Read conditions given to an option. Raises InvalidInputError for anything else, with what may be written."""
+    try:
+        return Criterion(text, tuple(_condition(part) for part in text.split(",")))
+    except InvalidInputError as error:
+        message = f"{option} {error}"
+        raise InvalidInputError(message) from None
 
 
 def _condition(text: str) -> Callable[[Mapping[str, object]], bool]:
     found = FORM.fullmatch(text)
     if found is None:
         raise _mistake(text, 'write for example "moved < 5 mm" or "outcome != fell"')
-    word, sign, value = found.groups()
+    word, sign, value = found[1], found[2].replace("==", "="), found[3]
     if word == OUTCOME:
         return _outcome(text, sign, value)
     if word not in NUMBERS:
@@ -102,4 +111,4 @@ def _number(text: str, word: str, sign: str, value: str) -> Callable[[Mapping[st
 
 
 def _mistake(text: str, why: str) -> InvalidInputError:
-    return InvalidInputError(f"--stands {text.strip() or '(empty)'}: {why}")
+    return InvalidInputError(f"{text.strip() or '(empty)'}: {why}")
