@@ -8,9 +8,9 @@
 True
 
 Scenarios: `load` (a file or dictionaries), `replace` (change keys, validated). Runs: `run`, `open_run`; a result has
-`final`, `frames`, `to_frame()`, `to_xarray()`. Studies: `sweep`, `open_sweep`, `limit`, `calibrate`, `sensitivity`,
-`converge`. Judging: `compare`. Looking: `plot`, `animate`, `report`. Functions have the options of the command of the
-same name.
+`final`, `frames`, `to_frame()`, `to_xarray()`. Studies: `sweep`, `open_sweep`, `limit`, `fragility`, `calibrate`,
+`sensitivity`, `converge`. Judging: `compare`. Looking: `plot`, `animate`, `report`. Functions have the options of the
+command of the same name.
 """
 
 from importlib import import_module
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from blocksim.study.api import animate, calibrate, plot, report, sensitivity
     from blocksim.study.compare import compare
     from blocksim.study.converge import converge
+    from blocksim.study.fragility import fragility
     from blocksim.study.limit import limit
     from blocksim.study.run import open_run, run
     from blocksim.study.sweep import sweep
@@ -33,6 +34,7 @@ __all__ = [
     "calibrate",
     "compare",
     "converge",
+    "fragility",
     "limit",
     "load",
     "open_run",
@@ -51,6 +53,7 @@ _HOMES = {
     "calibrate": ("blocksim.study.api", "calibrate"),
     "compare": ("blocksim.study.compare", "compare"),
     "converge": ("blocksim.study.converge", "converge"),
+    "fragility": ("blocksim.study.fragility", "fragility"),
     "limit": ("blocksim.study.limit", "limit"),
     "load": ("blocksim.scenario", "load_scenario"),
     "open_run": ("blocksim.study.run", "open_run"),

@@ -22,6 +22,7 @@ COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command
     "check": "Validate a scenario and summarise it.",
     "sweep": "Run a scenario many times with some keys varied.",
     "limit": "Find the value of a key at which the structure falls.",
+    "fragility": "Find the probability of collapse over an intensity.",
     "calibrate": "Fit inputs to measured repeats, within their priors.",
     "sensitivity": "Show which inputs decide where the blocks end.",
     "converge": "Refine step, stiffness and spacing until the run-out converges.",
@@ -39,7 +40,7 @@ COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command
 GROUPS = {  # heads of the list in `blocksim --help`
     "Run": ("new", "run", "schema"),
     "Look": ("plot", "animate", "report", "export"),
-    "Study": ("sweep", "limit", "calibrate", "sensitivity", "converge"),
+    "Study": ("sweep", "limit", "fragility", "calibrate", "sensitivity", "converge"),
     "Check": ("check", "compare", "verify", "verify-run", "bench"),
 }
 WITH_SCENARIOS = set(COMMANDS) - {"verify", "verify-run", "bench", "new", "schema"}

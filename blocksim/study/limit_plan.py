@@ -112,12 +112,13 @@ def _span(document: Document, key: str, values: Uniform, table: Mapping[str, Any
     unit = _unit(values)
     factor = float(parse_unit(unit).factor) if unit else 1.0
     low, high = (float(f"{end / factor:.12g}") for end in (values.low, values.high))
-    is_whole = _takes_whole(document, key) and all(type(table[end]) is int for end in ("from", "to"))
+    is_whole = takes_whole(document, key) and all(type(table[end]) is int for end in ("from", "to"))
     scanned = min(count, int(high - low) + 1) if is_whole else count
     return Span(low, high, scanned, is_log=values.scale == "log", is_whole=is_whole)
 
 
-def _takes_whole(document: Document, key: str) -> bool:
+def takes_whole(document: Document, key: str) -> bool:
+    """Return True for a key whose values are whole numbers."""
     field = field_of(key, document.build())
     return field is not None and int in options(field.annotation) and float not in options(field.annotation)
 

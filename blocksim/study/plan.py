@@ -123,7 +123,7 @@ def cases_of(document: Document, sweep: Sweep) -> Cases:
     if len(design) > MOST_CASES:
         message = f"{len(design)} cases are too many for one sweep; at most {MOST_CASES} are allowed"
         raise InvalidInputError(message)
-    _refuse_wrong_draws(document, sweep, design)
+    refuse_wrong_draws(document, sweep, design)
     cases = Cases(_for_cases(document), design, heads_of(sweep))
     looked_at = min(len(cases), MOST_LOOKED_AT)
     if all(case.scenario is None for case in islice(cases, looked_at)):
@@ -144,7 +144,7 @@ def _for_cases(document: Document) -> Document:
     return replace(document, data=data)
 
 
-def _refuse_wrong_draws(document: Document, sweep: Sweep, design: Design) -> None:
+def refuse_wrong_draws(document: Document, sweep: Sweep, design: Design) -> None:
     """Try the least and the greatest value that was drawn from each normal distribution."""
     findings = [
         Finding(("sweep", key), f"drawn: {message}; cut the distribution with from and to")

@@ -71,7 +71,7 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     A script that has processes started needs the guard `if __name__ == "__main__":`, as they import the script.
     """
     executor = chosen_executor(executor, scheduler, keep_cases=keep_cases)
-    _refuse_loss(shard, overwrite=overwrite)
+    refuse_loss(shard, overwrite=overwrite)
     runner = executor_named(executor)
     document = with_sweep(document_of(scenario), vary, mode, samples=samples, seed=seed)
     base = document.build()
@@ -94,7 +94,7 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     return SweepResult(folder, shard.file(TABLE), len(done.state[shard.slice]))
 
 
-def _refuse_loss(shard: Shard, *, overwrite: bool) -> None:
+def refuse_loss(shard: Shard, *, overwrite: bool) -> None:
     """Refuse that every job of an array removes what the others have done."""
     if overwrite and shard != WHOLE:
         raise InvalidInputError("a shard cannot overwrite what other shards have done; remove the folder first")

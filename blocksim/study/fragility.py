@@ -1,0 +1,282 @@
+"""The probability of collapse over an intensity: members drawn at every intensity, counts, and a lognormal curve.
+
+Members run as the cases of a sweep do, on its executors and in shards; what has ended is in the manifests, so a study
+that is called again, after a kill too, does only what is missing. What counts as failure is asked of the rows: another
+criterion, or fewer members, runs nothing again.
+"""
+
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from blocksim.analysis.intervals import interval
+from blocksim.analysis.lognormal import PURPOSE, Counts, Curve, NoCurve, fit
+from blocksim.extras import loaded
+from blocksim.scenario import Source, document_of
+from blocksim.simulation import folder as files
+from blocksim.simulation.atomic import write_text
+from blocksim.simulation.compilation import compile_kernels, kernels_of
+from blocksim.simulation.result_files import begins, grows_from
+from blocksim.study.executors import Execution
+from blocksim.study.fragility_plan import COLLAPSE, MEMBERS, FragilityPlan, read_fragility
+from blocksim.study.plan import Values
+from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Manifest, Shard, Timings
+from blocksim.study.rows import FINISHED, MOVEMENT, Row, check_experiment
+from blocksim.study.sweep import TIMINGS, SweepRun, refuse_loss
+from blocksim.study.sweep_folder import MANIFESTS, ORIGINS, SHARD, FolderKind, prepare, read_origin
+from blocksim.study.sweep_table import SweepTable
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from numpy.typing import NDArray
+
+PLAN, MEMBERS_TABLE, TABLE = "fragility.toml", "members.csv", "fragility.csv"
+INTENSITY = "intensity"
+COLUMNS = ("members", "failures", "share", "low", "high", "curve", "curve_low", "curve_high", "moving_on", "no_result")
+MOVES_ON = MOVEMENT[-1]
+OnRow = Callable[[int, int, Row], None]
+FRAGILITY = FolderKind(
+    what="a fragility study",
+    command="blocksim fragility FILE",
+    plan=PLAN,
+    head=b"# Fragility ",
+    results={
+        rf"members{SHARD}\.csv": begins(b"case,"),
+        r"fragility\.csv": begins(INTENSITY.encode()),
+        r"fragility\.json": ORIGINS,
+        rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
+        **MANIFESTS,
+    },
+    leftover=re.compile(r"\.(members[-\w]*\.csv|fragility\.csv|fragility\.json|fragility\.toml)\..*"),
+)
+
+
+@dataclass(frozen=True)
+class Point:
+    """One intensity: members with a result, those that failed, and the exact limits of the probability."""
+
+    intensity: float
+    members: int
+    failures: int
+    moving_on: int  # of those that have not failed: their runs end while blocks move
+    no_result: int  # members whose runs did not finish; they count nowhere else
+
+    @property
+    def share(self) -> float:
+        """Failures of all members with a result, NaN where there are none."""
+        return self.failures / self.members if self.members else math.nan
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """95 % limits after Clopper and Pearson, whatever the intensities beside this one came to."""
+        return interval(self.failures, self.members)
+
+
+@dataclass(frozen=True)
+class FragilityResult:
+    """Counts at every intensity, and the curve through them."""
+
+    plan: FragilityPlan = field(repr=False)
+    folder: Path
+    points: tuple[Point, ...]
+    curve: Curve | NoCurve
+    run: int  # members of this call; the others were known
+    left: int = 0  # members that have not run: those of other shards
+
+    @property
+    def failed(self) -> int:
+        """How many runs did not finish."""
+        return sum(point.no_result for point in self.points)
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """The counts as fragility.csv has them."""
+        import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+
+        return pd.DataFrame(list(_records(self)), columns=[_head(self.plan), *COLUMNS])
+
+    def probability(self, intensity: "NDArray[np.float64]") -> "NDArray[np.float64] | None":
+        """Return the curve at intensities in the unit of the study, None where there is no curve."""
+        return self.curve.probability(intensity) if isinstance(self.curve, Curve) else None
+
+    def to_dict(self) -> dict[str, object]:
+        """Return plain values for JSON; ends of intervals that are open are null."""
+        plan = self.plan
+        return {
+            "key": plan.head.key,
+            "unit": plan.head.unit,
+            "fails": plan.failure,
+            "members": plan.members,
+            "seed": plan.seed,
+            "scatter": _described(plan),
+            "points": [dict(zip((INTENSITY, *COLUMNS), map(_finite, row), strict=True)) for row in _records(self)],
+            "missing": self.left,
+            "curve": _curve(self.curve),
+        }
+
+    def __repr__(self) -> str:
+        """Return a line: key, median and dispersion, folder."""
+        return f"<FragilityResult {self.plan.head.key}: {self.summary}; {self.folder}>"
+
+    @property
+    def summary(self) -> str:
+        """The curve in words."""
+        if isinstance(self.curve, NoCurve):
+            return f"no curve, {self.curve.reason}"
+        return f"median {self.plan.shown(self.curve.median)}, dispersion {self.curve.dispersion:.4g}"
+
+
+def _described(plan: FragilityPlan) -> Mapping[str, object]:
+    table = plan.scatter.as_table()
+    return {key: table[key] for key in plan.scatter.vary}
+
+
+def _finite(value: object) -> object:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _curve(found: Curve | NoCurve) -> dict[str, object]:
+    if isinstance(found, NoCurve):
+        return {"reason": found.reason, "median_interval": [found.low or None, _finite(found.high)]}
+    return {
+        "median": found.median,
+        "median_interval": [found.median_interval[0] or None, _finite(found.median_interval[1])],
+        "dispersion": found.dispersion,
+        "dispersion_interval": [found.dispersion_interval[0] or None, _finite(found.dispersion_interval[1])],
+        "confidence": found.confidence,
+        "deviance": found.deviance,
+        "degrees_of_freedom": found.freedom,
+        "fits": _finite(found.fits),
+    }
+
+
+def fragility(  # noqa: PLR0913 - one argument for each option of the command
+    scenario: Source,
+    intensity: Mapping[str, Values],
+    scatter: Mapping[str, Values] | None = None,
+    *,
+    members: int = MEMBERS,
+    fails: str | Sequence[str] = COLLAPSE,
+    seed: int = 0,
+    executor: str | None = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    shard: Shard = WHOLE,
+    out: Path | str | None = None,
+    overwrite: bool = False,
+    retry_failed: bool = False,
+    on_row: OnRow = lambda *_: None,
+) -> FragilityResult:
+    """Return how probable failure is at each intensity, and the lognormal curve that is most likely.
+
+    `intensity` has one key and its values, {"motion.scale": [0.5, 1.0, 1.5]} or {"from": a, "to": b, "count": n};
+    `scatter` what is drawn for every member by itself: {"mean": m, "sd": s}, {"from": a, "to": b} or a list of equally
+    likely values, such as records (default: the distributions of [sweep]). `fails` says what counts as failure (see
+    `blocksim.study.criterion`), any of several. Members are drawn independently at every intensity, so that limits and
+    intervals hold.
+
+    Runs are kept in `out` (default: results/NAME/fragility-HASH); the same call, also one with more members, does only
+    what is missing. `executor`, `jobs`, `scheduler`, `shard` and `retry_failed` are those of `sweep`; after all shards
+    the call without one makes the curve. Raises ScenarioError, InvalidInputError, OutputExistsError where the
+    folder is not free, UnavailableError without scipy (extra `study`), StoppedEarlyError on Ctrl-C.
+    """
+    plan = read_fragility(document_of(scenario), intensity, scatter, members=members, fails=fails, seed=seed)
+    return run_fragility(
+        plan,
+        Execution(executor, jobs, scheduler),
+        shard,
+        out=out,
+        overwrite=overwrite,
+        retry_failed=retry_failed,
+        on_row=on_row,
+    )
+
+
+def run_fragility(  # noqa: PLR0913 - as `fragility`
+    plan: FragilityPlan,
+    execution: Execution,
+    shard: Shard = WHOLE,
+    *,
+    out: Path | str | None = None,
+    overwrite: bool = False,
+    retry_failed: bool = False,
+    on_row: OnRow = lambda *_: None,
+) -> FragilityResult:
+    """Run what is planned; see `fragility`."""
+    loaded("scipy.special", PURPOSE)
+    refuse_loss(shard, overwrite=overwrite)
+    run, setting = execution.ready()
+    base = plan.document.build()
+    check_experiment(base)
+    cases = plan.cases
+    folder = Path(out) if out is not None else files.RESULTS / base.name / f"fragility-{plan.name}"
+    prepare(folder, base, plan.name, overwrite=overwrite, kind=FRAGILITY)
+    compile_kernels(kernels_of(base))
+    with closing(Manifest(folder / shard.file(MANIFEST), "fragility study")) as kept:
+        done = CaseIndex(folder, len(cases))
+        if retry_failed:
+            done.forget_failed(shard)
+        before = sum(done.holds(number, settings) for number, settings in enumerate(cases.design))
+        table = SweepTable(folder / shard.file(MEMBERS_TABLE), cases, done, None, shard)
+        timings = Timings(folder / shard.file(TIMINGS), execution.name)
+        SweepRun(cases, shard, kept, done, table, timings, on_row).run(run, setting, fail_fast=False)
+        points = tuple(_points(plan, done))
+        counts = Counts.of(*zip(*((one.intensity, one.failures, one.members) for one in points), strict=True))
+        missing = len(cases) - done.count()
+        result = FragilityResult(plan, folder, points, fit(counts), done.count() - before, missing)
+        if shard == WHOLE:
+            _write(result)
+    return result
+
+
+def _points(plan: FragilityPlan, done: CaseIndex) -> Iterator[Point]:
+    """Count the members of every intensity that have a row."""
+    rows: dict[float, list[Row]] = {number: [] for number in plan.levels}
+    numbers = list(plan.levels)
+    with closing(done.reader()) as reader:
+        for case, settings in enumerate(plan.cases.design):
+            entry = reader.entry(case) if done.holds(case, settings) else None
+            if entry is not None:
+                rows[numbers[case % len(numbers)]].append(entry.row)
+    for number, found in rows.items():
+        ended = [row for row in found if row["status"] == FINISHED]
+        failures = [plan.has_failed(row) for row in ended]
+        moving = sum(bool(row.get(MOVES_ON)) for row, fails in zip(ended, failures, strict=True) if not fails)
+        yield Point(number, len(ended), sum(failures), moving, len(found) - len(ended))
+
+
+def _head(plan: FragilityPlan) -> str:
+    return f"{INTENSITY} [{plan.head.unit}]" if plan.head.unit else INTENSITY
+
+
+def _records(result: FragilityResult) -> Iterator[list[Any]]:
+    """Yield the rows of fragility.csv."""
+    import numpy as np  # noqa: PLC0415 - as pandas
+
+    x = np.array([point.intensity for point in result.points])
+    at, low, high = [np.full(len(x), np.nan)] * 3
+    if isinstance(result.curve, Curve):
+        at, (low, high) = result.curve.probability(x), result.curve.band(x)
+    for i, one in enumerate(result.points):
+        curve = [float(values[i]) for values in (at, low, high)]
+        yield [one.intensity, one.members, one.failures, one.share, *one.limits, *curve, one.moving_on, one.no_result]
+
+
+def _write(result: FragilityResult) -> None:
+    """Write fragility.csv, and the answer into fragility.json."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([_head(result.plan), *COLUMNS])
+    writer.writerows([["" if _finite(cell) is None else cell for cell in row] for row in _records(result)])
+    write_text(result.folder / TABLE, text.getvalue())
+    origin = read_origin(result.folder, FRAGILITY)
+    begun = {} if origin is None else origin.model_dump(exclude_none=True)
+    write_text(result.folder / FRAGILITY.origin, json.dumps({**begun, **result.to_dict()}, indent=2) + "\n")

@@ -1,0 +1,169 @@
+"""What `fragility` runs: members of a scenario drawn at every intensity, each by itself.
+
+The draws of one intensity are independent of those of all others, and random rather than stratified: only then are the
+counts binomial, and independent of one another, as exact limits and the likelihood of a curve assume. With common
+draws, or a Latin hypercube, the intervals would be too narrow or too wide. Member i at an intensity is the same
+whatever the other intensities are and however many members are drawn.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import Document, Sweep, scenario_hash
+from blocksim.scenario.keys import format_key, parse_key
+from blocksim.scenario.models.variation import Uniform, Variation
+from blocksim.simulation.provenance import HASH_DIGITS, code_hash
+from blocksim.study.criterion import Criterion, read_criterion
+from blocksim.study.design import Together, levels_of
+from blocksim.study.limit_plan import takes_whole
+from blocksim.study.plan import MOST_CASES, Cases, Values, Variations, cases_of, refuse_wrong_draws, varied
+from blocksim.study.rows import Head, heads_of, si_number
+from blocksim.study.sampling import Places, drawn, generator, open_interval
+
+INTENSITY, SCATTER, FAILS = "--intensity", "--scatter", "--fails"
+COLLAPSE = "outcome = fell"
+MEMBERS = 64
+MOST_SEED = 2**53
+NO_SCATTER = (
+    "no scatter: give --scatter KEY=MEAN+-SD (or KEY=FROM:TO, KEY=a,b,c), or a [sweep] table with distributions"
+)
+
+
+@dataclass(frozen=True)
+class FragilityPlan:
+    """One study: intensities that increase, and what scatters at each of them."""
+
+    document: Document  # without [sweep]
+    head: Head  # key and unit of the intensity
+    levels: Mapping[float, object]  # value of the key by its number in that unit
+    scatter: Sweep
+    members: int  # at every intensity
+    seed: int
+    fails: tuple[Criterion, ...]  # any of them
+
+    def shown(self, number: float) -> str:
+        """Return an intensity for people."""
+        return f"{number:.6g} {self.head.unit}".rstrip()
+
+    @property
+    def failure(self) -> str:
+        """What counts as failure, in words."""
+        return " or ".join(one.text.strip() for one in self.fails)
+
+    def has_failed(self, row: Mapping[str, object]) -> bool:
+        """Judge the row of a finished run."""
+        return any(one.holds(row) for one in self.fails)
+
+    @property
+    def name(self) -> str:
+        """A hash of all that decides a member; neither their number nor what counts as failure does."""
+        levels = [self.head.key, *map(str, self.levels.values())]
+        about = [scenario_hash(self.document.build()), levels, self.scatter.as_table(), self.seed, code_hash()]
+        return hashlib.sha256(json.dumps(about, default=str).encode()).hexdigest()[:HASH_DIGITS]
+
+    @cached_property
+    def cases(self) -> Cases:
+        """All members: the first of every intensity, the second of every intensity, and so on.
+
+        More members come after those that are there. Raises ScenarioError where a distribution gave a value that its
+        key cannot have, InvalidInputError where no case can be simulated.
+        """
+        draws = {key: self._draws(key, values) for key, values in self.scatter.vary.items()}
+        design = Together({self.head.key: tuple(self.levels.values()) * self.members, **draws})
+        refuse_wrong_draws(self.document, self.scatter, design)
+        cases = cases_of(self.document, Sweep.model_validate({"mode": "list", **design.columns}))
+        return replace(cases, heads=(self.head, *heads_of(self.scatter)))
+
+    def _draws(self, key: str, values: Variation) -> tuple[object, ...]:
+        """Return the values of a key in the order of the cases."""
+        is_whole = takes_whole(self.document, key) and not isinstance(values, tuple)
+        if is_whole and isinstance(values, Uniform):
+            values = replace(values, low=values.low - 0.5, high=values.high + 0.5)  # so that its ends are as likely
+        by_level = [drawn(values, self._places(key, number)) for number in self.levels]
+        together = [value for member in zip(*by_level, strict=True) for value in member]
+        return tuple(round(si_number(value)) for value in together) if is_whole else tuple(together)
+
+    def _places(self, key: str, number: float) -> Places:
+        name = f"{format_key(parse_key(key))} where {format_key(parse_key(self.head.key))} = {self.shown(number)}"
+        return open_interval(generator(self.seed, name).random(self.members))
+
+
+def read_fragility(
+    document: Document,
+    intensity: Mapping[str, Values] | Variations,
+    scatter: Mapping[str, Values] | Variations | None = None,
+    *,
+    members: int = MEMBERS,
+    fails: str | Sequence[str] = COLLAPSE,
+    seed: int = 0,
+) -> FragilityPlan:
+    """Return the plan of a study; without `scatter`, the [sweep] table of the scenario counts if it has distributions.
+
+    Raises ScenarioError for keys and values that the scenario cannot have, InvalidInputError for a wrong criterion,
+    anything but one intensity, nothing that scatters, and too many members.
+    """
+    criteria = tuple(read_criterion(text, FAILS) for text in ([fails] if isinstance(fails, str) else fails))
+    bare = document.without_sweep()
+    head, levels = _levels(bare, _variations(intensity))
+    if members < 1 or members * len(levels) > MOST_CASES or not 0 <= seed <= MOST_SEED:
+        message = (
+            f"{members} members at {len(levels)} intensities with seed {seed}: 1 to {MOST_CASES} runs are possible"
+        )
+        raise InvalidInputError(message)
+    spread = _scatter(document, _variations(scatter or {}))
+    if parse_key(head.key) in {parse_key(key) for key in spread.vary}:
+        message = f"{head.key} is the intensity; it cannot scatter too"
+        raise InvalidInputError(message)
+    return FragilityPlan(bare, head, levels, spread, members, seed, criteria)
+
+
+def _variations(given: Mapping[str, Values] | Variations) -> Variations:
+    return given if isinstance(given, Variations) else Variations.of(given)
+
+
+def _levels(document: Document, given: Variations) -> tuple[Head, dict[float, object]]:
+    """Return the column of the intensity, and its values by their numbers, from the smallest up."""
+    if len(given.tables) != 1:
+        message = (
+            f"one key is the intensity, not {len(given.tables)}: give {INTENSITY} KEY=a,b,c or KEY=FROM:TO:COUNT once"
+        )
+        raise InvalidInputError(message)
+    text, table = next((given.texts[key], table) for key, table in given.tables.items())
+    if isinstance(table, Mapping) and "count" not in table:
+        message = f"{INTENSITY} {text}: single values are needed, as in KEY=a,b,c or KEY=FROM:TO:COUNT"
+        raise InvalidInputError(message)
+    sweep = varied(document, given, INTENSITY, "grid")
+    (head,), (values,) = heads_of(sweep), sweep.vary.values()
+    cells = [(head.cell(value), value) for value in levels_of(values)]
+    numbers = {float(f"{_number(cell):.12g}"): value for cell, value in cells}
+    wrong = [value for number, value in numbers.items() if not 0.0 < number < math.inf]
+    if wrong or len(numbers) < len(cells):
+        why = f"{wrong[0]} is not above 0, as a lognormal curve needs" if wrong else "a value is given twice"
+        message = f"{INTENSITY} {text}: {why}"
+        raise InvalidInputError(message)
+    return head, dict(sorted(numbers.items()))
+
+
+def _number(cell: object) -> float:
+    return float(cell) if isinstance(cell, int | float) and not isinstance(cell, bool) else math.nan
+
+
+def _scatter(document: Document, given: Variations) -> Sweep:
+    if given.tables:
+        spread = varied(document.without_sweep(), given, SCATTER, "normal")
+        constant = next(
+            (key for key, values in spread.vary.items() if len(set(map(str, levels_of(values)))) == 1), None
+        )
+        if constant is not None:
+            message = f"{SCATTER} {given.texts[constant]}: one value does not scatter; set it with --set"
+            raise InvalidInputError(message)
+        return spread
+    own = document.build().sweep
+    if own is None or not own.is_sampled:
+        raise InvalidInputError(NO_SCATTER)
+    return own

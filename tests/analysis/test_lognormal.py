@@ -1,0 +1,95 @@
+"""The lognormal curve of counts: intervals hold what they say, and a curve that does not exist is not invented."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.stats import binom, norm
+
+from blocksim.analysis.intervals import interval
+from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit
+
+X = np.array([0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.5, 1.9])
+MEDIAN, DISPERSION, MEMBERS = 1.0, 0.4, 32
+P = norm.cdf(np.log(X / MEDIAN) / DISPERSION)
+DRAWN = [5, 9, 15, 19, 16, 23, 30, 32]
+
+
+def found(failed: list[int], members: int = MEMBERS) -> Curve | NoCurve:
+    return fit(Counts.of(X.tolist(), failed, [members] * len(X)))
+
+
+def test_exact_limits_cover_every_probability_of_the_curve_by_their_95_percent() -> None:
+    held = [interval(k, MEMBERS) for k in range(MEMBERS + 1)]
+    for p in P:
+        covers = [low <= p <= high for low, high in held]
+        assert binom.pmf(np.arange(MEMBERS + 1), MEMBERS, p) @ covers >= 0.95
+
+
+def test_intervals_of_median_dispersion_and_curve_cover_what_they_say() -> None:
+    stream, draws = np.random.default_rng(1), 400
+    hits = np.zeros(3)
+    for _ in range(draws):
+        one = found(stream.binomial(MEMBERS, P).tolist())
+        assert isinstance(one, Curve)
+        low, high = one.band(X[2:3])
+        truths = (MEDIAN, one.median_interval), (DISPERSION, one.dispersion_interval), (P[2], (low[0], high[0]))
+        hits += [ends[0] <= truth <= ends[1] for truth, ends in truths]
+    # four standard deviations of 400 draws that each hit with 0.95
+    assert np.abs(hits / draws - 0.95).max() < 4.0 * math.sqrt(0.95 * 0.05 / draws)
+
+
+def test_the_curve_is_the_most_likely_one_and_its_intervals_are_those_of_the_profile() -> None:
+    one = found(DRAWN)
+    assert isinstance(one, Curve)
+    k = np.array(DRAWN)
+
+    def loss(median: float, dispersion: float) -> float:
+        z = np.log(X / median) / dispersion
+        return -float((k * norm.logcdf(z) + (MEMBERS - k) * norm.logcdf(-z)).sum())
+
+    best = minimize(
+        lambda v: loss(*np.exp(v)), [0.0, -1.0], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-12}
+    )
+    assert (one.median, one.dispersion) == pytest.approx(np.exp(best.x), rel=1e-6)
+    for end in one.median_interval:
+        profile = minimize(lambda v, end=end: loss(end, math.exp(v[0])), [-1.0], method="Nelder-Mead")
+        assert 2.0 * (profile.fun - best.fun) == pytest.approx(3.8415, abs=2e-3)
+    for end in one.dispersion_interval:
+        profile = minimize(lambda v, end=end: loss(math.exp(v[0]), end), [0.0], method="Nelder-Mead")
+        assert 2.0 * (profile.fun - best.fun) == pytest.approx(3.8415, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("failed", "low", "high", "why"),
+    [
+        ([0] * 8, 1.9, math.inf, "no member fails"),
+        ([32] * 8, 0.0, 0.4, "all members fail"),
+        ([0] * 4 + [32] * 4, 0.85, 1.0, "all stand up to 0.85 and all fail from 1"),
+        ([0] * 4 + [7] + [32] * 3, 1.0, 1.0, "both occur at 1 only"),
+        ([32] * 4 + [0] * 4, 0.0, math.inf, "do not become more frequent"),
+        ([9, 8, 7, 6, 5, 4, 3, 2], 0.0, math.inf, "do not become more frequent"),
+    ],
+)
+def test_counts_without_a_finite_dispersion_have_no_curve(failed: list[int], low: float, high: float, why: str) -> None:
+    none = found(failed)
+    assert isinstance(none, NoCurve)
+    assert why in none.reason
+    assert (none.low, none.high) == (low, high)
+
+
+def test_few_members_do_not_bound_the_median() -> None:
+    assert found([0] * 8, members=4) == NoCurve("no member fails at any intensity", 0.0, math.inf)
+    flat = found([6, 5, 4, 5, 6, 4, 6, 7], members=16)
+    assert isinstance(flat, Curve)
+    assert flat.median_interval[1] == flat.dispersion_interval[1] == math.inf
+    assert 0.0 < flat.median_interval[0] < flat.median
+
+
+def test_counts_that_jump_up_and_down_do_not_pass_for_a_curve() -> None:
+    curve, jumps = found(DRAWN), found([0, 32, 0, 32, 9, 28, 15, 32])
+    assert isinstance(curve, Curve)
+    assert isinstance(jumps, Curve)
+    assert curve.fits > 0.05
+    assert jumps.fits < 1e-6

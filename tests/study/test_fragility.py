@@ -1,0 +1,233 @@
+"""Fragility by real runs: a closed form for every member, draws, resuming, shards, and what lies in the folder."""
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from blocksim.analysis.intervals import interval
+from blocksim.analysis.lognormal import Curve, NoCurve
+from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError, StoppedEarlyError, UnavailableError
+from blocksim.scenario import Document
+from blocksim.study import executors as batches
+from blocksim.study.fragility import FragilityResult, fragility
+from blocksim.study.fragility_plan import read_fragility
+from blocksim.study.progress import Shard
+
+MU = "friction.block_ground"
+SLIDES = "outcome = slid"
+TILTS = {"ground.tilt": ["14 deg", "17 deg", "20 deg", "23 deg", "26 deg"]}
+FRICTION = {MU: {"mean": 0.38, "sd": 0.06}}
+STONE = {"density": 2500, "young_modulus": "30 GPa", "poisson_ratio": 0.2}
+SLOPE: dict[str, Any] = {
+    "schema": 1,
+    "name": "slope",
+    "materials": {"stone": STONE},
+    "blocks": {"b": {"width": 0.1, "height": 0.05, "length": 0.1, "material": "stone"}},
+    "bodies": [{"block": "b", "x": 0, "y": 0.025}],
+    "friction": {"block_ground": 0.38},
+    "contact": {"restitution": 0},
+    "time": {"scheme": "nonsmooth", "end": 0.5, "step": 2e-3},
+    "output": {"every": 0.05},
+}
+
+
+def slides(out: Path, members: int = 8, **wanted: Any) -> FragilityResult:
+    return fragility(SLOPE, TILTS, FRICTION, out=out, **{"members": members, "fails": SLIDES, "jobs": 1, **wanted})
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> FragilityResult:
+    """Give a study that was run in one go; not to be changed."""
+    return slides(tmp_path_factory.mktemp("whole") / "study")
+
+
+def test_each_member_slides_where_its_own_friction_is_less_than_the_tangent_of_the_tilt(whole: FragilityResult) -> None:
+    plan = whole.plan
+    slopes = [math.tan(math.radians(number)) for number in plan.levels]
+    below = [
+        sum(float(str(case[MU])) < slope for case in plan.cases.design[i :: len(slopes)])
+        for i, slope in enumerate(slopes)
+    ]
+    assert [point.failures for point in whole.points] == below
+    assert [point.members for point in whole.points] == [8] * 5
+    assert [point.limits for point in whole.points] == [interval(k, 8) for k in below]
+    assert isinstance(whole.curve, Curve)
+    assert whole.curve.median_interval[0] < math.degrees(math.atan(0.38)) < whole.curve.median_interval[1]
+    assert whole.curve.median == pytest.approx(whole.to_dict()["curve"]["median"])  # type: ignore[index]
+
+
+def test_a_member_depends_on_its_number_and_intensity_alone() -> None:
+    def drawn(tilts: list[str], members: int, seed: int = 0, **others: Any) -> dict[tuple[float, int], object]:
+        scatter = {**FRICTION, **others}
+        plan = read_fragility(Document.from_mapping(SLOPE), {"ground.tilt": tilts}, scatter, members=members, seed=seed)
+        numbers = list(plan.levels)
+        values = enumerate(case[MU] for case in plan.cases.design)
+        return {(numbers[case % len(numbers)], case // len(numbers)): value for case, value in values}
+
+    few, many = (
+        drawn(["14 deg", "20 deg"], 4),
+        drawn(["23 deg", "0.34906585039886591 rad", "14 deg"], 9, gravity=[9.0, 9.1]),
+    )
+    assert {place: many[place] for place in few} == few
+    assert len(set(many.values())) == len(many)  # no value is common to intensities
+    assert not set(drawn(["14 deg"], 4, seed=1).values()) & set(few.values())
+
+
+def test_a_study_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_nothing_twice(
+    tmp_path: Path, whole: FragilityResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(batches, "MOST", 7)  # the last batch is not yet under way
+    for at in (1, 17):
+        seen: list[object] = []
+
+        def stop(done: int, _: int, row: dict[str, object], seen: list[object] = seen, at: int = at) -> None:
+            seen.append(row["case"])
+            if done == at and len(seen) == at:
+                raise KeyboardInterrupt
+
+        folder = tmp_path / f"stopped-{at}"
+        with pytest.raises(StoppedEarlyError, match="of 40 cases done; rerun the command to finish"):
+            slides(folder, on_row=stop)
+        again = slides(folder, on_row=stop)
+        kept = [json.loads(line)["number"] for line in (folder / "manifest.jsonl").read_text().splitlines()]
+        assert sorted(kept) == list(range(40))
+        assert again.run < 40
+        for name in ("fragility.csv", "members.csv"):
+            assert (folder / name).read_bytes() == (whole.folder / name).read_bytes()
+
+
+def test_more_members_and_another_criterion_do_not_repeat_what_has_run(tmp_path: Path) -> None:
+    first = slides(tmp_path, members=3)
+    more = slides(tmp_path, members=5)
+    assert (first.run, more.run) == (15, 10)
+    none = slides(tmp_path, members=5, fails=["turned > 10 deg", "outcome == fell"])
+    assert none.run == 0
+    assert isinstance(none.curve, NoCurve)
+    assert [point.failures for point in none.points] == [0] * 5
+
+
+def test_shards_in_any_order_give_the_study_that_one_process_gives(tmp_path: Path, whole: FragilityResult) -> None:
+    parts = [slides(tmp_path, shard=Shard(index, 3)) for index in (2, 0, 1)]
+    assert [part.left for part in parts] == [27, 13, 0]
+    assert not (tmp_path / "fragility.csv").exists()
+    merged = slides(tmp_path)
+    assert (merged.run, merged.left) == (0, 0)
+    for name in ("fragility.csv", "members.csv"):
+        assert (tmp_path / name).read_bytes() == (whole.folder / name).read_bytes()
+
+
+def test_members_whose_runs_fail_count_neither_as_failures_nor_as_survivors(tmp_path: Path) -> None:
+    springs = SLOPE | {"time": {"end": 0.01}, "contact": {"restitution": 0, "stiffness_scale": 0.001}}
+    limits = {"contact.max_overlap": [1e-2, 1e-12]}
+    found = fragility(
+        springs, {"ground.tilt": ["10 deg", "20 deg"]}, limits, members=8, fails="moved < 1 m", out=tmp_path
+    )
+    assert found.failed > 0
+    for point in found.points:
+        assert point.members + point.no_result == 8
+        assert point.failures == point.members
+
+
+def test_survivors_that_move_on_at_the_end_are_counted(tmp_path: Path) -> None:
+    found = slides(tmp_path, members=4, fails="moved > 100 m")
+    assert sum(point.moving_on for point in found.points) > 0
+    assert found.points[-1].moving_on == sum(
+        row["moves_on"] in (True, "True") for _, row in _members(tmp_path).iterrows() if row["ground.tilt [deg]"] == 26
+    )
+
+
+def _members(folder: Path) -> Any:
+    import pandas as pd  # noqa: PLC0415
+
+    return pd.read_csv(folder / "members.csv")
+
+
+def test_keys_that_take_whole_numbers_are_drawn_as_such() -> None:
+    wall = SLOPE | {
+        "bodies": [],
+        "structures": [
+            {"kind": "wall", "block": "b", "rows": 3, "columns": 3, "gap": "5 mm", "offset": "2 mm", "seed": 0}
+        ],
+    }
+    seeds = {"structures.0.seed": {"from": 1, "to": 4}}
+    plan = read_fragility(Document.from_mapping(wall), TILTS, seeds, members=40)
+    drawn = [case["structures.0.seed"] for case in plan.cases.design]
+    assert all(type(seed) is int for seed in drawn)
+    assert np.bincount(drawn)[1:].tolist() == pytest.approx([50] * 4, abs=25)  # type: ignore[arg-type]
+
+
+def test_the_folder_holds_counts_curve_members_and_scenario(whole: FragilityResult) -> None:
+    head, first, *_ = (whole.folder / "fragility.csv").read_text().splitlines()
+    assert head.startswith("intensity [deg],members,failures,share,low,high,curve,curve_low,curve_high")
+    assert first.startswith(f"14.0,8,{whole.points[0].failures},")
+    data = json.loads((whole.folder / "fragility.json").read_text())
+    assert (data["key"], data["unit"], data["fails"], data["seed"]) == ("ground.tilt", "deg", SLIDES, 0)
+    assert data["scatter"] == {MU: {"mean": 0.38, "sd": 0.06}}
+    assert [point["failures"] for point in data["points"]] == [point.failures for point in whole.points]
+    assert Document.read(whole.folder / "fragility.toml").build().name == "slope"
+
+
+def test_another_study_or_file_is_not_replaced_unasked(tmp_path: Path) -> None:
+    slides(tmp_path, members=1)
+    with pytest.raises(OutputExistsError, match="contains another fragility study; --overwrite replaces it"):
+        slides(tmp_path, members=1, seed=1)
+    slides(tmp_path, members=1, seed=1, overwrite=True)
+    (tmp_path / "fragility.csv").write_text("a table of somebody else")
+    with pytest.raises(OutputExistsError, match=r"fragility\.csv: changed since the fragility study wrote it"):
+        slides(tmp_path, members=1, seed=1, overwrite=True)
+
+
+@pytest.mark.parametrize(
+    ("intensity", "scatter", "wanted", "error", "why"),
+    [
+        ({}, FRICTION, {}, InvalidInputError, "one key is the intensity, not 0"),
+        ({"gravity": [1.0, 0.0]}, FRICTION, {}, InvalidInputError, "0.0 is not above 0, as a lognormal curve needs"),
+        ({"gravity": [1.0, 1]}, FRICTION, {}, InvalidInputError, "a value is given twice"),
+        ({"time.scheme": ["explicit"]}, FRICTION, {}, InvalidInputError, "explicit is not above 0"),
+        ({"gravty": [1.0]}, FRICTION, {}, ScenarioError, "did you mean 'gravity'"),
+        ({"gravity": [1.0]}, {MU: {"mean": 0.3}}, {}, ScenarioError, "--scatter .*sd is missing"),
+        ({"gravity": [1.0]}, {MU: {"mean": 0.1, "sd": 0.2}}, {}, ScenarioError, "cut the distribution"),
+        ({"gravity": [1.0]}, {"gravity": {"from": 1.0, "to": 2.0}}, {}, InvalidInputError, "cannot scatter too"),
+        ({"gravity": [1.0]}, {MU: [0.3]}, {}, InvalidInputError, "one value does not scatter"),
+        ({"gravity": {"from": 1, "to": 2}}, FRICTION, {}, InvalidInputError, "single values are needed"),
+        ({"gravity": [1.0]}, {}, {}, InvalidInputError, "no scatter: give --scatter"),
+        ({"gravity": [1.0]}, FRICTION, {"members": 0}, InvalidInputError, "0 members at 1 intensities"),
+        ({"gravity": [1.0]}, FRICTION, {"fails": "fel"}, InvalidInputError, "--fails fel: write for example"),
+        ({"gravity": [1.0]}, FRICTION, {"executor": "dask"}, InvalidInputError, "needs the address of a scheduler"),
+    ],
+)
+def test_mistakes_are_refused_before_anything_is_written(
+    tmp_path: Path, intensity: Any, scatter: Any, wanted: dict[str, Any], error: type[Exception], why: str
+) -> None:
+    with pytest.raises(error, match=why):
+        fragility(SLOPE, intensity, scatter, out=tmp_path / "study", **wanted)
+    assert not (tmp_path / "study").exists()
+
+
+def test_without_scipy_it_says_what_to_install_before_anything_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "scipy.special", None)
+    with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[study\]'"):
+        slides(tmp_path / "study")
+    assert not (tmp_path / "study").exists()
+
+
+@pytest.mark.long
+def test_intervals_cover_the_closed_form_through_the_whole_chain(tmp_path: Path) -> None:
+    studies, covered, fitted = 100, 0, 0
+    truth = [float(norm.cdf((math.tan(math.radians(tilt)) - 0.38) / 0.06)) for tilt in (14, 17, 20, 23, 26)]
+    for seed in range(studies):
+        found = slides(tmp_path / str(seed), members=24, seed=seed)
+        covered += sum(point.limits[0] <= p <= point.limits[1] for point, p in zip(found.points, truth, strict=True))
+        assert isinstance(found.curve, Curve)
+        low, high = found.curve.median_interval
+        fitted += low <= math.degrees(math.atan(0.38)) <= high
+    assert covered / (5 * studies) > 0.95 - 4.0 * math.sqrt(0.95 * 0.05 / (5 * studies))
+    assert abs(fitted / studies - 0.95) < 4.0 * math.sqrt(0.95 * 0.05 / studies)
