@@ -17,7 +17,8 @@ def plot_command(
     run: Annotated[
         Path,
         typer.Argument(
-            metavar="RUN", help="Run folder, results/NAME, scenario file, sweep folder, table of sensitivities."
+            metavar="RUN",
+            help="Run folder, results/NAME, scenario file, folder of a sweep or study, table of sensitivities.",
         ),
     ],
     out: Annotated[
@@ -71,7 +72,8 @@ def plot_command(
     (output.contacts = true). A run that was stopped or killed is drawn as far as it came.
 
     A sweep over one key, or a second one with few values, is drawn as lines of final x; over two keys as a map of
-    run-outs and outcomes; a sampled one as a matrix of its inputs. The measured range is marked in all of them.
+    run-outs and outcomes; a sampled one as a matrix of its inputs. The measured range is marked in all of them. A
+    fragility study is drawn as its counts, with limits, and the curve with its band.
 
     An older picture of blocksim is replaced; any other file only with --overwrite.
 

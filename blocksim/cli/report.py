@@ -17,7 +17,9 @@ MEGABYTE = 1e6
 def report_command(
     places: Annotated[
         list[Path],
-        typer.Argument(metavar="RUN", help="Run folder, results/NAME, scenario file, or sweep folder; one or several."),
+        typer.Argument(
+            metavar="RUN", help="Run folder, results/NAME, scenario file, folder of a sweep or study; one or several."
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="File to write.")] = Path("report.html"),
     experiment: options.ExperimentPath = None,

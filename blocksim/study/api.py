@@ -15,6 +15,8 @@ from blocksim.simulation.own_files import is_film, is_picture, is_report, refuse
 from blocksim.study import calibrate as calibration
 from blocksim.study import sensitivity as analysis
 from blocksim.study.calibrate_plan import read_plan
+from blocksim.study.fragility import FragilityResult
+from blocksim.study.limit import LimitResult
 from blocksim.study.pictures import RunLook, draw
 from blocksim.study.plan import Values, Variations
 from blocksim.study.reporting import report_on
@@ -26,7 +28,7 @@ from blocksim.view.layout import MILLIMETRES_PER_INCH, Paper
 from blocksim.view.paint import paint_named
 from blocksim.view.run_data import support_of
 
-Place = Path | str | Result | SweepResult
+Place = Path | str | Result | SweepResult | FragilityResult | LimitResult
 T = TypeVar("T")
 NOTHING = "nothing to vary: give vary={key: {'from': a, 'to': b}}, or a [sweep] table with distributions"
 
@@ -105,7 +107,7 @@ def report(
 
 def _folder(place: Place) -> Path:
     """Return where a run or a sweep lies. Raises InvalidInputError for a result that was not kept."""
-    if isinstance(place, SweepResult):
+    if isinstance(place, SweepResult | FragilityResult | LimitResult):
         return place.folder
     if not isinstance(place, Result):
         return Path(place)

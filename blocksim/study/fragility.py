@@ -9,28 +9,26 @@ import csv
 import io
 import json
 import math
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from blocksim.analysis.intervals import interval
 from blocksim.analysis.lognormal import PURPOSE, Counts, Curve, NoCurve, fit
 from blocksim.extras import loaded
 from blocksim.scenario import Source, document_of
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.compilation import compile_kernels, kernels_of
-from blocksim.simulation.result_files import begins, grows_from
 from blocksim.study.executors import Execution
+from blocksim.study.fragility_counts import Point
 from blocksim.study.fragility_plan import COLLAPSE, MEMBERS, FragilityPlan, read_fragility
 from blocksim.study.plan import Values
 from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Manifest, Shard, Timings
 from blocksim.study.rows import FINISHED, MOVEMENT, Row, check_experiment
 from blocksim.study.sweep import TIMINGS, SweepRun, refuse_loss
-from blocksim.study.sweep_folder import MANIFESTS, ORIGINS, SHARD, FolderKind, prepare, read_origin
+from blocksim.study.sweep_folder import FRAGILITY, INTENSITY, prepare, read_origin
 from blocksim.study.sweep_table import SweepTable
 
 if TYPE_CHECKING:
@@ -38,46 +36,10 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-PLAN, MEMBERS_TABLE, TABLE = "fragility.toml", "members.csv", "fragility.csv"
-INTENSITY = "intensity"
+MEMBERS_TABLE, TABLE = "members.csv", "fragility.csv"
 COLUMNS = ("members", "failures", "share", "low", "high", "curve", "curve_low", "curve_high", "moving_on", "no_result")
 MOVES_ON = MOVEMENT[-1]
 OnRow = Callable[[int, int, Row], None]
-FRAGILITY = FolderKind(
-    what="a fragility study",
-    command="blocksim fragility FILE",
-    plan=PLAN,
-    head=b"# Fragility ",
-    results={
-        rf"members{SHARD}\.csv": begins(b"case,"),
-        r"fragility\.csv": begins(INTENSITY.encode()),
-        r"fragility\.json": ORIGINS,
-        rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
-        **MANIFESTS,
-    },
-    leftover=re.compile(r"\.(members[-\w]*\.csv|fragility\.csv|fragility\.json|fragility\.toml)\..*"),
-)
-
-
-@dataclass(frozen=True)
-class Point:
-    """One intensity: members with a result, those that failed, and the exact limits of the probability."""
-
-    intensity: float
-    members: int
-    failures: int
-    moving_on: int  # of those that have not failed: their runs end while blocks move
-    no_result: int  # members whose runs did not finish; they count nowhere else
-
-    @property
-    def share(self) -> float:
-        """Failures of all members with a result, NaN where there are none."""
-        return self.failures / self.members if self.members else math.nan
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """95 % limits after Clopper and Pearson, whatever the intensities beside this one came to."""
-        return interval(self.failures, self.members)
 
 
 @dataclass(frozen=True)

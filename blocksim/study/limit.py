@@ -7,7 +7,6 @@ is called again; it comes to the same answer.
 import csv
 import io
 import json
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field, replace
@@ -20,7 +19,6 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.provenance import run_hash
-from blocksim.simulation.result_files import begins
 from blocksim.simulation.stopping import stop_requests
 from blocksim.study import criterion
 from blocksim.study.criterion import Verdict
@@ -30,23 +28,15 @@ from blocksim.study.limit_search import Change, Number, changes_in, next_values
 from blocksim.study.plan import Values
 from blocksim.study.progress import MANIFEST, Entry, Manifest, read_entries, values_hash
 from blocksim.study.rows import MOVEMENT, Row, as_cell, check_experiment, invalid_row
-from blocksim.study.sweep_folder import MANIFESTS, ORIGINS, FolderKind, prepare, read_origin
+from blocksim.study.sweep_folder import LIMIT, prepare, read_origin
 
 if TYPE_CHECKING:
     import pandas as pd
 
-PLAN, TABLE = "limit.toml", "limit.csv"
+TABLE = "limit.csv"
 VALUE, VERDICT = "value", "verdict"
 COLUMNS = (VERDICT, *MOVEMENT, "status", "reason", "seconds")
 AGAIN = "rerun the command to finish"
-LIMIT = FolderKind(
-    what="a limit",
-    command="blocksim limit FILE",
-    plan=PLAN,
-    head=b"# Limit ",
-    results={r"limit\.csv": begins(b"value"), r"limit\.json": ORIGINS, **MANIFESTS},
-    leftover=re.compile(r"\.(limit\.csv|limit\.json|limit\.toml)\..*"),
-)
 OnRun = Callable[[Number, Verdict, Row], None]
 
 

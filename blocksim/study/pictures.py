@@ -13,6 +13,7 @@ from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario.csv_table import Cell, raise_problems, read_open_table
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.study.stored_run import stored_run
+from blocksim.study.study_pictures import draw_study, study_in
 from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import is_sweep
@@ -230,13 +231,17 @@ def draw(  # noqa: PLR0913 - what a picture is made of
     *,
     ready: Callable[[Path], None],
 ) -> tuple[Path, str]:
-    """Draw what lies at a place: a run, a sweep, or a table of sensitivities; return as `draw_run`, and raise alike.
+    """Draw what lies at a place: a run, a sweep, a study, or a table of sensitivities; return as `draw_run`.
 
-    Raises InputMissingError where nothing is there.
+    Raises as that does, and InputMissingError where nothing is there.
     """
     if not place.exists():
         message = f"{place}: no such run folder, sweep folder, table or scenario file"
         raise InputMissingError(message)
+    study = study_in(place)
+    if study is not None:
+        refuse(asked.of_runs(), f"{place} is {study.what}")
+        return draw_study(place, study, out, kind, paper, ready), ""
     if is_sweep(place):
         refuse(asked.of_runs(), f"{place} is a sweep")
         return draw_sweep(place, out, experiment, kind, paper, ready=ready), ""

@@ -14,11 +14,14 @@ from blocksim.simulation import folder as files
 from blocksim.study.compare import compare_sweep
 from blocksim.study.rows import FINISHED, TABLE
 from blocksim.study.stored_run import choice, find_run
+from blocksim.study.study_pages import study_page
+from blocksim.study.study_pictures import study_in
 from blocksim.study.sweep_folder import PLAN, case_folder
 from blocksim.study.sweep_table import NEEDED, NO_COLUMNS, NO_TABLE, is_sweep, lines_in
 from blocksim.view.report.page import write_report
 from blocksim.view.report.player import MOST_BYTES
 from blocksim.view.report.runs import PartialRun, Subject, read_stored, run_subject
+from blocksim.view.report.studies import study_subject
 from blocksim.view.report.sweeps import CaseTable, sweep_subject
 
 MEMBERS = 50  # of a sweep in one page
@@ -32,7 +35,7 @@ def report_on(
     members: int = MEMBERS,
     on_remark: Callable[[str], None] = lambda _: None,
 ) -> tuple[int, list[str]]:
-    """Write runs and sweeps into one HTML file; return its size in bytes and what is damaged in them.
+    """Write runs, sweeps and studies into one HTML file; return its size in bytes and what is damaged in them.
 
     `members` is the maximum number of members of a sweep in the page; `on_remark` hears which of several runs is taken.
     Raises what finding and reading them raises, and OutputError.
@@ -41,6 +44,10 @@ def report_on(
     problems: list[str] = []
     for place in places:
         key = f"part-{len(shown) + 1}"
+        study = study_in(place)
+        if study is not None:
+            shown.append(study_subject(key, study_page(place, study), near(str(place))))
+            continue
         subjects, found = _sweep(key, place, experiment, members) if is_sweep(place) else _run(key, place, experiment)
         remark = "" if is_sweep(place) else choice(place, _folder(place))
         if remark:

@@ -35,7 +35,7 @@ CASES = "cases"
 SHARD = r"(?:-\d+-of-\d+)?"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FolderKind:
     """What distinguishes the folders of one kind of study."""
 
@@ -78,6 +78,29 @@ SWEEP = FolderKind(
         r"sweep\.json": ORIGINS,
     },
     leftover=re.compile(r"\.(sweep[-\w]*\.csv|sweep\.json|sweep\.toml)\..*"),
+)
+LIMIT = FolderKind(
+    what="a limit",
+    command="blocksim limit FILE",
+    plan="limit.toml",
+    head=b"# Limit ",
+    results={r"limit\.csv": begins(b"value"), r"limit\.json": ORIGINS, **MANIFESTS},
+    leftover=re.compile(r"\.(limit\.csv|limit\.json|limit\.toml)\..*"),
+)
+INTENSITY = "intensity"
+FRAGILITY = FolderKind(
+    what="a fragility study",
+    command="blocksim fragility FILE",
+    plan="fragility.toml",
+    head=b"# Fragility ",
+    results={
+        rf"members{SHARD}\.csv": begins(b"case,"),
+        r"fragility\.csv": begins(INTENSITY.encode()),
+        r"fragility\.json": ORIGINS,
+        rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
+        **MANIFESTS,
+    },
+    leftover=re.compile(r"\.(members[-\w]*\.csv|fragility\.csv|fragility\.json|fragility\.toml)\..*"),
 )
 
 

@@ -11,6 +11,7 @@ const build = (section) => {
     const player = new Player(section, data.frames);
     return { player, histories: new Histories(section.querySelector(".histories"), player) };
   }
+  if (data.kind === "study") return null;
   const table = new CaseTable(section, data, open);
   return { table, map: new OutcomeMap(section, data, table, open) };
 };

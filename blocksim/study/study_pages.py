@@ -1,0 +1,57 @@
+"""Fragility studies as parts of a report."""
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from blocksim.errors import BlocksimError
+from blocksim.scenario import load_stored
+from blocksim.study.study_pictures import draw_study, read_answer
+from blocksim.study.sweep_folder import FRAGILITY, FolderKind
+from blocksim.view.layout import OWN
+from blocksim.view.report.studies import StudyPage
+
+HEADS = ("members", "failures", "share", "95 % low", "95 % high", "move on", "no result")
+Parts = tuple[list[tuple[str, str]], str, tuple[str, ...], list[list[str]]]
+
+
+def study_page(folder: Path, kind: FolderKind) -> StudyPage:
+    """Return a study as a report shows it. Raises InputMissingError or InvalidInputError where it cannot be read."""
+    summary, title, heads, rows = PARTS[kind](folder)
+    scenario = load_stored(folder / kind.plan)
+    picture, problem = _picture(folder, kind)
+    description = scenario.description or ""
+    return StudyPage(scenario.name, description, summary, title, heads, rows, picture, [problem] if problem else [])
+
+
+def _picture(folder: Path, kind: FolderKind) -> tuple[bytes | None, str]:
+    """Return the picture as a PNG, or why there is none."""
+    with TemporaryDirectory() as place:
+        path = Path(place) / "picture.png"
+        try:
+            draw_study(folder, kind, path, None, OWN, lambda _: None)
+        except BlocksimError as error:
+            return None, str(error)
+        return path.read_bytes(), ""
+
+
+def _fragility(folder: Path) -> Parts:
+    stored, points = read_answer(folder)
+    rows = [
+        [
+            f"{one.intensity:.6g}",
+            str(one.members),
+            str(one.failures),
+            *(f"{value:.3f}" for value in (one.share, *one.limits)),
+            str(one.moving_on),
+            str(one.no_result),
+        ]
+        for one in points
+    ]
+    summary = [("intensity", stored.key), ("failure", stored.fails), ("members", str(sum(p.members for p in points)))]
+    key = f"{stored.key} ({stored.unit})" if stored.unit else stored.key
+    return summary, "Failures over the intensity", (key, *HEADS), rows
+
+
+PARTS: dict[FolderKind, Callable[[Path], Parts]] = {FRAGILITY: _fragility}
+"""What is shown of each kind of study beside its picture: pairs, title, heads and rows of a table."""
