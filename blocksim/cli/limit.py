@@ -76,6 +76,9 @@ def limit_command(
         Path | None, typer.Option("--out", metavar="DIR", help="Folder to write (default: results/NAME/limit-HASH).")
     ] = None,
     overwrite: options.Overwrite = False,
+    no_runs: Annotated[
+        bool, typer.Option("--no-runs", help="Keep no runs of both sides of a bracket, which plot and report show.")
+    ] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -108,6 +111,7 @@ def limit_command(
                 Execution(None if executor is None else executor.value, jobs, scheduler),
                 out=None if out is None else out / _folder(name) if len(plans) > 1 else out,
                 overwrite=overwrite,
+                keep_runs=not no_runs,
                 on_run=(lambda *_: None) if silent else _telling(plan.shown),
             )
     _show(found, as_json=as_json, quiet=quiet)
@@ -127,6 +131,8 @@ def _show(found: Mapping[str, LimitResult], *, as_json: bool, quiet: bool) -> No
         note("undecided: the run ends while blocks move on; a larger time.end may decide")
     for one in found.values():
         note(f"{len(one.rows)} runs, {one.run} of them now: {one.folder / 'limit.csv'}")
+        if one.kept:
+            note(f"picture of the mechanism: blocksim plot {one.folder}")
 
 
 def _folder(name: str) -> str:

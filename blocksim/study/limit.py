@@ -25,6 +25,7 @@ from blocksim.study.criterion import Verdict
 from blocksim.study.executors import Execution, Run, Setting, Task
 from blocksim.study.limit_plan import TOLERANCE, LimitPlan, read_limit
 from blocksim.study.limit_search import Change, Number, changes_in, next_values
+from blocksim.study.limit_sides import keep_sides
 from blocksim.study.plan import Values
 from blocksim.study.progress import MANIFEST, Entry, Manifest, read_entries, values_hash
 from blocksim.study.rows import MOVEMENT, Row, as_cell, check_experiment, invalid_row
@@ -48,6 +49,7 @@ class LimitResult:
     folder: Path
     rows: Mapping[Number, Row] = field(repr=False)
     run: int  # runs of this call; the others were known
+    kept: Mapping[Number, str] = field(default_factory=dict, repr=False)  # folders in `cases`, with frames, by value
 
     @property
     def verdicts(self) -> dict[Number, Verdict]:
@@ -88,22 +90,23 @@ class LimitResult:
                 {
                     "low": change.low,
                     "high": change.high,
-                    "below": _side(self.rows[change.low], change.below),
-                    "above": _side(self.rows[change.high], change.above),
+                    "below": self._side(change.low, change.below),
+                    "above": self._side(change.high, change.above),
                 }
                 for change in self.changes
             ],
         }
+
+    def _side(self, value: Number, verdict: Verdict) -> dict[str, object]:
+        row = self.rows[value]
+        told = {name: row.get(name) for name in (*MOVEMENT, "status", "reason")}
+        return {VERDICT: verdict.value, **told, "case": self.kept.get(value)}
 
     def __repr__(self) -> str:
         """Return a line: key, brackets, runs, folder."""
         shown = self.plan.shown
         found = ", ".join(f"{shown(one.low)} {one.below} / {shown(one.high)} {one.above}" for one in self.changes)
         return f"<LimitResult {self.plan.key}: {found or 'no change'}; {len(self.rows)} runs, {self.folder}>"
-
-
-def _side(row: Row, verdict: Verdict) -> dict[str, object]:
-    return {VERDICT: verdict.value, **{name: row.get(name) for name in (*MOVEMENT, "status", "reason")}}
 
 
 def limit(  # noqa: PLR0913 - one argument for each option of the command
@@ -117,6 +120,7 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     scheduler: str | None = None,
     out: Path | str | None = None,
     overwrite: bool = False,
+    keep_runs: bool = True,
     on_run: OnRun = lambda *_: None,
 ) -> LimitResult:
     """Find the values of a key at which a structure stops, or begins, to stand.
@@ -124,12 +128,15 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     `vary` has one key and its range, {"ground.tilt": {"from": "20 deg", "to": "40 deg"}}, with the number of values
     that are scanned as `count` (default 9); there may be several changes. `stands` says what counts as standing (see
     `blocksim.study.criterion`), `tolerance` how narrow a bracket gets relative to its ends. Runs are kept in `out`
-    (default: results/NAME/limit-HASH); the same call again does only what is missing. `executor`, `jobs` and
-    `scheduler` are those of `sweep`, and do not change the answer. Raises ScenarioError, InvalidInputError,
-    OutputExistsError where the folder is not free, UnavailableError, StoppedEarlyError on Ctrl-C.
+    (default: results/NAME/limit-HASH), with `keep_runs` those of both sides of a bracket with frames and contacts, which
+    `plot` and `report` show; the same call again does only what is missing. `executor`, `jobs` and `scheduler` are those
+    of `sweep`, and do not change the answer. Raises ScenarioError, InvalidInputError, OutputExistsError where the folder
+    is not free, UnavailableError, StoppedEarlyError on Ctrl-C.
     """
     plan = read_limit(document_of(scenario), vary, stands=stands, tolerance=tolerance)
-    return find_limit(plan, Execution(executor, jobs, scheduler), out=out, overwrite=overwrite, on_run=on_run)
+    return find_limit(
+        plan, Execution(executor, jobs, scheduler), out=out, overwrite=overwrite, keep_runs=keep_runs, on_run=on_run
+    )
 
 
 def find_limit(
@@ -138,6 +145,7 @@ def find_limit(
     *,
     out: Path | str | None = None,
     overwrite: bool = False,
+    keep_runs: bool = True,
     on_run: OnRun = lambda *_: None,
 ) -> LimitResult:
     """Search as planned; see `limit`."""
@@ -154,7 +162,8 @@ def find_limit(
                 search.complete(replace(setting, is_stopped=is_stopped))
         except KeyboardInterrupt:
             raise _stopped(len(search.known)) from None
-        result = LimitResult(plan, folder, search.rows, search.ran)
+        found = LimitResult(plan, folder, search.rows, search.ran)
+        result = replace(found, kept=keep_sides(folder, plan, found.limits, found.rows) if keep_runs else {})
         _write(result)
     return result
 

@@ -1,4 +1,4 @@
-"""Fragility studies as parts of a report."""
+"""Fragility studies and limits as parts of a report."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,12 +6,14 @@ from tempfile import TemporaryDirectory
 
 from blocksim.errors import BlocksimError
 from blocksim.scenario import load_stored
-from blocksim.study.study_pictures import draw_study, read_answer
-from blocksim.study.sweep_folder import FRAGILITY, FolderKind
+from blocksim.study.limit_plan import NAMES
+from blocksim.study.study_pictures import draw_study, read_answer, read_limit_answer
+from blocksim.study.sweep_folder import FRAGILITY, LIMIT, FolderKind
 from blocksim.view.layout import OWN
 from blocksim.view.report.studies import StudyPage
 
 HEADS = ("members", "failures", "share", "95 % low", "95 % high", "move on", "no result")
+SIDE_HEADS = ("verdict", "outcome", "first moved", "at s", "moved mm")
 Parts = tuple[list[tuple[str, str]], str, tuple[str, ...], list[list[str]]]
 
 
@@ -53,5 +55,30 @@ def _fragility(folder: Path) -> Parts:
     return summary, "Failures over the intensity", (key, *HEADS), rows
 
 
-PARTS: dict[FolderKind, Callable[[Path], Parts]] = {FRAGILITY: _fragility}
+def _limit(folder: Path) -> Parts:
+    stored = read_limit_answer(folder)
+    ends = [(value, end) for one in stored.changes for value, end in ((one.low, one.below), (one.high, one.above))]
+    rows = [
+        [
+            f"{value:.8g}",
+            end.verdict,
+            end.outcome or "",
+            "" if end.first_mover is None else f"block {end.first_mover}",
+            *("" if number is None else f"{number:.3g}" for number in (end.first_moved_s, end.displacement_mm)),
+        ]
+        for value, end in dict.fromkeys(ends)
+    ]
+    found = [f"{one.low:.7g} ({one.below.verdict}) to {one.high:.7g} ({one.above.verdict})" for one in stored.changes]
+    unit = f" {stored.unit}" if stored.unit else ""
+    summary = [
+        ("key", stored.key),
+        ("stands means", stored.stands),
+        ("contacts", NAMES.get(stored.scheme, stored.scheme)),
+        ("runs", str(stored.runs)),
+        *(("limit", f"{text}{unit}") for text in found or ["nothing changes within the range"]),
+    ]
+    return summary, "Both sides of every bracket", (f"value{unit}", *SIDE_HEADS), rows
+
+
+PARTS: dict[FolderKind, Callable[[Path], Parts]] = {FRAGILITY: _fragility, LIMIT: _limit}
 """What is shown of each kind of study beside its picture: pairs, title, heads and rows of a table."""

@@ -1,7 +1,9 @@
-"""What `plot` draws of the folders of fragility studies, as they are read back from their own files."""
+"""What `plot` draws of the folders of fragility studies and limits, as they are read back from their own files."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError
@@ -10,13 +12,19 @@ from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_stored
 from blocksim.scenario.bounded_read import MEGABYTE, read_limited
+from blocksim.study.criterion import Verdict
 from blocksim.study.fragility_counts import Point
-from blocksim.study.sweep_folder import FRAGILITY, FolderKind
+from blocksim.study.stored_run import stored_run
+from blocksim.study.sweep_folder import FRAGILITY, LIMIT, FolderKind, case_folder
 from blocksim.view.fragility import Band, Fragility, draw_fragility, places
 from blocksim.view.layout import Paper
+from blocksim.view.mechanism import Side, draw_mechanisms
+from blocksim.view.run_data import support_of
 from blocksim.view.style import picture_suffix
 
 MOST_BYTES = 50 * MEGABYTE
+STANDS = Verdict.STANDS.value
+Answer = TypeVar("Answer", bound=BaseModel)
 
 
 class StoredPoint(BaseModel, frozen=True):
@@ -36,6 +44,38 @@ class StoredFragility(BaseModel, frozen=True):
     unit: str
     fails: str
     points: tuple[StoredPoint, ...]
+
+
+class StoredSide(BaseModel, frozen=True):
+    """One side of a bracket of limit.json; `case` is the folder of its run in `cases`."""
+
+    verdict: str
+    outcome: str | None = None
+    first_mover: str | int | None = None
+    first_moved_s: float | None = None
+    displacement_mm: float | None = None
+    turn_deg: float | None = None
+    case: str | None = None
+
+
+class StoredChange(BaseModel, frozen=True):
+    """A bracket of limit.json."""
+
+    low: float
+    high: float
+    below: StoredSide
+    above: StoredSide
+
+
+class StoredLimit(BaseModel, frozen=True):
+    """What a picture needs of limit.json."""
+
+    key: str
+    unit: str
+    stands: str
+    scheme: str
+    runs: int
+    changes: tuple[StoredChange, ...]
 
 
 def study_in(place: Path | str) -> FolderKind | None:
@@ -68,14 +108,17 @@ def draw_fragility_of(folder: Path, path: Path, title: str, paper: Paper) -> Non
     draw_fragility(read_fragility_picture(folder), path, title, paper)
 
 
+def _read(path: Path, model: type[Answer], kind: FolderKind) -> Answer:
+    try:
+        return model.model_validate_json(read_limited(path, MOST_BYTES))
+    except ValidationError as error:
+        message = f"{path}: not the answer of {kind.what}: {str(error).splitlines()[0]}"
+        raise InvalidInputError(message) from None
+
+
 def read_answer(folder: Path) -> tuple[StoredFragility, list[Point]]:
     """Return what a study found. Raises InputMissingError or InvalidInputError."""
-    path = folder / FRAGILITY.origin
-    try:
-        stored = StoredFragility.model_validate_json(read_limited(path, MOST_BYTES))
-    except ValidationError as error:
-        message = f"{path}: not the answer of a fragility study: {str(error).splitlines()[0]}"
-        raise InvalidInputError(message) from None
+    stored = _read(folder / FRAGILITY.origin, StoredFragility, FRAGILITY)
     return stored, [Point(**one.model_dump()) for one in stored.points if one.failures <= one.members]
 
 
@@ -93,6 +136,48 @@ def read_fragility_picture(folder: Path) -> Fragility:
     return Fragility(stored.key, stored.unit, x, share, low, high, band, notes=(f"{_told(curve, stored)}.",))
 
 
+def read_limit_answer(folder: Path) -> StoredLimit:
+    """Return what a search for a limit found. Raises InputMissingError or InvalidInputError."""
+    return _read(folder / LIMIT.origin, StoredLimit, LIMIT)
+
+
+def draw_limit_of(folder: Path, path: Path, title: str, paper: Paper) -> None:
+    """Draw both sides of the brackets whose runs were kept."""
+    stored = read_limit_answer(folder)
+    brackets = [pair for change in stored.changes if (pair := _sides(folder, stored, change)) is not None]
+    if not brackets:
+        why = (
+            "nothing changes within its range" if not stored.changes else "it holds no runs of both sides of a bracket"
+        )
+        message = f"{folder}: {why}; nothing to draw"
+        raise InvalidInputError(message)
+    draw_mechanisms(brackets, path, title, paper)
+
+
+def _sides(folder: Path, stored: StoredLimit, change: StoredChange) -> tuple[Side, Side] | None:
+    """Return what is drawn of a bracket: what stands on the left."""
+    ends = [(change.low, change.below), (change.high, change.above)]
+    ends.sort(key=lambda end: end[1].verdict != STANDS)
+    found = [side for value, end in ends if (side := _side(folder, stored, value, end)) is not None]
+    return (found[0], found[1]) if len(found) == len(ends) else None
+
+
+def _side(folder: Path, stored: StoredLimit, value: float, end: StoredSide) -> Side | None:
+    place = None if end.case is None else case_folder(folder, end.case)
+    if place is None:
+        return None
+    run = stored_run(place)
+    first = None if end.first_mover is None else str(end.first_mover)
+    said = f"{end.verdict} at {stored.key} = {value:.7g} {stored.unit}".rstrip()
+    if first is None:
+        told = end.outcome or ""
+    else:
+        told = f"{end.outcome}; first moved: block {first} at {end.first_moved_s or 0.0:.3g} s"
+    side = Side(run.frames, support_of(run.scenario), first, said, is_mechanism=end.verdict != STANDS)
+    moment = float(run.frames.time[side.frame])
+    return replace(side, caption=f"{said}\n{told} (drawn at {moment:.3g} s)")
+
+
 def _told(curve: Curve | NoCurve, stored: StoredFragility) -> str:
     """Return what failure means, and the curve in words."""
     unit = f" {stored.unit}" if stored.unit else ""
@@ -105,5 +190,6 @@ def _told(curve: Curve | NoCurve, stored: StoredFragility) -> str:
 
 DRAWN: dict[FolderKind, tuple[str, Callable[[Path, Path, str, Paper], None]]] = {
     FRAGILITY: ("fragility", draw_fragility_of),
+    LIMIT: ("mechanism", draw_limit_of),
 }
 """Kinds of studies: the name of their picture, and what draws it."""

@@ -12,7 +12,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.view import style
-from blocksim.view.run_data import Floats, FramesLike, drawable_frames
+from blocksim.view.run_data import Floats, FramesLike, Support, drawable_frames
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,6 +25,7 @@ RARE = 0.995  # share of all speeds that the scale covers
 PEAK = 1.5  # largest over that speed, from which the scale leaves the rest beyond its end
 BAR_HEIGHT, ENTRIES_HEIGHT = 0.50, 0.24  # inches, of what explains the colours
 BAR = 0.10  # inches
+METRE = 1e4  # mm, from which on displacements are in metres
 LETTERS = 24  # of a material's name
 
 Fills = Callable[[int], Sequence[str]]
@@ -112,6 +113,24 @@ def by_turn(frames: FramesLike) -> Paint:
     most = min(max(farthest, LEAST_TURN), HALF_TURN)
     return _scaled(
         turns, Scale("rotation (°)", TURN_COLOURS, -most, most, "both" if farthest > most * 1.001 else "neither")
+    )
+
+
+def displacements(frames: FramesLike, support: Support) -> Floats:
+    """Return how far the centres of all blocks are from where they began (m), relative to the support, (n, b)."""
+    carried = support.offset(frames.time)
+    dx = frames.x - frames.x[0] - (carried[:, :1] - carried[0, 0])
+    dy = frames.y - frames.y[0] - (carried[:, 1:] - carried[0, 1])
+    return np.asarray(np.hypot(dx, dy))
+
+
+def by_displacement(frames: FramesLike, support: Support, most: float) -> Paint:
+    """Return a scale of the displacement since the start, from none to `most` (m)."""
+    high = 1e3 * most or 1.0
+    factor, unit = (1.0, "mm") if high < METRE else (1e-3, "m")
+    return _scaled(
+        factor * 1e3 * displacements(frames, support),
+        Scale(f"displacement ({unit})", SPEED_COLOURS, 0.0, factor * high),
     )
 
 

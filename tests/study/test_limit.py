@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Mapping
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,11 @@ import pytest
 from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError, StoppedEarlyError
 from blocksim.scenario import Document
 from blocksim.study.criterion import Verdict
-from blocksim.study.limit import limit
+from blocksim.study.limit import limit as searched
 from blocksim.study.limit_plan import variants
 from blocksim.study.progress import MANIFEST, Manifest
 
+limit = partial(searched, keep_runs=False)
 FRICTION = 0.38
 SLENDER, SQUAT = (0.02, 0.1), (0.1, 0.05)  # m
 TILT = {"ground.tilt": {"from": "5 deg", "to": "40 deg"}}

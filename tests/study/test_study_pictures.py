@@ -6,10 +6,14 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import InvalidInputError
+from blocksim.scenario import replace_values
 from blocksim.study.api import plot, report
 from blocksim.study.fragility import FragilityResult, fragility
+from blocksim.study.limit import limit
+from blocksim.study.stored_run import stored_run
 from blocksim.study.study_pictures import read_fragility_picture
 from tests.study.test_fragility import FRICTION, SLIDES, SLOPE, TILTS
+from tests.study.test_limit import SQUAT, TILT, block_on_a_slope
 
 
 @pytest.fixture(scope="module")
@@ -62,3 +66,30 @@ def test_a_damaged_answer_is_told(study: FragilityResult, tmp_path: Path, change
     with pytest.raises(InvalidInputError, match=why):
         plot(tmp_path, out=tmp_path / "picture.png")
     assert not (tmp_path / "picture.png").exists()
+
+
+def test_a_limit_is_drawn_as_its_mechanism_beside_the_last_that_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = limit(block_on_a_slope(SQUAT), TILT, tolerance=0.02, out="found")
+    (change,) = found.limits
+    assert set(found.kept) == {change.low, change.high}
+    for value, name in found.kept.items():
+        run = stored_run(Path("found/cases") / name)
+        assert run.scenario == replace_values(found.plan.scenario_at(value), {"output.contacts": True})
+        assert float(run.frames.time[-1]) == found.rows[value]["seconds"]
+    assert plot(found) == Path("slope_mechanism.png")
+    text = report(found, out="limit.html").read_text()
+    assert "Both sides of every bracket" in text
+    assert 'src="data:image/png;base64,' in text
+    assert limit(block_on_a_slope(SQUAT), TILT, tolerance=0.02, out="found").kept == found.kept
+
+
+def test_a_limit_without_a_change_has_nothing_to_draw_and_a_report(tmp_path: Path) -> None:
+    still = {"ground.tilt": {"from": "1 deg", "to": "2 deg", "count": 2}}
+    found = limit(block_on_a_slope(SQUAT), still, out=tmp_path / "found")
+    with pytest.raises(InvalidInputError, match="nothing changes within its range; nothing to draw"):
+        plot(found, out=tmp_path / "picture.png")
+    assert "nothing changes within the range" in report(found, out=tmp_path / "limit.html").read_text()
+    assert not (tmp_path / "found" / "cases").exists()

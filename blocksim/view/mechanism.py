@@ -1,0 +1,208 @@
+"""A mechanism beside its last stable neighbour: blocks coloured by displacement, joints that slide or rock marked.
+
+A joint is what two bodies pressed on each other through when the run began. Its points are followed on both bodies: it
+slides where points that are still closed are farther apart along it than a hundredth of the shorter block's shortest
+side, as blocks have moved from there on, and rocks about its most closed point where the bodies have turned against
+each other by that over this side, a hundredth.
+"""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from blocksim.simulation.contacts import SUPPORT, Rows
+from blocksim.simulation.movement import MOVED_SHARE
+from blocksim.view import style
+from blocksim.view.forces import WithContacts, contacts_of
+from blocksim.view.layout import EDGE, LINE, OWN, Paper, add_axes, wrapped, write_heading, write_text
+from blocksim.view.paint import Paint, by_displacement, displacements, draw_key
+from blocksim.view.panel import Canvas, Page, finish_panel, page_for
+from blocksim.view.run_data import Floats, Support, drawable_frames
+from blocksim.view.scene import corners, draw_scene
+from blocksim.view.window import MILLIMETRES, Extent, extent_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WIDTH, TALLEST, LEAST_WIDTH, LOWEST = 7.2, 3.6, 3.0, 0.5  # inches
+SIDE, GAP, HEAD, ROW_GAP, AXIS = 0.12, 0.16, 0.36, 0.12, 0.30  # inches
+VISIBLE = 0.3  # of a block's shortest side: displacement from which on a mechanism is seen
+SLIDES, ROCKS = "#CC79A7", "#FFFFFF"
+FIRST: dict[str, Any] = {"color": "#000000", "linewidth": 1.8, "zorder": 3.2, "solid_joinstyle": "miter"}
+LEGEND = "Outlined: block that moved first. Line: joint that slides; circle: point about which one rocks open."
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One side of a bracket: a run, its support, the block that moved first if any, and what is said above it."""
+
+    frames: WithContacts
+    support: Support
+    first: str | None
+    caption: str
+    is_mechanism: bool
+
+    @property
+    def frame(self) -> int:
+        """The last frame; of a mechanism the first in which it is seen."""
+        drawable = drawable_frames(self.frames)
+        if not self.is_mechanism:
+            return int(drawable[-1])
+        shortest = np.minimum(self.frames.size_x, self.frames.size_y)
+        seen = (displacements(self.frames, self.support)[drawable] > VISIBLE * shortest).any(axis=1)
+        return int(drawable[int(np.argmax(seen))] if seen.any() else drawable[-1])
+
+
+class Joint(NamedTuple):
+    """A joint in a frame: its points (m, scene, (k, 2)), whether it slides, and the point about which it rocks."""
+
+    points: Floats
+    slides: bool
+    hinges: Floats  # (1, 2), or (0, 2) where it does not rock
+
+
+def joints(frames: WithContacts, frame: int, support: Support) -> list[Joint]:
+    """Return the joints that slide or rock in a frame; none where no contact was recorded."""
+    contacts = contacts_of(frames)
+    pressed = next((found for found in range(len(contacts)) if len(contacts.at(found))), None)
+    if pressed is None:
+        return []
+    rows = contacts.at(pressed)
+    pairs: dict[tuple[int, int], list[int]] = defaultdict(list)
+    for index, ends in enumerate(zip(rows["body_a"].tolist(), rows["body_b"].tolist(), strict=True)):
+        pairs[ends].append(index)
+    loaded = (rows[chosen] for chosen in pairs.values() if (rows["normal_force"][chosen] > 0.0).any())
+    found = (_joint(frames, (pressed, frame), support, points) for points in loaded)
+    return [one for one in found if one.slides or len(one.hinges)]
+
+
+def _joint(frames: WithContacts, times: tuple[int, int], support: Support, rows: Rows) -> Joint:
+    """Follow the points of a joint on both bodies from one frame to another."""
+    pair = int(rows["body_a"][0]), int(rows["body_b"][0])
+    points = np.stack([rows["x"], rows["y"]], axis=-1)
+    on_a, on_b = (_carried(frames, body, times, points, support) for body in pair)
+    normal = np.stack([rows["normal_x"], rows["normal_y"]], axis=-1) @ _turn(frames, pair[1], times).T
+    apart = on_a - on_b
+    opening = (apart * normal).sum(axis=1)
+    slip = np.abs(apart[:, 1] * normal[:, 0] - apart[:, 0] * normal[:, 1])
+    least = MOVED_SHARE * min(_shortest(frames, body) for body in pair)
+    is_closed = opening <= least
+    turn_a, turn_b = (_angle(frames, body, times) for body in pair)
+    rocks = abs(turn_a - turn_b) > MOVED_SHARE and bool(is_closed.any())
+    hinges = on_a[[int(np.argmin(opening))]] if rocks else on_a[:0]
+    return Joint(on_b, bool((slip[is_closed] > least).any()), hinges)
+
+
+def _shortest(frames: WithContacts, body: int) -> float:
+    return float("inf") if body == SUPPORT else float(min(frames.size_x[body], frames.size_y[body]))
+
+
+def _angle(frames: WithContacts, body: int, times: tuple[int, int]) -> float:
+    """Return how far a body turns between two frames (rad)."""
+    return 0.0 if body == SUPPORT else float(frames.angle[times[1], body] - frames.angle[times[0], body])
+
+
+def _turn(frames: WithContacts, body: int, times: tuple[int, int]) -> Floats:
+    """Return the matrix that turns as a body has between two frames."""
+    angle = _angle(frames, body, times)
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def _carried(frames: WithContacts, body: int, times: tuple[int, int], points: Floats, support: Support) -> Floats:
+    """Return where points (k, 2) of a body are at another frame."""
+    if body == SUPPORT:
+        before, after = support.offset(frames.time[list(times)])
+        return np.asarray(points + after - before)
+    before, after = (np.array([frames.x[time, body], frames.y[time, body]]) for time in times)
+    return np.asarray((points - before) @ _turn(frames, body, times).T + after)
+
+
+def draw_mechanisms(
+    brackets: Sequence[tuple[Side, Side]], path: Path | str, title: str | None = None, paper: Paper = OWN
+) -> None:
+    """Draw both sides of every bracket, a row each, and write PNG, SVG or PDF; the same input gives the same bytes.
+
+    Raises InvalidInputError for an unknown picture format, too small a page and runs without contacts, OutputError.
+    """
+    path = Path(path)
+    style.picture_suffix(path)
+    width = paper.width(WIDTH, LEAST_WIDTH)
+    across = 0.5 * (width - GAP)
+    key = by_displacement(brackets[0][0].frames, brackets[0][0].support, 1.0).height
+    notes = wrapped([LEGEND], width - 2.0 * SIDE)
+    foot = AXIS + key + LINE * len(notes)
+    rows = len(brackets)
+    tallest = paper.panel(TALLEST, rows, HEAD + foot + rows * (HEAD + ROW_GAP), LOWEST)
+    pages = [page_for(_extent(pair), across, min(tallest, TALLEST), (SIDE, HEAD, ROW_GAP)) for pair in brackets]
+    height = paper.height(HEAD + sum(page.height for page in pages) + foot)
+    most = max(_most(side) for pair in brackets for side in pair)
+    with style.styled_figure(width, height, paper.dots) as figure:
+        top = height - HEAD
+        for pair, page in zip(brackets, pages, strict=True):
+            for column, side in enumerate(pair):
+                _draw_side(figure, side, page, (column * (across + GAP) + SIDE, top), most)
+            top -= page.height
+        paint = by_displacement(brackets[0][0].frames, brackets[0][0].support, most)
+        draw_key(figure, paint, SIDE, EDGE + LINE * len(notes))
+        for number, line in enumerate(reversed(notes)):
+            write_text(figure, SIDE, EDGE + LINE * number, line, color=style.FAINT_INK)
+        write_heading(figure, title, SIDE)
+        style.save_figure(figure, path)
+
+
+def _most(side: Side) -> float:
+    """Return the largest displacement (m) in the frame that is drawn."""
+    return float(displacements(side.frames, side.support)[side.frame].max())
+
+
+def _extent(pair: tuple[Side, Side]) -> Extent:
+    """Return what both panels of a row show: on one scale, all blocks of either."""
+    one, other = (extent_of(side.frames, np.array([side.frame]), side.support) for side in pair)
+    return Extent(
+        left=min(one.left, other.left),
+        right=max(one.right, other.right),
+        bottom=min(one.bottom, other.bottom),
+        top=max(one.top, other.top),
+        base=min(one.base, other.base),
+        tilt=one.tilt,
+    )
+
+
+def _draw_side(figure: "Figure", side: Side, page: Page, corner: tuple[float, float], most: float) -> None:
+    """Draw a panel with its upper left corner at a place in inches; ground is tilted as it is on that side."""
+    left, top = corner
+    axes = add_axes(figure, left, top - HEAD - page.panel_height, page.panel_width, page.panel_height)
+    extent = Extent(**{**vars(page.extent), "tilt": side.support.tilt})
+    canvas = Canvas(axes, extent, page.points_per_mm)
+    paint: Paint = by_displacement(side.frames, side.support, most)
+    draw_scene(canvas, side.frames, side.frame, side.support, paint)
+    _mark_first(canvas, side)
+    _mark_joints(canvas, joints(side.frames, side.frame, side.support))
+    finish_panel(canvas, (page.panel_width, page.panel_height), labelled=False)
+    axes.xaxis.set_visible(False)
+    room = page.panel_width * style.POINTS_PER_INCH
+    for number, line in enumerate(side.caption.split("\n")):
+        text = style.cut_to(line, room, style.FONT_SIZE)
+        write_text(figure, left, top - LINE * (number + 1), text, color=style.FAINT_INK if number else style.INK)
+
+
+def _mark_first(canvas: Canvas, side: Side) -> None:
+    if side.first in side.frames.names:
+        outline = corners(side.frames, side.frame)[side.frames.names.index(side.first)]
+        closed = np.concatenate([outline, outline[:2]])
+        canvas.axes.plot(*closed.T, transform=canvas.scene, **FIRST)
+
+
+def _mark_joints(canvas: Canvas, found: Sequence[Joint]) -> None:
+    for joint in found:
+        points = MILLIMETRES * joint.points
+        if joint.slides:
+            look: dict[str, Any] = {"color": SLIDES, "linewidth": 2.6, "zorder": 3.3, "solid_capstyle": "butt"}
+            canvas.axes.plot(*points.T, transform=canvas.scene, marker="D", markersize=2.2, **look)
+        for x, y in MILLIMETRES * joint.hinges:
+            look = {"color": ROCKS, "markeredgecolor": style.INK, "markeredgewidth": 0.8, "zorder": 3.4}
+            canvas.axes.plot(x, y, marker="o", markersize=4.0, transform=canvas.scene, **look)

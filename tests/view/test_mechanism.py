@@ -1,0 +1,73 @@
+"""Mechanisms: which joints slide and rock, which frame is drawn, and that the picture is the same every time."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import load_scenario
+from blocksim.study.run import run
+from blocksim.view.layout import Paper
+from blocksim.view.mechanism import Side, draw_mechanisms, joints
+from blocksim.view.run_data import support_of
+from tests.study.test_limit import SLENDER, SQUAT, block_on_a_slope
+
+
+def side(size: tuple[float, float], tilt: str, *, contacts: bool = True) -> Side:
+    data: dict[str, Any] = block_on_a_slope(size) | {"ground": {"tilt": tilt}}
+    scenario = load_scenario(data | {"output": {"every": 0.02, "contacts": contacts}})
+    result = run(scenario)
+    assert result.summary.movement is not None
+    moved = result.summary.movement.first_mover
+    return Side(result.frames, support_of(scenario), moved, f"at {tilt}", is_mechanism=moved is not None)
+
+
+@pytest.fixture(scope="module")
+def sliding() -> Side:
+    """Give a squat block that slides."""
+    return side(SQUAT, "25 deg")
+
+
+@pytest.fixture(scope="module")
+def toppling() -> Side:
+    """Give a slender block that topples downhill, to -x."""
+    return side(SLENDER, "15 deg")
+
+
+def test_a_sliding_block_has_a_joint_that_slides_and_does_not_rock(sliding: Side) -> None:
+    (joint,) = joints(sliding.frames, sliding.frame, sliding.support)
+    assert joint.slides
+    assert not len(joint.hinges)
+
+
+def test_a_toppling_block_rocks_about_its_lower_edge(toppling: Side) -> None:
+    (joint,) = joints(toppling.frames, toppling.frame, toppling.support)
+    assert not joint.slides
+    assert joint.hinges == pytest.approx(np.array([[-0.5 * SLENDER[0], 0.0]]), abs=1e-4)
+
+
+def test_a_block_that_stands_has_no_such_joint() -> None:
+    still = side(SQUAT, "5 deg")
+    assert joints(still.frames, still.frame, still.support) == []
+    assert still.frame == len(still.frames.time) - 1
+
+
+def test_a_mechanism_is_drawn_when_it_is_first_seen_and_not_as_a_heap(toppling: Side) -> None:
+    way = np.hypot(toppling.frames.x - toppling.frames.x[0], toppling.frames.y - toppling.frames.y[0])[:, 0]
+    assert way[toppling.frame - 1] <= 0.3 * SLENDER[0] < way[toppling.frame]
+    assert toppling.frame < len(way) - 1
+
+
+def test_the_picture_is_the_same_every_time_and_says_what_each_side_is(
+    toppling: Side, sliding: Side, tmp_path: Path
+) -> None:
+    for name in ("one", "two"):
+        draw_mechanisms([(sliding, toppling), (toppling, sliding)], tmp_path / f"{name}.svg", "Both")
+    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
+    with pytest.raises(InvalidInputError, match="too small for this picture"):
+        draw_mechanisms([(sliding, toppling)], tmp_path / "small.png", paper=Paper((5.0, 1.0)))
+    bare = side(SQUAT, "25 deg", contacts=False)
+    with pytest.raises(InvalidInputError, match=r"output\.contacts=true"):
+        draw_mechanisms([(bare, toppling)], tmp_path / "bare.png")
