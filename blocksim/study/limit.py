@@ -128,9 +128,9 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     `vary` has one key and its range, {"ground.tilt": {"from": "20 deg", "to": "40 deg"}}, with the number of values
     that are scanned as `count` (default 9); there may be several changes. `stands` says what counts as standing (see
     `blocksim.study.criterion`), `tolerance` how narrow a bracket gets relative to its ends. Runs are kept in `out`
-    (default: results/NAME/limit-HASH), with `keep_runs` those of both sides of a bracket with frames and contacts, which
-    `plot` and `report` show; the same call again does only what is missing. `executor`, `jobs` and `scheduler` are those
-    of `sweep`, and do not change the answer. Raises ScenarioError, InvalidInputError, OutputExistsError where the folder
+    (default: results/NAME/limit-HASH), with `keep_runs` those of both sides of a bracket with frames and contacts, for
+    `plot` and `report`; the same call again does only what is missing. `executor`, `jobs` and `scheduler` are those of
+    `sweep`, and do not change the answer. Raises ScenarioError, InvalidInputError, OutputExistsError where the folder
     is not free, UnavailableError, StoppedEarlyError on Ctrl-C.
     """
     plan = read_limit(document_of(scenario), vary, stands=stands, tolerance=tolerance)
