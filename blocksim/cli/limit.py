@@ -9,16 +9,17 @@ import typer
 
 from blocksim.cli import options
 from blocksim.cli.output import answer, note, number, print_json, table_lines
-from blocksim.cli.prepare import tell_compilation, warn_of_values
+from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.sweep_output import leaving_unfinished_cases
 from blocksim.cli.vary import RANGE, read_variations
 from blocksim.errors import ExitCode
 from blocksim.scenario import Document
+from blocksim.scenario.plausible import implausible_values
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study.criterion import DEFAULT, Verdict
 from blocksim.study.executors import Execution
 from blocksim.study.limit import LimitResult, OnRun, find_limit
-from blocksim.study.limit_plan import OPTION, TOLERANCE, is_soft, read_limit, variants
+from blocksim.study.limit_plan import OPTION, TOLERANCE, LimitPlan, is_soft, read_limit, variants
 from blocksim.study.limit_search import Change, Number
 from blocksim.study.rows import MOVEMENT, Row
 
@@ -98,7 +99,7 @@ def limit_command(
         for name, one in variants(document, both_laws=both_laws, stiffer=stiffer).items()
     }
     if not silent:
-        warn_of_values(document.build())
+        _warn(next(iter(plans.values())))
     found = {}
     for name, plan in plans.items():
         base = plan.scenario_at(plan.span.low)
@@ -116,6 +117,13 @@ def limit_command(
             )
     _show(found, as_json=as_json, quiet=quiet)
     raise typer.Exit(ExitCode.SUCCESS if all(one.changes for one in found.values()) else ExitCode.OUTSIDE)
+
+
+def _warn(plan: LimitPlan) -> None:
+    """Warn of implausible values of the scenario, and of those at both ends of the range."""
+    ends = (plan.scenario_at(value) for value in (plan.span.low, plan.span.high))
+    for text in dict.fromkeys(text for scenario in ends for text in implausible_values(scenario)):
+        note(f"warning: {text}")
 
 
 def _show(found: Mapping[str, LimitResult], *, as_json: bool, quiet: bool) -> None:

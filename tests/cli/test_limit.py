@@ -45,6 +45,15 @@ def test_nothing_that_changes_is_exit_code_1(blocksim: Command, golden: Golden) 
     golden(answer.out)
 
 
+def test_a_range_of_friction_coefficients_that_look_like_angles_is_warned_of(blocksim: Command) -> None:
+    answer = blocksim(*WALL, "--vary", "friction.block_block=25:45:2", "--set", "time.end=0.01", *ROUGH)
+    warnings = [line for line in answer.err.splitlines() if line.startswith("warning: ")]
+    assert warnings == [
+        f'warning: friction.block_block = {angle} is a friction coefficient; for an angle write "{angle} deg"'
+        for angle in (25, 45)
+    ]
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
