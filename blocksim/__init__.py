@@ -8,9 +8,9 @@
 True
 
 Scenarios: `load` (a file or dictionaries), `replace` (change keys, validated). Runs: `run`, `open_run`; a result has
-`final`, `frames`, `to_frame()`, `to_xarray()`. Studies: `sweep`, `open_sweep`, `limit`, `fragility`, `calibrate`,
-`sensitivity`, `converge`. Judging: `compare`. Looking: `plot`, `animate`, `report`. Functions have the options of the
-command of the same name.
+`final`, `frames`, `to_frame()`, `to_xarray()`. Studies: `sweep`, `open_sweep`, `limit`, `limit_curve`, `fragility`,
+`calibrate`, `sensitivity`, `converge`. Judging: `compare`. Looking: `plot`, `animate`, `report`. Functions have the
+options of the command of the same name.
 """
 
 from importlib import import_module
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from blocksim.study.converge import converge
     from blocksim.study.fragility import fragility
     from blocksim.study.limit import limit
+    from blocksim.study.limit_curve import limit_curve
     from blocksim.study.run import open_run, run
     from blocksim.study.sweep import sweep
     from blocksim.study.sweep_table import read_sweep as open_sweep
@@ -36,6 +37,7 @@ __all__ = [
     "converge",
     "fragility",
     "limit",
+    "limit_curve",
     "load",
     "open_run",
     "open_sweep",
@@ -55,6 +57,7 @@ _HOMES = {
     "converge": ("blocksim.study.converge", "converge"),
     "fragility": ("blocksim.study.fragility", "fragility"),
     "limit": ("blocksim.study.limit", "limit"),
+    "limit_curve": ("blocksim.study.limit_curve", "limit_curve"),
     "load": ("blocksim.scenario", "load_scenario"),
     "open_run": ("blocksim.study.run", "open_run"),
     "open_sweep": ("blocksim.study.sweep_table", "read_sweep"),

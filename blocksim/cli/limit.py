@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli import options
+from blocksim.cli import completion, options
+from blocksim.cli.limit_curve import show_curve
 from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.sweep_output import leaving_unfinished_cases
@@ -19,6 +20,8 @@ from blocksim.simulation.compilation import kernels_of
 from blocksim.study.criterion import DEFAULT, Verdict
 from blocksim.study.executors import Execution
 from blocksim.study.limit import LimitResult, OnRun, find_limit
+from blocksim.study.limit_curve import OPTION as OVER
+from blocksim.study.limit_curve import read_curve
 from blocksim.study.limit_plan import OPTION, TOLERANCE, LimitPlan, is_soft, read_limit, variants
 from blocksim.study.limit_search import Change, Number
 from blocksim.study.rows import MOVEMENT, Row
@@ -63,6 +66,15 @@ def limit_command(
     to: Annotated[
         float, typer.Option(metavar="SHARE", parser=_share, help="Width of a bracket, relative to the value.")
     ] = TOLERANCE,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            OVER,
+            metavar="KEY=VALUES",
+            help="Another key, KEY=a,b,c or KEY=FROM:TO:COUNT: search the limit at each of its values.",
+            autocompletion=completion.scenario_keys,
+        ),
+    ] = None,
     both_laws: Annotated[
         bool, typer.Option("--both-laws", help="Search with springs and with rigid contacts, and compare.")
     ] = False,
@@ -94,12 +106,26 @@ def limit_command(
     silent = quiet or as_json
     document = Document.read(scenario).with_settings(settings or [])
     given = read_variations(vary, OPTION, RANGE)
+    if over is not None:
+        if both_laws or stiffer:
+            raise typer.BadParameter(
+                "a curve of limits is searched with one law; leave the other option out", param_hint=OVER
+            )
+        curve = read_curve(document, given, read_variations([over], OVER), stands=stands, tolerance=to)
+        _warn(curve.one, silent=silent)
+        show_curve(
+            curve,
+            Execution(None if executor is None else executor.value, jobs, scheduler),
+            out,
+            overwrite=overwrite,
+            as_json=as_json,
+            quiet=quiet,
+        )
     plans = {
         name: read_limit(one, given, stands=stands, tolerance=to)
         for name, one in variants(document, both_laws=both_laws, stiffer=stiffer).items()
     }
-    if not silent:
-        _warn(next(iter(plans.values())))
+    _warn(next(iter(plans.values())), silent=silent)
     found = {}
     for name, plan in plans.items():
         base = plan.scenario_at(plan.span.low)
@@ -119,8 +145,11 @@ def limit_command(
     raise typer.Exit(ExitCode.SUCCESS if all(one.changes for one in found.values()) else ExitCode.OUTSIDE)
 
 
-def _warn(plan: LimitPlan) -> None:
-    """Warn of implausible values of the scenario, and of those at both ends of the range."""
+def _warn(plan: LimitPlan, *, silent: bool) -> None:
+    """Warn of implausible values of the scenario, and of those at both ends of the range; compile what it needs."""
+    tell_compilation(kernels_of(plan.scenario_at(plan.span.low)), quiet=silent)
+    if silent:
+        return
     ends = (plan.scenario_at(value) for value in (plan.span.low, plan.span.high))
     for text in dict.fromkeys(text for scenario in ends for text in implausible_values(scenario)):
         note(f"warning: {text}")

@@ -17,6 +17,7 @@ from blocksim.study import sensitivity as analysis
 from blocksim.study.calibrate_plan import read_plan
 from blocksim.study.fragility import FragilityResult
 from blocksim.study.limit import LimitResult
+from blocksim.study.limit_curve import CurveResult
 from blocksim.study.pictures import RunLook, draw
 from blocksim.study.plan import Values, Variations
 from blocksim.study.reporting import report_on
@@ -28,7 +29,7 @@ from blocksim.view.layout import MILLIMETRES_PER_INCH, Paper
 from blocksim.view.paint import paint_named
 from blocksim.view.run_data import support_of
 
-Place = Path | str | Result | SweepResult | FragilityResult | LimitResult
+Place = Path | str | Result | SweepResult | FragilityResult | LimitResult | CurveResult
 T = TypeVar("T")
 NOTHING = "nothing to vary: give vary={key: {'from': a, 'to': b}}, or a [sweep] table with distributions"
 
@@ -107,7 +108,7 @@ def report(
 
 def _folder(place: Place) -> Path:
     """Return where a run or a sweep lies. Raises InvalidInputError for a result that was not kept."""
-    if isinstance(place, SweepResult | FragilityResult | LimitResult):
+    if isinstance(place, SweepResult | FragilityResult | LimitResult | CurveResult):
         return place.folder
     if not isinstance(place, Result):
         return Path(place)

@@ -8,7 +8,6 @@ whatever the other intensities are and however many members are drawn.
 
 import hashlib
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -24,6 +23,7 @@ from blocksim.study.limit_plan import takes_whole
 from blocksim.study.plan import MOST_CASES, Cases, Values, Variations, cases_of, refuse_wrong_draws, varied
 from blocksim.study.rows import Head, heads_of, si_number
 from blocksim.study.sampling import Places, drawn, generator, open_interval
+from blocksim.study.typed_levels import typed_levels
 
 INTENSITY, SCATTER, FAILS = "--intensity", "--scatter", "--fails"
 COLLAPSE = "outcome = fell"
@@ -133,24 +133,12 @@ def _levels(document: Document, given: Variations) -> tuple[Head, dict[float, ob
             f"one key is the intensity, not {len(given.tables)}: give {INTENSITY} KEY=a,b,c or KEY=FROM:TO:COUNT once"
         )
         raise InvalidInputError(message)
-    text, table = next((given.texts[key], table) for key, table in given.tables.items())
-    if isinstance(table, Mapping) and "count" not in table:
-        message = f"{INTENSITY} {text}: single values are needed, as in KEY=a,b,c or KEY=FROM:TO:COUNT"
+    head, levels = typed_levels(document, given, INTENSITY)
+    wrong = [value for number, value in levels.items() if number <= 0.0]
+    if wrong:
+        message = f"{INTENSITY} {given.texts[head.key]}: {wrong[0]} is not above 0, as a lognormal curve needs"
         raise InvalidInputError(message)
-    sweep = varied(document, given, INTENSITY, "grid")
-    (head,), (values,) = heads_of(sweep), sweep.vary.values()
-    cells = [(head.cell(value), value) for value in levels_of(values)]
-    numbers = {float(f"{_number(cell):.12g}"): value for cell, value in cells}
-    wrong = [value for number, value in numbers.items() if not 0.0 < number < math.inf]
-    if wrong or len(numbers) < len(cells):
-        why = f"{wrong[0]} is not above 0, as a lognormal curve needs" if wrong else "a value is given twice"
-        message = f"{INTENSITY} {text}: {why}"
-        raise InvalidInputError(message)
-    return head, dict(sorted(numbers.items()))
-
-
-def _number(cell: object) -> float:
-    return float(cell) if isinstance(cell, int | float) and not isinstance(cell, bool) else math.nan
+    return head, levels
 
 
 def _scatter(document: Document, given: Variations) -> Sweep:

@@ -7,8 +7,8 @@ from tempfile import TemporaryDirectory
 from blocksim.errors import BlocksimError
 from blocksim.scenario import load_stored
 from blocksim.study.limit_plan import NAMES
-from blocksim.study.study_pictures import draw_study, read_answer, read_limit_answer
-from blocksim.study.sweep_folder import FRAGILITY, LIMIT, FolderKind
+from blocksim.study.study_pictures import draw_study, read_answer, read_curve_answer, read_limit_answer, with_unit
+from blocksim.study.sweep_folder import FRAGILITY, LIMIT, LIMIT_CURVE, FolderKind
 from blocksim.view.layout import OWN
 from blocksim.view.report.studies import StudyPage
 
@@ -51,8 +51,7 @@ def _fragility(folder: Path) -> Parts:
         for one in points
     ]
     summary = [("intensity", stored.key), ("failure", stored.fails), ("members", str(sum(p.members for p in points)))]
-    key = f"{stored.key} ({stored.unit})" if stored.unit else stored.key
-    return summary, "Failures over the intensity", (key, *HEADS), rows
+    return summary, "Failures over the intensity", (with_unit(stored.key, stored.unit), *HEADS), rows
 
 
 def _limit(folder: Path) -> Parts:
@@ -80,5 +79,16 @@ def _limit(folder: Path) -> Parts:
     return summary, "Both sides of every bracket", (f"value{unit}", *SIDE_HEADS), rows
 
 
-PARTS: dict[FolderKind, Callable[[Path], Parts]] = {FRAGILITY: _fragility, LIMIT: _limit}
+def _curve(folder: Path) -> Parts:
+    stored = read_curve_answer(folder)
+    heads = (with_unit(stored.over, stored.over_unit), with_unit(stored.key, stored.unit), "to", "below", "above")
+    rows = [
+        [f"{point.over:.6g}", f"{one.low:.8g}", f"{one.high:.8g}", one.below.verdict, one.above.verdict]
+        for point in stored.points
+        for one in point.changes
+    ]
+    return [("key", stored.key), ("over", stored.over), ("stands means", stored.stands)], "Limits", heads, rows
+
+
+PARTS: dict[FolderKind, Callable[[Path], Parts]] = {FRAGILITY: _fragility, LIMIT: _limit, LIMIT_CURVE: _curve}
 """What is shown of each kind of study beside its picture: pairs, title, heads and rows of a table."""

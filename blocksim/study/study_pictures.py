@@ -15,9 +15,10 @@ from blocksim.scenario.bounded_read import MEGABYTE, read_limited
 from blocksim.study.criterion import Verdict
 from blocksim.study.fragility_counts import Point
 from blocksim.study.stored_run import stored_run
-from blocksim.study.sweep_folder import FRAGILITY, LIMIT, FolderKind, case_folder
+from blocksim.study.sweep_folder import FRAGILITY, LIMIT, LIMIT_CURVE, FolderKind, case_folder
 from blocksim.view.fragility import Band, Fragility, draw_fragility, places
 from blocksim.view.layout import Paper
+from blocksim.view.limit_curve import Bracket, LimitCurve, draw_limit_curve
 from blocksim.view.mechanism import Side, draw_mechanisms
 from blocksim.view.run_data import support_of
 from blocksim.view.style import picture_suffix
@@ -76,6 +77,24 @@ class StoredLimit(BaseModel, frozen=True):
     scheme: str
     runs: int
     changes: tuple[StoredChange, ...]
+
+
+class StoredCurvePoint(BaseModel, frozen=True):
+    """The search at one value of limits.json."""
+
+    over: float
+    changes: tuple[StoredChange, ...]
+
+
+class StoredCurve(BaseModel, frozen=True):
+    """What a picture needs of limits.json."""
+
+    key: str
+    unit: str
+    over: str
+    over_unit: str
+    stands: str
+    points: tuple[StoredCurvePoint, ...]
 
 
 def study_in(place: Path | str) -> FolderKind | None:
@@ -154,6 +173,32 @@ def draw_limit_of(folder: Path, path: Path, title: str, paper: Paper) -> None:
     draw_mechanisms(brackets, path, title, paper)
 
 
+def read_curve_answer(folder: Path) -> StoredCurve:
+    """Return the limits of a curve. Raises InputMissingError or InvalidInputError."""
+    return _read(folder / LIMIT_CURVE.origin, StoredCurve, LIMIT_CURVE)
+
+
+def draw_curve_of(folder: Path, path: Path, title: str, paper: Paper) -> None:
+    """Draw limits over the other key."""
+    stored = read_curve_answer(folder)
+    points = [
+        (one.over, [Bracket(c.low, c.high, c.below.verdict, c.above.verdict) for c in one.changes])
+        for one in stored.points
+    ]
+    none = [f"{value:.6g}" for value, found in points if not found]
+    if len(none) == len(points):
+        message = f"{folder}: nothing changes within its range; nothing to draw"
+        raise InvalidInputError(message)
+    notes = [f"Stands means: {stored.stands}.", *([f"Nothing changes at {', '.join(none)}."] if none else [])]
+    axes = with_unit(stored.over, stored.over_unit), with_unit(stored.key, stored.unit)
+    draw_limit_curve(LimitCurve(*axes, points, tuple(notes)), path, title, paper)
+
+
+def with_unit(key: str, unit: str) -> str:
+    """Return a key with its unit, as along an axis."""
+    return f"{key} ({unit})" if unit else key
+
+
 def _sides(folder: Path, stored: StoredLimit, change: StoredChange) -> tuple[Side, Side] | None:
     """Return what is drawn of a bracket: what stands on the left."""
     ends = [(change.low, change.below), (change.high, change.above)]
@@ -191,5 +236,6 @@ def _told(curve: Curve | NoCurve, stored: StoredFragility) -> str:
 DRAWN: dict[FolderKind, tuple[str, Callable[[Path, Path, str, Paper], None]]] = {
     FRAGILITY: ("fragility", draw_fragility_of),
     LIMIT: ("mechanism", draw_limit_of),
+    LIMIT_CURVE: ("limits", draw_curve_of),
 }
 """Kinds of studies: the name of their picture, and what draws it."""

@@ -87,6 +87,15 @@ LIMIT = FolderKind(
     results={r"limit\.csv": begins(b"value"), r"limit\.json": ORIGINS, **MANIFESTS},
     leftover=re.compile(r"\.(limit\.csv|limit\.json|limit\.toml)\..*"),
 )
+OVER = "over"
+LIMIT_CURVE = FolderKind(
+    what="a curve of limits",
+    command="blocksim limit FILE",
+    plan="limits.toml",
+    head=b"# Limits ",
+    results={r"limits\.csv": begins(OVER.encode()), r"limits\.json": ORIGINS},
+    leftover=re.compile(r"\.(limits\.csv|limits\.json|limits\.toml)\..*"),
+)
 INTENSITY = "intensity"
 FRAGILITY = FolderKind(
     what="a fragility study",

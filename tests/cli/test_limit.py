@@ -54,6 +54,17 @@ def test_a_range_of_friction_coefficients_that_look_like_angles_is_warned_of(blo
     ]
 
 
+def test_limits_over_another_key_are_a_table(blocksim: Command, golden: Golden) -> None:
+    over = ("--over", "friction.block_block=0.2,0.9", "--vary", "ground.tilt=5deg:25deg:3", *ROUGH[:2], "--out", "out")
+    answer = blocksim(*WALL, *over, "--set", "time.end=0.3", *FELL)
+    assert answer.code == 1
+    golden(answer.out)
+    assert answer.err.endswith("limits: out/limits.csv; picture: blocksim plot out\n")
+    again = blocksim(*WALL, *over, "--set", "time.end=0.3", *FELL, "--json")
+    assert [(point["over"], len(point["changes"])) for point in json.loads(again.out)["points"]] == [(0.2, 1), (0.9, 0)]
+    assert blocksim(*WALL, *over, "--both-laws").code == 2
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -188,8 +188,8 @@ def test_another_study_or_file_is_not_replaced_unasked(tmp_path: Path) -> None:
     [
         ({}, FRICTION, {}, InvalidInputError, "one key is the intensity, not 0"),
         ({"gravity": [1.0, 0.0]}, FRICTION, {}, InvalidInputError, "0.0 is not above 0, as a lognormal curve needs"),
-        ({"gravity": [1.0, 1]}, FRICTION, {}, InvalidInputError, "a value is given twice"),
-        ({"time.scheme": ["explicit"]}, FRICTION, {}, InvalidInputError, "explicit is not above 0"),
+        ({"gravity": [1.0, 1]}, FRICTION, {}, InvalidInputError, "1 is given twice"),
+        ({"time.scheme": ["explicit"]}, FRICTION, {}, InvalidInputError, "explicit is not a number"),
         ({"gravty": [1.0]}, FRICTION, {}, ScenarioError, "did you mean 'gravity'"),
         ({"gravity": [1.0]}, {MU: {"mean": 0.3}}, {}, ScenarioError, "--scatter .*sd is missing"),
         ({"gravity": [1.0]}, {MU: {"mean": 0.1, "sd": 0.2}}, {}, ScenarioError, "cut the distribution"),

@@ -1,0 +1,77 @@
+"""Limits over another key: closed forms, resuming, what is refused, and the picture."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from blocksim.errors import InvalidInputError, OutputExistsError
+from blocksim.study.api import plot, report
+from blocksim.study.limit_curve import CurveResult, limit_curve
+from blocksim.view.limit_curve import Bracket, LimitCurve, joined
+from tests.study.test_limit import TILT, block_on_a_slope
+
+SIZE = (0.05, 0.1)  # m: topples at atan 0.5
+OVER: dict[str, Any] = {"friction.block_ground": [0.7, 0.3]}
+
+
+def curve(out: Path, **wanted: Any) -> CurveResult:
+    return limit_curve(block_on_a_slope(SIZE), TILT, OVER, out=out, tolerance=0.02, **wanted)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> CurveResult:
+    """Give a curve; not to be changed."""
+    return curve(tmp_path_factory.mktemp("curve") / "found")
+
+
+def test_a_block_slides_at_its_friction_angle_until_it_topples_before(found: CurveResult) -> None:
+    assert list(found.searches) == [0.3, 0.7]
+    for search, tangent in zip(found.searches.values(), (0.3, 0.5), strict=True):
+        (change,) = search.limits
+        assert change.low <= math.degrees(math.atan(tangent)) * 1.001
+        assert change.high >= math.degrees(math.atan(tangent)) * 0.999
+        assert change.high - change.low <= 0.02 * change.high
+
+
+def test_the_same_call_runs_nothing_and_another_one_is_refused(found: CurveResult) -> None:
+    again = curve(found.folder)
+    assert [search.run for search in again.searches.values()] == [0, 0]
+    with pytest.raises(OutputExistsError, match="contains another curve of limits"):
+        curve(found.folder, stands="moved < 1 mm")
+
+
+def test_the_folder_holds_table_and_answer_and_is_drawn(found: CurveResult, tmp_path: Path) -> None:
+    head, first, second = (found.folder / "limits.csv").read_text().splitlines()
+    assert head == "over,low [deg],high [deg],below,above"
+    assert first.startswith("0.3,")
+    assert second.endswith(",stands,falls")
+    data = json.loads((found.folder / "limits.json").read_text())
+    assert [point["over"] for point in data["points"]] == [0.3, 0.7]
+    assert plot(found, out=tmp_path / "limits.png").stat().st_size > 0
+    assert "friction.block_ground" in report(found, out=tmp_path / "limits.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("over", "why"),
+    [
+        ({}, "over one key, not 0"),
+        ({"friction.block_ground": {"from": 0.1, "to": 0.2}}, "--over .*: single values are needed"),
+        ({"time.scheme": ["explicit"]}, "explicit is not a number"),
+        ({"friction.block_ground": [0.3, 0.3]}, "0.3 is given twice"),
+    ],
+)
+def test_what_is_no_list_of_numbers_is_refused_before_anything_is_written(
+    tmp_path: Path, over: dict[str, Any], why: str
+) -> None:
+    with pytest.raises(InvalidInputError, match=why):
+        limit_curve(block_on_a_slope(SIZE), TILT, over, out=tmp_path / "curve")
+    assert not (tmp_path / "curve").exists()
+
+
+def test_only_neighbours_with_the_same_changes_are_joined() -> None:
+    one, two = Bracket(1.0, 3.0, "stands", "falls"), Bracket(4.0, 6.0, "falls", "stands")
+    points = [(0.0, [one]), (1.0, [one]), (2.0, [one, two]), (3.0, []), (4.0, [two])]
+    assert joined(LimitCurve("", "", points)) == [((0.0, 2.0), (1.0, 2.0))]
