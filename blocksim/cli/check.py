@@ -13,6 +13,7 @@ from blocksim.cli.output import GAP, answer, duration, note, number, print_json,
 from blocksim.cli.prepare import read_scenario, warn_of_values
 from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
+from blocksim.scenario.units import STANDARD_GRAVITY
 from blocksim.study.rows import check_experiment
 from blocksim.world.describe import Description, MotionDescription, PairDescription, SagDescription, describe
 from blocksim.world.free_memory import readable
@@ -189,8 +190,9 @@ def _sag(rigid: SagDescription | None) -> list[str]:
 def _motion(motion: MotionDescription | None) -> list[str]:
     if motion is None:
         return []
-    greatest = f"at most {number(MILLI * motion.displacement)} mm and {number(MILLI * motion.speed)} mm/s"
-    return [f"supports   move {greatest}, {number(MILLI * motion.final_speed)} mm/s at the end"]
+    peaks = f"{number(MILLI * motion.displacement)} mm, {number(MILLI * motion.speed)} mm/s"
+    greatest = f"at most {peaks} and {number(motion.acceleration / STANDARD_GRAVITY)} g"
+    return [f"supports   move {greatest}; {number(MILLI * motion.final_speed)} mm/s at the end"]
 
 
 def _use_of_particles(contact: Contact) -> str:

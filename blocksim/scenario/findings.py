@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from blocksim.scenario.keys import MISSING, NAMED, KeyPath, field_at, follow, keys_of, table_at
-from blocksim.scenario.models.motion import MOTIONS
+from blocksim.scenario.models.motions import MOTIONS
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES, scheme_of
 from blocksim.scenario.quantities import shown

@@ -13,7 +13,7 @@ from pydantic_core import PydanticUndefined
 from blocksim.scenario.keys import options, si_unit
 from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
-from blocksim.scenario.models.motion import MOTIONS
+from blocksim.scenario.models.motions import MOTIONS
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES, Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep

@@ -6,7 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.scenario.accelerations import pulse_samples, record_samples
 from blocksim.scenario.models.motion import FromTable, Harmonic
+from blocksim.scenario.models.motions import AnyMotion
+from blocksim.scenario.models.pulse import Pulse
+from blocksim.scenario.models.record import Record
 from blocksim.scenario.models.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -21,7 +25,7 @@ class MotionPieces(NamedTuple):
     """Displacement c0 + c1 s + c2 s² + c3 s³ of piece i, with s = t - times[i] from 0 to times[i + 1] - times[i].
 
     The pieces join with equal displacement and velocity, from 0 to a little beyond the end of the scenario. If the
-    motion ends before, the last piece is constant, or linear where a table of accelerations leaves a velocity.
+    motion ends before, the last piece is constant, or linear where accelerations leave a velocity.
     """
 
     times: Floats  # (k + 1,) s, increasing from 0
@@ -40,7 +44,7 @@ def motion_pieces(scenario: Scenario) -> MotionPieces:
     motion, end = scenario.motion, BEYOND * scenario.time.end
     if motion is None:
         return MotionPieces(np.zeros(1), np.zeros((0, 4)), 0.0)
-    return _from_zero_to(end, _harmonic(motion, end) if isinstance(motion, Harmonic) else _from_table(motion))
+    return _from_zero_to(end, _pieces(motion, end))
 
 
 def displacement_and_velocity(pieces: MotionPieces, times: Floats) -> tuple[Floats, Floats]:
@@ -52,6 +56,18 @@ def displacement_and_velocity(pieces: MotionPieces, times: Floats) -> tuple[Floa
     s = times - pieces.times[piece]
     c0, c1, c2, c3 = pieces.coefficients[piece].T
     return c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2.0 * c2 + 3.0 * s * c3)
+
+
+def _pieces(motion: AnyMotion, end: float) -> MotionPieces:
+    match motion:
+        case Harmonic():
+            return _harmonic(motion, end)
+        case FromTable():
+            return _from_table(motion)
+        case Pulse():
+            return _through(*pulse_samples(motion))
+        case Record():
+            return _integrated(*record_samples(motion))
 
 
 def _harmonic(motion: Harmonic, end: float) -> MotionPieces:

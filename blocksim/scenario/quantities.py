@@ -195,7 +195,8 @@ class Quantity:
 def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
     """Read "number unit" into an SI float and its dimension; raises ValueError with the reason.
 
-    `wanted` only decides which unit is suggested for a misspelt one.
+    `wanted` decides which unit is suggested for a misspelt one, and that g is the standard gravity, not a gram, where
+    an acceleration is meant.
     """
     found = _TEXT.fullmatch(text) if len(text) <= _MAX_LENGTH else None
     comma = _DECIMAL_COMMA.fullmatch(text) if len(text) <= _MAX_LENGTH else None
@@ -213,7 +214,7 @@ def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
         message = f'the unit is missing, write it as in "{wanted.example}"'
         raise ValueError(message)
     try:
-        worth = units.parse_unit(unit)
+        worth = units.parse_unit("g0" if wanted is ACCELERATION and unit == "g" else unit)
     except units.UnitError as error:
         raise ValueError(_unit_mistake(unit, error.unknown, wanted)) from None
     return _times(number, worth.factor), worth.dimension

@@ -12,7 +12,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from blocksim.scenario.models.contact import Friction, PairFriction
-from blocksim.scenario.models.motion import FromTable, MotionTable
+from blocksim.scenario.models.motion import MotionTable
+from blocksim.scenario.models.motions import TABLED
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Time
 from blocksim.scenario.models.study import Sweep
@@ -38,7 +39,7 @@ def scenario_to_toml(scenario: Scenario, experiment_table: str | None = None, mo
         data["time"] = {key: value for key, value in data["time"].items() if key in Time.model_fields}
     if experiment_table is not None and "experiment" in data:
         data["experiment"] = {"table": experiment_table}
-    if motion_table is not None and isinstance(scenario.motion, FromTable):
+    if motion_table is not None and isinstance(scenario.motion, TABLED):
         data["motion"]["table"] = motion_table
     return HEADER + tomli_w.dumps(data)
 
@@ -59,7 +60,7 @@ def _leave_to_static(scenario: Scenario, data: dict[str, Any]) -> None:
 def deciding_values(scenario: Scenario) -> dict[str, Any]:
     """Return everything that determines the motion and the output, as for JSON; of a table of motion its digest."""
     data = scenario.model_dump(mode="json", exclude=UNHASHED)
-    if isinstance(scenario.motion, FromTable):
+    if isinstance(scenario.motion, TABLED):
         data["motion"]["table"] = scenario.motion.table.digest
     return data
 
@@ -72,7 +73,7 @@ def scenario_hash(scenario: Scenario) -> str:
 
 def motion_table_content(scenario: Scenario) -> bytes | None:
     """Return the table of motion as it was read, for a copy, or None without one."""
-    return scenario.motion.table.content if isinstance(scenario.motion, FromTable) else None
+    return scenario.motion.table.content if isinstance(scenario.motion, TABLED) else None
 
 
 def _plain(table: BaseModel) -> dict[str, Any]:

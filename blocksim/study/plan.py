@@ -12,7 +12,7 @@ from blocksim.errors import BlocksimError, InvalidInputError, ScenarioError
 from blocksim.scenario import Document, Scenario, Sweep
 from blocksim.scenario.check import mistakes_of_value
 from blocksim.scenario.findings import Finding
-from blocksim.scenario.models.motion import FromTable
+from blocksim.scenario.models.motions import TABLED
 from blocksim.scenario.models.variation import Normal, written
 from blocksim.scenario.overrides import Override, frozen, with_value
 from blocksim.scenario.quantities import shown
@@ -139,7 +139,7 @@ def _for_cases(document: Document) -> Document:
     data = document.without_sweep().data
     if scenario.experiment is not None:
         data = {**data, "experiment": {"table": scenario.experiment.table}}
-    if isinstance(scenario.motion, FromTable):
+    if isinstance(scenario.motion, TABLED):
         data, _ = with_value(data, ("motion", "table"), scenario.motion.table)
     return replace(document, data=data)
 

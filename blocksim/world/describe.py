@@ -9,7 +9,8 @@ import numpy as np
 from blocksim.kernels.arrays import Record, World
 from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, place_bodies
 from blocksim.scenario.models.stepping import Nonsmooth
-from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
+from blocksim.scenario.motion import motion_pieces
+from blocksim.scenario.motion_peaks import motion_peaks
 from blocksim.world.bodies import outline_of
 from blocksim.world.bounds import bounds_of
 from blocksim.world.build import build_world
@@ -62,8 +63,9 @@ class PairDescription:
 
 @dataclass(frozen=True)
 class MotionDescription:
-    """Displacement and speed of the supports, SI."""
+    """Acceleration, speed and displacement of the supports, SI."""
 
+    acceleration: float  # m/s2, greatest
     displacement: float  # m, greatest
     speed: float  # m/s, greatest
     final_speed: float  # m/s
@@ -181,10 +183,9 @@ def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, ste
 def _motion(scenario: Scenario) -> MotionDescription | None:
     if scenario.motion is None:
         return None
-    pieces = motion_pieces(scenario)
-    times = np.interp(np.arange(0, len(pieces.times) - 0.75, 0.25), np.arange(len(pieces.times)), pieces.times)
-    displacement, velocity = np.abs(displacement_and_velocity(pieces, times[times <= scenario.time.end]))
-    return MotionDescription(float(displacement.max()), float(velocity.max()), float(velocity[-1]))
+    peaks = motion_peaks(motion_pieces(scenario), scenario.time.end)
+    found = (peaks.acceleration.value, peaks.displacement.value, peaks.velocity.value)
+    return MotionDescription(*found, abs(peaks.final_velocity))
 
 
 def _particles(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> int:

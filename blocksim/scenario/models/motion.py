@@ -195,9 +195,3 @@ class FromTable(Table):
     start: q.NonNegativeTime = Field(
         default=0.0, description="time at which the table's time is zero; the supports rest before"
     )
-
-
-AnyMotion = Annotated[Harmonic | FromTable, Field(discriminator="kind")]
-"""Any prescribed motion, distinguished by its `kind`."""
-MOTIONS: dict[str, type[Table]] = {"harmonic": Harmonic, "table": FromTable}
-"""Class by kind, as written in a scenario."""

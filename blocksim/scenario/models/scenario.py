@@ -16,7 +16,7 @@ from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table
 from blocksim.scenario.models.contact import Contact, Friction, Pair
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
-from blocksim.scenario.models.motion import AnyMotion
+from blocksim.scenario.models.motions import AnyMotion
 from blocksim.scenario.models.stepping import AnyTime, Explicit, Output
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure

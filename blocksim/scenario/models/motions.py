@@ -1,0 +1,17 @@
+"""All kinds of prescribed motion of the supports."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from blocksim.scenario.models.base import Table
+from blocksim.scenario.models.motion import FromTable, Harmonic
+from blocksim.scenario.models.pulse import Pulse
+from blocksim.scenario.models.record import Record
+
+AnyMotion = Annotated[Harmonic | FromTable | Pulse | Record, Field(discriminator="kind")]
+"""Any prescribed motion, distinguished by its `kind`."""
+MOTIONS: dict[str, type[Table]] = {"harmonic": Harmonic, "table": FromTable, "pulse": Pulse, "record": Record}
+"""Class by kind, as written in a scenario."""
+TABLED = (FromTable, Record)
+"""Those that read a file, named by the key `table`."""

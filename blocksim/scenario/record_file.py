@@ -1,0 +1,189 @@
+"""Accelerograms as files have them: PEER AT2, and text or CSV with a column of time and one of acceleration.
+
+AT2, of the PEER and NGA data bases: four lines of head with the unit in the third and `NPTS= 4000, DT= .0050 SEC` in
+the fourth (older files: `4000 0.0050 NPTS, DT`), then the samples, several a line. The format follows from this line,
+not from the file's name.
+
+Two columns, separated by blanks, commas or semicolons: times in s at a constant step, accelerations. Lines that begin
+with `#` or `%` are notes. A first line with names may say the unit: g, m/s2, cm/s2 (gal).
+"""
+
+import math
+import re
+import statistics
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from blocksim.errors import BlocksimError
+from blocksim.scenario.bounded_read import read_limited
+from blocksim.scenario.models.motion import LEAST_ROWS, MAX_BYTES, MAX_ROWS, MotionTable, MotionTableError
+from blocksim.scenario.quantities import shown
+from blocksim.scenario.units import STANDARD_GRAVITY
+
+Unit = Literal["g", "m/s^2", "cm/s^2"]
+UNITS: dict[Unit, float] = {"g": STANDARD_GRAVITY, "m/s^2": 1.0, "cm/s^2": 0.01}
+"""Units of acceleration in SI."""
+_PER_S2 = r"(?:[/_ ]?\s?s(?:ec)?\s?(?:2|\^2|²|\*\*2|[/_]s(?:ec)?\b))"
+_UNIT_WORDS: tuple[tuple[Unit, re.Pattern[str]], ...] = (
+    ("cm/s^2", re.compile(rf"(?<![a-z])(?:cm{_PER_S2}|gals?(?![a-z]))", re.IGNORECASE)),
+    ("m/s^2", re.compile(rf"(?<![a-z])m{_PER_S2}", re.IGNORECASE)),
+    ("g", re.compile(r"(?<![a-z])g(?![a-z0-9])", re.IGNORECASE)),
+)
+_AT2 = re.compile(r"NPTS\s*=\s*(\d+)\s*,?\s*DT\s*=\s*([0-9.]+(?:[ED][+-]?\d+)?)", re.IGNORECASE)
+_OLD_AT2 = re.compile(r"^\s*(\d+)\s+([0-9.]+(?:[ED][+-]?\d+)?)\s+NPTS\s*,?\s*DT", re.IGNORECASE)
+_OTHER = re.compile(r"\b(velocity|displacement)\b", re.IGNORECASE)
+_IN_UNITS = re.compile(r"\bUNITS?\b(?:\s+OF|\s*[:=])?\s*(.*)$", re.IGNORECASE)
+HEAD_LINES = 8
+"""Lines among which the one with NPTS and DT is looked for."""
+GAP = 1.5
+"""Steps between two samples above which some are missing."""
+UNEVEN = 0.25
+"""Steps by which a time may be off from a constant step: files round them."""
+COLUMNS = 2
+
+
+class Line(NamedTuple):
+    """A line of the file."""
+
+    number: int  # from 1
+    text: str
+
+
+@dataclass(frozen=True)
+class RecordTable(MotionTable):
+    """Samples of acceleration at a constant step, in m/s² where the file says its unit, otherwise as in the file."""
+
+    unit: Unit | None = field(kw_only=True)  # as the file says
+
+
+def read_record(path: Path) -> RecordTable:
+    """Read an accelerogram; raises MotionTableError with the line of the first mistake."""
+    try:
+        content = read_limited(path, MAX_BYTES, links=True)
+    except BlocksimError as error:
+        message = str(error).removeprefix(f"{path}: ")
+        raise MotionTableError(message) from None
+    text = content.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
+    lines = [Line(number, line) for number, line in enumerate(text.split("\n"), start=1)]
+    head = next((line for line in lines[:HEAD_LINES] if _size_of(line)), None)
+    unit, times, values = _two_columns(lines) if head is None else _at2(lines, head)
+    factor = 1.0 if unit is None else UNITS[unit]
+    return RecordTable(path, "acceleration", tuple(times), tuple(factor * one for one in values), content, unit=unit)
+
+
+def _size_of(line: Line) -> re.Match[str] | None:
+    return _AT2.search(line.text) or _OLD_AT2.search(line.text)
+
+
+def _at2(lines: Sequence[Line], head: Line) -> tuple[Unit | None, Iterable[float], list[float]]:
+    """Return unit, times and values of an AT2 file, of which `head` has number and step."""
+    before = lines[: head.number - 1]
+    other = next((line for line in before if _OTHER.search(line.text)), None)
+    if other is not None:
+        message = f"line {other.number}: {shown(other.text.strip())}: an acceleration is needed"
+        raise MotionTableError(message)
+    found = _size_of(head)
+    assert found is not None  # noqa: S101 - this is how the line was found
+    count, step = int(found[1]), _number(head.number, found[2])
+    if step <= 0.0:
+        message = f"line {head.number}: step {found[2]} s: it must be above 0"
+        raise MotionTableError(message)
+    values = [_number(line.number, word) for line in lines[head.number :] for word in line.text.split()]
+    if len(values) != count:
+        last = max((line.number for line in lines if line.text.strip()), default=head.number)
+        message = f"line {last}: the file ends after {len(values)} samples; line {head.number} has NPTS = {count}"
+        raise MotionTableError(message)
+    _check_count(count)
+    said = (_IN_UNITS.search(line.text) for line in before)
+    unit = next((_unit_in(one[1]) for one in said if one is not None and one[1]), None)
+    return unit, (number * step for number in range(count)), values
+
+
+def _two_columns(lines: Sequence[Line]) -> tuple[Unit | None, Iterable[float], list[float]]:
+    """Return unit, times and values of a file with two columns."""
+    kept = [line for line in lines if line.text.strip() and line.text.lstrip()[0] not in "#%"]
+    unit, is_named = _named_unit(kept[0]) if kept else (None, False)
+    rows = list(_rows(kept[is_named:]))
+    _check_count(len(rows))
+    times = [time for _, time, _ in rows]
+    step = (times[-1] - times[0]) / (len(times) - 1)
+    _check_steps([number for number, *_ in rows], times, step)
+    return unit, (times[0] + place * step for place in range(len(times))), [value for *_, value in rows]
+
+
+def _rows(lines: Iterable[Line]) -> Iterator[tuple[int, float, float]]:
+    """Yield line, time and acceleration of every sample."""
+    for number, text in lines:
+        cells = _cells(text)
+        if len(cells) != COLUMNS:
+            message = f"line {number}: {shown(text.strip())}: a time and an acceleration are needed"
+            raise MotionTableError(message)
+        yield number, _number(number, cells[0]), _number(number, cells[1])
+
+
+def _cells(text: str) -> list[str]:
+    return [cell for cell in re.split(r"[,;\s]+", text.strip()) if cell]
+
+
+def _named_unit(line: Line) -> tuple[Unit | None, bool]:
+    """Return the unit that the first line says, and whether it names columns at all."""
+    try:
+        float(_cells(line.text)[0])
+    except (ValueError, IndexError):
+        pass
+    else:
+        return None, False
+    text = line.text.strip()
+    if not re.match(r"\W*t", text, re.IGNORECASE):
+        message = f"line {line.number}: {shown(text)}: neither numbers nor columns of time and acceleration"
+        raise MotionTableError(message)
+    if re.match(r"[^,;]*(?<![a-z])ms(?![a-z/])", text, re.IGNORECASE):
+        message = f"line {line.number}: {shown(text)}: times in s are needed"
+        raise MotionTableError(message)
+    first = re.split(r"[,;]", text, maxsplit=1) if re.search(r"[,;]", text) else text.split(maxsplit=1)
+    return _unit_in(first[-1]), True
+
+
+def _unit_in(text: str) -> Unit | None:
+    return next((unit for unit, word in _UNIT_WORDS if word.search(text)), None)
+
+
+def _check_count(count: int) -> None:
+    if not LEAST_ROWS <= count <= MAX_ROWS:
+        message = f"{count} samples; {LEAST_ROWS} to {MAX_ROWS} are allowed"
+        raise MotionTableError(message)
+
+
+def _check_steps(lines: Sequence[int], times: Sequence[float], mean: float) -> None:
+    """Raise MotionTableError at the first time that does not increase, after a gap, or off a constant step (s)."""
+    steps = [after - before for before, after in pairwise(times)]
+    usual = statistics.median(steps)
+    for place, step in enumerate(steps, start=1):
+        why = ""
+        if step <= 0.0 or times[0] < 0.0:
+            why = "times must increase from 0 or later"
+        elif step > GAP * usual:
+            why = f"a gap of {step:g} s, the step is {usual:g} s"
+        if why:
+            message = f"line {lines[place]}: time {times[place]:g} s: {why}"
+            raise MotionTableError(message)
+    for place, time in enumerate(times):
+        if abs(time - times[0] - place * mean) > UNEVEN * mean:
+            why = f'not at a constant step of {usual:g} s; a motion of kind "table" takes any steps'
+            message = f"line {lines[place]}: time {time:g} s: {why}"
+            raise MotionTableError(message)
+
+
+def _number(line: int, text: str) -> float:
+    """Return a number of the file, also with the D of Fortran in its exponent."""
+    try:
+        number = float(re.sub(r"(?<=[0-9.])[dD](?=[+-]?\d)", "E", text))
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        message = f"line {line}: {shown(text)} is not a finite number"
+        raise MotionTableError(message)
+    return number
