@@ -37,8 +37,8 @@ def plot_command(
         str | None,
         typer.Option(
             metavar="KIND",
-            help="Of a run: strip (default), final or history. Of a sweep: lines, map (two inputs), matrix (every two "
-            "inputs) or histogram; tornado for sensitivities (default: what suits).",
+            help="Of a run: strip (default), final, history, motion (of the supports). Of a sweep: lines, map (two "
+            "inputs), matrix (every two inputs) or histogram; tornado for sensitivities (default: what suits).",
         ),
     ] = None,
     frames: Annotated[
@@ -68,8 +68,9 @@ def plot_command(
 
     The strip shows the measured ranges below the final state. --kind final shows where the blocks end, with rotation
     and measured range below each of them; --kind history shows x, y, rotation, energies, contacts and the ground's
-    motion over time, or the panels of --panels. --forces draws contact forces as arrows, of runs that have stored them
-    (output.contacts = true). A run that was stopped or killed is drawn as far as it came.
+    motion over time, or the panels of --panels; --kind motion shows acceleration, velocity and displacement of the
+    supports with their peaks, also of a scenario that has not been run. --forces draws contact forces as arrows, of
+    runs that have stored them (output.contacts = true). A run that was stopped or killed is drawn as far as it came.
 
     A sweep over one key, or a second one with few values, is drawn as lines of final x; over two keys as a map of
     run-outs and outcomes; a sampled one as a matrix of its inputs. The measured range is marked in all of them. A

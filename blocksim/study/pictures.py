@@ -9,18 +9,20 @@ import numpy as np
 
 from blocksim.analysis.experiment import load_table
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
-from blocksim.scenario import Scenario, load_stored
+from blocksim.scenario import Scenario, load_scenario, load_stored
 from blocksim.scenario.csv_table import Cell, raise_problems, read_open_table
 from blocksim.scenario.spelling import did_you_mean_or_list
-from blocksim.study.stored_run import stored_run
+from blocksim.simulation import folder as files
+from blocksim.study.stored_run import find_run, stored_run
 from blocksim.study.study_pictures import draw_study, study_in
 from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import is_sweep
 from blocksim.view.history_panels import Choice
-from blocksim.view.kinds import FINAL, HISTORY, STRIP, SWEEP_KINDS, Kind, kind_for, run_kind
+from blocksim.view.kinds import FINAL, HISTORY, MOTION, STRIP, SWEEP_KINDS, Kind, kind_for, run_kind
 from blocksim.view.layout import OWN, Paper
 from blocksim.view.levels import Panel, draw_levels
+from blocksim.view.motion import draw_support_motion
 from blocksim.view.paint import paint_named
 from blocksim.view.run_data import support_of
 from blocksim.view.style import picture_suffix
@@ -248,7 +250,25 @@ def draw(  # noqa: PLR0913 - what a picture is made of
     if place.suffix.lower() == ".csv":
         refuse(asked.of_runs(), f"{place} is a table")
         return draw_indices(place, out, kind, paper, ready=ready), ""
+    if kind == MOTION:
+        refuse(asked.of_runs(), f"this picture is of kind {kind}")
+        return draw_motion_of(place, out, paper, ready=ready), ""
     return draw_run(place, out, asked, experiment, kind or STRIP, paper, ready=ready)
+
+
+def draw_motion_of(place: Path, out: Path | None, paper: Paper, *, ready: Callable[[Path], None]) -> Path:
+    """Draw how the supports of a run or of a scenario file move, which need not have been run; return the picture.
+
+    Raises what loading the scenario and `draw_support_motion` raise.
+    """
+    if place.is_file():
+        scenario = load_scenario(place)
+    else:
+        scenario = load_stored(find_run(place, needed=(files.SCENARIO,)) / files.SCENARIO)
+    picture = out or Path(f"{scenario.name}_{MOTION}.png")
+    ready(picture)
+    draw_support_motion(support_of(scenario), scenario.time.end, picture, f"{scenario.name}: motion", paper)
+    return picture
 
 
 def refuse(given: Sequence[str], what: str) -> None:

@@ -41,6 +41,16 @@ def test_other_kinds_are_drawn(blocksim: Command, finished: Path, kind: str, tol
     assert f"<!-- {told} -->" in Path("picture.svg").read_text(encoding="utf-8")
 
 
+def test_the_motion_of_supports_is_drawn_without_a_run(blocksim: Command, finished: Path) -> None:
+    answer = blocksim("plot", "scenarios/pulse.toml", "--kind", "motion")
+    assert (answer.code, answer.err) == (0, "picture: pulse_motion.png\n")
+    answer = blocksim("plot", finished, "--kind", "motion")
+    assert (answer.code, answer.err) == (
+        65,
+        "the supports of this scenario do not move: it has no table [motion]\n",
+    )
+
+
 def test_the_last_frame_is_reached_by_the_time_printed_above_it(blocksim: Command, finished: Path) -> None:
     assert blocksim("plot", finished, "--out", "strip.svg").code == 0
     texts = Path("strip.svg").read_text(encoding="utf-8")

@@ -1,0 +1,118 @@
+"""Named lines over time, a panel for each quantity, one below the other."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from blocksim.view import style
+from blocksim.view.layout import OWN, Paper, add_axes, number_axis, write_heading, write_text
+from blocksim.view.run_data import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH = 7.2  # inches
+LEFT, RIGHT, HEAD, FOOT = 0.78, 1.75, 0.40, 0.42  # inches; texts stand on the right
+PANEL, GAP = 1.3, 0.16  # inches
+LOWEST, NARROWEST = 0.6, 1.0  # inches, of a panel on a page whose size was asked for
+BESIDE = 0.1  # inches, from a panel to its text
+LINE = 0.155  # inches, of a line of text
+MOST_POINTS = 4000  # of a line; each that stands for many shows their range
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)))
+
+
+@dataclass(frozen=True)
+class TimePanel:
+    """A quantity over time: lines by name, each times (s) and values in the unit of the label."""
+
+    label: str
+    lines: Mapping[str, tuple[Floats, Floats]]
+    note: str = ""  # beside the panel, below the names of the lines
+    marks: Sequence[tuple[float, float]] = field(default=())  # points (s, value) that are marked
+
+
+def draw_time_panels(
+    panels: Sequence[TimePanel], path: Path, title: str | None, note: str = "", paper: Paper = OWN
+) -> None:
+    """Draw panels one below the other; names of lines are written where a panel has more than one.
+
+    Raises InvalidInputError for an unknown picture format or too small a page, OutputError when the file cannot be
+    written.
+    """
+    style.picture_suffix(path)
+    width = paper.width(WIDTH, LEFT + RIGHT + NARROWEST)
+    others = HEAD + FOOT + (LINE if note else 0.0) + (len(panels) - 1) * GAP
+    own = max(PANEL, *(LINE * (_rows(panel) + 1) for panel in panels))
+    height = paper.panel(own, len(panels), others, LOWEST)
+    total = paper.height(others + len(panels) * height)
+    with style.styled_figure(width, total, paper.dots) as figure:
+        span = _span(panels)
+        drawn = []
+        for row, panel in enumerate(panels):
+            bottom = total - HEAD - (row + 1) * height - row * GAP
+            axes = add_axes(figure, LEFT, bottom, width - LEFT - RIGHT, height)
+            _draw(axes, panel, span)
+            drawn.append(axes)
+            axes.tick_params(axis="x", labelbottom=row == len(panels) - 1)
+            axes.yaxis.set_label_coords(-0.55 / (width - LEFT - RIGHT), 0.5)
+            _write_beside(figure, panel, width - RIGHT + BESIDE, bottom + height)
+        drawn[-1].set_xlabel("time (s)", labelpad=2.0)
+        write_heading(figure, title, 0.12, 0.08)
+        write_text(figure, 0.12, 0.05, note, color=style.FAINT_INK, va="bottom")
+        style.save_figure(figure, path)
+
+
+def _rows(panel: TimePanel) -> int:
+    return (len(panel.lines) if len(panel.lines) > 1 else 0) + (panel.note.count("\n") + 1 if panel.note else 0)
+
+
+def _span(panels: Sequence[TimePanel]) -> tuple[float, float]:
+    times = [time for panel in panels for time, _ in panel.lines.values() if len(time)]
+    first, last = min(float(time[0]) for time in times), max(float(time[-1]) for time in times)
+    return first, first + max(last - first, 1e-9)
+
+
+def _look(number: int) -> dict[str, Any]:
+    colour, dashes = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
+    return {"color": colour, "linestyle": dashes, "linewidth": 1.0}
+
+
+def _draw(axes: "Axes", panel: TimePanel, span: tuple[float, float]) -> None:
+    axes.axhline(0.0, color=style.FAINT_INK, linewidth=0.4)
+    for number, (time, values) in enumerate(panel.lines.values()):
+        axes.plot(*thinned(time, values), **_look(number))
+    for moment, value in panel.marks:
+        axes.plot(moment, value, marker="o", markersize=3.5, color=style.MEASURED_COLOUR, clip_on=False)
+    axes.set_xlim(span)
+    axes.margins(y=0.08)
+    axes.spines[["right", "top"]].set_visible(False)
+    axes.set_ylabel(panel.label)
+    number_axis(axes.yaxis)
+    number_axis(axes.xaxis, 8)
+
+
+def _write_beside(figure: "Figure", panel: TimePanel, left: float, top: float) -> None:
+    room = (RIGHT - 2.0 * BESIDE) * style.POINTS_PER_INCH
+    names = [*panel.lines] if len(panel.lines) > 1 else []
+    for number, name in enumerate(names):
+        cut = style.cut_to(name, room, style.FONT_SIZE)
+        write_text(figure, left, top - number * LINE, cut, va="top", color=_look(number)["color"])
+    write_text(figure, left, top - len(names) * LINE, panel.note, va="top")
+
+
+def thinned(time: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return at most MOST_POINTS points of a line: of each stretch the first, least, greatest and last one."""
+    if len(time) <= MOST_POINTS:
+        return time, values
+    edges = np.linspace(0, len(time), MOST_POINTS // 4 + 1).round().astype(np.intp)
+    kept: set[int] = set()
+    for first, after in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        part = values[first:after]
+        kept |= {first, after - 1, first + int(np.argmin(part)), first + int(np.argmax(part))}
+    places = np.array(sorted(kept), dtype=np.intp)
+    return time[places], values[places]

@@ -1,0 +1,39 @@
+"""The picture of the supports' motion."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blocksim.errors import InvalidInputError
+from blocksim.scenario.motion import motion_pieces
+from blocksim.view.motion import draw_support_motion
+from blocksim.view.run_data import Support
+from blocksim.view.time_panels import MOST_POINTS, thinned
+from tests.scenario.test_motion import END, scenario
+
+PULSE = {"kind": "pulse", "shape": "rectangular", "amplitude": "0.5 g", "duration": 0.1, "start": 0.2}
+
+
+def test_the_peaks_and_what_stays_are_printed(tmp_path: Path) -> None:
+    path = tmp_path / "motion.svg"
+    draw_support_motion(Support(motion=motion_pieces(scenario(PULSE))), END, path, "pulse")
+    texts = path.read_text(encoding="utf-8")
+    for told in ("PGA 4.903 m/s²", "= 0.5 g", "PGV 490.3 mm/s", "PGD 1348 mm", "At the end: 490.3 mm/s, 1348 mm."):
+        assert f"{told}" in texts
+
+
+def test_supports_at_rest_have_no_picture(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="do not move"):
+        draw_support_motion(Support(), END, tmp_path / "motion.png")
+
+
+def test_a_thinned_line_keeps_its_peaks() -> None:
+    time = np.arange(100_000.0)
+    values = np.sin(time)
+    values[[123, 77_777]] = 5.0, -7.0
+    kept, drawn = thinned(time, values)
+    assert len(kept) <= MOST_POINTS
+    assert (drawn.max(), drawn.min()) == (5.0, -7.0)
+    assert (kept[0], kept[-1]) == (0.0, 99_999.0)
+    assert np.all(np.diff(kept) > 0)
