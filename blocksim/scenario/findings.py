@@ -9,6 +9,7 @@ from pydantic_core import ErrorDetails
 
 from blocksim.scenario.keys import MISSING, NAMED, KeyPath, field_at, follow, keys_of, table_at
 from blocksim.scenario.models.motions import MOTIONS
+from blocksim.scenario.models.probe import PROBES
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES, scheme_of
 from blocksim.scenario.quantities import shown
@@ -19,7 +20,7 @@ from blocksim.scenario.systems import HELD, SYSTEMS
 TWO_VALUES = "two values are needed, one along x and one along y"
 MAX_FINDINGS = 200
 """Mistakes that are examined; a file of a million mistakes must not take minutes."""
-KINDS_IN: dict[str | int, Iterable[str]] = {"structures": KINDS, "motion": MOTIONS}
+KINDS_IN: dict[str | int, Iterable[str]] = {"structures": KINDS, "motion": MOTIONS, "probes": PROBES}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +73,7 @@ def _path(loc: Sequence[str | int]) -> KeyPath:
     path = tuple(loc)
     if path[:1] == (HELD,):
         return path[1:]
-    if path[:1] == ("structures",):
+    if path[:1] in (("structures",), ("probes",)):
         return (*path[:2], *path[3:])
     if path[:1] == ("time",) and path[1:2] not in [(scheme,) for scheme in SCHEMES]:
         return path  # of a scheme that is none of the union

@@ -14,6 +14,7 @@ from blocksim.scenario.keys import options, si_unit
 from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
 from blocksim.scenario.models.motions import MOTIONS
+from blocksim.scenario.models.probe import PROBES, Probe
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES, Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
@@ -46,6 +47,8 @@ def key_table() -> str:
         ("time", Time),
         *((f'time, scheme = "{scheme}"', model) for scheme, model in SCHEMES.items()),
         ("output", Output),
+        ("probes, every kind", Probe),
+        *((f'probes, kind = "{kind}"', model) for kind, model in PROBES.items()),
         ("experiment", Experiment),
         ("sweep", Sweep),
         *SYSTEMS.items(),
@@ -68,7 +71,9 @@ def with_part(text: str, begin: str, part: str, end: str) -> str:
 def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
     place = prefix.partition(",")[0]
     note = prefix.partition(", ")[2]
-    told = next((base.model_fields for base in (Structure, Time) if issubclass(model, base) and model is not base), {})
+    told = next(
+        (base.model_fields for base in (Structure, Time, Probe) if issubclass(model, base) and model is not base), {}
+    )
     for name, info in model.model_fields.items():
         has_rows_of_its_own = _is_table(info) and model not in {Friction, Pair, Sweep} and name != "provenance"
         if name == "kind" or info.alias == HELD or name in told or has_rows_of_its_own:

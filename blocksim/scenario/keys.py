@@ -18,7 +18,15 @@ from blocksim.scenario.systems import HELD, SYSTEMS
 KeyPath = tuple[str | int, ...]
 """Path in a scenario, such as ("structures", 0, "overlap")."""
 
-NAMED: dict[str | int, int] = {"materials": 2, "blocks": 2, "structures": 2, "bodies": 2, "walls": 2, "pairs": 3}
+NAMED: dict[str | int, int] = {
+    "materials": 2,
+    "blocks": 2,
+    "structures": 2,
+    "bodies": 2,
+    "walls": 2,
+    "pairs": 3,
+    "probes": 2,
+}
 """Tables of named or numbered entries: how many parts of a path lead to one entry."""
 
 TAGS = ("kind", "scheme")

@@ -13,6 +13,7 @@ from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.motion import PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.placement import PlacedBody, origins_of, place_bodies
+from blocksim.scenario.probes import unfit_probes
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.segments import TOLERANCE, profile_segments, surface_heights, wall_segments
 from blocksim.scenario.structures import MAX_BLOCKS, UnfitError
@@ -63,6 +64,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
     yield from _in_walls(scenario, origins, bodies)
     yield from _overlaps(origins, bodies)
     yield from _unfit_systems(scenario)
+    yield from unfit_probes(scenario, bodies)
 
 
 def _ends(bodies: Sequence[PlacedBody], name: str) -> tuple[float, float]:

@@ -136,6 +136,7 @@ class _Going:
         self._advance(0)
         self.start = start_energy(self.scene)
         self.recorder.sample(self.scene)
+        self.recorder.probes.sample(self.scene)
 
     def go_on(self) -> str:
         """Run to the end, or until somebody wants to stop; return why, and nothing at the end."""
@@ -148,10 +149,10 @@ class _Going:
 
     def _go_to(self, wanted: int) -> None:
         """Advance towards a step at which a frame is wanted, as far as one call goes."""
-        done, before = self.done, self.seconds
+        done, before = self.done, time.perf_counter()
         look = next_energy_check(done, self.bodies)
-        self._advance(min(wanted, look, done + self.pace.steps, self.keeper.next_step(done)))
-        self.pace.learn(self.done - done, self.seconds - before)
+        self._go_by_probes(min(wanted, look, done + self.pace.steps, self.keeper.next_step(done)))
+        self.pace.learn(self.done - done, time.perf_counter() - before)
         if self.done == wanted:
             self.recorder.sample(self.scene)
         ledger = energy_ledger(self.scene, self.start)
@@ -159,6 +160,14 @@ class _Going:
         if self.status == REACHED and adds_up(ledger) and self.done < self.last and self.keeper.is_due(self.done):
             self.keep_checkpoint()
         self.on_progress(Progress(self.done * self.step, self.end, self.done, ledger.relative_residual))
+
+    def _go_by_probes(self, last_step: int) -> None:
+        """Advance to a step in one call, or in several where probes are to be sampled on the way."""
+        probes = self.recorder.probes
+        while self.status == REACHED and self.done < last_step:
+            self._advance(min(last_step, probes.next_step(self.done)))
+            probes.sample(self.scene)
+        self.recorder.keep_up()
 
     def _advance(self, last_step: int) -> None:
         self.seconds -= time.perf_counter()

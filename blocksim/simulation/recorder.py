@@ -13,6 +13,7 @@ from blocksim.simulation.contacts import Contacts, joined
 from blocksim.simulation.contacts import Rows as ContactRows
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.movement import Watch
+from blocksim.simulation.probes import NO_PROBES, Probes
 from blocksim.world.systems.blocks import BLOCKS, blocks_placed
 from blocksim.world.systems.system import Floats, Present, Track
 
@@ -45,6 +46,9 @@ class FrameSink(Protocol):
     def append(self, frame: Frame) -> None:
         """Keep one frame."""
 
+    def keep_up(self) -> None:
+        """Keep the samples of probes so far, where enough time has passed."""
+
 
 def steps_per_frame(every: float, step: float) -> float:
     """Return the number of steps (s) between two frames that are wanted `every` seconds; at least one, not rounded."""
@@ -54,7 +58,7 @@ def steps_per_frame(every: float, step: float) -> float:
 class Recorder:
     """Frames, growing as the run continues; with a sink only the last one, so that long runs need no more memory."""
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - what there is to record
         self,
         placed: Sequence[PlacedBody],
         every: float,
@@ -63,10 +67,12 @@ class Recorder:
         *,
         others: Sequence[Present] = (),
         contacts: bool = False,
+        probes: Probes = NO_PROBES,
     ) -> None:
         """Record every `every` seconds, at the nearest step of length `step` (s); where there is a `sink`, in there.
 
         `others` are the systems beside the blocks. With `contacts` the contacts of every frame are recorded as well.
+        `probes` are sampled at steps of their own.
         """
         self.placed = tuple(placed)
         self.systems = (blocks_placed(placed), *others)
@@ -79,6 +85,7 @@ class Recorder:
         self.held: list[Frame] = []  # the last ones: all, or one
         self.ledger: tuple[str, ...] = ()
         self.with_contacts = contacts
+        self.probes = probes
         self.watch = Watch(self.placed)
 
     def next_step(self, done: int) -> int:
@@ -86,6 +93,11 @@ class Recorder:
         from blocksim.kernels.frame_times import next_frame  # noqa: PLC0415 - kernels, not for readers
 
         return next_frame(done, self.steps_per_frame)
+
+    def keep_up(self) -> None:
+        """Let the sink keep the samples of probes so far."""
+        if self.probes.all and self.sink is not None:
+            self.sink.keep_up()
 
     def is_output_time(self, step: int) -> bool:
         """Return True if a step is recorded wherever the run ends."""

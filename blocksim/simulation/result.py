@@ -10,6 +10,8 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, load_stored, place_bodies
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames, data_set, tidy_table
+from blocksim.simulation.probe_series import ProbeSeries
+from blocksim.simulation.stores.hdf5_probes import read_probes
 from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import Columns, as_frame, read_table
@@ -30,6 +32,7 @@ class Result:
     scenario: Scenario
     folder: Path | None = None
     held: Frames | None = field(default=None, repr=False)  # frames in memory, where they are
+    held_probes: dict[str, ProbeSeries] | None = field(default=None, repr=False)  # samples in memory, where they are
 
     @cached_property
     def frames(self) -> Frames:
@@ -38,6 +41,14 @@ class Result:
             return self.held
         assert self.folder is not None  # noqa: S101 - one of the two is there
         return read_frames(self.folder / files.FRAMES, self.scenario)
+
+    @cached_property
+    def probes(self) -> dict[str, ProbeSeries]:
+        """The samples of probes by name, read from the folder when first asked for. Raises what reading them raises."""
+        if self.held_probes is not None:
+            return self.held_probes
+        assert self.folder is not None  # noqa: S101 - one of the two is there
+        return read_probes(self.folder / files.FRAMES, self.scenario)
 
     @cached_property
     def final(self) -> "pd.DataFrame":

@@ -17,6 +17,7 @@ from pathlib import Path
 from blocksim.errors import BlocksimError, OutputExistsError
 from blocksim.scenario import Scenario, motion_table_content, scenario_to_toml
 from blocksim.scenario.bounded_read import MEGABYTE, read_head, read_limited
+from blocksim.scenario.probes import probe_names
 from blocksim.scenario.resolved import HEADER
 from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
 from blocksim.simulation.table import COLUMNS
@@ -26,6 +27,8 @@ EXPERIMENT = "experiment.csv"  # copy of the table that the scenario names
 MOTION = "motion.csv"  # copy of the table of the support's motion
 FINAL = "final.csv"
 FRAMES = "run.h5"
+PROBE = "probe-"  # and its name: CSV of a probe
+PROBE_LEFTOVER = re.compile(r"\.probe-[A-Za-z0-9._-]+\.csv\.[a-z0-9_]{8}(?:\.csv)?")  # killed while it was written
 SUMMARY = "run.json"
 DONE = "done.json"  # written last: a folder without it is not finished
 CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run continues, removed when it has finished
@@ -83,6 +86,15 @@ RUN_KINDS: Mapping[str, Kind] = {
 COPIES = (EXPERIMENT, MOTION)
 
 
+def probe_tables(scenario: Scenario) -> list[str]:
+    """Return the names of the CSV files of the probes of a scenario."""
+    return [f"{PROBE}{name}.csv" for name in probe_names(scenario)]
+
+
+def _is_probe_table(path: Path) -> bool:
+    return path.name.startswith(PROBE) and path.suffix == ".csv" and _is_of_kind(path, begins(b"step,time_s,"))
+
+
 def is_written(path: Path, kinds: Mapping[str, Kind], plan: str = SCENARIO) -> bool:
     """Return True if blocksim wrote a file: one of these kinds, a copy that the plan beside it names, or a leftover."""
     if not _is_plain_file(path):
@@ -91,7 +103,9 @@ def is_written(path: Path, kinds: Mapping[str, Kind], plan: str = SCENARIO) -> b
         return path.name in copies(path.parent, plan)
     if path.name in kinds:
         return _is_of_kind(path, kinds[path.name])
-    return is_leftover(path.name, (*kinds, *COPIES))
+    if FRAMES in kinds and _is_probe_table(path):
+        return True
+    return is_leftover(path.name, (*kinds, *COPIES)) or PROBE_LEFTOVER.fullmatch(path.name) is not None
 
 
 def _is_of_kind(path: Path, kind: Kind) -> bool:

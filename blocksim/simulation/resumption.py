@@ -16,6 +16,7 @@ from blocksim.scenario.resolved import deciding_values
 from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint import Origin, Stored, origin_of, read_checkpoint
 from blocksim.simulation.recorder import Recorder, Rows, rows_of_frames
+from blocksim.simulation.stores.hdf5_probes import read_probes
 from blocksim.simulation.stores.hdf5_reader import read_systems
 
 MOST_NAMED = 6  # differences in a message
@@ -90,6 +91,16 @@ def check_frames(stored: Stored, recorder: Recorder) -> None:
             f"{path}: changed after the interruption: the {count} frames before step {position.step} do not "
             f"match the SHA-256 in {stored.path.name}; {REMEDY}"
         )
+
+
+def take_over_probes(stored: Stored, scenario: Scenario, recorder: Recorder) -> None:
+    """Begin with the samples of probes before a checkpoint. Raises InvalidInputError where some are missing."""
+    if recorder.probes.all:
+        path = stored.path.parent / files.FRAMES
+        missing = recorder.probes.take_over(read_probes(path, scenario), stored.position.step)
+        if missing:
+            where = f"before step {stored.position.step}, at which {stored.path.name} resumes"
+            raise InvalidInputError(f"{path}: samples of probe {missing[0]} are missing {where}; {REMEDY}")
 
 
 def _newest_good(paths: list[Path], scenario: Scenario) -> Resumption:

@@ -23,13 +23,24 @@ from blocksim.simulation.compilation import compile_kernels, compile_systems, ke
 from blocksim.simulation.folder import CHECKPOINTS, folder_lock
 from blocksim.simulation.ledger import RESIDUAL_PROMISE
 from blocksim.simulation.loop import Attendance, LoopResult, Watcher, last_step_of, run_loop
+from blocksim.simulation.probe_series import bytes_of_series
+from blocksim.simulation.probes import probes_of
 from blocksim.simulation.provenance import environment, run_hash, state_hash
 from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.result import Result
-from blocksim.simulation.result_files import keep_scenario, read_tables
-from blocksim.simulation.resumption import NEW, Resumption, check_frames, find_resumption, kept_rows, remarks_on
+from blocksim.simulation.result_files import PROBE, keep_scenario, probe_tables, read_tables
+from blocksim.simulation.resumption import (
+    NEW,
+    Resumption,
+    check_frames,
+    find_resumption,
+    kept_rows,
+    remarks_on,
+    take_over_probes,
+)
 from blocksim.simulation.schemes import AnyScene, build, ledger_names
 from blocksim.simulation.stopping import WallTime, stop_requests
+from blocksim.simulation.stores.hdf5_probes import read_probes
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import csv_text, final_columns
@@ -140,7 +151,8 @@ def _attended(
 
 def _recorder(scenario: Scenario, built: Built) -> Recorder:
     step, output = float(built.scene.world.controls[0].step), scenario.output
-    return Recorder(built.placed, output.every, step, others=others_of(scenario), contacts=output.contacts)
+    probes, others = probes_of(scenario, built.placed, step, ledger_names(built.scene)), others_of(scenario)
+    return Recorder(built.placed, output.every, step, others=others, contacts=output.contacts, probes=probes)
 
 
 class Part:
@@ -161,6 +173,7 @@ class Part:
             self.past = Past.of(stored.path, stored.position)
             self.recorder.take_over(kept_rows(folder, self.recorder))
             check_frames(stored, self.recorder)
+            take_over_probes(stored, scenario, self.recorder)
 
     def prepare(self, tables: Mapping[str, bytes], *, overwrite: bool) -> str:
         """Make the folder ready for this part; return the resolved scenario. Raises OutputExistsError, OutputError."""
@@ -179,9 +192,12 @@ class Part:
             kept=self.recorder.held,
             others=self.recorder.systems[1:],
             contacts=self.scenario.output.contacts,
+            probes=self.recorder.probes,
         ) as sink:
             self.recorder.pour_into(sink)
-            files.clear_remains(self.folder, (files.FINAL, files.SUMMARY))  # of the part before
+            files.clear_remains(
+                self.folder, (files.FINAL, files.SUMMARY, *probe_tables(self.scenario))
+            )  # of the part before
             self.writer = self._writer(sink, precautions)
             watched = replace(attendance, keeper=self.writer)
             since = self.resumption.checkpoint and self.resumption.checkpoint.position
@@ -241,7 +257,8 @@ def _bytes_of(path: Path) -> bytes | None:
 def _result(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Result:
     frames = recorder.frames()
     summary = _summary(scenario, recorder, ended, seconds)
-    return Result(scenario.name, final_columns(frames), summary, scenario, held=frames)
+    probes = recorder.probes.series()
+    return Result(scenario.name, final_columns(frames), summary, scenario, held=frames, held_probes=probes)
 
 
 def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Summary:
@@ -289,18 +306,28 @@ def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResul
 
 
 def _with_checksums(summary: Summary, folder: Path) -> Summary:
-    kept = [name for name in (*COPIES, files.FINAL, files.FRAMES) if (folder / name).is_file()]
+    tables = [name for name in summary.sha256 if name.startswith(PROBE)]
+    kept = [name for name in (*COPIES, files.FINAL, files.FRAMES, *tables) if (folder / name).is_file()]
     return summary.model_copy(update={"sha256": {name: sha256_of(folder / name) for name in kept}})
 
 
 def _keep_result(result: Result, summary: Summary, folder: Path) -> Result:
     write_text(folder / files.FINAL, csv_text(result.columns))
-    summary = _with_checksums(summary, folder)
+    tables = _keep_probes(result.scenario, folder)
+    summary = _with_checksums(summary.model_copy(update={"sha256": dict.fromkeys(tables, "")}), folder)
     write_text(folder / files.SUMMARY, summary.to_json())
     if result.status == "finished":
         write_text(folder / files.DONE, json.dumps({"run": summary.run, "status": summary.status}) + "\n")
         files.clear_remains(folder, files.CHECKPOINTS)
     return Result(result.name, result.columns, summary, result.scenario, folder)
+
+
+def _keep_probes(scenario: Scenario, folder: Path) -> list[str]:
+    """Write a CSV for each probe, from what the run file has of it; return their names. Raises OutputError."""
+    tables = probe_tables(scenario)
+    for name, series in zip(tables, read_probes(folder / files.FRAMES, scenario).values(), strict=True):
+        write_text(folder / name, "".join(series.csv_lines()))
+    return tables
 
 
 def refuse_full_disk(folder: Path, scenario: Scenario, scene: AnyScene) -> None:
@@ -323,4 +350,6 @@ def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
     contacts = recorded_contacts(bodies, 0 if particles is None else particles.size) if scenario.output.contacts else 0
     values = sum(one.values for one in others_of(scenario))
     arrays = sum(array.nbytes for array in arrays_of(scene))
-    return file_bytes(bodies, frames, contacts, values) + CHECKPOINT_FILES * arrays
+    step = float(scene.world.controls[0].step)
+    series = bytes_of_series(scenario, steps, step, len(ledger_names(scene)))
+    return series + file_bytes(bodies, frames, contacts, values) + CHECKPOINT_FILES * arrays

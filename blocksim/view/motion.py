@@ -47,9 +47,7 @@ def draw_support_motion(support: Support, end: float, path: Path, title: str | N
     draw_time_panels(panels, path, title, note, paper)
 
 
-def _panel(
-    label: str, factor: float, line: tuple[Floats, Floats], peak: Peak, name: str, more: str = ""
-) -> TimePanel:
+def _panel(label: str, factor: float, line: tuple[Floats, Floats], peak: Peak, name: str, more: str = "") -> TimePanel:
     times, values = line
     near = int(np.argmin(np.abs(times - peak.time) - 1e-9 * np.abs(values)))
     unit = label.partition("(")[2].rstrip(")")

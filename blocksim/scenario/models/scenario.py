@@ -17,6 +17,7 @@ from blocksim.scenario.models.base import Identifier, OneOf, Table
 from blocksim.scenario.models.contact import Contact, Friction, Pair
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
 from blocksim.scenario.models.motions import AnyMotion
+from blocksim.scenario.models.probe import AnyProbe
 from blocksim.scenario.models.stepping import AnyTime, Explicit, Output
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure
@@ -54,6 +55,7 @@ class Scenario(Table):
     contact: Contact = Field(default=Contact(), description="contact model and its numbers")
     time: AnyTime = Field(default=Explicit(), description="time stepping")
     output: Output = Field(default=Output(), description="what is recorded")
+    probes: tuple[AnyProbe, ...] = Field(default=(), description="time histories to record")
     experiment: Experiment | None = Field(default=None, description="measurements to compare with")
     sweep: Sweep | None = Field(default=None, description="what `blocksim sweep` varies")
     provenance: dict[str, str] = Field(

@@ -22,9 +22,11 @@ from blocksim.errors import OutputError
 from blocksim.scenario import PlacedBody
 from blocksim.simulation.atomic import sync_file
 from blocksim.simulation.contacts import Rows
+from blocksim.simulation.probes import NO_PROBES, Probes
 from blocksim.simulation.recorder import Frame
 from blocksim.simulation.stores import hdf5_layout as layout
 from blocksim.simulation.stores.hdf5_contacts import append_contacts, bytes_of_contacts, create_contacts
+from blocksim.simulation.stores.hdf5_probes import append_probes, bytes_of_probes, commit_probes, create_probes
 from blocksim.world.systems.blocks import blocks_placed
 from blocksim.world.systems.system import Present
 
@@ -56,17 +58,19 @@ class FrameFile:
         kept: Iterable[Frame] = (),
         others: Sequence[Present] = (),
         contacts: bool = False,
+        probes: Probes = NO_PROBES,
     ) -> None:
         """Create the file with all its data sets, `ledger` names the energies; raises OutputError when that fails.
 
         It begins with the frames that are `kept` from an earlier part of the run. Only with those on the disk it takes
         the place of an older file. `others` are the systems beside the blocks. With `contacts` every frame has to bring
-        its contacts.
+        its contacts. The samples that `probes` hold are taken from them and written with the frames.
         """
         self.path = path
         self.systems = (blocks_placed(placed), *others)
         self.units = layout.measured_units(ledger)
         self.has_contacts = contacts
+        self.probes = probes
         self.time_step = time_step
         self.count = 0
         self.chunk_rows = min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // max(one.count for one in self.systems)))
@@ -91,7 +95,7 @@ class FrameFile:
 
     def _begin_with(self, kept: Iterable[Frame]) -> None:
         self.waiting.extend(kept)
-        if self.waiting:
+        if self.waiting:  # and with them the samples of probes
             self.commit()
             self.sync()
 
@@ -116,6 +120,7 @@ class FrameFile:
             self._growing(f"{layout.OBSERVABLES}/{name}", np.float64, unit)
         if self.has_contacts:
             create_contacts(self.file, self.chunk_rows)
+        create_probes(self.file, self.probes.series().values())
         for present in self.systems:
             for one, values in zip(present.system.constants, present.elements.constants, strict=True):
                 place = f"{layout.PARTICLES}/{present.system.name}/{one.name}"
@@ -137,16 +142,24 @@ class FrameFile:
     def append(self, frame: Frame) -> None:
         """Take one frame; writes what has come together a few times a second. Raises OutputError."""
         self.waiting.append(frame)
+        self.keep_up()
+
+    def keep_up(self) -> None:
+        """Write what has come together, a few times a second. Raises OutputError."""
         if time.monotonic() - self.flushed_at > FLUSH_SECONDS:
             self.commit()
 
     def commit(self) -> None:
         """Bring all frames so far to the disk and then say how many there are. Raises OutputError (disk full …)."""
+        samples = self.probes.taken().values()
         with self._telling_trouble():
-            if self.waiting:
-                self._reserve((len(self.waiting) + 2 * self.chunk_rows) * self.row_bytes + self._contact_bytes())
+            if self.waiting or any(map(len, samples)):
+                room = (len(self.waiting) + 2 * self.chunk_rows) * self.row_bytes + self._contact_bytes()
+                self._reserve(room + bytes_of_probes(samples))
+                append_probes(self.file, samples)
                 self._write_waiting()
                 self.file.flush()
+            commit_probes(self.file, samples)
             self.file[layout.COMMITTED][()] = self.count
             self.file.flush()
         self.flushed_at = time.monotonic()
@@ -158,6 +171,8 @@ class FrameFile:
             os.fsync(self.file.id.get_vfd_handle())
 
     def _write_waiting(self) -> None:
+        if not self.waiting:
+            return
         steps, states, rows, _ = zip(*self.waiting, strict=True)
         self._put(layout.STEP, np.array(steps))
         self._put(layout.TIME, np.array(steps) * self.time_step)

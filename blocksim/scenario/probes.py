@@ -1,0 +1,138 @@
+"""Probes of a scenario: their names, the bodies and supports that they are about, and the joints between bodies."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from blocksim.scenario.findings import Finding
+from blocksim.scenario.keys import KeyPath
+from blocksim.scenario.models.probe import AnyProbe, ForceProbe, JointProbe, PointProbe
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.placement import PlacedBody
+from blocksim.scenario.quantities import shown
+from blocksim.scenario.segments import TOLERANCE
+from blocksim.scenario.spelling import did_you_mean_or_list
+
+GROUND, WALL, WALLS, SUPPORTS = "ground", "wall", "walls", "supports"
+PARALLEL = 1e-6
+"""Sine of the angle between two faces up to which they make a joint."""
+Point = tuple[float, float]
+
+
+def probe_names(scenario: Scenario) -> list[str]:
+    """Return the names of all probes; one without a name is called by its kind and its number from 1."""
+    return [probe.name or f"{probe.kind}{number}" for number, probe in enumerate(scenario.probes, start=1)]
+
+
+def unfit_probes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[Finding]:
+    """Find names given twice, bodies and supports that do not exist, and bodies without a joint."""
+    seen: set[str] = set()
+    for number, name in enumerate(probe_names(scenario)):
+        if name in seen:
+            yield Finding(("probes", number, "name"), f"two probes are named {shown(name)}")
+        seen.add(name)
+    bodies = {body.name: body for body in placed}
+    supports = support_words(scenario)
+    for number, probe in enumerate(scenario.probes):
+        yield from _unfit(probe, ("probes", number), bodies, supports)
+
+
+def support_words(scenario: Scenario) -> list[str]:
+    """Return the words that mean supports: ground, walls together and one by one, all supports."""
+    walls = [f"{WALL} {number}" for number in range(1, len(scenario.walls) + 1)]
+    return [GROUND, SUPPORTS, *([WALLS] if walls else []), *walls]
+
+
+def _unfit(
+    probe: AnyProbe, path: tuple[str, int], bodies: Mapping[str, PlacedBody], supports: Sequence[str]
+) -> Iterator[Finding]:
+    match probe:
+        case ForceProbe():
+            named = {"on": probe.on} if probe.by is None else {"on": probe.on, "by": probe.by}
+            yield from _unknown([((*path, key), name) for key, name in named.items()], [*bodies, *supports])
+            if probe.by == probe.on:
+                yield Finding((*path, "by"), f"{shown(probe.by)} exerts no force on itself")
+        case PointProbe():
+            yield from _unknown([((*path, "body"), probe.body)], [*bodies])
+        case JointProbe():
+            places: list[tuple[KeyPath, str]] = [
+                ((*path, "bodies", number), name) for number, name in enumerate(probe.bodies)
+            ]
+            unknown = [*_unknown(places, [*bodies])]
+            yield from unknown
+            if not unknown and joint_between(*(bodies[name] for name in probe.bodies)) is None:
+                message = f"bodies {probe.bodies[0]} and {probe.bodies[1]} have no faces that lie opposite each other"
+                yield Finding((*path, "bodies"), f"{message} at the start")
+
+
+def _unknown(named: Sequence[tuple[KeyPath, str]], known: Sequence[str]) -> Iterator[Finding]:
+    for path, name in named:
+        if name not in known:
+            yield Finding(path, f"unknown body {shown(name)}, {did_you_mean_or_list(name, known)}")
+
+
+class Joint(NamedTuple):
+    """A joint between bodies a and b at the start, in the own axes of each (m).
+
+    Its two ends as points of a and of b, the outward normal of a's face, and the tangent along it, which is the normal
+    turned by -90 degrees: towards +x where b lies on a. The first end is the one farther back along the tangent.
+    """
+
+    ends_of_a: tuple[Point, Point]
+    ends_of_b: tuple[Point, Point]
+    normal: Point
+    tangent: Point
+
+
+def joint_between(a: PlacedBody, b: PlacedBody) -> Joint | None:
+    """Return the joint between the faces of two bodies that lie opposite each other, None where none do.
+
+    The faces are parallel, and overlap along each other. Of several such pairs that with the widest gap is the joint.
+    """
+    if abs(math.sin(2.0 * (b.angle - a.angle))) > 2.0 * PARALLEL:
+        return None
+    found = [one for one in (_facing(a, b, quarter) for quarter in range(4)) if one is not None]
+    return max(found, key=lambda one: one[0])[1] if found else None
+
+
+def _facing(a: PlacedBody, b: PlacedBody, quarter: int) -> tuple[float, Joint] | None:
+    """Return the gap (m) and the joint at the face of a whose normal is turned by so many quarters from its x axis."""
+    normal = _turned((1.0, 0.0), quarter)
+    tangent = _turned(normal, 3)
+    corners = np.array([_local(a, *corner) for corner in _corners(b)])
+    across, along = corners @ np.array(normal), corners @ np.array(tangent)
+    half, side = (0.5 * a.size_x, 0.5 * a.size_y) if quarter % 2 == 0 else (0.5 * a.size_y, 0.5 * a.size_x)
+    gap = float(across.min()) - half
+    first, last = max(float(along.min()), -side), min(float(along.max()), side)
+    smallest = min(a.size_x, a.size_y, b.size_x, b.size_y)
+    if gap < -max(TOLERANCE, PARALLEL * smallest) or last - first < PARALLEL * smallest:
+        return None
+    ends = [(half * normal[0] + s * tangent[0], half * normal[1] + s * tangent[1]) for s in (first, last)]
+    opposite = [(x + gap * normal[0], y + gap * normal[1]) for x, y in ends]
+    of_b = [_local(b, *_placed(a, *point)) for point in opposite]
+    return gap, Joint((ends[0], ends[1]), (of_b[0], of_b[1]), normal, tangent)
+
+
+def _turned(vector: Point, quarters: int) -> Point:
+    for _ in range(quarters):
+        vector = (-vector[1], vector[0])
+    return vector
+
+
+def _corners(body: PlacedBody) -> list[Point]:
+    x, y = 0.5 * body.size_x, 0.5 * body.size_y
+    return [_placed(body, *corner) for corner in ((-x, -y), (x, -y), (x, y), (-x, y))]
+
+
+def _placed(body: PlacedBody, x: float, y: float) -> Point:
+    """Return where a point of a body is (m), given in its own axes."""
+    cosine, sine = math.cos(body.angle), math.sin(body.angle)
+    return body.x + cosine * x - sine * y, body.y + sine * x + cosine * y
+
+
+def _local(body: PlacedBody, x: float, y: float) -> Point:
+    """Return a point (m) in the own axes of a body."""
+    cosine, sine = math.cos(body.angle), math.sin(body.angle)
+    return cosine * (x - body.x) + sine * (y - body.y), cosine * (y - body.y) - sine * (x - body.x)

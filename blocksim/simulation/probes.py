@@ -1,0 +1,300 @@
+"""Probes of a run under way: samples at fixed steps, between compiled calls, which never change the motion.
+
+Forces are those of `blocksim.simulation.contacts`: with springs at the time of the sample, with rigid contacts the
+impulses of the last substep over its length. Where the support moves, places and velocities relative to it are given
+beside those in the frame in which it was at rest at the start.
+"""
+
+import math
+import sys
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.scenario import PlacedBody, Scenario, place_segments
+from blocksim.scenario.models.probe import STEP, EnergyProbe, ForceProbe, JointProbe, PointProbe
+from blocksim.scenario.motion import motion_direction, motion_pieces
+from blocksim.scenario.probes import GROUND, SUPPORTS, WALL, WALLS, Joint, joint_between, probe_names
+from blocksim.simulation.contacts import forces_on_a
+from blocksim.simulation.probe_series import Column, ProbeSeries, columns_of, series_of
+
+if TYPE_CHECKING:
+    from blocksim.simulation.schemes import AnyScene
+
+Values = Sequence[float]
+Sampler = Callable[["Moment"], Values]
+
+
+class Moment:
+    """The scene at a step; what several probes need is worked out once."""
+
+    def __init__(self, scene: "AnyScene", support: "MovingSupport") -> None:
+        """Take the scene as it is now."""
+        self.scene = scene
+        self.bodies = scene.world.bodies
+        clock, controls = scene.world.clock[0], scene.world.controls[0]
+        self.step = int(clock.steps)
+        self.support = support
+        self.time = self.step * float(controls.step)
+
+    @cached_property
+    def contacts(self) -> tuple[Any, NDArray[np.float64], NDArray[np.float64]]:
+        """Contacts with the numbers of all bodies, supports too; forces (N) on a, (c, 2); static frictions, (c,)."""
+        from blocksim.simulation.schemes import scheme_of  # noqa: PLC0415 - numba, not for readers
+
+        rows = scheme_of(self.scene).contacts(self.scene, self.bodies.size)
+        classes = self.bodies["contact_class"]
+        table = self.scene.world.interactions["static_friction"]
+        return rows, forces_on_a(rows), table[classes[rows["body_a"]], classes[rows["body_b"]]]
+
+    @cached_property
+    def carried(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Displacement (m) and velocity (m/s) of the support along x and y."""
+        return self.support.at(self.time)
+
+    @cached_property
+    def energies(self) -> Values:
+        """Energies (J) of the ledger."""
+        from blocksim.simulation.schemes import measured_row  # noqa: PLC0415 - numba, not for readers
+        from blocksim.simulation.schemes.scheme import COUNTED  # noqa: PLC0415
+
+        found: list[float] = measured_row(self.scene)[: -len(COUNTED)].tolist()
+        return found
+
+
+class MovingSupport:
+    """Motion of the support, a moment at a time."""
+
+    def __init__(self, scenario: Scenario | None) -> None:
+        """Work out the pieces of its motion once; without a scenario it rests."""
+        self.times: list[float] = []
+        self.coefficients: list[list[float]] = []
+        self.direction = (1.0, 0.0)
+        if scenario is not None:
+            pieces = motion_pieces(scenario)
+            self.direction = motion_direction(scenario)
+            self.times, self.coefficients = pieces.times.tolist(), pieces.coefficients.tolist()
+
+    def at(self, time: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return displacement (m) and velocity (m/s) along x and y at a time (s)."""
+        if not self.coefficients:
+            return (0.0, 0.0), (0.0, 0.0)
+        piece = min(max(bisect_right(self.times, time) - 1, 0), len(self.coefficients) - 1)
+        s = time - self.times[piece]
+        c0, c1, c2, c3 = self.coefficients[piece]
+        moved, speed = c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2.0 * c2 + 3.0 * s * c3)
+        (x, y) = self.direction
+        return (moved * x, moved * y), (speed * x, speed * y)
+
+
+def force_sampler(on: NDArray[np.bool_], by: NDArray[np.bool_]) -> Sampler:
+    """Return what samples the force on some bodies by others, both as flags of all bodies, (n,)."""
+
+    def sample(moment: Moment) -> Values:
+        rows, forces, friction = moment.contacts
+        a, b = rows["body_a"], rows["body_b"]
+        is_of_a, is_of_b = on[a] & by[b], on[b] & by[a]
+        sign = is_of_a.astype(np.float64) - is_of_b
+        fx, fy = (sign @ forces).tolist() if len(rows) else (0.0, 0.0)
+        chosen = is_of_a | is_of_b
+        normal = np.where(chosen, np.abs(rows["normal_force"]), 0.0)
+        total = float(normal.sum())
+        if total == 0.0:
+            return fx, fy, math.nan, math.nan, math.nan, float(np.count_nonzero(chosen))
+        limit = float((friction * normal).sum())
+        shear = float(np.abs(rows["shear_force"][chosen]).sum())
+        x, y = float(normal @ rows["x"]) / total, float(normal @ rows["y"]) / total
+        share = shear / limit if limit > 0.0 else math.nan
+        return fx, fy, x, y, share, float(np.count_nonzero(chosen))
+
+    return sample
+
+
+def point_sampler(body: int, placed: PlacedBody, at: tuple[float, float]) -> Sampler:
+    """Return what samples the motion of a point of body number `body`, given in its own axes (m)."""
+    ax, ay = _arm(placed.angle, at)
+    start = placed.x + ax, placed.y + ay
+
+    def sample(moment: Moment) -> Values:
+        record = moment.bodies[body]
+        angle, spin = float(record.angle), float(record.spin)
+        rx, ry = _arm(angle, at)
+        x, y = float(record.x) + rx, float(record.y) + ry
+        vx, vy = float(record.vx) - spin * ry, float(record.vy) + spin * rx
+        (ux, uy), (wx, wy) = moment.carried
+        dx, dy = x - start[0], y - start[1]
+        return x, y, dx, dy, dx - ux, dy - uy, vx, vy, vx - wx, vy - wy, angle - placed.angle
+
+    return sample
+
+
+def joint_sampler(bodies: tuple[int, int], placed: tuple[PlacedBody, PlacedBody], joint: Joint) -> Sampler:
+    """Return what samples the joint between two bodies by number."""
+    turned = placed[1].angle - placed[0].angle
+
+    def sample(moment: Moment) -> Values:
+        a, b = (moment.bodies[one] for one in bodies)
+        cosine, sine = math.cos(a.angle), math.sin(a.angle)
+        opening, slip = [], []
+        for of_a, of_b in zip(joint.ends_of_a, joint.ends_of_b, strict=True):
+            px, py = _arm(float(b.angle), of_b)
+            x, y = float(b.x) + px - float(a.x), float(b.y) + py - float(a.y)
+            gap = cosine * x + sine * y - of_a[0], cosine * y - sine * x - of_a[1]
+            opening.append(gap[0] * joint.normal[0] + gap[1] * joint.normal[1])
+            slip.append(gap[0] * joint.tangent[0] + gap[1] * joint.tangent[1])
+        middle = 0.5 * (opening[0] + opening[1])
+        return middle, *opening, 0.5 * (slip[0] + slip[1]), float(b.angle) - float(a.angle) - turned
+
+    return sample
+
+
+def _arm(angle: float, at: tuple[float, float]) -> tuple[float, float]:
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return cosine * at[0] - sine * at[1], sine * at[0] + cosine * at[1]
+
+
+class Probe:
+    """One probe and its samples that are held: a row each, step and values."""
+
+    def __init__(self, name: str, kind: str, columns: tuple[Column, ...], period: float, sampler: Sampler) -> None:
+        """Begin without samples; `period` is the number of steps between two of them, not rounded."""
+        self.name, self.kind, self.columns, self.period, self.sampler = name, kind, columns, period, sampler
+        self.rows: list[tuple[int, Values]] = []
+        self.last = -1  # step of the last sample
+
+    def next_step(self, done: int) -> int:
+        """Return the next step to sample after `done` steps."""
+        from blocksim.kernels.frame_times import next_frame  # noqa: PLC0415 - kernels, not for readers
+
+        return next_frame(done, self.period)
+
+    def sample(self, moment: Moment) -> None:
+        """Add a sample if one is due at this step, wherever the run ends, and it is not there yet."""
+        step = moment.step
+        if step > self.last and (step == 0 or self.next_step(step - 1) == step):
+            self.rows.append((step, self.sampler(moment)))
+            self.last = step
+
+    def count_until(self, step: int) -> int:
+        """Return the number of samples up to a step, that at the start included."""
+        count, done = 1, self.next_step(0)
+        while done <= step:
+            count, done = count + 1, self.next_step(done)
+        return count
+
+    def take_over(self, series: ProbeSeries, last_step: int) -> bool:
+        """Begin with the samples up to a step; return False where some of them are missing."""
+        kept = int(np.searchsorted(series.step, last_step, side="right"))
+        values = np.stack([*series.columns.values()], axis=1)[:kept].tolist()
+        self.rows = [*zip(series.step[:kept].tolist(), values, strict=True)]
+        self.last = last_step
+        return kept == self.count_until(last_step)
+
+    def series(self, time_step: float) -> ProbeSeries:
+        """Return the samples that are held; `time_step` in s."""
+        return series_of(self.name, self.kind, self.columns, self.rows, time_step)
+
+
+class Probes:
+    """All probes of a run."""
+
+    def __init__(self, probes: Sequence[Probe], support: MovingSupport, time_step: float) -> None:
+        """Take the probes, the motion of the support and the step (s)."""
+        self.all, self.support, self.time_step = tuple(probes), support, time_step
+
+    def next_step(self, done: int) -> int:
+        """Return the next step at which any probe is sampled after `done` steps."""
+        return min((probe.next_step(done) for probe in self.all), default=sys.maxsize)
+
+    def sample(self, scene: "AnyScene") -> None:
+        """Add a sample of the present state to all probes that are due."""
+        if self.all:
+            moment = Moment(scene, self.support)
+            for probe in self.all:
+                probe.sample(moment)
+
+    def take_over(self, kept: Mapping[str, ProbeSeries], last_step: int) -> list[str]:
+        """Begin with samples of an earlier part up to a step; return the names of probes of which some are missing."""
+        return [
+            probe.name
+            for probe in self.all
+            if probe.name not in kept or not probe.take_over(kept[probe.name], last_step)
+        ]
+
+    def series(self) -> dict[str, ProbeSeries]:
+        """Return the samples that are held by the names of their probes."""
+        return {probe.name: probe.series(self.time_step) for probe in self.all}
+
+    def taken(self) -> dict[str, ProbeSeries]:
+        """Return the samples that are held, and hold them no more."""
+        found = self.series()
+        for probe in self.all:
+            probe.rows.clear()
+        return found
+
+
+NO_PROBES = Probes((), MovingSupport(None), 1.0)
+
+
+def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float, ledger: Sequence[str]) -> Probes:
+    """Return the probes of a scenario with steps of this length (s); `ledger` names its energies (J)."""
+    usual = scenario.output.every
+    made = [
+        Probe(name, probe.kind, columns_of(probe.kind, ledger), _period(probe.every, usual, time_step), sampler)
+        for probe, name, sampler in zip(
+            scenario.probes, probe_names(scenario), _samplers(scenario, placed), strict=True
+        )
+    ]
+    return Probes(made, MovingSupport(scenario if made else None), time_step)
+
+
+def _period(every: float | str | None, usual: float, step: float) -> float:
+    """Return the steps between two samples; `usual` is the time (s) between frames."""
+    if every == STEP:
+        return 1.0
+    return max(float(usual if every is None else every) / step, 1.0)
+
+
+def _samplers(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[Sampler]:
+    numbers = {body.name: number for number, body in enumerate(placed)}
+    for probe in scenario.probes:
+        match probe:
+            case ForceProbe():
+                on = _chosen(probe.on, scenario, placed)
+                by = ~on if probe.by is None else _chosen(probe.by, scenario, placed)
+                yield force_sampler(on, by & ~on)
+            case PointProbe():
+                number = numbers[probe.body]
+                yield point_sampler(number, placed[number], probe.at)
+            case JointProbe():
+                first, second = (numbers[name] for name in probe.bodies)
+                joint = joint_between(placed[first], placed[second])
+                assert joint is not None  # noqa: S101 - the scenario was checked
+                yield joint_sampler((first, second), (placed[first], placed[second]), joint)
+            case EnergyProbe():
+                yield lambda moment: moment.energies
+
+
+def _chosen(name: str, scenario: Scenario, placed: Sequence[PlacedBody]) -> NDArray[np.bool_]:
+    """Return which bodies a name means: blocks first, then pieces of ground, walls and the half-plane."""
+    walls, blocks = len(scenario.walls), len(placed)
+    count = blocks + len(place_segments(scenario)) + 1
+    flags = np.zeros(count, dtype=np.bool_)
+    own = [number for number, body in enumerate(placed) if body.name == name]
+    if own:
+        flags[own] = True
+    elif name == SUPPORTS:
+        flags[blocks:] = True
+        flags[:blocks] = [body.fixed for body in placed]
+    elif name == GROUND:
+        flags[blocks:] = True
+        flags[count - 1 - walls : count - 1] = False
+    elif name == WALLS:
+        flags[count - 1 - walls : count - 1] = True
+    else:
+        flags[count - 2 - walls + int(name.removeprefix(WALL))] = True
+    return flags

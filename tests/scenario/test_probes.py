@@ -1,0 +1,44 @@
+"""Joints between bodies as they are placed."""
+
+import math
+
+import pytest
+
+from blocksim.scenario import PlacedBody, place_bodies, scenario_from_mapping
+from blocksim.scenario.probes import joint_between
+from tests.scenario.conftest import data_of
+
+
+def bodies(*places: tuple[float, float, float]) -> list[PlacedBody]:
+    """Return bricks of 0.2 x 0.1 m at (x, y, angle in degrees)."""
+    placed = [{"block": "brick", "x": x, "y": y, "angle": f"{angle} deg"} for x, y, angle in places]
+    return [*place_bodies(scenario_from_mapping(data_of(structures=(), bodies=tuple(placed))))]
+
+
+@pytest.mark.parametrize("turn", [0.0, 30.0, 137.0])
+def test_the_joint_of_a_shifted_stack_spans_what_the_faces_share(turn: float) -> None:
+    cosine, sine = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+    above = (1.0 + 0.05 * cosine - 0.1 * sine, 1.0 + 0.05 * sine + 0.1 * cosine, turn)
+    joint = joint_between(*bodies((1.0, 1.0, turn), above))
+    assert joint is not None
+    assert joint.normal == pytest.approx((0.0, 1.0))
+    assert joint.tangent == pytest.approx((1.0, 0.0))
+    first, last = joint.ends_of_a
+    assert (*first, *last) == pytest.approx((-0.05, 0.05, 0.1, 0.05), abs=1e-12)
+    first, last = joint.ends_of_b
+    assert (*first, *last) == pytest.approx((-0.1, -0.05, 0.05, -0.05), abs=1e-12)
+
+
+def test_a_gap_is_part_of_a_joint_and_a_quarter_turn_too() -> None:
+    joint = joint_between(*bodies((0.0, 1.0, 0.0), (0.17, 1.02, 90.0)))
+    assert joint is not None
+    assert joint.normal == (1.0, 0.0)
+    assert joint.tangent == (0.0, -1.0)
+    assert (*joint.ends_of_a[0], *joint.ends_of_a[1]) == pytest.approx((0.1, 0.05, 0.1, -0.05))
+    # 20 mm away, its upper face to the left
+    assert (*joint.ends_of_b[1], *joint.ends_of_b[0]) == pytest.approx((-0.07, 0.05, 0.03, 0.05), abs=1e-12)
+
+
+@pytest.mark.parametrize("other", [(0.3, 1.2, 0.0), (0.0, 1.3, 20.0)])
+def test_bodies_that_face_no_other_have_no_joint(other: tuple[float, float, float]) -> None:
+    assert joint_between(*bodies((0.0, 1.0, 0.0), other)) is None

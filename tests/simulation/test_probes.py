@@ -1,0 +1,194 @@
+"""Probes: what they record of statics and rigid motion in both schemes, and that they are kept whole."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.simulation import Result, simulate, simulate_into
+from blocksim.simulation.folder import prepare_folder
+from blocksim.simulation.probe_series import ProbeSeries
+from blocksim.simulation.stores.hdf5_probes import read_probes
+from tests.simulation.sliding import interrupted_at
+
+SCHEMES = ("explicit", "nonsmooth")
+WEIGHT = 1000 * 0.2 * 0.1 * 0.1 * 9.81  # N
+OAK = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
+PROBES: list[dict[str, Any]] = [
+    {"kind": "force", "on": "supports", "name": "base"},
+    {"kind": "force", "on": "2", "by": "1", "every": "2 ms"},
+    {"kind": "point", "body": "2", "at": [0.1, 0.05], "every": "step"},
+    {"kind": "joint", "bodies": ["1", "2"]},
+    {"kind": "energy", "every": "7 ms"},
+]
+
+
+def scene(scheme: str, probes: list[dict[str, Any]], end: float = 0.3, **tables: Any) -> Scenario:
+    """Return two bricks, one on the other, on the ground."""
+    data: dict[str, Any] = {
+        "schema": 1,
+        "name": "a",
+        "materials": {"oak": OAK},
+        "blocks": {"brick": {"width": 0.2, "height": 0.1, "length": 0.1, "material": "oak"}},
+        "structures": [{"kind": "stack", "block": "brick", "count": 2}],
+        "friction": {"block_block": 0.6, "block_ground": 0.6},
+        "contact": {} if scheme == "nonsmooth" else {"stiffness_scale": 0.01},
+        "time": {"scheme": scheme, "end": end, "stop_at_rest": False},
+        "output": {"every": "10 ms"},
+        "probes": probes,
+    }
+    return scenario_from_mapping({**data, **tables})
+
+
+def probed(scheme: str, probes: list[dict[str, Any]], end: float = 0.3, **tables: Any) -> dict[str, ProbeSeries]:
+    return simulate(scene(scheme, probes, end, **tables)).probes
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_base_shear_and_support_force_are_mass_times_acceleration_and_weight(scheme: str) -> None:
+    motion = {"kind": "pulse", "shape": "rectangular", "amplitude": 1.5, "duration": 1.0, "start": 0.1}
+    found = probed(scheme, PROBES[:2], motion=motion)
+    base, upper = found["base"], found["force2"]
+    assert (base.time[0], base.time[-1], len(base)) == (0.0, pytest.approx(0.3, abs=1e-4), 31)
+    assert len(upper) == 151
+    last = -5
+    assert base["fx"][last:] == pytest.approx(-2 * WEIGHT * 1.5 / 9.81, rel=2e-3)
+    assert base["fy"][last:] == pytest.approx(-2 * WEIGHT, rel=1e-3)
+    assert upper["fx"][last:] == pytest.approx(WEIGHT * 1.5 / 9.81, rel=2e-3)
+    assert upper["mobilised"][last:] == pytest.approx(1.5 / 9.81 / 0.6, rel=2e-3)
+    # the weight and the inertia force meet the base where their moments balance: behind the centre by a/g of its height
+    moved = 0.5 * 1.5 * (base.time[last:] - 0.1) ** 2
+    assert base["x"][last:] - moved == pytest.approx(0.1 - 0.1 * 1.5 / 9.81, abs=2e-4)
+    assert base["y"][last:] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_sliding_block_mobilises_all_friction_and_its_joint_slips(scheme: str) -> None:
+    motion = {"kind": "pulse", "shape": "rectangular", "amplitude": 3.0, "duration": 1.0}
+    friction = {"block_block": 0.1, "block_ground": 0.9}
+    found = probed(scheme, PROBES[1:4], motion=motion, friction=friction)
+    assert found["force1"]["mobilised"][-20:] == pytest.approx(1.0, abs=1e-6)
+    slip = -0.5 * (3.0 - 0.981) * 0.3**2  # of the upper block, towards -x
+    assert found["joint3"]["slip"][-1] == pytest.approx(slip, rel=5e-3)
+    assert found["point2"]["relative_dx"][-1] == pytest.approx(slip, rel=5e-3)
+    assert found["point2"]["dx"][-1] == pytest.approx(0.5 * 0.981 * 0.3**2, rel=5e-3)
+    assert found["point2"]["vx"][-1] == pytest.approx(0.981 * 0.3, rel=5e-3)
+    assert found["point2"]["relative_vx"][-1] == pytest.approx((0.981 - 3.0) * 0.3, rel=5e-3)
+    assert abs(found["joint3"]["opening"][-1]) < 1e-4
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_point_of_a_turning_body_in_flight_follows_the_rigid_motion(scheme: str) -> None:
+    at = (0.1, -0.05)
+    body = {"block": "brick", "x": 0.0, "y": 2.0, "velocity": [1.0, 0.0], "spin": "3 rad/s", "name": "flying"}
+    still = {"block": "brick", "x": 3.0, "y": 0.05, "name": "still"}
+    probes = [{"kind": "point", "body": "flying", "at": list(at)}]
+    series = probed(scheme, probes, structures=[], bodies=[body, still])["point1"]
+    t, turned = series.time, 3.0 * series.time
+    cosine, sine = np.cos(turned), np.sin(turned)
+    assert series["rotation"] == pytest.approx(turned, abs=1e-9)
+    assert series["x"] == pytest.approx(t + at[0] * cosine - at[1] * sine, abs=1e-9)
+    assert series["y"] == pytest.approx(2.0 - 4.905 * t**2 + at[0] * sine + at[1] * cosine, abs=1e-3)
+    assert series["vx"] == pytest.approx(1.0 - 3.0 * (at[0] * sine + at[1] * cosine), abs=1e-9)
+    assert series["dx"] == pytest.approx(series["x"] - at[0], abs=1e-12)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_ground_and_walls_have_forces_of_their_own(scheme: str) -> None:
+    """A brick rests on the ground and is pressed against the wall at its right hand by the tilt."""
+    names = ("ground", "wall 1", "wall 2", "walls", "supports", "1")
+    found = probed(
+        scheme,
+        [{"kind": "force", "on": name, "name": name.replace(" ", "-")} for name in names],
+        walls=[{"from": [0.2, 0.0], "to": [0.2, 0.4]}, {"from": [-1.0, 0.4], "to": [-1.0, 0.0]}],
+        structures=[{"kind": "stack", "block": "brick", "count": 1}],
+        ground={"tilt": "-45 deg"},
+        friction={"block_block": 0.0, "block_ground": 0.0},
+        end=0.5,
+    )
+    last = {name: (one["fx"][-1], one["fy"][-1]) for name, one in found.items()}
+    pressed = WEIGHT * math.sqrt(0.5)
+    assert last["ground"] == pytest.approx((0.0, -pressed), abs=0.02)
+    assert last["wall-1"] == last["walls"] == pytest.approx((pressed, 0.0), abs=0.02)
+    assert last["wall-2"] == (0.0, 0.0)
+    assert last["supports"] == pytest.approx((pressed, -pressed), abs=0.02)
+    assert last["1"] == pytest.approx((-pressed, pressed), abs=0.02)
+    assert np.isnan(found["wall-2"]["x"]).all()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_energies_are_those_of_the_frames(scheme: str) -> None:
+    result = simulate(scene(scheme, [{"kind": "energy"}], end=0.1))
+    series = result.probes["energy1"]
+    assert series.step.tolist() == result.frames.step.tolist()
+    for name, values in result.frames.energy.items():
+        assert series[name].tolist() == values.tolist()
+
+
+def same(one: dict[str, ProbeSeries], other: dict[str, ProbeSeries]) -> bool:
+    """Return True if all samples of all probes have the same bits."""
+    return one.keys() == other.keys() and all(
+        series.step.tobytes() == other[name].step.tobytes()
+        and series.time.tobytes() == other[name].time.tobytes()
+        and all(values.tobytes() == other[name][key].tobytes() for key, values in series.columns.items())
+        for name, series in one.items()
+    )
+
+
+PULSE = {"kind": "pulse", "shape": "sine", "amplitude": 8.0, "duration": 0.05}
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_probes_change_no_bit_of_the_motion(scheme: str) -> None:
+    without, with_probes = (simulate(scene(scheme, probes, 0.05, motion=PULSE)) for probes in ([], PROBES))
+    assert with_probes.summary.final_state_sha256 == without.summary.final_state_sha256
+    assert np.array_equal(with_probes.frames.x, without.frames.x)
+
+
+@pytest.fixture(params=SCHEMES)
+def whole(request: pytest.FixtureRequest, tmp_path: Path) -> Result:
+    return simulate_into(scene(request.param, PROBES, 0.05, motion=PULSE), tmp_path / "whole")
+
+
+def test_resumed_run_has_the_samples_of_a_continuous_one(tmp_path: Path, whole: Result) -> None:
+    steps = [whole.summary.steps // 3, whole.summary.steps // 3 + 1, whole.summary.steps // 2]
+    assert interrupted_at(whole.scenario, tmp_path / "parts", steps) == steps
+    resumed = simulate_into(whole.scenario, tmp_path / "parts", resume=True)
+    assert same(resumed.probes, whole.probes)
+    assert same(simulate(whole.scenario, threads=2).probes, whole.probes)
+    for name in ("base", "force2", "point3", "joint4", "energy5"):
+        table = f"probe-{name}.csv"
+        assert (tmp_path / "parts" / table).read_bytes() == (tmp_path / "whole" / table).read_bytes()
+        assert table in resumed.summary.sha256
+
+
+def test_samples_that_are_missing_before_a_checkpoint_are_reported(tmp_path: Path) -> None:
+    import h5py  # noqa: PLC0415 - one test damages a file
+
+    scenario = scene("nonsmooth", PROBES, 0.05, motion=PULSE)
+    interrupted_at(scenario, tmp_path / "parts", [40])
+    with h5py.File(tmp_path / "parts" / "run.h5", "r+") as file:
+        file["probes/point3/n_committed"][()] = 20
+    with pytest.raises(InvalidInputError, match=r"samples of probe point3 are missing before step 40"):
+        simulate_into(scenario, tmp_path / "parts", resume=True)
+
+
+def test_the_tables_of_probes_are_files_of_the_run(tmp_path: Path, whole: Result) -> None:
+    folder = tmp_path / "whole"
+    table = (folder / "probe-joint4.csv").read_text().splitlines()
+    assert table[0] == "step,time_s,opening_mm,opening_first_mm,opening_last_mm,slip_mm,rotation_deg"
+    last = [values[-1] for values in whole.probes["joint4"].written().values()]
+    assert [float(cell) for cell in table[-1].split(",")[2:]] == last
+    assert [*whole.probes["force2"].to_frame().columns[:3]] == ["time_s", "fx_N", "fy_N"]
+    prepare_folder(folder, overwrite=True)
+    assert [*folder.iterdir()] == []
+
+
+def test_a_file_without_the_probes_is_no_run_of_the_scenario(tmp_path: Path) -> None:
+    simulate_into(scene("nonsmooth", [], 0.02), tmp_path / "run")
+    with pytest.raises(InvalidInputError, match="probes cannot be read"):
+        read_probes(tmp_path / "run" / "run.h5", scene("nonsmooth", PROBES, 0.02))
