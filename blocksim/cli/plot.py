@@ -37,8 +37,9 @@ def plot_command(
         str | None,
         typer.Option(
             metavar="KIND",
-            help="Of a run: strip (default), final, history, motion (of the supports). Of a sweep: lines, map (two "
-            "inputs), matrix (every two inputs) or histogram; tornado for sensitivities (default: what suits).",
+            help="Of a run: strip (default), final, history, motion (of the supports) or probe. Of a sweep: lines, "
+            "map (two inputs), matrix (every two inputs) or histogram; tornado for sensitivities (default: what "
+            "suits).",
         ),
     ] = None,
     frames: Annotated[
@@ -55,6 +56,9 @@ def plot_command(
     blocks: Annotated[
         str | None, typer.Option("--block", metavar="N,N,...", help="Blocks of a history, by name.")
     ] = None,
+    probes: Annotated[
+        str | None, typer.Option("--probe", metavar="N,N,...", help="Probes to draw, by name (default: all).")
+    ] = None,
     relative: Annotated[bool, typer.Option("--relative", help="Plot a history relative to the moving ground.")] = False,
     colour: options.Colour = "block",
     size: options.Size = None,
@@ -69,8 +73,9 @@ def plot_command(
     The strip shows the measured ranges below the final state. --kind final shows where the blocks end, with rotation
     and measured range below each of them; --kind history shows x, y, rotation, energies, contacts and the ground's
     motion over time, or the panels of --panels; --kind motion shows acceleration, velocity and displacement of the
-    supports with their peaks, also of a scenario that has not been run. --forces draws contact forces as arrows, of
-    runs that have stored them (output.contacts = true). A run that was stopped or killed is drawn as far as it came.
+    supports with their peaks, also of a scenario that has not been run; --kind probe shows what [[probes]] recorded.
+    --forces draws contact forces as arrows, of runs that have stored them (output.contacts = true). A run that was
+    stopped or killed is drawn as far as it came.
 
     A sweep over one key, or a second one with few values, is drawn as lines of final x; over two keys as a map of
     run-outs and outcomes; a sampled one as a matrix of its inputs. The measured range is marked in all of them. A
@@ -82,7 +87,7 @@ def plot_command(
     Example: blocksim plot scenarios/three_blocks.toml --out strip.png
     """
     chosen = options.names_of("--panels", panels), options.names_of("--block", blocks)
-    asked = RunLook(_moments(times), frames, *chosen, relative, colour, forces)
+    asked = RunLook(_moments(times), frames, *chosen, relative, colour, forces, options.names_of("--probe", probes))
     paper = options.paper_of(size, dots)
     ready = partial(refuse_foreign, is_own=is_picture, overwrite=overwrite)
     picture, remark = draw(run, out, asked, experiment, kind, paper, ready=ready)

@@ -13,17 +13,19 @@ from blocksim.scenario import Scenario, load_scenario, load_stored
 from blocksim.scenario.csv_table import Cell, raise_problems, read_open_table
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.simulation import folder as files
+from blocksim.simulation.stores.hdf5_probes import read_probes
 from blocksim.study.stored_run import find_run, stored_run
 from blocksim.study.study_pictures import draw_study, study_in
 from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import is_sweep
 from blocksim.view.history_panels import Choice
-from blocksim.view.kinds import FINAL, HISTORY, MOTION, STRIP, SWEEP_KINDS, Kind, kind_for, run_kind
+from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, STRIP, SWEEP_KINDS, Kind, kind_for, run_kind
 from blocksim.view.layout import OWN, Paper
 from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.motion import draw_support_motion
 from blocksim.view.paint import paint_named
+from blocksim.view.probes import draw_probes
 from blocksim.view.run_data import support_of
 from blocksim.view.style import picture_suffix
 from blocksim.view.tornado import Bars, draw_tornado
@@ -38,6 +40,7 @@ MEANINGS = {
     "--frames": "sets the number of panels of a run's strip",
     "--panels": "selects the panels of a run's history",
     "--block": "selects the blocks of a run's history",
+    "--probe": "selects the probes of a run",
     "--relative": "plots a run's history relative to the ground",
     "--forces": "shows contacts of a run",
     "--colour": "colours the blocks of a run",
@@ -169,23 +172,30 @@ class RunLook:
     relative: bool = False  # to the moving support
     colour: str = "block"
     forces: bool = False
+    probes: tuple[str, ...] | None = None  # by name
 
     def of_runs(self) -> list[str]:
         """Return the options that were given and mean nothing for a sweep."""
         forces, colour = {"--forces": self.forces}, {"--colour": self.colour != "block"}
-        given = {**self._of_strips(), **self._of_histories(), **forces, **colour}
+        given = {**self._of_strips(), **self._of_histories(), **self._of_probes(), **forces, **colour}
         return [option for option, is_given in given.items() if is_given]
 
     def beside(self, kind: str) -> list[str]:
         """Return the options that were given and mean nothing for a kind of picture."""
+        if kind == PROBE:
+            return [option for option in self.of_runs() if option != "--probe"]
         meant = {STRIP: self._of_histories(), FINAL: {**self._of_histories(), "--frames": self.frames is not None}}
-        return [option for option, is_given in meant.get(kind, self._of_strips()).items() if is_given]
+        given = {**meant.get(kind, self._of_strips()), **self._of_probes()}
+        return [option for option, is_given in given.items() if is_given]
 
     def arguments(self, kind: str) -> dict[str, Any]:
         """Return what a kind of picture is drawn with."""
         if kind == HISTORY:
             return {"choice": Choice(self.panels or (), self.blocks or (), self.relative)}
         return {"times": self.times, "count": self.frames} if kind == STRIP else {"times": self.times}
+
+    def _of_probes(self) -> dict[str, bool]:
+        return {"--probe": self.probes is not None}
 
     def _of_strips(self) -> dict[str, bool]:
         return {"--at": self.times is not None, "--frames": self.frames is not None}
@@ -253,7 +263,25 @@ def draw(  # noqa: PLR0913 - what a picture is made of
     if kind == MOTION:
         refuse(asked.of_runs(), f"this picture is of kind {kind}")
         return draw_motion_of(place, out, paper, ready=ready), ""
+    if kind == PROBE:
+        refuse(asked.beside(kind), f"this picture is of kind {kind}")
+        return draw_probes_of(place, out, asked.probes or (), paper, ready=ready)
     return draw_run(place, out, asked, experiment, kind or STRIP, paper, ready=ready)
+
+
+def draw_probes_of(
+    place: Path, out: Path | None, names: Sequence[str], paper: Paper, *, ready: Callable[[Path], None]
+) -> tuple[Path, str]:
+    """Draw the probes of a run, all or those of these names; return as `draw_run`.
+
+    Raises what `stored_run`, reading the probes and `draw_probes` raise.
+    """
+    stored = stored_run(place)
+    picture = out or Path(f"{stored.scenario.name}_{PROBE}.png")
+    ready(picture)
+    probes = read_probes(stored.folder / files.FRAMES, stored.scenario)
+    draw_probes(probes, picture, f"{stored.scenario.name}: probes", names, paper)
+    return picture, stored.remark
 
 
 def draw_motion_of(place: Path, out: Path | None, paper: Paper, *, ready: Callable[[Path], None]) -> Path:

@@ -13,6 +13,7 @@ from blocksim.view.sweeps.data import SweepData
 
 STRIP, FINAL, HISTORY = "strip", "final", "history"
 MOTION = "motion"  # of the supports; needs no run
+PROBE = "probe"
 # Each draws frames to a path, with title, measured table and support.
 RUN_KINDS: dict[str, Callable[..., None]] = {
     STRIP: draw_strip,
@@ -45,8 +46,8 @@ SWEEP_KINDS = {  # by default the first that suits a sweep is drawn
 def run_kind(name: str) -> Callable[..., None]:
     """Return what draws pictures of a kind. Raises InvalidInputError for an unknown one."""
     if name not in RUN_KINDS:
-        meant = nearest(name, [*RUN_KINDS, MOTION], MOST_SLIPS)
-        hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join([*RUN_KINDS, MOTION])}"
+        meant = nearest(name, [*RUN_KINDS, MOTION, PROBE], MOST_SLIPS)
+        hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join([*RUN_KINDS, MOTION, PROBE])}"
         message = f"--kind {name}: unknown kind for a run, {hint}"
         raise InvalidInputError(message)
     return RUN_KINDS[name]

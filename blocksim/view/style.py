@@ -115,11 +115,15 @@ def in_style(dots: float | None = None) -> Iterator[None]:
 
 def save_figure(figure: "Figure", path: Path) -> None:
     """Write the figure as PNG, SVG or PDF after its suffix; raises OutputError when it cannot be written."""
-    suffix = picture_suffix(path)
+    write_bytes(path, figure_bytes(figure, picture_suffix(path)))
+
+
+def figure_bytes(figure: "Figure", suffix: str) -> bytes:
+    """Return the figure in the format of a suffix, one of those that are written."""
     buffer = BytesIO()
     with no_word_of_missing_letters():
         figure.savefig(buffer, format=suffix[1:], metadata=METADATA[suffix])
-    write_bytes(path, buffer.getvalue())
+    return buffer.getvalue()
 
 
 @contextmanager

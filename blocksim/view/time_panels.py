@@ -1,6 +1,7 @@
 """Named lines over time, a panel for each quantity, one below the other."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -45,8 +46,21 @@ def draw_time_panels(
     written.
     """
     style.picture_suffix(path)
+    with _drawn(panels, title, note, paper) as figure:
+        style.save_figure(figure, path)
+
+
+def time_panels_png(panels: Sequence[TimePanel], paper: Paper = OWN) -> bytes:
+    """Return such a picture without a title as PNG."""
+    with _drawn(panels, None, "", paper) as figure:
+        return style.figure_bytes(figure, ".png")
+
+
+@contextmanager
+def _drawn(panels: Sequence[TimePanel], title: str | None, note: str, paper: Paper) -> Iterator["Figure"]:
     width = paper.width(WIDTH, LEFT + RIGHT + NARROWEST)
-    others = HEAD + FOOT + (LINE if note else 0.0) + (len(panels) - 1) * GAP
+    head = HEAD if title else GAP
+    others = head + FOOT + (LINE if note else 0.0) + (len(panels) - 1) * GAP
     own = max(PANEL, *(LINE * (_rows(panel) + 1) for panel in panels))
     height = paper.panel(own, len(panels), others, LOWEST)
     total = paper.height(others + len(panels) * height)
@@ -54,7 +68,7 @@ def draw_time_panels(
         span = _span(panels)
         drawn = []
         for row, panel in enumerate(panels):
-            bottom = total - HEAD - (row + 1) * height - row * GAP
+            bottom = total - head - (row + 1) * height - row * GAP
             axes = add_axes(figure, LEFT, bottom, width - LEFT - RIGHT, height)
             _draw(axes, panel, span)
             drawn.append(axes)
@@ -64,7 +78,7 @@ def draw_time_panels(
         drawn[-1].set_xlabel("time (s)", labelpad=2.0)
         write_heading(figure, title, 0.12, 0.08)
         write_text(figure, 0.12, 0.05, note, color=style.FAINT_INK, va="bottom")
-        style.save_figure(figure, path)
+        yield figure
 
 
 def _rows(panel: TimePanel) -> int:

@@ -51,6 +51,20 @@ def test_the_motion_of_supports_is_drawn_without_a_run(blocksim: Command, finish
     )
 
 
+def test_probes_are_drawn_by_name(blocksim: Command) -> None:
+    probe = ("--set", 'probes=[{ kind = "force", on = "supports", name = "base" }, { kind = "energy" }]')
+    brief = ("--set", "time.end=0.02", "--out", "out")
+    assert blocksim("run", "scenarios/three_blocks_nonsmooth.toml", *probe, *brief).code == 0
+    answer = blocksim("plot", "out", "--kind", "probe", "--probe", "base", "--out", "probe.svg")
+    assert (answer.code, answer.err) == (0, "picture: probe.svg\n")
+    assert "<!-- probe base -->" in Path("probe.svg").read_text(encoding="utf-8")
+    answer = blocksim("plot", "out", "--kind", "probe", "--block", "1")
+    assert (answer.code, answer.err) == (
+        65,
+        "--block selects the blocks of a run's history, but this picture is of kind probe\n",
+    )
+
+
 def test_the_last_frame_is_reached_by_the_time_printed_above_it(blocksim: Command, finished: Path) -> None:
     assert blocksim("plot", finished, "--out", "strip.svg").code == 0
     texts = Path("strip.svg").read_text(encoding="utf-8")

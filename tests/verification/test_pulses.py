@@ -1,12 +1,12 @@
 """Blocks under acceleration pulses of their support, both schemes at default settings, against published values.
 
 Where the two schemes part: at the onset of slip the base of a block follows the support until the contacts have built
-up the limiting shear force. Springs need a time
-of sqrt(m/k) for that, in which a block of some height tilts on its normal springs as well; rigid contacts are as soft
-as their substep is long. The velocity that is gained stays until the block sticks again: for a slab of 1.0 x 0.1 m its
-slip on the cosine is 0.25 % too large with springs and 0.012 % with rigid contacts, for 1.0 x 0.25 m 1.1 and 0.27 %, the
-latter in proportion to the substep. Gravity that is switched on with the pulse has no part in it: a pulse that
-starts later gives the same with rigid contacts, and more with springs, whose normal force is there at once then.
+up the limiting shear force. Springs need a time of sqrt(m/k) for that, in which a block of some height tilts on its
+normal springs as well; rigid contacts are as soft as their substep is long. The velocity that is gained stays until
+the block sticks again: for a slab of 1.0 x 0.1 m its slip on the cosine is 0.25 % too large with springs and 0.012 %
+with rigid contacts, for 1.0 x 0.25 m 1.1 and 0.27 %, the latter in proportion to the substep. Gravity that is switched
+on with the pulse has no part in it: a pulse that starts later gives the same with rigid contacts, and more with
+springs, whose normal force is there at once then.
 """
 
 from typing import Any

@@ -1,6 +1,7 @@
 """Runs in a report: what can be read of their folders, as plain values for templates and scripts."""
 
 import math
+from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,9 +14,12 @@ from blocksim.scenario.document import MAX_BYTES
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.movement import Movement
+from blocksim.simulation.probe_series import ProbeSeries
+from blocksim.simulation.stores.hdf5_probes import read_probes
 from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import Columns, read_table, rows_of
+from blocksim.view.probes import panels_of, probe_picture
 from blocksim.view.report.player import MOST_BYTES, frame_indices, pack_forces, pack_frames, scene_data
 
 Part = TypeVar("Part")
@@ -55,6 +59,7 @@ class PartialRun:
     final: Columns | None
     problems: tuple[str, ...] = ()
     damage: tuple[str, ...] = ()
+    probes: Mapping[str, ProbeSeries] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -98,7 +103,13 @@ def read_stored(folder: Path) -> PartialRun:
     if scenario is None and summary is None and final is None:
         message = "\n".join([f"{folder}: nothing of this run can be read", *attempts.problems])
         raise InvalidInputError(message)
-    return PartialRun(folder, scenario, text, summary, frames, final, tuple(attempts.problems), tuple(attempts.damage))
+    probes = None if scenario is None or frames is None else attempts.at(lambda: _probes(folder, scenario))
+    found = (folder, scenario, text, summary, frames, final)
+    return PartialRun(*found, tuple(attempts.problems), tuple(attempts.damage), probes or {})
+
+
+def _probes(folder: Path, scenario: Scenario) -> dict[str, ProbeSeries]:
+    return read_probes(folder / files.FRAMES, scenario)
 
 
 def _text(folder: Path) -> str | None:
@@ -151,6 +162,7 @@ def run_subject(
         "comparison": comparison,
         "ledger": _ledger(run),
         "provenance": _provenance(run),
+        "probes": [] if parent is not None else [_probe(one) for one in run.probes.values() if len(one)],
         "has_player": data is not None,
         "has_particles": bool(data and data["scene"]["particles"]),
         "has_forces": bool(data and data["forces"]),
@@ -246,6 +258,13 @@ def _ledger(run: PartialRun) -> list[tuple[str, str]]:
 
 def _joule(value: float) -> str:
     return f"{value:.6g}".replace("-", "−") if math.isfinite(value) else "–"
+
+
+def _probe(probe: ProbeSeries) -> dict[str, str]:
+    """Return a line about a probe, and its picture (PNG, base64)."""
+    picture = b64encode(probe_picture(probe)).decode() if panels_of(probe) else ""
+    text = f"{probe.name}: {probe.kind}, {len(probe)} samples to {probe.time[-1]:.4g} s, in probe-{probe.name}.csv"
+    return {"text": text, "picture": picture}
 
 
 def _provenance(run: PartialRun) -> list[tuple[str, str]]:
