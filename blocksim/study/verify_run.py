@@ -11,12 +11,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, load_stored, scenario_hash
 from blocksim.scenario.bounded_read import read_limited
 from blocksim.simulation import Progress, Result, Watcher, read_result, simulate
 from blocksim.simulation import folder as files
+from blocksim.simulation.frames import Floats
+from blocksim.simulation.probe_series import ProbeSeries
 from blocksim.simulation.provenance import ROOM_PREFIX, environment
 from blocksim.simulation.resumption import STARTS_ANEW
 from blocksim.simulation.summary import MOST_BYTES, Summary, changed_files, read_summary
@@ -80,6 +84,28 @@ def _are_warnings(then: Summary, now: tuple[str, ...]) -> bool:
     before = then.warnings[: len(then.warnings) - len(now)]
     is_allowed = bool(then.resumed_from) or all(text.endswith(STARTS_ANEW) for text in before)
     return (*before, *now) == then.warnings and is_allowed
+
+
+def differing_samples(stored: Mapping[str, ProbeSeries], again: Mapping[str, ProbeSeries]) -> Iterator[EntryDifference]:
+    """Yield where the samples of each probe first are others, in the column that comes first."""
+    for name, now in again.items():
+        then, place = stored[name], f"probes/{name}"
+        if then.step.tobytes() != now.step.tobytes():
+            yield EntryDifference(files.FRAMES, f"{place}/step", len(then), len(now))
+            continue
+        for column, values in now.columns.items():
+            before = then.columns.get(column)
+            if before is None or before.tobytes() != values.tobytes():
+                yield _first_apart(f"{place}/{column}", before, values, now)
+                break
+
+
+def _first_apart(place: str, before: Floats | None, values: Floats, probe: ProbeSeries) -> EntryDifference:
+    if before is None:
+        return EntryDifference(files.FRAMES, place, None, float(values[0]))
+    first = int(np.flatnonzero(before.view(np.int64) != values.view(np.int64))[0])
+    where = f"{place} at step {probe.step[first]}"
+    return EntryDifference(files.FRAMES, where, float(before[first]), float(values[first]))
 
 
 def _read_entries(path: Path) -> dict[str, Any]:
@@ -155,7 +181,10 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = _i
         status=_ends(summary, again.summary),
         frames=differences(stored.frames, again.frames),
         origins=now,
-        entries=differing_entries(folder, summary, again.summary, same_code=not tells_of_code(now)),
+        entries=(
+            *differing_entries(folder, summary, again.summary, same_code=not tells_of_code(now)),
+            *differing_samples(stored.probes, again.probes),
+        ),
     )
 
 
