@@ -1,6 +1,7 @@
 """Probes of a run over time: forces, material points, joints and energies, a panel for each quantity."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ from blocksim.view.window import MILLIMETRES
 
 MOST_PANELS = 12
 LETTERS = 24  # of a line beside a panel
+PERCENT = 98.0  # of the samples of a force that are not those of an impact
+MOST_USUAL, CUT = 3.0, 1.5  # times what they hardly exceed: forces beyond are cut, there
 
 
 def draw_probes(
@@ -67,14 +70,29 @@ def _largest(columns: Mapping[str, Floats]) -> float:
     return max((float(np.nanmax(np.abs(values), initial=0.0)) for values in columns.values()), default=0.0)
 
 
+def _usual(forces: Mapping[str, Floats]) -> float:
+    """Return the size (N) that forces hardly exceed but in impacts."""
+    return max((float(np.percentile(np.abs(values), PERCENT)) for values in forces.values()), default=0.0)
+
+
 def _some(probe: ProbeSeries, *names: str) -> dict[str, Floats]:
     return {name.replace("_", " "): probe[name] for name in names}
 
 
 def _force(probe: ProbeSeries) -> list[TimePanel]:
     forces = _some(probe, "fx", "fy")
-    factor, unit = unit_for(_largest(forces), "N")
-    panels = [_panel(probe, "force", unit, factor, forces)]
+    largest, usual = _largest(forces), _usual(forces)
+    is_cut = usual > 0.0 and largest > MOST_USUAL * usual
+    factor, unit = unit_for(usual if is_cut else largest, "N")
+    panel = _panel(probe, "force", unit, factor, forces)
+    if is_cut:
+        low, high = (
+            sign * min(max(float((sign * one).max()) for one in forces.values()), CUT * usual) for sign in (-1, 1)
+        )
+        room = 0.08 * (high - low)
+        note = f"{panel.note}\nlargest: {factor * largest:.3g} {unit}"
+        panel = replace(panel, note=note, limits=(factor * (low - room), factor * (high + room)))
+    panels = [panel]
     if np.isfinite(probe["mobilised"]).any():
         panels.append(_panel(probe, "share of friction", "", 1.0, {"mobilised": probe["mobilised"]}))
     return panels

@@ -35,6 +35,7 @@ class TimePanel:
     lines: Mapping[str, tuple[Floats, Floats]]
     note: str = ""  # beside the panel, below the names of the lines
     marks: Sequence[tuple[float, float]] = field(default=())  # points (s, value) that are marked
+    limits: tuple[float, float] | None = None  # of the values, where the panel does not show all of them
 
 
 def draw_time_panels(
@@ -104,6 +105,8 @@ def _draw(axes: "Axes", panel: TimePanel, span: tuple[float, float]) -> None:
         axes.plot(moment, value, marker="o", markersize=3.5, color=style.MEASURED_COLOUR, clip_on=False)
     axes.set_xlim(span)
     axes.margins(y=0.08)
+    if panel.limits is not None:
+        axes.set_ylim(*panel.limits)
     axes.spines[["right", "top"]].set_visible(False)
     axes.set_ylabel(panel.label)
     number_axis(axes.yaxis)

@@ -1,11 +1,15 @@
 """The scenarios that ship, end to end: what their comments and the README say about them."""
 
+import runpy
+
 import numpy as np
 import pytest
 
 from blocksim.analysis import Verdict
 from blocksim.analysis.compare import Comparison
 from blocksim.scenario import Document, load_scenario
+from blocksim.scenario.record_file import read_record
+from blocksim.scenario.units import STANDARD_GRAVITY
 from blocksim.simulation import Frames, Result
 from blocksim.study.compare import compare_run
 from blocksim.study.run import run
@@ -113,6 +117,23 @@ def test_tower_stands() -> None:
 def test_tower_with_large_offset_falls() -> None:
     result = run_shipped("tower", **{"contact.stiffness_scale": 0.001, "structures.0.offset": "3.5 mm"})
     assert result.final["rotation_deg"].abs().max() > 45.0
+
+
+@pytest.mark.parametrize(("pga", "stands"), [("0.35 g", True), ("0.7 g", False)])
+def test_column_rocks_under_its_record_and_falls_under_twice_of_it(pga: str, stands: bool) -> None:
+    result = run_shipped("record_column", **{"motion.pga": pga, "time.end": 12.0})
+    turned = result.frames.rotation[:, 0]
+    assert (np.degrees(np.abs(turned).max()) < 10.0) == stands
+    assert np.degrees(np.abs(turned).max()) > 2.0
+    crown = result.probes["crown"]
+    assert crown["rotation"].tolist() == result.frames.rotation[:, 4].tolist()
+
+
+def test_the_synthetic_record_is_what_its_script_makes() -> None:
+    script = runpy.run_path(str(SCENARIOS / "records" / "synthetic.py"))
+    found = read_record(SCENARIOS / "records" / "synthetic.AT2")
+    assert (len(found.times), found.times[1], found.unit) == (script["COUNT"], script["STEP"], "g")
+    np.testing.assert_allclose(found.values, STANDARD_GRAVITY * script["record"](), rtol=0, atol=1e-7)
 
 
 def test_dominoes_fall_one_after_the_other_at_a_constant_speed() -> None:

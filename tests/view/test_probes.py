@@ -32,6 +32,17 @@ def test_every_kind_of_probe_is_drawn_in_units_of_its_own(tmp_path: Path) -> Non
     assert "force" not in (tmp_path / "one.svg").read_text(encoding="utf-8")
 
 
+def test_the_force_of_an_impact_does_not_hide_the_others() -> None:
+    series = made_up("force", "base", 200)
+    series.columns["fx"][:], series.columns["fy"][:] = 1.0, -20.0
+    series.columns["fy"][77] = -5000.0
+    panel, *_ = panels_of(series)
+    assert panel.limits == pytest.approx((-30.0 - 0.08 * 31.0, 1.0 + 0.08 * 31.0))
+    assert panel.note.endswith("largest: 5e+03 N")
+    series.columns["fy"][77] = -50.0
+    assert panels_of(series)[0].limits is None
+
+
 def test_a_moving_support_is_taken_off_the_motion_of_a_point() -> None:
     still = made_up("point", "p")
     still.columns["relative_dx"][:], still.columns["relative_dy"][:] = still["dx"], still["dy"]
