@@ -206,6 +206,7 @@ contact.smoothing_length = 0.1
 contact.kernel = "cubic-spline"
 time = { end = 1.0, step = 1e-6, safety = 0.1, force_step = true, stop_at_rest = false, rest_speed = 1, rest_hold = 1 }
 output = { every = 1.0, contacts = true }
+probes.0 = { name = "crown", every = "step", body = "2", at = [0.1, 0] }
 """
 
 
@@ -218,7 +219,7 @@ def flat(table: dict[str, Any], path: str = "") -> dict[str, Any]:
 
 
 HASHED = {key: value for line in OTHER_VALUES.splitlines() for key, value in flat(tomllib.loads(line)).items()}
-SINGLE_CHOICE = {"schema", "time.scheme", "materials.m.unit_weight", "motion.kind"}
+SINGLE_CHOICE = {"schema", "time.scheme", "materials.m.unit_weight", "motion.kind", "probes.0.kind"}
 
 
 @pytest.fixture
@@ -235,6 +236,7 @@ def data() -> dict[str, Any]:
         "walls": [{"from": [-10, 0], "to": [-10, 1]}],
         "pairs": {"m": {"n": {"friction": 0.3}}},
         "motion": {"kind": "harmonic", "amplitude": 1, "frequency": 1},
+        "probes": [{"kind": "point", "body": "1"}],
     }
 
 
