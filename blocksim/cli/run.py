@@ -151,6 +151,8 @@ def _tell_end(result: Result) -> None:
         f"{summary.steps} steps of {summary.time_step_s:.2e} s in {summary.solver_seconds:.2f} s; "
         f"relative energy error {summary.energy_J.relative_residual:.0e}"
     )
+    for one in summary.events:
+        note(f"{one.time_s:.3f} s: {one.what}")
     if summary.movement is not None:
         note(f"{_moved(summary.movement)}{_moving(result)}")
     for text in summary.warnings:

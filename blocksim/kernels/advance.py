@@ -16,6 +16,7 @@ from blocksim.kernels.arrays import (
     Records,
     World,
 )
+from blocksim.kernels.driven import book_driven, move_driven
 from blocksim.kernels.energy import weights_power
 from blocksim.kernels.forces import forces_between, forces_within
 from blocksim.kernels.integrate import kinetic_energy, place_all_corners, renew_rotations, start_all
@@ -106,8 +107,10 @@ def supervise(world: World, k: int, task: int, step: float, systems: Systems | N
             world.team[STATUS] = check(world, systems)
         elif task == MOVE:
             move_support(world, step)
+            move_driven(world, step)
         else:
             book_support(world, step)
+            book_driven(world, step)
     meet(world.team)
     return world.team[STATUS]
 
@@ -177,7 +180,7 @@ def begin_steps(world: World, k: int, step: float) -> bool:
         if share.status != REACHED:
             return False
     start_all(world.bodies, share.first_body, share.last_body, step)
-    if has_motion(world.controls[0]):
+    if has_motion(world):
         supervise(world, k, MOVE, step, None)
         return True
     meet(world.team)
@@ -190,7 +193,7 @@ def begin_steps(world: World, k: int, step: float) -> bool:
 def end_steps(world: World, k: int, step: float, systems: Systems | None) -> bool:
     """Look at what has to be looked at after some steps; return whether the run continues."""
     share = world.shares[k]
-    if has_motion(world.controls[0]):
+    if has_motion(world):
         supervise(world, k, BOOK, step, None)
     if share.steps == share.next_check:
         share.next_check += world.controls[0].check_every

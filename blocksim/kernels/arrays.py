@@ -33,6 +33,7 @@ CONTACTS = 2  # of a pair in the surface model, see models/surface.py
 GROUP = 16  # bodies whose pairs share one book of the ledger
 CACHE_LINE = 64  # bytes
 NO_FACE = -1
+SUPPORT, DRIVEN, REMOVED = 1, 2, 3  # moves with the support, along a path of its own; is not there any more
 ALL = 15  # bits of all four faces or corners
 
 # status codes that `advance` returns
@@ -86,8 +87,8 @@ BODY = joined(
         flags="pairs_changed "  # flag: those two differ
         "faces corners "  # bits of those that can touch; pieces of ground have their upper face and its free ends,
         # and in bits 4 and 5 of corners whether those at the right and left are sharper than a right angle
-        "is_moved "  # flag: moves with the support
-        "counts",  # flag: forces on it matter, as it is free or moves with the support
+        "is_moved "  # 0 for free bodies, else SUPPORT, DRIVEN or REMOVED: what moves it
+        "counts",  # flag: forces on it matter, as it is free, driven, or moves with the support
     ),
     record_type(
         "radius "  # m: half diagonal
@@ -170,7 +171,7 @@ CLOCK = record_type(
     "ends_at "  # step at which the run ends, as two bodies were found too deep in one another; 0: none
     "is_started",  # flag
 )
-LEDGER = record_type("dashpot friction broken to_support travel_work largest_kinetic")  # J
+LEDGER = record_type("dashpot friction broken to_support events travel_work largest_kinetic")  # J
 ACTION = record_type(
     "fx fy torque_a torque_b "  # N, N m: force of a pair on body a and its torque; torque on b is against torque_b
     "dashpot friction broken",  # J: lost in the drift that led here
@@ -203,6 +204,15 @@ MOVED = record_type(
     "fx fy",  # N: contact totals on it in the evaluation before
     indices="body",
 )
+DRIVE = record_type(
+    "x y angle "  # m, m, rad: where a driven body was at the start
+    "along_x along_y "  # -: direction in which it is shifted
+    "about_x about_y "  # m: the point about which it turns, which is shifted with it
+    "fx fy torque "  # N, N, N m: contact totals on it in the evaluation before
+    "rest_time",  # s: from when on it stays where it is; infinite where it never does
+    # pieces of its shift and of its turn among all paths: the one that holds, and the one after the last
+    indices="body shift shift_end turn turn_end",
+)
 MOTION_PIECE = record_type("start c0 c1 c2 c3")  # s, m, m/s ...: c0 + c1 t + c2 t^2 + c3 t^3 with t from the start
 
 
@@ -228,6 +238,8 @@ class World(NamedTuple):
     matrices: Floats  # (8, 3, 3) work space of one pair
     moved: Records  # (f,) MOVED, all bodies that move with the support
     motion: Records  # (m,) MOTION_PIECE, displacement of the support over time
+    driven: Records  # (d,) DRIVE, bodies with a motion of their own
+    paths: Records  # (q,) MOTION_PIECE, shift (m) and turn (rad) of all driven bodies over time
     controls: Records  # (1,) CONTROLS
     clock: Records  # (1,) CLOCK
     ledger: Records  # (g,) LEDGER, one for each group of bodies; what is not of pairs is in the first one

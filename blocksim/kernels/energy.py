@@ -8,7 +8,17 @@ from blocksim.kernels.jit import entry_kernel, rare_kernel
 from blocksim.kernels.laws import stored_energy
 from blocksim.kernels.memory import share_before, shear_stiffness_before
 
-LEDGER_ROW = ("kinetic", "potential", "stored_normal", "stored_shear", "dashpot", "friction", "broken", "to_support")
+LEDGER_ROW = (
+    "kinetic",
+    "potential",
+    "stored_normal",
+    "stored_shear",
+    "dashpot",
+    "friction",
+    "broken",
+    "to_support",
+    "events",
+)
 
 
 @rare_kernel
@@ -80,8 +90,9 @@ def measure(world: World, row: Floats) -> None:
     row[3] = shear
     row[4], row[5], row[6] = booked(world.ledger)
     row[7] = ledger.to_support
-    row[8] = count
-    row[9] = largest
+    row[8] = ledger.events
+    row[9] = count
+    row[10] = largest
 
 
 @rare_kernel

@@ -1,13 +1,14 @@
-"""Prescribed motion of the support: the ground, its pieces, walls and all fixed bodies together."""
+"""Prescribed motion of the support: the ground, its pieces, walls and all fixed bodies together; see driven.py too."""
 
 from blocksim.kernels.arrays import Record, Records, World
 from blocksim.kernels.jit import kernel, rare_kernel
 
 
 @kernel
-def has_motion(controls: Record) -> bool:
-    """Return True if the support moves at all."""
-    return controls.motion_x != 0.0 or controls.motion_y != 0.0
+def has_motion(world: World) -> bool:
+    """Return True if the support moves at all, or any body is driven."""
+    controls = world.controls[0]
+    return controls.motion_x != 0.0 or controls.motion_y != 0.0 or world.driven.size > 0
 
 
 @rare_kernel
@@ -23,6 +24,13 @@ def displacement(piece: Record, time: float) -> float:
     """Return the displacement (m) at a time (s)."""
     t = time - piece.start
     return piece.c0 + t * (piece.c1 + t * (piece.c2 + t * piece.c3))
+
+
+@rare_kernel
+def rate(piece: Record, time: float) -> float:
+    """Return the velocity (m/s) at a time (s)."""
+    t = time - piece.start
+    return piece.c1 + t * (2.0 * piece.c2 + 3.0 * t * piece.c3)
 
 
 @rare_kernel
@@ -46,14 +54,14 @@ def move_support(world: World, step: float) -> None:
     clock.motion_piece = piece_at(world.motion, clock.motion_piece, before)
     piece = world.motion[piece_at(world.motion, clock.motion_piece, now)]
     moved = displacement(piece, now)
-    rate = (moved - last) / step if step > 0.0 else piece.c1
+    speed = (moved - last) / step if step > 0.0 else rate(piece, now)
     change = acceleration(piece, now)
     for base in world.moved:
         body = world.bodies[base.body]
         body.x = base.x + controls.motion_x * moved
         body.y = base.y + controls.motion_y * moved
-        body.vx = controls.motion_x * rate
-        body.vy = controls.motion_y * rate
+        body.vx = controls.motion_x * speed
+        body.vy = controls.motion_y * speed
         body.ax = controls.motion_x * change
         body.ay = controls.motion_y * change
 
@@ -79,7 +87,11 @@ def book_support(world: World, step: float) -> None:
 
 @rare_kernel
 def is_support_at_rest(world: World) -> bool:
-    """Return True if the motion of the support is over, or there is none."""
+    """Return True if the motion of the support and of all driven bodies is over, or there is none."""
+    time = world.clock[0].steps * world.controls[0].step
+    for one in world.driven:
+        if time < one.rest_time:
+            return False
     last = world.motion[world.motion.size - 1]
     is_constant = last.c1 == 0.0 and last.c2 == 0.0 and last.c3 == 0.0
-    return is_constant and world.clock[0].steps * world.controls[0].step >= last.start
+    return is_constant and time >= last.start

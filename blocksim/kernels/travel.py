@@ -6,6 +6,7 @@ from blocksim.kernels.arrays import Record, World
 from blocksim.kernels.broad_phase import rebuild_pairs
 from blocksim.kernels.energy import smallest_side
 from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.support import has_motion
 
 PAIR_SHARE = 0.4  # of the skin, that a body may move; two use up 0.8 skins, the rest covers what was not foreseen
 GROWTH = 4.0  # until the next look a body may become this many times as fast as the fastest one is now
@@ -51,7 +52,7 @@ def unseen_steps(world: World, farthest: float, fastest: float) -> int:
     if left <= 0.0:
         return 0
     gravity = math.sqrt(controls.gravity_x**2 + controls.gravity_y**2)
-    most = MOST_UNSEEN if controls.motion_x == 0.0 and controls.motion_y == 0.0 else MOST_UNSEEN_DRIVEN
+    most = MOST_UNSEEN_DRIVEN if has_motion(world) else MOST_UNSEEN
     drift = controls.step * (GROWTH * fastest + math.sqrt(2.0 * gravity * left))
     return most if left > drift * most else int(left / drift)
 

@@ -16,7 +16,7 @@ from blocksim.scenario.models.stepping import Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.pairs import GROUND, ResolvedPair, resolve_pair
 from blocksim.scenario.placement import PlacedBody, place_bodies
-from blocksim.scenario.resolved import motion_table_content, scenario_hash, scenario_to_toml
+from blocksim.scenario.resolved import body_table_contents, motion_table_content, scenario_hash, scenario_to_toml
 from blocksim.scenario.segments import PlacedSegment, place_segments, surface_height
 
 __all__ = [
@@ -41,6 +41,7 @@ __all__ = [
     "Sweep",
     "Time",
     "Wall",
+    "body_table_contents",
     "document_of",
     "json_schema",
     "load_scenario",

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from blocksim.scenario.keys import MISSING, NAMED, KeyPath, field_at, follow, keys_of, table_at
+from blocksim.scenario.models.drive import DRIVES
 from blocksim.scenario.models.motions import MOTIONS
 from blocksim.scenario.models.probe import PROBES
 from blocksim.scenario.models.scenario import Scenario
@@ -20,7 +21,12 @@ from blocksim.scenario.systems import HELD, SYSTEMS
 TWO_VALUES = "two values are needed, one along x and one along y"
 MAX_FINDINGS = 200
 """Mistakes that are examined; a file of a million mistakes must not take minutes."""
-KINDS_IN: dict[str | int, Iterable[str]] = {"structures": KINDS, "motion": MOTIONS, "probes": PROBES}
+KINDS_IN: dict[str | int, Iterable[str]] = {
+    "structures": KINDS,
+    "motion": MOTIONS,
+    "probes": PROBES,
+    "bodies": DRIVES,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +62,7 @@ def _finding(entry: ErrorDetails, data: object) -> Finding:
         case "union_tag_invalid":
             kind = follow(data, (*path, "kind"))
             hint = did_you_mean(str(kind), KINDS_IN[path[0]]) or f"choose {_kinds(path)}"
-            return Finding((*path, "kind"), f"unknown {str(path[0]).removesuffix('s')} kind {shown(kind)}; {hint}")
+            return Finding((*path, "kind"), f"unknown {_of_kinds(path)} kind {shown(kind)}; {hint}")
         case "extra_forbidden":
             return _unknown_key(path, data)
         case "blocksim":
@@ -75,6 +81,8 @@ def _path(loc: Sequence[str | int]) -> KeyPath:
         return path[1:]
     if path[:1] in (("structures",), ("probes",)):
         return (*path[:2], *path[3:])
+    if path[:1] == ("bodies",) and path[2:3] == ("motion",):
+        return (*path[:3], *path[4:])
     if path[:1] == ("time",) and path[1:2] not in [(scheme,) for scheme in SCHEMES]:
         return path  # of a scheme that is none of the union
     if path[:1] in (("motion",), ("time",)):
@@ -121,6 +129,11 @@ def _table_with(word: str) -> str:
     tables = ((name, table_at((name,), {})) for name in keys_of(Scenario) if name not in NAMED and name not in SYSTEMS)
     having = [name for name, table in tables if table is not None and word in keys_of(table)]
     return having[0] if len(having) == 1 else ""
+
+
+def _of_kinds(path: KeyPath) -> str:
+    """Return what the table at a path is that has a kind."""
+    return "motion" if path[-1] == "motion" else str(path[0]).removesuffix("s")
 
 
 def _kinds(path: KeyPath) -> str:

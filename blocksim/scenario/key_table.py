@@ -12,6 +12,8 @@ from pydantic_core import PydanticUndefined
 
 from blocksim.scenario.keys import options, si_unit
 from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
+from blocksim.scenario.models.drive import OWN_DRIVES
+from blocksim.scenario.models.events import Event, NewVelocity
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
 from blocksim.scenario.models.motions import MOTIONS
 from blocksim.scenario.models.probe import PROBES, Probe
@@ -36,9 +38,12 @@ def key_table() -> str:
         ("structures, every kind", Structure),
         *((f'structures, kind = "{kind}"', model) for kind, model in KINDS.items()),
         ("bodies", BodySpec),
+        *((f'bodies.motion, kind = "{kind}"', model) for kind, model in OWN_DRIVES.items()),
         ("ground", Ground),
         ("walls", Wall),
         *((f'motion, kind = "{kind}"', model) for kind, model in MOTIONS.items()),
+        ("events", Event),
+        ("events.velocity", NewVelocity),
         ("friction", Friction),
         ("friction.PAIR", PairFriction),
         ("pairs.A.B", Pair),

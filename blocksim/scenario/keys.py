@@ -24,6 +24,7 @@ NAMED: dict[str | int, int] = {
     "structures": 2,
     "bodies": 2,
     "walls": 2,
+    "events": 2,
     "pairs": 3,
     "probes": 2,
 }

@@ -44,7 +44,7 @@ def motion_pieces(scenario: Scenario) -> MotionPieces:
     motion, end = scenario.motion, BEYOND * scenario.time.end
     if motion is None:
         return MotionPieces(np.zeros(1), np.zeros((0, 4)), 0.0)
-    return _from_zero_to(end, _pieces(motion, end))
+    return from_zero_to(end, _pieces(motion, end))
 
 
 def displacement_and_velocity(pieces: MotionPieces, times: Floats) -> tuple[Floats, Floats]:
@@ -65,7 +65,7 @@ def _pieces(motion: AnyMotion, end: float) -> MotionPieces:
         case FromTable():
             return _from_table(motion)
         case Pulse():
-            return _through(*pulse_samples(motion))
+            return through(*pulse_samples(motion))
         case Record():
             return _integrated(*record_samples(motion))
 
@@ -83,7 +83,7 @@ def _harmonic(motion: Harmonic, end: float) -> MotionPieces:
     speed = 2.0 * math.pi * motion.frequency
     sine, cosine = np.sin(speed * since + motion.phase), np.cos(speed * since + motion.phase)
     velocity = motion.amplitude * (rate / motion.resolved_ramp * sine + rise * speed * cosine)
-    return _through(times, motion.amplitude * rise * sine, velocity)
+    return through(times, motion.amplitude * rise * sine, velocity)
 
 
 def _ramp(share: Floats) -> tuple[Floats, Floats]:
@@ -98,7 +98,7 @@ def _from_table(motion: FromTable) -> MotionPieces:
     if motion.table.quantity == "acceleration":
         return _integrated(times, values)
     displacement = values - values[0]
-    return _through(times, displacement, spline_slopes(times, displacement))
+    return through(times, displacement, spline_slopes(times, displacement))
 
 
 def _integrated(times: Floats, acceleration: Floats) -> MotionPieces:
@@ -112,7 +112,7 @@ def _integrated(times: Floats, acceleration: Floats) -> MotionPieces:
     return MotionPieces(times, np.column_stack(columns), float(velocity[-1]))
 
 
-def _through(times: Floats, displacement: Floats, velocity: Floats) -> MotionPieces:
+def through(times: Floats, displacement: Floats, velocity: Floats) -> MotionPieces:
     """Return the cubic pieces with these displacements (m) and velocities (m/s) at the joints (Hermite)."""
     step = np.diff(times)
     secant = np.diff(displacement) / step
@@ -143,7 +143,7 @@ def spline_slopes(x: Floats, y: Floats) -> Floats:
     return slopes
 
 
-def _from_zero_to(end: float, pieces: MotionPieces) -> MotionPieces:
+def from_zero_to(end: float, pieces: MotionPieces) -> MotionPieces:
     """Add rest before the first piece, and after the last one its final velocity until `end` (s)."""
     times, coefficients, velocity = pieces
     if times[0] > 0.0:

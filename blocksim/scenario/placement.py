@@ -24,7 +24,9 @@ class PlacedBody(NamedTuple):
     vx: float
     vy: float
     spin: float
-    fixed: bool
+    fixed: bool  # held at the start: forces do not move it
+    driven: bool = False  # by a motion of its own; fixed as well
+    freed: bool = False  # by an event
 
     @property
     def mass(self) -> float:
@@ -75,6 +77,7 @@ def _forget(dead: weakref.ref[Scenario]) -> None:
 
 
 def _placed(scenario: Scenario) -> _Placement:
+    freed = {name for event in scenario.events for name in event.free}
     bodies: list[PlacedBody] = []
     origins: list[tuple[KeyPath, int]] = []
     for number, structure in enumerate(scenario.structures):
@@ -85,7 +88,9 @@ def _placed(scenario: Scenario) -> _Placement:
     for number, spec in enumerate(scenario.bodies):
         pose = Pose(spec.x, spec.y, spec.angle, *spec.velocity, spec.spin)
         name = spec.name or str(len(bodies) + 1)
-        bodies.append(_placer(scenario, spec.block)(name, pose, fixed=spec.fixed))
+        is_driven = spec.motion is not None
+        body = _placer(scenario, spec.block)(name, pose, fixed=spec.fixed or is_driven)
+        bodies.append(body._replace(driven=is_driven, freed=name in freed) if is_driven or freed else body)
         origins.append((("bodies", number), 1))
     return _Placement(weakref.ref(scenario, _forget), tuple(bodies), tuple(origins))
 

@@ -3,7 +3,7 @@
 import functools
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from blocksim.scenario.models.contact import Friction, PairFriction
-from blocksim.scenario.models.motion import MotionTable
+from blocksim.scenario.models.motion import FromTable, MotionTable
 from blocksim.scenario.models.motions import TABLED
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Time
@@ -25,12 +25,17 @@ SCHEME = "time.scheme"
 UNHASHED = {"description", "experiment", "sweep", "provenance"}
 
 
-def scenario_to_toml(scenario: Scenario, experiment_table: str | None = None, motion_table: str | None = None) -> str:
+def scenario_to_toml(
+    scenario: Scenario,
+    experiment_table: str | None = None,
+    motion_table: str | None = None,
+    body_tables: Mapping[str, str] | None = None,
+) -> str:
     """Write every key with its value; loading the text gives an equal scenario, floats to the last bit.
 
     Where a sweep varies the scheme, keys that only one scheme has are left out; a sweep is refused unless they have
     their defaults. `experiment_table` and `motion_table` replace the paths of tables, for copies kept beside the
-    resolved file.
+    resolved file; `body_tables` those of the motions of bodies, by the digest of the table.
     """
     data = _plain(scenario)
     if scenario.sweep is not None:
@@ -41,6 +46,10 @@ def scenario_to_toml(scenario: Scenario, experiment_table: str | None = None, mo
         data["experiment"] = {"table": experiment_table}
     if motion_table is not None and isinstance(scenario.motion, TABLED):
         data["motion"]["table"] = motion_table
+    for number, table in _body_tables(scenario):
+        name = (body_tables or {}).get(table.digest)
+        if name is not None:
+            data["bodies"][number]["motion"]["table"] = name
     return HEADER + tomli_w.dumps(data)
 
 
@@ -62,7 +71,21 @@ def deciding_values(scenario: Scenario) -> dict[str, Any]:
     data = scenario.model_dump(mode="json", exclude=UNHASHED)
     if isinstance(scenario.motion, TABLED):
         data["motion"]["table"] = scenario.motion.table.digest
+    for number, table in _body_tables(scenario):
+        data["bodies"][number]["motion"]["table"] = table.digest
     return data
+
+
+def _body_tables(scenario: Scenario) -> Iterator[tuple[int, MotionTable]]:
+    """Yield the numbers of bodies whose motion is a table, and the tables."""
+    for number, body in enumerate(scenario.bodies):
+        if isinstance(body.motion, FromTable):
+            yield number, body.motion.table
+
+
+def body_table_contents(scenario: Scenario) -> dict[str, bytes]:
+    """Return the tables of the motions of bodies as they were read, for copies, each once by its digest."""
+    return {table.digest: table.content for _, table in _body_tables(scenario)}
 
 
 def scenario_hash(scenario: Scenario) -> str:

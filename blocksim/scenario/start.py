@@ -8,13 +8,16 @@ from operator import attrgetter
 import numpy as np
 
 from blocksim.scenario import keys, overlap
+from blocksim.scenario.events import impossible_events
 from blocksim.scenario.findings import MAX_FINDINGS, Finding
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
+from blocksim.scenario.models.drive import MOST_BODY_TABLES
 from blocksim.scenario.models.motion import PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.placement import PlacedBody, origins_of, place_bodies
 from blocksim.scenario.probes import unfit_probes
 from blocksim.scenario.quantities import shown
+from blocksim.scenario.resolved import body_table_contents
 from blocksim.scenario.segments import TOLERANCE, profile_segments, surface_heights, wall_segments
 from blocksim.scenario.structures import MAX_BLOCKS, UnfitError
 
@@ -65,6 +68,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
     yield from _overlaps(origins, bodies)
     yield from _unfit_systems(scenario)
     yield from unfit_probes(scenario, bodies)
+    yield from impossible_events(scenario, bodies)
 
 
 def _ends(bodies: Sequence[PlacedBody], name: str) -> tuple[float, float]:
@@ -93,13 +97,17 @@ def _too_many(scenario: Scenario) -> Iterator[Finding]:
 
 
 def _endless_motion(scenario: Scenario) -> Iterator[Finding]:
-    """Find vibrations of too many cycles."""
-    motion = scenario.motion
-    if isinstance(motion, Harmonic):
-        pieces = sum(count for *_, count in motion.sections(scenario.time.end))
+    """Find vibrations of too many cycles, and too many tables."""
+    motions: list[tuple[keys.KeyPath, object]] = [((), scenario.motion)]
+    motions += [(("bodies", number), body.motion) for number, body in enumerate(scenario.bodies)]
+    for path, motion in motions:
+        pieces = sum(count for *_, count in motion.sections(scenario.time.end)) if isinstance(motion, Harmonic) else 0
         if pieces > MAX_PIECES:
             message = f"{pieces / PIECES_PER_CYCLE:.6g} cycles are too many; at most {MAX_PIECES // PIECES_PER_CYCLE}"
-            yield Finding(("motion", "frequency"), f"{message} are allowed")
+            yield Finding((*path, "motion", "frequency"), f"{message} are allowed")
+    if len(tables := body_table_contents(scenario)) > MOST_BODY_TABLES:
+        message = f"{len(tables)} different tables of motion of bodies are too many; at most {MOST_BODY_TABLES}"
+        yield Finding(("bodies",), f"{message} are allowed")
 
 
 def _fixed_stiffnesses(scenario: Scenario) -> Iterator[Finding]:

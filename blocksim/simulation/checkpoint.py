@@ -22,6 +22,7 @@ from blocksim.kernels.arrays import zeros
 from blocksim.scenario import Scenario
 from blocksim.scenario.resolved import deciding_values
 from blocksim.simulation.atomic import writing
+from blocksim.simulation.happened import Happened
 from blocksim.simulation.provenance import code_hashes, code_version, machine
 from blocksim.simulation.schemes import AnyScene
 from blocksim.world.free_memory import available_bytes, readable
@@ -44,6 +45,7 @@ class Position(BaseModel, frozen=True):
     total_seconds: float
     threads: int  # that it ran on; it can continue with any number
     resumed_from: tuple[int, ...] = ()  # steps at which earlier parts of the run were resumed
+    events: tuple[Happened, ...] = ()  # that have happened so far
 
 
 class Origin(BaseModel, frozen=True):

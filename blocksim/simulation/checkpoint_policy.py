@@ -11,6 +11,7 @@ from typing import NamedTuple, Protocol
 
 from blocksim.simulation.checkpoint import Origin, Position, write_checkpoint
 from blocksim.simulation.folder import CHECKPOINTS
+from blocksim.simulation.happened import Happened
 from blocksim.simulation.schemes import AnyScene
 
 CHECKPOINT_SECONDS = 60.0
@@ -47,6 +48,7 @@ class Standing(NamedTuple):
     start_energy: float  # J
     solver_seconds: float  # in all parts of the run
     threads: int
+    events: tuple[Happened, ...] = ()
 
 
 @dataclass(frozen=True)

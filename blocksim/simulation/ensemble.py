@@ -20,6 +20,7 @@ from blocksim.kernels.frame_times import next_frame
 from blocksim.kernels.watch import Watched
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.simulation.compilation import compile_kernels, kernels_of
+from blocksim.simulation.events import NEVER, Timeline
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.ledger import (
     EnergyLedger,
@@ -33,12 +34,12 @@ from blocksim.simulation.ledger import (
 from blocksim.simulation.loop import last_step_of, outcome_of
 from blocksim.simulation.movement import EndSpeed, FirstMove, FirstMoves, end_speeds
 from blocksim.simulation.outcome import Outcome, diagnosed
-from blocksim.simulation.recorder import MOTION, POSITION, Rows, frames_from_rows, steps_per_frame
+from blocksim.simulation.recorder import POSITION, Rows, frames_from_rows, steps_per_frame
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measured_row, scheme_of
 from blocksim.simulation.table import COLUMNS, Columns, as_frame, final_values
 from blocksim.simulation.team import ALONE
 from blocksim.world.scenes import Refusal, Stack, member, stack_of_one
-from blocksim.world.systems.blocks import blocks_placed
+from blocksim.world.systems.blocks import blocks_placed, motion_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -168,6 +169,8 @@ class Ensemble:
         self.scheme = scheme_of(self.scenes)
         self.bodies = int(self.scenes.world.bodies.shape[1]) - 1
         self.time_steps: list[float] = self.scenes.world.controls["step"][:, 0].tolist()
+        own = zip([scenarios[number] for number in stack.numbers], self.placed, self.time_steps, strict=True)
+        self.timelines = [Timeline(one, placed, step) if one.events else None for one, placed, step in own]
         ends = [scenarios[number].time.end for number in stack.numbers]
         self.last_steps = np.array([*map(last_step_of, ends, self.time_steps)], dtype=np.int64)
         self.starts = np.zeros((len(ends), len(self.scheme.measured)))
@@ -185,7 +188,9 @@ class Ensemble:
         nobody = np.zeros(0, dtype=np.int64)  # compiles, before there are threads
         self._advance_members(nobody, self.last_steps, self.starts, self.codes)
         count = len(self.codes)
-        if self.scheme.advance_members is None:
+        if any(self.timelines):  # each is advanced alone, from where it begins
+            self._advance_members(np.arange(count), np.zeros_like(self.codes), self.starts, self.codes)
+        if self.scheme.advance_members is None or any(self.timelines):
             self.codes[:] = PAIRS_FULL
             return
         chunk = min(CHUNK, -(-count // threads))
@@ -277,12 +282,16 @@ class Ensemble:
         """Advance one scene from stop to stop, as `_advance` does; return it and its status code."""
         while True:
             done = int(scene.world.clock[0].steps)
-            look, stop = self._next_look(m, done), self._next_stop(m, done)
-            scene, code = ALONE.advance(scene, stop)
-            is_under_way = code == REACHED and stop < self.last_steps[m]
-            continues = is_under_way and (stop != look or adds_up(energy_ledger(scene, start)))
-            if not continues or self._is_frame(m, stop):
-                time = int(scene.world.clock[0].steps) * self.time_steps[m]
+            look, timeline = self._next_look(m, done), self.timelines[m]
+            event = NEVER if timeline is None else timeline.next_step(done)
+            scene, code = ALONE.advance(scene, min(self._next_stop(m, done), event))
+            if timeline is not None:
+                scene, code = timeline.act(scene, ALONE, code)
+            now = int(scene.world.clock[0].steps)
+            is_under_way = code == REACHED and now < self.last_steps[m]
+            continues = is_under_way and (now != look or adds_up(energy_ledger(scene, start)))
+            if not continues or self._is_frame(m, now):
+                time = now * self.time_steps[m]
                 self.moves.see([m], self._positions(stack_of_one(scene), slice(None)), [time])
             if not continues:
                 return scene, code
@@ -297,7 +306,7 @@ class Closing:
         self.names = ledger_names(scenes)
         self.scenes, self.placed = scenes, placed
         self.measured = measured
-        self.motion = np.stack([world.bodies[name][:, :blocks] for name in MOTION], axis=1)  # (m, 6, b)
+        self.motion = motion_of(world.bodies[:, :blocks])  # (m, 6, b)
         self.steps: NDArray[np.int64] = world.clock["steps"].copy()  # (m, 1)
         self.time_steps: list[float] = world.controls["step"][:, 0].tolist()
         book = world.ledger[:, 0]

@@ -15,6 +15,7 @@ from blocksim.scenario import Scenario
 from blocksim.scenario.bounded_read import MEGABYTE, read_limited
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.result_files import (
+    BODY_MOTIONS,
     CHECKPOINTS,
     DONE,
     EXPERIMENT,
@@ -33,6 +34,7 @@ RESULTS = Path("results")
 MOST_BYTES = MEGABYTE  # of done.json
 
 __all__ = [
+    "BODY_MOTIONS",
     "CHECKPOINTS",
     "DONE",
     "EXPERIMENT",

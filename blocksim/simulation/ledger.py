@@ -30,10 +30,11 @@ Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is Non
 class EnergyLedger(BaseModel, frozen=True, extra="allow"):
     """All in J. The residual is what total + losses has drifted since the start.
 
-    `to_support` is the work done on a support that moves; negative where the support drives the scene. What a scheme
-    does not know is zero: springs, dashpots and contacts that break are of the explicit one, impacts and correction
-    (blocksim.kernels.nonsmooth.energy) of the non-smooth one. Systems beside the blocks add entries of their own, whose
-    names begin with theirs.
+    `to_support` is the work done on supports and driven bodies that move; negative where they drive the scene. `events`
+    is what events have taken out of it, with bodies removed or fixed, and negative where they bring some in. What a
+    scheme does not know is zero: springs, dashpots and contacts that break are of the explicit one, impacts and
+    correction (blocksim.kernels.nonsmooth.energy) of the non-smooth one. Systems beside the blocks add entries of their
+    own, whose names begin with theirs.
     """
 
     kinetic: Number
@@ -46,6 +47,7 @@ class EnergyLedger(BaseModel, frozen=True, extra="allow"):
     impacts: Number = 0.0
     correction: Number = 0.0
     to_support: Number = 0.0
+    events: Number = 0.0
     start: Number
     in_play: Number
     __pydantic_extra__: dict[str, Number]
@@ -63,6 +65,7 @@ class EnergyLedger(BaseModel, frozen=True, extra="allow"):
         """Energy now plus all losses, minus the energy at the start (J)."""
         now = self.kinetic + self.potential + self.stored_normal + self.stored_shear
         lost = self.dashpot + self.friction + self.broken + self.impacts + self.correction + self.to_support
+        lost += self.events
         further = sum((self.model_extra or {}).values())
         residual: float = now + lost + further - self.start
         return residual

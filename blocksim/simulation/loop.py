@@ -8,6 +8,8 @@ from blocksim.kernels.arrays import REACHED
 from blocksim.simulation import outcome as ends
 from blocksim.simulation.checkpoint import Position
 from blocksim.simulation.checkpoint_policy import KEEPS_NOTHING, Keeper, Standing
+from blocksim.simulation.events import Timeline
+from blocksim.simulation.happened import Happened
 from blocksim.simulation.ledger import EnergyLedger, adds_up, energy_ledger, next_energy_check, start_energy
 from blocksim.simulation.outcome import Outcome, diagnosed
 from blocksim.simulation.recorder import Recorder
@@ -39,6 +41,7 @@ class Attendance:
     on_progress: Watcher = lambda _: None
     stop: Callable[[], str] = lambda: ""  # why to stop now; nothing as long as the run may continue
     keeper: Keeper = KEEPS_NOTHING
+    timeline: Timeline | None = None  # where there are events
 
 
 NOBODY = Attendance()
@@ -57,6 +60,8 @@ class LoopResult:
     solver_seconds: float
     threads: int
     overlap: float
+    events: tuple[Happened, ...] = ()
+    pending: tuple[int, ...] = ()  # numbers of events that have not happened
 
 
 def last_step_of(end: float, step: float) -> int:
@@ -122,6 +127,7 @@ class _Going:
         self.pace = Pace(self.bodies)
         self.status, self.is_lost = REACHED, False
         self.seconds = self.start = 0.0  # in compiled code; J
+        self.timeline = attendance.timeline
 
     @property
     def done(self) -> int:
@@ -132,6 +138,8 @@ class _Going:
         """Evaluate the contacts at the start, or take over what an earlier part of the run has left."""
         if since is not None:
             self.start, self.seconds = since.start_energy, since.solver_seconds
+            if self.timeline is not None:
+                self.timeline.happened = since.events
             return
         self._advance(0)
         self.start = start_energy(self.scene)
@@ -151,8 +159,11 @@ class _Going:
         """Advance towards a step at which a frame is wanted, as far as one call goes."""
         done, before = self.done, time.perf_counter()
         look = next_energy_check(done, self.bodies)
-        self._go_by_probes(min(wanted, look, done + self.pace.steps, self.keeper.next_step(done)))
+        event = wanted if self.timeline is None else self.timeline.next_step(done)
+        self._go_by_probes(min(wanted, look, event, done + self.pace.steps, self.keeper.next_step(done)))
         self.pace.learn(self.done - done, time.perf_counter() - before)
+        if self.timeline is not None:
+            self.scene, self.status = self.timeline.act(self.scene, self.team, self.status)
         if self.done == wanted:
             self.recorder.sample(self.scene)
         ledger = energy_ledger(self.scene, self.start)
@@ -178,7 +189,8 @@ class _Going:
         """Have the present state kept, before the frame of a moment that is no output time is recorded."""
         done, recorder = self.done, self.recorder
         frames = recorder.count_until(done), recorder.digest_until(done)
-        self.keeper.keep(self.scene, Standing(done, *frames, self.start, self.seconds, self.team.threads))
+        events = () if self.timeline is None else self.timeline.happened
+        self.keeper.keep(self.scene, Standing(done, *frames, self.start, self.seconds, self.team.threads, events))
 
     def result(self, why: str) -> LoopResult:
         """Record where the run ended, and return its outcome."""
@@ -187,4 +199,6 @@ class _Going:
         outcome = ends.interrupted(why) if why else outcome_of(self.status, ledger)
         outcome = diagnosed(outcome, self.status, self.scene, self.recorder.placed)
         overlap = float(measured_row(self.scene)[-1])
-        return LoopResult(self.scene, outcome, ledger, self.seconds, self.team.threads, overlap)
+        happened, pending = ((), []) if self.timeline is None else (self.timeline.happened, self.timeline.pending)
+        threads = self.team.threads
+        return LoopResult(self.scene, outcome, ledger, self.seconds, threads, overlap, happened, tuple(pending))

@@ -15,8 +15,9 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from blocksim.errors import BlocksimError, OutputExistsError
-from blocksim.scenario import Scenario, motion_table_content, scenario_to_toml
+from blocksim.scenario import Scenario, body_table_contents, motion_table_content, scenario_to_toml
 from blocksim.scenario.bounded_read import MEGABYTE, read_head, read_limited
+from blocksim.scenario.models.drive import MOST_BODY_TABLES
 from blocksim.scenario.probes import probe_names
 from blocksim.scenario.resolved import HEADER
 from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
@@ -25,6 +26,7 @@ from blocksim.simulation.table import COLUMNS
 SCENARIO = "scenario.toml"  # resolved; written first
 EXPERIMENT = "experiment.csv"  # copy of the table that the scenario names
 MOTION = "motion.csv"  # copy of the table of the support's motion
+BODY_MOTIONS = tuple(f"motion-{k}.csv" for k in range(1, 1 + MOST_BODY_TABLES))  # of those of the motions of bodies
 FINAL = "final.csv"
 FRAMES = "run.h5"
 PROBE = "probe-"  # and its name: CSV of a probe
@@ -32,7 +34,7 @@ PROBE_LEFTOVER = re.compile(r"\.probe-[A-Za-z0-9._-]+\.csv\.[a-z0-9_]{8}(?:\.csv
 SUMMARY = "run.json"
 DONE = "done.json"  # written last: a folder without it is not finished
 CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run continues, removed when it has finished
-OURS = (SCENARIO, EXPERIMENT, MOTION, FINAL, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
+OURS = (SCENARIO, EXPERIMENT, MOTION, *BODY_MOTIONS, FINAL, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
 HEAD_BYTES = 4096
 MOST_BYTES = 10 * MEGABYTE  # of a scenario or a summary
 TABLE_BYTES = MEGABYTE  # of a table of an experiment, which is not read if larger
@@ -83,7 +85,7 @@ RUN_KINDS: Mapping[str, Kind] = {
     **dict.fromkeys(CHECKPOINTS, begins(CHECKPOINT)),
 }
 """The files of a run but the copies of tables, whose content is a person's: see `copies`."""
-COPIES = (EXPERIMENT, MOTION)
+COPIES = (EXPERIMENT, MOTION, *BODY_MOTIONS)
 
 
 def probe_tables(scenario: Scenario) -> list[str]:
@@ -184,6 +186,7 @@ def read_tables(scenario: Scenario) -> dict[str, bytes]:
     tables = {}
     if scenario.experiment is not None:
         tables[EXPERIMENT] = read_limited(scenario.experiment.table, TABLE_BYTES, links=True)
+    tables |= dict(zip(BODY_MOTIONS, body_table_contents(scenario).values(), strict=False))
     motion = motion_table_content(scenario)
     return tables if motion is None else {**tables, MOTION: motion}
 
@@ -238,4 +241,5 @@ def _foreign(path: Path) -> OutputExistsError:
 def resolved_beside(scenario: Scenario, tables: Mapping[str, bytes]) -> str:
     """Return the resolved scenario (TOML) that refers to the copies beside it."""
     names = {name: name if name in tables else None for name in (EXPERIMENT, MOTION)}
-    return scenario_to_toml(scenario, experiment_table=names[EXPERIMENT], motion_table=names[MOTION])
+    of_bodies = dict(zip(body_table_contents(scenario), BODY_MOTIONS, strict=False))
+    return scenario_to_toml(scenario, names[EXPERIMENT], names[MOTION], of_bodies)

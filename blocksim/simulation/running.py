@@ -20,7 +20,9 @@ from blocksim.simulation.atomic import sha256_of, write_text
 from blocksim.simulation.checkpoint import origin_of, restored
 from blocksim.simulation.checkpoint_policy import DEFAULTS, NO_PAST, CheckpointPolicy, CheckpointWriter, Past
 from blocksim.simulation.compilation import compile_kernels, compile_systems, kernels_of
+from blocksim.simulation.events import Timeline
 from blocksim.simulation.folder import CHECKPOINTS, folder_lock
+from blocksim.simulation.happened import in_words
 from blocksim.simulation.ledger import RESIDUAL_PROMISE
 from blocksim.simulation.loop import Attendance, LoopResult, Watcher, last_step_of, run_loop
 from blocksim.simulation.probe_series import bytes_of_series
@@ -52,7 +54,7 @@ from blocksim.world.scenes import Built, arrays_of
 from blocksim.world.systems import others_of
 
 CHECKPOINT_FILES = len(CHECKPOINTS) + 1  # the last one while it is written
-COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION)
+COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION, *files.BODY_MOTIONS)
 
 
 def _ignore(_: object) -> None:
@@ -82,7 +84,8 @@ def simulate(
     began += _compiled(scenario)
     recorder = _recorder(scenario, built)
     with _attended(built.scene, recorder, threads, limit, on_progress) as (team, attendance):
-        ended = run_loop(built.scene, recorder, scenario.time.end, team=team, attendance=attendance)
+        watched = replace(attendance, timeline=_timeline(scenario, recorder))
+        ended = run_loop(built.scene, recorder, scenario.time.end, team=team, attendance=watched)
     return _result(scenario, recorder, ended, time.perf_counter() - began)
 
 
@@ -149,6 +152,11 @@ def _attended(
         yield team, Attendance(on_progress, lambda: requests.reason() or limit.reason())
 
 
+def _timeline(scenario: Scenario, recorder: Recorder) -> Timeline | None:
+    """Return the events of a run, None where it has none."""
+    return Timeline(scenario, recorder.placed, recorder.time_step) if scenario.events else None
+
+
 def _recorder(scenario: Scenario, built: Built) -> Recorder:
     step, output = float(built.scene.world.controls[0].step), scenario.output
     probes, others = probes_of(scenario, built.placed, step, ledger_names(built.scene)), others_of(scenario)
@@ -199,7 +207,7 @@ class Part:
                 self.folder, (files.FINAL, files.SUMMARY, *probe_tables(self.scenario))
             )  # of the part before
             self.writer = self._writer(sink, precautions)
-            watched = replace(attendance, keeper=self.writer)
+            watched = replace(attendance, keeper=self.writer, timeline=_timeline(self.scenario, self.recorder))
             since = self.resumption.checkpoint and self.resumption.checkpoint.position
             return run_loop(
                 self.scene, self.recorder, self.scenario.time.end, team=team, attendance=watched, since=since
@@ -282,6 +290,7 @@ def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds:
         total_seconds=seconds,
         energy_J=ended.ledger,
         threads=ended.threads,
+        events=ended.events,
         movement=recorder.watch.found(_velocity_of_support(ended.scene)),
         warnings=tuple(_warnings(scenario, recorder.placed, ended)),
         environment=environment(),
@@ -299,6 +308,8 @@ def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResul
         yield f"relative energy error {residual:.1e}, above {RESIDUAL_PROMISE:g}"
     if is_shorter_than_step(every, float(ended.scene.world.controls[0].step)):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
+    for number in ended.pending if ended.outcome.is_finished else ():
+        yield f"events.{number} has not happened, as nothing came to rest: {in_words(scenario.events[number])}"
     if isinstance(scenario.time, Nonsmooth) and ended.outcome.is_finished:
         sunk = overlap_warning(ended.overlap, min(min(body.size_x, body.size_y) for body in placed))
         if sunk:

@@ -9,6 +9,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario.bounded_read import MEGABYTE, read_limited
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import sha256_of
+from blocksim.simulation.happened import Happened
 from blocksim.simulation.ledger import EnergyLedger
 from blocksim.simulation.movement import Movement
 
@@ -37,6 +38,7 @@ class Summary(BaseModel, frozen=True):
     resumed_from: tuple[int, ...] = ()  # steps at which parts of the run after the first one began
     last_checkpoint: int | None = None  # step of the last good one, where the run did not finish
     energy_J: EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
+    events: tuple[Happened, ...] = ()  # in the order in which they have happened
     movement: Movement | None = None  # None in runs of earlier versions
     warnings: tuple[str, ...]
     environment: dict[str, str]

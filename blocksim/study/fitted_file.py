@@ -17,6 +17,7 @@ import tomli_w
 from blocksim.errors import BlocksimError
 from blocksim.scenario import Document, Scenario, scenario_hash, scenario_to_toml
 from blocksim.scenario.keys import KeyPath, follow, format_key
+from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.overrides import with_value
 from blocksim.scenario.source import Place, Span, locate
 
@@ -50,16 +51,23 @@ def with_fitted(
 def _with_values(text: str, wanted: Document, settings: int) -> str:
     """Return the text with all values that were set over it; the first so many are settings, the others are fitted."""
     fitted = {override.path for override in wanted.overrides[settings:] if override.path[0] != "provenance"}
-    for path in dict.fromkeys([*(override.path for override in wanted.overrides), *TABLES]):
+    for path in dict.fromkeys([*(override.path for override in wanted.overrides), *_tables(wanted)]):
         if follow(wanted.data, path) != follow(Document.parse(text).data if text else {}, path):
             text = _edited(text, path, wanted, is_fitted=path in fitted)
     return text
 
 
+def _tables(document: Document) -> tuple[KeyPath, ...]:
+    """Return the keys of a scenario that may name a table."""
+    bodies = document.data.get("bodies", ())
+    count = len(bodies) if isinstance(bodies, tuple) else 0
+    return (*TABLES, *(("bodies", number, "motion", "table") for number in range(count)))
+
+
 def _moved(document: Document, folder: Path) -> Document:
     """Return the document with its paths as seen from another folder."""
     data = document.data
-    for path in TABLES:
+    for path in _tables(document):
         named = follow(data, path)
         if isinstance(named, str):
             target = (document.folder / named).resolve()
@@ -126,8 +134,15 @@ def _says(text: str, scenario: Scenario, folder: Path) -> bool:
 
 def _resolved(scenario: Scenario, moved: Document) -> str:
     experiment, motion = (follow(moved.data, path) for path in TABLES[:2])
+    motions = ((number, body.motion) for number, body in enumerate(scenario.bodies))
+    of_bodies = {
+        one.table.digest: str(follow(moved.data, ("bodies", number, "motion", "table")))
+        for number, one in motions
+        if isinstance(one, FromTable)
+    }
     return scenario_to_toml(
         scenario,
         experiment_table=experiment if isinstance(experiment, str) else None,
         motion_table=motion if isinstance(motion, str) else None,
+        body_tables=of_bodies,
     )

@@ -148,12 +148,14 @@ class Support:
     """Ground, walls and fixed bodies of one run; x runs along the ground, all in SI. The default: level and at rest.
 
     `profile` is the surface towards +x, level beyond both ends. `fixed` states for every body whether it moves with the
-    support. A tilt raises the +x end. Without `motion` all rest. `weight` (N) is that of all free bodies.
+    support or by a motion of its own (`driven`). A tilt raises the +x end. Without `motion` all rest. `weight` (N) is
+    that of all free bodies.
     """
 
     profile: tuple[tuple[float, float], ...] = ((0.0, 0.0), (1.0, 0.0))
     walls: tuple[PlacedSegment, ...] = ()
     fixed: tuple[bool, ...] = ()
+    driven: tuple[bool, ...] = ()
     tilt: float = 0.0
     direction: tuple[float, float] = (1.0, 0.0)
     motion: MotionPieces | None = None
@@ -202,9 +204,10 @@ def support_of(scenario: Scenario) -> Support:
     return Support(
         profile=scenario.ground.profile or Support.profile,
         walls=wall_segments(scenario),
-        fixed=tuple(body.fixed for body in placed),
+        fixed=tuple(body.fixed and not body.freed for body in placed),
+        driven=tuple(body.driven for body in placed),
         tilt=scenario.ground.tilt,
         direction=motion_direction(scenario),
         motion=None if scenario.motion is None else motion_pieces(scenario),
-        weight=scenario.gravity * sum(body.mass for body in placed if not body.fixed),
+        weight=scenario.gravity * sum(body.mass for body in placed if not body.fixed or body.freed),
     )

@@ -13,6 +13,7 @@ from blocksim.view.paint import Paint, by_block
 from blocksim.view.panel import Canvas
 from blocksim.view.run_data import Floats, FramesLike, Support, others_of, outlines_of
 from blocksim.view.window import MILLIMETRES
+from blocksim.world.systems.blocks import are_removed
 from blocksim.world.systems.system import Track
 
 Flags = NDArray[np.bool_]
@@ -60,7 +61,8 @@ def draw_standing(canvas: Canvas, frames: FramesLike, frame: int, support: Suppo
     """Draw ground and walls at the time of one frame, and where they were at the start."""
     offset = MILLIMETRES * support.offset(frames.time[frame : frame + 1])[0]
     draw_support(canvas, support, offset)
-    draw_start(canvas, support, offset, corners(frames, frame)[_fixed(frames, support)])
+    carried = _fixed(frames, support) & ~np.array(support.driven or (False,) * len(frames.names))
+    draw_start(canvas, support, offset, corners(frames, frame)[carried & are_there(frames, frame)])
     draw_shift(canvas, support, offset, MILLIMETRES * float(frames.x[0].mean()))
 
 
@@ -91,8 +93,14 @@ def _draw_system(canvas: Canvas, track: Track, frame: int, colour: str) -> None:
     canvas.axes.add_collection(drawn)
 
 
+def are_there(frames: FramesLike, frame: int) -> Flags:
+    """Return for every block whether it has not been removed by a frame, (b,): what is not there has no velocity."""
+    vx = getattr(frames, "vx", None)
+    return np.ones(len(frames.names), dtype=bool) if vx is None else np.asarray(~are_removed(vx[frame]))
+
+
 def _fixed(frames: FramesLike, support: Support) -> Flags:
-    """Return for every block whether it moves with the support, (b,)."""
+    """Return for every block whether it is fixed or driven, (b,)."""
     return np.array(support.fixed or (False,) * len(frames.names))
 
 
@@ -135,12 +143,16 @@ def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags,
     smallest = MILLIMETRES * canvas.points_per_mm * float(min(frames.size_x.min(), frames.size_y.min()))
     thin = min(style.LINE_WIDTH, 0.05 * smallest)
     line: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
-    colours = [fill for fill, held in zip(fills, fixed, strict=True) if not held]
+    there = are_there(frames, frame)
+    colours = [fill for fill, is_free in zip(fills, ~fixed & there, strict=True) if is_free]
     hatch = FIXED_HATCH if smallest >= LEAST_HATCHED else None
-    held = PolyCollection(list(outlines[fixed]), facecolors=style.GROUND_COLOUR, hatch=hatch, **line)
-    free = PolyCollection(list(outlines[~fixed]), facecolors=colours, **line)
+    held = PolyCollection(list(outlines[fixed & there]), facecolors=style.GROUND_COLOUR, hatch=hatch, **line)
+    free = PolyCollection(list(outlines[~fixed & there]), facecolors=colours, **line)
     sides = LineCollection(
-        list(_upper_sides(frames, frame)[~fixed]), colors=style.INK, linewidths=2.0 * thin, transform=canvas.scene
+        list(_upper_sides(frames, frame)[~fixed & there]),
+        colors=style.INK,
+        linewidths=2.0 * thin,
+        transform=canvas.scene,
     )
     for artist in (held, free, sides):
         canvas.axes.add_collection(artist)
@@ -152,7 +164,8 @@ def _draw_names(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags, fi
     from matplotlib.patheffects import withStroke  # noqa: PLC0415 - see style
 
     fonts = _label_fonts(frames, canvas.points_per_mm)
-    for kind in (fixed, ~fixed):
+    there = are_there(frames, frame)
+    for kind in (fixed & there, ~fixed & there):
         if not all(fonts[kind]):
             continue
         for index in np.flatnonzero(kind):

@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.arrays import ALL, BODY, MOTION_PIECE, MOVED, Record, Records, zeros
+from blocksim.kernels.arrays import ALL, BODY, DRIVEN, MOTION_PIECE, MOVED, SUPPORT, Record, Records, zeros
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments
 from blocksim.scenario.motion import motion_direction, motion_pieces
+from blocksim.world.drives import DriveRecords, drive_records, piece_records
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
 
 # A piece of ground is a slab of which only the upper face counts; its thickness is a share of the smallest side of all
@@ -34,12 +35,14 @@ class Outline(NamedTuple):
     classes: tuple[ContactClass, ...]
     interactions: Interactions
     motion: Records  # (m,) MOTION_PIECE
+    drives: DriveRecords
 
     @property
-    def shape(self) -> tuple[str, int, int, int, int]:
+    def shape(self) -> tuple[str, int, int, int, int, tuple[int, ...]]:
         """Common properties of scenes that are built together."""
         model = self.scenario.contact.model
-        return model, len(self.placed), len(self.segments), len(self.classes), self.motion.size
+        drives = (*self.drives.driven["body"].tolist(), self.drives.paths.size)
+        return model, len(self.placed), len(self.segments), len(self.classes), self.motion.size, drives
 
 
 Outlines = Sequence[Outline]
@@ -51,7 +54,8 @@ def outline_of(scenario: Scenario) -> Outline:
     placed = place_bodies(scenario)
     classes = contact_classes(scenario, placed)
     interactions = interactions_of(scenario, classes)
-    return Outline(scenario, placed, place_segments(scenario), classes, interactions, motion_records(scenario))
+    motion, drives = motion_records(scenario), drive_records(scenario, placed)
+    return Outline(scenario, placed, place_segments(scenario), classes, interactions, motion, drives)
 
 
 def body_records(outlines: Outlines) -> Records:
@@ -69,8 +73,22 @@ def body_records(outlines: Outlines) -> Records:
             _fill_slabs(records[blocks:-1].view(np.recarray), outline)
     has_profile = [outline.scenario.ground.profile is not None for outline in outlines]
     bodies["y"][has_profile, -1] = -math.inf
-    bodies["is_moved"] = bodies["inverse_mass"] == 0.0
+    bodies["is_moved"] = np.where(bodies["inverse_mass"] == 0.0, SUPPORT, 0)
+    bodies["is_moved"][:, outlines[0].drives.driven["body"]] = DRIVEN
     return bodies
+
+
+def with_freed(bodies: Records, outlines: Outlines) -> Records:
+    """Return the same records with the masses of bodies that events free, by which steps are chosen."""
+    places = [(m, i) for m, one in enumerate(outlines) for i, body in enumerate(one.placed) if body.freed]
+    if not places:
+        return bodies
+    heavy = bodies.copy()
+    for m, i in places:
+        body = outlines[m].placed[i]
+        heavy["mass"][m, i], heavy["inertia"][m, i] = body.mass, body.inertia
+        heavy["inverse_mass"][m, i], heavy["inverse_inertia"][m, i] = 1.0 / body.mass, 1.0 / body.inertia
+    return heavy
 
 
 def _fill_blocks(records: NDArray[np.record], outlines: Outlines) -> None:
@@ -136,7 +154,7 @@ def support_direction(scenario: Scenario) -> tuple[float, float]:
 
 def moved_records(bodies: Records) -> Records:
     """Return where all bodies (..., n + 1) that move with the support start; in every scene there are equally many."""
-    is_moved = bodies["is_moved"] != 0
+    is_moved = bodies["is_moved"] == SUPPORT
     numbers = np.nonzero(is_moved)[-1].reshape(*is_moved.shape[:-1], -1)
     records = zeros(numbers.shape, MOVED)
     records["body"] = numbers
@@ -149,10 +167,5 @@ def motion_records(scenario: Scenario) -> Records:
     """Return the pieces of the displacement over time; where a motion ends before the run, the last one is constant."""
     if scenario.motion is None:
         return STANDSTILL
-    pieces = motion_pieces(scenario)
-    count = len(pieces.coefficients)
-    records = zeros(max(1, count), MOTION_PIECE)
-    records["start"][:count] = pieces.times[:-1]
-    for k, name in enumerate(("c0", "c1", "c2", "c3")):
-        records[name][:count] = pieces.coefficients[:, k]
-    return records
+    records = piece_records(motion_pieces(scenario))
+    return records if records.size else STANDSTILL

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import Scenario
+from blocksim.scenario.drives import greatest_rate
 from blocksim.scenario.motion import motion_pieces
+from blocksim.world.drives import driven_speed, highest_rise
 from blocksim.world.interactions import Interactions
 
 
@@ -61,13 +63,25 @@ def bounds_of(bodies: NDArray[np.record], blocks: int) -> list[Bounds]:
 def fastest_fall(scenario: Scenario, bounds: Bounds) -> float:
     """Return the speed (m/s) at which the highest corner would reach the lowest ground, from rest."""
     lowest = min((y for _, y in scenario.ground.profile or ()), default=0.0)
-    height = max(0.0, bounds.top - lowest)
+    height = max(0.0, bounds.top + highest_rise(scenario) - lowest)
     return math.sqrt(2.0 * scenario.gravity * math.cos(scenario.ground.tilt) * height)
 
 
 def impact_speed(scenario: Scenario, bounds: Bounds) -> float:
     """Return the bound (m/s) of the speed of any point of a block that does not slide downhill."""
-    return math.hypot(bounds.speed, fastest_fall(scenario, bounds))
+    return math.hypot(given_speed(scenario, bounds), fastest_fall(scenario, bounds))
+
+
+def given_speed(scenario: Scenario, bounds: Bounds) -> float:
+    """Return the greatest speed (m/s) of any point of a block that the scenario itself gives."""
+    new = (event.velocity for event in scenario.events)
+    sizes = [math.hypot(block.size_x, block.size_y) for block in scenario.blocks.values()]
+    given = (
+        math.hypot(one.vx or 0.0, one.vy or 0.0) + 0.5 * max(sizes) * abs(one.spin or 0.0)
+        for one in new
+        if one is not None
+    )
+    return max(bounds.speed, driven_speed(scenario), *given)
 
 
 def greatest_speed(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
@@ -92,10 +106,4 @@ def support_speed(scenario: Scenario) -> float:
     """Return the greatest speed (m/s) of the support, zero where it does not move."""
     if scenario.motion is None:
         return 0.0
-    pieces = motion_pieces(scenario)
-    _, c1, c2, c3 = pieces.coefficients.T
-    length = np.diff(pieces.times)
-    with np.errstate(divide="ignore", invalid="ignore"):  # straight and parabolic pieces are fastest at an end
-        middle = np.nan_to_num(-c2 / (3.0 * c3), posinf=0.0, neginf=0.0)
-    rates = [np.abs(c1 + s * (2.0 * c2 + 3.0 * s * c3)) for s in (0.0 * length, np.clip(middle, 0.0, length), length)]
-    return float(max(np.max(rate, initial=0.0) for rate in rates))
+    return greatest_rate(motion_pieces(scenario))

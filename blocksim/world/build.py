@@ -96,6 +96,8 @@ def assembled(parts: Parts, controls: Records, **arrays: Any) -> World:
         matrices=numbers((members, 8, 3, 3), np.float64),
         moved=moved_records(bodies),
         motion=joined([outline.motion for outline in parts.outlines]),
+        driven=joined([outline.drives.driven for outline in parts.outlines]),
+        paths=joined([outline.drives.paths for outline in parts.outlines]),
         controls=controls,
         clock=zeros((members, 1), CLOCK),
         shares=zeros((members, 1), SHARE),

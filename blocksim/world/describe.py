@@ -4,14 +4,12 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from blocksim.kernels.arrays import Record, World
 from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, place_bodies
 from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.scenario.motion import motion_pieces
 from blocksim.scenario.motion_peaks import motion_peaks
-from blocksim.world.bodies import outline_of
+from blocksim.world.bodies import outline_of, with_freed
 from blocksim.world.bounds import bounds_of
 from blocksim.world.build import build_world
 from blocksim.world.coupled import couple
@@ -29,6 +27,7 @@ from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
 from blocksim.world.particles import particle_count
 from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
+from blocksim.world.scenes import stack_of_one
 from blocksim.world.systems import others_of
 from blocksim.world.systems.system import Present
 
@@ -165,8 +164,8 @@ def _seconds_of(others: Sequence[Present]) -> float:
 def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, step: float) -> SagDescription | None:
     if not isinstance(scenario.time, Nonsmooth):
         return None
-    (bounds,) = bounds_of(world.bodies[np.newaxis], len(placed))
     outline = outline_of(scenario)
+    (bounds,) = bounds_of(with_freed(stack_of_one(world.bodies), [outline]), len(placed))
     sag = scene_sag(step / scenario.time.substeps, placed, scenario.gravity)
     return SagDescription(
         why=reason_of_step(outline, bounds).why,

@@ -121,6 +121,7 @@ def _stepping(outline: Outline, stride: Stride) -> dict[str, float]:
         "is_guarded": has_impacts_in_rounds(restitution),
         "least_reach": 0.5 * stride.skin,
         "most_reach": MOST_REACH * stride.skin,
+        "is_driven": outline.drives.driven.size > 0,
     }
 
 

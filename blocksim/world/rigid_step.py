@@ -30,7 +30,7 @@ from typing import NamedTuple
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.world.bodies import Outline
-from blocksim.world.bounds import Bounds, greatest_speed, impact_speed
+from blocksim.world.bounds import Bounds, given_speed, greatest_speed, impact_speed
 from blocksim.world.sag import WARNING_SHARE, scene_sag, soft_contact
 from blocksim.world.step import MOST_STEPS, StepError, UncountableStepsError
 
@@ -124,5 +124,5 @@ def longest_step(outline: Outline, bounds: Bounds) -> float:
     """Return the longest manual step (s)."""
     scenario = outline.scenario
     speed = greatest_speed(scenario, bounds, outline.interactions)
-    rate = max(bounds.speed, speed / _substeps(scenario))
+    rate = max(given_speed(scenario, bounds), speed / _substeps(scenario))
     return SHARE * bounds.smallest / rate if rate > 0.0 else scenario.time.end

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError
 from blocksim.kernels.arrays import SLOTS, Records, zeros
 from blocksim.scenario import PlacedBody, Scenario
-from blocksim.world.bodies import Outline, Outlines, body_records, outline_of
+from blocksim.world.bodies import Outline, Outlines, body_records, outline_of, with_freed
 from blocksim.world.bounds import Bounds, bounds_of
 from blocksim.world.memory import Size, refuse_if_too_large
 from blocksim.world.particles import place_particles, slots_of_a_pair
@@ -107,7 +107,7 @@ def build_one(scenario: Scenario, construction: Construction) -> Built:
     outline = outline_of(scenario)
     with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused
         bodies = body_records([outline])
-        (bounds,) = bounds_of(bodies, len(outline.placed))
+        (bounds,) = bounds_of(with_freed(bodies, [outline]), len(outline.placed))
         stride = construction.choose(outline, bounds)
     ((_, parts),) = _divided([outline], bodies, construction.model(outline))
     refuse_if_too_large(construction.size(parts))
@@ -140,7 +140,8 @@ def _choose(outlines: Outlines, construction: Construction) -> tuple[Records, li
     chosen: list[Stride | BlocksimError] = []
     with np.errstate(all="ignore"):  # as in `build_one`
         bodies = body_records(outlines)
-        for outline, bounds in zip(outlines, bounds_of(bodies, len(outlines[0].placed)), strict=True):
+        all_bounds = bounds_of(with_freed(bodies, outlines), len(outlines[0].placed))
+        for outline, bounds in zip(outlines, all_bounds, strict=True):
             try:
                 chosen.append(construction.choose(outline, bounds))
             except BlocksimError as error:

@@ -24,7 +24,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Explicit, Nonsmooth
-from blocksim.world.bounds import Bounds, Kind, fastest_fall, greatest_speed, support_speed
+from blocksim.world.bounds import Bounds, Kind, fastest_fall, given_speed, greatest_speed, support_speed
 from blocksim.world.interactions import Interactions
 from blocksim.world.stable_step import ContactBody, ContactStiffness, Load, stable_step, steepest
 from blocksim.world.systems import largest_step
@@ -102,7 +102,7 @@ def _contact_body(kind: Kind) -> ContactBody:
 def expected_load(scenario: Scenario, bounds: Bounds) -> Load:
     """Return the speed that the fastest point may reach by falling, or by sliding all the time, and the weight."""
     along = scenario.gravity * abs(math.sin(scenario.ground.tilt))
-    speed = bounds.speed + fastest_fall(scenario, bounds) + along * scenario.time.end
+    speed = given_speed(scenario, bounds) + fastest_fall(scenario, bounds) + along * scenario.time.end
     return Load(speed, scenario.gravity * bounds.mass)
 
 

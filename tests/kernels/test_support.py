@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import AT_REST, CONTROLS, MOTION_PIECE, REACHED, Records, World, zeros
+from blocksim.kernels.arrays import AT_REST, MOTION_PIECE, REACHED, Records, World, zeros
 from blocksim.kernels.support import acceleration, book_support, displacement, has_motion, piece_at
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.build import build_world
@@ -291,9 +291,9 @@ def test_work_on_the_support_is_booked_by_the_trapezoid_rule_and_its_totals_are_
 
 @pytest.mark.parametrize(("x", "y", "moves"), [(0.0, 0.0, False), (1.0, 0.0, True), (0.0, -1.0, True)])
 def test_support_moves_where_its_motion_has_a_direction(x: float, y: float, moves: bool) -> None:
-    controls = zeros(1, CONTROLS)[0]
-    controls.motion_x, controls.motion_y = x, y
-    assert has_motion(controls) == moves
+    world = on_support([LYING]).world
+    world.controls.motion_x, world.controls.motion_y = x, y
+    assert has_motion(world) == moves
 
 
 @pytest.mark.parametrize("is_driven", [False, True])

@@ -110,6 +110,7 @@ STEPPING = record_type(
     "colours row_count active_count group_count "  # now
     "sweeps "  # of the velocity pass, in all so far
     "is_guarded "  # flag: impacts go one after the other, in rounds
+    "is_driven "  # flag: bodies move otherwise than the supports
     "has_rebounds "  # flag: anything rebounds in the substep under way
     "has_gain",  # flag: the last round has created energy in a cluster
 )

@@ -79,6 +79,40 @@ def energy(contacts: Contacts, line: Record, vx: float, vy: float, spin: float) 
 
 
 @rare_kernel
+def count_work(contacts: Contacts) -> None:
+    """Take the work of driven bodies, seen from the supports, out of the energies of clusters after a round.
+
+    What a body that moves otherwise than the supports brings in is no gain of impacts.
+    """
+    stepping = contacts.stepping[0]
+    for m in range(stepping.group_count if stepping.is_driven else 0):
+        group = contacts.groups[m]
+        for lane in range(group.count if contacts.asides[m].is_hit else 0):
+            root = contacts.impacts[of_row(contacts, group, lane).root]
+            root.now -= work_of(contacts, group, lane)
+
+
+@rare_kernel
+def work_of(contacts: Contacts, group: Record, lane: int) -> float:
+    """Return the work (J) that the impulses of a row bring into its free body, seen from the supports."""
+    lines = contacts.lines
+    is_b = lines[group.a[lane]].inverse_mass > 0.0
+    fixed = lines[group.b[lane] if is_b else group.a[lane]]
+    if fixed.inverse_mass > 0.0:
+        return 0.0
+    ux = fixed.vx - contacts.stepping[0].support_vx
+    uy = fixed.vy - contacts.stepping[0].support_vy
+    normal = group.normal_one[lane] + group.normal_two[lane]
+    shear = group.shear[lane]
+    nx = group.nx[lane]
+    ny = group.ny[lane]
+    moment = (group.arm_b[lane] if is_b else group.arm_a[lane]) * normal - group.width[lane] * group.normal_two[lane]
+    moment += (group.shear_arm_b[lane] if is_b else group.shear_arm_a[lane]) * shear
+    work = normal * (nx * ux + ny * uy) + shear * (nx * uy - ny * ux) + fixed.spin * moment
+    return work if is_b else -work
+
+
+@rare_kernel
 def has_gain(root: Record) -> bool:
     """Return True if impacts have created energy in a cluster."""
     return root.now > root.then * (1.0 + ROUND_OFF)
@@ -97,6 +131,7 @@ def weigh(contacts: Contacts) -> bool:
             root = bodies[body.root]
             root.then += energy(contacts, lines[i], body.vx, body.vy, body.spin)
             root.now += energy(contacts, lines[i], lines[i].vx, lines[i].vy, lines[i].spin)
+    count_work(contacts)
     gains = False
     for body in bodies:
         gains = gains or has_gain(body)

@@ -17,7 +17,7 @@ DEEPEST = (
     0.5  # of the smallest side of a pair: what goes deeper comes out on the other side. Impacts of fast blocks that
 )
 # are found late, in steps as long as theirs, go as deep as a tenth and are pushed out again
-NONSMOOTH_LEDGER = ("kinetic", "potential", "impacts", "friction", "correction", "to_support")
+NONSMOOTH_LEDGER = ("kinetic", "potential", "impacts", "friction", "correction", "to_support", "events")
 
 
 @rare_kernel
@@ -91,4 +91,5 @@ def measure_nonsmooth(scene: Nonsmooth, row: Floats) -> None:
     row[1] = potential_energy(scene.world)
     row[2], row[3], row[5] = booked(scene.contacts.books)
     row[4] = correction(scene)
-    row[6], row[7] = contact_points(scene)
+    row[6] = scene.world.ledger[0].events
+    row[7], row[8] = contact_points(scene)

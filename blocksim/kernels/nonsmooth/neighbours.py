@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from blocksim.kernels.arrays import Record
 from blocksim.kernels.broad_phase import bucket, cell_of, fill_grid
+from blocksim.kernels.driven import way_over
 from blocksim.kernels.geometry import ground_gap, separation
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
@@ -46,7 +47,7 @@ def common_frame(scene: Nonsmooth) -> Frame:
     bodies = scene.world.bodies
     way = 0.0
     speed = 0.0
-    if has_motion(scene.world.controls[0]):
+    if has_motion(scene.world):
         return frame_of_supports(scene)
     for i in range(bodies.size - 1):
         body = bodies[i]
@@ -62,6 +63,28 @@ def common_frame(scene: Nonsmooth) -> Frame:
 def corner_speed(body: Record, frame: Frame) -> float:
     """Return an upper bound (m/s) of the speed of a body's points in a frame."""
     return math.sqrt((body.vx - frame.vx) ** 2 + (body.vy - frame.vy) ** 2) + body.radius * abs(body.spin)
+
+
+@kernel
+def travel(scene: Nonsmooth, i: int, frame: Frame) -> float:
+    """Return how far (m) a corner of a body may have come in a frame since the pair list was made."""
+    body = scene.world.bodies[i]
+    dx = body.x - scene.spots[i].x - frame.x
+    dy = body.y - scene.spots[i].y - frame.y
+    return math.sqrt(dx * dx + dy * dy) + body.radius * abs(body.angle - body.list_angle)
+
+
+@rare_kernel
+def coming_speed(scene: Nonsmooth, one: Record, frame: Frame) -> float:
+    """Return an upper bound (m/s) of the mean speed of the points of a driven body in the step to come, in a frame.
+
+    A path may begin, end or turn back at once: the velocity until now does not tell.
+    """
+    world = scene.world
+    step = world.controls[0].step
+    way = way_over(world, one, world.clock[0].steps * step, step)
+    rate = math.sqrt((way.x / step - frame.vx) ** 2 + (way.y / step - frame.vy) ** 2)
+    return rate + world.bodies[one.body].radius * abs(way.angle) / step
 
 
 @kernel
@@ -83,11 +106,14 @@ def look(scene: Nonsmooth) -> bool:
         spot = scene.spots[i]
         rate = corner_speed(body, frame) + falls
         fastest = max(fastest, rate)
-        dx = body.x - spot.x - frame.x
-        dy = body.y - spot.y - frame.y
-        gone = math.sqrt(dx * dx + dy * dy) + body.radius * abs(body.angle - body.list_angle)
+        gone = travel(scene, i, frame)
         is_finite = is_finite and math.isfinite(rate + gone)
         is_good = is_good and gone + min(2.0 * rate * controls.step, MOST_MARGIN * spot.reach) <= spot.reach
+    for one in world.driven:
+        rate = coming_speed(scene, one, frame)
+        reach = scene.spots[one.body].reach
+        fastest = max(fastest, rate)
+        is_good = is_good and travel(scene, one.body, frame) + min(rate * controls.step, MOST_MARGIN * reach) <= reach
     stepping.margin = min(2.0 * controls.step * fastest, 2.0 * MOST_MARGIN * stepping.least_reach)
     return is_good or not is_finite or rebuild(scene, frame)  # what is not finite is found after the step
 

@@ -227,6 +227,19 @@ def reach(
 
 
 @kernel
+def given_to(row: Rows, a: Bodies, b: Bodies, normal_one: Lanes, normal_two: Lanes, shear: Lanes) -> Lanes:
+    """Return the work (J) of the impulses on body a of rows, did it move as the fixed body of the row does."""
+    is_b = a.inverse_mass > 0.0
+    vx = select(is_b, b.vx, a.vx)
+    vy = select(is_b, b.vy, a.vy)
+    spin = select(is_b, b.spin, a.spin)
+    normal = normal_one + normal_two
+    moment = select(is_b, row.arm_b, row.arm_a) * normal - row.width * normal_two
+    moment = moment + select(is_b, row.shear_arm_b, row.shear_arm_a) * shear
+    return normal * (row.nx * vx + row.ny * vy) + shear * (row.nx * vy - row.ny * vx) + spin * moment
+
+
+@kernel
 def taken_by(
     contacts: Contacts, then: Records, group: Record, lane: Lane, gx: float, gy: float
 ) -> tuple[Lanes, Lanes, Lanes]:
@@ -243,7 +256,6 @@ def taken_by(
     normal_two = load(lane, group.normal_two)
     if is_all(normal_one + normal_two <= 0.0):
         return 0.0 * normal_one, 0.0 * normal_one, 0.0 * normal_one
-    stepping = contacts.stepping[0]
     row = rows_of(group, lane)
     shear = load(lane, group.shear)
     a = bodies_at(contacts, group.a, lane)
@@ -254,7 +266,5 @@ def taken_by(
     vx = a.vx - b.vx + vx_a - vx_b + free * gx
     vy = a.vy - b.vy + vy_a - vy_b + free * gy
     slip = slip_of(row, vx, vy, a.spin + spin_a, b.spin + spin_b)
-    along_normal = row.nx * stepping.support_vx + row.ny * stepping.support_vy
-    along_tangent = row.nx * stepping.support_vy - row.ny * stepping.support_vx
-    given = free * ((normal_one + normal_two) * along_normal + shear * along_tangent)
+    given = free * given_to(row, a, b, normal_one, normal_two, shear)
     return slip.one * normal_one + slip.two * normal_two, slip.shear * shear, -given

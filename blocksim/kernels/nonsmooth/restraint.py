@@ -23,7 +23,7 @@ from blocksim.kernels.arrays import Record
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.lanes import WIDTH, load, store
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
-from blocksim.kernels.nonsmooth.clusters import ROUND_OFF, energy, has_gain, of_row
+from blocksim.kernels.nonsmooth.clusters import ROUND_OFF, count_work, energy, has_gain, of_row
 from blocksim.kernels.nonsmooth.rounds import clear
 
 NEITHER, LOW, HIGH = range(3)  # what the last solution of a cluster is kept as: that with too little or too much energy
@@ -115,6 +115,7 @@ def weigh_again(contacts: Contacts) -> None:
     for i in range(bodies.size):
         if bodies[i].is_open and lines[i].inverse_mass > 0.0:
             bodies[bodies[i].root].now += energy(contacts, lines[i], lines[i].vx, lines[i].vy, lines[i].spin)
+    count_work(contacts)
 
 
 @rare_kernel

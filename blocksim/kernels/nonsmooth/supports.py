@@ -1,6 +1,7 @@
-"""Prescribed motion of the supports: the ground, its pieces, walls and all fixed bodies together."""
+"""Prescribed motion: of the supports (the ground, its pieces, walls, fixed bodies) and of driven bodies."""
 
-from blocksim.kernels.arrays import World
+from blocksim.kernels.arrays import Record, World
+from blocksim.kernels.driven import follow_pieces, pose_at, put, way_over
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.support import displacement, has_motion, piece_at
@@ -14,11 +15,11 @@ def displacement_at(world: World, time: float) -> float:
 
 @rare_kernel
 def drive(scene: Nonsmooth, number: int) -> None:
-    """Give the supports their velocity in substep `number` of the step under way: displacement over time."""
+    """Give supports and driven bodies their velocity in substep `number` of the step under way: way over time."""
     world = scene.world
     controls = world.controls[0]
     stepping = scene.contacts.stepping[0]
-    if not has_motion(controls):
+    if not has_motion(world):
         return
     h = stepping.substep
     begin = world.clock[0].steps * controls.step + number * h
@@ -30,15 +31,22 @@ def drive(scene: Nonsmooth, number: int) -> None:
         before = scene.contacts.before[one.body]
         line.vx = before.vx = stepping.support_vx
         line.vy = before.vy = stepping.support_vy
+    for one in world.driven:
+        line = scene.contacts.lines[one.body]
+        before = scene.contacts.before[one.body]
+        way = way_over(world, one, begin, h)
+        line.vx = before.vx = way.x / h
+        line.vy = before.vy = way.y / h
+        line.spin = before.spin = way.angle / h
 
 
 @rare_kernel
 def place_supports(scene: Nonsmooth) -> None:
-    """End a step of the supports, which is not counted yet: exactly where they have to be, never summed up."""
+    """End a step of supports and driven bodies, which is not counted yet: where they have to be, never summed up."""
     world = scene.world
     controls = world.controls[0]
     clock = world.clock[0]
-    if not has_motion(controls):
+    if not has_motion(world):
         return
     now = (clock.steps + 1) * controls.step
     clock.motion_piece = piece_at(world.motion, clock.motion_piece, now)
@@ -55,3 +63,21 @@ def place_supports(scene: Nonsmooth) -> None:
         body.vy = line.vy
         line.dx = 0.0
         line.dy = 0.0
+    for one in world.driven:
+        place_driven(scene, one, now)
+
+
+@rare_kernel
+def place_driven(scene: Nonsmooth, one: Record, time: float) -> None:
+    """End a step of one driven body, at a time (s)."""
+    world = scene.world
+    body = world.bodies[one.body]
+    line = scene.contacts.lines[one.body]
+    follow_pieces(world, one, time)
+    put(body, pose_at(world, one, time))
+    body.vx = line.vx
+    body.vy = line.vy
+    body.spin = line.spin
+    line.dx = 0.0
+    line.dy = 0.0
+    line.turned = 0.0

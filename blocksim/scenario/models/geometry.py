@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table
+from blocksim.scenario.models.drive import AnyDrive
 from blocksim.scenario.units import USUAL_GRAVITY
 
 Side = Literal["width", "height", "length"]
@@ -103,6 +104,7 @@ class BodySpec(Table):
     velocity: tuple[q.Speed, q.Speed] = Field(default=(0.0, 0.0), description="velocity of the centre along x and y")
     spin: q.Spin = Field(default=0.0, description="angular velocity, counter-clockwise positive")
     fixed: bool = Field(default=False, description="true for a body that never moves")
+    motion: AnyDrive | None = Field(default=None, description="prescribed motion of this body alone")
     name: Identifier | None = Field(default=None, description="name in tables (default: its number, from 1)")
 
     @model_validator(mode="after")
@@ -110,6 +112,16 @@ class BodySpec(Table):
         if self.fixed and (self.velocity != (0.0, 0.0) or self.spin != 0.0):
             message = "a fixed body cannot have a velocity or a spin"
             raise q.invalid(message, "fixed")
+        return self
+
+    @model_validator(mode="after")
+    def _driven_by_its_motion(self) -> Self:
+        if self.motion is not None and self.fixed:
+            message = "a body with a motion is driven, not fixed; remove one of the two"
+            raise q.invalid(message, "fixed")
+        if self.motion is not None and (self.velocity != (0.0, 0.0) or self.spin != 0.0):
+            message = "velocity and spin of a driven body follow from its motion"
+            raise q.invalid(message, "motion")
         return self
 
 

@@ -15,6 +15,7 @@ from pydantic.json_schema import SkipJsonSchema
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table
 from blocksim.scenario.models.contact import Contact, Friction, Pair
+from blocksim.scenario.models.events import Event
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
 from blocksim.scenario.models.motions import AnyMotion
 from blocksim.scenario.models.probe import AnyProbe
@@ -48,6 +49,7 @@ class Scenario(Table):
     ground: Ground = Field(default=Ground(), description="the ground")
     walls: tuple[Wall, ...] = Field(default=(), description="straight segments of boundary, in addition to the ground")
     motion: AnyMotion | None = Field(default=None, description="prescribed motion of ground, walls and fixed bodies")
+    events: tuple[Event, ...] = Field(default=(), description="what happens to bodies and walls during the run")
     friction: Friction = Field(default=Friction(), description="friction between blocks and with the ground")
     pairs: dict[str, dict[str, Pair]] = Field(
         default={}, description="pairs of materials that differ, as in [pairs.aluminium.ground]"

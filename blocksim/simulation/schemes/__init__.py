@@ -74,9 +74,9 @@ def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
 
 
 def _together(scenario: Scenario) -> str | None:
-    """Return what scenes have in common that are built together; None for those that are not."""
+    """Return what scenes have in common that are built together; None for those that are not, and with events."""
     scheme = scheme_named(scenario)
-    return None if scenario.systems or scheme.advance_members is None else scheme.name
+    return None if scenario.systems or scenario.events or scheme.advance_members is None else scheme.name
 
 
 def _alone(number: int, scenario: Scenario) -> Stack | Refusal:

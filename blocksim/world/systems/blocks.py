@@ -59,8 +59,24 @@ def _elements(scenario: Scenario) -> Elements:
     return elements_of(place_bodies(scenario))
 
 
+def motion_of(bodies: Any) -> Floats:
+    """Return the quantities (..., 6, b) of bodies (..., b): a removed one is where it was and has no velocity: NaN."""
+    from blocksim.kernels.arrays import REMOVED  # noqa: PLC0415 - kernels, not for readers
+
+    values = np.stack([bodies[one.name] for one in QUANTITIES], axis=-2)
+    is_gone = bodies["is_moved"] == REMOVED
+    if is_gone.any():
+        values[..., 3:, :] = np.where(is_gone[..., None, :], np.nan, values[..., 3:, :])
+    return values
+
+
+def are_removed(vx: Floats) -> Any:
+    """Return which blocks have been removed, given their velocities along x in frames (m/s)."""
+    return np.isnan(vx)
+
+
 def _state(world: Any, count: int) -> Floats:
-    return np.stack([world.bodies[one.name][:count] for one in QUANTITIES])
+    return motion_of(world.bodies[:count])
 
 
 BLOCKS = System(

@@ -1,0 +1,128 @@
+"""Events of a scenario: their order, and those that cannot happen."""
+
+from collections.abc import Iterator, Sequence
+
+from blocksim.scenario import keys
+from blocksim.scenario.findings import Finding
+from blocksim.scenario.models.events import Event
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.placement import PlacedBody
+from blocksim.scenario.quantities import shown
+from blocksim.scenario.spelling import did_you_mean_or_list
+
+MAX_EVENTS = 1000
+WALL = "wall {}"
+GROUPS = ("remove", "fix", "free")
+FREE, FIXED, DRIVEN, GONE = "free", "fixed", "driven", "removed"
+RESULTS = {"remove": GONE, "fix": FIXED, "free": FREE}
+MANY = 50
+"""Names of bodies beyond which a message does not list them all."""
+
+
+def wall_names(scenario: Scenario) -> list[str]:
+    """Return the names of the walls, in the order of the file."""
+    return [WALL.format(number) for number, _ in enumerate(scenario.walls, start=1)]
+
+
+def freed_names(scenario: Scenario) -> frozenset[str]:
+    """Return the names of bodies that some event frees."""
+    return frozenset(name for event in scenario.events for name in event.free)
+
+
+def in_order(events: Sequence[Event]) -> list[int]:
+    """Return the numbers of events: those with a time by it, then those that wait for rest; else as in the file."""
+    return sorted(range(len(events)), key=lambda number: (events[number].at is None, events[number].at or 0.0))
+
+
+def impossible_events(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+    """Find events that cannot happen: in themselves, or after others."""
+    if not scenario.events:
+        return
+    if len(scenario.events) > MAX_EVENTS:
+        yield Finding(("events",), f"{len(scenario.events)} events are too many; at most {MAX_EVENTS} are allowed")
+        return
+    if scenario.systems:
+        yield Finding(("events",), f"events are not available beside {', '.join(scenario.systems)}", at="key")
+    known = [body.name for body in bodies]
+    found = [one for number in range(len(scenario.events)) for one in _alone(scenario, number, known)]
+    yield from found
+    if not found:
+        yield from _in_turn(scenario, bodies)
+
+
+def _alone(scenario: Scenario, number: int, known: Sequence[str]) -> Iterator[Finding]:
+    """Find what is wrong with one event by itself."""
+    event, path = scenario.events[number], ("events", number)
+    if event.at is not None and event.at > scenario.time.end:
+        message = f"{event.at:g} s is after the end of the run, time.end = {scenario.time.end:g} s"
+        yield Finding((*path, "at"), message, relation=True)
+    if event.when is not None and not scenario.time.stop_at_rest:
+        yield Finding((*path, "when"), "rest is looked for only with time.stop_at_rest = true", relation=True)
+    walls = wall_names(scenario)
+    for place, name in _names(event, path):
+        allowed = [*known, *walls] if place[2] == "remove" else known
+        if name not in set(allowed):
+            yield Finding(place, _unknown(name, allowed, walls, is_wall_allowed=place[2] == "remove"))
+
+
+def _unknown(name: str, allowed: Sequence[str], walls: Sequence[str], *, is_wall_allowed: bool) -> str:
+    if name in walls and not is_wall_allowed:
+        return f"{shown(name)} is a wall, which can only be removed"
+    what = "body or wall" if is_wall_allowed else "body"
+    hint = f", {did_you_mean_or_list(name, allowed)}" if len(allowed) <= MANY else ""
+    return f"there is no {what} {shown(name)}{hint}"
+
+
+def _names(event: Event, path: keys.KeyPath) -> Iterator[tuple[keys.KeyPath, str]]:
+    """Yield all names in an event with their places."""
+    for group in GROUPS:
+        yield from (((*path, group, place), name) for place, name in enumerate(getattr(event, group)))
+    if event.velocity is not None:
+        yield (*path, "velocity", "body"), event.velocity.body
+
+
+def _in_turn(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+    """Find what events before make impossible.
+
+    Nobody knows whether a rest comes before or after a time: of what events of both kinds name, only that it goes once
+    is checked.
+    """
+    start = {body.name: DRIVEN if body.driven else FIXED if body.fixed else FREE for body in bodies}
+    start |= dict.fromkeys(wall_names(scenario), FIXED)
+    mixed = _named_by(scenario, timed=True) & _named_by(scenario, timed=False)
+    states: dict[str, tuple[str, int | None]] = {name: (state, None) for name, state in start.items()}
+    for number in in_order(scenario.events):
+        for place, name in _names(scenario.events[number], ("events", number)):
+            state, cause = states[name]
+            message = _conflict(scenario, str(place[2]), name, state, (cause, number), is_sure=name not in mixed)
+            if message:
+                yield Finding(place, message)
+            states[name] = (RESULTS.get(str(place[2]), state), number)
+
+
+def _named_by(scenario: Scenario, *, timed: bool) -> set[str]:
+    events = [event for event in scenario.events if (event.at is not None) == timed]
+    return {name for event in events for _, name in _names(event, ())}
+
+
+def _conflict(
+    scenario: Scenario, action: str, name: str, state: str, causes: tuple[int | None, int], *, is_sure: bool
+) -> str:
+    """Return why something cannot be done to a body in a state, which an event (None: the start) has brought about."""
+    cause, number = causes
+    is_new_velocity = action == "velocity" and state == FREE
+    if cause is not None and _moment(scenario, cause) == _moment(scenario, number) and not is_new_velocity:
+        return f"{shown(name)} is {state} at the same moment, by events.{cause}"
+    since = "" if cause is None else f" since {_moment(scenario, cause)}, by events.{cause}"
+    if state == GONE:
+        return f"{shown(name)} is removed{since}" if is_sure or action == "remove" else ""
+    if is_sure and RESULTS.get(action) == state:
+        return f"{shown(name)} is {state} already{since}"
+    if is_sure and action == "velocity" and state != FREE:
+        return f"{shown(name)} is {state}{since}: free it first"
+    return ""
+
+
+def _moment(scenario: Scenario, number: int) -> str:
+    event = scenario.events[number]
+    return f"rest ({number})" if event.at is None else f"{event.at:g} s"

@@ -1,0 +1,233 @@
+"""Events of a run, between two compiled calls: when they are due, and what they do to the arrays of a scene.
+
+Events fall on fixed steps, so that no output, checkpoint or number of threads decides about them. What happens is
+written into the arrays; then the pair list is made anew, with springs the forces at the same moment too, and what the
+scene holds less afterwards is booked as an entry of its own in the ledger.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from blocksim.kernels.arrays import AT_REST, DRIVEN, REACHED, REMOVED, SUPPORT, Record, Records, World, zeros
+from blocksim.kernels.nonsmooth.arrays import AWAY, Nonsmooth
+from blocksim.scenario import PlacedBody, Scenario
+from blocksim.scenario.events import in_order, wall_names
+from blocksim.scenario.models.events import Event
+from blocksim.simulation.happened import Happened, in_words
+from blocksim.simulation.ledger import start_energy
+
+if TYPE_CHECKING:
+    from blocksim.simulation.schemes import AnyScene
+    from blocksim.simulation.team import Team
+
+NEVER = np.iinfo(np.int64).max
+NO_SIZE = -1e12  # m: half sides of what is not there: farther than that from everything
+NOT_THERE = {"mass", "inertia", "inverse_mass", "inverse_inertia"}
+RATES = ("vx", "vy", "spin")
+ACCELERATIONS = ("ax", "ay", "spin_rate")
+
+
+class Timeline:
+    """The events of one run, and how far they have come."""
+
+    def __init__(self, scenario: Scenario, placed: Sequence[PlacedBody], step: float) -> None:
+        """Take the bodies as placed and the time step (s)."""
+        self.events, self.placed, self.step = scenario.events, placed, step
+        self.names = {body.name: number for number, body in enumerate(placed)}
+        self.walls = wall_names(scenario)
+        self.happened: tuple[Happened, ...] = ()
+        order = in_order(self.events)
+        self.timed = [(_step_of(self.events[n].at, step), n) for n in order if self.events[n].at is not None]
+        self.at_rest = [number for number in order if self.events[number].at is None]
+
+    @property
+    def pending(self) -> list[int]:
+        """Numbers of the events that have not happened."""
+        done = {one.event for one in self.happened}
+        return [number for number in range(len(self.events)) if number not in done]
+
+    def next_step(self, done: int) -> int:
+        """Return the next step after `done` at which an event is due."""
+        return min((step for step, _ in self.timed if step > done), default=NEVER)
+
+    def act(self, scene: "AnyScene", team: "Team", status: int) -> tuple["AnyScene", int]:
+        """Let happen what is due at the step that a scene has come to; return it and the status code.
+
+        Rest ends no run to which anything has yet to happen.
+        """
+        pending = self.pending
+        if not pending or status not in (REACHED, AT_REST):
+            return scene, status
+        done = int(scene.world.clock[0].steps)
+        due = [number for step, number in self.timed if step == done and number in pending]
+        if status == AT_REST:
+            due = due or [number for number in self.at_rest if number in pending][:1]
+            scene.world.clock[0].checks_at_rest = 0
+            status = REACHED
+        for number in due:
+            scene, status = self._happen(scene, team, number)
+        return scene, status
+
+    def _happen(self, scene: "AnyScene", team: "Team", number: int) -> tuple["AnyScene", int]:
+        before, event = start_energy(scene), self.events[number]
+        scene, status = self._renewed(self._changed(scene, event), team)
+        clock, energy = scene.world.clock[0], before - start_energy(scene)
+        clock.checks_at_rest = 0
+        scene.world.ledger[0].events += energy
+        steps = int(clock.steps)
+        told = Happened(event=number, step=steps, time_s=steps * self.step, what=in_words(event), energy_J=energy)
+        self.happened = (*self.happened, told)
+        return scene, status
+
+    def _changed(self, scene: Any, event: Event) -> Any:
+        """Return the scene with what an event does in its arrays."""
+        old = scene.world.bodies.copy()
+        world = scene.world
+        for name in event.remove:
+            world = removed(world, self._number(world, name))
+        for name in event.fix:
+            world = fixed(world, self.names[name])
+        for name in event.free:
+            world = freed(world, self.names[name], self.placed[self.names[name]])
+        if event.velocity is not None:
+            _set_velocity(world.bodies[self.names[event.velocity.body]], event)
+        if not isinstance(scene, Nonsmooth):
+            return world
+        _renew_lines(scene._replace(world=world), old)
+        return scene._replace(world=world)
+
+    def _renewed(self, scene: Any, team: "Team") -> tuple[Any, int]:
+        """Have the pair list made anew, and with springs the forces at this moment, as if after a step of no length."""
+        clock = scene.world.clock[0]
+        clock.rebuilds = 0
+        if isinstance(scene, Nonsmooth):
+            return scene, REACHED
+        clock.next_look = clock.steps
+        clock.is_started = 0
+        return team.advance(scene, int(clock.steps))
+
+    def _number(self, world: World, name: str) -> int:
+        """Return the number of a body or a wall; walls are the last before the half-plane."""
+        if name in self.names:
+            return self.names[name]
+        return int(world.bodies.size) - 1 - len(self.walls) + self.walls.index(name)
+
+
+def _step_of(time: float | None, step: float) -> int:
+    return max(1, round((time or 0.0) / step))
+
+
+def removed(world: World, number: int) -> World:
+    """Return a world without a body: it stays where it is, touches nothing, has no mass and never moves."""
+    body = world.bodies[number]
+    world = _without(world, number)
+    body.is_moved = REMOVED
+    body.half_x = body.half_y = NO_SIZE
+    body.faces = body.corners = body.particle_count = 0
+    _hold(body)
+    return world
+
+
+def fixed(world: World, number: int) -> World:
+    """Return a world with a body that moves with the support from now on; what is not there or fixed is left."""
+    body = world.bodies[number]
+    if body.is_moved in (SUPPORT, REMOVED):
+        return world
+    world = _without(world, number)
+    _hold(body)
+    body.is_moved = SUPPORT
+    ground, controls = world.bodies[-1], world.controls[0]
+    body.vx, body.vy = ground.vx, ground.vy
+    moved = _displacement(world)
+    extended = zeros(world.moved.size + 1, world.moved.dtype)
+    extended[:-1] = world.moved
+    last = extended[-1]
+    last.body, last.x, last.y = number, body.x - controls.motion_x * moved, body.y - controls.motion_y * moved
+    return world._replace(moved=_sorted(extended))
+
+
+def freed(world: World, number: int, placed: PlacedBody) -> World:
+    """Return a world with a body that is free from now on, as fast as it is; what is not there or free is left."""
+    body = world.bodies[number]
+    if body.is_moved not in (SUPPORT, DRIVEN):
+        return world
+    world = _without(world, number)
+    body.is_moved = 0
+    body.mass, body.inertia = placed.mass, placed.inertia
+    body.inverse_mass, body.inverse_inertia = 1.0 / placed.mass, 1.0 / placed.inertia
+    return world
+
+
+def _hold(body: Record) -> None:
+    """Take mass, motion and forces from a body."""
+    for name in (*NOT_THERE, *RATES, *ACCELERATIONS, "fx", "fy", "torque", "pairs_now", "pairs_before"):
+        body[name] = 0
+
+
+def _without(world: World, number: int) -> World:
+    """Return a world whose support and paths do not move a body."""
+    moved, driven = (_all_but(records, number) for records in (world.moved, world.driven))
+    return world._replace(moved=moved, driven=driven)
+
+
+def _all_but(records: Records, number: int) -> Records:
+    kept = records["body"] != number
+    if kept.all():
+        return records
+    fewer = zeros(int(np.count_nonzero(kept)), records.dtype)
+    fewer[:] = records[kept]
+    return fewer
+
+
+def _sorted(records: Records) -> Records:
+    order = np.argsort(records["body"], kind="stable")
+    ordered = zeros(records.size, records.dtype)
+    ordered[:] = records[order]
+    return ordered
+
+
+def _displacement(world: World) -> float:
+    """Return how far (m) the support has come along its direction."""
+    clock, controls = world.clock[0], world.controls[0]
+    time = float(clock.steps * controls.step)
+    place = int(np.searchsorted(world.motion["start"], time, side="right")) - 1
+    piece = world.motion[max(0, place)]
+    t = time - piece.start
+    return float(piece.c0 + t * (piece.c1 + t * (piece.c2 + t * piece.c3)))
+
+
+def _set_velocity(body: Record, event: Event) -> None:
+    new = event.velocity
+    for name in RATES if new is not None and body.inverse_mass > 0.0 else ():
+        value = getattr(new, name)
+        if value is not None:
+            body[name] = value
+
+
+def _renew_lines(scene: Nonsmooth, old: Records) -> None:
+    """Bring lines and rows of rigid contacts up to date with bodies that an event has changed.
+
+    All velocities begin anew half a substep back, as those at the start of a run do: what was held falls from now on.
+    The correction in the ledger stays what it is; `old` are the bodies before the event.
+    """
+    bodies, lines, before = scene.world.bodies, scene.contacts.lines, scene.contacts.before
+    controls, h = scene.world.controls[0], float(scene.contacts.stepping[0].substep)
+    hx, hy = h * float(controls.gravity_x), h * float(controls.gravity_y)
+    was_free, is_free = old["inverse_mass"] > 0.0, bodies["inverse_mass"] > 0.0
+    shown = old["vx"] ** 2 + old["vy"] ** 2
+    ahead = (lines["vx"] + 0.5 * hx) ** 2 + (lines["vy"] + 0.5 * hy) ** 2
+    kept = np.where(was_free, before["lifted"] - lines["vx"] * hx - lines["vy"] * hy + 0.5 * (ahead - shown), 0.0)
+    for name in ("inverse_mass", "inverse_inertia", "spin"):
+        lines[name] = bodies[name]
+    lines["vx"] = bodies["vx"] - np.where(is_free, 0.5 * hx, 0.0)
+    lines["vy"] = bodies["vy"] - np.where(is_free, 0.5 * hy, 0.0)
+    before["lifted"] = np.where(is_free, kept + lines["vx"] * hx + lines["vy"] * hy, before["lifted"])
+    for name in RATES:
+        before[name] = lines[name]
+    rows = scene.contacts.rows[: int(scene.contacts.stepping[0].row_count)]
+    is_gone = (bodies["is_moved"][rows["a"]] == REMOVED) | (bodies["is_moved"][rows["b"]] == REMOVED)
+    for name in ("normal_one", "normal_two", "shear"):
+        rows[name][is_gone] = 0.0
+    rows["reach"][is_gone] = AWAY
