@@ -96,8 +96,8 @@ def _is_table(info: FieldInfo) -> bool:
     is_model = isinstance(kind, type) and issubclass(kind, SUBTABLES) and "Speed" not in str(info.annotation)
     parts = list(options(info.annotation))
     optional = len(parts) > 1 and any(isinstance(part, type) and issubclass(part, BaseModel) for part in parts)
-    has_numbers = re.search(r"\b(float|int)\b", str(info.annotation)) is not None or info.annotation == tuple[str, str]
-    return (is_model and not has_numbers) or optional or "Any" in str(info.annotation)
+    has_values = re.search(r"\b(float|int)\b|tuple\[str", str(info.annotation)) is not None
+    return (is_model and not has_values) or optional or "Any" in str(info.annotation)
 
 
 def _default(info: FieldInfo) -> str:

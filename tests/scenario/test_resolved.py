@@ -219,6 +219,8 @@ def flat(table: dict[str, Any], path: str = "") -> dict[str, Any]:
 
 
 HASHED = {key: value for line in OTHER_VALUES.splitlines() for key, value in flat(tomllib.loads(line)).items()}
+RAMP = {"kind": "ramp", "distance": 1, "duration": 1}
+HASHED |= {"bodies.0.motion": RAMP, "events": [{"at": 1, "remove": ["1"]}]}
 SINGLE_CHOICE = {"schema", "time.scheme", "materials.m.unit_weight", "motion.kind", "probes.0.kind"}
 
 
