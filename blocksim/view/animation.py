@@ -154,7 +154,7 @@ class Animation:
         draw_key(figure, self.paint, MARGINS[0], KEY_FOOT)
         if self.forces is not None:
             self._tell_scale(self.forces.example)
-        if self.support.motion is None:
+        if self.support.is_still:
             draw_standing(self.canvas, self.frames, int(self.drawable[0]), self.support)
 
     def _tell_scale(self, example: str) -> None:
@@ -180,7 +180,7 @@ class Animation:
 
     def _draw(self, frame: int) -> None:
         """Add to the panel what has moved since the last picture."""
-        if self.support.motion is not None:
+        if not self.support.is_still:
             draw_standing(self.canvas, self.frames, frame, self.support)
         draw_blocks(self.canvas, self.frames, frame, self.support, self.paint)
         if self.has_trails:

@@ -1,7 +1,7 @@
 """A run as its pictures need it: frames and the choice among them, ground, walls and fixed bodies with their motion."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import PlacedSegment, Scenario, place_bodies
+from blocksim.scenario.events import wall_names
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
 from blocksim.scenario.segments import wall_segments
 from blocksim.world.systems.system import Track
@@ -149,13 +150,14 @@ class Support:
 
     `profile` is the surface towards +x, level beyond both ends. `fixed` states for every body whether it moves with the
     support or by a motion of its own (`driven`). A tilt raises the +x end. Without `motion` all rest. `weight` (N) is
-    that of all free bodies.
+    that of all free bodies. `gone` are the times (s) at which walls are removed, infinite for those that stay.
     """
 
     profile: tuple[tuple[float, float], ...] = ((0.0, 0.0), (1.0, 0.0))
     walls: tuple[PlacedSegment, ...] = ()
     fixed: tuple[bool, ...] = ()
     driven: tuple[bool, ...] = ()
+    gone: tuple[float, ...] = ()
     tilt: float = 0.0
     direction: tuple[float, float] = (1.0, 0.0)
     motion: MotionPieces | None = None
@@ -166,6 +168,18 @@ class Support:
         """The direction of motion in words."""
         turn = float(np.degrees(np.arctan2(*self.direction[::-1])))
         return "along x" if abs(turn) < LEAST_ANGLE else f"at {turn:.3g}° to x".replace("-", "−")
+
+    @property
+    def is_still(self) -> bool:
+        """Whether ground and walls are the same at all times."""
+        return self.motion is None and not np.isfinite(self.gone).any()
+
+    def at(self, time: float) -> "Support":
+        """Return the support with the walls that are there at a time (s)."""
+        if not np.isfinite(self.gone).any():
+            return self
+        there = [time < gone for gone in self.gone]
+        return replace(self, walls=tuple(wall for wall, stays in zip(self.walls, there, strict=True) if stays), gone=())
 
     def displacement(self, times: Floats) -> Floats:
         """Return the displacement (m) along `direction` at these times (s)."""
@@ -198,6 +212,13 @@ class Support:
         return np.asarray(line[1:-1][turns])
 
 
+def _removals(scenario: Scenario) -> Iterator[float]:
+    """Yield for every wall the time (s) at which an event removes it; when all rest, no scenario tells."""
+    for name in wall_names(scenario):
+        times = (event.at for event in scenario.events if name in event.remove and event.at is not None)
+        yield min(times, default=np.inf)
+
+
 def support_of(scenario: Scenario) -> Support:
     """Return the support of a scenario's runs."""
     placed = place_bodies(scenario)
@@ -205,7 +226,8 @@ def support_of(scenario: Scenario) -> Support:
         profile=scenario.ground.profile or Support.profile,
         walls=wall_segments(scenario),
         fixed=tuple(body.fixed and not body.freed for body in placed),
-        driven=tuple(body.driven for body in placed),
+        driven=tuple(body.driven for body in placed) if any(body.driven for body in placed) else (),
+        gone=tuple(_removals(scenario)),
         tilt=scenario.ground.tilt,
         direction=motion_direction(scenario),
         motion=None if scenario.motion is None else motion_pieces(scenario),

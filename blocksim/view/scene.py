@@ -60,6 +60,7 @@ def draw_scene(canvas: Canvas, frames: FramesLike, frame: int, support: Support,
 def draw_standing(canvas: Canvas, frames: FramesLike, frame: int, support: Support) -> None:
     """Draw ground and walls at the time of one frame, and where they were at the start."""
     offset = MILLIMETRES * support.offset(frames.time[frame : frame + 1])[0]
+    support = support.at(float(frames.time[frame]))
     draw_support(canvas, support, offset)
     carried = _fixed(frames, support) & ~np.array(support.driven or (False,) * len(frames.names))
     draw_start(canvas, support, offset, corners(frames, frame)[carried & are_there(frames, frame)])

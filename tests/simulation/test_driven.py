@@ -58,7 +58,7 @@ def test_lift_presses_with_the_mass_times_gravity_and_acceleration(scheme: str) 
     assert contacts is not None
     for share in (0.25, 0.75):
         frame = int(np.argmin(np.abs(run.frames.time - (0.02 + 0.08 * share))))
-        pressed = sum(contacts.table(frame)["normal_force"])
+        pressed = sum(contacts.at(frame)["normal_force"])
         pull = 6.0 / PEAK * (60.0 * share - 180.0 * share**2 + 120.0 * share**3)
         assert pressed == pytest.approx(mass * (G + pull), rel=0.02)
     gained = mass * G * motion["distance"]
@@ -71,46 +71,51 @@ def scenario_mass(scenario: Any) -> float:
     return float(build_scene(scenario).world.bodies.mass[0])
 
 
-def turning(slope: float) -> dict[str, Any]:
-    """Return a slow turn about the left end of the plate's upper face."""
-    return {"kind": "rotation", "angle": f"{slope} deg", "spin": "60 deg/s", "about": [-0.15, 0.1]}
+def turning(scheme: str, slope: float, friction: float, **keys: Any) -> Simulation:
+    """Start a block on a plate whose slope (degrees) is two less than this, and grows by 10 degrees in a second."""
+    angle, half = radians(slope - 2.0), keys.get("height", HEIGHT) / 2
+    c, s = cos(angle), sin(angle)
+    motion = {"kind": "rotation", "angle": "10 deg", "duration": 1.0, "about": [0.0, 0.2]}
+    below = plate(motion, x=s * THICK / 2, y=0.2 - c * THICK / 2, angle=angle)
+    above = {"x": -s * half, "y": 0.2 + c * half, "angle": angle, **keys}
+    return Simulation(build_scene(on_plate(scheme, [above, below], 1.0, friction=friction)))
+
+
+def slope_of(run: Simulation) -> float:
+    """Return the slope of the plate (degrees)."""
+    return degrees(float(run.bodies.angle[1]))
 
 
 @both
 def test_block_slides_from_a_turning_plate_at_the_friction_angle(scheme: str) -> None:
     slope = degrees(atan(FRICTION))
-    run = Simulation(build_scene(on_plate(scheme, [block(x=-0.13), plate(turning(30.0))], 0.5)))
-    place, angles = along_plate(run), []
-    while run.time < 0.45 and not angles:
+    run = turning(scheme, slope, FRICTION)
+    while run.time < 0.4 and along_plate(run) > -2e-5:
         run.to_step(run.steps + 20)
-        if abs(along_plate(run) - place) > 1e-4:
-            angles.append(degrees(float(run.bodies.angle[1])))
-    late = degrees(0.5 * (2e-4 / (0.5 * G * radians(60.0))) ** (1.0 / 3.0) * radians(60.0))  # until it has slid so far
-    assert slope - 0.5 < angles[0] < slope + 2.0 * late + 1.0
+    assert slope - 0.1 < slope_of(run) < slope + 0.6  # until it has slid so far
 
 
 def along_plate(run: Simulation) -> float:
-    """Return the place (m) of the block along the plate."""
+    """Return the place (m) of the block along the plate, from the point that it turns about."""
     angle = float(run.bodies.angle[1])
-    x, y = float(run.bodies.x[0]) + 0.15, float(run.bodies.y[0]) - 0.1
-    return x * cos(angle) + y * sin(angle)
+    return float(run.bodies.x[0]) * cos(angle) + (float(run.bodies.y[0]) - 0.2) * sin(angle)
 
 
 @both
 def test_slender_block_tips_from_a_turning_plate_at_its_own_slope(scheme: str) -> None:
-    slender = block(x=-0.14, width=0.01, height=0.04)
-    run = Simulation(build_scene(on_plate(scheme, [slender, plate(turning(30.0))], 0.5, friction=2.0)))
-    while run.time < 0.45 and float(run.bodies.angle[1] - run.bodies.angle[0]) > -radians(0.2):
+    slope = degrees(atan(0.25))
+    run = turning(scheme, slope, 2.0, width=0.01, height=0.04)
+    while run.time < 0.4 and float(run.bodies.angle[0] - run.bodies.angle[1]) < radians(0.5):
         run.to_step(run.steps + 20)
-    assert degrees(float(run.bodies.angle[1])) == pytest.approx(degrees(atan(0.25)), abs=2.0)
-    assert float(run.bodies.angle[0]) > float(run.bodies.angle[1])  # downhill, with the turn
+    assert slope - 0.1 < slope_of(run) < slope + 1.5  # until it has tipped so far
 
 
 @both
 def test_driven_plate_does_to_a_block_what_a_fixed_one_on_a_moving_support_does(scheme: str) -> None:
     motion = {"kind": "harmonic", "amplitude": "4 mm", "frequency": 8, "direction": "20 deg"}
-    own = simulate(on_plate(scheme, [block(), plate(motion)], 0.1))
-    shared = simulate(on_plate(scheme, [block(), plate()], 0.1, motion=motion))
+    time = {"step": 1e-4} if scheme == "nonsmooth" else {}  # the usual one follows from how fast bodies are
+    own = simulate(on_plate(scheme, [block(), plate(motion)], 0.1, time=time))
+    shared = simulate(on_plate(scheme, [block(), plate()], 0.1, motion=motion, time=time))
     assert own.final.iloc[0, 1:].tolist() == pytest.approx(shared.final.iloc[0, 1:].tolist(), abs=1e-9)
     assert own.summary.energy_J.to_support == pytest.approx(shared.summary.energy_J.to_support, abs=1e-12)
 
@@ -157,7 +162,7 @@ def test_wheel_of_a_far_point_moves_on_its_circle(scheme: str) -> None:
 def test_block_struck_by_a_driven_body_leaves_as_restitution_says(scheme: str) -> None:
     """At 1.8 times the speed, with energy that the driven body brings in: no gain that had to be prevented."""
     ramp = {"kind": "ramp", "distance": 0.05, "speed": 1.0}
-    pusher = {"x": -0.1, "y": 0.03, "width": 0.02, "height": 0.04, "name": "pusher", "motion": ramp}
+    pusher = {"x": -0.04, "y": 0.03, "width": 0.02, "height": 0.04, "name": "pusher", "motion": ramp}
     scenario = on_plate(scheme, [{"x": 0.0, "y": HEIGHT / 2}, pusher], 0.09, friction=0.0, gravity=0.0, restitution=0.8)
     run = simulate(scenario)
     assert run.final.loc[0, "vx_mm_s"] == pytest.approx(1800.0, rel=0.01)
