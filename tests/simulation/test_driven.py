@@ -162,7 +162,7 @@ def test_wheel_of_a_far_point_moves_on_its_circle(scheme: str) -> None:
 def test_block_struck_by_a_driven_body_leaves_as_restitution_says(scheme: str) -> None:
     """At 1.8 times the speed, with energy that the driven body brings in: no gain that had to be prevented."""
     ramp = {"kind": "ramp", "distance": 0.05, "speed": 1.0}
-    pusher = {"x": -0.04, "y": 0.03, "width": 0.02, "height": 0.04, "name": "pusher", "motion": ramp}
+    pusher = {"x": -0.04, "y": HEIGHT / 2, "width": 0.02, "height": 0.02, "name": "pusher", "motion": ramp}
     scenario = on_plate(scheme, [{"x": 0.0, "y": HEIGHT / 2}, pusher], 0.09, friction=0.0, gravity=0.0, restitution=0.8)
     run = simulate(scenario)
     assert run.final.loc[0, "vx_mm_s"] == pytest.approx(1800.0, rel=0.01)

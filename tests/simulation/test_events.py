@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.errors import ScenarioError
 from blocksim.simulation import read_result, run_ensemble, simulate, simulate_into
-from blocksim.verification.scene import HEIGHT
+from blocksim.verification.scene import HEIGHT, PaperBlock
 from tests.simulation.driven import FRICTION, SCHEMES, G, block, on_plate, plate
 from tests.simulation.sliding import assert_same, interrupted_at
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from blocksim.scenario import Scenario
 
 both = pytest.mark.parametrize("scheme", SCHEMES)
+MASS = PaperBlock().mass  # kg
 REST = {"stop_at_rest": True, "rest_hold": 0.004, "rest_speed": 0.02}
 
 
@@ -53,15 +54,15 @@ def test_removed_body_stays_where_it_was_without_a_velocity_and_takes_its_energy
     bodies = [block(velocity=[1.0, 0.0]), plate(), block(x=0.1, name="flying", y=0.3)]
     scenario = with_events(scheme, [{"at": 0.03, "remove": ["flying"]}], bodies=bodies)
     run = simulate_into(scenario, tmp_path)
-    mass = 0.5 * G * run.summary.events[0].time_s ** 2
+    fall = 0.5 * G * run.summary.events[0].time_s ** 2
     frames = read_result(tmp_path).frames
     gone = frames.time > run.summary.events[0].time_s - 1e-9
     assert np.isnan(frames.vx[gone, 2]).all()
-    assert frames.y[gone, 2] == pytest.approx(0.3 - mass, abs=1e-6)
+    assert frames.y[gone, 2] == pytest.approx(0.3 - fall, abs=1e-6)
     assert np.isfinite(frames.vx[~gone]).all()
     assert (tmp_path / "final.csv").read_text().splitlines()[-1].endswith(",,,")
     assert run.summary.energy_J.events == pytest.approx(run.summary.events[0].energy_J)
-    assert run.summary.events[0].energy_J == pytest.approx(0.3 * G * 0.0544, rel=0.01)  # its weight is 0.53 N
+    assert run.summary.events[0].energy_J == pytest.approx(0.3 * G * MASS, rel=1e-6)
     assert run.summary.energy_J.relative_residual < 1e-3
     assert run.summary.movement is not None
     assert run.summary.movement.first_mover == "block"
@@ -78,7 +79,7 @@ def test_body_is_held_in_its_flight_and_falls_again_from_rest(scheme: str) -> No
     end = run.summary.simulated_time_s
     assert run.frames.y[-1, 0] == pytest.approx(y - 0.5 * G * (end - free) ** 2, abs=1e-9)
     fixed, freed = (event.energy_J for event in run.summary.events)
-    assert fixed == pytest.approx(-freed + 0.5 * 0.0544 * (G * held) ** 2, rel=0.02)
+    assert fixed == pytest.approx(-freed + 0.5 * MASS * (G * held) ** 2, rel=1e-6)
     assert run.summary.energy_J.relative_residual < 1e-6
 
 
@@ -105,15 +106,15 @@ def test_driven_plate_that_is_freed_flies_on_and_one_that_is_fixed_stops(scheme:
 
 
 @both
-def test_wall_is_removed_and_what_leans_on_it_goes_on(scheme: str) -> None:
-    walls = [{"from": [0.05, 0.3], "to": [0.05, 0.05]}]
-    moving = [block(velocity=[2.0, 0.0]), plate(width=0.6)]
+def test_wall_that_is_removed_lets_a_block_pass(scheme: str) -> None:
+    walls = [{"from": [0.05, 0.5], "to": [0.05, 1.5]}]
+    moving = [block(y=1.0, velocity=[1.0, 0.0])]
     stopped, passed = (
-        simulate(with_events(scheme, events, bodies=moving, walls=walls, friction=0.0))
+        simulate(with_events(scheme, events, bodies=moving, walls=walls))
         for events in ((), [{"at": 0.005, "remove": ["wall 1"]}])
     )
-    assert stopped.final.loc[0, "x_mm"] < 40.0
-    assert passed.final.loc[0, "x_mm"] == pytest.approx(160.0, rel=0.01)
+    assert 30.0 < stopped.final.loc[0, "x_mm"] < 35.0
+    assert passed.final.loc[0, "x_mm"] == pytest.approx(1e3 * passed.summary.simulated_time_s, rel=1e-6)
 
 
 @both
@@ -126,7 +127,8 @@ def test_rest_lets_the_next_event_happen_and_the_run_go_on(scheme: str) -> None:
     assert run.reason == "at rest"
     assert run.final.loc[0, "y_mm"] == pytest.approx(500.0 * HEIGHT, abs=0.5)
     slid = 0.5 * 0.3**2 / (FRICTION * G)
-    assert run.final.loc[0, "x_mm"] == pytest.approx(1e3 * slid, rel=0.03)
+    flight = (0.2 / G) ** 0.5
+    assert 0.99 * slid < 1e-3 * run.final.loc[0, "x_mm"] < slid + flight * REST["rest_speed"]
 
 
 @both
