@@ -1,5 +1,6 @@
 """blocksim check: validate a scenario and summarise it."""
 
+import math
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
@@ -11,9 +12,12 @@ import typer
 from blocksim.cli import options
 from blocksim.cli.output import GAP, answer, duration, note, number, print_json, table_lines, width_of_screen
 from blocksim.cli.prepare import read_scenario, warn_of_values
-from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
+from blocksim.scenario import Contact, PlacedBody, Scenario, place_bodies, scenario_to_toml
+from blocksim.scenario.drives import drives_of, greatest_rate
+from blocksim.scenario.events import in_order
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
 from blocksim.scenario.units import STANDARD_GRAVITY
+from blocksim.simulation.happened import in_words
 from blocksim.study.rows import check_experiment
 from blocksim.world.describe import Description, MotionDescription, PairDescription, SagDescription, describe
 from blocksim.world.free_memory import readable
@@ -151,6 +155,8 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
         f"results    at most {description.frames} frames, about {readable(description.bytes)}",
         *_short_interval(scenario, description),
         *_motion(description.motion),
+        *_driven(scenario),
+        *_events(scenario),
         *_boundary(scenario, description),
         *(f"{name:<10} {count}, beside the blocks" for name, count in description.systems.items()),
         f"neighbours checked up to {MILLI * description.skin:.3g} mm apart",
@@ -193,6 +199,24 @@ def _motion(motion: MotionDescription | None) -> list[str]:
     peaks = f"{number(MILLI * motion.displacement)} mm, {number(MILLI * motion.speed)} mm/s"
     greatest = f"at most {peaks} and {number(motion.acceleration / STANDARD_GRAVITY)} g"
     return [f"supports   move {greatest}; {number(MILLI * motion.final_speed)} mm/s at the end"]
+
+
+def _driven(scenario: Scenario) -> Iterator[str]:
+    """Yield a line for every body with a motion of its own."""
+    for drive in drives_of(scenario):
+        spec = scenario.bodies[drive.body - sum(structure.size for structure in scenario.structures)]
+        name = place_bodies(scenario)[drive.body].name
+        kind = "" if spec.motion is None else f" ({spec.motion.kind})"
+        speed, spin = greatest_rate(drive.shift), math.degrees(greatest_rate(drive.turn))
+        rates = [f"{number(MILLI * speed)} mm/s"] * (speed > 0.0) + [f"{number(spin)} °/s"] * (spin > 0.0)
+        rests = f", at rest from {drive.rest_time:.3f} s on" if math.isfinite(drive.rest_time) else ""
+        yield f"driven     {name}{kind}, at most {' and '.join(rates)}{rests}"
+
+
+def _events(scenario: Scenario) -> Iterator[str]:
+    """Yield a line for every event, in their order."""
+    for event in (scenario.events[k] for k in in_order(scenario.events)):
+        yield f"event      {'at rest' if event.at is None else f'{event.at:.3f} s'}: {in_words(event)}"
 
 
 def _use_of_particles(contact: Contact) -> str:
