@@ -57,6 +57,15 @@ x = "1 m"
 y = "2 m"
 fixed = true
 """
+DRIVEN = """motion = { kind = "rotation", angle = "-20 deg", duration = "0.1 s", start = "0.1 s" }
+name = "plate"
+[[events]]
+when = "rest"
+free = ["plate"]
+[[events]]
+at = "0.25 s"
+remove = ["block"]
+"""
 SHAKEN = '[motion]\nkind = "harmonic"\namplitude = "10 mm"\nfrequency = "2 Hz"\nduration = "1.5 s"\n'
 CUBE = 'width = 0.1\nheight = 0.1\nlength = 0.1\nmaterial = "aluminium"\n'
 KINDS = "".join(f'\n[blocks.k{i}]\n{CUBE}[[bodies]]\nblock = "k{i}"\nx = {i}\ny = 0.05\n' for i in range(1, 15))
@@ -66,6 +75,7 @@ MADE = {
     "shaken.toml": SLIDE.replace('end = "0.5 s"', 'end = "2 s"') + SHAKEN,
     "crowd.toml": (SCENARIOS / "wall.toml").read_text() + PLATE,
     "kinds.toml": SLIDE + KINDS,
+    "driven.toml": SLIDE + PLATE.replace("fixed = true\n", DRIVEN),
 }
 
 
