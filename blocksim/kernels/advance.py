@@ -180,7 +180,7 @@ def begin_steps(world: World, k: int, step: float) -> bool:
         if share.status != REACHED:
             return False
     start_all(world.bodies, share.first_body, share.last_body, step)
-    if has_motion(world):
+    if has_motion(world.controls[0]):
         supervise(world, k, MOVE, step, None)
         return True
     meet(world.team)
@@ -193,7 +193,7 @@ def begin_steps(world: World, k: int, step: float) -> bool:
 def end_steps(world: World, k: int, step: float, systems: Systems | None) -> bool:
     """Look at what has to be looked at after some steps; return whether the run continues."""
     share = world.shares[k]
-    if has_motion(world):
+    if has_motion(world.controls[0]):
         supervise(world, k, BOOK, step, None)
     if share.steps == share.next_check:
         share.next_check += world.controls[0].check_every

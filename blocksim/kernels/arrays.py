@@ -162,7 +162,8 @@ CONTROLS = record_type(
     "cell_width cell_radius "  # m: of the grid of the broad phase; half diagonal of the largest body in it
     "particle_size smoothing_length support",  # m: diameter; of the SPH kernel; radius beyond which it is zero
     "model law sph_kernel "  # codes
-    "check_every rest_checks",  # steps between checks; checks in a row that must find rest (0: never)
+    "check_every rest_checks "  # steps between checks; checks in a row that must find rest (0: never)
+    "driven",  # bodies with a motion of their own
 )
 CLOCK = record_type(
     "",
@@ -200,17 +201,12 @@ SHARE = on_own_lines(
 TEAM_SIZE, ARRIVED, MEETINGS, STATUS = 0, 8, 16, 24
 TEAM_WORDS = 32
 MOVED = record_type(
-    "x y "  # m: where a body that moves with the support was at the start
-    "fx fy",  # N: contact totals on it in the evaluation before
-    indices="body",
-)
-DRIVE = record_type(
-    "x y angle "  # m, m, rad: where a driven body was at the start
-    "along_x along_y "  # -: direction in which it is shifted
+    "x y angle "  # m, m, rad: where a body that moves with the support, or is driven, was at the start
+    "along_x along_y "  # -: direction in which a driven body is shifted; this and the following only of those
     "about_x about_y "  # m: the point about which it turns, which is shifted with it
-    "fx fy torque "  # N, N, N m: contact totals on it in the evaluation before
-    "rest_time",  # s: from when on it stays where it is; infinite where it never does
-    # pieces of its shift and of its turn among all paths: the one that holds, and the one after the last
+    "rest_time "  # s: from when on it stays where it is; infinite where it never does
+    "fx fy torque",  # N, N, N m: contact totals in the evaluation before
+    # pieces of its shift and of its turn: the one that holds, and the one after the last; zero for the support's
     indices="body shift shift_end turn turn_end",
 )
 MOTION_PIECE = record_type("start c0 c1 c2 c3")  # s, m, m/s ...: c0 + c1 t + c2 t^2 + c3 t^3 with t from the start
@@ -236,10 +232,8 @@ class World(NamedTuple):
     action: Records  # (1,) ACTION, work space of one pair
     before: Records  # (c,) CONTACT or PARTICLE_CONTACT, work space of one pair whose contacts change
     matrices: Floats  # (8, 3, 3) work space of one pair
-    moved: Records  # (f,) MOVED, all bodies that move with the support
-    motion: Records  # (m,) MOTION_PIECE, displacement of the support over time
-    driven: Records  # (d,) DRIVE, bodies with a motion of their own
-    paths: Records  # (q,) MOTION_PIECE, shift (m) and turn (rad) of all driven bodies over time
+    moved: Records  # (f,) MOVED, all bodies that move with the support, then those that are driven
+    motion: Records  # (m,) MOTION_PIECE, shift (m) and turn (rad) of every driven body over time, then of the support
     controls: Records  # (1,) CONTROLS
     clock: Records  # (1,) CLOCK
     ledger: Records  # (g,) LEDGER, one for each group of bodies; what is not of pairs is in the first one

@@ -224,7 +224,7 @@ def rebuild_pairs(world: World) -> bool:
         body.list_x = body.x
         body.list_y = body.y
         body.list_angle = body.angle
-        body.counts = body.inverse_mass > 0.0 or (body.is_moved != 0 and has_motion(world))
+        body.counts = body.inverse_mass > 0.0 or (body.is_moved != 0 and has_motion(world.controls[0]))
     world.clock[0].pair_count = count
     world.clock[0].rebuilds += 1
     return True

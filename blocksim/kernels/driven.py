@@ -10,7 +10,7 @@ from typing import NamedTuple
 from blocksim.kernels.arrays import Record, Records, World
 from blocksim.kernels.geometry import place_corners
 from blocksim.kernels.jit import rare_kernel
-from blocksim.kernels.support import acceleration, displacement, rate
+from blocksim.kernels.support import acceleration, displacement, is_driven, rate
 
 
 class Pose(NamedTuple):
@@ -22,9 +22,9 @@ class Pose(NamedTuple):
 
 
 @rare_kernel
-def path_piece(paths: Records, piece: int, end: int, time: float) -> int:
+def path_piece(motion: Records, piece: int, end: int, time: float) -> int:
     """Return the piece of one path that holds at a time (s), looked for from `piece` to before `end`."""
-    while piece + 1 < end and paths[piece + 1].start <= time:
+    while piece + 1 < end and motion[piece + 1].start <= time:
         piece += 1
     return piece
 
@@ -32,13 +32,13 @@ def path_piece(paths: Records, piece: int, end: int, time: float) -> int:
 @rare_kernel
 def shift_at(world: World, one: Record, time: float) -> Record:
     """Return the piece of the shift of a driven body that holds at a time (s) that is not before the step under way."""
-    return world.paths[path_piece(world.paths, one.shift, one.shift_end, time)]
+    return world.motion[path_piece(world.motion, one.shift, one.shift_end, time)]
 
 
 @rare_kernel
 def turn_at(world: World, one: Record, time: float) -> Record:
     """Return the piece of the turn of a driven body that holds at a time (s) that is not before the step under way."""
-    return world.paths[path_piece(world.paths, one.turn, one.turn_end, time)]
+    return world.motion[path_piece(world.motion, one.turn, one.turn_end, time)]
 
 
 @rare_kernel
@@ -77,15 +77,17 @@ def put(body: Record, pose: Pose) -> None:
 @rare_kernel
 def follow_pieces(world: World, one: Record, time: float) -> None:
     """Have pieces of a driven body looked for from those on that hold at a time (s)."""
-    one.shift = path_piece(world.paths, one.shift, one.shift_end, time)
-    one.turn = path_piece(world.paths, one.turn, one.turn_end, time)
+    one.shift = path_piece(world.motion, one.shift, one.shift_end, time)
+    one.turn = path_piece(world.motion, one.turn, one.turn_end, time)
 
 
 @rare_kernel
 def move_driven(world: World, step: float) -> None:
     """Bring all driven bodies to the end of the drift under way: poses exact, velocities those of the drift."""
     before = world.clock[0].steps * world.controls[0].step
-    for one in world.driven:
+    for one in world.moved:
+        if not is_driven(one):
+            continue
         body = world.bodies[one.body]
         follow_pieces(world, one, before)
         if step > 0.0:
@@ -135,7 +137,9 @@ def book_driven(world: World, step: float) -> None:
     Clears the totals.
     """
     total = 0.0
-    for before in world.driven:
+    for before in world.moved:
+        if not is_driven(before):
+            continue
         body = world.bodies[before.body]
         total += (before.fx + body.fx) * body.vx + (before.fy + body.fy) * body.vy
         total += (before.torque + body.torque) * body.spin

@@ -38,8 +38,6 @@ def member(worlds: World, m: int) -> World:
         worlds.matrices[m],
         worlds.moved[m],
         worlds.motion[m],
-        worlds.driven[m],
-        worlds.paths[m],
         worlds.controls[m],
         worlds.clock[m],
         worlds.ledger[m],

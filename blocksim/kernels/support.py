@@ -5,10 +5,15 @@ from blocksim.kernels.jit import kernel, rare_kernel
 
 
 @kernel
-def has_motion(world: World) -> bool:
+def has_motion(controls: Record) -> bool:
     """Return True if the support moves at all, or any body is driven."""
-    controls = world.controls[0]
-    return controls.motion_x != 0.0 or controls.motion_y != 0.0 or world.driven.size > 0
+    return controls.motion_x != 0.0 or controls.motion_y != 0.0 or controls.driven != 0
+
+
+@kernel
+def is_driven(one: Record) -> bool:
+    """Return True for the record of a body with a motion of its own, among those that move."""
+    return one.shift_end > 0
 
 
 @rare_kernel
@@ -57,6 +62,8 @@ def move_support(world: World, step: float) -> None:
     speed = (moved - last) / step if step > 0.0 else rate(piece, now)
     change = acceleration(piece, now)
     for base in world.moved:
+        if is_driven(base):
+            break
         body = world.bodies[base.body]
         body.x = base.x + controls.motion_x * moved
         body.y = base.y + controls.motion_y * moved
@@ -74,6 +81,8 @@ def book_support(world: World, step: float) -> None:
     """
     total = 0.0
     for before in world.moved:
+        if is_driven(before):
+            break
         body = world.bodies[before.body]
         total += (before.fx + body.fx) * body.vx + (before.fy + body.fy) * body.vy
         before.fx = body.fx
@@ -89,8 +98,8 @@ def book_support(world: World, step: float) -> None:
 def is_support_at_rest(world: World) -> bool:
     """Return True if the motion of the support and of all driven bodies is over, or there is none."""
     time = world.clock[0].steps * world.controls[0].step
-    for one in world.driven:
-        if time < one.rest_time:
+    for one in world.moved:
+        if is_driven(one) and time < one.rest_time:
             return False
     last = world.motion[world.motion.size - 1]
     is_constant = last.c1 == 0.0 and last.c2 == 0.0 and last.c3 == 0.0

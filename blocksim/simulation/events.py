@@ -142,10 +142,10 @@ def fixed(world: World, number: int) -> World:
     body.vx, body.vy = ground.vx, ground.vy
     moved = _displacement(world)
     extended = zeros(world.moved.size + 1, world.moved.dtype)
-    extended[:-1] = world.moved
-    last = extended[-1]
-    last.body, last.x, last.y = number, body.x - controls.motion_x * moved, body.y - controls.motion_y * moved
-    return world._replace(moved=_sorted(extended))
+    extended[1:] = world.moved  # those of the support come first
+    first = extended[0]
+    first.body, first.x, first.y = number, body.x - controls.motion_x * moved, body.y - controls.motion_y * moved
+    return world._replace(moved=extended)
 
 
 def freed(world: World, number: int, placed: PlacedBody) -> World:
@@ -168,32 +168,22 @@ def _hold(body: Record) -> None:
 
 def _without(world: World, number: int) -> World:
     """Return a world whose support and paths do not move a body."""
-    moved, driven = (_all_but(records, number) for records in (world.moved, world.driven))
-    return world._replace(moved=moved, driven=driven)
-
-
-def _all_but(records: Records, number: int) -> Records:
-    kept = records["body"] != number
+    kept = world.moved["body"] != number
     if kept.all():
-        return records
-    fewer = zeros(int(np.count_nonzero(kept)), records.dtype)
-    fewer[:] = records[kept]
-    return fewer
-
-
-def _sorted(records: Records) -> Records:
-    order = np.argsort(records["body"], kind="stable")
-    ordered = zeros(records.size, records.dtype)
-    ordered[:] = records[order]
-    return ordered
+        return world
+    moved = zeros(int(np.count_nonzero(kept)), world.moved.dtype)
+    moved[:] = world.moved[kept]
+    world.controls[0].driven = np.count_nonzero(moved["shift_end"])
+    return world._replace(moved=moved)
 
 
 def _displacement(world: World) -> float:
     """Return how far (m) the support has come along its direction."""
     clock, controls = world.clock[0], world.controls[0]
     time = float(clock.steps * controls.step)
-    place = int(np.searchsorted(world.motion["start"], time, side="right")) - 1
-    piece = world.motion[max(0, place)]
+    first = int(clock.motion_piece)
+    begun = int(np.searchsorted(world.motion["start"][first:], time, side="right"))
+    piece = world.motion[first + max(0, begun - 1)]
     t = time - piece.start
     return float(piece.c0 + t * (piece.c1 + t * (piece.c2 + t * piece.c3)))
 

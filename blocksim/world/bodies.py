@@ -34,7 +34,7 @@ class Outline(NamedTuple):
     segments: tuple[PlacedSegment, ...]
     classes: tuple[ContactClass, ...]
     interactions: Interactions
-    motion: Records  # (m,) MOTION_PIECE
+    motion: Records  # (m,) MOTION_PIECE, of driven bodies and then of the support
     drives: DriveRecords
 
     @property
@@ -55,6 +55,10 @@ def outline_of(scenario: Scenario) -> Outline:
     classes = contact_classes(scenario, placed)
     interactions = interactions_of(scenario, classes)
     motion, drives = motion_records(scenario), drive_records(scenario, placed)
+    if drives.paths.size:
+        both = zeros(drives.paths.size + motion.size, MOTION_PIECE)
+        both[: drives.paths.size], both[drives.paths.size :] = drives.paths, motion
+        motion = both
     return Outline(scenario, placed, place_segments(scenario), classes, interactions, motion, drives)
 
 
@@ -150,6 +154,17 @@ STANDSTILL = zeros(1, MOTION_PIECE)
 def support_direction(scenario: Scenario) -> tuple[float, float]:
     """Return the direction (unit vector) of the support's motion; zero where it does not move."""
     return (0.0, 0.0) if scenario.motion is None else motion_direction(scenario)
+
+
+def all_moved_records(bodies: Records, outlines: Outlines) -> Records:
+    """Return what moves with the supports of m scenes, then what is driven, (m, f)."""
+    supports, driven = moved_records(bodies), [outline.drives.driven for outline in outlines]
+    count = supports.shape[-1]
+    records = zeros((len(outlines), count + driven[0].size), MOVED)
+    records[:, :count] = supports
+    for m, own in enumerate(driven):
+        records[m, count:] = own
+    return records
 
 
 def moved_records(bodies: Records) -> Records:

@@ -28,7 +28,7 @@ from blocksim.kernels.laws import LAW_CODES
 from blocksim.kernels.models import MODEL_CODES
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import Scenario
-from blocksim.world.bodies import Outline, moved_records, support_direction
+from blocksim.world.bodies import Outline, all_moved_records, support_direction
 from blocksim.world.bounds import Bounds
 from blocksim.world.interactions import interaction_tables
 from blocksim.world.memory import SceneSize, refuse_if_too_large
@@ -94,16 +94,16 @@ def assembled(parts: Parts, controls: Records, **arrays: Any) -> World:
         ledger=zeros((members, count // GROUP + 1), LEDGER),
         action=zeros((members, 1), ACTION),
         matrices=numbers((members, 8, 3, 3), np.float64),
-        moved=moved_records(bodies),
+        moved=all_moved_records(bodies, parts.outlines),
         motion=joined([outline.motion for outline in parts.outlines]),
-        driven=joined([outline.drives.driven for outline in parts.outlines]),
-        paths=joined([outline.drives.paths for outline in parts.outlines]),
         controls=controls,
         clock=zeros((members, 1), CLOCK),
         shares=zeros((members, 1), SHARE),
         between=zeros((members, 1), ACTION),
         team=numbers((members, TEAM_WORDS), np.int64),
     )
+    world.clock["motion_piece"][:, 0] = parts.outlines[0].drives.paths.size
+    world.controls["driven"][:, 0] = parts.outlines[0].drives.driven.size
     world.ledger["largest_kinetic"][:, 0] = _kinetic_energies(bodies)
     return world
 

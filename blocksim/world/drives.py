@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.arrays import DRIVE, MOTION_PIECE, Records, zeros
+from blocksim.kernels.arrays import MOTION_PIECE, MOVED, Records, zeros
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.drives import Drive, drives_of, greatest_rate
 from blocksim.scenario.motion import MotionPieces
@@ -16,14 +16,14 @@ COEFFICIENTS = ("c0", "c1", "c2", "c3")
 class DriveRecords(NamedTuple):
     """Driven bodies of one scene, and the pieces of all their paths."""
 
-    driven: Records  # (d,) DRIVE
+    driven: Records  # (d,) MOVED
     paths: Records  # (q,) MOTION_PIECE
 
 
 def drive_records(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> DriveRecords:
     """Return the driven bodies of a scenario; both arrays are empty where there are none."""
     drives = drives_of(scenario)
-    driven, pieces, count = zeros(len(drives), DRIVE), [], 0
+    driven, pieces, count = zeros(len(drives), MOVED), [], 0
     for record, drive in zip(driven, drives, strict=True):
         body = placed[drive.body]
         record.body, record.rest_time = drive.body, drive.rest_time

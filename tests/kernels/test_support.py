@@ -293,7 +293,7 @@ def test_work_on_the_support_is_booked_by_the_trapezoid_rule_and_its_totals_are_
 def test_support_moves_where_its_motion_has_a_direction(x: float, y: float, moves: bool) -> None:
     world = on_support([LYING]).world
     world.controls.motion_x, world.controls.motion_y = x, y
-    assert has_motion(world) == moves
+    assert has_motion(world.controls[0]) == moves
 
 
 @pytest.mark.parametrize("is_driven", [False, True])

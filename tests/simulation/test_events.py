@@ -128,7 +128,7 @@ def test_rest_lets_the_next_event_happen_and_the_run_go_on(scheme: str) -> None:
     assert run.final.loc[0, "y_mm"] == pytest.approx(500.0 * HEIGHT, abs=0.5)
     slid = 0.5 * 0.3**2 / (FRICTION * G)
     flight = (0.2 / G) ** 0.5
-    assert 0.99 * slid < 1e-3 * run.final.loc[0, "x_mm"] < slid + flight * REST["rest_speed"]
+    assert 0.99 * slid < 1e-3 * run.columns["x_mm"][0] < slid + flight * REST["rest_speed"]
 
 
 @both

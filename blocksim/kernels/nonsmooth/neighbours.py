@@ -19,7 +19,7 @@ from blocksim.kernels.geometry import ground_gap, separation
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.colours import colour_pairs, keep_impulses, most_groups, place_rows
-from blocksim.kernels.support import has_motion
+from blocksim.kernels.support import has_motion, is_driven
 
 STEPS = 16.0  # that a body should be able to continue before its reach is used up
 MOST_MARGIN = 0.5  # of the least reach of two bodies
@@ -47,7 +47,7 @@ def common_frame(scene: Nonsmooth) -> Frame:
     bodies = scene.world.bodies
     way = 0.0
     speed = 0.0
-    if has_motion(scene.world):
+    if has_motion(scene.world.controls[0]):
         return frame_of_supports(scene)
     for i in range(bodies.size - 1):
         body = bodies[i]
@@ -72,6 +72,21 @@ def travel(scene: Nonsmooth, i: int, frame: Frame) -> float:
     dx = body.x - scene.spots[i].x - frame.x
     dy = body.y - scene.spots[i].y - frame.y
     return math.sqrt(dx * dx + dy * dy) + body.radius * abs(body.angle - body.list_angle)
+
+
+@rare_kernel
+def look_at_driven(scene: Nonsmooth, frame: Frame) -> tuple[float, bool]:
+    """Return the speed (m/s) of the fastest driven body in the step to come, and whether none uses up its reach."""
+    step = scene.world.controls[0].step
+    fastest = 0.0
+    is_good = True
+    for one in scene.world.moved:
+        if is_driven(one):
+            rate = coming_speed(scene, one, frame)
+            reach = scene.spots[one.body].reach
+            fastest = max(fastest, rate)
+            is_good = is_good and travel(scene, one.body, frame) + min(rate * step, MOST_MARGIN * reach) <= reach
+    return fastest, is_good
 
 
 @rare_kernel
@@ -109,11 +124,10 @@ def look(scene: Nonsmooth) -> bool:
         gone = travel(scene, i, frame)
         is_finite = is_finite and math.isfinite(rate + gone)
         is_good = is_good and gone + min(2.0 * rate * controls.step, MOST_MARGIN * spot.reach) <= spot.reach
-    for one in world.driven:
-        rate = coming_speed(scene, one, frame)
-        reach = scene.spots[one.body].reach
-        fastest = max(fastest, rate)
-        is_good = is_good and travel(scene, one.body, frame) + min(rate * controls.step, MOST_MARGIN * reach) <= reach
+    if controls.driven != 0:
+        coming, stays = look_at_driven(scene, frame)
+        fastest = max(fastest, coming)
+        is_good = is_good and stays
     stepping.margin = min(2.0 * controls.step * fastest, 2.0 * MOST_MARGIN * stepping.least_reach)
     return is_good or not is_finite or rebuild(scene, frame)  # what is not finite is found after the step
 

@@ -4,7 +4,7 @@ from blocksim.kernels.arrays import Record, World
 from blocksim.kernels.driven import follow_pieces, pose_at, put, way_over
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-from blocksim.kernels.support import displacement, has_motion, piece_at
+from blocksim.kernels.support import displacement, has_motion, is_driven, piece_at
 
 
 @rare_kernel
@@ -19,7 +19,7 @@ def drive(scene: Nonsmooth, number: int) -> None:
     world = scene.world
     controls = world.controls[0]
     stepping = scene.contacts.stepping[0]
-    if not has_motion(world):
+    if not has_motion(controls):
         return
     h = stepping.substep
     begin = world.clock[0].steps * controls.step + number * h
@@ -27,17 +27,25 @@ def drive(scene: Nonsmooth, number: int) -> None:
     stepping.support_vx = controls.motion_x * rate
     stepping.support_vy = controls.motion_y * rate
     for one in world.moved:
+        if is_driven(one):
+            drive_own(scene, one, begin)
+            continue
         line = scene.contacts.lines[one.body]
         before = scene.contacts.before[one.body]
         line.vx = before.vx = stepping.support_vx
         line.vy = before.vy = stepping.support_vy
-    for one in world.driven:
-        line = scene.contacts.lines[one.body]
-        before = scene.contacts.before[one.body]
-        way = way_over(world, one, begin, h)
-        line.vx = before.vx = way.x / h
-        line.vy = before.vy = way.y / h
-        line.spin = before.spin = way.angle / h
+
+
+@rare_kernel
+def drive_own(scene: Nonsmooth, one: Record, begin: float) -> None:
+    """Give a driven body its velocity in the substep that begins at a time (s)."""
+    h = scene.contacts.stepping[0].substep
+    line = scene.contacts.lines[one.body]
+    before = scene.contacts.before[one.body]
+    way = way_over(scene.world, one, begin, h)
+    line.vx = before.vx = way.x / h
+    line.vy = before.vy = way.y / h
+    line.spin = before.spin = way.angle / h
 
 
 @rare_kernel
@@ -46,7 +54,7 @@ def place_supports(scene: Nonsmooth) -> None:
     world = scene.world
     controls = world.controls[0]
     clock = world.clock[0]
-    if not has_motion(world):
+    if not has_motion(controls):
         return
     now = (clock.steps + 1) * controls.step
     clock.motion_piece = piece_at(world.motion, clock.motion_piece, now)
@@ -55,6 +63,9 @@ def place_supports(scene: Nonsmooth) -> None:
     stepping.support_x = controls.motion_x * moved
     stepping.support_y = controls.motion_y * moved
     for one in world.moved:
+        if is_driven(one):
+            place_driven(scene, one, now)
+            continue
         body = world.bodies[one.body]
         line = scene.contacts.lines[one.body]
         body.x = one.x + stepping.support_x
@@ -63,8 +74,6 @@ def place_supports(scene: Nonsmooth) -> None:
         body.vy = line.vy
         line.dx = 0.0
         line.dy = 0.0
-    for one in world.driven:
-        place_driven(scene, one, now)
 
 
 @rare_kernel
