@@ -21,6 +21,7 @@ from blocksim.kernels.energy import weights_power
 from blocksim.kernels.forces import forces_between, forces_within
 from blocksim.kernels.integrate import kinetic_energy, place_all_corners, renew_rotations, start_all
 from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
+from blocksim.kernels.loads import are_loads_steady, push_bodies
 from blocksim.kernels.shares import add_from_before, divide
 from blocksim.kernels.support import book_support, has_motion, is_support_at_rest, move_support
 from blocksim.kernels.systems import Coupled, Systems, step_systems, survey_systems
@@ -46,7 +47,7 @@ def fastest_point(bodies: Records) -> float:
 @rare_kernel
 def is_supported(bodies: Records, controls: Record) -> bool:
     """Return True if every free body touches something, where there is gravity: at the top of its flight none rests."""
-    if controls.gravity_x == 0.0 and controls.gravity_y == 0.0:
+    if controls.gravity_x == 0.0 and controls.gravity_y == 0.0 and controls.push == 0.0:
         return True
     for i in range(bodies.size - 1):
         if bodies[i].inverse_mass > 0.0 and bodies[i].pairs_before == 0:
@@ -77,6 +78,7 @@ def check(world: World, systems: Systems | None) -> int:
         clock.ends_at = clock.steps
         return OVERLAP_LIMIT
     rests = fastest < controls.rest_speed and is_supported(world.bodies, controls) and is_support_at_rest(world)
+    rests = rests and are_loads_steady(world)
     clock.checks_at_rest = clock.checks_at_rest + 1 if rests else 0
     return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
 
@@ -180,11 +182,13 @@ def begin_steps(world: World, k: int, step: float) -> bool:
         if share.status != REACHED:
             return False
     start_all(world.bodies, share.first_body, share.last_body, step)
+    if world.loads.size > 0:
+        push_bodies(world, share.first_body, share.last_body, share.steps * world.controls[0].step + step, step)
     if has_motion(world.controls[0]):
         supervise(world, k, MOVE, step, None)
         return True
     meet(world.team)
-    if share.is_started != 0:
+    if share.is_started != 0 and world.loads.size == 0:
         share.until = min(share.last_step, share.next_check, world.clock[0].next_look)
     return True
 

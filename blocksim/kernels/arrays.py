@@ -159,6 +159,7 @@ CONTROLS = record_type(
     "skin rest_speed "  # m: reach of the pair list beyond contact; m/s
     "motion_x motion_y "  # -: direction of the support's motion, both zero without one
     "max_overlap "  # m, zero: a share of the smallest side of each pair
+    "push loads_end "  # m/s2: no load gives any point more; s: from then on none changes with time
     "cell_width cell_radius "  # m: of the grid of the broad phase; half diagonal of the largest body in it
     "particle_size smoothing_length support",  # m: diameter; of the SPH kernel; radius beyond which it is zero
     "model law sph_kernel "  # codes
@@ -172,7 +173,7 @@ CLOCK = record_type(
     "ends_at "  # step at which the run ends, as two bodies were found too deep in one another; 0: none
     "is_started",  # flag
 )
-LEDGER = record_type("dashpot friction broken to_support events travel_work largest_kinetic")  # J
+LEDGER = record_type("dashpot friction broken to_support to_loads events travel_work largest_kinetic")  # J
 ACTION = record_type(
     "fx fy torque_a torque_b "  # N, N m: force of a pair on body a and its torque; torque on b is against torque_b
     "dashpot friction broken",  # J: lost in the drift that led here
@@ -210,6 +211,20 @@ MOVED = record_type(
     indices="body shift shift_end turn turn_end",
 )
 MOTION_PIECE = record_type("start c0 c1 c2 c3")  # s, m, m/s ...: c0 + c1 t + c2 t^2 + c3 t^3 with t from the start
+# kinds of loads: accelerations of all free bodies first
+LOAD_FIELD, LOAD_TILT, LOAD_FORCE, LOAD_WATER = range(4)
+LOAD = record_type(
+    "x y "  # m: where it acts, in the body frame; of water the lower end of the face, of which the other is
+    "end_x end_y "
+    "fx fy torque "  # N, N, N m for a value of one; of accelerations m/s2; of a face m of depth times its inward normal
+    "unit_weight "  # N/m2: of water, times the length of the face
+    "up_x up_y "  # -: against gravity as it is at the start
+    "last_fx last_fy last_torque",  # N, N, N m: in the last evaluation
+    counters="first_piece last_piece",  # its pieces, from the first to before the last
+    indices="body",
+    flags="kind turns",  # flag: its force turns with the body
+)
+LOAD_PIECE = record_type("start value rate")  # s, value, 1/s: value + rate (t - start)
 
 
 class World(NamedTuple):
@@ -240,6 +255,8 @@ class World(NamedTuple):
     shares: Records  # (t,) SHARE, one for each thread
     between: Records  # (1,) or, with threads, (p,) ACTION of the pairs whose bodies are of two shares, sorted
     team: Integers  # (32,) what threads tell one another
+    loads: Records  # (l,) LOAD
+    load_pieces: Records  # (k,) LOAD_PIECE, load after load
 
     @property
     def world(self) -> "World":

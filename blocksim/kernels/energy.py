@@ -17,6 +17,7 @@ LEDGER_ROW = (
     "friction",
     "broken",
     "to_support",
+    "to_loads",
     "events",
 )
 
@@ -79,6 +80,15 @@ def booked(ledger: Records) -> tuple[float, float, float]:
     return dashpot, friction, broken
 
 
+@rare_kernel
+def given_to_loads(ledger: Records) -> float:
+    """Return the work (J) done on loads, against that which they do, summed over all groups of bodies in order."""
+    total = 0.0
+    for book in ledger:
+        total += book.to_loads
+    return total
+
+
 @entry_kernel
 def measure(world: World, row: Floats) -> None:
     """Write one row of the ledger: energies (J) as in `LEDGER_ROW`, number of contacts, largest overlap (m)."""
@@ -90,9 +100,10 @@ def measure(world: World, row: Floats) -> None:
     row[3] = shear
     row[4], row[5], row[6] = booked(world.ledger)
     row[7] = ledger.to_support
-    row[8] = ledger.events
-    row[9] = count
-    row[10] = largest
+    row[8] = given_to_loads(world.ledger)
+    row[9] = ledger.events
+    row[10] = count
+    row[11] = largest
 
 
 @rare_kernel

@@ -44,6 +44,8 @@ def member(worlds: World, m: int) -> World:
         worlds.shares[m],
         worlds.between[m],
         worlds.team[m],
+        worlds.loads[m],
+        worlds.load_pieces[m],
     )
 
 

@@ -51,7 +51,7 @@ def unseen_steps(world: World, farthest: float, fastest: float) -> int:
     left = PAIR_SHARE * controls.skin - farthest
     if left <= 0.0:
         return 0
-    gravity = math.sqrt(controls.gravity_x**2 + controls.gravity_y**2)
+    gravity = math.sqrt(controls.gravity_x**2 + controls.gravity_y**2) + controls.push
     most = MOST_UNSEEN_DRIVEN if has_motion(controls) else MOST_UNSEEN
     drift = controls.step * (GROWTH * fastest + math.sqrt(2.0 * gravity * left))
     return most if left > drift * most else int(left / drift)

@@ -9,6 +9,8 @@ from pydantic_core import ErrorDetails
 
 from blocksim.scenario.keys import MISSING, NAMED, KeyPath, field_at, follow, keys_of, table_at
 from blocksim.scenario.models.drive import DRIVES
+from blocksim.scenario.models.history import HISTORIES
+from blocksim.scenario.models.loads import LOADS
 from blocksim.scenario.models.motions import MOTIONS
 from blocksim.scenario.models.probe import PROBES
 from blocksim.scenario.models.scenario import Scenario
@@ -26,6 +28,8 @@ KINDS_IN: dict[str | int, Iterable[str]] = {
     "motion": MOTIONS,
     "probes": PROBES,
     "bodies": DRIVES,
+    "loads": LOADS,
+    "history": HISTORIES,
 }
 
 
@@ -61,7 +65,7 @@ def _finding(entry: ErrorDetails, data: object) -> Finding:
             return Finding((*path, "kind"), f"this key is missing: {_kinds(path)} is needed", at="key")
         case "union_tag_invalid":
             kind = follow(data, (*path, "kind"))
-            hint = did_you_mean(str(kind), KINDS_IN[path[0]]) or f"choose {_kinds(path)}"
+            hint = did_you_mean(str(kind), KINDS_IN[_table_of_kinds(path)]) or f"choose {_kinds(path)}"
             return Finding((*path, "kind"), f"unknown {_of_kinds(path)} kind {shown(kind)}; {hint}")
         case "extra_forbidden":
             return _unknown_key(path, data)
@@ -77,12 +81,23 @@ def _finding(entry: ErrorDetails, data: object) -> Finding:
 def _path(loc: Sequence[str | int]) -> KeyPath:
     """Drop what pydantic adds to the path of the file: the tag of a union, and the sweep's inner table."""
     path = tuple(loc)
-    if path[:1] == (HELD,):
-        return path[1:]
-    if path[:1] in (("structures",), ("probes",)):
-        return (*path[:2], *path[3:])
-    if path[:1] == ("bodies",) and path[2:3] == ("motion",):
-        return (*path[:3], *path[4:])
+    match path:
+        case (held, *_) if held == HELD:
+            return path[1:]
+        case ("structures" | "probes", *_):
+            return (*path[:2], *path[3:])
+        case ("bodies", _, "motion", *_):
+            return (*path[:3], *path[4:])
+        case ("loads", _, _, "history", *_):
+            return (*path[:2], "history", *path[5:])
+        case ("loads", *_):
+            return (*path[:2], *path[3:])
+        case _:
+            return _path_of_one(path)
+
+
+def _path_of_one(path: KeyPath) -> KeyPath:
+    """Return the same for tables that are there once."""
     if path[:1] == ("time",) and path[1:2] not in [(scheme,) for scheme in SCHEMES]:
         return path  # of a scheme that is none of the union
     if path[:1] in (("motion",), ("time",)):
@@ -133,11 +148,16 @@ def _table_with(word: str) -> str:
 
 def _of_kinds(path: KeyPath) -> str:
     """Return what the table at a path is that has a kind."""
-    return "motion" if path[-1] == "motion" else str(path[0]).removesuffix("s")
+    return "motion" if path[-1] == "motion" else _table_of_kinds(path).removesuffix("s")
+
+
+def _table_of_kinds(path: KeyPath) -> str:
+    """Return the table whose kinds are known: that of bodies, or the last one of these on the way."""
+    return "bodies" if path[0] == "bodies" else next(str(part) for part in reversed(path) if part in KINDS_IN)
 
 
 def _kinds(path: KeyPath) -> str:
-    *others, last = (shown(kind) for kind in KINDS_IN[path[0]])
+    *others, last = (shown(kind) for kind in KINDS_IN[_table_of_kinds(path)])
     return f"{', '.join(others)} or {last}"
 
 

@@ -15,6 +15,8 @@ from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFricti
 from blocksim.scenario.models.drive import OWN_DRIVES
 from blocksim.scenario.models.events import Event, NewVelocity
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
+from blocksim.scenario.models.history import HISTORIES
+from blocksim.scenario.models.loads import LOADS, Load
 from blocksim.scenario.models.motions import MOTIONS
 from blocksim.scenario.models.probe import PROBES, Probe
 from blocksim.scenario.models.scenario import Scenario
@@ -27,6 +29,10 @@ BEGIN = "<!-- keys: written by `make readme` -->"
 END = "<!-- end of keys -->"
 HEAD = "| key | unit | default | meaning |\n| --- | --- | --- | --- |"
 SUBTABLES = (dict, tuple, BaseModel)
+
+
+SHARED = (Structure, Load, Time, Probe)
+"""What kinds of a table have in common, told once."""
 
 
 def key_table() -> str:
@@ -44,6 +50,9 @@ def key_table() -> str:
         *((f'motion, kind = "{kind}"', model) for kind, model in MOTIONS.items()),
         ("events", Event),
         ("events.velocity", NewVelocity),
+        ("loads, every kind", Load),
+        *((f'loads, kind = "{kind}"', model) for kind, model in LOADS.items()),
+        *((f'loads.history, kind = "{kind}"', model) for kind, model in HISTORIES.items()),
         ("friction", Friction),
         ("friction.PAIR", PairFriction),
         ("pairs.A.B", Pair),
@@ -77,7 +86,8 @@ def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
     place = prefix.partition(",")[0]
     note = prefix.partition(", ")[2]
     told = next(
-        (base.model_fields for base in (Structure, Time, Probe) if issubclass(model, base) and model is not base), {}
+        (base.model_fields for base in (Structure, Load, Time, Probe) if issubclass(model, base) and model is not base),
+        {},
     )
     for name, info in model.model_fields.items():
         has_rows_of_its_own = _is_table(info) and model not in {Friction, Pair, Sweep} and name != "provenance"

@@ -25,6 +25,7 @@ NAMED: dict[str | int, int] = {
     "bodies": 2,
     "walls": 2,
     "events": 2,
+    "loads": 2,
     "pairs": 3,
     "probes": 2,
 }
@@ -129,8 +130,16 @@ def field_of(key: str, scenario: Scenario) -> FieldInfo | None:
     data = scenario.model_dump(by_alias=True, exclude={"sweep"})
     path: KeyPath = ()
     for part in parse_key(key):
-        path = (*path, int(part) if isinstance(follow(data, path), list | tuple) else part)
+        entries = follow(data, path)
+        path = (*path, _number_of(part, entries) if isinstance(entries, list | tuple) else part)
     return field_at(path, data)
+
+
+def _number_of(part: str, entries: Sequence[object]) -> int | str:
+    """Return the number of the entry of a list that a part of a key means: its number, or its name."""
+    if part.isdecimal():
+        return int(part)
+    return next((i for i, one in enumerate(entries) if isinstance(one, Mapping) and one.get("name") == part), part)
 
 
 def is_known(path: Sequence[str | int], data: object) -> bool:

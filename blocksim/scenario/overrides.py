@@ -172,6 +172,9 @@ def _without_synonym(node: Data, part: str) -> Data:
 def _index(entries: Sequence[object], part: str | int, done: Sequence[str | int]) -> int:
     if str(part).isdecimal() and len(str(part)) < MAX_DEPTH and int(part) < len(entries):
         return int(part)
+    named = [index for index, entry in enumerate(entries) if isinstance(entry, Mapping) and entry.get("name") == part]
+    if len(named) == 1:
+        return named[0]
     message = f"{format_key(done)} is a list of {len(entries)}, numbered from 0; {shown(part)} does not exist"
     raise UnfitOverrideError(message)
 

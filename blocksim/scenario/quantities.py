@@ -83,6 +83,8 @@ PRESSURE = Kind(units.PRESSURE, "Pa", "69 GPa")
 DENSITY = Kind(units.DENSITY, "kg/m^3", "2700 kg/m^3")
 UNIT_WEIGHT = Kind(units.UNIT_WEIGHT, "N/m^3", "26.7 kN/m^3")
 STIFFNESS = Kind(units.STIFFNESS, "N/m", "1e6 N/m")
+FORCE = Kind(units.FORCE, "N", "2 kN")
+MOMENT = Kind(units.MOMENT, "N m", "5 N m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,8 +309,12 @@ NonNegativeSpeed = Annotated[float, Quantity(SPEED, at_least=0.0)]
 PositiveSpeed = Annotated[float, Quantity(SPEED, above=0.0)]
 PositiveFrequency = Annotated[float, Quantity(FREQUENCY, above=0.0)]
 Spin = Annotated[float, Quantity(SPIN)]
+PositiveSpin = Annotated[float, Quantity(SPIN, above=0.0)]
 NonNegativeAcceleration = Annotated[float, Quantity(ACCELERATION, at_least=0.0)]
 Pressure = Annotated[float, Quantity(PRESSURE, above=0.0)]
+AnyPressure = Annotated[float, Quantity(Kind(units.PRESSURE, "Pa", "10 kPa"))]
+Force = Annotated[float, Quantity(FORCE)]
+Moment = Annotated[float, Quantity(MOMENT)]
 Density = Annotated[float, Quantity(DENSITY, above=0.0)]
 UnitWeight = Annotated[float, Quantity(UNIT_WEIGHT, above=0.0)]
 Stiffness = Annotated[float, Quantity(STIFFNESS, above=0.0)]

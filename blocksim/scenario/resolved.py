@@ -11,13 +11,14 @@ import tomli_w
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from blocksim.scenario.keys import si_unit
 from blocksim.scenario.models.contact import Friction, PairFriction
 from blocksim.scenario.models.motion import FromTable, MotionTable
 from blocksim.scenario.models.motions import TABLED
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Time
 from blocksim.scenario.models.study import Sweep
-from blocksim.scenario.quantities import ANGLE, Quantity
+from blocksim.scenario.quantities import ANGLE
 from blocksim.scenario.systems import HELD
 
 HEADER = "# Resolved by blocksim: all values as used, in SI units (m, kg, s, N, Pa), angles in rad.\n"
@@ -114,8 +115,9 @@ def _plain(table: BaseModel) -> dict[str, Any]:
 
 def _field(info: FieldInfo, value: object) -> object:
     """Write one field; an angle needs its unit, because a bare one would be refused."""
-    is_angle = any(isinstance(mark, Quantity) and mark.kind is ANGLE for mark in info.metadata)
-    return f"{value!r} rad" if is_angle else _value(value)
+    if si_unit(info) != ANGLE.unit or value is None:
+        return _value(value)
+    return [f"{one!r} rad" for one in value] if isinstance(value, tuple) else f"{value!r} rad"
 
 
 def _value(value: object) -> object:

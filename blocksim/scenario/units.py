@@ -33,6 +33,7 @@ FREQUENCY: Dimension = (0, 0, -1, 0)
 SPIN: Dimension = (0, 0, -1, 1)
 ACCELERATION: Dimension = (1, 0, -2, 0)
 FORCE: Dimension = (1, 1, -2, 0)
+MOMENT: Dimension = (2, 1, -2, 0)
 PRESSURE: Dimension = (-1, 1, -2, 0)
 DENSITY: Dimension = (-3, 1, 0, 0)
 UNIT_WEIGHT: Dimension = (-2, 1, -2, 0)
@@ -50,6 +51,7 @@ NAMES: dict[Dimension, str] = {
     SPIN: "a spin",
     ACCELERATION: "an acceleration",
     FORCE: "a force",
+    MOMENT: "a moment",
     PRESSURE: "a pressure",
     DENSITY: "a density",
     UNIT_WEIGHT: "a unit weight",
@@ -128,6 +130,8 @@ COMMON: dict[str, tuple[Fraction, Dimension]] = {
     "MN/m": (Fraction(10**6), STIFFNESS),
     "kN": (Fraction(1000), FORCE),
     "N": (Fraction(1), FORCE),
+    "N m": (Fraction(1), MOMENT),
+    "kN m": (Fraction(1000), MOMENT),
     "kg": (Fraction(1), MASS),
     "g": (Fraction(1, 1000), MASS),
 }

@@ -30,7 +30,8 @@ Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is Non
 class EnergyLedger(BaseModel, frozen=True, extra="allow"):
     """All in J. The residual is what total + losses has drifted since the start.
 
-    `to_support` is the work done on supports and driven bodies that move; negative where they drive the scene. `events`
+    `to_support` is the work done on supports and driven bodies that move; negative where they drive the scene.
+    `to_loads` is that done on loads; negative where they drive it. `events`
     is what events have taken out of it, with bodies removed or fixed, and negative where they bring some in. What a
     scheme does not know is zero: springs, dashpots and contacts that break are of the explicit one, impacts and
     correction (blocksim.kernels.nonsmooth.energy) of the non-smooth one. Systems beside the blocks add entries of their
@@ -47,6 +48,7 @@ class EnergyLedger(BaseModel, frozen=True, extra="allow"):
     impacts: Number = 0.0
     correction: Number = 0.0
     to_support: Number = 0.0
+    to_loads: Number = 0.0
     events: Number = 0.0
     start: Number
     in_play: Number
@@ -65,7 +67,7 @@ class EnergyLedger(BaseModel, frozen=True, extra="allow"):
         """Energy now plus all losses, minus the energy at the start (J)."""
         now = self.kinetic + self.potential + self.stored_normal + self.stored_shear
         lost = self.dashpot + self.friction + self.broken + self.impacts + self.correction + self.to_support
-        lost += self.events
+        lost += self.to_loads + self.events
         further = sum((self.model_extra or {}).values())
         residual: float = now + lost + further - self.start
         return residual
@@ -85,7 +87,7 @@ def start_energy(scene: "AnyScene") -> float:
 
 
 class InPlay(NamedTuple):
-    """What the energy in play of a scene follows from, beside the work of its support."""
+    """What the energy in play of a scene follows from, beside the work of its support and loads."""
 
     mass: float  # kg, of all bodies
     moved: float  # J: largest kinetic energy + sum of the weights' travel |m g v| dt
@@ -108,11 +110,11 @@ def energy_ledger(scene: "AnyScene", start: float) -> EnergyLedger:
 def ledger_of(names: Sequence[str], row: NDArray[np.float64], start: float, in_play: InPlay) -> EnergyLedger:
     """Return the ledger of a state in which energies (J) of these names were measured.
 
-    Energy in play: largest kinetic energy + sum of the weights' travel |m g v| dt + |work of the support|, at least
-    m_total g 1 mm.
+    Energy in play: largest kinetic energy + sum of the weights' travel |m g v| dt + |work of support and loads|, at
+    least m_total g 1 mm.
     """
     entries = dict(zip(names, row.tolist(), strict=False))
-    driven = in_play.moved + abs(entries.get("to_support", 0.0))
+    driven = in_play.moved + abs(entries.get("to_support", 0.0)) + abs(entries.get("to_loads", 0.0))
     weight = in_play.mass * USUAL_GRAVITY
     return EnergyLedger(**entries, start=start, in_play=max(driven, weight * SMALLEST_HEIGHT))
 

@@ -38,6 +38,7 @@ ENERGIES = {  # how entries of the ledger are drawn together
     "lost to friction": ("friction",),
     "lost in impacts": ("dashpot", "broken", "impacts", "correction"),
     "given to support": ("to_support",),
+    "given to loads": ("to_loads",),
 }
 ENERGY_LOOKS: dict[str, tuple[str, Any]] = {  # the same in every picture; dashes distinguish them in grey
     "kinetic": ("#0072B2", "-"),
@@ -46,6 +47,7 @@ ENERGY_LOOKS: dict[str, tuple[str, Any]] = {  # the same in every picture; dashe
     "lost to friction": ("#009E73", (0, (5, 1.5))),
     "lost in impacts": ("#222222", (0, (3, 1, 1, 1))),
     "given to support": ("#56B4E9", (0, (2, 1))),
+    "given to loads": ("#D55E00", (0, (4, 1, 1, 1))),
 }
 OTHER_ENERGY: tuple[str, Any] = ("#999999", "-")
 BESIDE: dict[str, Any] = {

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from blocksim.kernels.arrays import ALL, BODY, DRIVEN, MOTION_PIECE, MOVED, SUPPORT, Record, Records, zeros
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments
 from blocksim.scenario.motion import motion_direction, motion_pieces
+from blocksim.world.applied import Applied, applied_loads
 from blocksim.world.drives import DriveRecords, drive_records, piece_records
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
 
@@ -36,13 +37,15 @@ class Outline(NamedTuple):
     interactions: Interactions
     motion: Records  # (m,) MOTION_PIECE, of driven bodies and then of the support
     drives: DriveRecords
+    applied: Applied
 
     @property
-    def shape(self) -> tuple[str, int, int, int, int, tuple[int, ...]]:
+    def shape(self) -> tuple[object, ...]:
         """Common properties of scenes that are built together."""
         model = self.scenario.contact.model
         drives = (*self.drives.driven["body"].tolist(), self.drives.paths.size)
-        return model, len(self.placed), len(self.segments), len(self.classes), self.motion.size, drives
+        loads = self.applied.loads.size, self.applied.pieces.size
+        return model, len(self.placed), len(self.segments), len(self.classes), self.motion.size, drives, loads
 
 
 Outlines = Sequence[Outline]
@@ -59,7 +62,8 @@ def outline_of(scenario: Scenario) -> Outline:
         both = zeros(drives.paths.size + motion.size, MOTION_PIECE)
         both[: drives.paths.size], both[drives.paths.size :] = drives.paths, motion
         motion = both
-    return Outline(scenario, placed, place_segments(scenario), classes, interactions, motion, drives)
+    applied = applied_loads(scenario, placed)
+    return Outline(scenario, placed, place_segments(scenario), classes, interactions, motion, drives, applied)
 
 
 def body_records(outlines: Outlines) -> Records:

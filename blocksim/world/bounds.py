@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from blocksim.scenario import Scenario
 from blocksim.scenario.drives import greatest_rate
 from blocksim.scenario.motion import motion_pieces
+from blocksim.world.applied import greatest_push, steepest_tilt
 from blocksim.world.drives import driven_speed, highest_rise
 from blocksim.world.interactions import Interactions
 
@@ -86,8 +87,9 @@ def given_speed(scenario: Scenario, bounds: Bounds) -> float:
 
 def greatest_speed(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
     """Return the bound (m/s) of the speed of any point of a block."""
-    tilt = abs(scenario.ground.tilt)
-    pull = scenario.gravity * max(0.0, math.sin(tilt) - least_support_friction(bounds, table) * math.cos(tilt))
+    tilt = steepest_tilt(scenario)
+    held = least_support_friction(bounds, table) * math.cos(tilt)
+    pull = max(0.0, scenario.gravity * (math.sin(tilt) - held) + greatest_push(scenario))
     return impact_speed(scenario, bounds) + pull * scenario.time.end
 
 

@@ -28,6 +28,7 @@ from blocksim.kernels.laws import LAW_CODES
 from blocksim.kernels.models import MODEL_CODES
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import Scenario
+from blocksim.world.applied import stacked
 from blocksim.world.bodies import Outline, all_moved_records, support_direction
 from blocksim.world.bounds import Bounds
 from blocksim.world.interactions import interaction_tables
@@ -85,6 +86,7 @@ def assembled(parts: Parts, controls: Records, **arrays: Any) -> World:
     members, count = parts.bodies.shape
     bodies = parts.bodies
     bodies["half_x"][:, -1] = math.inf  # the half-plane has one face without ends
+    loads, load_pieces = stacked([outline.applied for outline in parts.outlines])
     world = World(
         bodies=bodies,
         **arrays,
@@ -101,6 +103,8 @@ def assembled(parts: Parts, controls: Records, **arrays: Any) -> World:
         shares=zeros((members, 1), SHARE),
         between=zeros((members, 1), ACTION),
         team=numbers((members, TEAM_WORDS), np.int64),
+        loads=loads,
+        load_pieces=load_pieces,
     )
     world.clock["motion_piece"][:, 0] = parts.outlines[0].drives.paths.size
     world.controls["driven"][:, 0] = parts.outlines[0].drives.driven.size
@@ -206,6 +210,8 @@ def empty_controls(parts: Parts, strides: Sequence[Stride]) -> Records:
     for name in rows[0]:
         controls[name][:, 0] = [row[name] for row in rows]
     controls["cell_radius"][:, 0] = parts.cell_radius
+    controls["push"][:, 0] = [outline.applied.push for outline in parts.outlines]
+    controls["loads_end"][:, 0] = [outline.applied.end for outline in parts.outlines]
     return controls
 
 

@@ -17,6 +17,7 @@ from blocksim.kernels.nonsmooth.arrays import (
     KEPT,
     LINE,
     PART,
+    PUSH,
     ROW,
     SPOT,
     STEPPING,
@@ -151,6 +152,7 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
         firsts=numbers((*members, bodies), np.int64),
         begins=numbers((*members, COLOURS + 1), np.int64),
         used=numbers((*members, bodies), np.int64),
+        pushes=zeros((*members, bodies if world.loads.size else 1), PUSH),
     )
 
 
@@ -173,7 +175,7 @@ def with_more_rows(scene: Nonsmooth) -> Nonsmooth:
     for name in ("rows", "books"):
         getattr(larger.contacts, name)[: getattr(old, name).size] = getattr(old, name)
     contacts = larger.contacts._replace(lines=old.lines, before=old.before, ends=old.ends, residuals=old.residuals)
-    return larger._replace(contacts=contacts, spots=scene.spots, begins=scene.begins)
+    return larger._replace(contacts=contacts, spots=scene.spots, begins=scene.begins, pushes=scene.pushes)
 
 
 def with_more_threads(scene: Nonsmooth, threads: int) -> Nonsmooth:

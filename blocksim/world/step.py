@@ -24,6 +24,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Explicit, Nonsmooth
+from blocksim.world.applied import greatest_push, steepest_tilt
 from blocksim.world.bounds import Bounds, Kind, fastest_fall, given_speed, greatest_speed, support_speed
 from blocksim.world.interactions import Interactions
 from blocksim.world.stable_step import ContactBody, ContactStiffness, Load, stable_step, steepest
@@ -101,9 +102,10 @@ def _contact_body(kind: Kind) -> ContactBody:
 
 def expected_load(scenario: Scenario, bounds: Bounds) -> Load:
     """Return the speed that the fastest point may reach by falling, or by sliding all the time, and the weight."""
-    along = scenario.gravity * abs(math.sin(scenario.ground.tilt))
+    push = greatest_push(scenario)
+    along = scenario.gravity * math.sin(steepest_tilt(scenario)) + push
     speed = given_speed(scenario, bounds) + fastest_fall(scenario, bounds) + along * scenario.time.end
-    return Load(speed, scenario.gravity * bounds.mass)
+    return Load(speed, (scenario.gravity + push) * bounds.mass)
 
 
 def step_of_travel(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:

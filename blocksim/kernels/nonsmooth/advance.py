@@ -8,9 +8,11 @@ from blocksim.kernels.energy import weights_power
 from blocksim.kernels.integrate import kinetic_energy, renew_rotations
 from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
 from blocksim.kernels.lanes import WIDTH
+from blocksim.kernels.loads import are_loads_steady
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.energy import has_excessive_overlap
 from blocksim.kernels.nonsmooth.groups import gather, pack_groups, unpack_groups
+from blocksim.kernels.nonsmooth.loads import show_velocities
 from blocksim.kernels.nonsmooth.manifold import Place, are_four_of_blocks, collide, collide_four
 from blocksim.kernels.nonsmooth.motion import place_all
 from blocksim.kernels.nonsmooth.neighbours import look
@@ -29,7 +31,7 @@ def is_supported(scene: Nonsmooth) -> bool:
     """Return True if every free body has a contact that presses, where there is gravity."""
     world = scene.world
     controls = world.controls[0]
-    if controls.gravity_x == 0.0 and controls.gravity_y == 0.0:
+    if controls.gravity_x == 0.0 and controls.gravity_y == 0.0 and controls.push == 0.0:
         return True
     scene.used[:] = 0
     contacts = scene.contacts
@@ -60,6 +62,7 @@ def check(scene: Nonsmooth) -> int:
     if has_excessive_overlap(scene):
         return OVERLAP_LIMIT
     rests = fastest < controls.rest_speed and is_supported(scene) and is_support_at_rest(world)
+    rests = rests and are_loads_steady(world)
     clock.checks_at_rest = clock.checks_at_rest + 1 if rests else 0
     return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
 
@@ -149,6 +152,8 @@ def do_step(scene: Nonsmooth, k: int) -> int:
     first, last = bodies_of(contacts, k, size)
     gravity = (world.controls[0].gravity_x, world.controls[0].gravity_y)
     place_all(world.bodies, contacts, first, last, kick_share(count - 1, is_first), gravity)
+    if world.loads.size > 0:
+        show_velocities(scene, first, last, kick_share(count - 1, is_first))
     return supervise(scene, k, CHECK)
 
 

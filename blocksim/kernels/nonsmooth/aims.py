@@ -18,9 +18,12 @@ def gaps(group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies, bend_time: 
 
 @kernel
 def pulls(row: Rows, a: Bodies, b: Bodies, stepping: Record) -> Lanes:
-    """Return by how much gravity changes J v of rows in a substep (m/s) as long as nothing touches."""
+    """Return by how much gravity changes J v of rows in a substep (m/s) as long as nothing touches.
+
+    So do loads that act on all bodies. Those on single ones are left out: a rebound is off by their share of a kick.
+    """
     free = select(a.inverse_mass > 0.0, 1.0, 0.0) - select(b.inverse_mass > 0.0, 1.0, 0.0)
-    return free * (row.nx * stepping.fall_x + row.ny * stepping.fall_y)
+    return free * (row.nx * stepping.pull_x + row.ny * stepping.pull_y)
 
 
 @kernel

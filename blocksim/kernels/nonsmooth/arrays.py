@@ -102,6 +102,7 @@ STEPPING = record_type(
     "support_x support_y "  # m: how far they have come
     "listed_x listed_y "  # m: how far they had come when the pair list was made
     "fall_x fall_y "  # m/s: what a substep of gravity adds to velocities
+    "pull_x pull_y "  # m/s: the same of gravity and of loads that act on all bodies
     "lag "  # -: of a substep of gravity, what velocities lack when the substep under way begins
     "bend_share "  # -: of the bend of a row, what velocities gain up to the middle of the substep under way
     "bend_time next_bend_time",  # s: times the bend, by how much gaps at its start and end are off
@@ -113,6 +114,11 @@ STEPPING = record_type(
     "is_driven "  # flag: bodies move otherwise than the supports
     "has_rebounds "  # flag: anything rebounds in the substep under way
     "has_gain",  # flag: the last round has created energy in a cluster
+)
+PUSH = record_type(
+    "ax ay rate "  # m/s2, m/s2, rad/s2: of loads, in the substep under way
+    "last_ax last_ay last_rate "  # in the one before
+    "work"  # J: that loads have done on the body
 )
 BOOK = record_type("impacts friction to_support")  # J: what normal and shear impulses have taken, and given, so far
 
@@ -148,3 +154,4 @@ class Nonsmooth(NamedTuple):
     firsts: Integers  # (n + 1,) work space: the first old row of a body a, from 1; 0 where there is none
     begins: Integers  # (COLOURS + 1,) where every colour begins among the rows
     used: Integers  # (n + 1,) work space: bits of the colours that a body's pairs have
+    pushes: Records  # (n + 1,) PUSH; one of no use without loads

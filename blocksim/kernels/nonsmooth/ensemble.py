@@ -33,6 +33,7 @@ def member(scenes: Nonsmooth, m: int) -> Nonsmooth:
         scenes.firsts[m],
         scenes.begins[m],
         scenes.used[m],
+        scenes.pushes[m],
     )
 
 

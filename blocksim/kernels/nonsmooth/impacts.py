@@ -19,11 +19,12 @@ creates none: with lambda_n t = 0 and friction against the slip that is left the
 energy that it had: restraint.py.
 """
 
-from blocksim.kernels.arrays import TEAM_SIZE, Integers, Record
+from blocksim.kernels.arrays import TEAM_SIZE, Integers, Record, Records
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.nonsmooth.arrays import Contacts
 from blocksim.kernels.nonsmooth.clusters import find_clusters, weigh
 from blocksim.kernels.nonsmooth.iterate import VELOCITY, agree, velocity_pass
+from blocksim.kernels.nonsmooth.loads import kick_again
 from blocksim.kernels.nonsmooth.restraint import (
     aim_share,
     begin_search,
@@ -140,10 +141,12 @@ def go_round(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int]
 
 
 @rare_kernel
-def follow_impacts(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int], share: float) -> None:
+def follow_impacts(
+    contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int], share: float, pushes: Records
+) -> None:
     """Let clusters in which anything rebounds go through their impacts one after the other.
 
-    `bodies` are those of thread k, `share` is that of a kick of gravity in this substep.
+    `bodies` are those of thread k, `share` is that of a kick of gravity in this substep, `pushes` are of loads.
     """
     stepping = contacts.stepping[0]
     groups = part_of(0, stepping.group_count, k, team[TEAM_SIZE])
@@ -163,6 +166,8 @@ def follow_impacts(contacts: Contacts, team: Integers, k: int, bodies: tuple[int
         book_round(contacts, groups[0], groups[1], lacks * stepping.fall_x, lacks * stepping.fall_y)
         meet(team)
     resume(contacts, bodies[0], bodies[1], share * stepping.fall_x, share * stepping.fall_y)
+    if pushes.size > 1:
+        kick_again(contacts, pushes, bodies[0], bodies[1], share)
     meet(team)
     aim_rest(contacts, groups[0], groups[1])
     meet(team)

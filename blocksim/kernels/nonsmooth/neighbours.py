@@ -112,7 +112,7 @@ def look(scene: Nonsmooth) -> bool:
     controls = world.controls[0]
     stepping = scene.contacts.stepping[0]
     frame = common_frame(scene)
-    falls = 2.0 * controls.step * math.sqrt(controls.gravity_x**2 + controls.gravity_y**2)
+    falls = 2.0 * controls.step * (math.sqrt(controls.gravity_x**2 + controls.gravity_y**2) + controls.push)
     fastest = 0.0
     is_good = world.clock[0].rebuilds > 0
     is_finite = True

@@ -6,6 +6,7 @@ from blocksim.kernels.nonsmooth.arrays import Contacts, Nonsmooth
 from blocksim.kernels.nonsmooth.bends import follow_bends
 from blocksim.kernels.nonsmooth.impacts import follow_impacts
 from blocksim.kernels.nonsmooth.iterate import FIRST_VELOCITY, POSITION, WARM, sweep, velocity_pass
+from blocksim.kernels.nonsmooth.loads import book_loads, kick_by_loads, pull_of_loads
 from blocksim.kernels.nonsmooth.motion import drift_all, kick_all, kick_all_warm
 from blocksim.kernels.nonsmooth.rounds import bring_back
 from blocksim.kernels.nonsmooth.supports import drive
@@ -37,8 +38,55 @@ def prepare(scene: Nonsmooth, number: int, share: float) -> None:
     follow_bends(stepping, number)
     stepping.fall_x = stepping.substep * controls.gravity_x
     stepping.fall_y = stepping.substep * controls.gravity_y
+    stepping.pull_x = stepping.fall_x
+    stepping.pull_y = stepping.fall_y
+    if scene.world.loads.size > 0:
+        time = scene.world.clock[0].steps * controls.step + number * stepping.substep
+        ax, ay = pull_of_loads(scene.world, time)
+        stepping.pull_x += stepping.substep * ax
+        stepping.pull_y += stepping.substep * ay
     stepping.lag = share - 0.5
     stepping.has_rebounds = 0
+
+
+@kernel
+def start(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
+    """Kick the bodies of thread k with gravity and loads, and begin with the impulses of the last substep."""
+    contacts = scene.contacts
+    team = scene.world.team
+    h = contacts.stepping[0].substep
+    hx = h * scene.world.controls[0].gravity_x
+    hy = h * scene.world.controls[0].gravity_y
+    share = kick_share(number, is_first_step)
+    first, last = bodies_of(contacts, k, team[TEAM_SIZE])
+    if number == 0:
+        kick_all(contacts.lines, contacts.before, first, last, share, hx, hy)
+        if scene.world.loads.size > 0:
+            kick_by_loads(scene, number, first, last, share, 0.0)
+        meet(team)
+        sweep(contacts, WARM, team, k)
+    else:
+        last_share = kick_share(number - 1, is_first_step)
+        kick_all_warm(contacts.lines, contacts.before, first, last, last_share, hx, hy)
+        if scene.world.loads.size > 0:
+            kick_by_loads(scene, number, first, last, share, last_share)
+        meet(team)
+
+
+@kernel
+def book(scene: Nonsmooth, k: int, share: float) -> tuple[int, int]:
+    """Book the bodies and rows of thread k, whose groups are returned, in a substep with that share of a kick."""
+    contacts = scene.contacts
+    stepping = contacts.stepping[0]
+    team = scene.world.team
+    if scene.world.loads.size > 0:
+        first, last = bodies_of(contacts, k, team[TEAM_SIZE])
+        book_loads(scene, first, last, share)
+    first, last = part_of(0, stepping.group_count, k, team[TEAM_SIZE])
+    hx = stepping.substep * scene.world.controls[0].gravity_x
+    hy = stepping.substep * scene.world.controls[0].gravity_y
+    book_rows(contacts, first, last, (share - 1.0) * hx, (share - 1.0) * hy)
+    return first, last
 
 
 @kernel
@@ -47,29 +95,20 @@ def substep(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
     contacts = scene.contacts
     team = scene.world.team
     stepping = contacts.stepping[0]
-    h = stepping.substep
-    hx = h * scene.world.controls[0].gravity_x
-    hy = h * scene.world.controls[0].gravity_y
     share = kick_share(number, is_first_step)
     first, last = bodies_of(contacts, k, team[TEAM_SIZE])
     if k == 0:
         prepare(scene, number, share)
-    if number == 0:
-        kick_all(contacts.lines, contacts.before, first, last, share, hx, hy)
-        meet(team)
-        sweep(contacts, WARM, team, k)
-    else:
-        kick_all_warm(contacts.lines, contacts.before, first, last, kick_share(number - 1, is_first_step), hx, hy)
-        meet(team)
+    start(scene, k, number, is_first_step)
     sweep(contacts, POSITION, team, k)
-    drift_all(contacts.lines, first, last + (k == team[TEAM_SIZE] - 1), h)  # the ground, which may move, is the last
+    ground = last + (k == team[TEAM_SIZE] - 1)  # which may move, is the last
+    drift_all(contacts.lines, first, ground, stepping.substep)
     meet(team)
     velocity_pass(contacts, team, k, FIRST_VELOCITY, stepping.tolerance)
     if stepping.has_rebounds:
         meet(team)
-        follow_impacts(contacts, team, k, (first, last), share)
-    first, last = part_of(0, stepping.group_count, k, team[TEAM_SIZE])
-    book_rows(contacts, first, last, (share - 1.0) * hx, (share - 1.0) * hy)
+        follow_impacts(contacts, team, k, (first, last), share, scene.pushes)
+    first, last = book(scene, k, share)
     if stepping.has_rebounds and number == stepping.substeps - 1:
         bring_back(contacts, first, last, True)
     meet(team)

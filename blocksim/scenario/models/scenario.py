@@ -17,6 +17,7 @@ from blocksim.scenario.models.base import Identifier, OneOf, Table
 from blocksim.scenario.models.contact import Contact, Friction, Pair
 from blocksim.scenario.models.events import Event
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
+from blocksim.scenario.models.loads import AnyLoad
 from blocksim.scenario.models.motions import AnyMotion
 from blocksim.scenario.models.probe import AnyProbe
 from blocksim.scenario.models.stepping import AnyTime, Explicit, Output
@@ -50,6 +51,7 @@ class Scenario(Table):
     walls: tuple[Wall, ...] = Field(default=(), description="straight segments of boundary, in addition to the ground")
     motion: AnyMotion | None = Field(default=None, description="prescribed motion of ground, walls and fixed bodies")
     events: tuple[Event, ...] = Field(default=(), description="what happens to bodies and walls during the run")
+    loads: tuple[AnyLoad, ...] = Field(default=(), description="loads on bodies, and on all of them")
     friction: Friction = Field(default=Friction(), description="friction between blocks and with the ground")
     pairs: dict[str, dict[str, Pair]] = Field(
         default={}, description="pairs of materials that differ, as in [pairs.aluminium.ground]"

@@ -35,6 +35,7 @@ LEDGER = {  # name in run.json: name in the report
     "impacts": "lost in impacts",
     "correction": "correction of positions",
     "to_support": "given to the support",
+    "to_loads": "given to loads",
     "start": "at the start",
     "in_play": "in play",
     "residual": "residual",

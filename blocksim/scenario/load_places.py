@@ -1,0 +1,103 @@
+"""Loads and held bodies that do not fit those of a scenario: unknown or fixed ones, points outside, covered faces."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
+
+from blocksim.scenario.findings import Finding
+from blocksim.scenario.models.loads import Face, Force, Gravity, OnBody, Pressure
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.overlap import Rectangles, crossings, near_pairs, penetration
+from blocksim.scenario.placement import PlacedBody
+from blocksim.scenario.quantities import shown
+from blocksim.scenario.segments import profile_segments, wall_segments
+from blocksim.scenario.spelling import did_you_mean_or_list
+
+MAX_LOADS = 1000
+STRIP = 1e-3
+"""Thickness of the strip before a face in which nothing else may lie, in smaller sides of the body."""
+NORMALS: Mapping[Face, tuple[float, float]] = {
+    "left": (-1.0, 0.0),
+    "right": (1.0, 0.0),
+    "top": (0.0, 1.0),
+    "bottom": (0.0, -1.0),
+}
+"""Outward normals of faces, in the body."""
+
+
+def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+    """Find loads that do not fit the placed bodies; all values are valid otherwise."""
+    loads = scenario.loads
+    if len(loads) > MAX_LOADS:
+        yield Finding(("loads",), f"{len(loads)} loads are too many; at most {MAX_LOADS} are allowed")
+        return
+    by_name = {body.name: body for body in bodies} if loads else {}
+    names: set[str] = set()
+    turns = False
+    for number, load in enumerate(loads):
+        if load.name is not None and load.name in names:
+            yield Finding(("loads", number, "name"), f"two loads are named {shown(load.name)}")
+        names.add(load.name or "")
+        if isinstance(load, Gravity):
+            if turns:
+                yield Finding(("loads", number), "gravity turns already; one load of this kind is allowed")
+            turns = True
+        elif isinstance(load, OnBody):
+            yield from _on_body(scenario, number, load, by_name)
+
+
+def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str, PlacedBody]) -> Iterator[Finding]:
+    place = ("loads", number, "body")
+    body = bodies.get(load.body)
+    if body is None:
+        yield Finding(place, f"unknown body {shown(load.body)}, {did_you_mean_or_list(load.body, bodies)}")
+    elif body.fixed:
+        yield Finding(place, f"body {shown(load.body)} is fixed; a load has no effect on it")
+    elif isinstance(load, Force):
+        half = (0.5 * body.size_x, 0.5 * body.size_y)
+        if any(abs(at) > side * (1.0 + STRIP) for at, side in zip(load.point, half, strict=True)):
+            size = f"{1e3 * body.size_x:g} x {1e3 * body.size_y:g} mm"
+            message = f"the point lies outside of body {shown(load.body)}, {size} about its centre"
+            yield Finding(("loads", number, "point"), message)
+    elif isinstance(load, Pressure):
+        other = next(_covers(scenario, load, body, [*bodies.values()]), None)
+        if other is not None:
+            message = f"this face of body {shown(load.body)} is covered by {other}; pressure needs a free face"
+            yield Finding(("loads", number, "face"), message)
+
+
+def _covers(scenario: Scenario, load: Pressure, body: PlacedBody, bodies: Sequence[PlacedBody]) -> Iterator[str]:
+    """Yield what lies against a part of a face that is more than a line."""
+    strip = strip_before(body, load.face)
+    if scenario.ground.profile is None and float(Rectangles.of([strip]).bottom[0]) < -_margin(body):
+        yield "the ground"
+    for _, segment, depth in crossings([strip], (*profile_segments(scenario), *wall_segments(scenario))):
+        if depth > _margin(body):
+            yield "the ground" if segment < len(profile_segments(scenario)) else "a wall"
+    outlines = Rectangles.of([strip, *bodies])
+    for one, other in chain.from_iterable(zip(*pairs, strict=True) for pairs in near_pairs(outlines)):
+        first, second = sorted((int(one), int(other)))
+        if first == 0 and bodies[second - 1] is not body:
+            depth = float(penetration(Rectangles.of([strip]), Rectangles.of([bodies[second - 1]]))[0])
+            if depth > _margin(body):
+                yield f"body {shown(bodies[second - 1].name)}"
+
+
+def _margin(body: PlacedBody) -> float:
+    """Return how far (m) anything may reach into the strip: half of it."""
+    return 0.5 * STRIP * min(body.size_x, body.size_y)
+
+
+def strip_before(body: PlacedBody, face: Face) -> PlacedBody:
+    """Return the strip before a face of a body, a little shorter than the face at both ends."""
+    thickness = STRIP * min(body.size_x, body.size_y)
+    nx, ny = NORMALS[face]
+    away = 0.5 * (abs(nx) * body.size_x + abs(ny) * body.size_y + thickness)
+    size_x, size_y = (thickness, body.size_y - 2.0 * thickness) if nx else (body.size_x - 2.0 * thickness, thickness)
+    cosine, sine = math.cos(body.angle), math.sin(body.angle)
+    return body._replace(
+        size_x=size_x,
+        size_y=size_y,
+        x=body.x + away * (cosine * nx - sine * ny),
+        y=body.y + away * (sine * nx + cosine * ny),
+    )
