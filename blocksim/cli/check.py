@@ -16,6 +16,7 @@ from blocksim.scenario import Contact, PlacedBody, Scenario, place_bodies, scena
 from blocksim.scenario.drives import drives_of, greatest_rate
 from blocksim.scenario.events import in_order
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
+from blocksim.scenario.spelling import listed
 from blocksim.scenario.units import STANDARD_GRAVITY
 from blocksim.simulation.happened import in_words
 from blocksim.study.rows import check_experiment
@@ -24,6 +25,7 @@ from blocksim.world.free_memory import readable
 from blocksim.world.memory import PROCESS_BYTES
 
 MOST_BODIES = 12
+MOST_LOADS = 6
 SIDES = ("along x", "upright", "depth mm", "mass kg", "inertia kg m²")
 NO_KEY = (DEFAULT, MATERIALS)
 LEAST_ROOM = 24
@@ -157,6 +159,7 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
         *_motion(description.motion),
         *_driven(scenario),
         *_events(scenario),
+        *_loads(scenario),
         *_boundary(scenario, description),
         *(f"{name:<10} {count}, beside the blocks" for name, count in description.systems.items()),
         f"neighbours checked up to {MILLI * description.skin:.3g} mm apart",
@@ -217,6 +220,14 @@ def _events(scenario: Scenario) -> Iterator[str]:
     """Yield a line for every event, in their order."""
     for event in (scenario.events[k] for k in in_order(scenario.events)):
         yield f"event      {'at rest' if event.at is None else f'{event.at:.3f} s'}: {in_words(event)}"
+
+
+def _loads(scenario: Scenario) -> list[str]:
+    """Return what acts on the blocks, and whether they come to rest before."""
+    named = [f"{load.kind} {load.name or number}" for number, load in enumerate(scenario.loads)]
+    loads = [f"loads      {listed(named, MOST_LOADS)}"] if named else []
+    held = f"; held: {', '.join(scenario.start.hold)}" if scenario.start.hold else ""
+    return [*loads, *([f"start      settles before time zero{held}"] if scenario.start.settle else [])]
 
 
 def _use_of_particles(contact: Contact) -> str:

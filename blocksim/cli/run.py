@@ -151,6 +151,9 @@ def _tell_end(result: Result) -> None:
         f"{summary.steps} steps of {summary.time_step_s:.2e} s in {summary.solver_seconds:.2f} s; "
         f"relative energy error {summary.energy_J.relative_residual:.0e}"
     )
+    if summary.settled is not None:
+        far = f"{number(summary.settled.largest_displacement_mm)} mm (block {summary.settled.displaced_block})"
+        note(f"settled before time zero in {summary.settled.steps} steps; largest displacement {far}")
     for one in summary.events:
         note(f"{one.time_s:.3f} s: {one.what}")
     if summary.movement is not None:

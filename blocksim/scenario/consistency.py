@@ -93,6 +93,9 @@ def unfit_choices(scenario: Scenario) -> Iterator[Finding]:
     for name in () if scenario.time.has_systems else scenario.systems:
         message = f"{name} need another scheme: {shown(scenario.time.scheme)} advances blocks and supports only"
         yield Finding((name,), message, at="key", relation=True)
+    if scenario.start.settle and scenario.systems:
+        message = f"{', '.join(scenario.systems)} cannot settle: blocks and supports alone can"
+        yield Finding(("start", "settle"), message, relation=True)
     if not isinstance(scenario.time, Nonsmooth):
         return
     for name in SPRING_CHOICES:

@@ -20,6 +20,7 @@ from blocksim.scenario.models.loads import LOADS, Load
 from blocksim.scenario.models.motions import MOTIONS
 from blocksim.scenario.models.probe import PROBES, Probe
 from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.start import Start
 from blocksim.scenario.models.stepping import SCHEMES, Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import KINDS, Structure
@@ -53,6 +54,7 @@ def key_table() -> str:
         ("loads, every kind", Load),
         *((f'loads, kind = "{kind}"', model) for kind, model in LOADS.items()),
         *((f'loads.history, kind = "{kind}"', model) for kind, model in HISTORIES.items()),
+        ("start", Start),
         ("friction", Friction),
         ("friction.PAIR", PairFriction),
         ("pairs.A.B", Pair),

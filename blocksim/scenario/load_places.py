@@ -46,6 +46,16 @@ def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Fi
             yield from _on_body(scenario, number, load, by_name)
 
 
+def unfit_holds(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+    """Find bodies to hold that do not exist, or need not be held."""
+    known = {body.name: body for body in bodies} if scenario.start.hold else {}
+    for number, name in enumerate(scenario.start.hold):
+        if name not in known:
+            yield Finding(("start", "hold", number), f"unknown body {shown(name)}, {did_you_mean_or_list(name, known)}")
+        elif known[name].fixed:
+            yield Finding(("start", "hold", number), f"body {shown(name)} is fixed and cannot be released")
+
+
 def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str, PlacedBody]) -> Iterator[Finding]:
     place = ("loads", number, "body")
     body = bodies.get(load.body)

@@ -25,6 +25,7 @@ from blocksim.simulation.atomic import writing
 from blocksim.simulation.happened import Happened
 from blocksim.simulation.provenance import code_hashes, code_version, machine
 from blocksim.simulation.schemes import AnyScene
+from blocksim.simulation.settled import Settled
 from blocksim.world.free_memory import available_bytes, readable
 from blocksim.world.scenes import arrays_of, with_parts
 
@@ -44,6 +45,7 @@ class Position(BaseModel, frozen=True):
     solver_seconds: float  # of wall time, in all parts so far
     total_seconds: float
     threads: int  # that it ran on; it can continue with any number
+    settled: Settled | None = None  # how it came to rest before time zero, where it did
     resumed_from: tuple[int, ...] = ()  # steps at which earlier parts of the run were resumed
     events: tuple[Happened, ...] = ()  # that have happened so far
 

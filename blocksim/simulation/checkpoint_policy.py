@@ -13,6 +13,7 @@ from blocksim.simulation.checkpoint import Origin, Position, write_checkpoint
 from blocksim.simulation.folder import CHECKPOINTS
 from blocksim.simulation.happened import Happened
 from blocksim.simulation.schemes import AnyScene
+from blocksim.simulation.settled import Settled
 
 CHECKPOINT_SECONDS = 60.0
 NEVER = sys.maxsize  # steps
@@ -59,12 +60,13 @@ class Past:
     resumed_from: tuple[int, ...] = ()
     checkpoint: Path | None = None  # from which this part continues
     step: int | None = None  # of that checkpoint
+    settled: Settled | None = None  # how it came to rest before time zero, where it did
 
     @classmethod
     def of(cls, path: Path, position: Position) -> "Past":
         """Return the past of a run that continues from a checkpoint."""
         parts = (*position.resumed_from, position.step)
-        return cls(position.total_seconds, parts, path, position.step)
+        return cls(position.total_seconds, parts, path, position.step, position.settled)
 
 
 NO_PAST = Past()
@@ -145,7 +147,12 @@ class CheckpointWriter:
         if standing.step == self.last_step:
             return
         self.frames.sync()
-        position = Position(**standing._asdict(), total_seconds=self.total_seconds, resumed_from=self.past.resumed_from)
+        position = Position(
+            **standing._asdict(),
+            total_seconds=self.total_seconds,
+            settled=self.past.settled,
+            resumed_from=self.past.resumed_from,
+        )
         write_checkpoint(self.paths[0], scene, position, self.origin)
         self.paths.reverse()
         self.last_step, self.written_at = standing.step, time.monotonic()

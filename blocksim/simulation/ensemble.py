@@ -36,6 +36,7 @@ from blocksim.simulation.movement import EndSpeed, FirstMove, FirstMoves, end_sp
 from blocksim.simulation.outcome import Outcome, diagnosed
 from blocksim.simulation.recorder import POSITION, Rows, frames_from_rows, steps_per_frame
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measured_row, scheme_of
+from blocksim.simulation.settling import settle
 from blocksim.simulation.table import COLUMNS, Columns, as_frame, final_values
 from blocksim.simulation.team import ALONE
 from blocksim.world.scenes import Refusal, Stack, member, stack_of_one
@@ -152,11 +153,24 @@ def _run_batch(scenarios: Sequence[Scenario], pool: ThreadPoolExecutor, threads:
     for one in build_stacks(scenarios):
         if isinstance(one, Refusal):
             ends[one.number] = MemberFailure(one.error)
-        else:
-            ensemble = Ensemble(scenarios, one)
-            ensemble.advance(pool, threads)
-            ends.update(zip(one.numbers, ensemble.ends(), strict=True))
+            continue
+        try:
+            stack = _settled(scenarios[one.numbers[0]], one)
+        except BlocksimError as error:
+            ends[one.numbers[0]] = MemberFailure(error)
+            continue
+        ensemble = Ensemble(scenarios, stack)
+        ensemble.advance(pool, threads)
+        ends.update(zip(one.numbers, ensemble.ends(), strict=True))
     return [ends[i] for i in range(len(scenarios))]
+
+
+def _settled(scenario: Scenario, stack: Stack) -> Stack:
+    """Return a stack as its runs begin; one that settles first has one scene. Raises SettleError."""
+    if not scenario.start.settle:
+        return stack
+    scene, _ = settle(member(stack.scenes, 0), scenario, stack.placed[0], ALONE)
+    return stack._replace(scenes=stack_of_one(scene))
 
 
 class Ensemble:

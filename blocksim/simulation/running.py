@@ -41,6 +41,8 @@ from blocksim.simulation.resumption import (
     take_over_probes,
 )
 from blocksim.simulation.schemes import AnyScene, build, ledger_names
+from blocksim.simulation.settled import Settled
+from blocksim.simulation.settling import settle
 from blocksim.simulation.stopping import WallTime, stop_requests
 from blocksim.simulation.stores.hdf5_probes import read_probes
 from blocksim.simulation.stores.hdf5_writer import FrameFile
@@ -83,10 +85,18 @@ def simulate(
     built = build(scenario)
     began += _compiled(scenario)
     recorder = _recorder(scenario, built)
-    with _attended(built.scene, recorder, threads, limit, on_progress) as (team, attendance):
+    with _attended(built.scene, scenario, threads, limit, on_progress) as (team, attendance):
+        scene, settled = begun(built, scenario, team)
         watched = replace(attendance, timeline=_timeline(scenario, recorder))
-        ended = run_loop(built.scene, recorder, scenario.time.end, team=team, attendance=watched)
-    return _result(scenario, recorder, ended, time.perf_counter() - began)
+        ended = run_loop(scene, recorder, scenario.time.end, team=team, attendance=watched)
+    return _result(scenario, recorder, ended, time.perf_counter() - began, settled)
+
+
+def begun(built: Built, scenario: Scenario, team: Team) -> tuple[AnyScene, Settled | None]:
+    """Return a scene at time zero as its run begins, and how it settled, where it does. Raises SettleError."""
+    if not scenario.start.settle:
+        return built.scene, None
+    return settle(built.scene, scenario, built.placed, team)
 
 
 def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
@@ -116,11 +126,15 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
         resumption = _resumption(folder, scenario, listener) if resume else NEW
         began += _compiled(scenario, listener)
         limit = WallTime(precautions.wall_time)
-        part = Part(scenario, folder, built, resumption)
-        toml = part.prepare(tables, overwrite=overwrite or resume)
-        with _attended(part.scene, part.recorder, threads, limit, on_progress) as (team, attendance):
+        with _attended(built.scene, scenario, threads, limit, on_progress) as (team, attendance):
+            settled = None if resumption.checkpoint is None else resumption.checkpoint.position.settled
+            if resumption.checkpoint is None:
+                scene, settled = begun(built, scenario, team)
+                built = built._replace(scene=scene)
+            part = Part(scenario, folder, built, resumption, settled)
+            toml = part.prepare(tables, overwrite=overwrite or resume)
             ended = part.run(toml, precautions, team, attendance)
-            result = _result(scenario, part.recorder, ended, time.perf_counter() - began)
+            result = _result(scenario, part.recorder, ended, time.perf_counter() - began, settled)
             return _keep_result(result, part.account(result.summary), folder)
 
 
@@ -144,10 +158,10 @@ def _resumption(folder: Path, scenario: Scenario, listener: Listener) -> Resumpt
 
 @contextmanager
 def _attended(
-    scene: AnyScene, recorder: Recorder, threads: int, limit: WallTime, on_progress: Watcher
+    scene: AnyScene, scenario: Scenario, threads: int, limit: WallTime, on_progress: Watcher
 ) -> Iterator[tuple[Team, Attendance]]:
     """Give the threads of a run, and what stops it: a signal, or the limit of wall time."""
-    elements = sum(one.count for one in recorder.systems[1:])  # the first are the blocks
+    elements = sum(one.count for one in others_of(scenario))
     with stop_requests() as requests, team_for(scene, threads, elements) as team:
         yield team, Attendance(on_progress, lambda: requests.reason() or limit.reason())
 
@@ -166,7 +180,9 @@ def _recorder(scenario: Scenario, built: Built) -> Recorder:
 class Part:
     """What goes into the folder of a run while it runs: frames and checkpoints."""
 
-    def __init__(self, scenario: Scenario, folder: Path, built: Built, resumption: Resumption) -> None:
+    def __init__(
+        self, scenario: Scenario, folder: Path, built: Built, resumption: Resumption, settled: Settled | None = None
+    ) -> None:
         """Take the scene at time zero and go to the checkpoint, if there is one.
 
         Nothing is written yet. Raises InvalidInputError where the checkpoint or the frames before it do not fit.
@@ -176,7 +192,7 @@ class Part:
         self.scene = built.scene if stored is None else restored(stored, built.scene)
         self.recorder = _recorder(scenario, built)
         self.step = self.recorder.time_step
-        self.past = NO_PAST
+        self.past = replace(NO_PAST, settled=settled)
         if stored is not None:
             self.past = Past.of(stored.path, stored.position)
             self.recorder.take_over(kept_rows(folder, self.recorder))
@@ -262,9 +278,11 @@ def _bytes_of(path: Path) -> bytes | None:
     return path.read_bytes() if path.is_file() else None
 
 
-def _result(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Result:
+def _result(
+    scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float, settled: Settled | None
+) -> Result:
     frames = recorder.frames()
-    summary = _summary(scenario, recorder, ended, seconds)
+    summary = _summary(scenario, recorder, ended, seconds).model_copy(update={"settled": settled})
     probes = recorder.probes.series()
     return Result(scenario.name, final_columns(frames), summary, scenario, held=frames, held_probes=probes)
 

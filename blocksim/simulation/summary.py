@@ -12,6 +12,7 @@ from blocksim.simulation.atomic import sha256_of
 from blocksim.simulation.happened import Happened
 from blocksim.simulation.ledger import EnergyLedger
 from blocksim.simulation.movement import Movement
+from blocksim.simulation.settled import Settled
 
 MOST_BYTES = MEGABYTE
 """Of run.json; a run writes two thousand."""
@@ -38,6 +39,7 @@ class Summary(BaseModel, frozen=True):
     resumed_from: tuple[int, ...] = ()  # steps at which parts of the run after the first one began
     last_checkpoint: int | None = None  # step of the last good one, where the run did not finish
     energy_J: EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
+    settled: Settled | None = None  # how it came to rest before time zero, where it did
     events: tuple[Happened, ...] = ()  # in the order in which they have happened
     movement: Movement | None = None  # None in runs of earlier versions
     warnings: tuple[str, ...]

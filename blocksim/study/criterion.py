@@ -4,7 +4,8 @@ Conditions are joined by commas, and all of them must hold. `moved` is the large
 to end, `turned` the largest rotation; `outcome` is one of stands, rocked back, slid, fell (see
 `blocksim.simulation.movement`), several of them with "|" between.
 
-A run that meets all conditions but moves on at its end (as `blocksim.simulation.movement` has it) is undecided.
+A run that meets all conditions but moves on at its end (as `blocksim.simulation.movement` has it) is undecided. A scene
+that does not come to rest before time zero (`start.settle`) falls.
 """
 
 import math
@@ -18,6 +19,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import quantities as q
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.simulation.movement import Manner
+from blocksim.simulation.settled import NOT_AT_REST
 from blocksim.study.rows import FINISHED, MOVEMENT
 
 STANDS = "--stands"
@@ -55,6 +57,8 @@ class Criterion:
 
     def verdict(self, row: Mapping[str, object]) -> Verdict:
         """Judge a row of a sweep."""
+        if NOT_AT_REST in str(row.get("reason", "")):
+            return Verdict.FALLS
         if row["status"] != FINISHED:
             return Verdict.FAILED
         if not self.holds(row):

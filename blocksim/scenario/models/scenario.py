@@ -20,6 +20,7 @@ from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material,
 from blocksim.scenario.models.loads import AnyLoad
 from blocksim.scenario.models.motions import AnyMotion
 from blocksim.scenario.models.probe import AnyProbe
+from blocksim.scenario.models.start import Start
 from blocksim.scenario.models.stepping import AnyTime, Explicit, Output
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure
@@ -52,6 +53,7 @@ class Scenario(Table):
     motion: AnyMotion | None = Field(default=None, description="prescribed motion of ground, walls and fixed bodies")
     events: tuple[Event, ...] = Field(default=(), description="what happens to bodies and walls during the run")
     loads: tuple[AnyLoad, ...] = Field(default=(), description="loads on bodies, and on all of them")
+    start: Start = Field(default=Start(), description="what happens before time zero")
     friction: Friction = Field(default=Friction(), description="friction between blocks and with the ground")
     pairs: dict[str, dict[str, Pair]] = Field(
         default={}, description="pairs of materials that differ, as in [pairs.aluminium.ground]"

@@ -62,8 +62,8 @@ def build(scenario: Scenario) -> Built:
 def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
     """Build the scenes of scenarios at time zero, those of one scheme and shape together.
 
-    A scene with systems beside blocks and supports, and one of a scheme without a way to advance members together, is a
-    stack of its own.
+    A scene with systems beside blocks and supports, one of a scheme without a way to advance members together, and one
+    that settles before it begins, is a stack of its own.
     """
     for places in alike([_together(scenario) for scenario in scenarios]):
         some = [scenarios[i] for i in places]
@@ -76,7 +76,8 @@ def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
 def _together(scenario: Scenario) -> str | None:
     """Return what scenes have in common that are built together; None for those that are not, and with events."""
     scheme = scheme_named(scenario)
-    return None if scenario.systems or scenario.events or scheme.advance_members is None else scheme.name
+    is_alone = scenario.systems or scenario.events or scheme.advance_members is None or scenario.start.settle
+    return None if is_alone else scheme.name
 
 
 def _alone(number: int, scenario: Scenario) -> Stack | Refusal:

@@ -1,0 +1,26 @@
+"""How a run begins: at once, or after everything has come to rest."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from blocksim.scenario import quantities as q
+from blocksim.scenario.models.base import Table
+
+
+class Start(Table):
+    """What happens before time zero: nothing, or the blocks settle under gravity and the loads of time zero."""
+
+    settle: bool = Field(
+        default=False, description="true to bring all to rest before time zero, with the contact forces that hold it"
+    )
+    hold: tuple[str, ...] = Field(
+        default=(), description="names of bodies that are kept still meanwhile and released at time zero"
+    )
+
+    @model_validator(mode="after")
+    def _holds_while_it_settles(self) -> Self:
+        if self.hold and not self.settle:
+            message = "nothing is held without settle = true"
+            raise q.invalid(message, "hold")
+        return self

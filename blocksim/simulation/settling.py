@@ -1,0 +1,234 @@
+"""Bringing a scene to rest before time zero.
+
+Gravity and the loads of time zero grow in proportion, in small parts, so that the forces of contacts grow in proportion
+too, and friction is mobilised as far as the final load needs, not as far as a blow of the whole one would. After each
+part velocities are taken away whenever the kinetic energy has passed a peak (kinetic damping: P. A. Cundall, Explicit
+finite difference methods in geomechanics, Blacksburg 1976). Nothing of this damping is left at time zero: the time loop
+is that of any run, with other numbers in its arrays between two calls. Supports do not move, and time stands still
+for loads. Bodies that are held have no weight and no inverse mass until then.
+
+A scene at rest is one whose blocks have no acceleration (springs), or move no further (rigid contacts). One that fails
+moves on, as no kinetic energy peaks there: it ends once a block has come farther than springs give way.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.errors import BlocksimError, ExitCode
+from blocksim.kernels.arrays import REACHED
+from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.scenario import PlacedBody, Scenario
+from blocksim.simulation.schemes import AnyScene
+from blocksim.simulation.settled import NOT_AT_REST, Settled
+from blocksim.simulation.team import Team
+
+PARTS = 50  # in which gravity and loads grow
+CALL_STEPS = {"explicit": 20, "nonsmooth": 2}  # between two looks at the kinetic energy
+PART_STEPS = {"explicit": 1000, "nonsmooth": 40}  # at most, for one part
+MOST_STEPS = {"explicit": 1_000_000, "nonsmooth": 40_000}  # in all
+BALANCE = 1e-8  # of gravity (and of the strongest load): accelerations at rest
+ROUGH_BALANCE = 1e-3  # the same while loads grow
+STILL = 1e-10  # of the smallest side of a block: way in a step of rigid contacts at rest
+MOVED_SHARE = 0.25  # of the smallest side of a block: soft springs give way by as much as a tenth, what falls goes on
+HELD = ("inverse_mass", "inverse_inertia", "counts")
+FALLS = ("fx", "fy", "torque")
+MILLI = 1e3
+Floats = NDArray[np.float64]
+
+
+class SettleError(BlocksimError):
+    """The scene does not come to rest; the message names the block that moves, and how fast."""
+
+    exit_code = ExitCode.NUMERICAL_FAILURE
+
+
+def settle(scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team) -> tuple[AnyScene, Settled]:
+    """Bring a scene at time zero to rest; return it, still at time zero, and how. Raises SettleError."""
+    going = _Settling(scene, scenario, placed, team)
+    with going.without_time():
+        going.load_up()
+        going.come_to_rest()
+    going.begin()
+    return going.scene, going.settled()
+
+
+class _Settling:
+    """A scene on its way to rest."""
+
+    def __init__(self, scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team) -> None:
+        self.scene, self.placed, self.team = scene, placed, team
+        self.kind = scenario.time.scheme
+        self.count = len(placed)
+        names = {body.name: number for number, body in enumerate(placed)}
+        self.names = scenario.start.hold
+        self.held = np.array([names[name] for name in scenario.start.hold], dtype=np.intp)
+        self.is_free = np.array([not body.fixed for body in placed])
+        self.is_free[self.held] = False
+        controls = scene.world.controls[0]
+        self.gravity = float(controls.gravity_x), float(controls.gravity_y)
+        self.scale = float(np.hypot(*self.gravity) + controls.push)
+        self.smallest = min(min(body.size_x, body.size_y) for body in placed)
+        self.start = self._places()
+        self.before = self.start
+        self.energy, self.steps = 0.0, 0
+
+    @property
+    def bodies(self) -> Any:
+        """The records of the blocks."""
+        return self.scene.world.bodies[: self.count]
+
+    @contextmanager
+    def without_time(self) -> Iterator[None]:
+        """Keep what is held still, supports too, and loads as they are at time zero; give all back at the end."""
+        world = self.scene.world
+        controls, loads, pieces = world.controls.copy(), world.loads.copy(), world.load_pieces.copy()
+        held = {name: self.bodies[name][self.held].copy() for name in HELD}
+        velocities = {name: self.bodies[name].copy() for name in ("vx", "vy", "spin")}
+        for name in HELD:
+            self.bodies[name][self.held] = 0
+        world.controls["motion_x"] = world.controls["motion_y"] = 0.0
+        world.controls["rest_checks"] = 0
+        world.load_pieces["rate"] = 0.0
+        world.loads["last_piece"] = world.loads["first_piece"] + 1
+        self.loads = loads
+        self._stop()
+        yield
+        world = self.scene.world
+        world.controls[...] = controls
+        world.load_pieces[...] = pieces
+        for name in (*FALLS, "last_piece"):
+            world.loads[name] = loads[name]
+        for name, values in held.items():
+            self.bodies[name][self.held] = values
+        for name, values in velocities.items():
+            self.bodies[name] = values
+
+    def load_up(self) -> None:
+        """Let gravity and loads grow to their size."""
+        for part in range(1, PARTS + 1):
+            self._load(part / PARTS)
+            end = self.steps + PART_STEPS[self.kind]
+            while self.steps < end:
+                self._go()
+                if self._unrest() <= ROUGH_BALANCE / PARTS:
+                    break
+
+    def come_to_rest(self) -> None:
+        """Go on until nothing moves any more. Raises SettleError."""
+        while self._unrest() > BALANCE or self.energy > 0.0:
+            if self.steps > MOST_STEPS[self.kind]:
+                raise self._error()
+            self._go()
+            if self._unrest() <= BALANCE:
+                self._stop()
+
+    def begin(self) -> None:
+        """Make this time zero: clock and books begin anew, contacts stay as they are."""
+        world = self.scene.world
+        clock, ledger = world.clock, world.ledger
+        for name in clock.dtype.names or ():
+            if name != "pair_count":
+                clock[name] = 0
+        for name in ledger.dtype.names or ():
+            ledger[name] = 0.0
+        bodies = self.bodies
+        energies = bodies["mass"] * (bodies["vx"] ** 2 + bodies["vy"] ** 2) + bodies["inertia"] * bodies["spin"] ** 2
+        ledger["largest_kinetic"][0] = 0.5 * float(np.sum(energies))
+        if isinstance(self.scene, Nonsmooth):
+            _begin_rigid(self.scene)
+
+    def settled(self) -> Settled:
+        """Return how it came to rest."""
+        ways = self._ways()
+        far = int(np.argmax(ways))
+        return Settled(
+            steps=self.steps,
+            largest_displacement_mm=MILLI * float(ways[far]),
+            displaced_block=self.placed[far].name,
+            held=self.names,
+        )
+
+    def _load(self, share: float) -> None:
+        world = self.scene.world
+        world.controls["gravity_x"], world.controls["gravity_y"] = (share * one for one in self.gravity)
+        for name in FALLS:
+            world.loads[name] = share * self.loads[name]
+
+    def _go(self) -> None:
+        """Take some steps; take all velocities away where the kinetic energy falls. Raises SettleError."""
+        self.before = self._places()
+        self.steps += CALL_STEPS[self.kind]
+        self.scene, status = self.team.advance(self.scene, self.steps)
+        energy = self._kinetic()
+        if status != REACHED or not np.isfinite(energy) or self._ways().max() > MOVED_SHARE * self.smallest:
+            raise self._error()
+        if energy < self.energy:
+            self._stop()
+        else:
+            self.energy = energy
+
+    def _stop(self) -> None:
+        for name in ("vx", "vy", "spin"):
+            self.bodies[name] = 0.0
+            if isinstance(self.scene, Nonsmooth):
+                self.scene.contacts.lines[name][: self.count] = 0.0
+        self.energy = 0.0
+
+    def _kinetic(self) -> float:
+        bodies = self.bodies
+        speeds = bodies["mass"] * (bodies["vx"] ** 2 + bodies["vy"] ** 2)
+        return 0.5 * float(np.sum(speeds + bodies["inertia"] * bodies["spin"] ** 2))
+
+    def _unrest(self) -> float:
+        """Return how far the scene is from rest: BALANCE is near enough."""
+        if not self.is_free.any():
+            return 0.0
+        bodies = self.bodies
+        if isinstance(self.scene, Nonsmooth):
+            ways = _ways(self._places() - self.before, bodies["radius"])
+            share = float(ways[self.is_free].max()) / (CALL_STEPS[self.kind] * STILL * self.smallest)
+            return BALANCE * share if self.steps else np.inf
+        rates = np.hypot(bodies["ax"], bodies["ay"]) + bodies["radius"] * np.abs(bodies["spin_rate"])
+        rates = rates[self.is_free]
+        return float(rates.max()) / self.scale if self.steps and self.scale > 0.0 else np.inf
+
+    def _places(self) -> Floats:
+        return np.stack([self.bodies[name] for name in ("x", "y", "angle")])
+
+    def _ways(self) -> Floats:
+        """Return how far every block has come (m)."""
+        return np.where(self.is_free, _ways(self._places() - self.start, self.bodies["radius"]), 0.0)
+
+    def _error(self) -> SettleError:
+        bodies = self.bodies
+        speeds = np.hypot(bodies["vx"], bodies["vy"]) + bodies["radius"] * np.abs(bodies["spin"])
+        fastest = int(np.nanargmax(np.where(self.is_free, speeds, -1.0)))
+        ways = self._ways()
+        far = int(np.nanargmax(ways))
+        return SettleError(
+            f"the scene {NOT_AT_REST} (start.settle): block {self.placed[fastest].name} moves at "
+            f"{MILLI * float(speeds[fastest]):.3g} mm/s, block {self.placed[far].name} has come "
+            f"{MILLI * float(ways[far]):.3g} mm, after {self.steps} steps"
+        )
+
+
+def _begin_rigid(scene: Nonsmooth) -> None:
+    """Halve the impulses that hold against gravity, of which the first substep has half a kick, and clear the books."""
+    contacts = scene.contacts
+    for name in ("normal_one", "normal_two", "shear"):
+        contacts.rows[name] *= 0.5
+    for name in contacts.books.dtype.names or ():
+        contacts.books[name] = 0.0
+    for name in scene.pushes.dtype.names or ():
+        scene.pushes[name] = 0.0
+    contacts.stepping["sweeps"] = 0
+
+
+def _ways(change: Floats, radius: Floats) -> Floats:
+    """Return a bound of the ways (m) of the corners of blocks whose x, y, angle changed so, (3, b)."""
+    dx, dy, turned = change
+    return np.asarray(np.hypot(dx, dy) + radius * np.abs(turned))

@@ -1,0 +1,139 @@
+"""A scene that comes to rest before time zero: forces, clock, books, held bodies, failure, resuming, ensembles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blocksim.errors import ExitCode, ScenarioError
+from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
+from blocksim.simulation import simulate, simulate_into
+from blocksim.simulation.ensemble import run_ensemble
+from blocksim.simulation.schemes import build, scheme_of
+from blocksim.simulation.settling import SettleError, settle
+from blocksim.simulation.team import ALONE
+from blocksim.study.criterion import DEFAULT, Verdict, read_criterion
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SCHEMES = ("explicit", "nonsmooth")
+G = 9.81
+
+
+def stack(scheme: str, *, hold: tuple[str, ...] = (), **changes: Any) -> Scenario:
+    """Return three stones on one another, soft ones, that settle."""
+    data = {
+        "schema": 1,
+        "name": "stack",
+        "materials": {"stone": {"density": 2000.0, "young_modulus": "1 GPa", "poisson_ratio": 0.2}},
+        "blocks": {"b": {"width": 0.4, "height": 0.2, "length": 1.0, "material": "stone"}},
+        "bodies": [{"block": "b", "x": 0.05 * k, "y": 0.1 + 0.2 * k} for k in range(3)],
+        "contact": {"stiffness_scale": 0.001, "restitution": 0.0},
+        "friction": {"block_block": 0.6, "block_ground": 0.6},
+        "time": {"scheme": scheme, "end": 0.02, "stop_at_rest": False},
+        "output": {"every": 0.005, "contacts": True},
+        "start": {"settle": True, "hold": list(hold)},
+        **changes,
+    }
+    return scenario_from_mapping(data)
+
+
+def support_force(scene: Any, count: int) -> float:
+    """Return the size (N) of the force of the ground."""
+    rows = scheme_of(scene).contacts(scene, count)
+    rows = rows[rows["body_b"] < 0]
+    x = rows["normal_force"] * rows["normal_x"] - rows["shear_force"] * rows["normal_y"]
+    y = rows["normal_force"] * rows["normal_y"] + rows["shear_force"] * rows["normal_x"]
+    return float(np.hypot(x.sum(), y.sum()))
+
+
+@pytest.mark.parametrize(("scheme", "scale"), [("explicit", 0.001), ("explicit", 0.01), ("nonsmooth", 1.0)])
+def test_the_tilted_wall_starts_at_rest_and_the_ground_carries_its_weight(scheme: str, scale: float) -> None:
+    settings = ["start.settle=true", f"time.scheme={scheme}", f"contact.stiffness_scale={scale}"]
+    scenario = load_scenario(SCENARIOS / "tilting_wall.toml", settings)
+    built = build(scenario)
+    scene, settled = settle(built.scene, scenario, built.placed, ALONE)
+    scene, _ = ALONE.advance(scene, 0)
+    weight = G * sum(body.mass for body in built.placed)
+    assert support_force(scene, len(built.placed)) == pytest.approx(weight, rel=1e-6)
+    assert int(scene.world.clock[0].steps) == 0
+    before = np.stack([scene.world.bodies["x"], scene.world.bodies["y"]])
+    scene, _ = ALONE.advance(scene, 100)
+    after = np.stack([scene.world.bodies["x"], scene.world.bodies["y"]])
+    # the first substep of rigid contacts has half a kick, and is solved to the tolerance of the velocity pass
+    assert np.abs(after - before)[:, :-1].max() < (1e-9 if scheme == "explicit" else 1e-4)
+    assert 0.0 < settled.largest_displacement_mm < 20.0
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_tilt_at_which_it_falls_ends_with_the_block_that_moves_and_how_fast(scheme: str) -> None:
+    scenario = stack(scheme, ground={"tilt": "35 deg"})
+    with pytest.raises(SettleError, match=r"block \S+ moves at .* mm/s, block \S+ has come") as caught:
+        simulate(scenario)
+    assert caught.value.exit_code == ExitCode.NUMERICAL_FAILURE
+    row = {"status": "failed", "reason": str(caught.value)}
+    assert read_criterion(DEFAULT).verdict(row) is Verdict.FALLS
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_held_body_stays_where_it_is_and_falls_from_time_zero_on(scheme: str) -> None:
+    bodies = [{"block": "b", "x": 0.0, "y": 0.1}, {"block": "b", "x": 0.3, "y": 0.3, "name": "over"}]
+    held = simulate(stack(scheme, bodies=bodies, hold=("over",)))
+    assert held.frames.x[0, 1] == 0.3
+    assert held.frames.y[0, 1] == 0.3
+    assert held.frames.rotation[-1, 1] < 0.0  # it overhangs by more than half of its length
+    assert held.summary.settled is not None
+    assert held.summary.settled.held == ("over",)
+    with pytest.raises(SettleError):
+        simulate(stack(scheme, bodies=bodies))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_velocities_are_those_of_the_release_and_books_begin_at_time_zero(scheme: str) -> None:
+    bodies = [{"block": "b", "x": 0.0, "y": 0.1}, {"block": "b", "x": 1.0, "y": 0.1, "velocity": [0.5, 0.0]}]
+    result = simulate(stack(scheme, bodies=bodies))
+    assert result.frames.vx[0] == pytest.approx([0.0, 0.5])
+    ledger = result.summary.energy_J
+    assert ledger.relative_residual < 1e-3
+    assert ledger.kinetic + ledger.friction + ledger.dashpot + ledger.stored_shear == pytest.approx(20.0, rel=0.02)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_loads_of_time_zero_are_carried_at_time_zero(scheme: str) -> None:
+    push = {"kind": "force", "body": "2", "magnitude": "300 N"}
+    scenario = stack(scheme, loads=[push])
+    built = build(scenario)
+    scene, _ = settle(built.scene, scenario, built.placed, ALONE)
+    scene, _ = ALONE.advance(scene, 0)
+    weight = 3 * 160.0 * G
+    assert support_force(scene, 3) == pytest.approx(np.hypot(weight, 300.0), rel=1e-6)
+    assert -simulate(scenario).summary.energy_J.to_loads == pytest.approx(0.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_resumed_run_an_ensemble_and_threads_have_the_bits_of_a_run(scheme: str, tmp_path: Path) -> None:
+    scenario = stack(scheme, hold=("3",))
+    whole = simulate(scenario, threads=2)
+    (one,) = run_ensemble([scenario])
+    assert one.final.equals(whole.final)
+    first = simulate_into(scenario, tmp_path / "run")
+    assert first.summary.final_state_sha256 == whole.summary.final_state_sha256
+    assert first.summary.settled == whole.summary.settled
+
+
+def test_nothing_settles_unless_it_is_asked_for() -> None:
+    assert simulate(stack("nonsmooth", start={})).summary.settled is None
+
+
+@pytest.mark.parametrize(
+    ("start", "message"),
+    [
+        ({"hold": ["1"]}, "nothing is held without settle = true"),
+        ({"settle": True, "hold": ["nobody"]}, 'unknown body "nobody"'),
+    ],
+)
+def test_impossible_starts_are_told_with_their_place(start: dict[str, Any], message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        stack("explicit", start=start)
