@@ -231,3 +231,19 @@ def test_intervals_cover_the_closed_form_through_the_whole_chain(tmp_path: Path)
         fitted += low <= math.degrees(math.atan(0.38)) <= high
     assert covered / (5 * studies) > 0.95 - 4.0 * math.sqrt(0.95 * 0.05 / (5 * studies))
     assert abs(fitted / studies - 0.95) < 4.0 * math.sqrt(0.95 * 0.05 / studies)
+
+
+@pytest.mark.long
+def test_counts_and_members_are_the_same_from_processes(tmp_path: Path, whole: FragilityResult) -> None:
+    slides(tmp_path, executor="processes", jobs=2)
+    for name in ("fragility.csv", "members.csv"):
+        assert (tmp_path / name).read_bytes() == (whole.folder / name).read_bytes()
+
+
+@pytest.mark.long
+def test_counts_and_members_are_the_same_from_a_cluster(tmp_path: Path, whole: FragilityResult) -> None:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        slides(tmp_path, scheduler=cluster.scheduler_address)
+    for name in ("fragility.csv", "members.csv"):
+        assert (tmp_path / name).read_bytes() == (whole.folder / name).read_bytes()
