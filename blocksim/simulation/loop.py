@@ -164,6 +164,8 @@ class _Going:
         self.pace.learn(self.done - done, time.perf_counter() - before)
         if self.timeline is not None:
             self.scene, self.status = self.timeline.act(self.scene, self.team, self.status)
+        self.recorder.probes.sample(self.scene)  # like frames after what happens at this step
+        self.recorder.keep_up()
         if self.done == wanted:
             self.recorder.sample(self.scene)
         ledger = energy_ledger(self.scene, self.start)
@@ -177,8 +179,8 @@ class _Going:
         probes = self.recorder.probes
         while self.status == REACHED and self.done < last_step:
             self._advance(min(last_step, probes.next_step(self.done)))
-            probes.sample(self.scene)
-        self.recorder.keep_up()
+            if self.status == REACHED and self.done < last_step:
+                probes.sample(self.scene)
 
     def _advance(self, last_step: int) -> None:
         self.seconds -= time.perf_counter()

@@ -192,3 +192,19 @@ def test_a_file_without_the_probes_is_no_run_of_the_scenario(tmp_path: Path) -> 
     simulate_into(scene("nonsmooth", [], 0.02), tmp_path / "run")
     with pytest.raises(InvalidInputError, match="probes cannot be read"):
         read_probes(tmp_path / "run" / "run.h5", scene("nonsmooth", PROBES, 0.02))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_samples_show_what_frames_show_at_the_step_of_an_event(scheme: str) -> None:
+    push = {"at": "20 ms", "velocity": {"body": "2", "vx": 0.5}}
+    rest = {"when": "rest", "velocity": {"body": "2", "vx": 0.25}}
+    probes = [{"kind": "point", "body": "2"}, {"kind": "energy"}]
+    time = {"scheme": scheme, "end": 0.6, "stop_at_rest": True}
+    result = simulate(scene(scheme, probes, events=[push, rest], time=time))
+    assert len(result.summary.events) == 2
+    point, energy = result.probes["point1"], result.probes["energy2"]
+    count = len(point)
+    assert result.frames.step[:count].tolist() == point.step.tolist()
+    assert point["vx"].tolist() == result.frames.vx[:count, 1].tolist()
+    assert energy["kinetic"].tolist() == result.frames.energy["kinetic"][:count].tolist()
+    assert point["vx"].max() == pytest.approx(0.5, abs=0.01)
