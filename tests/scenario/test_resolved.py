@@ -207,6 +207,8 @@ contact.kernel = "cubic-spline"
 time = { end = 1.0, step = 1e-6, safety = 0.1, force_step = true, stop_at_rest = false, rest_speed = 1, rest_hold = 1 }
 output = { every = 1.0, contacts = true }
 probes.0 = { name = "crown", every = "step", body = "2", at = [0.1, 0] }
+loads.0 = { name = "push", body = "2", magnitude = 2, direction = "1 deg", axes = "body", point = [0.1, 0] }
+start = { settle = false, hold = ["2"] }
 """
 
 
@@ -221,7 +223,15 @@ def flat(table: dict[str, Any], path: str = "") -> dict[str, Any]:
 HASHED = {key: value for line in OTHER_VALUES.splitlines() for key, value in flat(tomllib.loads(line)).items()}
 RAMP = {"kind": "ramp", "distance": 1, "duration": 1}
 HASHED |= {"bodies.0.motion": RAMP, "events": [{"at": 1, "remove": ["1"]}]}
-SINGLE_CHOICE = {"schema", "time.scheme", "materials.m.unit_weight", "motion.kind", "probes.0.kind"}
+SINGLE_CHOICE = {
+    "schema",
+    "time.scheme",
+    "materials.m.unit_weight",
+    "motion.kind",
+    "probes.0.kind",
+    "loads.0.kind",
+    "loads.0.history.kind",
+}
 
 
 @pytest.fixture
@@ -239,6 +249,8 @@ def data() -> dict[str, Any]:
         "pairs": {"m": {"n": {"friction": 0.3}}},
         "motion": {"kind": "harmonic", "amplitude": 1, "frequency": 1},
         "probes": [{"kind": "point", "body": "1"}],
+        "loads": [{"kind": "force", "body": "1", "magnitude": 1}],
+        "start": {"settle": True},
     }
 
 

@@ -1,0 +1,123 @@
+"""Loads in a scenario: what they are refused for, with their place, and how tables and names are read."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from blocksim.errors import ScenarioError
+from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_hash, scenario_to_toml
+from blocksim.scenario.models.history import Stretch
+from blocksim.scenario.models.loads import Gravity, VaryingLoad
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from blocksim.scenario import Scenario
+
+
+def data_with(*loads: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    return {
+        "schema": 1,
+        "name": "loads",
+        "materials": {"m": {"density": 2000, "young_modulus": "1 GPa", "poisson_ratio": 0.2}},
+        "blocks": {"b": {"width": 1, "height": 1, "length": 1, "material": "m"}},
+        "bodies": [{"block": "b", "x": 0, "y": 0.5}, {"block": "b", "x": 1, "y": 0.5, "fixed": True}],
+        "loads": list(loads),
+        **changes,
+    }
+
+
+def scenario(*loads: dict[str, Any], folder: Path | None = None) -> Scenario:
+    return scenario_from_mapping(data_with(*loads), *([] if folder is None else [folder]))
+
+
+FORCE: dict[str, Any] = {"kind": "force", "body": "1", "magnitude": "2 kN"}
+WATER: dict[str, Any] = {"kind": "pressure", "body": "1", "face": "left", "water_level": 1}
+REFUSED: dict[str, tuple[dict[str, Any], str]] = {
+    "unknown body": ({**FORCE, "body": "9"}, 'loads.0.body: unknown body "9"'),
+    "fixed body": ({**FORCE, "body": "2"}, 'loads.0.body: body "2" is fixed; a load has no effect on it'),
+    "wrong unit": ({**FORCE, "magnitude": "2 kN m"}, 'loads.0.magnitude: "2 kN m" is a moment; a force'),
+    "point outside": ({**FORCE, "point": [0.6, 0]}, "loads.0.point: the point lies outside"),
+    "covered by the ground": ({**WATER, "face": "bottom"}, "loads.0.face: .* covered by the ground"),
+    "covered by a body": ({**WATER, "face": "right"}, 'loads.0.face: .* covered by body "2"'),
+    "negative level": ({**WATER, "water_level": -1}, "loads.0.water_level: -1 is too small"),
+    "no pressure": ({"kind": "pressure", "body": "1", "face": "left"}, "loads.0: the pressure is missing"),
+    "two pressures": ({**WATER, "magnitude": 5}, "loads.0.water_level: .* both given"),
+    "unknown kind": ({**FORCE, "kind": "forse"}, "loads.0.kind: unknown load kind \"forse\"; did you mean 'force'"),
+    "unknown history": ({**FORCE, "history": {"kind": "rmp"}}, "loads.0.history.kind: unknown history kind"),
+    "ramp of no length": (
+        {**FORCE, "history": {"kind": "ramp", "start": 1, "end": 1}},
+        "loads.0.history.end: a ramp that begins at 1 s cannot end at 1 s",
+    ),
+    "times that go back": (
+        {**FORCE, "history": {"kind": "steps", "times": [1, 0.5], "factors": [1, 2]}},
+        "loads.0.history.times.1: 0.5 s comes after 1 s",
+    ),
+    "a factor too few": (
+        {**FORCE, "history": {"kind": "table", "times": [0, 1], "factors": [1]}},
+        "loads.0.history.factors: 1 factors for 2 times",
+    ),
+    "no rate": ({"kind": "gravity", "to": "5 deg"}, "loads.0: rate is missing"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_loads_that_cannot_be_are_refused_with_their_place(case: str) -> None:
+    load, message = REFUSED[case]
+    with pytest.raises(ScenarioError, match=message):
+        scenario(load)
+
+
+def test_two_loads_that_turn_gravity_are_refused() -> None:
+    turn = {"kind": "gravity", "to": "5 deg", "rate": "1 deg/s"}
+    with pytest.raises(ScenarioError, match=r"loads\.1: gravity turns already"):
+        scenario(turn, turn)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("time_s,factor\n0,1\n1,\n", "load.csv: line 3: the factor is missing"),
+        ("time_s,force\n0,1\n1,2\n", "load.csv: line 1: the columns are time_s,force; time_s,factor are needed"),
+        ("time_s,factor\n1,1\n0.5,2\n", "load.csv: line 3: time 0.5 s: times must increase"),
+        ("time_s,factor\n0,1\n", "load.csv: 1 lines with samples"),
+        ("time_s,factor\n0,1\n1,2 N\n", "load.csv: line 3: '2 N' is not a number"),
+    ],
+)
+def test_a_table_with_a_gap_or_of_other_columns_is_refused_with_its_line(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    (tmp_path / "load.csv").write_text(text)
+    with pytest.raises(ScenarioError, match=message):
+        scenario({**FORCE, "history": {"kind": "table", "table": "load.csv"}}, folder=tmp_path)
+
+
+def test_a_table_is_read_and_the_resolved_scenario_needs_it_no_more(tmp_path: Path) -> None:
+    (tmp_path / "load.csv").write_text("# jack\ntime_s,factor\n0.5,1\n1.5,3\n")
+    (tmp_path / "tilt.csv").write_text("time_s,tilt_deg\n0,0\n10,20\n")
+    read = scenario(
+        {**FORCE, "history": {"kind": "table", "table": "load.csv"}},
+        {"kind": "gravity", "table": "tilt.csv"},
+        folder=tmp_path,
+    )
+    one, two = read.loads
+    assert isinstance(one, VaryingLoad)
+    assert one.stretches() == (Stretch(0.0, 1.0, 0.0), Stretch(0.5, 1.0, 2.0), Stretch(1.5, 3.0, 0.0))
+    assert isinstance(two, Gravity)
+    assert two.tilts == pytest.approx((0.0, 0.3490658503988659))
+    (tmp_path / "scenario.toml").write_text(scenario_to_toml(read))
+    for name in ("load.csv", "tilt.csv"):
+        (tmp_path / name).unlink()
+    again = load_scenario(tmp_path / "scenario.toml")
+    assert again == read
+    assert scenario_hash(again) == scenario_hash(read)
+
+
+def test_a_load_is_set_by_its_name() -> None:
+    named = data_with(FORCE, {**FORCE, "name": "push"})
+    changed = load_scenario(named, {"loads.push.magnitude": "5 kN"})
+    assert [getattr(load, "magnitude", None) for load in changed.loads] == [2000.0, 5000.0]
+    with pytest.raises(ScenarioError, match="does not exist"):
+        load_scenario(named, {"loads.pull.magnitude": "5 kN"})
