@@ -28,7 +28,8 @@ STICKING = 2.0  # friction coefficient
 EXACT = 1e-9  # m/s, rad/s: rigid impacts are those of the closed forms
 COLLISION_STEPS = 20_000
 COLLISION_END = 4e-3  # s, of rigid blocks
-REBOUNDS, REBOUND = (0.2, 0.8), 1e-3  # restitutions; off them by, as arms are those before the last step
+WIDTH_TWO = 0.03  # m: of the second of two blocks that collide
+REBOUNDS, REBOUND = (0.2, 0.8), 1e-3  # restitutions; off them by, as arms are those before a step
 
 
 def restitution(setting: Setting) -> Iterator[Row]:
@@ -76,7 +77,7 @@ def sticking_corner(setting: Setting) -> Iterator[Row]:
 def collision(setting: Setting, restitution: float) -> Simulation:
     """Start two free blocks that will meet off-centre, both turning."""
     one = {"y": 0.1, "velocity": [1.0, 0.1], "spin": 5.0}
-    two = {"y": 0.112, "x": 0.0335, "velocity": [-0.6, 0.0], "angle": 0.05, "spin": -12.0, "width": 0.03}
+    two = {"y": 0.112, "x": 0.0335, "velocity": [-0.6, 0.0], "angle": 0.05, "spin": -12.0, "width": WIDTH_TWO}
     return setting.start([one, two], restitution=restitution, gravity=0.0)
 
 
@@ -106,19 +107,39 @@ def two_blocks(setting: Setting) -> Iterator[Row]:
 def rebound(scene: Simulation) -> float:
     """Return how fast the points that meet first part, as a share of how fast they approached.
 
-    The upper right corner of the left block meets the left face of the other one.
+    The upper right corner of the left block meets the left face of the other one. Impulses act where the blocks are
+    when the step begins, or, as steps of strong impacts of few blocks end at these, where they meet.
     """
     before = after = scene.state()
     while after[0, 3] == before[0, 3]:
         before, after = after, scene.to_step(scene.steps + 1).state()
-    return -parting(after, before) / parting(before, before)
+    place = meeting(before) if scene.scene.contacts.stepping[0].is_divided else before
+    return -parting(after, place) / parting(before, place)
+
+
+def meeting(state: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return where two blocks meet that move as they do in a state, without gravity."""
+    place = state.copy()
+    time = 0.0
+    for _ in range(10):  # Newton's method
+        corner_x, corner_y = corner(place)
+        x_two, y_two, angle_two = place[1, :3]
+        gap = cos(angle_two) * (x_two - corner_x) + sin(angle_two) * (y_two - corner_y) - WIDTH_TWO / 2
+        time -= gap / parting(state, place)
+        place[:, :3] = state[:, :3] + time * state[:, 3:]
+    return place
+
+
+def corner(place: NDArray[np.float64]) -> tuple[float, float]:
+    """Return where the upper right corner of the left block is (m)."""
+    x, y, angle = place[0, :3]
+    return x + (cos(angle) * WIDTH - sin(angle) * HEIGHT) / 2, y + (sin(angle) * WIDTH + cos(angle) * HEIGHT) / 2
 
 
 def parting(state: NDArray[np.float64], place: NDArray[np.float64]) -> float:
     """Return the speed (m/s) in a state at which corner and face part, at their places and angles in another one."""
-    (x, y, angle), (x_two, y_two, angle_two) = place[:, :3]
-    corner_x = x + (cos(angle) * WIDTH - sin(angle) * HEIGHT) / 2
-    corner_y = y + (sin(angle) * WIDTH + cos(angle) * HEIGHT) / 2
+    (x, y, _), (x_two, y_two, angle_two) = place[:, :3]
+    corner_x, corner_y = corner(place)
     (vx, vy, spin), (vx_two, vy_two, spin_two) = state[:, 3:]
     along = vx_two - spin_two * (corner_y - y_two) - vx + spin * (corner_y - y)
     across = vy_two + spin_two * (corner_x - x_two) - vy - spin * (corner_x - x)

@@ -30,8 +30,8 @@ from blocksim.world.bodies import Outline
 from blocksim.world.bounds import Bounds
 from blocksim.world.build import GROWTH, empty_controls, first_capacity, numbers, without_lists
 from blocksim.world.memory import RigidSize, refuse_if_too_large
-from blocksim.world.rigid_step import choose_rigid_step
-from blocksim.world.sag import soft_contact
+from blocksim.world.rigid_step import FEW, choose_rigid_step
+from blocksim.world.sag import DAMPING, soft_contact
 from blocksim.world.scenes import SURFACE, Construction, Parts, Stride, build_one
 from blocksim.world.step import choose_skin
 
@@ -110,8 +110,13 @@ def _stepping(outline: Outline, stride: Stride) -> dict[str, float]:
     substep = stride.step / time.substeps
     soft = soft_contact(substep)
     restitution = max(touch.restitution for row in outline.interactions for touch in row)
+    free = sum(not body.fixed for body in outline.placed)
     return {
         "substep": substep,
+        "length": stride.step,
+        "rest_gap": time.restitution_threshold * substep,
+        "frequency": soft.frequency,
+        "damping": DAMPING,
         "closed_bias": soft.bias,
         "softness": soft.softness,
         "open_bias": 1.0 / substep,
@@ -120,6 +125,8 @@ def _stepping(outline: Outline, stride: Stride) -> dict[str, float]:
         "substeps": time.substeps,
         "velocity_sweeps": time.velocity_sweeps,
         "is_guarded": has_impacts_in_rounds(restitution),
+        # parts shift velocities by what gravity alone brings them
+        "is_divided": has_impacts_in_rounds(restitution) and free < FEW and not outline.scenario.loads,
         "least_reach": 0.5 * stride.skin,
         "most_reach": MOST_REACH * stride.skin,
         "is_driven": outline.drives.driven.size > 0,

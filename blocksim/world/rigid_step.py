@@ -8,19 +8,12 @@ start, or in one substep at that bound.
 
 A block that meets something in a substep h stays there until it ends, and has not yet moved with its new velocity: it
 is behind by what the impact adds to velocity and spin times h/2 on average, and gravity changes its speed by g h
-meanwhile. Every impact passes that on to the next: a squat block that hops on its corners (32 x 50 mm, restitution 0.8)
-has its second peak off by 6 % and its fourth by 19 %, 0.3 and 0.6 % of the tilt it starts from, in proportion to h
-whatever the step. Against speeds of free falls over sides L, sqrt(g L), that is h / sqrt(L/g).
-
-Tried against it: a point that meets with approach u after the share s / (u h) of a substep is, at its end, e (u h - s)
-away, and the impact has acted for the rest of it. So the position pass aimed at that gap, with the share (u h - s) /
-(u h) of the impulses along normal and tangent, and the rebound gave up the energy of the height gained. Peaks two and
-four were off by 3.1 and 14.7 % instead of 3.9 and 19.3 % of those in steps 32 times as short (without the tangent: 4.3
-and 18.6 %), and at a restitution of 0.5 the third by 1.7 instead of 0.4 %. It is not worth its cost. A
-few blocks can afford to have it small: a step is at most a share of sqrt(L/g) that grows with their number, so that
-costs are about the same, and that of a crowd is the usual one. A single block of 25 mm takes 1/13 ms, three of 32 mm
-take 1/4 ms; the usual step is divided by whole numbers, so that outputs fall on the ends of steps. So with the way in a
-step at the speed of an impact.
+meanwhile. Every impact passes that on to the next. Against speeds of free falls over sides L, sqrt(g L), that is
+h / sqrt(L/g). A few blocks can afford to have it small: a step is at most a share of sqrt(L/g) that grows with their
+number, so that costs are about the same, and that of a crowd is the usual one. A single block of 25 mm takes 1/13 ms,
+three of 32 mm take 1/4 ms; the usual step is divided by whole numbers, so that outputs fall on the ends of steps. So
+with the way in a step at the speed of an impact. Where few blocks rebound strongly that is not enough, as hops multiply
+errors a hundredfold: their steps are cut at impacts, see blocksim.kernels.nonsmooth.parts.
 """
 
 import math

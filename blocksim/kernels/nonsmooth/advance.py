@@ -16,6 +16,7 @@ from blocksim.kernels.nonsmooth.loads import show_velocities
 from blocksim.kernels.nonsmooth.manifold import Place, are_four_of_blocks, collide, collide_four
 from blocksim.kernels.nonsmooth.motion import place_all
 from blocksim.kernels.nonsmooth.neighbours import look
+from blocksim.kernels.nonsmooth.parts import begin_next_part, begin_step, cut, is_cut
 from blocksim.kernels.nonsmooth.rounds import forget_struck
 from blocksim.kernels.nonsmooth.substep import bodies_of, kick_share, substep
 from blocksim.kernels.nonsmooth.supports import place_supports
@@ -24,6 +25,7 @@ from blocksim.kernels.support import is_support_at_rest
 from blocksim.kernels.team import meet
 
 LOOK, GATHER, CHECK = range(3)  # what one thread does for all
+UNDER_WAY = -1  # beside the status codes: the step goes on
 
 
 @kernel
@@ -68,6 +70,18 @@ def check(scene: Nonsmooth) -> int:
 
 
 @kernel
+def end_part(scene: Nonsmooth) -> int:
+    """End a part of a step for all; return UNDER_WAY, or the status of a step that has come to its end."""
+    clock = scene.world.clock[0]
+    place_supports(scene)
+    if is_cut(scene):
+        begin_next_part(scene)
+        return UNDER_WAY
+    clock.steps += 1
+    return check(scene) if clock.steps % scene.world.controls[0].check_every == 0 else REACHED
+
+
+@kernel
 def supervise(scene: Nonsmooth, k: int, task: int) -> int:
     """Let the first thread do something for all while the others wait; return the status code that all go by."""
     team = scene.world.team
@@ -75,15 +89,17 @@ def supervise(scene: Nonsmooth, k: int, task: int) -> int:
     if k == 0:
         team[STATUS] = REACHED
         if task == LOOK:
-            if not look(scene):
+            if look(scene):
+                begin_step(scene)
+            else:
                 team[STATUS] = PAIRS_FULL
         elif task == GATHER:
-            gather(scene.contacts, scene.begins)
+            if scene.contacts.stepping[0].is_divided and cut(scene):
+                team[STATUS] = UNDER_WAY
+            else:
+                gather(scene.contacts, scene.begins)
         else:
-            place_supports(scene)
-            scene.world.clock[0].steps += 1
-            if scene.world.clock[0].steps % scene.world.controls[0].check_every == 0:
-                team[STATUS] = check(scene)
+            team[STATUS] = end_part(scene)
     meet(team)
     return team[STATUS]
 
@@ -96,7 +112,7 @@ def collide_rows(scene: Nonsmooth, begin: int, end: int) -> None:
     rows = contacts.rows
     ground = bodies.size - 1
     h = contacts.stepping[0].substep
-    ahead = 0.5 * (scene.world.controls[0].step - h)
+    ahead = 0.5 * (contacts.stepping[0].length - h)
     r = begin
     while r < end:
         if r + WIDTH <= end and are_four_of_blocks(rows, r, bodies):
@@ -129,31 +145,45 @@ def load_lines(scene: Nonsmooth) -> None:
 
 @kernel
 def do_step(scene: Nonsmooth, k: int) -> int:
-    """Take one step as thread k; return the status code."""
-    world = scene.world
+    """Take one step as thread k, in as many parts as it takes; return the status code."""
     contacts = scene.contacts
-    size = world.team[TEAM_SIZE]
     if contacts.stepping[0].is_guarded:
-        first, last = part_of(0, contacts.stepping[0].row_count, k, size)
+        first, last = part_of(0, contacts.stepping[0].row_count, k, scene.world.team[TEAM_SIZE])
         forget_struck(contacts, first, last)
     status = supervise(scene, k, LOOK)
     if status != REACHED:
         return status
+    status = UNDER_WAY
+    while status == UNDER_WAY:
+        status = do_part(scene, k)
+    return status
+
+
+@kernel
+def do_part(scene: Nonsmooth, k: int) -> int:
+    """Take one part of a step as thread k, or find that it has to be shorter; return UNDER_WAY or the status code."""
+    world = scene.world
+    contacts = scene.contacts
+    size = world.team[TEAM_SIZE]
     first, last = part_of(0, contacts.stepping[0].row_count, k, size)
+    if contacts.stepping[0].parts > 0:
+        forget_struck(contacts, first, last)
     collide_rows(scene, first, last)
-    supervise(scene, k, GATHER)
+    if supervise(scene, k, GATHER) == UNDER_WAY:
+        return UNDER_WAY
     begin, end = part_of(0, contacts.stepping[0].group_count, k, size)
     pack_groups(contacts, begin, end)
-    is_first = world.clock[0].steps == 0
     count = contacts.stepping[0].substeps
+    is_first = world.clock[0].steps == 0 and contacts.stepping[0].parts == 0
     for number in range(count):
         substep(scene, k, number, is_first)
     unpack_groups(contacts, begin, end)
     first, last = bodies_of(contacts, k, size)
     gravity = (world.controls[0].gravity_x, world.controls[0].gravity_y)
-    place_all(world.bodies, contacts, first, last, kick_share(count - 1, is_first), gravity)
+    share = kick_share(count - 1, is_first)
+    place_all(world.bodies, contacts, first, last, share, gravity)
     if world.loads.size > 0:
-        show_velocities(scene, first, last, kick_share(count - 1, is_first))
+        show_velocities(scene, first, last, share)
     return supervise(scene, k, CHECK)
 
 

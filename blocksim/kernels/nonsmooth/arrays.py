@@ -105,11 +105,16 @@ STEPPING = record_type(
     "pull_x pull_y "  # m/s: the same of gravity and of loads that act on all bodies
     "lag "  # -: of a substep of gravity, what velocities lack when the substep under way begins
     "bend_share "  # -: of the bend of a row, what velocities gain up to the middle of the substep under way
-    "bend_time next_bend_time",  # s: times the bend, by how much gaps at its start and end are off
+    "bend_time next_bend_time "  # s: times the bend, by how much gaps at its start and end are off
+    "rest_gap "  # m: points with no larger one touch others at an impact
+    "frequency damping "  # 1/s, -: w and zeta of points in contact
+    "length gone",  # s: of the part of a step under way, and of the step before it; parts.py
     "substeps "
     "velocity_sweeps "  # at most
     "colours row_count active_count group_count "  # now
     "sweeps "  # of the velocity pass, in all so far
+    "parts "  # of the step under way, before this one
+    "is_divided "  # flag: steps are cut at impacts; parts.py
     "is_guarded "  # flag: impacts go one after the other, in rounds
     "is_driven "  # flag: bodies move otherwise than the supports
     "has_rebounds "  # flag: anything rebounds in the substep under way

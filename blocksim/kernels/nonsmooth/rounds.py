@@ -59,7 +59,7 @@ def aim_point(u: Lanes, start: Lanes, active: Lanes, after: Lanes, bend: Lanes, 
     """Return the target (m/s) of a point in the round to come, and whether it is hit and has to reach `after`."""
     counts = active > -FAR
     is_hit = counts & (u < -stepping.threshold)
-    rests = counts & (abs(u) <= stepping.threshold) & (start <= stepping.threshold * stepping.substep)
+    rests = counts & (abs(u) <= stepping.threshold) & (start <= stepping.rest_gap)
     return select(is_hit, bend + after, select(rests, bend - greater(u, 0.0), -FAR)), is_hit
 
 

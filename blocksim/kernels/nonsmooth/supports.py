@@ -4,6 +4,7 @@ from blocksim.kernels.arrays import Record, World
 from blocksim.kernels.driven import follow_pieces, pose_at, put, way_over
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.kernels.nonsmooth.parts import begin_of_part, end_of_part
 from blocksim.kernels.support import displacement, has_motion, is_driven, piece_at
 
 
@@ -22,7 +23,7 @@ def drive(scene: Nonsmooth, number: int) -> None:
     if not has_motion(controls):
         return
     h = stepping.substep
-    begin = world.clock[0].steps * controls.step + number * h
+    begin = begin_of_part(scene) + number * h
     rate = (displacement_at(world, begin + h) - displacement_at(world, begin)) / h
     stepping.support_vx = controls.motion_x * rate
     stepping.support_vy = controls.motion_y * rate
@@ -56,7 +57,7 @@ def place_supports(scene: Nonsmooth) -> None:
     clock = world.clock[0]
     if not has_motion(controls):
         return
-    now = (clock.steps + 1) * controls.step
+    now = end_of_part(scene)
     clock.motion_piece = piece_at(world.motion, clock.motion_piece, now)
     moved = displacement(world.motion[clock.motion_piece], now)
     stepping = scene.contacts.stepping[0]
