@@ -27,5 +27,7 @@ Impacts of bodies that touch one another go in rounds instead (in crowds only wh
 world/nonsmooth.py), and create no energy:
 impacts.py, clusters.py, rounds.py.
 
+Where few blocks rebound strongly, steps are cut at impacts: parts.py.
+
 Gravity kicks half a substep at first and whole ones then: velocities live half a substep before positions (leap-frog).
 """
