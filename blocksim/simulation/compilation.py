@@ -7,6 +7,7 @@ import numpy as np
 
 from blocksim.errors import OutputError
 from blocksim.kernels import jit
+from blocksim.kernels.compiler import compiling
 from blocksim.kernels.watch import Watched
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.simulation.schemes import SCHEMES, AnyScene, build_scene, measured_row, scheme_of
@@ -48,7 +49,8 @@ def compile_kernels(kernels: str = SURFACE) -> float:
     """
     began = time.perf_counter()
     try:
-        _compile(kernels)
+        with compiling():
+            _compile(kernels)
     except OSError as error:
         message = (
             f"{jit.cache_folder()}: the compiled solver cannot be stored there: {error.strerror or error}; "
@@ -61,7 +63,8 @@ def compile_kernels(kernels: str = SURFACE) -> float:
 def compile_systems(scenario: Scenario) -> None:
     """Compile what a scenario with systems beside blocks and supports needs as well, for these systems."""
     if scenario.systems:
-        measured_row(ALONE.advance(build_scene(scenario), 0)[0])
+        with compiling():
+            measured_row(ALONE.advance(build_scene(scenario), 0)[0])
 
 
 def _compile(kernels: str) -> None:
