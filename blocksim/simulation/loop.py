@@ -177,6 +177,9 @@ class _Going:
     def _go_by_probes(self, last_step: int) -> None:
         """Advance to a step in one call, or in several where probes are to be sampled on the way."""
         probes = self.recorder.probes
+        if not probes.all:
+            self._advance(last_step)
+            return
         while self.status == REACHED and self.done < last_step:
             self._advance(min(last_step, probes.next_step(self.done)))
             if self.status == REACHED and self.done < last_step:
