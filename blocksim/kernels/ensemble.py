@@ -61,7 +61,7 @@ def advance_members(
 ) -> None:
     """Advance some members from their start to their last step, or to what ends them before.
 
-    `members` (k,) are the numbers of those to advance; by number, last_steps (n,) are steps, starts (n, 11) gets the
+    `members` (k,) are the numbers of those to advance; by number, last_steps (n,) are steps, starts (n, r) gets the
     row of `measure` at the start, and codes (n,) the status codes. `watched` gets the first frame in
     which a block had moved. PAIRS_FULL leaves a member to the caller, who can give it more room. A member is advanced
     by the code that advances a single world, so the bits are the same.

@@ -26,8 +26,12 @@ SAFETY = 0.05  # the default; the stiffest mode has frequency times step = 2 saf
 PHASES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a step, at which an impact begins
 ROUND_OFF = 1e-12
 RIGID_LEDGER_TOLERANCE = 1e-11  # what impulses take is known to round-off
+# Blocks of 1 to 10 MN, whose weights do 1e5 to 1e6 times the energy in play on their heights: every step rounds that by
+# 1e-16, and the dam lies for 30 000 of them. Nothing else drifts: friction, impacts and loads balance to 1e-13.
+HEAVY = {"dam": 1e-8, "toppling_slope": 1e-10}
 LEDGER_TOLERANCE = 1e-3
 SOFT = 0.01  # stiffness scale of the quick size; crowds keep their own
+LESS_SOFT = 0.1  # with driven bodies: what starts at full speed is off by half a step of it, before anything has fallen
 STIFFER = 10.0  # where the scenario's own stiffness is too soft for a law
 CROWD = 100  # blocks; scenes of more on springs are run for their first moments only
 CROWD_END = 0.05  # s
@@ -73,7 +77,7 @@ def ledgers(setting: Setting) -> Iterator[Row]:
     for path in sorted(SCENARIOS.glob("*.toml")):
         if not setting.rigid and load_scenario(path).time.scheme != setting.scheme:
             continue
-        tolerance = RIGID_LEDGER_TOLERANCE if setting.rigid else LEDGER_TOLERANCE
+        tolerance = HEAVY.get(path.stem, RIGID_LEDGER_TOLERANCE) if setting.rigid else LEDGER_TOLERANCE
         yield absolute(_name(setting, path), "", 0.0, worst_residual(setting, path), tolerance)
 
 
@@ -126,7 +130,8 @@ def worst_residual(setting: Setting, path: Path) -> float:
     own = document.build()
     is_crowd = _is_crowd(own)
     if setting.quick and not is_crowd:
-        overrides["contact.stiffness_scale"] = SOFT
+        is_driven = any(body.motion is not None for body in own.bodies)
+        overrides["contact.stiffness_scale"] = LESS_SOFT if is_driven else SOFT
     if _gives_way(setting, own, is_crowd=is_crowd):
         usual = overrides.get("contact.stiffness_scale", own.contact.stiffness_scale)
         overrides["contact.stiffness_scale"] = STIFFER * float(str(usual))

@@ -49,7 +49,7 @@ def advance_nonsmooth_members(
 ) -> None:
     """Advance some members from their start to their last step, or to what ends them before.
 
-    As blocksim.kernels.ensemble.advance_members, with rows of `measure_nonsmooth` (n, 9).
+    As blocksim.kernels.ensemble.advance_members, with rows of `measure_nonsmooth`.
     """
     for m in members:
         scene = member(scenes, m)

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from blocksim.bench.scenes import pushed_wall, three_blocks
 from blocksim.kernels.arrays import AT_REST, REACHED, TEAM_SIZE
 from blocksim.kernels.nonsmooth.advance import advance_nonsmooth_in_team
+from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
 from blocksim.kernels.nonsmooth.solve import solve_two
 from blocksim.kernels.watch import Watched
@@ -214,7 +215,7 @@ def test_members_of_an_ensemble_have_the_same_bits(begin: Callable[..., Any]) ->
     scenarios = [three_blocks({"restitution": e}) for e in (0.0, 0.1)]
     alone = [begin(scenario).to_step(400) for scenario in scenarios]
     scenes = only(build_stacks([rigid(scenario) for scenario in scenarios], NONSMOOTH)).scenes
-    codes, starts = np.zeros(2, dtype=np.int64), np.zeros((2, 8))
+    codes, starts = np.zeros(2, dtype=np.int64), np.zeros((2, len(NONSMOOTH_LEDGER) + 2))
     places, lengths = np.zeros((2, 3, 3)), np.zeros((2, 3))
     watched = Watched(np.zeros(2), np.zeros(2, dtype=np.int64), places, places, lengths, lengths)  # no frames
     advance_nonsmooth_members(scenes, np.arange(2), np.full(2, 400), starts, codes, watched)
