@@ -227,6 +227,7 @@ def test_a_run_whose_load_still_changes_does_not_end_at_rest(scheme: str) -> Non
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.usefixtures("compiler")
 def test_loads_give_the_same_bits_on_two_threads(scheme: str) -> None:
     width, height = 16, 14
     wall = {"kind": "wall", "block": "b", "rows": height, "columns": width}

@@ -70,9 +70,14 @@ def row(gap: float) -> list[dict[str, Any]]:
     return blocks
 
 
+@pytest.mark.parametrize("is_divided", [0, 1])  # in rounds of one substep, or in parts of steps
 @pytest.mark.parametrize(("gap", "within"), [(1e-4, 1e-6), (1e-5, 1e-3)])
-def test_row_of_blocks_apart_passes_a_blow_on(single: Callable[..., Simulation], gap: float, within: float) -> None:
-    run = single(row(gap), restitution=1.0, gravity=0.0, **SMOOTH).to_time(0.02)
+def test_row_of_blocks_apart_passes_a_blow_on(
+    single: Callable[..., Simulation], gap: float, within: float, is_divided: int
+) -> None:
+    run = single(row(gap), restitution=1.0, gravity=0.0, **SMOOTH)
+    run.scene.contacts.stepping[0].is_divided = is_divided
+    run.to_time(0.02)
     assert run.bodies.vx == pytest.approx([0.0, 0.0, 0.0, 0.0, 1.0], abs=within)
 
 
