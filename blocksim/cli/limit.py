@@ -29,6 +29,7 @@ from blocksim.study.rows import MOVEMENT, Row
 SHARE = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(%?)")
 PERCENT = 100.0
 OUTCOME, MOVER, MOVED, DISPLACEMENT, TURN, *_ = MOVEMENT
+UNSETTLED = "does not settle"
 HEADS = ("verdict", "outcome", "first moved", "at s", "moved mm", "turned °")
 
 
@@ -204,6 +205,8 @@ def _lines(name: str, found: LimitResult) -> list[str]:
 def _cells(value: Number, verdict: Verdict, row: Row) -> list[str]:
     if verdict is Verdict.FAILED:
         return [f"{value:.8g}", verdict.value, str(row["reason"]).splitlines()[0], *("",) * 4]
+    if OUTCOME not in row:  # it falls before time zero
+        return [f"{value:.8g}", verdict.value, UNSETTLED, *("",) * 4]
     moved = row.get(MOVED)
     first = "" if row.get(MOVER) is None else f"block {row[MOVER]}"
     return [

@@ -45,6 +45,13 @@ def test_nothing_that_changes_is_exit_code_1(blocksim: Command, golden: Golden) 
     golden(answer.out)
 
 
+def test_what_falls_before_time_zero_has_a_row(blocksim: Command) -> None:
+    answer = blocksim(*WALL, "--vary", "ground.tilt=60deg:70deg:2", "--set", "start.settle=true", *ROUGH)
+    assert answer.code == 1
+    assert answer.out.count("does not settle") == 2
+    assert max(map(len, answer.out.splitlines())) <= 80
+
+
 def test_a_range_of_friction_coefficients_that_look_like_angles_is_warned_of(blocksim: Command) -> None:
     answer = blocksim(*WALL, "--vary", "friction.block_block=25:45:2", "--set", "time.end=0.01", *ROUGH)
     warnings = [line for line in answer.err.splitlines() if line.startswith("warning: ")]
