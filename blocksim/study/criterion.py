@@ -57,13 +57,18 @@ class Criterion:
 
     def verdict(self, row: Mapping[str, object]) -> Verdict:
         """Judge a row of a sweep."""
-        if NOT_AT_REST in str(row.get("reason", "")):
+        if falls_before_zero(row):
             return Verdict.FALLS
         if row["status"] != FINISHED:
             return Verdict.FAILED
         if not self.holds(row):
             return Verdict.FALLS
         return Verdict.UNDECIDED if row.get(MOVES_ON) else Verdict.STANDS
+
+
+def falls_before_zero(row: Mapping[str, object]) -> bool:
+    """Return True for the row of a run that did not come to rest before time zero (`start.settle`)."""
+    return NOT_AT_REST in str(row.get("reason", ""))
 
 
 def read_criterion(text: str, option: str = STANDS) -> Criterion:

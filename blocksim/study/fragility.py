@@ -21,6 +21,7 @@ from blocksim.scenario import Source, document_of
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.compilation import compile_kernels, kernels_of
+from blocksim.study.criterion import falls_before_zero
 from blocksim.study.executors import Execution
 from blocksim.study.fragility_counts import Point
 from blocksim.study.fragility_plan import COLLAPSE, MEMBERS, FragilityPlan, read_fragility
@@ -209,8 +210,8 @@ def _points(plan: FragilityPlan, done: CaseIndex) -> Iterator[Point]:
             if entry is not None:
                 rows[numbers[case % len(numbers)]].append(entry.row)
     for number, found in rows.items():
-        ended = [row for row in found if row["status"] == FINISHED]
-        failures = [plan.has_failed(row) for row in ended]
+        ended = [row for row in found if row["status"] == FINISHED or falls_before_zero(row)]
+        failures = [falls_before_zero(row) or plan.has_failed(row) for row in ended]
         moving = sum(bool(row.get(MOVES_ON)) for row, fails in zip(ended, failures, strict=True) if not fails)
         yield Point(number, len(ended), sum(failures), moving, len(found) - len(ended))
 

@@ -134,6 +134,15 @@ def test_members_whose_runs_fail_count_neither_as_failures_nor_as_survivors(tmp_
         assert point.failures == point.members
 
 
+def test_members_that_do_not_come_to_rest_before_time_zero_fail(tmp_path: Path) -> None:
+    settled = SLOPE | {"start": {"settle": True}, "time": {"end": 0.01, "scheme": "nonsmooth"}}
+    friction = {"friction.block_ground": [0.3, 0.4]}
+    found = fragility(
+        settled, {"ground.tilt": ["10 deg", "60 deg"]}, friction, members=4, fails="moved > 1 m", out=tmp_path
+    )
+    assert [(point.members, point.failures, point.no_result) for point in found.points] == [(4, 0, 0), (4, 4, 0)]
+
+
 def test_survivors_that_move_on_at_the_end_are_counted(tmp_path: Path) -> None:
     found = slides(tmp_path, members=4, fails="moved > 100 m")
     assert sum(point.moving_on for point in found.points) > 0
