@@ -17,9 +17,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from blocksim.errors import BlocksimError
-from blocksim.scenario.bounded_read import read_limited
-from blocksim.scenario.models.motion import LEAST_ROWS, MAX_BYTES, MAX_ROWS, MotionTable, MotionTableError
+from blocksim.scenario.models.motion import LEAST_ROWS, MAX_ROWS, MotionTable, MotionTableError, content_of
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.units import STANDARD_GRAVITY
 
@@ -61,11 +59,7 @@ class RecordTable(MotionTable):
 
 def read_record(path: Path) -> RecordTable:
     """Read an accelerogram; raises MotionTableError with the line of the first mistake."""
-    try:
-        content = read_limited(path, MAX_BYTES, links=True)
-    except BlocksimError as error:
-        message = str(error).removeprefix(f"{path}: ")
-        raise MotionTableError(message) from None
+    content = content_of(path)
     text = content.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
     lines = [Line(number, line) for number, line in enumerate(text.split("\n"), start=1)]
     head = next((line for line in lines[:HEAD_LINES] if _size_of(line)), None)

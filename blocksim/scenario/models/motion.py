@@ -12,10 +12,10 @@ Lines that begin with `#` are notes. Times increase and are not negative; the mo
 
 import hashlib
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema, model_validator
 
@@ -102,13 +102,21 @@ class MotionTable:
         return hashlib.sha256(repr((self.quantity, self.times, self.values)).encode()).hexdigest()
 
 
-def read_motion_table(path: Path) -> MotionTable:
-    """Read a table of motion; raises MotionTableError with the line of the first mistake."""
+Samples = TypeVar("Samples", bound=MotionTable)
+
+
+def content_of(path: Path) -> bytes:
+    """Return what a file of motion holds; raises MotionTableError where it cannot be read, or is too large."""
     try:
-        content = read_limited(path, MAX_BYTES, links=True)
+        return read_limited(path, MAX_BYTES, links=True)
     except BlocksimError as error:
         message = str(error).removeprefix(f"{path}: ")
         raise MotionTableError(message) from None
+
+
+def read_motion_table(path: Path) -> MotionTable:
+    """Read a table of motion; raises MotionTableError with the line of the first mistake."""
+    content = content_of(path)
     try:
         lines = bare_rows(content)
     except UnicodeDecodeError:
@@ -161,19 +169,29 @@ def _number(line: int, text: str) -> float:
     return number
 
 
-def _table(value: object, info: ValidationInfo) -> MotionTable:
-    """Read the table; its path is relative to the scenario's folder, which is the validation context."""
-    if isinstance(value, MotionTable):
+def table_from(
+    value: object, info: ValidationInfo, kind: type[Samples], read: Callable[[Path], Samples], example: str
+) -> Samples:
+    """Return a table as it is, or read it; its path is relative to the scenario's folder, the validation context.
+
+    Raises a pydantic error with the name of the file for what `read` finds wrong, and for what is no path.
+    """
+    if isinstance(value, kind):
         return value
-    path = table_path(value, (info.context or {}).get("folder", ""), "shaking.csv")
+    path = table_path(value, (info.context or {}).get("folder", ""), example)
     try:
-        return read_motion_table(path)
+        return read(path)
     except MotionTableError as error:
         message = f"{path.name}: {error}"
         raise q.invalid(message) from None
 
 
-def _path(table: MotionTable) -> str:
+def _table(value: object, info: ValidationInfo) -> MotionTable:
+    return table_from(value, info, MotionTable, read_motion_table, "shaking.csv")
+
+
+def path_of(table: MotionTable) -> str:
+    """Return the path of a table as a scenario has it."""
     return table.path.as_posix()
 
 
@@ -186,7 +204,10 @@ class FromTable(Table):
 
     kind: Literal["table"] = Field(description="kind of motion")
     table: Annotated[
-        MotionTable, PlainValidator(_table), PlainSerializer(_path), WithJsonSchema({"type": "string", "minLength": 1})
+        MotionTable,
+        PlainValidator(_table),
+        PlainSerializer(path_of),
+        WithJsonSchema({"type": "string", "minLength": 1}),
     ] = Field(
         description="CSV table, relative to the scenario file: time_s and displacement_m, _mm or acceleration_g, _m_s2"
     )

@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self, get_args
 from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema, model_validator
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import OneOf, Table, table_path
-from blocksim.scenario.models.motion import MotionTable, MotionTableError
+from blocksim.scenario.models.base import OneOf, Table
+from blocksim.scenario.models.motion import path_of, table_from
 from blocksim.scenario.models.pulse import Acceleration
 from blocksim.scenario.record_file import UNITS, RecordTable, Unit, read_record
 
@@ -14,19 +14,7 @@ Baseline = Literal["rest", "parabolic", "none"]
 
 
 def _record(value: object, info: ValidationInfo) -> RecordTable:
-    """Read the record; its path is relative to the scenario's folder, which is the validation context."""
-    if isinstance(value, RecordTable):
-        return value
-    path = table_path(value, (info.context or {}).get("folder", ""), "record.AT2")
-    try:
-        return read_record(path)
-    except MotionTableError as error:
-        message = f"{path.name}: {error}"
-        raise q.invalid(message) from None
-
-
-def _path(table: MotionTable) -> str:
-    return table.path.as_posix()
+    return table_from(value, info, RecordTable, read_record, "record.AT2")
 
 
 class Record(Table):
@@ -40,7 +28,7 @@ class Record(Table):
     table: Annotated[
         RecordTable,
         PlainValidator(_record),
-        PlainSerializer(_path),
+        PlainSerializer(path_of),
         WithJsonSchema({"type": "string", "minLength": 1}),
     ] = Field(description="accelerogram, relative to the scenario file: PEER AT2, or text or CSV of time and value")
     unit: Annotated[Unit, OneOf(get_args(Unit))] | None = Field(
