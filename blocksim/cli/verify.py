@@ -48,7 +48,7 @@ class Scheme(StrEnum):
 
 
 def verify_command(
-    cases: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="V1 to V24 (default: all).")] = None,
+    cases: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="V1 to V25 (default: all).")] = None,
     model: Annotated[Model, typer.Option(help="Contact model.")] = Model.SURFACE,
     law: Annotated[Law, typer.Option(help="Force law.")] = Law.LINEAR,
     scheme: Annotated[Scheme, typer.Option(help="Stepping: springs or impulses.")] = Scheme.EXPLICIT,

@@ -19,6 +19,7 @@ from blocksim.kernels.arrays import (
 from blocksim.kernels.driven import book_driven, move_driven
 from blocksim.kernels.energy import weights_power
 from blocksim.kernels.forces import forces_between, forces_within
+from blocksim.kernels.inertia import note_contacts, share_out
 from blocksim.kernels.integrate import kinetic_energy, place_all_corners, renew_rotations, start_all
 from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
 from blocksim.kernels.loads import are_loads_steady, push_bodies
@@ -28,7 +29,7 @@ from blocksim.kernels.systems import Coupled, Systems, step_systems, survey_syst
 from blocksim.kernels.team import meet
 from blocksim.kernels.travel import look, outruns_lists
 
-LOOK, CHECK, MOVE, BOOK = range(4)  # what one thread does for all
+LOOK, CHECK, MOVE, BOOK, SHARE_OUT = range(5)  # what one thread does for all
 
 
 @rare_kernel
@@ -110,6 +111,8 @@ def supervise(world: World, k: int, task: int, step: float, systems: Systems | N
         elif task == MOVE:
             move_support(world, step)
             move_driven(world, step)
+        elif task == SHARE_OUT:
+            share_out(world)
         else:
             book_support(world, step)
             book_driven(world, step)
@@ -159,6 +162,7 @@ def open_call(world: World, k: int, last_step: int) -> None:
     share.next_check = (clock.steps // every + 1) * every
     share.until = 0
     share.is_too_deep = 0
+    share.asks = 0
     share.status = OVERLAP_LIMIT if has_ended(clock, clock.steps) else REACHED
 
 
@@ -199,6 +203,8 @@ def end_steps(world: World, k: int, step: float, systems: Systems | None) -> boo
     share = world.shares[k]
     if has_motion(world.controls[0]):
         supervise(world, k, BOOK, step, None)
+    if share.steps >= world.clock[0].next_share:
+        supervise(world, k, SHARE_OUT, step, None)
     if share.steps == share.next_check:
         share.next_check += world.controls[0].check_every
         share.status = supervise(world, k, CHECK, step, systems)
@@ -231,6 +237,7 @@ def march(world: World, last_step: int, k: int, team: Integers | None, systems: 
             break
         if share.steps + 1 == clock.ends_at:
             share.until = clock.ends_at
+        share.until = min(share.until, clock.next_share)
         share.steps += share.is_started
         share.is_started = 1
         if systems is not None:
@@ -241,6 +248,7 @@ def march(world: World, last_step: int, k: int, team: Integers | None, systems: 
             exchange_forces(world, k, step)
         forces_within(world, share, step, goes_on)
         note_depth(clock, share)
+        note_contacts(clock, share)
         meet(world.team)
         if not goes_on and not end_steps(world, k, step, systems):
             break

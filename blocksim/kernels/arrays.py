@@ -71,32 +71,38 @@ def on_own_lines(one: np.dtype[np.void]) -> np.dtype[np.void]:
     return np.dtype({"names": names, "formats": [one[name] for name in names], "offsets": offsets, "itemsize": size})
 
 
-# Four cache lines, of which a step needs the first three.
-BODY = joined(
-    record_type(
-        "x y angle "  # m, m, rad: centre and total turned angle of the body axes, never wrapped
-        "cos sin "  # of angle, advanced beside it and renewed at fixed steps
-        "upper_x upper_y lower_x lower_y "  # m: from the centre to the upper and the lower right corner, world axes
-        "vx vy spin "  # m/s, m/s, rad/s
-        "ax ay spin_rate "  # m/s2, m/s2, rad/s2: of the last force evaluation
-        "fx fy torque "  # N, N, N m: contact totals of the evaluation under way
-        "half_x half_y "  # m: half sides along the body's own axes
-        "inverse_mass inverse_inertia",  # 1/kg, 1/(kg m2): zero for fixed bodies and the ground
-        indices="contact_class",  # index into the interaction table; class 0 is the ground
-        small="pairs_now pairs_before",  # pairs in contact in this evaluation and the one before
-        flags="pairs_changed "  # flag: those two differ
-        "faces corners "  # bits of those that can touch; pieces of ground have their upper face and its free ends,
-        # and in bits 4 and 5 of corners whether those at the right and left are sharper than a right angle
-        "is_moved "  # 0 for free bodies, else SUPPORT, DRIVEN or REMOVED: what moves it
-        "counts",  # flag: forces on it matter, as it is free, driven, or moves with the support
-    ),
-    record_type(
-        "radius "  # m: half diagonal
-        "mass inertia "  # kg, kg m2 about the centre, out of the plane: zero for fixed bodies too
-        "list_x list_y list_angle",  # m, m, rad: where the body was when the pair list was made
-        indices="first_particle particle_count",  # its part of the particles
-        small="row_x row_y",  # intervals between particles on the faces along x and along y
-    ),
+# Five cache lines, of which a step needs the first three.
+BODY = on_own_lines(
+    joined(
+        record_type(
+            "x y angle "  # m, m, rad: centre and total turned angle of the body axes, never wrapped
+            "cos sin "  # of angle, advanced beside it and renewed at fixed steps
+            "upper_x upper_y lower_x lower_y "  # m: from the centre to the upper and the lower right corner, world axes
+            "vx vy spin "  # m/s, m/s, rad/s
+            "ax ay spin_rate "  # m/s2, m/s2, rad/s2: of the last force evaluation
+            "fx fy torque "  # N, N, N m: contact totals of the evaluation under way
+            "half_x half_y "  # m: half sides along the body's own axes
+            "inverse_mass inverse_inertia",  # 1/kg, 1/(kg m2): zero for fixed bodies and the ground
+            indices="contact_class",  # index into the interaction table; class 0 is the ground
+            small="pairs_now pairs_before",  # pairs in contact in this evaluation and the one before
+            flags="pairs_changed sums_changed "  # flags: those two differ; there are new sums, see inertia.py
+            "faces corners "  # bits of those that can touch; pieces of ground have their upper face and its free ends,
+            # and in bits 4 and 5 of corners whether those at the right and left are sharper than a right angle
+            "is_moved "  # 0 for free bodies, else SUPPORT, DRIVEN or REMOVED: what moves it
+            "counts",  # flag: forces on it matter, as it is free, driven, or moves with the support
+        ),
+        record_type(
+            "radius "  # m: half diagonal
+            "mass inertia "  # kg, kg m2 about the centre, out of the plane: zero for fixed bodies too
+            "list_x list_y list_angle "  # m, m, rad: where the body was when the pair list was made
+            "k_xx k_xy k_yy "  # N/m: stiffness of all contacts along their normals; see inertia.py
+            "k_x k_y",  # N: the same times the lever arms of the normals
+            indices="first_particle particle_count",  # its part of the particles
+            small="row_x row_y "  # intervals between particles on the faces along x and along y
+            "seats coming "  # pairs in those sums; pairs about to touch
+            "is_asked",  # flag: contacts of one of its pairs have changed, or its sums are being made
+        ),
+    )
 )
 PARTICLE = record_type(
     "x y "  # m: place in the body frame
@@ -106,11 +112,15 @@ PARTICLE = record_type(
     "share"  # -: tributary length over face length, summed over both faces at a corner that is one particle
 )
 PAIR = record_type(
-    "limit",  # m: a deeper overlap ends the run
+    "limit "  # m: a deeper overlap ends the run
+    "stiffness "  # of each of its corner contacts, in units of normal_stiffness; see tributary.py
+    "slide turn",  # how that changes with the slip of a ahead of b, per m, and by turning a, per rad
     indices="a b",  # bodies, sorted
     small="near active "  # number of candidate slots; of contacts
     "idle",  # candidates that are neither in contact nor a twin
-    flags="twins "  # bits of the slots whose corner is in touch, but marks the same end of a face contact as another
+    flags="bearing "  # PLANE, ENDS or APART: what its contacts are; see tributary.py
+    "is_coming "  # flag: about to touch
+    "twins "  # bits of the slots whose corner is in touch, but marks the same end of a face contact as another
     "axis "  # along which the two were apart when last looked at; 0, 1: x, y of body b, 2, 3: of body a
     "is_between "  # flag: its bodies are of two shares
     "normal_left shear_left "  # steps until the dashpots along normals and tangents are made again
@@ -141,7 +151,7 @@ POINT = record_type(
     "normal_arm_a normal_arm_b shear_arm_a shear_arm_b "  # m: lever arms of normal and tangent about both bodies
     "closing slipping "  # m: relative displacement of the last drift, against the normal and along the tangent
     "closing_rate slip_rate "  # m/s: the same as rates at the end of the drift, predicted
-    "share "  # -: stiffness over that of a corner contact
+    "share "  # -: stiffness over that of a corner contact, in the models with particles
     "weight drawn "  # first steps of a contact: weight of the dashpot, share of the drift that draws the shear spring
     "stiffness rate before force "  # N/m, m/s, N, N: of the pass under way; force of the step before; force now
     "spring_force normal_force limit "  # N: spring of the pass under way; normal total; Coulomb limit of the other
@@ -156,7 +166,8 @@ NORMAL, SHEAR = 0, 1
 AHEAD, BACK = 1, 2
 CONTROLS = record_type(
     "step gravity_x gravity_y "  # s, m/s2
-    "skin rest_speed "  # m: reach of the pair list beyond contact; m/s
+    "skin rest_speed "  # m: bodies may move by 0.4 of it before the pair list is made again; m/s
+    "approach "  # m: closer bodies are always listed; see kernels/inertia.py
     "motion_x motion_y "  # -: direction of the support's motion, both zero without one
     "max_overlap "  # m, zero: a share of the smallest side of each pair
     "push loads_end "  # m/s2: no load gives any point more; s: from then on none changes with time
@@ -170,6 +181,7 @@ CLOCK = record_type(
     "",
     "steps checks_at_rest pair_count rebuilds motion_piece "
     "next_look "  # step at which the bodies' travel since the last pair list is looked at again
+    "next_share last_share last_sums "  # steps at which sums of stiffness are, were looked at, and all were made
     "ends_at "  # step at which the run ends, as two bodies were found too deep in one another; 0: none
     "is_started",  # flag
 )
@@ -178,7 +190,8 @@ ACTION = record_type(
     "fx fy torque_a torque_b "  # N, N m: force of a pair on body a and its torque; torque on b is against torque_b
     "dashpot friction broken",  # J: lost in the drift that led here
     indices="pair",  # its number
-    flags="touches is_changed "  # whether it has contacts; whether they have changed
+    flags="touches is_changed "  # whether it has contacts; whether it was none of steady.py's
+    "asks "  # whether its number of contacts has changed
     "is_too_deep",  # whether its bodies lie deeper in one another than they may
 )
 SHARE = on_own_lines(
@@ -194,7 +207,8 @@ SHARE = on_own_lines(
         "first_between last_between "  # those of them whose body b is of another share, among all such
         "next_pair next_between "  # where the evaluation of those is
         "first_task last_task",  # pairs between shares that this thread evaluates
-        flags="is_too_deep",  # whether any pair that it has evaluated is
+        flags="is_too_deep "  # whether any pair that it has evaluated is
+        "asks",  # whether the number of contacts of any has changed
     )
 )
 # words of World.team, each on a cache line of its own: how many threads take part, have arrived at the meeting under

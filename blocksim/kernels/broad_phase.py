@@ -14,6 +14,7 @@ from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.models import near_slots
 from blocksim.kernels.support import has_motion
 
+TRAVELLED = 0.8  # of the skin, by which two bodies may have come nearer since the list was made
 FARTHEST_CELL = 1e9  # bodies beyond it share cells
 PRIME_COLUMN, PRIME_ROW = 73856093, 19349663  # M. Teschner et al., Proc. VMV (2003) 47-54
 
@@ -30,17 +31,28 @@ def are_near(body: Record, other: Record, reach: float) -> bool:
 
 
 @rare_kernel
+def list_reach(controls: Record) -> float:
+    """Return up to which gap (m) two bodies are listed: they may move by 0.8 of the skin, and be on approach then."""
+    return max(controls.skin, TRAVELLED * controls.skin + controls.approach)
+
+
+@rare_kernel
 def add_pair(world: World, count: int, a: int, b: int) -> int:
     """Append a pair with its candidate slots, if it has any and there is room; return the count needed."""
     fits = count < world.spare_pairs.size
     row = count if fits else world.spare_pairs.size - 1
-    near = near_slots(world, a, b, world.controls[0].skin, world.spare_candidates[row])
+    near = near_slots(world, a, b, list_reach(world.controls[0]), world.spare_candidates[row])
     if near > 0 and fits:
         pair = world.spare_pairs[count]
         pair.a = a
         pair.b = b
         pair.near = near
         pair.limit = overlap_limit(world.bodies[a], world.bodies[b], world.controls[0].max_overlap)
+        pair.stiffness = 0.0
+        pair.slide = 0.0
+        pair.turn = 0.0
+        pair.bearing = 0
+        pair.is_coming = 0
         pair.active = 0
         pair.twins = 0
         pair.axis = 0
@@ -92,7 +104,7 @@ def insert_sorted(row: Integers, count: int, j: int) -> int:
 @rare_kernel
 def neighbours_in_cell(world: World, i: int, column: int, row: int, count: int) -> int:
     """Add the bodies after i in one cell that are within the skin of it to the work space; return their number."""
-    reach = world.controls[0].skin
+    reach = list_reach(world.controls[0])
     j = world.heads[bucket(column, row, world.heads.size)]
     while j > 0:
         if j - 1 > i and are_near(world.bodies[i], world.bodies[j - 1], reach):
@@ -106,7 +118,7 @@ def neighbours_of_large(world: World, i: int) -> int:
     """Write the bodies after i that are within the skin of it into the work space, sorted; return their number."""
     count = 0
     for j in range(i + 1, world.bodies.size - 1):
-        if are_near(world.bodies[i], world.bodies[j], world.controls[0].skin):
+        if are_near(world.bodies[i], world.bodies[j], list_reach(world.controls[0])):
             world.neighbours[count] = j
             count += 1
     return count
@@ -126,7 +138,7 @@ def neighbours_of(world: World, i: int) -> int:
         for y in range(row - 1, row + 2):
             count = neighbours_in_cell(world, i, x, y, count)
     for j in world.large:
-        if j > i and are_near(body, world.bodies[j], controls.skin):
+        if j > i and are_near(body, world.bodies[j], list_reach(controls)):
             count = insert_sorted(world.neighbours, count, j)
     return count
 
@@ -136,7 +148,7 @@ def collect_pairs(world: World) -> int:
     """Write all pairs within reach into the spare list, sorted; return how many there are, fitting or not."""
     bodies = world.bodies
     ground = bodies.size - 1
-    reach = world.controls[0].skin
+    reach = list_reach(world.controls[0])
     count = 0
     fill_grid(world)
     for i in range(ground):
@@ -181,6 +193,10 @@ def carry_history(world: World, count: int) -> None:
             new.axis = world.pairs[q].axis
             if world.pairs[q].active > 0:
                 new.active = world.pairs[q].active
+                new.stiffness = world.pairs[q].stiffness
+                new.bearing = world.pairs[q].bearing
+                new.slide = world.pairs[q].slide
+                new.turn = world.pairs[q].turn
                 new.twins = world.pairs[q].twins
                 new.normal_left = world.pairs[q].normal_left
                 new.shear_left = world.pairs[q].shear_left

@@ -9,6 +9,7 @@ continue as they were, which is what nearly all pairs do at nearly all steps.
 """
 
 from blocksim.kernels.arrays import NORMAL, SHEAR, Record, World
+from blocksim.kernels.bearing import measure
 from blocksim.kernels.coupled import MOBILITY, add_coupled_dashpots, fill_mobility
 from blocksim.kernels.damping import (
     BOTH,
@@ -28,11 +29,12 @@ from blocksim.kernels.damping import (
 from blocksim.kernels.depth import is_too_deep
 from blocksim.kernels.friction import clip_to_cone, draw_spring
 from blocksim.kernels.history import change_contacts, keep_places
+from blocksim.kernels.inertia import Piece, piece_of
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.kinematics import coupling, mutual_mass, resolve_point, weigh_onset
-from blocksim.kernels.laws import elastic_force, has_constant_stiffness, tangent_stiffness
-from blocksim.kernels.memory import normal_loss, shear_loss, shear_stiffness_before
-from blocksim.kernels.models import contact_points
+from blocksim.kernels.laws import elastic_force, has_constant_stiffness, stored_energy, tangent_stiffness
+from blocksim.kernels.memory import normal_loss, shear_loss, shear_stiffness_before, stiffness_before
+from blocksim.kernels.models import SURFACE, contact_points
 
 IMPACT_STEPS = 10.0  # an impact lasts some thirty steps; a face lost in a third of that cannot stop a corner
 
@@ -89,8 +91,14 @@ def shared_step(a: Record, b: Record, step: float) -> float:
 
 
 @kernel
-def has_new_neighbours(a: Record, b: Record) -> bool:
-    """Return True if the number of pairs on a free body has changed, which makes operators of the old one void."""
+def has_new_neighbours(a: Record, b: Record, model: int) -> bool:
+    """Return True if operators of a pair are void, since others bear its bodies now.
+
+    Where particles touch, this is after the number of pairs on a body has changed, else when there are new sums; see
+    inertia.py.
+    """
+    if model == SURFACE:
+        return (a.sums_changed | b.sums_changed) != 0
     return (a.pairs_changed | b.pairs_changed) != 0
 
 
@@ -112,6 +120,21 @@ def damp(world: World, p: int, count: int, direction: int, pattern: int, ratio: 
 
 
 @rare_kernel
+def pieces_of(world: World, p: int, count: int, direction: int) -> tuple[Piece, Piece]:
+    """Return what of both bodies the dashpots of a pair with one or two points stand for."""
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    one = world.points[0]
+    two = world.points[count - 1]
+    stiffness = count * pair.stiffness
+    mean_a = 0.5 * (one.normal_arm_a + two.normal_arm_a)
+    mean_b = 0.5 * (one.normal_arm_b + two.normal_arm_b)
+    of_a = piece_of(a, stiffness, one.nx, one.ny, mean_a, direction)
+    return of_a, piece_of(b, stiffness, one.nx, one.ny, mean_b, direction)
+
+
+@rare_kernel
 def fill_operator(world: World, p: int, count: int, direction: int, pattern: int, ratio: float, step: float) -> None:
     """Make the operator of one or two points again; a weight of a first step holds for this step only."""
     pair = world.pairs[p]
@@ -121,12 +144,13 @@ def fill_operator(world: World, p: int, count: int, direction: int, pattern: int
     one = world.points[0]
     two = world.points[count - 1]
     half = 0.5 * step
-    m_one = mutual_mass(one, one, a, b, direction)
-    m_mixed = mutual_mass(one, two, a, b, direction)
-    m_two = mutual_mass(two, two, a, b, direction)
+    of_a, of_b = pieces_of(world, p, count, direction)
+    m_one = mutual_mass(one, one, of_a, of_b, direction)
+    m_mixed = mutual_mass(one, two, of_a, of_b, direction)
+    m_two = mutual_mass(two, two, of_a, of_b, direction)
     if direction == NORMAL and pair.slides != 0:
         values = world.interactions[a.contact_class, b.contact_class]
-        m_one = m_mixed = m_two = sliding_mass(m_one, coupling(one, a, b), values.kinetic_friction, pair.slides)
+        m_one = m_mixed = m_two = sliding_mass(m_one, coupling(one, of_a, of_b), values.kinetic_friction, pair.slides)
     keep_masses(operator, half, m_one, m_mixed, m_two)
     if pattern == 1:
         fill_single(operator, 0, ratio, half, m_one, one.stiffness, one.weight)
@@ -184,9 +208,10 @@ def foresee_slip(pair: Record, point: Record, values: Record) -> None:
 def normal_pass(world: World, p: int, count: int, values: Record, step: float) -> None:
     """Springs and dashpots along the normals."""
     law = world.controls[0].law
-    for i in range(count):
-        push_spring(world.points[i], world.contacts[p, i], law, values.normal_stiffness)
     pair = world.pairs[p]
+    stiffness = pair.stiffness if world.controls[0].model == SURFACE else values.normal_stiffness
+    for i in range(count):
+        push_spring(world.points[i], world.contacts[p, i], law, stiffness)
     if count > 1:
         pair.slides = 0
     elif world.points[0].drawn < 1.0:
@@ -196,18 +221,19 @@ def normal_pass(world: World, p: int, count: int, values: Record, step: float) -
 
 
 @rare_kernel
-def draw_springs(world: World, p: int, count: int, values: Record, book: Record) -> int:
+def draw_springs(world: World, p: int, count: int, values: Record, before: float, book: Record) -> int:
     """Clip the normal forces and stretch the shear springs; return the bits of the points that stick.
 
-    Beyond two points only zero or not zero counts.
+    Beyond two points only zero or not zero counts. `before` is the stiffness of corners in the step before.
     """
     law = world.controls[0].law
     sticking = 0
     for i in range(count):
         point = world.points[i]
         contact = world.contacts[p, i]
-        old_stiffness = shear_stiffness_before(contact, values, law, world.particles)
-        book.dashpot += clip_tension(point, normal_loss(contact, values, law, world.particles))
+        of_spring = stiffness_before(contact, before, values, world.particles)
+        old_stiffness = shear_stiffness_before(contact, of_spring, values, law)
+        book.dashpot += clip_tension(point, normal_loss(contact, of_spring, law))
         stiffness = values.shear_ratio * point.stiffness
         slip = point.slipping
         spring, point.limit, slides, friction_work = draw_spring(
@@ -227,9 +253,9 @@ def draw_springs(world: World, p: int, count: int, values: Record, book: Record)
 
 
 @rare_kernel
-def shear_pass(world: World, p: int, count: int, values: Record, step: float, book: Record) -> None:
+def shear_pass(world: World, p: int, count: int, values: Record, before: float, step: float, book: Record) -> None:
     """Clip the normal forces; springs with history along the tangents and dashpots where a point sticks."""
-    sticking = draw_springs(world, p, count, values, book)
+    sticking = draw_springs(world, p, count, values, before, book)
     pair = world.pairs[p]
     if pair.sticking != sticking or sticking == 0:
         pair.shear_left = 0
@@ -246,17 +272,22 @@ def shear_pass(world: World, p: int, count: int, values: Record, step: float, bo
 
 
 @rare_kernel
-def force_pass(world: World, count: int, action: Record) -> None:
+def force_pass(world: World, p: int, count: int, action: Record) -> None:
     """Sum all forces of the pair.
 
-    `force` is the resistance to slip of a ahead of b, along the tangent (-ny, nx).
+    `force` is the resistance to slip of a ahead of b, along the tangent (-ny, nx). To it comes what a change of the
+    stiffness does; see tributary.py.
     """
+    pair = world.pairs[p]
+    law = world.controls[0].law
     for i in range(count):
         point = world.points[i]
-        action.fx += point.nx * point.normal_force + point.ny * point.force
-        action.fy += point.ny * point.normal_force - point.nx * point.force
-        action.torque_a += point.normal_arm_a * point.normal_force - point.shear_arm_a * point.force
-        action.torque_b += point.normal_arm_b * point.normal_force - point.shear_arm_b * point.force
+        along = point.force + stored_energy(law, pair.slide, point.depth)
+        couple = stored_energy(law, pair.turn, point.depth)
+        action.fx += point.nx * point.normal_force + point.ny * along
+        action.fy += point.ny * point.normal_force - point.nx * along
+        action.torque_a += point.normal_arm_a * point.normal_force - point.shear_arm_a * along - couple
+        action.torque_b += point.normal_arm_b * point.normal_force - point.shear_arm_b * along - couple
     action.touches = 1
 
 
@@ -272,6 +303,7 @@ def clear_action(action: Record) -> None:
     action.broken = 0.0
     action.touches = 0
     action.is_changed = 1
+    action.asks = 0
     action.is_too_deep = 0
 
 
@@ -286,6 +318,8 @@ def pair_forces(world: World, p: int, step: float) -> None:
     clear_action(action)
     count = contact_points(world, p)
     action.is_too_deep = is_too_deep(world, p, count)
+    model = world.controls[0].model
+    action.asks = count != pair.active and model == SURFACE
     if count == 0:
         if pair.active > 0:
             change_contacts(world, p, 0, step, action)
@@ -293,11 +327,14 @@ def pair_forces(world: World, p: int, step: float) -> None:
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
     values = world.interactions[a.contact_class, b.contact_class]
-    if has_new_neighbours(a, b) or not has_constant_stiffness(world.controls[0].law):
+    if has_new_neighbours(a, b, model) or not has_constant_stiffness(world.controls[0].law):
         renew_dashpots(pair)
     resolve_points(world, p, count, step, action)
-    shared = shared_step(a, b, step)
+    before = pair.stiffness
+    if model == SURFACE:
+        measure(world, p, count, values.normal_stiffness)
+    shared = step if model == SURFACE else shared_step(a, b, step)
     normal_pass(world, p, count, values, shared)
-    shear_pass(world, p, count, values, shared, action)
-    force_pass(world, count, action)
+    shear_pass(world, p, count, values, before, shared, action)
+    force_pass(world, p, count, action)
     keep_places(world, p, count)

@@ -26,7 +26,7 @@ from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.matrices import RANK_TOLERANCE, inverse_root_2
 
 BOTH = 3  # pattern of two points with a dashpot
-OPERATOR_LIFE = 16  # steps
+OPERATOR_LIFE = 32  # steps
 LEAST_MASS_SHARE = 0.1  # of the inverse mass without friction
 
 

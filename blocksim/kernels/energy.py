@@ -6,7 +6,7 @@ from blocksim.kernels.arrays import ALL, Floats, Record, Records, World
 from blocksim.kernels.integrate import kinetic_energy
 from blocksim.kernels.jit import entry_kernel, rare_kernel
 from blocksim.kernels.laws import stored_energy
-from blocksim.kernels.memory import share_before, shear_stiffness_before
+from blocksim.kernels.memory import shear_stiffness_before, stiffness_before
 
 LEDGER_ROW = (
     "kinetic",
@@ -58,9 +58,9 @@ def contact_summary(world: World) -> tuple[float, float, int, float]:
             values = world.interactions[world.bodies[pair.a].contact_class, world.bodies[pair.b].contact_class]
             for k in range(pair.active):
                 contact = world.contacts[p, k]
-                share = share_before(contact, world.particles)
-                stiffness = shear_stiffness_before(contact, values, law, world.particles)
-                normal += stored_energy(law, values.normal_stiffness * share, contact.depth)
+                of_spring = stiffness_before(contact, pair.stiffness, values, world.particles)
+                stiffness = shear_stiffness_before(contact, of_spring, values, law)
+                normal += stored_energy(law, of_spring, contact.depth)
                 shear += 0.5 * stiffness * contact.spring * contact.spring
                 count += 1
                 largest = max(largest, contact.depth)

@@ -9,6 +9,13 @@ from blocksim.kernels.steady import CHANGED, TOUCHING, steady_forces
 
 
 @rare_kernel
+def note(share: Record, action: Record) -> None:
+    """Note of a pair that was evaluated what all threads have to know after the step."""
+    share.is_too_deep |= action.is_too_deep
+    share.asks |= action.asks
+
+
+@rare_kernel
 def forces_between(world: World, share: Record, step: float) -> None:
     """Evaluate a thread's part of the pairs between shares after a drift of `step` (s), and keep what they do."""
     for m in range(share.first_task, share.last_task):
@@ -16,7 +23,7 @@ def forces_between(world: World, share: Record, step: float) -> None:
         kind, effect = steady_forces(world, p, step, world.particles)
         if kind == CHANGED:
             pair_forces(world, p, step)
-            share.is_too_deep |= world.action[0].is_too_deep
+            note(share, world.action[0])
             world.between[m] = world.action[0]
             world.between[m].pair = p
         else:
@@ -61,7 +68,7 @@ def forces_of_group(world: World, share: Record, end: int, step: float, book: Re
                 friction += effect.friction
             elif kind == CHANGED:
                 changed_forces(world, p, step, book)
-                share.is_too_deep |= world.action[0].is_too_deep
+                note(share, world.action[0])
         p += 1
     share.next_pair = p
     book.dashpot += dashpot

@@ -3,7 +3,7 @@
 import math
 
 from blocksim.kernels.arrays import Record
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.jit import kernel, rare_kernel
 
 # beyond this multiple of the transition speed the static share is below double precision
 FULLY_KINETIC = 40.0
@@ -51,7 +51,7 @@ def draw_spring(
     falls the spring is kept and the force falls with it (C. Thornton, J. Appl. Mech. 64 (1997) 160-164). Both lose
     energy and neither creates any: F^2/2 (1/k0 - 1/k1) and (k0 - k1) s (s + ds)/2.
     """
-    kept = old * (old_stiffness / stiffness) if stiffness > old_stiffness else old
+    kept = old * min(old_stiffness / stiffness, 1.0)
     spring = kept + slip * drawn
     needed = stiffness * abs(spring)
     limit = coulomb_limit(values, normal_force, rate, needed)
@@ -75,6 +75,24 @@ def draw_same_spring(
         return spring, limit, False, 0.0
     spring = math.copysign(limit / stiffness, spring)
     return spring, limit, True, 0.5 * stiffness * ((old + spring) * slip - (spring - old) * (spring + old))
+
+
+@rare_kernel
+def draw_changed_spring(
+    values: Record, stiffness: float, old_stiffness: float, old: float, slip: float, normal_force: float, rate: float
+) -> tuple[float, float, bool, float]:
+    """As draw_spring, over the whole drift; kept out of the hot path."""
+    return draw_spring(values, stiffness, old_stiffness, old, slip, 1.0, normal_force, rate)
+
+
+@kernel
+def draw_lasting_spring(
+    values: Record, stiffness: float, old_stiffness: float, old: float, slip: float, normal_force: float, rate: float
+) -> tuple[float, float, bool, float]:
+    """As draw_spring, over the whole drift, quick where the stiffness has not changed."""
+    if stiffness == old_stiffness:
+        return draw_same_spring(values, stiffness, old, slip, normal_force, rate)
+    return draw_changed_spring(values, stiffness, old_stiffness, old, slip, normal_force, rate)
 
 
 @kernel

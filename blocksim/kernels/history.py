@@ -10,7 +10,7 @@ from blocksim.kernels.broad_phase import idle_candidates
 from blocksim.kernels.damping import renew_dashpots
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.kinematics import has_just_begun, resolve_point, weigh_first_step
-from blocksim.kernels.memory import normal_loss, shear_loss, shear_stiffness_before
+from blocksim.kernels.memory import normal_loss, shear_loss, shear_stiffness_before, stiffness_before
 from blocksim.kernels.models import SURFACE, place_ended
 from blocksim.kernels.models.surface import slot_normal
 from blocksim.kernels.models.twins import PARALLEL
@@ -91,8 +91,9 @@ def release(world: World, p: int, old: Record, step: float, book: Record) -> Non
     point = world.points[world.points.size - 1]
     place_ended(world, p, old, point)
     resolve_point(point, a, b, step)
-    stiffness = shear_stiffness_before(old, values, law, world.particles)
-    lost = normal_loss(old, values, law, world.particles) * point.closing
+    of_spring = stiffness_before(old, pair.stiffness, values, world.particles)
+    stiffness = shear_stiffness_before(old, of_spring, values, law)
+    lost = normal_loss(old, of_spring, law) * point.closing
     book.dashpot += 0.5 * (lost + shear_loss(old, stiffness) * point.slipping)
     book.broken += 0.5 * stiffness * old.spring * (old.spring + point.slipping)
 

@@ -64,6 +64,7 @@ def finish_step(body: Record, controls: Record, step: float) -> None:
         body.vy += half * body.ay
         body.spin += half * body.spin_rate
         body.pairs_changed = body.pairs_now != body.pairs_before
+        body.sums_changed = 0
         body.pairs_before = body.pairs_now
         body.pairs_now = 0
         body.fx = 0.0

@@ -1,6 +1,7 @@
 """Rates, displacements and inverse masses at the contact points of one pair, along the normals or the tangents."""
 
 from blocksim.kernels.arrays import NORMAL, Record
+from blocksim.kernels.inertia import Piece, inverse_mass_of
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.laws import dashpot_weight
 
@@ -71,23 +72,21 @@ def weigh_onset(point: Record, law: int) -> None:
 
 
 @rare_kernel
-def coupling(point: Record, a: Record, b: Record) -> float:
+def coupling(point: Record, of_a: Piece, of_b: Piece) -> float:
     """Return the inverse mass (1/kg) that couples normal and tangent of a point, by its arms about both centres."""
-    of_a = point.normal_arm_a * point.shear_arm_a * a.inverse_inertia
-    return of_a + point.normal_arm_b * point.shear_arm_b * b.inverse_inertia
+    turning_a = (point.normal_arm_a - of_a.arm) * point.shear_arm_a * of_a.inverse_inertia
+    return turning_a + (point.normal_arm_b - of_b.arm) * point.shear_arm_b * of_b.inverse_inertia
 
 
 @rare_kernel
-def mutual_mass(one: Record, two: Record, a: Record, b: Record, direction: int) -> float:
+def mutual_mass(one: Record, two: Record, of_a: Piece, of_b: Piece, direction: int) -> float:
     """Return the inverse mass (1/kg) J M^-1 J^T that two points see of one another, along normals or tangents.
 
     Tangents enclose the angle of the normals, so that one formula for the translation serves both directions.
     """
+    cosine = one.nx * two.nx + one.ny * two.ny
     if direction == NORMAL:
-        arms_a = one.normal_arm_a * two.normal_arm_a
-        arms_b = one.normal_arm_b * two.normal_arm_b
+        arms_a, arms_b = (one.normal_arm_a, two.normal_arm_a), (one.normal_arm_b, two.normal_arm_b)
     else:
-        arms_a = one.shear_arm_a * two.shear_arm_a
-        arms_b = one.shear_arm_b * two.shear_arm_b
-    translation = (one.nx * two.nx + one.ny * two.ny) * (a.inverse_mass + b.inverse_mass)
-    return translation + arms_a * a.inverse_inertia + arms_b * b.inverse_inertia
+        arms_a, arms_b = (one.shear_arm_a, two.shear_arm_a), (one.shear_arm_b, two.shear_arm_b)
+    return inverse_mass_of(arms_a[0], arms_b[0], arms_a[1], arms_b[1], cosine, of_a, of_b)

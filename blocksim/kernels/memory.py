@@ -6,24 +6,22 @@ from blocksim.kernels.laws import elastic_force, tangent_stiffness
 
 
 @kernel
-def share_before(contact: Record, particles: Records | None) -> float:
-    """Return the share of stiffness that a contact had; corners (no particles) have all of it."""
+def stiffness_before(contact: Record, of_corners: float, values: Record, particles: Records | None) -> float:
+    """Return the stiffness that a contact had, in units of `normal_stiffness`; `of_corners` is that of its pair."""
     if particles is None:
-        return 1.0
-    return contact.share
+        return of_corners
+    return values.normal_stiffness * contact.share
 
 
 @kernel
-def shear_stiffness_before(contact: Record, values: Record, law: int, particles: Records | None) -> float:
-    """Return the stiffness (N/m) that the shear spring had."""
-    stiffness = values.normal_stiffness * share_before(contact, particles)
+def shear_stiffness_before(contact: Record, stiffness: float, values: Record, law: int) -> float:
+    """Return the stiffness (N/m) that the shear spring of a contact had; `stiffness` as above."""
     return values.shear_ratio * tangent_stiffness(law, stiffness, contact.depth)
 
 
 @kernel
-def normal_loss(contact: Record, values: Record, law: int, particles: Records | None) -> float:
-    """Return the part (N) of the normal force that was dashpot, less what clipping took."""
-    stiffness = values.normal_stiffness * share_before(contact, particles)
+def normal_loss(contact: Record, stiffness: float, law: int) -> float:
+    """Return the part (N) of the normal force that was dashpot, less what clipping took; `stiffness` as above."""
     return contact.normal_force - elastic_force(law, stiffness, contact.depth)
 
 

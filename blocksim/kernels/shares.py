@@ -106,6 +106,15 @@ def keep(action: Record, effect: Effect, touches: bool) -> None:
     action.friction = effect.friction
     action.touches = touches
     action.is_changed = 0
+    action.asks = 0
+
+
+@rare_kernel
+def ask_for_sums(world: World, pair: Record) -> None:
+    """Have the sums of the bodies of a pair made again, of the second one only where it is of the share."""
+    world.bodies[pair.a].is_asked = 1
+    if not pair.is_between:
+        world.bodies[pair.b].is_asked = 1
 
 
 @rare_kernel
@@ -115,6 +124,8 @@ def add_kept(world: World, pair: Record, action: Record, book: Record) -> tuple[
     Losses of changed contacts go into the book at once, others are returned (J, to dashpots and friction): which, must
     not depend on who evaluates a pair, since a sum in another order has other bits.
     """
+    if action.asks:
+        ask_for_sums(world, pair)
     if action.touches:
         add_to_first(world.bodies[pair.a], action.fx, action.fy, action.torque_a)
         if not pair.is_between:
@@ -133,5 +144,7 @@ def add_from_before(world: World, share: Record) -> None:
     for m in range(share.first_between):
         action = world.between[m]
         b = world.pairs[action.pair].b
-        if action.touches and share.first_body <= b < share.last_body:
-            add_to_second(world.bodies[b], action.fx, action.fy, action.torque_b)
+        if share.first_body <= b < share.last_body:
+            world.bodies[b].is_asked |= action.asks
+            if action.touches:
+                add_to_second(world.bodies[b], action.fx, action.fy, action.torque_b)

@@ -8,7 +8,7 @@ import math
 from typing import NamedTuple
 
 from blocksim.kernels.arrays import HALF, NORMAL, SHEAR, Record
-from blocksim.kernels.contact import IMPACT_STEPS, shared_step
+from blocksim.kernels.contact import IMPACT_STEPS
 from blocksim.kernels.damping import (
     BOTH,
     OPERATOR_LIFE,
@@ -19,6 +19,7 @@ from blocksim.kernels.damping import (
     sliding_mass,
 )
 from blocksim.kernels.geometry import corner_offset
+from blocksim.kernels.inertia import Piece, inverse_mass_of, piece_of
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.models.twins import CONE_TOLERANCE, corner_signs
 
@@ -130,6 +131,15 @@ def arms(spot: Spot, dx: float, dy: float, direction: int) -> tuple[float, float
     return arm - (dx * spot.nx + dy * spot.ny), arm
 
 
+@kernel
+def pieces_of(
+    a: Record, b: Record, spot: Spot, arm_a: float, arm_b: float, stiffness: float, direction: int
+) -> tuple[Piece, Piece]:
+    """Return what of both bodies the dashpots of a pair stand for; mean arms (m) of its normals, stiffness (N/m)."""
+    of_a = piece_of(a, stiffness, spot.nx, spot.ny, arm_a, direction)
+    return of_a, piece_of(b, stiffness, spot.nx, spot.ny, arm_b, direction)
+
+
 @rare_kernel
 def renew_single(
     operator: Record,
@@ -142,10 +152,14 @@ def renew_single(
     step: float,
     stiffness: float,
 ) -> None:
-    """Make the operator of a single contact again."""
-    arm_a, arm_b = arms(spot, a.x - b.x, a.y - b.y, direction)
-    mass = a.inverse_mass + b.inverse_mass + arm_a * arm_a * a.inverse_inertia + arm_b * arm_b * b.inverse_inertia
-    half = 0.5 * shared_step(a, b, step)
+    """Make the operator of a single contact again; `stiffness` (N/m) is that along the direction."""
+    dx = a.x - b.x
+    dy = a.y - b.y
+    normal_a, normal_b = arms(spot, dx, dy, NORMAL)
+    of_a, of_b = pieces_of(a, b, spot, normal_a, normal_b, pair.stiffness, direction)
+    arm_a, arm_b = arms(spot, dx, dy, direction)
+    mass = inverse_mass_of(arm_a, arm_b, arm_a, arm_b, 1.0, of_a, of_b)
+    half = 0.5 * step
     keep_masses(operator, half, mass, mass, mass)
     keep_dashpots(pair, direction, 1, OPERATOR_LIFE if half > 0.0 else 0)
     fill_single(operator, 0, ratio, half, mass, stiffness, 1.0)
@@ -156,15 +170,18 @@ def renew_sliding(
     operator: Record, pair: Record, a: Record, b: Record, spot: Spot, values: Record, step: float
 ) -> None:
     """Make the operator along the normal of a single contact that slides again."""
-    arm_a, arm_b = arms(spot, a.x - b.x, a.y - b.y, NORMAL)
-    shear_a, shear_b = arms(spot, a.x - b.x, a.y - b.y, SHEAR)
-    mass = a.inverse_mass + b.inverse_mass + arm_a * arm_a * a.inverse_inertia + arm_b * arm_b * b.inverse_inertia
-    mixed = arm_a * shear_a * a.inverse_inertia + arm_b * shear_b * b.inverse_inertia
+    dx = a.x - b.x
+    dy = a.y - b.y
+    arm_a, arm_b = arms(spot, dx, dy, NORMAL)
+    shear_a, shear_b = arms(spot, dx, dy, SHEAR)
+    of_a, of_b = pieces_of(a, b, spot, arm_a, arm_b, pair.stiffness, NORMAL)
+    mass = inverse_mass_of(arm_a, arm_b, arm_a, arm_b, 1.0, of_a, of_b)
+    mixed = (arm_a - of_a.arm) * shear_a * of_a.inverse_inertia + (arm_b - of_b.arm) * shear_b * of_b.inverse_inertia
     mass = sliding_mass(mass, mixed, values.kinetic_friction, pair.slides)
-    half = 0.5 * shared_step(a, b, step)
+    half = 0.5 * step
     keep_masses(operator, half, mass, mass, mass)
     keep_dashpots(pair, NORMAL, 1, OPERATOR_LIFE if half > 0.0 else 0)
-    fill_single(operator, 0, values.normal_damping, half, mass, values.normal_stiffness, 1.0)
+    fill_single(operator, 0, values.normal_damping, half, mass, pair.stiffness, 1.0)
 
 
 @rare_kernel
@@ -181,17 +198,24 @@ def renew_double(
     step: float,
     stiffness: float,
 ) -> None:
-    """Make the operator of two contacts again, of which those in `pattern` have a dashpot."""
+    """Make the operator of two contacts again, of which those in `pattern` have a dashpot.
+
+    `stiffness` (N/m) is that of each along the direction.
+    """
     dx = a.x - b.x
     dy = a.y - b.y
+    normal_one_a, normal_one_b = arms(one, dx, dy, NORMAL)
+    normal_two_a, normal_two_b = arms(two, dx, dy, NORMAL)
+    mean_a = 0.5 * (normal_one_a + normal_two_a)
+    mean_b = 0.5 * (normal_one_b + normal_two_b)
+    of_a, of_b = pieces_of(a, b, one, mean_a, mean_b, 2.0 * pair.stiffness, direction)
     one_a, one_b = arms(one, dx, dy, direction)
     two_a, two_b = arms(two, dx, dy, direction)
-    translation = a.inverse_mass + b.inverse_mass
     cosine = one.nx * two.nx + one.ny * two.ny
-    m_one = translation + one_a * one_a * a.inverse_inertia + one_b * one_b * b.inverse_inertia
-    m_two = translation + two_a * two_a * a.inverse_inertia + two_b * two_b * b.inverse_inertia
-    m_mixed = cosine * translation + one_a * two_a * a.inverse_inertia + one_b * two_b * b.inverse_inertia
-    half = 0.5 * shared_step(a, b, step)
+    m_one = inverse_mass_of(one_a, one_b, one_a, one_b, 1.0, of_a, of_b)
+    m_two = inverse_mass_of(two_a, two_b, two_a, two_b, 1.0, of_a, of_b)
+    m_mixed = inverse_mass_of(one_a, one_b, two_a, two_b, cosine, of_a, of_b)
+    half = 0.5 * step
     keep_masses(operator, half, m_one, m_mixed, m_two)
     keep_dashpots(pair, direction, pattern, OPERATOR_LIFE if half > 0.0 else 0)
     if pattern == BOTH:

@@ -11,11 +11,13 @@ from blocksim.kernels.apart import begins_contact, choose_axis, gap_along
 from blocksim.kernels.arrays import ALL, NORMAL, SHEAR, Record, Records, World
 from blocksim.kernels.contact import has_new_neighbours
 from blocksim.kernels.damping import BOTH, are_dashpots_due, damp_one, damp_two, note_slip, renew_dashpots
-from blocksim.kernels.friction import clip_to_cone, draw_same_spring
+from blocksim.kernels.friction import clip_to_cone, draw_lasting_spring
 from blocksim.kernels.jit import kernel
 from blocksim.kernels.laws import has_constant_stiffness
+from blocksim.kernels.models import SURFACE
 from blocksim.kernels.models.twins import is_oblique
 from blocksim.kernels.spots import Spot, follow, relative_motion, renew_double, renew_single, renew_sliding
+from blocksim.kernels.tributary import APART, PLANE, bearing_of_faces, is_flat, stiffness_between
 
 CHANGED, UNTOUCHED, TOUCHING = range(3)
 
@@ -71,9 +73,35 @@ def is_unsettled(world: World, p: int, a: Record, b: Record, dx: float, dy: floa
         return True
     if pair.idle > 0 and begins_contact(world, p, a, b, dx, dy):
         return True
-    if pair.active > 0 and has_new_neighbours(a, b):
+    if pair.active > 0 and has_new_neighbours(a, b, SURFACE):
         renew_dashpots(pair)
     return pair.active > 0 and (b.faces != ALL or not has_constant_stiffness(world.controls[0].law))
+
+
+@kernel
+def measure_one(pair: Record, a: Record, b: Record, spot: Spot, stiffness: float) -> None:
+    """Measure the stiffness of a single contact where dashpots are due; `stiffness` is that of a corner."""
+    if pair.normal_left == 0 and pair.bearing != PLANE:
+        bearing = bearing_of_faces(a, b, spot.nx, spot.ny)
+        pair.stiffness = stiffness * bearing.share
+        pair.slide = stiffness * bearing.slide
+        pair.turn = stiffness * bearing.turn
+
+
+@kernel
+def are_ends(pair: Record, a: Record, b: Record) -> bool:
+    """Return True if two contacts are on the ground or the two ends of one interval of parallel faces.
+
+    That changes by turning only, slowly, and is looked at where dashpots are due.
+    """
+    return pair.bearing != APART and (pair.normal_left != 0 or pair.bearing == PLANE or is_flat(a, b))
+
+
+@kernel
+def measure_two(pair: Record, one: Spot, two: Spot) -> None:
+    """Measure the stiffness of two contacts where dashpots are due."""
+    if pair.normal_left == 0 and pair.bearing != PLANE:
+        pair.stiffness = stiffness_between(pair, one.x - two.x, one.y - two.y, one.nx, one.ny)
 
 
 @kernel
@@ -87,7 +115,9 @@ def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
     goes_on, spot = follow(contact, a, b, dx, dy, motion, step, pair.normal_left == 0)
     if not goes_on or spot.depth > pair.limit:
         return CHANGED, NOTHING
-    k = values.normal_stiffness
+    before = pair.stiffness
+    measure_one(pair, a, b, spot, values.normal_stiffness)
+    k = pair.stiffness
     spring = k * spot.depth
     force = spring
     if values.normal_damping > 0.0:
@@ -98,26 +128,34 @@ def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
                 renew_single(operator, pair, a, b, spot, NORMAL, values.normal_damping, step, k)
         force = damp_one(operator, spring, contact.normal_force, spot.closing_rate)
     normal = max(force, 0.0)
-    dashpot = 0.5 * (contact.normal_force - k * contact.depth + (normal - spring)) * spot.closing
-    drawn, shear, lost, friction = shear_of_one(world, p, a, b, spot, normal, step)
+    dashpot = 0.5 * (contact.normal_force - before * contact.depth + (normal - spring)) * spot.closing
+    drawn, shear, lost, friction = shear_of_one(world, p, a, b, spot, normal, step, before)
     keep(contact, drawn, spot.depth, normal, shear)
+    square = 0.5 * spot.depth * spot.depth
+    shear += square * pair.slide
     fx = spot.nx * normal + spot.ny * shear
     fy = spot.ny * normal - spot.nx * shear
-    torque = spot.x * fy - spot.y * fx
+    torque = spot.x * fy - spot.y * fx - square * pair.turn
     return TOUCHING, Effect(fx, fy, torque - (dx * fy - dy * fx), torque, dashpot + lost, friction)
 
 
 @kernel
 def shear_of_one(
-    world: World, p: int, a: Record, b: Record, spot: Spot, normal: float, step: float
+    world: World, p: int, a: Record, b: Record, spot: Spot, normal: float, step: float, before: float
 ) -> tuple[float, float, float, float]:
-    """Return shear spring (m), shear force (N) and the losses (J) to dashpot and friction of a single contact."""
+    """Return shear spring (m), shear force (N) and the losses (J) to dashpot and friction of a single contact.
+
+    `before` (N/m) is the stiffness along the normal in the step before.
+    """
     contact = world.contacts[p, 0]
     pair = world.pairs[p]
     operator = world.operators[p, SHEAR]
     values = world.interactions[a.contact_class, b.contact_class]
-    k = values.shear_ratio * values.normal_stiffness
-    drawn, limit, slides, friction = draw_same_spring(values, k, contact.spring, spot.slip, normal, spot.slip_rate)
+    k = values.shear_ratio * pair.stiffness
+    old = values.shear_ratio * before
+    drawn, limit, slides, friction = draw_lasting_spring(
+        values, k, old, contact.spring, spot.slip, normal, spot.slip_rate
+    )
     elastic = k * drawn
     shear = elastic
     if slides:
@@ -130,7 +168,7 @@ def shear_of_one(
         slides = shear != free
     if normal > 0.0:
         note_slip(pair, slides, shear)
-    dashpot = 0.5 * (contact.shear_force - k * contact.spring + (shear - elastic)) * spot.slip
+    dashpot = 0.5 * (contact.shear_force - old * contact.spring + (shear - elastic)) * spot.slip
     return drawn, shear, dashpot, friction
 
 
@@ -154,28 +192,30 @@ def double(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
     goes_1, one = follow(first, a, b, dx, dy, motion, step, pair.normal_left == 0)
     goes_2, two = follow(second, a, b, dx, dy, motion, step, pair.normal_left == 0)
-    if not (goes_1 and goes_2) or max(one.depth, two.depth) > pair.limit:
+    if not (goes_1 and goes_2 and are_ends(pair, a, b)) or max(one.depth, two.depth) > pair.limit:
         return CHANGED, NOTHING
-    k = values.normal_stiffness
-    spring_1 = k * one.depth
-    spring_2 = k * two.depth
-    force_1 = spring_1
-    force_2 = spring_2
+    before = pair.stiffness
+    measure_two(pair, one, two)
+    k = pair.stiffness
+    spring_1, spring_2 = k * one.depth, k * two.depth
+    force_1, force_2 = spring_1, spring_2
     if values.normal_damping > 0.0:
         if are_dashpots_due(pair, NORMAL):
             renew_double(operator, pair, a, b, one, two, NORMAL, BOTH, values.normal_damping, step, k)
         force_1, force_2 = damp_two(
             operator, spring_1, spring_2, first.normal_force, second.normal_force, one.closing_rate, two.closing_rate
         )
-    normal_1 = max(force_1, 0.0)
-    normal_2 = max(force_2, 0.0)
-    lost_1 = (first.normal_force - k * first.depth + (normal_1 - spring_1)) * one.closing
-    lost_2 = (second.normal_force - k * second.depth + (normal_2 - spring_2)) * two.closing
+    normal_1, normal_2 = max(force_1, 0.0), max(force_2, 0.0)
+    lost_1 = (first.normal_force - before * first.depth + (normal_1 - spring_1)) * one.closing
+    lost_2 = (second.normal_force - before * second.depth + (normal_2 - spring_2)) * two.closing
     drawn_1, drawn_2, shear_1, shear_2, lost, friction = shear_of_two(
-        world, p, a, b, one, two, normal_1, normal_2, step
+        world, p, a, b, one, two, normal_1, normal_2, step, before
     )
     keep(first, drawn_1, one.depth, normal_1, shear_1)
     keep(second, drawn_2, two.depth, normal_2, shear_2)
+    half_slide = 0.5 * pair.slide
+    shear_1 += half_slide * one.depth * one.depth
+    shear_2 += half_slide * two.depth * two.depth
     fx, fy, torque = sum_of_two(one, two, normal_1, normal_2, shear_1, shear_2)
     dashpot = 0.5 * (lost_1 + lost_2) + lost
     return TOUCHING, Effect(fx, fy, torque - (dx * fy - dy * fx), torque, dashpot, friction)
@@ -205,16 +245,25 @@ def shear_of_two(
     normal_1: float,
     normal_2: float,
     step: float,
+    before: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """Return shear springs (m) and forces (N) of two contacts, and their losses (J) to dashpots and friction."""
+    """Return shear springs (m) and forces (N) of two contacts, and their losses (J) to dashpots and friction.
+
+    `before` (N/m) is their stiffness along the normal in the step before.
+    """
     first = world.contacts[p, 0]
     second = world.contacts[p, 1]
     pair = world.pairs[p]
     operator = world.operators[p, SHEAR]
     values = world.interactions[a.contact_class, b.contact_class]
-    k = values.shear_ratio * values.normal_stiffness
-    drawn_1, limit_1, slides_1, work_1 = draw_same_spring(values, k, first.spring, one.slip, normal_1, one.slip_rate)
-    drawn_2, limit_2, slides_2, work_2 = draw_same_spring(values, k, second.spring, two.slip, normal_2, two.slip_rate)
+    k = values.shear_ratio * pair.stiffness
+    old = values.shear_ratio * before
+    drawn_1, limit_1, slides_1, work_1 = draw_lasting_spring(
+        values, k, old, first.spring, one.slip, normal_1, one.slip_rate
+    )
+    drawn_2, limit_2, slides_2, work_2 = draw_lasting_spring(
+        values, k, old, second.spring, two.slip, normal_2, two.slip_rate
+    )
     elastic_1 = k * drawn_1
     elastic_2 = k * drawn_2
     shear_1 = elastic_1
@@ -231,6 +280,6 @@ def shear_of_two(
         # a point that slides has its spring at the limit and no dashpot
         shear_1 = elastic_1 if slides_1 else clip_to_cone(values, shear_1, limit_1, normal_1, one.slip_rate)
         shear_2 = elastic_2 if slides_2 else clip_to_cone(values, shear_2, limit_2, normal_2, two.slip_rate)
-    lost_1 = (first.shear_force - k * first.spring + (shear_1 - elastic_1)) * one.slip
-    lost_2 = (second.shear_force - k * second.spring + (shear_2 - elastic_2)) * two.slip
+    lost_1 = (first.shear_force - old * first.spring + (shear_1 - elastic_1)) * one.slip
+    lost_2 = (second.shear_force - old * second.spring + (shear_2 - elastic_2)) * two.slip
     return drawn_1, drawn_2, shear_1, shear_2, 0.5 * (lost_1 + lost_2), work_1 + work_2

@@ -3,12 +3,12 @@
 import math
 
 from blocksim.kernels.arrays import Record, World
-from blocksim.kernels.broad_phase import rebuild_pairs
+from blocksim.kernels.broad_phase import TRAVELLED, rebuild_pairs
 from blocksim.kernels.energy import smallest_side
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.support import has_motion
 
-PAIR_SHARE = 0.4  # of the skin, that a body may move; two use up 0.8 skins, the rest covers what was not foreseen
+PAIR_SHARE = 0.5 * TRAVELLED  # of the skin, that a body may move; the rest covers what was not foreseen
 GROWTH = 4.0  # until the next look a body may become this many times as fast as the fastest one is now
 MOST_UNSEEN = 1000  # steps
 WAY_SHARE = 0.25  # of the smallest side, by which two bodies may come nearer in a step

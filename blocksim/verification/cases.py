@@ -10,6 +10,7 @@ from blocksim.verification import (
     impacts,
     resting,
     rocking,
+    seats,
     sliding,
     symmetry,
     toppling,
@@ -24,6 +25,7 @@ SAMPLING = "the position of the opposite particles decides how strongly an edge 
 SHARED_IMPACT = "several particles along the face share the impact, so it acts a little inside of the corner"
 EXACT_PLANE = "the plane is exact, the face of a fixed block is made of particles; bounces multiply the difference"
 NO_DISC = "probably because ends of ground segments have no disc, so contacts at edges end at full overlap"
+PAIRWISE = "dashpots of a pair stand for the whole block, also where other pairs bear it too"
 SMOOTHED = "edges are felt within a smoothing length of 1.3 mm, as if they were rounded"
 
 CASES = (
@@ -163,6 +165,14 @@ CASES = (
         "pymunk, Box2D",
         collapse.before_impact,
         remarks={"particles": BUMPS, "kernel": SMOOTHED},
+    ),
+    Case(
+        "V25",
+        "flat landings on one to three seats",
+        "restitution, no spin",
+        seats.seats,
+        remarks={"particles": PAIRWISE, "kernel": PAIRWISE},
+        not_for={"nonsmooth": "it is about springs of several pairs below one block; V4 has rigid restitution"},
     ),
 )
 

@@ -24,6 +24,7 @@ from blocksim.kernels.arrays import (
     World,
     zeros,
 )
+from blocksim.kernels.broad_phase import TRAVELLED
 from blocksim.kernels.laws import LAW_CODES
 from blocksim.kernels.models import MODEL_CODES
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
@@ -34,7 +35,7 @@ from blocksim.world.bounds import Bounds
 from blocksim.world.interactions import interaction_tables
 from blocksim.world.memory import SceneSize, refuse_if_too_large
 from blocksim.world.scenes import Construction, Parts, Stride, build_one, joined
-from blocksim.world.step import MOST_STEPS, choose_skin, choose_step
+from blocksim.world.step import MOST_STEPS, choose_approach, choose_skin, choose_step
 
 CHECK_INTERVAL = 1e-4  # s of simulated time between checks of rest, overlap and finiteness
 CHEAP_CHECKS = 50  # steps between checks, from which on they cost almost nothing; where steps are long, at most for
@@ -56,7 +57,8 @@ def build_world(scenario: Scenario) -> World:
 
 def _choose(outline: Outline, bounds: Bounds) -> Stride:
     step = choose_step(outline.scenario, bounds, outline.interactions)
-    return Stride(step, choose_skin(outline.scenario, bounds, outline.interactions, step))
+    skin = choose_skin(outline.scenario, bounds, outline.interactions, step)
+    return Stride(step, skin, choose_approach(outline.scenario, bounds, outline.interactions, step))
 
 
 def _size(parts: Parts) -> SceneSize:
@@ -69,7 +71,8 @@ def _assemble(parts: Parts, strides: Sequence[Stride]) -> World:
     model = _model(parts.outlines[0])
     before = zeros((members, contacts_of_a_pair(parts.slots, model)), contact_type(model))
     controls = empty_controls(parts, strides)
-    controls["cell_width"] = 2.0 * controls["cell_radius"] + controls["skin"]
+    reach = np.maximum(controls["skin"], TRAVELLED * controls["skin"] + controls["approach"])
+    controls["cell_width"] = 2.0 * controls["cell_radius"] + reach
     lists = empty_lists(first_capacity(bodies), parts.slots, before)
     return assembled(parts, controls, points=_points(members, parts.slots), before=before, **lists)
 
@@ -216,7 +219,7 @@ def empty_controls(parts: Parts, strides: Sequence[Stride]) -> Records:
 
 
 def _controls(scenario: Scenario, stride: Stride) -> dict[str, float]:
-    contact, time, (step, skin) = scenario.contact, scenario.time, stride
+    contact, time, (step, skin, approach) = scenario.contact, scenario.time, stride
     motion_x, motion_y = support_direction(scenario)
     kernel = KERNEL_CODES[contact.kernel]
     smoothing_length = contact.resolved_smoothing_length
@@ -226,6 +229,7 @@ def _controls(scenario: Scenario, stride: Stride) -> dict[str, float]:
     return {
         "step": step,
         "skin": skin,
+        "approach": approach,
         "gravity_x": -scenario.gravity * math.sin(scenario.ground.tilt),
         "gravity_y": -scenario.gravity * math.cos(scenario.ground.tilt),
         "motion_x": motion_x,

@@ -33,6 +33,7 @@ class Stride(NamedTuple):
 
     step: float  # s
     skin: float  # m
+    approach: float = 0.0  # m, up to which bodies are always listed
 
 
 class Parts(NamedTuple):

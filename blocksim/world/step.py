@@ -22,6 +22,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from blocksim.errors import InvalidInputError
+from blocksim.kernels.inertia import APPROACH_STEPS
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Explicit, Nonsmooth
 from blocksim.world.applied import greatest_push, steepest_tilt
@@ -35,6 +36,7 @@ TRAVEL_SHARE, TRAVEL_SHARE_OF_PARTICLES = 0.05, 0.01  # of the smallest side, th
 # Shares of the smallest side, measured: in the surface model a body has eight corners to examine, so that a long list
 # costs less than making it again; with particles a long list holds hundreds of them a pair.
 SKIN_SHARE, SKIN_SHARE_OF_PARTICLES = 0.25, 0.05
+LEAST_APPROACH, MOST_APPROACH = 0.1, 0.5  # of the default skin
 RESERVE = 2.5  # times the speed expected: blocks that are struck are faster; the automatic step leaves as much
 ROUND_UP = 1.0005  # so that four digits of a number are not less than it
 MILLI = 1e3
@@ -160,6 +162,19 @@ def choose_skin(scenario: Scenario, bounds: Bounds, table: Interactions, step: f
     if given < least:
         raise SkinTooSmallError(given, least, speed, step)
     return given
+
+
+def choose_approach(scenario: Scenario, bounds: Bounds, table: Interactions, step: float) -> float:
+    """Return the gap (m) below which bodies are listed whatever the skin: what they are seen to approach in.
+
+    As far as the fastest comes while approaches are looked for, within shares of the default skin. Models with
+    particles look for none.
+    """
+    if _has_particles(scenario):
+        return 0.0
+    default = bounds.smallest * SKIN_SHARE
+    way = APPROACH_STEPS * step * greatest_speed(scenario, bounds, table)
+    return min(max(way, LEAST_APPROACH * default), MOST_APPROACH * default)
 
 
 def _has_particles(scenario: Scenario) -> bool:

@@ -36,7 +36,7 @@ def scattered(start: Start, seed: int, skin: float) -> Simulation:
         bodies.angle = random.uniform(-4.0, 4.0, COUNT)
         bodies.cos, bodies.sin = np.cos(bodies.angle), np.sin(bodies.angle)
         controls = world.controls[0]
-        controls.skin = skin
+        controls.skin, controls.approach = skin, 0.0
         controls.cell_width = 2.0 * controls.cell_radius + skin
 
     bodies = [{"x": 0.1 * i, "y": 0.1, "fixed": i < 2, "width": 0.01 + 0.001 * i} for i in range(COUNT)]

@@ -49,6 +49,7 @@ def touching(pose: Pose, *, depth: float, spring: float = 0.0) -> World:
     """Return two blocks with one contact that has this overlap and shear spring (m)."""
     world = pose((0.0, 1.0, 0.0), (0.0, 1.0 + HEIGHT, 0.0))
     world.pairs[0].active = 1
+    world.pairs[0].stiffness = world.interactions[1, 1].normal_stiffness
     contact = world.contacts[0, 0]
     contact.depth, contact.spring = depth, spring
     return world

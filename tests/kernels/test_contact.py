@@ -20,7 +20,9 @@ from blocksim.kernels.contact import (
     spare_lost_faces,
 )
 from blocksim.kernels.damping import BOTH, OPERATOR_LIFE
+from blocksim.kernels.inertia import Piece
 from blocksim.kernels.kinematics import mutual_mass, resolve_point
+from blocksim.kernels.models import KERNEL, PARTICLES, SURFACE
 from tests.kernels.conftest import dashpots_by_definition
 
 if TYPE_CHECKING:
@@ -54,13 +56,22 @@ def test_pairs_in_contact_are_counted_for_every_body(start: Start, paper_block: 
     assert wall.bodies.pairs_before.tolist() == [2, 2, 2]
 
 
-@pytest.mark.parametrize(("of_a", "of_b", "new"), [(0, 0, False), (1, 0, True), (0, 1, True), (1, 1, True)])
-def test_pair_has_new_neighbours_where_the_number_of_pairs_on_a_body_has_changed(
-    make_body: MakeBody, of_a: int, of_b: int, new: bool
+@pytest.mark.parametrize(
+    ("model", "flag", "other"),
+    [
+        (SURFACE, "sums_changed", "pairs_changed"),
+        (PARTICLES, "pairs_changed", "sums_changed"),
+        (KERNEL, "pairs_changed", "sums_changed"),
+    ],
+)
+def test_dashpots_are_void_where_others_bear_a_body_now_and_corners_know_how_stiffly(
+    make_body: MakeBody, model: int, flag: str, other: str
 ) -> None:
     a, b = make_body(), make_body()
-    a.pairs_changed, b.pairs_changed = of_a, of_b
-    assert has_new_neighbours(a, b) == new
+    for of_a, of_b in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        a[flag], b[flag] = of_a, of_b
+        a[other], b[other] = 1 - of_a, 1 - of_b
+        assert has_new_neighbours(a, b, model) == bool(of_a or of_b)
 
 
 def test_sticking_block_pulls_its_shear_springs_against_the_slope(start: Start, paper_block: PaperBlock) -> None:
@@ -152,7 +163,8 @@ def test_dashpots_of_a_pair_follow_the_definition(
     points.weight = weights[:count]
     if count == 2 and pattern != BOTH:
         points.stiffness[2 - pattern] = 0.0  # it slides
-    masses = np.array([[mutual_mass(one, two, a, b, direction) for two in points] for one in points])
+    of_a, of_b = (Piece(body.inverse_mass, body.inverse_inertia, 0.0) for body in (a, b))
+    masses = np.array([[mutual_mass(one, two, of_a, of_b, direction) for two in points] for one in points])
     expected = points.force + dashpots_by_definition(points, masses, 0.7, STEP)
     damp(world, 0, count, direction, pattern, 0.7, STEP)
     assert points.force == pytest.approx(expected, rel=1e-7, abs=1e-9 * np.abs(expected).max())
@@ -190,8 +202,7 @@ def test_point_that_slides_has_no_dashpot_and_the_other_one_keeps_its_own(pose: 
     one.force, two.force = 100.0, 0.0
     one.slipping, two.slipping = 1e-9, 1e-9
     stiffness = float(values.shear_ratio) * K
-    values.normal_stiffness = K
-    assert draw_springs(world, 0, 2, values, action) == 1
+    assert draw_springs(world, 0, 2, values, K, action) == 1
     assert (one.stiffness, two.stiffness) == (pytest.approx(stiffness), 0.0)
     assert (one.force, two.force) == (pytest.approx(stiffness * 1e-9), 0.0)
     assert world.contacts[0].spring.tolist() == [1e-9, 0.0]
@@ -228,7 +239,9 @@ def test_pair_writes_what_it_does_and_adds_to_no_body_and_to_no_book(pose: Pose)
     a, contacts = world.bodies[0], world.contacts[0]
     pushes, pulls = float(contacts.normal_force.sum()), float(contacts.shear_force.sum())
     assert (action.touches, action.is_changed) == (1, 1)
-    assert (action.fy, action.fx) == pytest.approx((pushes, pulls))
+    # besides, what the interval below the block lacks pushes along the face
+    stored = 0.5 * float(world.interactions[1, 1].normal_stiffness) * float((contacts.depth**2).sum())
+    assert (action.fy, action.fx) == pytest.approx((pushes, pulls + stored / 0.032))
     assert action.fx < 0.0 < action.fy
     assert action.friction > 0.0
     # both torques are of the same forces, about centres that are apart

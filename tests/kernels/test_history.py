@@ -40,6 +40,7 @@ def stacked(pose: Pose, *before: Contact) -> World:
     pair = world.pairs[0]
     assert (pair.a, pair.b, pair.near) == (0, 1, 4)
     pair.active = len(before)
+    pair.stiffness = world.interactions[1, 1].normal_stiffness
     world.pairs["normal_left"] = world.pairs["shear_left"] = 5
     for n, (contact, (slot, face)) in enumerate(zip(world.contacts[0], before, strict=False), start=1):
         contact.slot, contact.face = slot, face

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import NORMAL, OPERATOR, PAIR, SHEAR, zeros
-from blocksim.kernels.contact import fill_operator, shared_step
+from blocksim.kernels.arrays import NORMAL, OPERATOR, SHEAR, zeros
+from blocksim.kernels.contact import fill_operator
 from blocksim.kernels.kinematics import resolve_point
 from blocksim.kernels.models import contact_points
 from blocksim.kernels.models.surface import face_normal, opens
@@ -39,6 +39,9 @@ def moving(pose: Pose, seed: int, angle: float, shift: float) -> World:
         for name in ("vx", "vy", "spin", "ax", "ay", "spin_rate"):
             body[name] = 0.01 * random.normal()
         body.pairs_before = random.integers(1, 6)
+        body.seats = random.integers(1, 4)  # borne by others too, over a middle of their own
+        body.k_xx, body.k_yy = 1e10 * random.uniform(0.2, 1.0, 2)
+        body.k_x, body.k_y = 1e7 * random.normal(size=2)
     return world
 
 
@@ -84,8 +87,9 @@ def test_dashpots_are_those_of_the_general_way(
     for point in world.points[: len(spots)]:
         resolve_point(point, a, b, STEP)
         point.stiffness = 1e8
-    fill_operator(world, 0, len(spots), direction, pattern, 0.7, shared_step(a, b, STEP))
-    expected, operator, pair = world.operators[0, direction], zeros(1, OPERATOR)[0], zeros(1, PAIR)[0]
+    world.pairs.stiffness = 0.3 * world.interactions[1, 1].normal_stiffness
+    fill_operator(world, 0, len(spots), direction, pattern, 0.7, STEP)
+    expected, operator, pair = world.operators[0, direction], zeros(1, OPERATOR)[0], world.pairs[0].copy()
     if len(spots) == 1:
         renew_single(operator, pair, a, b, spots[0], direction, 0.7, STEP, 1e8)
     else:

@@ -309,7 +309,7 @@ def test_dashpots_are_made_anew_where_the_number_of_neighbours_has_changed(pose:
     assert min(left) > 2
     steady_forces(world, 0, STEP, world.particles)
     assert steps_left(world) == [n - 1 for n in left]
-    world.bodies[1].pairs_changed = 1
+    world.bodies[1].sums_changed = 1
     steady_forces(world, 0, STEP, world.particles)
     assert steps_left(world) == left
 

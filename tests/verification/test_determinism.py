@@ -10,6 +10,7 @@ import pytest
 
 from blocksim.bench.scenes import pushed_wall
 from blocksim.kernels.arrays import REACHED
+from blocksim.kernels.broad_phase import list_reach
 from blocksim.verification.scene import Simulation
 from blocksim.world.build import build_world
 
@@ -69,7 +70,7 @@ def with_skin(skin: float) -> Callable[[World], None]:
     def change(world: World) -> None:
         controls = world.controls[0]
         controls.skin = skin
-        controls.cell_width = 2.0 * controls.cell_radius + skin
+        controls.cell_width = 2.0 * controls.cell_radius + list_reach(controls)
 
     return change
 
