@@ -106,11 +106,12 @@ def face_across(body: Record, nx: float, ny: float, side: float) -> tuple[float,
 def face_per_length(a: Record, b: Record, half_a: float, half_b: float) -> float:
     """Return one over the length (1/m) of the face that shares refer to: the free body's, of two free ones the longer.
 
-    `half_a` and `half_b` (m) are half of the faces that touch.
+    `half_a` and `half_b` (m) are half of the faces that touch. A body that is only held until time zero counts as free:
+    it comes to rest on the springs that it has afterwards.
     """
-    if a.inverse_mass == 0.0:
+    if a.is_moved != 0:
         return 0.5 / half_b
-    if b.inverse_mass == 0.0:
+    if b.is_moved != 0:
         return 0.5 / half_a
     return 0.5 / max(half_a, half_b)
 

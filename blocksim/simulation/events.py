@@ -27,6 +27,8 @@ NO_SIZE = -1e12  # m: half sides of what is not there: farther than that from ev
 NOT_THERE = {"mass", "inertia", "inverse_mass", "inverse_inertia"}
 RATES = ("vx", "vy", "spin")
 ACCELERATIONS = ("ax", "ay", "spin_rate")
+OF_CONTACTS = ("fx", "fy", "torque", "pairs_now", "pairs_before", "pairs_changed")
+OF_PIECES = ("seats", "coming", "is_asked", "sums_changed")  # see kernels/inertia.py
 
 
 class Timeline:
@@ -99,13 +101,20 @@ class Timeline:
         return scene._replace(world=world)
 
     def _renewed(self, scene: Any, team: "Team") -> tuple[Any, int]:
-        """Have the pair list made anew, and with springs the forces at this moment, as if after a step of no length."""
+        """Have the pair list made anew, and with springs the forces at this moment, as if after a step of no length.
+
+        What bears a block may have changed without a contact that begins or ends: stiffness is measured and all sums of
+        it are made again.
+        """
         clock = scene.world.clock[0]
         clock.rebuilds = 0
         if isinstance(scene, Nonsmooth):
             return scene, REACHED
-        clock.next_look = clock.steps
+        clock.next_look = clock.next_share = clock.steps
         clock.is_started = 0
+        scene.world.bodies["is_asked"] = 1
+        for name in ("normal_left", "shear_left"):
+            scene.world.pairs[name] = 0
         return team.advance(scene, int(clock.steps))
 
     def _number(self, world: World, name: str) -> int:
@@ -162,7 +171,7 @@ def freed(world: World, number: int, placed: PlacedBody) -> World:
 
 def _hold(body: Record) -> None:
     """Take mass, motion and forces from a body."""
-    for name in (*NOT_THERE, *RATES, *ACCELERATIONS, "fx", "fy", "torque", "pairs_now", "pairs_before"):
+    for name in (*NOT_THERE, *RATES, *ACCELERATIONS, *OF_CONTACTS, *OF_PIECES):
         body[name] = 0
 
 

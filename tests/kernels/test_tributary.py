@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from blocksim.kernels.arrays import SUPPORT
 from blocksim.kernels.contact import pair_forces
 from blocksim.kernels.models.twins import CONE_TOLERANCE
 from blocksim.kernels.tributary import FLAT, LEAST, bearing_of_faces, interval_of
@@ -39,7 +40,7 @@ def test_share_refers_to_the_face_of_the_free_body_and_of_two_to_the_longer(
     a, b = make_body(y=HEIGHT, width=0.02), make_body()
     for name, body in (("a", a), ("b", b)):
         if name == fixed:
-            body.inverse_mass = 0.0
+            body.is_moved = SUPPORT
     assert interval_of(a, b, *UP).per_length == pytest.approx(1.0 / length)
 
 

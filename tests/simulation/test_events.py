@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from blocksim.scenario import Scenario
+    from blocksim.simulation import Result
 
 both = pytest.mark.parametrize("scheme", SCHEMES)
 MASS = PaperBlock().mass  # kg
@@ -162,6 +163,50 @@ def test_interruptions_and_ensembles_change_no_bit_of_a_run_with_events(tmp_path
     assert resumed.summary.events == whole.summary.events
     assert resumed.summary.warnings == ()
     assert [str(one.columns) for one in run_ensemble([scenario, scenario])] == [str(whole.columns)] * 2
+
+
+JOINT = 0.002  # m, where two seats meet, from the middle of the block
+SOON = 3.3  # steps before it lands
+
+
+def seat(name: str, side: float, **keys: Any) -> dict[str, Any]:
+    """Return a fixed seat of a block, left (-1) or right (1) of the joint."""
+    return plate(width=0.1, x=JOINT + 0.05 * side, name=name, **keys)
+
+
+def landing(seats: Sequence[Mapping[str, object]], start: Mapping[str, object], *events: Mapping[str, object]) -> Result:
+    """Return a block 1 mm above its seats that comes down on them at 1 m/s, or does so after an event."""
+    bodies = [block(**{"y": 0.1 + 0.5 * HEIGHT + 1e-3, **start}), *seats]
+    return simulate(with_events("explicit", events, 0.01, bodies=bodies, gravity=0.0, restitution=0.5))
+
+
+def test_seat_that_is_removed_bears_no_part_of_a_block_that_lands_steps_later() -> None:
+    left, right = seat("left", -1.0), seat("right", 1.0)
+    alone = landing([left], {"velocity": [0.0, -1.0]})
+    removal = {"at": 1e-3 - SOON * alone.summary.time_step_s, "remove": ["right"]}
+    run = landing([left, right], {"velocity": [0.0, -1.0]}, removal)
+    for name in ("vy_mm_s", "spin_deg_s"):
+        assert run.final.loc[0, name] == pytest.approx(alone.final.loc[0, name], rel=1e-9)
+
+
+def test_block_that_is_freed_steps_before_it_lands_is_borne_by_both_seats() -> None:
+    seats = [seat("left", -1.0), seat("right", 1.0)]
+    step = landing(seats, {"velocity": [0.0, -1.0]}).summary.time_step_s
+    start = {"fixed": True, "y": 0.1 + 0.5 * HEIGHT + SOON * step}
+    freed = {"at": step, "free": ["block"], "velocity": {"body": "block", "vy": -1.0}}
+    run = landing(seats, start, freed)
+    assert run.final.loc[0, "vy_mm_s"] == pytest.approx(500.0, abs=1.0)
+    assert run.final.loc[0, "spin_deg_s"] == pytest.approx(0.0, abs=0.1)
+
+
+def test_block_on_two_others_is_fixed_and_freed_and_they_stay_where_they_are() -> None:
+    bodies = [block(y=0.1 + 1.5 * HEIGHT), block(name="left", x=-0.016), block(name="right", x=0.016), plate()]
+    events = [{"at": 0.02, "fix": ["block"]}, {"at": 0.03, "free": ["block"]}]
+    run = simulate(with_events("explicit", events, bodies=bodies))
+    assert run.reason == "end of simulated time"
+    assert run.final.loc[0, "y_mm"] == pytest.approx(100.0 + 1500.0 * HEIGHT, abs=0.05)
+    assert run.final.loc[1:2, "y_mm"].to_numpy() == pytest.approx(100.0 + 500.0 * HEIGHT, abs=0.05)
+    assert run.summary.energy_J.relative_residual < 1e-3
 
 
 @pytest.mark.parametrize(
