@@ -218,6 +218,6 @@ def test_losses_of_pairs_between_shares_are_in_the_books_of_their_first_bodies(b
         together(team, last)
         for name in ("dashpot", "friction", "broken"):
             assert team[0].ledger[name].tobytes() == one.ledger[name].tobytes(), (name, last)
-    for name in ("dashpot", "friction", "broken"):
-        assert (one.ledger[name] != before[name]).sum() >= 2, name
+    for name, least in (("dashpot", 3), ("friction", 3), ("broken", 2)):
+        assert (one.ledger[name] != before[name]).sum() >= least, name
     assert len(contacts_between(team[0])) > 3

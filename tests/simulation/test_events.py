@@ -174,7 +174,9 @@ def seat(name: str, side: float, **keys: Any) -> dict[str, Any]:
     return plate(width=0.1, x=JOINT + 0.05 * side, name=name, **keys)
 
 
-def landing(seats: Sequence[Mapping[str, object]], start: Mapping[str, object], *events: Mapping[str, object]) -> Result:
+def landing(
+    seats: Sequence[Mapping[str, object]], start: Mapping[str, object], *events: Mapping[str, object]
+) -> Result:
     """Return a block 1 mm above its seats that comes down on them at 1 m/s, or does so after an event."""
     bodies = [block(**{"y": 0.1 + 0.5 * HEIGHT + 1e-3, **start}), *seats]
     return simulate(with_events("explicit", events, 0.01, bodies=bodies, gravity=0.0, restitution=0.5))

@@ -32,22 +32,26 @@ SQUEEZE, OFFSET = 1e-4, 1e-8  # m: overlap of a block between two others, and it
 RATIOS = [0.0, 0.05, 0.2, 0.7, 1.0, 2.0, 5.3, 20.0]
 
 
-def recurrence(w: float, z: float, acting: float, pairs: int, h: float) -> np.ndarray:
-    """Return the matrix of one step on (x, u, f), without g."""
-    c = 2.0 * z * w / sqrt(pairs)
+def recurrence(w: float, z: float, acting: float, pairs: int, h: float, *, whole: bool = False) -> np.ndarray:
+    """Return the matrix of one step on (x, u, f), without g.
+
+    `whole`: as with particles, where dashpots stand for all of the mass and count their own force max(1, p/2) times.
+    """
+    c = 2.0 * z * w / (1.0 if whole else sqrt(pairs))
+    own = max(1.0, 0.5 * pairs) if whole else pairs
     columns = []
     for x, u, f in np.eye(3):
         half = u - 0.5 * h * acting * f
         moved = x + h * half
-        free = half - 0.5 * h * acting * f + 0.5 * pairs * h * (f - w * w * moved)
-        force = w * w * moved + c * free / (1.0 + 0.5 * pairs * h * c)
+        free = half - 0.5 * h * acting * f + 0.5 * own * h * (f - w * w * moved)
+        force = w * w * moved + c * free / (1.0 + 0.5 * own * h * c)
         columns.append((moved, half - 0.5 * h * acting * force, force))
     return np.array(columns).T
 
 
-def spectral_radius(z: float, acting: float, pairs: int, h: float) -> float:
+def spectral_radius(z: float, acting: float, pairs: int, h: float, *, whole: bool = False) -> float:
     """Return that of the recurrence for w = 1."""
-    return float(np.abs(np.linalg.eigvals(recurrence(1.0, z, acting, pairs, h))).max())
+    return float(np.abs(np.linalg.eigvals(recurrence(1.0, z, acting, pairs, h, whole=whole))).max())
 
 
 @pytest.mark.parametrize("z", RATIOS)
@@ -65,6 +69,17 @@ def test_pairs_that_act_apart_are_stable_up_to_the_bound(z: float, pairs: int) -
     for acting in (0.01, 0.1, 0.5, 1.0, 1.5):
         assert all(spectral_radius(z, acting, pairs, h) <= 1.0 + 1e-9 for h in bound * np.linspace(0.001, 1.0, 100))
     assert z == 0.0 or z > 1.0 or spectral_radius(z, 0.01, pairs, 1.1 * bound) > 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("z", [0.05, 0.7, 1.5, 5.3, 20.0])
+@pytest.mark.parametrize("pairs", [2, 3, 4, 6])
+def test_pairs_of_particles_become_unstable_where_the_root_flips_sign(z: float, pairs: int) -> None:
+    """Put x' = -x, u' = -u, f' = -f into the recurrence: z h = (1 - p h^2/4)/(2 (p - q)), a quadratic in h."""
+    change = 2.0 * (pairs - max(1.0, 0.5 * pairs)) * z
+    limit = 2.0 * (sqrt(change**2 + pairs) - change) / pairs
+    radii = (spectral_radius(z, pairs, pairs, limit * part, whole=True) for part in np.linspace(0.001, 1.0 - 1e-6, 100))
+    assert all(radius <= 1.0 + 1e-9 for radius in radii)
+    assert spectral_radius(z, pairs, pairs, limit * (1.0 + 1e-5), whole=True) > 1.0 + 1e-9
 
 
 def squeezed(start: Start, block: PaperBlock, e: float, product: float | None) -> tuple[Simulation, float]:
