@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from blocksim.scenario import keys
 from blocksim.scenario.findings import Finding
 from blocksim.scenario.models.events import Event
+from blocksim.scenario.models.loads import Gravity
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.placement import PlacedBody
 from blocksim.scenario.quantities import shown
@@ -45,6 +46,7 @@ def impossible_events(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Itera
         yield Finding(("events",), f"events are not available beside {', '.join(scenario.systems)}", at="key")
     known = [body.name for body in bodies]
     found = [one for number in range(len(scenario.events)) for one in _alone(scenario, number, known)]
+    found += _wrong_unloads(scenario)
     yield from found
     if not found:
         yield from _in_turn(scenario, bodies)
@@ -63,6 +65,22 @@ def _alone(scenario: Scenario, number: int, known: Sequence[str]) -> Iterator[Fi
         allowed = [*known, *walls] if place[2] == "remove" else known
         if name not in set(allowed):
             yield Finding(place, _unknown(name, allowed, walls, is_wall_allowed=place[2] == "remove"))
+
+
+def _wrong_unloads(scenario: Scenario) -> Iterator[Finding]:
+    """Find loads to end that do not exist, cannot end, or end twice."""
+    loads = {load.name: load for load in scenario.loads if load.name is not None}
+    ends: dict[str, int] = {}
+    for number in in_order(scenario.events):
+        for place, name in enumerate(scenario.events[number].unload):
+            path = ("events", number, "unload", place)
+            if name not in loads:
+                yield Finding(path, f"there is no load {shown(name)}, {did_you_mean_or_list(name, loads)}")
+            elif isinstance(loads[name], Gravity):
+                yield Finding(path, f"{shown(name)} is gravity, which does not end; a table of tilts turns it back")
+            elif name in ends:
+                yield Finding(path, f"{shown(name)} has ended already, by events.{ends[name]}")
+            ends.setdefault(name, number)
 
 
 def _unknown(name: str, allowed: Sequence[str], walls: Sequence[str], *, is_wall_allowed: bool) -> str:

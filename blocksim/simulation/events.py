@@ -39,6 +39,7 @@ class Timeline:
         self.events, self.placed, self.step = scenario.events, placed, step
         self.names = {body.name: number for number, body in enumerate(placed)}
         self.walls = wall_names(scenario)
+        self.loads = [load.name for load in scenario.loads]
         self.happened: tuple[Happened, ...] = ()
         order = in_order(self.events)
         self.timed = [(_step_of(self.events[n].at, step), n) for n in order if self.events[n].at is not None]
@@ -93,6 +94,8 @@ class Timeline:
             world = fixed(world, self.names[name])
         for name in event.free:
             world = freed(world, self.names[name], self.placed[self.names[name]])
+        for name in event.unload:
+            end_load(world, self.loads.index(name))
         if event.velocity is not None:
             _set_velocity(world.bodies[self.names[event.velocity.body]], event)
         if not isinstance(scene, Nonsmooth):
@@ -167,6 +170,16 @@ def freed(world: World, number: int, placed: PlacedBody) -> World:
     body.mass, body.inertia = placed.mass, placed.inertia
     body.inverse_mass, body.inverse_inertia = 1.0 / placed.mass, 1.0 / placed.inertia
     return world
+
+
+def end_load(world: World, number: int) -> None:
+    """Let a load be zero from now on, and steady."""
+    load, clock, controls = world.loads[number], world.clock[0], world.controls[0]
+    last = int(load.last_piece) - 1
+    piece = world.load_pieces[last]
+    piece.start, piece.value, piece.rate = clock.steps * controls.step, 0.0, 0.0
+    load.first_piece = last
+    controls.loads_end = world.load_pieces["start"][world.loads["last_piece"] - 1].max()
 
 
 def _hold(body: Record) -> None:

@@ -29,6 +29,8 @@ def _parts(event: Event) -> Iterator[str]:
     for names, done in ((event.remove, "removed"), (event.fix, "fixed"), (event.free, "freed")):
         if names:
             yield f"{_listed(names)} {done}"
+    if event.unload:
+        yield f"{'load' if len(event.unload) == 1 else 'loads'} {', '.join(event.unload)} ended"
     if event.velocity is not None:
         yield f"{event.velocity.body} gets {_values(event.velocity)}"
 

@@ -136,6 +136,34 @@ def test_rest_lets_the_next_event_happen_and_the_run_go_on(scheme: str) -> None:
 
 
 @both
+def test_load_that_ends_leaves_a_body_as_fast_as_it_has_become(scheme: str) -> None:
+    pull = {"kind": "force", "name": "pull", "body": "block", "magnitude": 2.0 * MASS}
+    wind = {"kind": "horizontal", "name": "wind", "magnitude": 3.0 / G, "history": {"kind": "ramp", "end": 1e-9}}
+    events = [{"at": 0.03, "unload": ["pull"]}, {"at": 0.05, "unload": ["wind"]}]
+    run = simulate(with_events(scheme, events, bodies=[block(y=1.0), plate()], loads=[wind, pull]))
+    assert [event.what for event in run.summary.events] == ["load pull ended", "load wind ended"]
+    first, second = (event.time_s for event in run.summary.events)
+    vx = 5.0 * first + 3.0 * (second - first)
+    x = 2.5 * first**2 + 5.0 * first * (second - first) + 1.5 * (second - first) ** 2
+    x += vx * (run.summary.simulated_time_s - second)
+    assert run.final.loc[0, "vx_mm_s"] == pytest.approx(1e3 * vx, rel=1e-3)
+    assert run.final.loc[0, "x_mm"] == pytest.approx(1e3 * x, rel=1e-3)
+    assert run.summary.energy_J.to_loads == pytest.approx(-0.5 * MASS * vx**2, rel=2e-3)
+    assert run.summary.energy_J.relative_residual < 1e-4
+
+
+@both
+def test_load_that_has_ended_at_rest_delays_no_later_rest(scheme: str) -> None:
+    push = {"kind": "force", "name": "push", "body": "block", "magnitude": 0.5 * FRICTION * MASS * G}
+    late = {**push, "name": "late", "magnitude": 1e-9, "history": {"kind": "ramp", "end": 50.0}}
+    events = [{"at": 0.01, "unload": ["late"]}, {"when": "rest", "unload": ["push"]}]
+    run = simulate(with_events(scheme, events, end=1.0, time=REST, loads=[push, late]))
+    assert [event.what for event in run.summary.events] == ["load late ended", "load push ended"]
+    assert run.reason == "at rest"
+    assert run.summary.simulated_time_s < 0.5
+
+
+@both
 def test_rest_before_a_time_does_not_end_the_run_and_what_never_happens_is_told(scheme: str) -> None:
     late = simulate(with_events(scheme, [{"at": 0.06, "remove": ["plate"]}], time=REST))
     assert [one.what for one in late.summary.events] == ["plate removed"]
@@ -152,12 +180,14 @@ def test_interruptions_and_ensembles_change_no_bit_of_a_run_with_events(tmp_path
         {"at": 0.03, "remove": ["plate"]},
         {"at": 0.02, "velocity": {"body": "block", "vx": 0.5}},
         {"at": 0.04, "fix": ["block"]},
+        {"at": 0.025, "unload": ["lift"]},
     ]
-    scenario = with_events(scheme, events, output={"every": 0.002, "contacts": True})
+    lift = {"kind": "force", "name": "lift", "body": "block", "direction": "90 deg", "magnitude": 0.5 * MASS * G}
+    scenario = with_events(scheme, events, output={"every": 0.002, "contacts": True}, loads=[lift])
     whole = simulate_into(scenario, tmp_path / "whole")
     at = [event.step for event in whole.summary.events]
     assert at == sorted(at)
-    interrupted_at(scenario, tmp_path / "parts", [at[0] - 1, at[0], at[1], at[2] + 1])
+    interrupted_at(scenario, tmp_path / "parts", [at[0] - 1, at[0], at[1], at[3] + 1])
     resumed = simulate_into(scenario, tmp_path / "parts", resume=True)
     assert_same(resumed, whole)
     assert resumed.summary.events == whole.summary.events
@@ -225,6 +255,9 @@ def test_block_on_two_others_is_fixed_and_freed_and_they_stay_where_they_are() -
         ([{"at": 0.01, "fix": ["block"]}, {"at": 0.01, "free": ["block"]}], "at the same moment"),
         ([{"at": 0.01, "fix": ["block"], "velocity": {"body": "block", "vx": 1.0}}], "at the same moment"),
         ([{"at": 0.01, "velocity": {"body": "plate", "vx": 1.0}}], "free it first"),
+        ([{"at": 0.01, "unload": ["winf"]}], "did you mean 'wind'"),
+        ([{"at": 0.01, "unload": ["table"]}], "is gravity, which does not end"),
+        ([{"at": 0.02, "unload": ["wind"]}, {"at": 0.01, "unload": ["wind"]}], "ended already, by events.1"),
         ([{"at": 0.01, "when": "rest", "remove": ["plate"]}], "both given"),
         ([{"remove": ["plate"]}], "give a time"),
         ([{"at": 0.01}], "nothing happens"),
@@ -232,7 +265,11 @@ def test_block_on_two_others_is_fixed_and_freed_and_they_stay_where_they_are() -
     ],
 )
 def test_impossible_events_are_told_with_their_place(events: list[dict[str, object]], told: str) -> None:
+    loads = [
+        {"kind": "horizontal", "name": "wind", "magnitude": 0.1},
+        {"kind": "gravity", "name": "table", "to": "1 deg", "rate": "1 deg/s"},
+    ]
     with pytest.raises(ScenarioError, match=r"events\.\d") as caught:
-        with_events("explicit", events, walls=[{"from": [0.4, 0.3], "to": [0.4, 0.1]}])
+        with_events("explicit", events, loads=loads, walls=[{"from": [0.4, 0.3], "to": [0.4, 0.1]}])
     assert told in str(caught.value)
     assert caught.value.exit_code == 65

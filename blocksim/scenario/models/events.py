@@ -1,4 +1,4 @@
-"""What happens to bodies and walls during a run, at a time or once everything rests."""
+"""What happens to bodies, walls and loads during a run, at a time or once everything rests."""
 
 from typing import Annotated, Literal, Self
 
@@ -8,7 +8,7 @@ from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import OneOf, Table
 
 When = Literal["rest"]
-ACTIONS = ("remove", "fix", "free", "velocity")
+ACTIONS = ("remove", "fix", "free", "unload", "velocity")
 Names = tuple[str, ...]
 
 
@@ -38,6 +38,7 @@ class Event(Table):
     remove: Names = Field(default=(), description='names of bodies and walls ("wall 1" is the first) that go')
     fix: Names = Field(default=(), description="names of bodies that are fixed from then on")
     free: Names = Field(default=(), description="names of fixed or driven bodies that are free from then on")
+    unload: Names = Field(default=(), description="names of loads that end")
     velocity: NewVelocity | None = Field(default=None, description="velocity that a body gets")
 
     @model_validator(mode="after")
@@ -53,6 +54,6 @@ class Event(Table):
     @model_validator(mode="after")
     def _does_something(self) -> Self:
         if not any(getattr(self, action) for action in ACTIONS):
-            message = "nothing happens; give remove, fix, free or velocity"
+            message = "nothing happens; give remove, fix, free, unload or velocity"
             raise q.invalid(message)
         return self
