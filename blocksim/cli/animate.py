@@ -45,7 +45,7 @@ def animate_command(
     stored = stored_run(run)
     animation = out or Path(f"{stored.scenario.name}.gif")
     refuse_foreign(animation, is_film, overwrite=overwrite)
-    support = support_of(stored.scenario)
+    support = support_of(stored.scenario, stored.events)
     older = replacement(animation)
     look = Look(width, trails, stored.scenario.name, forces, paint_named(colour, stored.frames, stored.scenario))
     with counting("frames", quiet=quiet) as on_picture:

@@ -86,7 +86,7 @@ def animate(  # noqa: PLR0913 - one argument for each option of the command
     path = Path(f"{stored.scenario.name}.gif" if out is None else out)
     refuse_foreign(path, is_film, overwrite=overwrite)
     look = Look(width, trails, stored.scenario.name, forces, paint_named(colour, stored.frames, stored.scenario))
-    draw_animation(stored.frames, path, Pace(speed, fps), look, support_of(stored.scenario))
+    draw_animation(stored.frames, path, Pace(speed, fps), look, support_of(stored.scenario, stored.events))
     return path
 
 

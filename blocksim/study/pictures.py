@@ -227,7 +227,8 @@ def draw_run(  # noqa: PLR0913 - what a picture is made of
     measured = None if table is None else load_table(table)
     picture = out or Path(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
     ready(picture)
-    look = {"title": scenario.name, "measured": measured, "support": support_of(scenario), "forces": asked.forces}
+    support = support_of(scenario, stored.events)
+    look = {"title": scenario.name, "measured": measured, "support": support, "forces": asked.forces}
     paint = paint_named(asked.colour, stored.frames, scenario)
     draw(stored.frames, picture, **look, **asked.arguments(kind), paint=paint, paper=paper)
     return picture, stored.remark

@@ -4,6 +4,7 @@ Finished, failed, stopped, killed or still in progress.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,7 @@ from blocksim.scenario import Scenario, load_scenario, load_stored
 from blocksim.scenario.spelling import listed
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
+from blocksim.simulation.happened import Happened
 from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import read_summary
 from blocksim.study.rows import FINISHED, TABLE
@@ -87,6 +89,13 @@ class StoredRun:
     scenario: Scenario
     frames: Frames
     choice: str = ""
+
+    @cached_property
+    def events(self) -> tuple[Happened, ...]:
+        """The events that have happened; none where run.json is missing or damaged."""
+        with suppress(BlocksimError):
+            return read_summary(self.folder / files.SUMMARY).events
+        return ()
 
     @cached_property
     def remark(self) -> str:

@@ -218,7 +218,7 @@ def _side(folder: Path, stored: StoredLimit, value: float, end: StoredSide) -> S
         told = end.outcome or ""
     else:
         told = f"{end.outcome}; first moved: block {first} at {end.first_moved_s or 0.0:.3g} s"
-    side = Side(run.frames, support_of(run.scenario), first, said, is_mechanism=end.verdict != STANDS)
+    side = Side(run.frames, support_of(run.scenario, run.events), first, said, is_mechanism=end.verdict != STANDS)
     moment = float(run.frames.time[side.frame])
     return replace(side, caption=f"{said}\n{told} (drawn at {moment:.3g} s)")
 

@@ -12,6 +12,7 @@ from blocksim.scenario import PlacedSegment, Scenario, place_bodies
 from blocksim.scenario.events import wall_names
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
 from blocksim.scenario.segments import wall_segments
+from blocksim.simulation.happened import Happened
 from blocksim.world.systems.system import Track
 
 PRINTED_DIGITS = 3  # of a time in s
@@ -212,22 +213,34 @@ class Support:
         return np.asarray(line[1:-1][turns])
 
 
-def _removals(scenario: Scenario) -> Iterator[float]:
-    """Yield for every wall the time (s) at which an event removes it; when all rest, no scenario tells."""
+def event_times(scenario: Scenario, happened: Sequence[Happened] = ()) -> list[float]:
+    """Return when (s) each event of a scenario has happened in a run, or will; infinite where nobody knows.
+
+    Of events that wait for rest only a run knows the time.
+    """
+    times = [np.inf if event.at is None else event.at for event in scenario.events]
+    for one in happened:
+        times[one.event] = one.time_s
+    return times
+
+
+def _removals(scenario: Scenario, times: Sequence[float]) -> Iterator[float]:
+    """Yield for every wall the time (s) at which an event removes it."""
     for name in wall_names(scenario):
-        times = (event.at for event in scenario.events if name in event.remove and event.at is not None)
-        yield min(times, default=np.inf)
+        yield min(
+            (at for event, at in zip(scenario.events, times, strict=True) if name in event.remove), default=np.inf
+        )
 
 
-def support_of(scenario: Scenario) -> Support:
-    """Return the support of a scenario's runs."""
+def support_of(scenario: Scenario, happened: Sequence[Happened] = ()) -> Support:
+    """Return the support of a scenario's runs, or of one in which these events have happened."""
     placed = place_bodies(scenario)
     return Support(
         profile=scenario.ground.profile or Support.profile,
         walls=wall_segments(scenario),
         fixed=tuple(body.fixed and not body.freed for body in placed),
         driven=tuple(body.driven for body in placed) if any(body.driven for body in placed) else (),
-        gone=tuple(_removals(scenario)),
+        gone=tuple(_removals(scenario, event_times(scenario, happened))),
         tilt=scenario.ground.tilt,
         direction=motion_direction(scenario),
         motion=None if scenario.motion is None else motion_pieces(scenario),

@@ -107,7 +107,7 @@ def _fixed(frames: FramesLike, support: Support) -> Flags:
 
 def draw_centres(canvas: Canvas, frames: FramesLike, frame: int) -> None:
     """Mark the centre of every block by a line through the ground below it."""
-    for x in MILLIMETRES * frames.x[frame]:
+    for x in MILLIMETRES * frames.x[frame, are_there(frames, frame)]:
         ends = [canvas.floor, canvas.extent.base]
         canvas.axes.plot([x, x], ends, color=style.INK, linewidth=1.2, transform=canvas.scene)
 

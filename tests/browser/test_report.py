@@ -90,6 +90,24 @@ def test_blocks_are_where_the_run_says_to_a_pixel(three: tuple[Path, Frames], op
     one.keep("three-blocks")
 
 
+def test_blocks_that_an_event_removed_are_neither_drawn_nor_found(tmp_path: Path, open_page: Open) -> None:
+    write_run(tmp_path / "run", count=21)
+    stored = read_stored(tmp_path / "run")
+    assert stored.frames is not None
+    vx = stored.frames.vx.copy()
+    vx[10:, 2] = np.nan
+    subject = run_subject("part-1", replace(stored, frames=replace(stored.frames, vx=vx)))
+    write_report([subject], tmp_path / "report.html", title="gone", version="0")
+    one = open_page(tmp_path / "report.html")
+    for frame, is_there in ((9, True), (10, False)):
+        one.page.evaluate(f"{PLAYER}.show({frame})")
+        x, y = one.state()["centres"][2]
+        seen = (np.abs(pixels(one) - COLOURS[2]) <= 2).all(axis=-1).any()
+        assert (bool(seen), one.page.evaluate(f"{PLAYER}.blockAt({x}, {y}) === 2")) == (is_there, is_there)
+    one.page.evaluate(f"{PLAYER}.mark(2)")
+    assert "removed" in one.page.locator(".player .state").inner_text()
+
+
 def frames_a_second(one: Opened) -> float:
     """Return how often the player draws in a second when it draws as often as it can."""
     rate: float = one.page.evaluate(

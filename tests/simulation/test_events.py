@@ -156,7 +156,10 @@ def test_load_that_ends_leaves_a_body_as_fast_as_it_has_become(scheme: str) -> N
 def test_load_that_has_ended_at_rest_delays_no_later_rest(scheme: str) -> None:
     push = {"kind": "force", "name": "push", "body": "block", "magnitude": 0.5 * FRICTION * MASS * G}
     late = {**push, "name": "late", "magnitude": 1e-9, "history": {"kind": "ramp", "end": 50.0}}
-    events = [{"at": 0.01, "unload": ["late"]}, {"when": "rest", "unload": ["push"]}]
+    events: list[Mapping[str, object]] = [
+        {"at": 0.01, "unload": ["late"]},
+        {"when": "rest", "unload": ["push"]},
+    ]
     run = simulate(with_events(scheme, events, end=1.0, time=REST, loads=[push, late]))
     assert [event.what for event in run.summary.events] == ["load late ended", "load push ended"]
     assert run.reason == "at rest"

@@ -9,6 +9,7 @@ import pytest
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_to_toml
 from blocksim.simulation.frames import Frames
+from blocksim.simulation.happened import Happened
 from blocksim.view.run_data import Support, drawable_frames, moments_at, moments_by_motion, path_travelled, support_of
 from tests.view.made_up import blocks_at
 
@@ -113,6 +114,16 @@ def test_the_resolved_scenario_of_a_run_tells_all(tmp_path: Path) -> None:
     assert [(wall.x0, wall.y0, wall.x1, wall.y1) for wall in support.walls] == [(2, 2, 2, 3)]
     assert np.degrees(support.tilt) == pytest.approx(-10.0)
     assert support.offset(np.array([0.0, 1.25, 1.75])) == pytest.approx(np.array([[0, 0], [0, 0.01], [0, -0.01]]))
+
+
+def test_walls_go_at_the_time_of_an_event_and_at_rest_when_a_run_came_to_it() -> None:
+    walls = [{"from": [x, 2], "to": [x, 3]} for x in (2, 3)]
+    events = [{"when": "rest", "remove": ["wall 1"]}, {"at": 0.9, "remove": ["wall 2"]}]
+    scenario = scenario_from_mapping({**SCENE, "walls": walls, "events": events})
+    happened = Happened(event=0, step=15, time_s=1.5, what="", energy_J=0.0)
+    times = (0.8, 1.0, 1.4, 1.5)
+    assert [len(support_of(scenario).at(time).walls) for time in times] == [2, 1, 1, 1]
+    assert [len(support_of(scenario, [happened]).at(time).walls) for time in times] == [2, 1, 1, 0]
 
 
 def test_a_plain_scenario_has_level_ground_at_rest() -> None:

@@ -4,6 +4,7 @@ Frames are thinned where there are too many, and rounded where they are large. L
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,12 +14,14 @@ from numpy.typing import NDArray
 from blocksim.scenario import Scenario
 from blocksim.simulation.contacts import Contacts
 from blocksim.simulation.frames import Frames
+from blocksim.simulation.happened import Happened
 from blocksim.view import style
 from blocksim.view.forces import force_scale, pushing_up
 from blocksim.view.report.elements import element_bytes, pack_systems
 from blocksim.view.report.packing import EXACT_VALUES, SHORT_BYTES, pack
 from blocksim.view.run_data import Floats, Indices, drawable_frames, support_of
 from blocksim.view.window import MILLIMETRES, extent_of
+from blocksim.world.systems.blocks import are_removed
 
 MOST_BYTES = 12_000_000  # of the frames of one run, before they become text, which takes a third more
 CONTACT_BYTES = 16  # of a contact in a frame
@@ -123,9 +126,12 @@ def _listed(values: Floats) -> list[float]:
     return [float(f"{value:.7g}") for value in values]
 
 
-def scene_data(frames: Frames, scenario: Scenario, kept: Indices) -> dict[str, Any]:
-    """Return everything but the frames that the player needs, as plain values for JSON."""
-    support = support_of(scenario)
+def scene_data(frames: Frames, scenario: Scenario, kept: Indices, happened: Sequence[Happened] = ()) -> dict[str, Any]:
+    """Return everything but the frames that the player needs, as plain values for JSON.
+
+    `gone` and `walls_gone` say from which of the kept frames on a block or wall is not there any more, None for never.
+    """
+    support = support_of(scenario, happened)
     extent = extent_of(frames, kept, support)
     reach = ENDLESS_WIDTHS * (extent.width + extent.height) / MILLIMETRES
     fixed = support.fixed or (False,) * len(frames.names)
@@ -134,11 +140,19 @@ def scene_data(frames: Frames, scenario: Scenario, kept: Indices) -> dict[str, A
         "tilt": support.tilt,
         "ground": (MILLIMETRES * support.line(reach)).round(4).tolist(),
         "walls": [[MILLIMETRES * end for end in (wall.x0, wall.y0, wall.x1, wall.y1)] for wall in support.walls],
+        "gone": _first(are_removed(frames.vx[kept])),
+        "walls_gone": _first(frames.time[kept][:, None] >= np.array(support.gone).reshape(1, -1)),
         "offset": (MILLIMETRES * support.offset(frames.time[kept])).round(4).tolist() if support.motion else None,
         "fixed": [bool(flag) for flag in fixed],
         "colours": list(style.BLOCK_COLOURS),
         "particles": _particles(frames, scenario),
     }
+
+
+def _first(flags: NDArray[np.bool_]) -> list[int | None]:
+    """Return the first frame with a flag for each column of (n, b), None where there is none."""
+    firsts = np.where(flags.any(axis=0), flags.argmax(axis=0), -1).tolist()
+    return [None if first < 0 else first for first in firsts]
 
 
 def _particles(frames: Frames, scenario: Scenario) -> dict[str, Any] | None:

@@ -181,7 +181,7 @@ def _moving(run: PartialRun, most_bytes: int) -> tuple[dict[str, Any] | None, li
     except InvalidInputError as error:
         return None, [], [str(error)]
     kept = frame_indices(run.frames, most_bytes)
-    scene = scene_data(run.frames, run.scenario, kept)
+    scene = scene_data(run.frames, run.scenario, kept, () if run.summary is None else run.summary.events)
     forces = pack_forces(run.frames, kept, scene["tilt"])
     found = packed.data["energy"]
     energy = {label: found[name] for name, label in LEDGER.items() if name in found}

@@ -8,7 +8,8 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
-from blocksim.view.report.player import boundary_particles, pack_frames
+from blocksim.simulation.happened import Happened
+from blocksim.view.report.player import boundary_particles, pack_frames, scene_data
 from blocksim.world.build import build_world
 from tests.view.report.folders import SCENARIOS, numbers, write_run
 
@@ -42,6 +43,18 @@ def test_thousand_blocks_and_many_frames_stay_below_the_limit(tmp_path: Path) ->
     size = sum(len(part["data"]) for part in packed.data["channels"].values())
     assert 300 < packed.kept < 1700
     assert size < 17_000_000
+
+
+def test_page_knows_when_blocks_and_walls_are_gone(tmp_path: Path) -> None:
+    frames = write_run(tmp_path / "run", "slope", count=5)
+    scenario = load_scenario(SCENARIOS / "slope.toml", {"events": [{"when": "rest", "remove": ["wall 1"]}]})
+    frames.vx[3:, 1] = np.nan
+    happened = Happened(event=0, step=10, time_s=float(frames.time[2]), what="", energy_J=0.0)
+    kept = np.array([0, 2, 3, 4])
+    data = scene_data(frames, scenario, kept, [happened])
+    assert data["gone"] == [None, 2, *[None] * (len(frames.names) - 2)]
+    assert data["walls_gone"] == [1, *[None] * (len(scenario.walls) - 1)]
+    assert scene_data(frames, scenario, kept)["walls_gone"] == [None] * len(scenario.walls)
 
 
 def test_surface_model_has_none() -> None:

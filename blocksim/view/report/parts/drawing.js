@@ -61,7 +61,7 @@ class Drawing {
 
   drawSupport(frame) {
     const { context, colours, view } = this;
-    const { ground, walls } = this.frames.scene;
+    const { ground } = this.frames.scene;
     const [dx, dy] = this.frames.offset(frame);
     view.apply(context, this.ratio, dx, dy);
     const depth = 1e3 * (this.canvas.height / view.scale);
@@ -73,7 +73,7 @@ class Drawing {
     context.fill();
     context.beginPath();
     for (const [x, y] of ground) context.lineTo(x, y);
-    for (const [x0, y0, x1, y1] of walls) {
+    for (const [x0, y0, x1, y1] of this.frames.walls(frame)) {
       context.moveTo(x0, y0);
       context.lineTo(x1, y1);
     }
@@ -110,12 +110,12 @@ class Drawing {
     context.strokeStyle = colours.edge;
     for (const [fill, blocks] of this.groups) {
       const path = new Path2D();
-      for (const block of blocks) this.trace(path, block);
+      for (const block of blocks) if (this.frames.isThere(frame, block)) this.trace(path, block);
       context.fillStyle = fill ?? colours.ground;
       context.fill(path);
       if (this.isClear) context.stroke(path);
     }
-    if (this.isClear) this.drawUpperSides();
+    if (this.isClear) this.drawUpperSides(frame);
   }
 
   // Keeps centre and half sides of every block in pixels, as vectors along its own axes.
@@ -147,11 +147,12 @@ class Drawing {
   }
 
   // A line along every block's own upper side shows turns.
-  drawUpperSides() {
+  drawUpperSides(frame) {
     const { context, frames, places } = this;
     const path = new Path2D();
     let widest = 0;
     for (let block = 0; block < frames.blocks; block += 1) {
+      if (!frames.isThere(frame, block)) continue;
       const [px, py, ax, ay, bx, by] = places.subarray(6 * block, 6 * block + 6);
       const smaller = Math.min(Math.hypot(ax, ay), Math.hypot(bx, by));
       const along = 1 - 0.14 * smaller / Math.hypot(ax, ay);
@@ -198,6 +199,7 @@ class Drawing {
     const size = Math.max(2.5 / view.scale, 0.25);
     context.fillStyle = this.colours.ink;
     for (let block = 0; block < frames.blocks; block += 1) {
+      if (!frames.isThere(frame, block)) continue;
       const at = frames.blocks * frame + block;
       view.apply(context, this.ratio, frames.x[at], frames.y[at], frames.angle(frame, block));
       for (const [x, y] of outlines[which[block]]) context.fillRect(x - 0.5 * size, y - 0.5 * size, size, size);
@@ -212,7 +214,7 @@ class Drawing {
     context.textBaseline = "middle";
     for (let block = 0; block < frames.blocks; block += 1) {
       const size = Math.min(0.6 * room(block), 18);
-      if (size < 8 || frames.names[block].length > 24) continue;
+      if (size < 8 || !frames.isThere(frame, block) || frames.names[block].length > 24) continue;
       context.font = `${size}px system-ui, sans-serif`;
       if (context.measureText(frames.names[block]).width > room(block)) continue;
       const [x, y] = view.toPixels(frames.x[frames.blocks * frame + block], frames.y[frames.blocks * frame + block]);
@@ -301,6 +303,7 @@ class Drawing {
 
   drawMark(frame, block) {
     const { context, frames, view } = this;
+    if (!frames.isThere(frame, block)) return;
     const at = frames.blocks * frame + block;
     view.apply(context, this.ratio, frames.x[at], frames.y[at], frames.angle(frame, block));
     context.strokeStyle = this.colours.link;

@@ -36,6 +36,12 @@ class Frames {
     return (this.rotation[frame * this.blocks + block] + this.startAngle[block]) * Math.PI / 180;
   }
 
+  // Whether an event has not yet removed a block.
+  isThere(frame, block) { return frame < (this.scene.gone[block] ?? Infinity); }
+
+  // The walls that no event has removed yet.
+  walls(frame) { return this.scene.walls.filter((_, wall) => frame < (this.scene.walls_gone[wall] ?? Infinity)); }
+
   offset(frame) { return this.scene.offset ? this.scene.offset[frame] : [0, 0]; }
 
   // From which to before which contact those of a frame are.
@@ -63,6 +69,7 @@ class Frames {
   // The block at a place (mm), the one drawn last where there are several; -1 where there is none.
   blockAt(frame, x, y) {
     for (let block = this.blocks - 1; block >= 0; block -= 1) {
+      if (!this.isThere(frame, block)) continue;
       const dx = x - this.x[frame * this.blocks + block];
       const dy = y - this.y[frame * this.blocks + block];
       const angle = this.angle(frame, block);

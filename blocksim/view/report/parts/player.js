@@ -146,7 +146,7 @@ class Player {
       return;
     }
     const at = frames.blocks * this.frame + marked;
-    const values = [
+    const values = !frames.isThere(this.frame, marked) ? ["removed"] : [
       `x ${shown(frames.x[at])} mm`, `y ${shown(frames.y[at])} mm`, `rotation ${shown(frames.rotation[at])}°`,
       `vx ${shown(frames.vx[at], 1)} mm/s`, `vy ${shown(frames.vy[at], 1)} mm/s`, `spin ${shown(frames.spin[at], 1)} °/s`,
     ];
