@@ -12,6 +12,8 @@ from blocksim.errors import InvalidInputError
 from blocksim.view import style
 from blocksim.view.animation_files import write_gif, write_mp4
 from blocksim.view.forces import WithContacts, draw_forces, force_scale
+from blocksim.view.load_arrows import draw_marks, draw_outside
+from blocksim.view.loads import length_in, outside, with_room
 from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import Canvas, Page, depth_of, draw_ruler, finish_panel, page_for
 from blocksim.view.run_data import Floats, FramesLike, Indices, Support, drawable_frames
@@ -31,7 +33,7 @@ HIGHEST = 1.25  # height of the panel over its width
 KEY_FOOT = 0.04  # inches, below what explains the colours
 HELD = 1.5  # s that the last picture stays
 MOST_PICTURES = 10_000
-TIME_ROOM = 60.0  # points
+TIME_ROOM, MARKS_ROOM = 60.0, 70.0  # points: for the time, and for a mark of what acts on all bodies
 FEW_BLOCKS = 30  # up to which trails are drawn by default
 TRAIL: dict[str, Any] = {"linewidths": 1.0, "alpha": 0.5, "zorder": 2.5}  # below names
 
@@ -128,7 +130,9 @@ class Animation:
         tallest = HIGHEST * (across - 2.0 * MARGINS[0])
         margins = (*MARGINS[:2], MARGINS[2] + self.paint.height)
         self.seen = together(frames, self.drawable, support)
-        self.page = page_for(extent_of(frames, self.drawable, support, self.seen), across, tallest, margins)
+        extent = extent_of(frames, self.drawable, support, self.seen)
+        self.acts, self.length = outside(frames, self.drawable, support), length_in(extent)
+        self.page = page_for(with_room(extent, self.acts, self.length), across, tallest, margins)
         self._prepare(look.title)
 
     def _prepare(self, title: str) -> None:
@@ -152,16 +156,19 @@ class Animation:
         place = MARGINS[0] / self.page.width, 1.0 - 0.06 / self.page.height
         figure.text(*place, shown, va="top", fontsize=style.TITLE_SIZE)
         draw_key(figure, self.paint, MARGINS[0], KEY_FOOT)
-        if self.forces is not None:
-            self._tell_scale(self.forces.example)
+        scales = [] if self.forces is None else [f"forces: {self.forces.example}"]
+        scales += [f"loads: {self.acts.sizes}"] if self.acts.sizes else []
+        if scales:
+            self._tell_scale("; ".join(scales))
         if self.support.is_still:
             draw_standing(self.canvas, self.frames, int(self.drawable[0]), self.support)
 
-    def _tell_scale(self, example: str) -> None:
-        """Write the scale of forces at the right, in the line of the time, as far as there is room."""
-        room = self.page.panel_width * style.POINTS_PER_INCH - TIME_ROOM
+    def _tell_scale(self, scales: str) -> None:
+        """Write the scale of arrows at the right, in the line of the time, as far as there is room."""
+        marks = MARKS_ROOM * max(map(len, self.acts.marks), default=0)
+        room = self.page.panel_width * style.POINTS_PER_INCH - TIME_ROOM - marks
         top = self.page.extent.top + 4.0 / self.page.points_per_mm
-        text = style.cut_to(f"forces: {example}", room, style.FONT_SIZE)
+        text = style.cut_to(scales, room, style.FONT_SIZE)
         self.canvas.axes.text(self.page.extent.right, top, text, ha="right", va="bottom", color=style.FAINT_INK)
 
     def picture(self, frame: int) -> Pixels:
@@ -185,6 +192,9 @@ class Animation:
         draw_blocks(self.canvas, self.frames, frame, self.support, self.paint)
         if self.has_trails:
             self._draw_trails(frame)
+        index = int(np.searchsorted(self.drawable, frame))
+        draw_outside(self.canvas, self.acts, index, self.length)
+        draw_marks(self.canvas, self.acts.marks[index], TIME_ROOM)
         if self.forces is not None:
             draw_forces(self.canvas, self.frames, frame, self.forces)
         top = self.page.extent.top + 4.0 / self.page.points_per_mm

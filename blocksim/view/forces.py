@@ -109,7 +109,7 @@ def draw_forces(canvas: Canvas, frames: WithContacts, frame: int, scale: ForceSc
     size = min(1.0, scale.longest * canvas.points_per_mm / WHOLE)
     if size < 1.0:
         _draw_veil(canvas)
-    for part in _parts(found, canvas, size):
+    for part in arrow_parts(found, canvas, size):
         canvas.axes.add_collection(part)
 
 
@@ -122,7 +122,7 @@ def _draw_veil(canvas: Canvas) -> None:
     canvas.axes.add_artist(Rectangle(*place, facecolor="#FFFFFF", alpha=VEIL_ALPHA, linewidth=0.0, zorder=VEIL))
 
 
-def _parts(found: Floats, canvas: Canvas, size: float) -> "list[Collection]":
+def arrow_parts(found: Floats, canvas: Canvas, size: float, colour: str = style.INK) -> "list[Collection]":
     """Return shafts and heads of arrows, with a light line around them that keeps them apart from dark blocks.
 
     `size` is that of heads and lines over their usual one.
@@ -144,6 +144,6 @@ def _parts(found: Floats, canvas: Canvas, size: float) -> "list[Collection]":
         PolyCollection(
             heads, facecolors="#FFFFFF", edgecolors="#FFFFFF", linewidths=size * (HALO - WIDTH), zorder=BELOW, **at
         ),
-        LineCollection(shafts, colors=style.INK, linewidths=size * WIDTH, zorder=FORCES, **at),
-        PolyCollection(heads, facecolors=style.INK, linewidths=0.0, zorder=FORCES, **at),
+        LineCollection(shafts, colors=colour, linewidths=size * WIDTH, zorder=FORCES, **at),
+        PolyCollection(heads, facecolors=colour, linewidths=0.0, zorder=FORCES, **at),
     ]

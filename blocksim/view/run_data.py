@@ -13,6 +13,7 @@ from blocksim.scenario.events import wall_names
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
 from blocksim.scenario.segments import wall_segments
 from blocksim.simulation.happened import Happened
+from blocksim.view.acting import Acting, acting_loads
 from blocksim.world.systems.system import Track
 
 PRINTED_DIGITS = 3  # of a time in s
@@ -151,7 +152,8 @@ class Support:
 
     `profile` is the surface towards +x, level beyond both ends. `fixed` states for every body whether it moves with the
     support or by a motion of its own (`driven`). A tilt raises the +x end. Without `motion` all rest. `weight` (N) is
-    that of all free bodies. `gone` are the times (s) at which walls are removed, infinite for those that stay.
+    that of all free bodies. `gone` are the times (s) at which walls are removed, infinite for those that stay. `loads`
+    are those on the blocks.
     """
 
     profile: tuple[tuple[float, float], ...] = ((0.0, 0.0), (1.0, 0.0))
@@ -163,6 +165,7 @@ class Support:
     direction: tuple[float, float] = (1.0, 0.0)
     motion: MotionPieces | None = None
     weight: float = 0.0
+    loads: tuple[Acting, ...] = ()
 
     @property
     def way(self) -> str:
@@ -234,15 +237,16 @@ def _removals(scenario: Scenario, times: Sequence[float]) -> Iterator[float]:
 
 def support_of(scenario: Scenario, happened: Sequence[Happened] = ()) -> Support:
     """Return the support of a scenario's runs, or of one in which these events have happened."""
-    placed = place_bodies(scenario)
+    placed, times = place_bodies(scenario), event_times(scenario, happened)
     return Support(
         profile=scenario.ground.profile or Support.profile,
         walls=wall_segments(scenario),
         fixed=tuple(body.fixed and not body.freed for body in placed),
         driven=tuple(body.driven for body in placed) if any(body.driven for body in placed) else (),
-        gone=tuple(_removals(scenario, event_times(scenario, happened))),
+        gone=tuple(_removals(scenario, times)),
         tilt=scenario.ground.tilt,
         direction=motion_direction(scenario),
         motion=None if scenario.motion is None else motion_pieces(scenario),
+        loads=acting_loads(scenario, times),
         weight=scenario.gravity * sum(body.mass for body in placed if not body.fixed or body.freed),
     )

@@ -11,6 +11,8 @@ import numpy as np
 from blocksim.view import style
 from blocksim.view.forces import ForceScale, WithContacts, draw_forces, force_scale
 from blocksim.view.layout import OWN, Paper, write_heading
+from blocksim.view.load_arrows import draw_marks, draw_outside
+from blocksim.view.loads import Outside, length_in, outside, with_room
 from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import ROW_HEIGHT, Canvas, depth_of, draw_ruler, finish_panel, room_below
 from blocksim.view.run_data import FramesLike, Indices, Support, drawable_frames, moments_at, moments_by_motion
@@ -28,6 +30,7 @@ LINE = 0.155  # inches, of each further line of text above a panel or below the 
 LETTERS_AN_INCH = 15.0  # in a line below the strip
 LEAST_WIDTH, NARROWEST_PANEL, LOWEST_PANEL = 1.75, 1.25, 0.25  # inches, on a page whose size was asked for
 POINTS = style.POINTS_PER_INCH
+CAPTION = 3.0  # points, from a panel to the text above it
 TICKS = 0.26  # inches, for the numbers under a row of panels
 TALLEST_PANEL = 4.0  # inches
 WIDEST_IN_FOURS, WIDEST_IN_PAIRS = 2.5, 6.0  # width over height, so that a panel stays about an inch tall
@@ -110,7 +113,7 @@ def draw_strip(  # noqa: PLR0913 - one argument for each option of the command
     support, paint = support or Support(), paint or by_block(frames)
     drawable = drawable_frames(frames)
     scale = force_scale(frames) if forces else None
-    extent = extent_of(frames, drawable, support)
+    extent, length = _window(frames, drawable, support)
     ranges = [] if measured is None else measured_ranges(measured, frames.names, extent.width)
     extent = widened(extent, ranges)
     columns, usual = arrangement(extent, readable_scale(frames))
@@ -120,11 +123,14 @@ def draw_strip(  # noqa: PLR0913 - one argument for each option of the command
     else:
         chosen = moments_at(frames, drawable, times)
         ranges = ranges if chosen[-1] == drawable[-1] else []  # they belong to the final state
-    notes = wrap(_legend(ranges, support, scale), int(LETTERS_AN_INCH * paper.width(WIDTH, LEAST_WIDTH)))
-    lines = Lines(1 if support.motion is None else 2, len(notes), rows_of(ranges), paint.height)
+    acts = outside(frames, chosen, support)
+    told = [_legend(ranges, support, scale), acts.explanation]
+    notes = wrap(" ".join(filter(None, told)), int(LETTERS_AN_INCH * paper.width(WIDTH, LEAST_WIDTH)))
+    lines = Lines(_captions(support, acts), len(notes), rows_of(ranges), paint.height)
     layout = plan_on(paper, extent, columns, len(chosen), lines)
     with style.styled_figure(layout.width, layout.height, paper.dots) as figure:
         _draw_panels(figure, frames, chosen, layout, ranges, support, paint)
+        _draw_acts(figure, acts, layout, length)
         if scale is not None:
             _draw_forces(figure, frames, chosen, layout, scale)
         _draw_texts(figure, layout, title, notes)
@@ -262,7 +268,29 @@ def _draw_panels(  # noqa: PLR0913, PLR0917 - what is drawn, and where
         finish_panel(canvas, (layout.panel_width, layout.panel_height), labelled=index + layout.columns > last)
         if layout.extent.tilt:
             draw_ruler(canvas, depth_of(rows_of(ranges)))
-        canvas.axes.set_title(_caption(frames, frame, support), loc="left", pad=3.0)
+        canvas.axes.set_title(_caption(frames, frame, support), loc="left", pad=CAPTION)
+
+
+def _window(frames: FramesLike, drawable: Indices, support: Support) -> tuple[Extent, float]:
+    """Return the extent that holds blocks and arrows of loads, and the length (mm) of the longest arrow."""
+    extent = extent_of(frames, drawable, support)
+    length = length_in(extent)
+    return with_room(extent, outside(frames, drawable, support), length), length
+
+
+def _captions(support: Support, acts: Outside) -> int:
+    """Return the lines of text above each panel: time, displacement of the support, loads on all bodies."""
+    return 1 + (support.motion is not None) + any(acts.marks)
+
+
+def _draw_acts(figure: "Figure", acts: Outside, layout: Layout, length: float) -> None:
+    """Add what acts from outside to all panels, and above them what acts on all bodies, below the time."""
+    for index, axes in enumerate(() if acts.is_empty else figure.axes):
+        canvas = Canvas(axes, layout.extent, layout.points_per_mm)
+        draw_outside(canvas, acts, index, length)
+        if acts.marks[index]:
+            draw_marks(canvas, acts.marks[index], up=2.0)
+            axes.set_title(axes.get_title(loc="left"), loc="left", pad=CAPTION + LINE * POINTS)
 
 
 def _draw_forces(figure: "Figure", frames: WithContacts, chosen: Indices, layout: Layout, scale: ForceScale) -> None:

@@ -108,6 +108,25 @@ def test_blocks_that_an_event_removed_are_neither_drawn_nor_found(tmp_path: Path
     assert "removed" in one.page.locator(".player .state").inner_text()
 
 
+def test_loads_are_drawn_where_they_act_and_when_they_act(tmp_path: Path, open_page: Open) -> None:
+    steps = {"kind": "steps", "times": [0.1], "factors": [1.0]}
+    loads = [{"kind": "force", "body": "1", "magnitude": 5.0, "point": [-0.012, 0.0], "history": steps}]
+    write_run(tmp_path / "run", count=21, overrides={"loads": loads})
+    report(tmp_path / "run", "--out", tmp_path / "report.html")
+    one = open_page(tmp_path / "report.html")
+    red = (165, 0, 38)
+    one.page.evaluate(f"{PLAYER}.show(9)")
+    assert not (np.abs(pixels(one) - red) <= 2).all(axis=-1).any()
+    one.page.evaluate(f"{PLAYER}.show(10)")
+    seen = (np.abs(pixels(one) - red) <= 2).all(axis=-1)
+    columns, rows = np.nonzero(seen.any(axis=0))[0], np.nonzero(seen.any(axis=1))[0]
+    (x, y), scale = one.state()["centres"][0], one.state()["scale"]
+    assert columns.max() == pytest.approx(x - 12.0 * scale, abs=2.0)
+    assert rows.mean() == pytest.approx(y, abs=1.5)
+    one.page.keyboard.press("l")
+    assert not (np.abs(pixels(one) - red) <= 2).all(axis=-1).any()
+
+
 def frames_a_second(one: Opened) -> float:
     """Return how often the player draws in a second when it draws as often as it can."""
     rate: float = one.page.evaluate(

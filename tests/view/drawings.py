@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.analysis import load_table
+from blocksim.scenario.models.history import Stretch
+from blocksim.scenario.models.loads import Force, Horizontal, Moment, Pressure
 from blocksim.scenario.motion import MotionPieces
+from blocksim.view.acting import Acting
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
 from blocksim.view.history_panels import Choice
@@ -43,6 +46,16 @@ MOVING = Support(motion=PIECES, direction=(np.cos(0.3), np.sin(0.3)), fixed=(Tru
 STEP = Support(profile=((0.05, 0.0), (0.05, -0.05)), fixed=(True, False, False))
 TILTED = Support(tilt=-0.2)
 LEGEND = ("total", "alone")
+RISING = (Stretch(0.0, 0.0, 2.0), Stretch(0.5, 1.0, 0.0))
+LOADED = Support(
+    loads=(
+        Acting(Force(kind="force", body="1", magnitude=-2e3, point=(0.016, 0.0)), 0, RISING, np.inf),
+        Acting(Moment(kind="moment", body="2", magnitude=0.5), 1, RISING, np.inf),
+        Acting(Pressure(kind="pressure", body="3", face="top", magnitude=5e6), 2, RISING, 0.5),
+        Acting(Horizontal(kind="horizontal", magnitude=0.25), -1, RISING, np.inf),
+    ),
+    motion=PIECES,
+)
 
 
 def panel(blocks: int = 3, levels: int = 4, size_mm: float = 1.0, **more: Any) -> Panel:
@@ -145,6 +158,7 @@ DRAWINGS: dict[str, Drawing] = {
     "strip of a ride": of_run(draw_strip, riding(), support=replace(MOVING, fixed=())),
     "strip on tilted ground": of_run(draw_strip, toppling(1), support=TILTED),
     "strip on steep moving ground": of_run(draw_strip, toppling(3), support=Support(tilt=-0.9, motion=PIECES)),
+    "strip with loads": of_run(draw_strip, toppling(3, steps=61), support=LOADED, times=[0.0, 0.1, 0.3, 0.6]),
     "strip of a tower": of_run(draw_strip, stacked(12), title=None),
     "strip with forces": of_run(draw_strip, pressed(toppling(7)), forces=True),
     "strip with odd names": of_run(draw_strip, odd(3), title="100 % $x_1$"),

@@ -29,6 +29,11 @@ def pack(values: Floats, *, exact: bool = False) -> tuple[dict[str, Any], float]
     return {"type": "u2", "low": low, "step": step, "data": _text(steps)}, _largest(low + step * steps - values)
 
 
+def listed(values: Floats) -> list[float]:
+    """Return a few values as plain numbers of seven digits."""
+    return [float(f"{value:.7g}") for value in values]
+
+
 def _largest(errors: Floats) -> float:
     finite = np.abs(errors[np.isfinite(errors)])
     return float(finite.max()) if finite.size else 0.0

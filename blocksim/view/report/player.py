@@ -18,7 +18,7 @@ from blocksim.simulation.happened import Happened
 from blocksim.view import style
 from blocksim.view.forces import force_scale, pushing_up
 from blocksim.view.report.elements import element_bytes, pack_systems
-from blocksim.view.report.packing import EXACT_VALUES, SHORT_BYTES, pack
+from blocksim.view.report.packing import EXACT_VALUES, SHORT_BYTES, listed, pack
 from blocksim.view.run_data import Floats, Indices, drawable_frames, support_of
 from blocksim.view.window import MILLIMETRES, extent_of
 from blocksim.world.systems.blocks import are_removed
@@ -60,9 +60,9 @@ def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
     data = {
         "time": pack(frames.time[kept], exact=True)[0],
         "names": list(frames.names),
-        "size_x": _listed(MILLIMETRES * frames.size_x),
-        "size_y": _listed(MILLIMETRES * frames.size_y),
-        "start_angle": _listed(np.degrees(frames.start_angle)),
+        "size_x": listed(MILLIMETRES * frames.size_x),
+        "size_y": listed(MILLIMETRES * frames.size_y),
+        "start_angle": listed(np.degrees(frames.start_angle)),
         "channels": {name: part for name, (part, _) in packed.items()},
         "energy": {name: pack(values[kept], exact=True)[0] for name, values in frames.energy.items()},
         "contact_count": pack(frames.contact_count[kept], exact=True)[0],
@@ -120,10 +120,6 @@ def _channels(frames: Frames, kept: Indices) -> dict[str, Floats]:
     lengths = {name: MILLIMETRES * getattr(frames, name)[kept] for name in ("x", "y", "vx", "vy")}
     turns = {"rotation": np.degrees(frames.rotation[kept]), "spin": np.degrees(frames.spin[kept])}
     return {name: {**lengths, **turns}[name] for name in CHANNELS}
-
-
-def _listed(values: Floats) -> list[float]:
-    return [float(f"{value:.7g}") for value in values]
 
 
 def scene_data(frames: Frames, scenario: Scenario, kept: Indices, happened: Sequence[Happened] = ()) -> dict[str, Any]:

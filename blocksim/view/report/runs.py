@@ -20,6 +20,7 @@ from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import Columns, read_table, rows_of
 from blocksim.view.probes import panels_of, probe_picture
+from blocksim.view.report.loads import pack_loads
 from blocksim.view.report.player import MOST_BYTES, frame_indices, pack_forces, pack_frames, scene_data
 
 Part = TypeVar("Part")
@@ -167,6 +168,7 @@ def run_subject(
         "has_player": data is not None,
         "has_particles": bool(data and data["scene"]["particles"]),
         "has_forces": bool(data and data["forces"]),
+        "has_loads": bool(data and data["loads"]),
         "has_measured": bool(data and data["measured"]),
     }
     return Subject(key, "run", run.name, page, {"kind": "run", "name": run.name, "frames": data})
@@ -181,12 +183,16 @@ def _moving(run: PartialRun, most_bytes: int) -> tuple[dict[str, Any] | None, li
     except InvalidInputError as error:
         return None, [], [str(error)]
     kept = frame_indices(run.frames, most_bytes)
-    scene = scene_data(run.frames, run.scenario, kept, () if run.summary is None else run.summary.events)
-    forces = pack_forces(run.frames, kept, scene["tilt"])
+    happened = () if run.summary is None else run.summary.events
+    scene = scene_data(run.frames, run.scenario, kept, happened)
+    forces, loads = pack_forces(run.frames, kept, scene["tilt"]), pack_loads(run.frames, run.scenario, kept, happened)
+    if loads is not None:
+        scene["extent"] = [loads.extent.left, loads.extent.right, loads.extent.bottom, loads.extent.top]
     found = packed.data["energy"]
     energy = {label: found[name] for name, label in LEDGER.items() if name in found}
-    notes = [*packed.notes, NO_FORCES if forces is None else forces["told"]]
-    return {**packed.data, "energy": energy, "scene": scene, "forces": forces}, notes, []
+    notes = [*packed.notes, NO_FORCES if forces is None else forces["told"], *(loads.notes if loads else ())]
+    moving = {"energy": energy, "scene": scene, "forces": forces, "loads": loads.data if loads else None}
+    return {**packed.data, **moving}, notes, []
 
 
 def _measured(names: Sequence[str], comparison: Mapping[str, Any] | None) -> list[dict[str, Any]]:

@@ -8,11 +8,12 @@ class Drawing {
     this.frames = frames;
     this.view = new View(frames.scene.extent, frames.scene.tilt);
     this.groups = this.grouped();
+    this.loads = new LoadDrawing(this);
     this.takeColours();
   }
 
   takeColours() {
-    this.colours = Object.fromEntries(["stage", "ground", "edge", "ink", "faint", "link", "measured"].map((name) => [name, colour(name)]));
+    this.colours = Object.fromEntries(["stage", "ground", "edge", "ink", "faint", "link", "measured", "load"].map((name) => [name, colour(name)]));
   }
 
   fillOf(block) {
@@ -52,6 +53,7 @@ class Drawing {
     if (options.trails) this.drawTrails();
     if (options.particles) this.drawParticles(frame);
     if (options.names) this.drawNames(frame);
+    if (options.loads) this.loads.draw(frame);
     if (options.forces) this.drawForces(frame);
     if (options.measured) this.drawMeasured(frame);
     if (marked >= 0) this.drawMark(frame, marked);
@@ -255,7 +257,14 @@ class Drawing {
     const [px, py] = view.toPixels(x[at], y[at]);
     const ux = (view.cos * fx[at] - view.sin * fy[at]) / force;
     const uy = -(view.sin * fx[at] + view.cos * fy[at]) / force;
-    const [ex, ey] = [px + reach * ux, py + reach * uy];
+    this.traceArrow(path, px, py, px + reach * ux, py + reach * uy);
+  }
+
+  // Adds an arrow between two places (pixels) to a path.
+  traceArrow(path, px, py, ex, ey) {
+    const reach = Math.hypot(ex - px, ey - py);
+    if (!(reach > 1)) return;
+    const [ux, uy] = [(ex - px) / reach, (ey - py) / reach];
     path.moveTo(px, py);
     path.lineTo(ex, ey);
     const head = Math.min(6, 0.5 * reach);

@@ -12,6 +12,11 @@ class Frames {
     this.contactCount = decode(data.contact_count);
     for (const [name, part] of Object.entries(data.channels)) this[name] = decode(part);
     this.systems = data.systems.map((one) => ({ ...one, x: decode(one.x), y: decode(one.y), shape: one.shape && decode(one.shape) }));
+    this.loads = data.loads && {
+      ...data.loads,
+      arrows: data.loads.arrows.map((one) => ({ ...one, ...Object.fromEntries(["x0", "y0", "x1", "y1"].map((name) => [name, decode(one[name])])) })),
+      turns: data.loads.turns && { ...data.loads.turns, ...Object.fromEntries(["x", "y", "sweep"].map((name) => [name, decode(data.loads.turns[name])])) },
+    };
     this.forces = data.forces && { ...data.forces, ...Object.fromEntries(["x", "y", "fx", "fy"].map((name) => [name, decode(data.forces[name])])) };
   }
 

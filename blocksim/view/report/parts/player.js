@@ -13,7 +13,7 @@ class Player {
     this.marked = -1;
     this.pinned = false;
     this.timer = 0;
-    this.options = { trails: false, particles: false, forces: false, measured: true, names: this.frames.blocks <= MOST_NAMES };
+    this.options = { trails: false, particles: false, forces: false, measured: true, loads: Boolean(this.frames.loads), names: this.frames.blocks <= MOST_NAMES };
     this.listeners = [];
     this.chosen = [];
     this.wireControls();
@@ -236,7 +236,7 @@ class Player {
       "+": () => this.act("in"), "=": () => this.act("in"), "-": () => this.act("out"), 0: () => this.act("fit"),
       w: () => this.shift(0, 40), a: () => this.shift(40, 0), s: () => this.shift(0, -40), d: () => this.shift(-40, 0),
       b: () => this.walk(1), B: () => this.walk(-1),
-      t: () => this.toggle("trails"), n: () => this.toggle("names"), p: () => this.toggle("particles"), f: () => this.toggle("forces"),
+      t: () => this.toggle("trails"), n: () => this.toggle("names"), p: () => this.toggle("particles"), f: () => this.toggle("forces"), l: () => this.toggle("loads"),
       "?": () => this.part("details.keys").toggleAttribute("open"),
     };
     const action = keys[event.key];

@@ -1,0 +1,153 @@
+"""Where arrows of loads are, how long they are for one another, and when there is none."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from blocksim.scenario import scenario_from_mapping
+from blocksim.simulation.happened import Happened
+from blocksim.view.loads import FORCE, PRESSURE, SPEED, Arrows, Outside, outside, with_room
+from blocksim.view.run_data import Support, support_of
+from blocksim.view.window import extent_of
+from tests.view.made_up import blocks_at
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from blocksim.simulation.frames import Frames
+
+WIDTH, HEIGHT = 0.2, 0.4  # m
+QUARTER = 0.5 * np.pi
+PUSH = {"kind": "force", "name": "push", "body": "1", "magnitude": 6.0, "point": [-0.1, 0.1]}
+STRONGER = {"kind": "force", "name": "pull", "body": "1", "magnitude": 12.0, "point": [0.1, 0.0]}
+
+
+def acting(
+    loads: Sequence[Mapping[str, object]], frames: Frames, happened: Sequence[Happened] = (), **tables: Any
+) -> Outside:
+    """Return what acts in all frames of one block."""
+    return outside(frames, np.arange(len(frames.time)), support(loads, happened, **tables))
+
+
+def support(loads: Sequence[Mapping[str, object]], happened: Sequence[Happened] = (), **tables: Any) -> Support:
+    """Return the support of a scene with one block and these loads."""
+    block = {"width": WIDTH, "height": HEIGHT, "length": 0.1, "material": "oak"}
+    scene = {
+        "schema": 1,
+        "name": "a",
+        "materials": {"oak": {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}},
+        "blocks": {"brick": block},
+        "bodies": [{"block": "brick", "x": 0.0, "y": 0.2, "name": "1"}],
+        "loads": loads,
+        **tables,
+    }
+    return support_of(scenario_from_mapping(scene), happened)
+
+
+def block(angles: Sequence[float], x: float = 0.0) -> Frames:
+    """Return a block a second apart at these angles."""
+    return blocks_at(np.full(len(angles), x), 0.2, angles, size=(WIDTH, HEIGHT))
+
+
+def only(found: Outside, kind: str) -> list[Arrows]:
+    return [one for one in found.arrows if one.kind == kind]
+
+
+def test_forces_lie_outside_their_body_are_in_proportion_and_turn_where_they_should() -> None:
+    turning = {**STRONGER, "axes": "body"}
+    push, pull = only(acting([PUSH, turning], block([0.0, QUARTER], x=1.0)), FORCE)
+    assert push.lines(100.0)[0, 0] == pytest.approx(np.array([[850.0, 300.0], [900.0, 300.0]]))
+    assert pull.lines(100.0)[0, 0] == pytest.approx(np.array([[1100.0, 200.0], [1200.0, 200.0]]))
+    assert pull.lines(100.0)[1, 0] == pytest.approx(np.array([[1000.0, 300.0], [1000.0, 400.0]]))
+    assert push.at[1, 0] == pytest.approx([900.0, 100.0])
+    assert push.way[1, 0] == pytest.approx([0.5, 0.0])
+
+
+def test_loads_follow_their_histories_and_are_gone_when_an_event_ends_them_or_their_body_is_removed() -> None:
+    ramp = {**PUSH, "history": {"kind": "ramp", "end": 4.0}}
+    frames, events = block([0.0] * 6), [{"when": "rest", "unload": ["push"]}]
+    (rising,) = only(acting([ramp], frames), FORCE)
+    assert rising.way[:, 0, 0] == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0, 1.0])
+    ended = Happened(event=0, step=3, time_s=3.0, what="", energy_J=0.0)
+    (cut,) = only(acting([ramp], frames, [ended], events=events), FORCE)
+    assert cut.way[:, 0, 0] == pytest.approx([0.0, 0.5, 1.0, 0.0, 0.0, 0.0])
+    frames.vx[2:] = np.nan
+    (gone,) = only(acting([PUSH], frames), FORCE)
+    assert gone.way[:, 0, 0] == pytest.approx([1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_water_is_as_long_as_it_is_deep_and_air_evenly() -> None:
+    water = {"kind": "pressure", "body": "1", "face": "left", "water_level": 0.3}
+    air = {"kind": "pressure", "body": "1", "face": "top", "magnitude": -0.5 * 9810.0 * 0.3}
+    deep, even = only(acting([water, air], block([0.0])), PRESSURE)
+    depth = np.maximum(0.3 - 1e-3 * deep.at[0, :, 1], 0.0)
+    assert (deep.at[0, 0, 1], deep.at[0, -1, 1]) == pytest.approx((0.0, 400.0))
+    assert deep.at[0, :, 0] == pytest.approx(np.full(9, -100.0))
+    assert deep.way[0, :, 0] == pytest.approx(depth / 0.3)
+    assert deep.lines(10.0)[0, 0] == pytest.approx(np.array([[-110.0, 0.0], [-100.0, 0.0]]))
+    assert even.way[0] == pytest.approx(np.array([[0.0, 0.5]] * 5))  # suction
+    assert even.lines(10.0)[0, :, 0, 1] == pytest.approx(np.full(5, 400.0))
+    assert even.at[0, :, 0] == pytest.approx([-80.0, -40.0, 0.0, 40.0, 80.0])
+
+
+def test_water_on_tilted_ground_is_deep_against_gravity() -> None:
+    water = {"kind": "pressure", "body": "1", "face": "left", "water_level": 1.0}
+    (deep,) = only(acting([water], block([0.0]), ground={"tilt": "30 deg"}), PRESSURE)
+    depth = 1.0 - 1e-3 * deep.at[0] @ np.array([0.5, np.sqrt(0.75)])
+    assert deep.way[0, :, 0] == pytest.approx(depth / depth.max())
+
+
+def test_moments_turn_by_their_size_to_either_side() -> None:
+    turns = [
+        {"kind": "moment", "body": "1", "magnitude": size, "history": {"kind": "ramp", "end": 1.0}}
+        for size in (-4.0, 2.0)
+    ]
+    found = acting(turns, block([0.0, 0.3])).turns
+    assert found is not None
+    assert found.sweep / np.pi == pytest.approx(np.array([[0.0, 0.0], [-1.5, 0.75]]))
+
+
+def test_marks_show_the_sum_of_coefficients_and_where_gravity_points_in_the_picture() -> None:
+    loads: list[Mapping[str, object]] = [
+        {"kind": "horizontal", "magnitude": -0.3},
+        {"kind": "horizontal", "magnitude": 0.05},
+        {"kind": "gravity", "to": "30 deg", "rate": "30 deg/s"},
+    ]
+    first, last = acting(loads, block([0.0, 0.0]), ground={"tilt": "0 deg"}).marks
+    assert [mark.text for mark in first] == ["0.25 g", "tilt 0.00°"]
+    assert [mark.text for mark in last] == ["0.25 g", "tilt 30.00°"]
+    assert first[0].way == (-1.0, 0.0)
+    assert first[1].way == pytest.approx((0.0, -1.0))
+    assert last[1].way == pytest.approx((-0.5, -np.sqrt(0.75)))
+    table = {"kind": "gravity", "to": "60 deg", "rate": "30 deg/s"}
+    tilted = acting([table], block([0.0, 0.0]), ground={"tilt": "30 deg"}).marks
+    assert tilted[0][0].way == pytest.approx((0.0, -1.0))  # such a picture is turned
+
+
+def test_driven_bodies_show_their_velocity_from_their_edge_on() -> None:
+    frames = block([0.0, 0.0])
+    frames.vx[1], frames.vy[1] = 0.3, 0.4
+    ramp = {"kind": "ramp", "distance": 1.0, "speed": 0.5}
+    body = {"block": "brick", "x": 0.0, "y": 0.2, "name": "1", "motion": ramp}
+    (speed,) = only(acting([], frames, bodies=[body]), SPEED)
+    assert speed.lines(10.0)[0, 0] == pytest.approx(np.array([[0.0, 200.0]] * 2))
+    assert speed.lines(10.0)[1, 0] == pytest.approx(np.array([[100.0, 333.33], [106.0, 341.33]]), abs=0.01)
+    assert acting([], frames, bodies=[body]).explanation.endswith("the longest 0.5 m/s.")
+
+
+def test_arrows_are_inside_the_picture_and_nothing_changes_without_loads() -> None:
+    frames, chosen = block([0.0, QUARTER]), np.arange(2)
+    loaded = support([PUSH, STRONGER])
+    extent = extent_of(frames, chosen, loaded)
+    found = outside(frames, chosen, loaded)
+    room = with_room(extent, found, 300.0)
+    for lines in (one.lines(300.0).reshape(-1, 2) for one in found.arrows):
+        assert ([room.left, room.bottom] < lines.min(axis=0)).all()
+        assert (lines.max(axis=0) < [room.right, room.top]).all()
+    nothing = outside(frames, chosen, Support())
+    assert nothing.is_empty
+    assert with_room(extent, nothing, 300.0) == extent
+    assert nothing.explanation == ""
