@@ -33,6 +33,7 @@ from blocksim.simulation.ledger import (
 )
 from blocksim.simulation.loop import last_step_of, outcome_of
 from blocksim.simulation.movement import EndSpeed, FirstMove, FirstMoves, end_speeds
+from blocksim.simulation.moving_support import MovingSupport
 from blocksim.simulation.outcome import Outcome, diagnosed
 from blocksim.simulation.recorder import POSITION, Rows, frames_from_rows, steps_per_frame
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measured_row, scheme_of
@@ -190,11 +191,14 @@ class Ensemble:
         self.starts = np.zeros((len(ends), len(self.scheme.measured)))
         self.codes = np.zeros(len(ends), dtype=np.int64)
         every = [scenarios[number].output.every for number in stack.numbers]
-        periods = np.array([*map(steps_per_frame, every, self.time_steps)])
+        self.periods = np.array([*map(steps_per_frame, every, self.time_steps)])
         start = self._positions(self.scenes, slice(None))
-        self.moves = FirstMoves(self.placed, start)
+        self.supports = [MovingSupport(scenarios[number]) for number in stack.numbers]
+        self.moves = FirstMoves(self.placed, start, self.supports)
         steps, places = np.zeros(len(ends), dtype=np.int64), np.zeros_like(start)
         reach, thresholds = self.moves.shapes.reach, self.moves.thresholds
+        # compiled code sees no motion relative to a support that moves
+        periods = np.where([support.moves for support in self.supports], 0.0, self.periods)
         self.watched = Watched(periods, steps, places, start, reach, thresholds)
 
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
@@ -217,10 +221,28 @@ class Ensemble:
         while members.size:
             done = next_energy_check(done, self.bodies)
             np.minimum(self.last_steps, done, out=stops)
-            self._advance_members(members, stops, rows, self.codes)
+            rides = np.array([self.supports[m].moves for m in members.tolist()])
+            self._advance_members(members[~rides], stops, rows, self.codes)
+            for m in members[rides].tolist():
+                self._advance_watching(m, int(stops[m]), rows)
             rows = np.zeros_like(self.starts)  # what is measured at the start of a later call
             members = members[(self.codes[members] == REACHED) & (self.last_steps[members] > done)]
             members = members[[self._adds_up(m) for m in members.tolist()]]
+
+    def _advance_watching(self, m: int, stop: int, rows: NDArray[np.float64]) -> None:
+        """Advance a member on a moving support to a step, from frame to frame until something has moved there."""
+        stops, is_under_way = np.zeros_like(self.codes), True
+        while is_under_way:
+            frame = stop if self.moves.found[m] else min(stop, self._next_frame(m))
+            stops[m] = frame
+            self._advance_members(np.array([m]), stops, rows, self.codes)
+            rows = np.zeros_like(rows)  # what is measured at the start of a later call
+            is_under_way = self.codes[m] == REACHED and frame < stop
+            if self.codes[m] == REACHED and self._is_frame(m, frame):
+                self.moves.see([m], self._positions(self.scenes, [m]), [frame * self.time_steps[m]])
+
+    def _next_frame(self, m: int) -> int:
+        return next_frame(int(self.scenes.world.clock["steps"][m, 0]), self.periods[m])
 
     def _advance_members(self, members: Steps, stops: Steps, rows: NDArray[np.float64], codes: Steps) -> None:
         """Advance some members in compiled code, where the scheme can."""
@@ -234,10 +256,10 @@ class Ensemble:
     def _next_stop(self, m: int, done: int) -> int:
         """Return where a member stops next that is advanced alone; frames count only until something has moved."""
         look = self._next_look(m, done)
-        return look if self.moves.found[m] else min(look, next_frame(done, self.watched.periods[m]))
+        return look if self.moves.found[m] else min(look, next_frame(done, self.periods[m]))
 
     def _is_frame(self, m: int, step: int) -> bool:
-        return step > 0 and next_frame(step - 1, self.watched.periods[m]) == step
+        return step > 0 and next_frame(step - 1, self.periods[m]) == step
 
     def _see_ends(self) -> None:
         """Find what moved first in members without a frame in which anything had: the end is one too.

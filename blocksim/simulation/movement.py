@@ -9,10 +9,11 @@ shortest side. A scene
     slid         where some block has moved and none has fallen,
     fell         where some block has fallen.
 
-Fixed blocks do not count. A run that `time.end` cuts short is reported as it is then; it moves on where some block, as
-fast as it is then (relative to the support), would be farther than that hundredth away within another tenth of the
-time. The first mover is the block that has moved in the first frame in which any has (the farthest of several); members
-of ensembles keep no frames, but are looked at when those would be recorded, until one block has moved.
+All of this is relative to the support: what rides on a shaking table has not moved. Fixed and driven blocks do not
+count; a removed one stays where it was then. A run that `time.end` cuts short is reported as it is then; it moves on
+where some block, as fast as it is then, would be farther than that hundredth away within another tenth of the time. The
+first mover is the block that has moved in the first frame in which any has (the farthest of several); members of
+ensembles keep no frames, but are looked at when those would be recorded, until one block has moved.
 """
 
 from collections.abc import Sequence
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from blocksim.scenario import PlacedBody
+from blocksim.simulation.moving_support import AT_REST, MovingSupport
 from blocksim.simulation.table import MILLI, Columns
 
 ROUND_OFF = 1e-9  # between two ways to compute a distance
@@ -32,6 +34,8 @@ FURTHER = 0.1  # of the simulated time
 FALLEN_TURN = np.radians(45.0)
 FALLEN_SHARE = 0.5  # of the shortest side, downwards
 Floats = NDArray[np.float64]
+Way = tuple[float, float]  # m, along x and y
+RESTED: Way = (0.0, 0.0)
 
 
 class Manner(StrEnum):
@@ -62,7 +66,7 @@ class Movement(BaseModel, frozen=True):
     """The entries of run.json about movement, in frames and at the end; blocks by name."""
 
     outcome: Manner
-    largest_displacement_mm: float  # of a centre, from its start
+    largest_displacement_mm: float  # of the centre of a block that can move, from its start, relative to the support
     displaced_block: str
     largest_rotation_deg: float
     rotated_block: str
@@ -145,19 +149,21 @@ def end_speeds(
 
 
 def from_start_to_end(
-    placed: Sequence[PlacedBody], final: Columns, first: FirstMove | None
+    placed: Sequence[PlacedBody], final: Columns, first: FirstMove | None, carried: Way = RESTED
 ) -> tuple[Manner, float, float]:
     """Return manner, largest displacement of a centre (mm) and largest rotation (degrees), of a final table.
 
     `first` is the first move on the way, if there was any: it distinguishes what rocked back from what stands.
+    `carried` is the way (m) of the support; of blocks that were removed on the way it is not known, and taken as none.
     """
     shapes = _shapes_of(placed)
-    dx = np.array(final["x_mm"]) / MILLI - [body.x for body in placed]
-    dy = np.array(final["y_mm"]) / MILLI - [body.y for body in placed]
+    is_there = ~np.isnan(np.array(final["vx_mm_s"], dtype=np.float64))
+    dx = np.array(final["x_mm"]) / MILLI - [body.x for body in placed] - carried[0] * is_there
+    dy = np.array(final["y_mm"]) / MILLI - [body.y for body in placed] - carried[1] * is_there
     turn = np.abs(np.array(final["rotation_deg"]))
     way = np.hypot(dx, dy)
     manner = _with_way_there(_manner(shapes, way, -dy, np.radians(turn)), first)
-    return manner, float(MILLI * way.max()), float(turn.max())
+    return manner, float(MILLI * (way * shapes.is_free).max()), float((turn * shapes.is_free).max())
 
 
 def _with_way_there(manner: Manner, first: FirstMove | None) -> Manner:
@@ -168,9 +174,12 @@ def _with_way_there(manner: Manner, first: FirstMove | None) -> Manner:
 class FirstMoves:
     """The first moves in m scenes with the same number b of blocks, advanced together."""
 
-    def __init__(self, placed: Sequence[Sequence[PlacedBody]], start: Floats) -> None:
-        """Take the blocks of every scene and where they begin, (m, 3, b): x, y (m), angle (rad)."""
+    def __init__(
+        self, placed: Sequence[Sequence[PlacedBody]], start: Floats, supports: Sequence[MovingSupport] = ()
+    ) -> None:
+        """Take the blocks of every scene, where they begin, (m, 3, b): x, y (m), angle (rad), and their supports."""
         self.placed, self.start = placed, start
+        self.supports = supports or [AT_REST] * len(placed)
         self.shapes = _shapes_of([body for bodies in placed for body in bodies]).split(len(placed))
         self.found: list[FirstMove | None] = [None] * len(placed)
 
@@ -187,7 +196,9 @@ class FirstMoves:
 
     def see(self, scenes: list[int], position: Floats, times: list[float], *, threshold: float = 1.0) -> None:
         """Examine some scenes, at positions (k, 3, b) and times (s); those that have moved before stay as they are."""
+        carried = np.array([self.supports[m].way(time) for m, time in zip(scenes, times, strict=True)]).reshape(-1, 2)
         dx, dy, angle = (position - self.start[scenes]).swapaxes(0, 1)
+        dx, dy = dx - carried[:, :1], dy - carried[:, 1:]
         shares = _shares(self.shapes.chosen(scenes), np.hypot(dx, dy), np.abs(angle))
         for m, block, share, time in zip(scenes, shares.argmax(axis=1), shares.max(axis=1), times, strict=True):
             if share > threshold and self.found[m] is None:
@@ -197,9 +208,10 @@ class FirstMoves:
 class Watch:
     """Follows the frames of a run; it examines nothing else, and is the same wherever a run was resumed."""
 
-    def __init__(self, placed: Sequence[PlacedBody]) -> None:
-        """Take the blocks; the first frame that is seen says where they begin."""
-        self.placed, self.shapes = placed, _shapes_of(placed)
+    def __init__(self, placed: Sequence[PlacedBody], support: MovingSupport = AT_REST) -> None:
+        """Take the blocks and their support; the first frame that is seen says where they begin."""
+        self.placed, self.shapes, self.support = placed, _shapes_of(placed), support
+        self.carried = np.zeros((2, len(placed)))  # m: way of the support, as long as a block was there
         self.start: Floats | None = None
         self.way, self.turn = np.zeros(len(placed)), np.zeros(len(placed))  # largest so far: m, rad
         self.first: FirstMove | None = None
@@ -211,7 +223,11 @@ class Watch:
         self.last = motion, time
         if self.start is None:
             self.start = motion[:3].copy()
+        if self.support.moves:
+            is_there = ~np.isnan(motion[3])
+            self.carried[:, is_there] = np.array(self.support.way(time))[:, None]
         dx, dy, angle = motion[:3] - self.start
+        dx, dy = dx - self.carried[0], dy - self.carried[1]
         way, turn = np.hypot(dx, dy), np.abs(angle)
         self.way, self.turn = np.fmax(self.way, way), np.fmax(self.turn, turn)
         self.manner = _manner(self.shapes, way, -dy, turn)
@@ -225,12 +241,12 @@ class Watch:
         assert self.last is not None  # noqa: S101 - the start is a frame
         motion, time = self.last
         (end,) = end_speeds([self.placed], motion[None], np.array([support]), [time])
-        far, turned = int(np.argmax(self.way)), int(np.argmax(self.turn))
+        far, turned = (int(np.argmax(most * self.shapes.is_free)) for most in (self.way, self.turn))
         return Movement(
             outcome=_with_way_there(self.manner, self.first),
-            largest_displacement_mm=float(MILLI * self.way[far]),
+            largest_displacement_mm=float(MILLI * self.way[far] * self.shapes.is_free[far]),
             displaced_block=self.placed[far].name,
-            largest_rotation_deg=float(np.degrees(self.turn[turned])),
+            largest_rotation_deg=float(np.degrees(self.turn[turned] * self.shapes.is_free[turned])),
             rotated_block=self.placed[turned].name,
             first_mover=None if self.first is None else self.first.block,
             first_moved_s=None if self.first is None else self.first.time,

@@ -7,7 +7,6 @@ beside those in the frame in which it was at rest at the start.
 
 import math
 import sys
-from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -17,9 +16,9 @@ from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody, Scenario, place_segments
 from blocksim.scenario.models.probe import STEP, EnergyProbe, ForceProbe, JointProbe, PointProbe
-from blocksim.scenario.motion import motion_direction, motion_pieces
 from blocksim.scenario.probes import GROUND, SUPPORTS, WALL, WALLS, Joint, joint_between, probe_names
 from blocksim.simulation.contacts import forces_on_a
+from blocksim.simulation.moving_support import AT_REST, MovingSupport
 from blocksim.simulation.probe_series import Column, ProbeSeries, columns_of, series_of
 
 if TYPE_CHECKING:
@@ -32,7 +31,7 @@ Sampler = Callable[["Moment"], Values]
 class Moment:
     """The scene at a step; what several probes need is worked out once."""
 
-    def __init__(self, scene: "AnyScene", support: "MovingSupport") -> None:
+    def __init__(self, scene: "AnyScene", support: MovingSupport) -> None:
         """Take the scene as it is now."""
         self.scene = scene
         self.bodies = scene.world.bodies
@@ -64,31 +63,6 @@ class Moment:
 
         found: list[float] = measured_row(self.scene)[: -len(COUNTED)].tolist()
         return found
-
-
-class MovingSupport:
-    """Motion of the support, a moment at a time."""
-
-    def __init__(self, scenario: Scenario | None) -> None:
-        """Work out the pieces of its motion once; without a scenario it rests."""
-        self.times: list[float] = []
-        self.coefficients: list[list[float]] = []
-        self.direction = (1.0, 0.0)
-        if scenario is not None:
-            pieces = motion_pieces(scenario)
-            self.direction = motion_direction(scenario)
-            self.times, self.coefficients = pieces.times.tolist(), pieces.coefficients.tolist()
-
-    def at(self, time: float) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return displacement (m) and velocity (m/s) along x and y at a time (s)."""
-        if not self.coefficients:
-            return (0.0, 0.0), (0.0, 0.0)
-        piece = min(max(bisect_right(self.times, time) - 1, 0), len(self.coefficients) - 1)
-        s = time - self.times[piece]
-        c0, c1, c2, c3 = self.coefficients[piece]
-        moved, speed = c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2.0 * c2 + 3.0 * s * c3)
-        (x, y) = self.direction
-        return (moved * x, moved * y), (speed * x, speed * y)
 
 
 def force_sampler(on: NDArray[np.bool_], by: NDArray[np.bool_]) -> Sampler:
@@ -237,7 +211,7 @@ class Probes:
         return found
 
 
-NO_PROBES = Probes((), MovingSupport(None), 1.0)
+NO_PROBES = Probes((), AT_REST, 1.0)
 
 
 def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float, ledger: Sequence[str]) -> Probes:

@@ -13,6 +13,7 @@ from blocksim.simulation.contacts import Contacts, joined
 from blocksim.simulation.contacts import Rows as ContactRows
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.movement import Watch
+from blocksim.simulation.moving_support import AT_REST, MovingSupport
 from blocksim.simulation.probes import NO_PROBES, Probes
 from blocksim.world.systems.blocks import BLOCKS, blocks_placed
 from blocksim.world.systems.system import Floats, Present, Track
@@ -68,11 +69,12 @@ class Recorder:
         others: Sequence[Present] = (),
         contacts: bool = False,
         probes: Probes = NO_PROBES,
+        support: MovingSupport = AT_REST,
     ) -> None:
         """Record every `every` seconds, at the nearest step of length `step` (s); where there is a `sink`, in there.
 
         `others` are the systems beside the blocks. With `contacts` the contacts of every frame are recorded as well.
-        `probes` are sampled at steps of their own.
+        `probes` are sampled at steps of their own. What has moved is seen from the `support`.
         """
         self.placed = tuple(placed)
         self.systems = (blocks_placed(placed), *others)
@@ -86,7 +88,7 @@ class Recorder:
         self.ledger: tuple[str, ...] = ()
         self.with_contacts = contacts
         self.probes = probes
-        self.watch = Watch(self.placed)
+        self.watch = Watch(self.placed, support)
 
     def next_step(self, done: int) -> int:
         """Return the next step to record after `done` steps, wherever those end."""

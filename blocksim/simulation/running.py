@@ -25,6 +25,7 @@ from blocksim.simulation.folder import CHECKPOINTS, folder_lock
 from blocksim.simulation.happened import in_words
 from blocksim.simulation.ledger import RESIDUAL_PROMISE
 from blocksim.simulation.loop import Attendance, LoopResult, Watcher, last_step_of, run_loop
+from blocksim.simulation.moving_support import MovingSupport
 from blocksim.simulation.probe_series import bytes_of_series
 from blocksim.simulation.probes import probes_of
 from blocksim.simulation.provenance import environment, run_hash, state_hash
@@ -174,7 +175,10 @@ def _timeline(scenario: Scenario, recorder: Recorder) -> Timeline | None:
 def _recorder(scenario: Scenario, built: Built) -> Recorder:
     step, output = float(built.scene.world.controls[0].step), scenario.output
     probes, others = probes_of(scenario, built.placed, step, ledger_names(built.scene)), others_of(scenario)
-    return Recorder(built.placed, output.every, step, others=others, contacts=output.contacts, probes=probes)
+    support = MovingSupport(scenario)
+    return Recorder(
+        built.placed, output.every, step, others=others, contacts=output.contacts, probes=probes, support=support
+    )
 
 
 class Part:

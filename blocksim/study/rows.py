@@ -19,7 +19,7 @@ from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import PlacedBody, Scenario, Sweep, place_bodies
 from blocksim.scenario import quantities as q
 from blocksim.scenario.units import ANGLE, parse_unit
-from blocksim.simulation.movement import EndSpeed, FirstMove, from_start_to_end
+from blocksim.simulation.movement import RESTED, EndSpeed, FirstMove, Way, from_start_to_end
 from blocksim.simulation.table import COLUMNS, MILLI, Columns
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ TABLE = "sweep.csv"
 """Rows of all cases; it makes a folder one of a sweep."""
 X = ".x_mm"
 MOVEMENT = ("outcome", "first_mover", "first_moved_s", "displacement_mm", "turn_deg", "end_speed_mm_s", "moves_on")
-"""As in run.json, but displacement and rotation are the largest of all blocks from start to end."""
+"""As in run.json, but displacement and rotation are the largest of all blocks that can move, from start to end."""
 KEPT = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")  # of the final table, for every block
 QUARTER = 90.0  # deg
 DIGITS = 12  # of a number in the table: more show the rounding of the unit
@@ -50,12 +50,13 @@ class Course(NamedTuple):
     seconds: float
     first_move: FirstMove | None
     end_speed: EndSpeed | None = None
+    carried: Way = RESTED  # m: of the support, from start to end
 
 
 def row_of(course: Course, final: Columns, placed: Sequence[PlacedBody]) -> Row:
     """Return the row of a case that was run; `placed` are the blocks at the start."""
     row: Row = {"status": course.status, "reason": course.reason, "seconds": course.seconds}
-    manner, displacement, rotation = from_start_to_end(placed, final, course.first_move)
+    manner, displacement, rotation = from_start_to_end(placed, final, course.first_move, course.carried)
     mover, moved = course.first_move or (None, None)
     _, speed, moves_on = course.end_speed or (None, None, None)
     values_of = (manner.value, mover, moved, displacement, rotation, None if speed is None else MILLI * speed, moves_on)

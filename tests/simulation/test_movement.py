@@ -11,6 +11,7 @@ from blocksim.simulation import simulate, simulate_into
 from blocksim.simulation.checkpoint_policy import CheckpointPolicy
 from blocksim.simulation.ensemble import run_ensemble
 from blocksim.simulation.movement import Manner, Watch, from_start_to_end
+from blocksim.simulation.moving_support import MovingSupport
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 FALLING = {"contact.stiffness_scale": 0.001, "time.end": 0.2, "output.every": 0.005}
@@ -153,6 +154,70 @@ def test_members_end_as_fast_as_the_same_runs_alone() -> None:
     members = [member.end_speed for member in run_ensemble(scenarios)]
     assert members == [movement.end_speed for movement in alone if movement is not None]
     assert all(end is not None and end.moves_on for end in members)
+
+
+def on_a_table(scheme: str, **motion: object) -> Scenario:
+    """Return a block on a table that shakes by 6 mm, on which its friction holds it or does not."""
+    friction = motion.pop("friction", 2.0)
+    changes = {
+        "blocks.brick.upright": "height",
+        "bodies": [{"block": "brick", "x": 0.0, "y": 0.0125, "name": "1"}],
+        "structures": [],
+        "motion": {"kind": "harmonic", "amplitude": 0.006, "frequency": 5.0, "ramp": 0.05, **motion},
+        "friction.block_ground": friction,
+        "contact.stiffness_scale": 0.001,
+        "time.scheme": scheme,
+        "time.stop_at_rest": False,
+        "time.end": 0.28,
+        "output.every": 0.005,
+    }
+    return load_scenario(SCENARIOS / "three_blocks_nominal.toml", changes)
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
+def test_what_rides_on_a_moving_table_has_not_moved(scheme: str) -> None:
+    held, slides = on_a_table(scheme), on_a_table(scheme, friction=0.1)
+    lifted = on_a_table(scheme, direction="90 deg", amplitude=0.03, frequency=1.0, ramp=0.2)
+    members = run_ensemble([held, slides, lifted])
+    for scenario, member, outcome in zip((held, slides, lifted), members, ("stands", "slid", "stands"), strict=True):
+        run = simulate(scenario)
+        found = run.summary.movement
+        assert found is not None
+        assert found.outcome == outcome
+        assert member.first_move == found.first_move
+        carried = MovingSupport(scenario).way(member.seconds)
+        manner, displacement, _ = from_start_to_end(member.placed, member.columns, member.first_move, carried)
+        assert np.hypot(*carried) > 3e-3
+        assert manner == outcome
+        assert str(member.columns) == str(run.columns)
+        assert displacement <= found.largest_displacement_mm + 1e-9
+        assert (found.largest_displacement_mm > 0.25) == (outcome == "slid")
+
+
+def test_removed_block_stays_where_it_was_on_the_table() -> None:
+    support = MovingSupport(on_a_table("explicit"))
+    watch = Watch(PLACED, support)
+    rides = frame()
+    watch.see(rides, 0.0)
+    for time in (0.14, 0.28):
+        rides = frame()
+        rides[0] += support.way(min(time, 0.14))[0]
+        rides[3] = np.nan if time > 0.14 else 0.0
+        watch.see(rides, time)
+    assert abs(support.way(0.28)[0] - support.way(0.14)[0]) > 1e-3
+    assert watch.found().outcome == "stands"
+
+
+def test_driven_blocks_are_not_the_ones_that_moved_farthest() -> None:
+    watch = Watch((PLACED[0], PLACED[1]._replace(fixed=True), PLACED[2]))
+    for dx in (0.0, 100.0):
+        motion = frame(dx=dx, turn=dx)
+        motion[0, 2] += 1e-6 * dx
+        watch.see(motion, dx)
+    found = watch.found()
+    assert found.displaced_block == "3"
+    assert found.largest_displacement_mm == pytest.approx(0.1)
+    assert found.largest_rotation_deg == 0.0
 
 
 def test_blocks_on_a_shaking_table_are_as_fast_as_they_move_on_it() -> None:

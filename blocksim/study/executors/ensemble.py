@@ -10,7 +10,7 @@ import time
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +18,7 @@ from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError,
 from blocksim.scenario import Document, Scenario, place_bodies
 from blocksim.simulation import MemberEnd, MemberFailure, Result, Summary, run_in_batches
 from blocksim.simulation import folder as files
+from blocksim.simulation.moving_support import MovingSupport
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash, run_hash
 from blocksim.simulation.summary import changed_results, read_summary
 from blocksim.simulation.table import Columns, read_table
@@ -88,7 +89,10 @@ def rows_of(scenarios: Sequence[Scenario], threads: int) -> list[Row]:
     if not scenarios:
         return []
     try:
-        return [_row_of(one) for batch in run_in_batches(scenarios, threads=threads) for one in batch]
+        return [
+            _row_of(one, scenario)
+            for one, scenario in zip(chain(*run_in_batches(scenarios, threads=threads)), scenarios, strict=True)
+        ]
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         if len(scenarios) == 1:
             return [row_of_error(error)]
@@ -96,11 +100,12 @@ def rows_of(scenarios: Sequence[Scenario], threads: int) -> list[Row]:
     return rows_of(scenarios[:middle], threads) + rows_of(scenarios[middle:], threads)
 
 
-def _row_of(member: MemberEnd | MemberFailure) -> Row:
+def _row_of(member: MemberEnd | MemberFailure, scenario: Scenario) -> Row:
     """Return the row of a member."""
     if isinstance(member, MemberFailure):
         return row_of_error(member.error)
-    course = Course(member.outcome.status, member.outcome.reason, member.seconds, member.first_move, member.end_speed)
+    outcome, carried = member.outcome, MovingSupport(scenario).way(member.seconds)
+    course = Course(outcome.status, outcome.reason, member.seconds, member.first_move, member.end_speed, carried)
     return row_of(course, member.columns, member.placed)
 
 
@@ -149,7 +154,7 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
         row = _known_row(scenario, folder)
         if row is None:
             result = _run_on(scenario, folder)
-            row = row_of(_course(result.summary), result.columns, place_bodies(scenario))
+            row = row_of(_course(result.summary, scenario), result.columns, place_bodies(scenario))
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         return row_of_error(error)
     return row
@@ -170,14 +175,15 @@ def _known_row(scenario: Scenario, folder: Path) -> Row | None:
         is_same = summary.run == run_hash(scenario)
         if is_same and _has_ended(folder, summary) and not changed_results(folder, summary):
             final = read_table(folder / files.FINAL)
-            return row_of(_course(summary), final, place_bodies(scenario))
+            return row_of(_course(summary, scenario), final, place_bodies(scenario))
     return None
 
 
-def _course(summary: Summary) -> Course:
+def _course(summary: Summary, scenario: Scenario) -> Course:
     moved = summary.movement
     first, end = (None, None) if moved is None else (moved.first_move, moved.end_speed)
-    return Course(summary.status, summary.reason, summary.simulated_time_s, first, end)
+    seconds = summary.simulated_time_s
+    return Course(summary.status, summary.reason, seconds, first, end, MovingSupport(scenario).way(seconds))
 
 
 def _has_ended(folder: Path, summary: Summary) -> bool:
