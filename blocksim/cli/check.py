@@ -1,6 +1,5 @@
 """blocksim check: validate a scenario and summarise it."""
 
-import math
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
@@ -10,22 +9,18 @@ from typing import Annotated
 import typer
 
 from blocksim.cli import options
+from blocksim.cli.check_lists import lines_of
 from blocksim.cli.output import GAP, answer, duration, note, number, print_json, table_lines, width_of_screen
 from blocksim.cli.prepare import read_scenario, warn_of_values
-from blocksim.scenario import Contact, PlacedBody, Scenario, place_bodies, scenario_to_toml
-from blocksim.scenario.drives import drives_of, greatest_rate
-from blocksim.scenario.events import in_order
+from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
-from blocksim.scenario.spelling import listed
 from blocksim.scenario.units import STANDARD_GRAVITY
-from blocksim.simulation.happened import in_words
 from blocksim.study.rows import check_experiment
 from blocksim.world.describe import Description, MotionDescription, PairDescription, SagDescription, describe
 from blocksim.world.free_memory import readable
 from blocksim.world.memory import PROCESS_BYTES
 
 MOST_BODIES = 12
-MOST_LOADS = 6
 SIDES = ("along x", "upright", "depth mm", "mass kg", "inertia kg m²")
 NO_KEY = (DEFAULT, MATERIALS)
 LEAST_ROOM = 24
@@ -157,9 +152,7 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
         f"results    at most {description.frames} frames, about {readable(description.bytes)}",
         *_short_interval(scenario, description),
         *_motion(description.motion),
-        *_driven(scenario),
-        *_events(scenario),
-        *_loads(scenario),
+        *lines_of(scenario),
         *_boundary(scenario, description),
         *(f"{name:<10} {count}, beside the blocks" for name, count in description.systems.items()),
         f"neighbours checked up to {MILLI * description.skin:.3g} mm apart",
@@ -202,32 +195,6 @@ def _motion(motion: MotionDescription | None) -> list[str]:
     peaks = f"{number(MILLI * motion.displacement)} mm, {number(MILLI * motion.speed)} mm/s"
     greatest = f"at most {peaks} and {number(motion.acceleration / STANDARD_GRAVITY)} g"
     return [f"supports   move {greatest}; {number(MILLI * motion.final_speed)} mm/s at the end"]
-
-
-def _driven(scenario: Scenario) -> Iterator[str]:
-    """Yield a line for every body with a motion of its own."""
-    for drive in drives_of(scenario):
-        spec = scenario.bodies[drive.body - sum(structure.size for structure in scenario.structures)]
-        name = place_bodies(scenario)[drive.body].name
-        kind = "" if spec.motion is None else f" ({spec.motion.kind})"
-        speed, spin = greatest_rate(drive.shift), math.degrees(greatest_rate(drive.turn))
-        rates = [f"{number(MILLI * speed)} mm/s"] * (speed > 0.0) + [f"{number(spin)} °/s"] * (spin > 0.0)
-        rests = f", at rest from {drive.rest_time:.3f} s on" if math.isfinite(drive.rest_time) else ""
-        yield f"driven     {name}{kind}, at most {' and '.join(rates)}{rests}"
-
-
-def _events(scenario: Scenario) -> Iterator[str]:
-    """Yield a line for every event, in their order."""
-    for event in (scenario.events[k] for k in in_order(scenario.events)):
-        yield f"event      {'at rest' if event.at is None else f'{event.at:.3f} s'}: {in_words(event)}"
-
-
-def _loads(scenario: Scenario) -> list[str]:
-    """Return what acts on the blocks, and whether they come to rest before."""
-    named = [f"{load.kind} {load.name or number}" for number, load in enumerate(scenario.loads)]
-    loads = [f"loads      {listed(named, MOST_LOADS)}"] if named else []
-    held = f"; held: {', '.join(scenario.start.hold)}" if scenario.start.hold else ""
-    return [*loads, *([f"start      settles before time zero{held}"] if scenario.start.settle else [])]
 
 
 def _use_of_particles(contact: Contact) -> str:

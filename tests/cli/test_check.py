@@ -66,6 +66,54 @@ free = ["plate"]
 at = "0.25 s"
 remove = ["block"]
 """
+LOADED = (
+    """
+[[loads]]
+kind = "force"
+name = "push"
+body = "block"
+magnitude = "25 kN"
+direction = "180 deg"
+axes = "body"
+history = { kind = "ramp", end = "0.2 s" }
+[[loads]]
+kind = "moment"
+body = "block"
+magnitude = "-3 N m"
+history = { kind = "steps", times = [0, 0.1], factors = [0, 1] }
+[[loads]]
+kind = "pressure"
+body = "block"
+face = "left"
+water_level = "10 mm"
+[[loads]]
+kind = "pressure"
+body = "block"
+face = "top"
+magnitude = "2.5 MPa"
+[[loads]]
+kind = "horizontal"
+magnitude = 0.25
+[[loads]]
+kind = "gravity"
+to = "20 deg"
+rate = "100 deg/s"
+[[events]]
+at = "0.2 s"
+unload = ["push"]
+[[probes]]
+kind = "force"
+on = "ground"
+by = "block"
+every = "step"
+[[probes]]
+kind = "point"
+body = "block"
+name = "corner"
+every = "2 ms"
+"""
+    + '[[probes]]\nkind = "energy"\n' * 9
+)
 SHAKEN = '[motion]\nkind = "harmonic"\namplitude = "10 mm"\nfrequency = "2 Hz"\nduration = "1.5 s"\n'
 CUBE = 'width = 0.1\nheight = 0.1\nlength = 0.1\nmaterial = "aluminium"\n'
 KINDS = "".join(f'\n[blocks.k{i}]\n{CUBE}[[bodies]]\nblock = "k{i}"\nx = {i}\ny = 0.05\n' for i in range(1, 15))
@@ -75,6 +123,7 @@ MADE = {
     "shaken.toml": SLIDE.replace('end = "0.5 s"', 'end = "2 s"') + SHAKEN,
     "crowd.toml": (SCENARIOS / "wall.toml").read_text() + PLATE,
     "kinds.toml": SLIDE + KINDS,
+    "loaded.toml": SLIDE + LOADED,
     "driven.toml": SLIDE + PLATE.replace("fixed = true\n", DRIVEN),
 }
 
