@@ -11,6 +11,7 @@ from blocksim.scenario.events import in_order
 from blocksim.scenario.models.history import Constant, Ramp
 from blocksim.scenario.models.loads import AnyLoad, Force, Gravity, Horizontal, Moment, Pressure, VaryingLoad
 from blocksim.scenario.models.probe import STEP, AnyProbe, EnergyProbe, ForceProbe, PointProbe
+from blocksim.scenario.motion import settles
 from blocksim.scenario.probes import probe_names
 from blocksim.simulation.happened import in_words
 
@@ -25,7 +26,7 @@ def lines_of(scenario: Scenario) -> Iterator[str]:
     yield from _driven(scenario)
     yield from _some("event", [*_events(scenario)])
     yield from _some("load", [f"{_name(load, number)}{_load(load)}" for number, load in enumerate(scenario.loads)])
-    if scenario.start.settle:
+    if settles(scenario):
         held = f"; held: {', '.join(scenario.start.hold)}" if scenario.start.hold else ""
         yield from _wrapped("start", f"settles before time zero{held}")
     names = probe_names(scenario)

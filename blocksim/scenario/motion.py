@@ -39,6 +39,13 @@ def motion_direction(scenario: Scenario) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
+def settles(scenario: Scenario) -> bool:
+    """Return True where blocks come to rest before time zero: asked to, or under a pulse at its peak from there on."""
+    motion = scenario.motion
+    is_abrupt = isinstance(motion, Pulse) and motion.is_abrupt and motion.start == 0.0
+    return scenario.start.settle or (is_abrupt and not scenario.systems)
+
+
 def motion_pieces(scenario: Scenario) -> MotionPieces:
     """Return the displacement of the supports; no pieces (k = 0) if they rest."""
     motion, end = scenario.motion, BEYOND * scenario.time.end

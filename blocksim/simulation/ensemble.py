@@ -19,6 +19,7 @@ from blocksim.kernels.arrays import PAIRS_FULL, REACHED
 from blocksim.kernels.frame_times import next_frame
 from blocksim.kernels.watch import Watched
 from blocksim.scenario import PlacedBody, Scenario
+from blocksim.scenario.motion import settles
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.events import NEVER, Timeline
 from blocksim.simulation.frames import Frames
@@ -37,7 +38,7 @@ from blocksim.simulation.moving_support import MovingSupport
 from blocksim.simulation.outcome import Outcome, diagnosed
 from blocksim.simulation.recorder import POSITION, Rows, frames_from_rows, steps_per_frame
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measured_row, scheme_of
-from blocksim.simulation.settling import settle
+from blocksim.simulation.settling import begun
 from blocksim.simulation.table import COLUMNS, Columns, as_frame, final_values
 from blocksim.simulation.team import ALONE
 from blocksim.world.scenes import Refusal, Stack, member, stack_of_one
@@ -168,9 +169,9 @@ def _run_batch(scenarios: Sequence[Scenario], pool: ThreadPoolExecutor, threads:
 
 def _settled(scenario: Scenario, stack: Stack) -> Stack:
     """Return a stack as its runs begin; one that settles first has one scene. Raises SettleError."""
-    if not scenario.start.settle:
+    if not settles(scenario):
         return stack
-    scene, _ = settle(member(stack.scenes, 0), scenario, stack.placed[0], ALONE)
+    scene, _ = begun(member(stack.scenes, 0), scenario, stack.placed[0], ALONE)
     return stack._replace(scenes=stack_of_one(scene))
 
 

@@ -26,6 +26,7 @@ from blocksim.simulation.happened import in_words
 from blocksim.simulation.ledger import RESIDUAL_PROMISE
 from blocksim.simulation.loop import Attendance, LoopResult, Watcher, last_step_of, run_loop
 from blocksim.simulation.moving_support import MovingSupport
+from blocksim.simulation.onset import onset_warning
 from blocksim.simulation.probe_series import bytes_of_series
 from blocksim.simulation.probes import probes_of
 from blocksim.simulation.provenance import environment, run_hash, state_hash
@@ -43,7 +44,7 @@ from blocksim.simulation.resumption import (
 )
 from blocksim.simulation.schemes import AnyScene, build, ledger_names
 from blocksim.simulation.settled import Settled
-from blocksim.simulation.settling import settle
+from blocksim.simulation.settling import begun
 from blocksim.simulation.stopping import WallTime, stop_requests
 from blocksim.simulation.stores.hdf5_probes import read_probes
 from blocksim.simulation.stores.hdf5_writer import FrameFile
@@ -87,17 +88,10 @@ def simulate(
     began += _compiled(scenario)
     recorder = _recorder(scenario, built)
     with _attended(built.scene, scenario, threads, limit, on_progress) as (team, attendance):
-        scene, settled = begun(built, scenario, team)
+        scene, settled = begun(built.scene, scenario, built.placed, team)
         watched = replace(attendance, timeline=_timeline(scenario, recorder))
         ended = run_loop(scene, recorder, scenario.time.end, team=team, attendance=watched)
     return _result(scenario, recorder, ended, time.perf_counter() - began, settled)
-
-
-def begun(built: Built, scenario: Scenario, team: Team) -> tuple[AnyScene, Settled | None]:
-    """Return a scene at time zero as its run begins, and how it settled, where it does. Raises SettleError."""
-    if not scenario.start.settle:
-        return built.scene, None
-    return settle(built.scene, scenario, built.placed, team)
 
 
 def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
@@ -130,7 +124,7 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
         with _attended(built.scene, scenario, threads, limit, on_progress) as (team, attendance):
             settled = None if resumption.checkpoint is None else resumption.checkpoint.position.settled
             if resumption.checkpoint is None:
-                scene, settled = begun(built, scenario, team)
+                scene, settled = begun(built.scene, scenario, built.placed, team)
                 built = built._replace(scene=scene)
             part = Part(scenario, folder, built, resumption, settled)
             toml = part.prepare(tables, overwrite=overwrite or resume)
@@ -286,7 +280,9 @@ def _result(
     scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float, settled: Settled | None
 ) -> Result:
     frames = recorder.frames()
-    summary = _summary(scenario, recorder, ended, seconds).model_copy(update={"settled": settled})
+    summary = _summary(scenario, recorder, ended, seconds)
+    added = [text for text in [onset_warning(scenario, recorder.placed, ended.scene.world, settled)] if text]
+    summary = summary.model_copy(update={"settled": settled, "warnings": (*summary.warnings, *added)})
     probes = recorder.probes.series()
     return Result(scenario.name, final_columns(frames), summary, scenario, held=frames, held_probes=probes)
 

@@ -7,12 +7,18 @@ finite difference methods in geomechanics, Blacksburg 1976). Nothing of this dam
 is that of any run, with other numbers in its arrays between two calls. Supports do not move, and time stands still
 for loads. Bodies that are held have no weight and no inverse mass until then.
 
+Supports that accelerate from time zero on (a pulse that begins at its peak) load the contacts at once. Springs would
+need a time of sqrt(m/k) to take that up, in which a block that is about to slip gains a velocity of a sqrt(m/k) that it
+keeps: 2 to 4 % of the slip of a slab of stone of 1 m under 0.8 g. So the inertial force of that acceleration is loaded
+too, after gravity, as far as the scene carries it at rest: all of it, or up to where something slips, rocks or falls.
+A scene under a pulse that begins at its peak at time zero is settled unasked, if it lies at rest as it was placed.
+
 A scene at rest is one whose blocks have no acceleration (springs), or move no further (rigid contacts). One that fails
 moves on, as no kinetic energy peaks there: it ends once a block has come farther than springs give way.
 """
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
@@ -22,9 +28,11 @@ from blocksim.errors import BlocksimError, ExitCode
 from blocksim.kernels.arrays import REACHED
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario
+from blocksim.scenario.motion import settles
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.settled import NOT_AT_REST, Settled
 from blocksim.simulation.team import Team
+from blocksim.world.scenes import arrays_of
 
 PARTS = 50  # in which gravity and loads grow
 CALL_STEPS = {"explicit": 20, "nonsmooth": 2}  # between two looks at the kinetic energy
@@ -33,6 +41,8 @@ MOST_STEPS = {"explicit": 1_000_000, "nonsmooth": 40_000}  # in all
 BALANCE = 1e-8  # of gravity (and of the strongest load): accelerations at rest
 ROUGH_BALANCE = 1e-3  # the same while loads grow
 STILL = 1e-10  # of the smallest side of a block: way in a step of rigid contacts at rest
+FIRST_SHARE, LAST_SHARE = 0.25, 1e-3  # of the inertial force: parts in which it grows, halved where one is too much
+UNASKED_SHARE = 0.01  # of the smallest side of a block: way in settling that was not asked for; what was to drop drops
 MOVED_SHARE = 0.25  # of the smallest side of a block: soft springs give way by as much as a tenth, what falls goes on
 HELD = ("inverse_mass", "inverse_inertia", "counts")
 FALLS = ("fx", "fy", "torque")
@@ -46,12 +56,33 @@ class SettleError(BlocksimError):
     exit_code = ExitCode.NUMERICAL_FAILURE
 
 
+def begun(
+    scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team
+) -> tuple[AnyScene, Settled | None]:
+    """Return a scene at time zero as its run begins, and how it settled, where it did.
+
+    Raises SettleError where that was asked for and fails; otherwise the scene begins as it was placed.
+    """
+    if scenario.start.settle:
+        return settle(scene, scenario, placed, team)
+    if not settles(scenario) or any(body.vx or body.vy or body.spin for body in placed):
+        return scene, None
+    kept = [array.copy() for array in arrays_of(scene)]
+    with suppress(SettleError):
+        found, settled = settle(scene, scenario, placed, team)
+        if settled.largest_displacement_mm <= MILLI * UNASKED_SHARE * _smallest(placed):
+            return found, settled
+    _restore(scene, kept)
+    return scene, None
+
+
 def settle(scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team) -> tuple[AnyScene, Settled]:
     """Bring a scene at time zero to rest; return it, still at time zero, and how. Raises SettleError."""
     going = _Settling(scene, scenario, placed, team)
     with going.without_time():
         going.load_up()
         going.come_to_rest()
+        going.follow_support()
     going.begin()
     return going.scene, going.settled()
 
@@ -70,8 +101,10 @@ class _Settling:
         self.is_free[self.held] = False
         controls = scene.world.controls[0]
         self.gravity = float(controls.gravity_x), float(controls.gravity_y)
+        self.support = _support_acceleration(scene)
+        self.carried = 0.0  # share of the inertial force of that
         self.scale = float(np.hypot(*self.gravity) + controls.push)
-        self.smallest = min(min(body.size_x, body.size_y) for body in placed)
+        self.smallest = _smallest(placed)
         self.start = self._places()
         self.before = self.start
         self.energy, self.steps = 0.0, 0
@@ -119,12 +152,42 @@ class _Settling:
 
     def come_to_rest(self) -> None:
         """Go on until nothing moves any more. Raises SettleError."""
+        self._rest(MOST_STEPS[self.kind])
+
+    def _rest(self, last: int) -> None:
+        """Go on until nothing moves any more, at most a little beyond a step. Raises SettleError."""
         while self._unrest() > BALANCE or self.energy > 0.0:
-            if self.steps > MOST_STEPS[self.kind]:
+            if self.steps > last:
                 raise self._error()
             self._go()
             if self._unrest() <= BALANCE:
                 self._stop()
+
+    def follow_support(self) -> None:
+        """Let the inertial force of the supports' acceleration at time zero grow as far as it is carried at rest."""
+        part = FIRST_SHARE if any(self.support) else 0.0
+        most = max(self.steps, PART_STEPS[self.kind])  # as many as gravity took
+        is_bounded = False
+        while self.carried < 1.0 and part >= LAST_SHARE:
+            scene, steps = self.scene, self.steps
+            kept = [array.copy() for array in arrays_of(scene)]
+            share = min(self.carried + part, 1.0)
+            if self._carries(share, most):
+                self.carried = share
+            else:
+                _restore(scene, kept)
+                self.scene, self.steps, self.energy, is_bounded = scene, steps, 0.0, True
+            part *= 0.5 if is_bounded else 1.0
+
+    def _carries(self, share: float, steps: int) -> bool:
+        """Return True if the scene rests under a share of the inertial force after some steps."""
+        self._load(1.0, share)
+        try:
+            self._go()
+            self._rest(self.steps + steps)
+        except SettleError:
+            return False
+        return True
 
     def begin(self) -> None:
         """Make this time zero: clock and books begin anew, contacts stay as they are."""
@@ -152,9 +215,10 @@ class _Settling:
             held=self.names,
         )
 
-    def _load(self, share: float) -> None:
+    def _load(self, share: float, inertial: float = 0.0) -> None:
         world = self.scene.world
-        world.controls["gravity_x"], world.controls["gravity_y"] = (share * one for one in self.gravity)
+        for name, pull, pushed in zip(("gravity_x", "gravity_y"), self.gravity, self.support, strict=True):
+            world.controls[name] = share * pull - inertial * pushed
         for name in FALLS:
             world.loads[name] = share * self.loads[name]
 
@@ -214,6 +278,28 @@ class _Settling:
             f"{MILLI * float(speeds[fastest]):.3g} mm/s, block {self.placed[far].name} has come "
             f"{MILLI * float(ways[far]):.3g} mm, after {self.steps} steps"
         )
+
+
+def _smallest(placed: Sequence[PlacedBody]) -> float:
+    """Return the smallest side (m) of all blocks."""
+    return min(min(body.size_x, body.size_y) for body in placed)
+
+
+def _restore(scene: AnyScene, kept: Sequence[NDArray[Any]]) -> None:
+    """Give all arrays of a scene the values that they had."""
+    for array, values in zip(arrays_of(scene), kept, strict=True):
+        array[...] = values
+
+
+def _support_acceleration(scene: AnyScene) -> tuple[float, float]:
+    """Return the acceleration (m/s2) of the supports just after time zero."""
+    controls, pieces = scene.world.controls[0], scene.world.motion[int(scene.world.clock[0].motion_piece) :]
+    begun = pieces[pieces["start"] <= 0.0]
+    if begun.size == 0:
+        return 0.0, 0.0
+    now = begun[-1]
+    rate = float(2.0 * now["c2"] - 6.0 * now["c3"] * now["start"])
+    return rate * float(controls.motion_x), rate * float(controls.motion_y)
 
 
 def _begin_rigid(scene: Nonsmooth) -> None:

@@ -13,7 +13,7 @@ from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import simulate, simulate_into
 from blocksim.simulation.ensemble import run_ensemble
 from blocksim.simulation.schemes import build, scheme_of
-from blocksim.simulation.settling import SettleError, settle
+from blocksim.simulation.settling import SettleError, begun, settle
 from blocksim.simulation.team import ALONE
 from blocksim.study.criterion import DEFAULT, Verdict, read_criterion
 
@@ -49,9 +49,15 @@ def support_force(scene: Any, count: int) -> float:
     return float(np.hypot(x.sum(), y.sum()))
 
 
-@pytest.mark.parametrize(("scheme", "scale"), [("explicit", 0.001), ("explicit", 0.01), ("nonsmooth", 1.0)])
-def test_the_tilted_wall_starts_at_rest_and_the_ground_carries_its_weight(scheme: str, scale: float) -> None:
-    settings = ["start.settle=true", f"time.scheme={scheme}", f"contact.stiffness_scale={scale}"]
+@pytest.mark.parametrize(
+    ("scheme", "scale", "tilt"),  # on springs so soft the wall falls at 30.8 degrees, and leans far before it does
+    [("explicit", 0.001, 28.0), ("explicit", 0.01, 30.0), ("nonsmooth", 1.0, 30.0)],
+)
+def test_the_tilted_wall_starts_at_rest_and_the_ground_carries_its_weight(
+    scheme: str, scale: float, tilt: float
+) -> None:
+    overrides = {"time.scheme": scheme, "contact.stiffness_scale": scale, "ground.tilt": f"{tilt} deg"}
+    settings = {"start.settle": True, **overrides}
     scenario = load_scenario(SCENARIOS / "tilting_wall.toml", settings)
     built = build(scenario)
     scene, settled = settle(built.scene, scenario, built.placed, ALONE)
@@ -125,6 +131,51 @@ def test_a_resumed_run_an_ensemble_and_threads_have_the_bits_of_a_run(scheme: st
 
 def test_nothing_settles_unless_it_is_asked_for() -> None:
     assert simulate(stack("nonsmooth", start={})).summary.settled is None
+
+
+JERK = {"kind": "pulse", "shape": "rectangular", "duration": 1.0, "direction": "0 deg"}
+
+
+def jerked(scheme: str, share: float) -> Scenario:
+    """Return two stones on a support that accelerates by a share of gravity at once."""
+    bodies = [{"block": "b", "x": 0.0, "y": 0.1}, {"block": "b", "x": 0.0, "y": 0.3}]
+    contact = {"stiffness_scale": 0.1, "restitution": 0.0}
+    friction = {"block_block": 0.4, "block_ground": 0.4}
+    motion = {**JERK, "amplitude": share * G}
+    return stack(scheme, start={}, bodies=bodies, contact=contact, friction=friction, motion=motion)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize(("share", "carried"), [(0.3, 0.3), (0.8, 0.4)])
+def test_the_inertial_force_of_a_support_that_jerks_at_time_zero_is_carried_up_to_friction(
+    scheme: str, share: float, carried: float
+) -> None:
+    scenario = jerked(scheme, share)
+    built = build(scenario)
+    scene, settled = begun(built.scene, scenario, built.placed, ALONE)
+    assert settled is not None
+    scene, _ = ALONE.advance(scene, 0)
+    weight = 2 * 160.0 * G
+    pushed = np.sqrt(support_force(scene, 2) ** 2 - weight**2)
+    assert pushed == pytest.approx(carried * weight, rel=1e-4 if share == carried else 0.01)
+
+
+def test_members_of_an_ensemble_begin_as_a_run_does_on_a_support_that_jerks_at_time_zero() -> None:
+    scenario = jerked("nonsmooth", 0.3)
+    one, two = run_ensemble([scenario, scenario])
+    assert one.final.equals(simulate(scenario).final)
+    assert two.final.equals(one.final)
+
+
+def test_what_is_to_drop_or_moves_already_does_not_settle_unasked_under_such_a_support() -> None:
+    motion = {**JERK, "amplitude": 1.0}
+    for body in ({"y": 0.11}, {"velocity": [0.1, 0.0]}):
+        result = simulate(
+            stack("explicit", start={}, motion=motion, bodies=[{"block": "b", "x": 0.0, "y": 0.1, **body}])
+        )
+        assert result.summary.settled is None
+        assert result.frames.y[0, 0] == body.get("y", 0.1)
+        assert result.summary.warnings == ()
 
 
 @pytest.mark.parametrize(

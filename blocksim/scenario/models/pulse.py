@@ -12,6 +12,8 @@ MOST_CYCLES = 1000.0
 Shape = Literal["sine", "half-sine", "rectangular", "cosine"]
 SINGLE = ("half-sine", "rectangular")
 """Shapes of half a cycle, which do not repeat."""
+ABRUPT = ("rectangular", "cosine")
+"""Shapes that begin at their largest acceleration."""
 _SHAPES = OneOf(get_args(Shape))
 _Cycles = Annotated[float, q.Quantity(q.NUMBER, above=0.0, at_most=MOST_CYCLES)]
 Acceleration = Annotated[float, q.Quantity(q.ACCELERATION, above=0.0)]
@@ -36,6 +38,11 @@ class Pulse(Table):
     cycles: _Cycles = Field(default=1.0, description="number of cycles of a sine or cosine, at most 1000")
     direction: q.Angle = Field(default=0.0, description="direction of positive acceleration, counter-clockwise from +x")
     start: q.NonNegativeTime = Field(default=0.0, description="start of the pulse; the supports rest before")
+
+    @property
+    def is_abrupt(self) -> bool:
+        """Return True for a pulse that begins at its largest acceleration."""
+        return self.shape in ABRUPT
 
     @property
     def resolved_cycles(self) -> float:

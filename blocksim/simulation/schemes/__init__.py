@@ -10,6 +10,7 @@ from blocksim.errors import BlocksimError
 from blocksim.kernels.systems import Coupled, measure_systems, plan_of
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES as TABLES
+from blocksim.scenario.motion import settles
 from blocksim.simulation.schemes.scheme import COUNTED, AnyScene, Scene, Scheme
 from blocksim.world import scenes
 from blocksim.world.coupled import couple
@@ -76,7 +77,7 @@ def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
 def _together(scenario: Scenario) -> str | None:
     """Return what scenes have in common that are built together; None for those that are not, and with events."""
     scheme = scheme_named(scenario)
-    is_alone = scenario.systems or scenario.events or scheme.advance_members is None or scenario.start.settle
+    is_alone = scenario.systems or scenario.events or scheme.advance_members is None or settles(scenario)
     return None if is_alone else scheme.name
 
 
