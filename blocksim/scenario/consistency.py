@@ -10,6 +10,7 @@ from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.scenario.overrides import Data
 from blocksim.scenario.pairs import GROUND
 from blocksim.scenario.quantities import shown
+from blocksim.scenario.soil_places import unfit_soils
 from blocksim.scenario.spelling import did_you_mean_or_list
 
 BLOCKS_BY_NAME = ("structures", "bodies")
@@ -93,6 +94,7 @@ def unfit_choices(scenario: Scenario) -> Iterator[Finding]:
     for name in () if scenario.time.has_systems else scenario.systems:
         message = f"{name} need another scheme: {shown(scenario.time.scheme)} advances blocks and supports only"
         yield Finding((name,), message, at="key", relation=True)
+    yield from unfit_soils(scenario)
     if scenario.start.settle and scenario.systems:
         message = f"{', '.join(scenario.systems)} cannot settle: blocks and supports alone can"
         yield Finding(("start", "settle"), message, relation=True)

@@ -30,3 +30,16 @@ def slope(r: float, h: float) -> float:
         return 0.0
     s = 1.0 - 0.5 * q
     return -SCALE * 5.0 * q * s * s * s / (h * h * h)
+
+
+@kernel
+def steepness(h: float) -> float:
+    """Return -W'/r (1/m^4) at r = 0, where it is largest."""
+    return 5.0 * SCALE / (h * h * h * h)
+
+
+@kernel
+def fading(r: float, inverse: float) -> float:
+    """Return -W'/r (-) as a share of that, zero from the support radius on, whose inverse (1/m) is given; no branch."""
+    s = max(1.0 - r * inverse, 0.0)
+    return s * s * s

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -13,6 +13,7 @@ from blocksim.scenario.models.drive import AnyDrive
 from blocksim.scenario.units import USUAL_GRAVITY
 
 Side = Literal["width", "height", "length"]
+YieldSurface = Literal["mohr-coulomb", "plane-strain-associated"]
 SIDES: tuple[Side, ...] = ("width", "height", "length")
 Point = tuple[q.Length, q.Length]
 
@@ -30,6 +31,14 @@ class Material(Table):
     )
     young_modulus: q.Pressure = Field(description="Young's modulus E")
     poisson_ratio: q.PoissonRatio = Field(description="Poisson's ratio")
+    friction_angle: q.FrictionAngle | None = Field(default=None, description="makes it a soil: its angle of friction")
+    cohesion: q.Cohesion | None = Field(default=None, description="cohesion of a soil (default: 0)")
+    dilation: q.Angle | None = Field(default=None, description="angle of dilation of a soil; only 0 is available")
+    yield_surface: Annotated[YieldSurface, OneOf(get_args(YieldSurface))] | None = Field(
+        default=None,
+        description="how Drucker and Prager's surface follows from friction angle and cohesion (default: "
+        "mohr-coulomb, which fails as they say; plane-strain-associated is the value often printed, too weak here)",
+    )
 
     @model_validator(mode="after")
     def _one_density(self) -> Self:
@@ -40,6 +49,22 @@ class Material(Table):
             message = "density and unit_weight are both given; keep one of them"
             raise q.invalid(message, "unit_weight")
         return self
+
+    @model_validator(mode="after")
+    def _soil_has_a_friction_angle(self) -> Self:
+        for key in () if self.is_soil else ("cohesion", "dilation", "yield_surface"):
+            if getattr(self, key) is not None:
+                raise q.invalid(
+                    'only soil has this; give friction_angle too, "0 deg" where there is none', key, at="key"
+                )
+        if self.dilation:
+            raise q.invalid("soil that dilates is not available; leave dilation out", "dilation")
+        return self
+
+    @property
+    def is_soil(self) -> bool:
+        """Return True for a soil."""
+        return self.friction_angle is not None
 
     @property
     def density(self) -> float:

@@ -1,0 +1,82 @@
+"""The arrays of all soils of a scene, with unit and sign of every field; SI units.
+
+`n` particles of one spacing s stand for prisms of s x s and the depth of the scene out of the plane, so that masses,
+forces and energies are those of blocks. Stresses are positive in tension. Particles are kept in the order of their
+cells; `number` names them for whoever looks from outside.
+
+Losses are booked by groups of particles, in their order, so that the bits of a sum depend on no number of threads.
+"""
+
+from typing import NamedTuple
+
+from blocksim.kernels.arrays import INTERACTION, Integers, Records, record_type
+
+GROUP = 64  # particles that share one book
+NEIGHBOURS = 64  # room in the list of a particle; undisturbed soil has 28, and 36 with the skin
+
+POINT = record_type(
+    "x y vx vy "  # m, m/s
+    "pxx pxy pyx pyy"  # Pa: stress times kernel correction, what neighbours feel; one cache line with the above
+)
+STATE = record_type(
+    "sxx syy szz sxy "  # Pa, tension positive
+    "plastic "  # -: accumulated plastic shear strain, the integral of (2 e:e)^(1/2) of the plastic rate e
+    "fx fy "  # N: all forces but gravity in the evaluation under way
+    "drag_x drag_y",  # N: what artificial viscosity contributes to them
+    indices="number "  # as in the scenario
+    "first",  # its first touch
+    small="count",  # of its touches
+    flags="kind",  # which of the soils it is of
+)
+KIND = record_type(
+    "density mass volume "  # kg/m3, kg, m3 of a particle
+    "lame shear bulk "  # Pa: Lame's first parameter, shear modulus, bulk modulus
+    "slope cohesion "  # -, Pa: (J2)^(1/2) = cohesion - slope I1 is the yield surface
+    "impedance "  # kg/(m2 s): density times wave speed
+    "settling",  # 1/s: rate of damping while gravity grows
+    flags="is_corrected",
+)
+TOUCH = record_type(
+    "spring depth "  # m: shear spring, overlap
+    "normal_force shear_force "  # N: pushing apart, resisting slip
+    "fx fy",  # N: on the particle
+    indices="particle body",
+)
+BOOK = record_type(
+    "plastic viscosity dashpot friction settling ramp "  # J, lost so far; ramp: what the missing weight would have done
+    "fastest",  # m/s: highest speed in the drift under way
+)
+CONTROLS = record_type(
+    "area smoothing reach skin "  # m2, m, m, m: s^2; h; support radius; how much farther lists reach
+    "travel "  # m: no particle or body has moved farther since the lists were made
+    "radius "  # m: of the disc that touches bodies
+    "viscosity ramp "  # -, s: factor of artificial viscosity; until when gravity grows
+    "left bottom cell",  # m: of the grid
+    "columns rows "  # of the grid
+    "blocks "  # the first bodies are blocks, the others supports
+    "touch_count is_listed is_uniform is_full",  # flags: lists are made; one kind; a list had no room
+)
+
+
+class Soils(NamedTuple):
+    """All soils of a scene."""
+
+    points: Records  # (n,) POINT
+    states: Records  # (n,) STATE
+    kinds: Records  # (k,) KIND, one for each table of the scenario
+    interactions: Records  # (k, c) INTERACTION of kinds with contact classes of bodies
+    order: Integers  # (n,) uint32, work space of the sorting
+    starts: Integers  # (3 n + 3,) uint32: where cells begin
+    lists: Integers  # (n, NEIGHBOURS) uint32
+    lengths: Integers  # (n,) uint32: of the lists
+    touches: Records  # (t,) TOUCH, what is near a body, sorted by particle and body
+    kept: Records  # (t,) TOUCH, the same before the lists are made again
+    by_body: Integers  # (t,) uint32: touches sorted by body
+    begins: Integers  # (bodies + 1,) uint32: where those of a body begin
+    books: Records  # (n / GROUP, rounded up) BOOK
+    spare_point: Records  # (1,) POINT, work space
+    spare_state: Records  # (1,) STATE
+    controls: Records  # (1,) CONTROLS
+
+
+__all__ = ["BOOK", "CONTROLS", "GROUP", "INTERACTION", "KIND", "NEIGHBOURS", "POINT", "STATE", "TOUCH", "Soils"]

@@ -1,0 +1,77 @@
+"""What all soils of a scene hold and have lost, and how fast they are."""
+
+import math
+
+from blocksim.kernels.arrays import Floats, World
+from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.soil.arrays import Soils
+from blocksim.kernels.soil.stress import invariants, strain_energy
+
+ENERGIES = (
+    "kinetic",
+    "potential",
+    "elastic",  # strain energy of the particles
+    "contact",  # in the springs between particles and bodies
+    "plastic",
+    "viscosity",
+    "dashpot",
+    "friction",
+    "settling",  # lost to damping while gravity grows
+    "ramp",  # what the missing part of gravity would have done meanwhile
+)
+
+
+@rare_kernel
+def survey(soils: Soils, world: World) -> tuple[float, float, float]:
+    """Return highest speed (m/s), kinetic energy (J) and power of the weights (W), each counted positive.
+
+    The speed is infinite where a number is not finite, or a list had no room.
+    """
+    fastest, kinetic, power = 0.0, 0.0, 0.0
+    controls = world.controls[0]
+    for i in range(soils.points.size):
+        point = soils.points[i]
+        mass = soils.kinds[soils.states[i].kind].mass
+        squared = point.vx**2 + point.vy**2
+        fastest = max(fastest, squared if math.isfinite(squared + point.x + point.y) else math.inf)
+        kinetic += 0.5 * mass * squared
+        power += mass * abs(controls.gravity_x * point.vx + controls.gravity_y * point.vy)
+    if soils.controls[0].is_full:
+        fastest = math.inf
+    return math.sqrt(fastest), kinetic, power
+
+
+@rare_kernel
+def measure_touches(soils: Soils, world: World) -> float:
+    """Return the energy (J) in the springs between particles and bodies."""
+    total = 0.0
+    for e in range(soils.controls[0].touch_count):
+        touch = soils.touches[e]
+        kind = soils.states[touch.particle].kind
+        values = soils.interactions[kind, world.bodies[touch.body].contact_class]
+        squares = touch.depth * touch.depth + values.shear_ratio * touch.spring * touch.spring
+        total += 0.5 * values.normal_stiffness * squares
+    return total
+
+
+@rare_kernel
+def measure(soils: Soils, world: World, row: Floats) -> None:
+    """Write the energies (J) as in ENERGIES, then the mass (kg)."""
+    row[:] = 0.0
+    controls = world.controls[0]
+    for i in range(soils.points.size):
+        point, state = soils.points[i], soils.states[i]
+        kind = soils.kinds[state.kind]
+        total, deviator = invariants(state.sxx, state.syy, state.szz, state.sxy)
+        row[0] += 0.5 * kind.mass * (point.vx**2 + point.vy**2)
+        row[1] -= kind.mass * (controls.gravity_x * point.x + controls.gravity_y * point.y)
+        row[2] += strain_energy(kind, total, deviator)
+        row[10] += kind.mass
+    row[3] = measure_touches(soils, world)
+    for book in soils.books:
+        row[4] += book.plastic
+        row[5] += book.viscosity
+        row[6] += book.dashpot
+        row[7] += book.friction
+        row[8] += book.settling
+        row[9] += book.ramp

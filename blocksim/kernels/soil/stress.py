@@ -1,0 +1,105 @@
+"""The constitutive law of a particle: hypoelastic, Jaumann's rate, Drucker and Prager's yield surface without dilation.
+
+Stress is turned by the rotation of the step (Cayley's form, which keeps its size exactly), then isotropic elasticity
+adds what the strain of the step gives, with the strain out of the plane zero, and what lies beyond
+
+    f = (J2)^(1/2) + a I1 - k = 0
+
+returns to it at the same pressure: the deviator is scaled by Y/(J2)^(1/2), Y = k - a I1, which is exact as the plastic
+flow has no volume change. Where Y < 0 there is nothing but the apex, I1 = k/a.
+
+In plane strain such a flow ends where s_zz is zero, as its rate is proportional to the deviator and has no component
+out of the plane. So the failing stress lies midway, s_zz = (s_1 + s_2)/2, (J2)^(1/2) = |s_1 - s_2|/2 and
+I1 = 3 (s_1 + s_2)/2: with a = sin(phi)/3 and k = c cos(phi) the surface is Mohr and Coulomb's.
+"""
+
+import math
+
+from blocksim.kernels.arrays import Record
+from blocksim.kernels.jit import kernel
+
+
+@kernel
+def invariants(sxx: float, syy: float, szz: float, sxy: float) -> tuple[float, float]:
+    """Return I1 (Pa) and the root of J2 (Pa)."""
+    total = sxx + syy + szz
+    mean = total / 3.0
+    dx, dy, dz = sxx - mean, syy - mean, szz - mean
+    return total, math.sqrt(0.5 * (dx * dx + dy * dy + dz * dz) + sxy * sxy)
+
+
+@kernel
+def strain_energy(kind: Record, total: float, deviator: float) -> float:
+    """Return the elastic energy (J) of a particle with these invariants (Pa)."""
+    return kind.volume * (total * total / (18.0 * kind.bulk) + deviator * deviator / (2.0 * kind.shear))
+
+
+@kernel
+def turned(sxx: float, syy: float, sxy: float, angle: float) -> tuple[float, float, float]:
+    """Return a stress (Pa) turned with its body by a small angle (rad), counter-clockwise positive."""
+    q = 0.5 * angle
+    scale = 1.0 / (1.0 + q * q)
+    c, s = (1.0 - q * q) * scale, 2.0 * q * scale
+    cosine, sine = c * c - s * s, 2.0 * c * s
+    mean, half = 0.5 * (sxx + syy), 0.5 * (sxx - syy)
+    across = half * sine + sxy * cosine
+    half = half * cosine - sxy * sine
+    return mean + half, mean - half, across
+
+
+@kernel
+def strength(kind: Record, total: float) -> float:
+    """Return the largest root of J2 (Pa) at I1 (Pa); negative beyond the apex."""
+    return kind.cohesion - kind.slope * total
+
+
+@kernel
+def work_of(state: Record, sxx: float, syy: float, sxy: float, dxx: float, dyy: float, dxy: float) -> float:
+    """Return the work per volume (J/m3) of the mean of the stress before, given, and now over a strain (-)."""
+    return 0.5 * ((sxx + state.sxx) * dxx + (syy + state.syy) * dyy + 2.0 * (sxy + state.sxy) * dxy)
+
+
+@kernel
+def return_to_surface(state: Record, kind: Record) -> float:
+    """Bring the stress of a particle back to the yield surface; return the root of J2 (Pa) that was too much, or 0."""
+    total, deviator = invariants(state.sxx, state.syy, state.szz, state.sxy)
+    most = strength(kind, total)
+    if deviator <= most:
+        return 0.0
+    factor, mean = 0.0, total / 3.0
+    if most > 0.0:
+        factor = most / deviator
+    elif kind.slope > 0.0:
+        mean = kind.cohesion / (3.0 * kind.slope)
+    state.sxx = mean + factor * (state.sxx - total / 3.0)
+    state.syy = mean + factor * (state.syy - total / 3.0)
+    state.szz = mean + factor * (state.szz - total / 3.0)
+    state.sxy *= factor
+    return deviator * (1.0 - factor)
+
+
+@kernel
+def strain(state: Record, kind: Record, ux: float, uy: float, wx: float, wy: float, step: float) -> float:
+    """Advance the stress of a particle by a step (s) of a velocity gradient (1/s); return the energy (J) lost to flow.
+
+    dvx/dx, dvx/dy, dvy/dx, dvy/dy. The loss is the work of the mean stress less what elasticity has gained.
+    """
+    dxx, dyy, dxy = step * ux, step * wy, 0.5 * step * (uy + wx)
+    sxx, syy, sxy = turned(state.sxx, state.syy, state.sxy, 0.5 * step * (wx - uy))
+    before = state.szz
+    volume = kind.lame * (dxx + dyy)
+    state.sxx = sxx + volume + 2.0 * kind.shear * dxx
+    state.syy = syy + volume + 2.0 * kind.shear * dyy
+    state.szz = before + volume
+    state.sxy = sxy + 2.0 * kind.shear * dxy
+    lost = return_to_surface(state, kind)
+    if lost == 0.0:
+        total, _ = invariants(state.sxx, state.syy, state.szz, state.sxy)
+        if strength(kind, total) >= 0.0:
+            return 0.0
+    state.plastic += lost / kind.shear
+    total, deviator = invariants(sxx, syy, before, sxy)
+    held = strain_energy(kind, total, deviator)
+    total, deviator = invariants(state.sxx, state.syy, state.szz, state.sxy)
+    work = kind.volume * work_of(state, sxx, syy, sxy, dxx, dyy, dxy)
+    return work - (strain_energy(kind, total, deviator) - held)

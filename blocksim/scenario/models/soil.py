@@ -1,0 +1,119 @@
+"""[[soils]]: bodies of soil, filled with particles of one spacing."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Literal, Self, get_args
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from blocksim.scenario import polygons
+from blocksim.scenario import quantities as q
+from blocksim.scenario.models.base import Identifier, OneOf
+from blocksim.scenario.models.geometry import Point
+from blocksim.scenario.spelling import did_you_mean_or_list
+from blocksim.scenario.systems import SYSTEMS, SystemTable
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from blocksim.scenario.models.scenario import Scenario
+
+Kind = Literal["outline", "rectangle"]
+Start = Literal["geostatic", "ramp"]
+Gradient = Literal["raw", "corrected"]
+MOST_PARTICLES = 1_000_000
+LEAST_ACROSS = 4
+SPACINGS_A_SIDE = 8
+"""Least number of spacings along the smallest side of all blocks."""
+MILLI = 1e3
+
+
+class SoilTable(SystemTable):
+    """A body of soil: an outline, or a rectangle, filled with particles."""
+
+    declared_in = "blocksim.world.systems.soils:SOILS"
+    name: Identifier = Field(description="name of the soil in tables")
+    material: str = Field(description="the name of its material, which has a friction_angle")
+    kind: Annotated[Kind, OneOf(get_args(Kind))] = Field(
+        default="outline", description="what is given of its shape: an outline, or the x and y of a rectangle"
+    )
+    outline: tuple[Point, ...] | None = Field(
+        default=None, description="corners [x, y] in order; where an edge is inclined, discs of a spacing stay inside"
+    )
+    x: Point | None = Field(default=None, description="where the rectangle begins and ends along the ground")
+    y: Point | None = Field(default=None, description="where the rectangle begins and ends above the ground")
+    spacing: q.PositiveLength = Field(description="distance of the particles at the start, the same for all soils")
+    start: Annotated[Start, OneOf(get_args(Start))] = Field(
+        default="geostatic",
+        description="geostatic: stresses of the weight above; ramp: no stress, and gravity grows over 0.1 s",
+    )
+    gradient: Annotated[Gradient, OneOf(get_args(Gradient))] | None = Field(
+        default=None, description="raw or corrected (default: corrected where there is cohesion)"
+    )
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        wanted = ("outline",) if self.kind == "outline" else ("x", "y")
+        for key in ("outline", "x", "y"):
+            is_given = getattr(self, key) is not None
+            if is_given and key not in wanted:
+                raise q.invalid(f"this key does not belong to kind {q.shown(self.kind)}", key, at="key")
+            if not is_given and key in wanted:
+                raise q.invalid(f"kind {q.shown(self.kind)} needs the key {key}", "kind", at="key")
+        for key in ("x", "y"):
+            ends = getattr(self, key)
+            if ends is not None and ends[1] <= ends[0]:
+                raise q.invalid("the end must be beyond the begin", key)
+        return self
+
+    @model_validator(mode="after")
+    def _is_a_polygon(self) -> Self:
+        if self.outline is None:
+            return self
+        if len(self.outline) < 3:  # noqa: PLR2004 - a triangle
+            raise q.invalid("an outline needs at least three corners [x, y]", "outline")
+        if len(set(self.outline)) < len(self.outline):
+            raise q.invalid("two corners are the same", "outline")
+        for one, other in polygons.self_crossings(np.array(self.outline)):
+            raise q.invalid(f"edges {one + 1} and {other + 1} of the outline meet", "outline")
+        if abs(polygons.signed_area(np.array(self.outline))) <= polygons.ROUND_OFF**2:
+            raise q.invalid("the outline has no area", "outline")
+        return self
+
+    @property
+    def corners(self) -> "NDArray[np.float64]":
+        """Corners (m, (k, 2)), counter-clockwise."""
+        if self.outline is not None:
+            return polygons.corners_of(self.outline)
+        (x0, x1), (y0, y1) = self.x or (0.0, 0.0), self.y or (0.0, 0.0)
+        return polygons.corners_of([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+
+    def impossible(self, scenario: "Scenario") -> Iterator[tuple[str, str]]:
+        """Find a material that is no soil, a spacing that does not suit, and what the outline meets."""
+        from blocksim.scenario.soil_places import meetings  # noqa: PLC0415 - needs the scenario's own model
+
+        if self.material not in scenario.materials:
+            hint = did_you_mean_or_list(self.material, scenario.materials)
+            yield "material", f"unknown material {q.shown(self.material)}, {hint}"
+        elif not scenario.materials[self.material].is_soil:
+            yield "material", f"{q.shown(self.material)} is no soil; give this material a friction_angle"
+        unfit = list(self._unfit_spacing(scenario))
+        yield from unfit or meetings(self, "outline" if self.kind == "outline" else "kind", scenario)
+
+    def _unfit_spacing(self, scenario: "Scenario") -> Iterator[tuple[str, str]]:
+        """Find a spacing that is too large, too small, or not that of the first soil."""
+        sides = [min(block.size_x, block.size_y) for block in scenario.blocks.values()]
+        across = polygons.count_across(self.corners, self.spacing)
+        first = scenario.systems["soils"][0]
+        if isinstance(first, SoilTable) and self.spacing != first.spacing:
+            yield "spacing", f"all soils have the same spacing, here {MILLI * first.spacing:.6g} mm"
+        if sides and SPACINGS_A_SIDE * self.spacing > min(sides) * (1.0 + 1e-9):
+            most = MILLI * min(sides) / SPACINGS_A_SIDE
+            yield "spacing", f"above an eighth of the smallest side of the blocks: at most {most:.4g} mm"
+        if min(across) < LEAST_ACROSS:
+            yield "spacing", f"only {min(across)} particles across; at least {LEAST_ACROSS} are needed"
+        if across[0] * across[1] > MOST_PARTICLES:
+            yield "spacing", f"{across[0] * across[1]} particles are too many; at most {MOST_PARTICLES} are allowed"
+
+
+SYSTEMS["soils"] = SoilTable

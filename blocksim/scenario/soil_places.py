@@ -1,0 +1,80 @@
+"""What the outlines of soils must not meet, and choices of a scenario that soil does not go with."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.scenario import polygons
+from blocksim.scenario.findings import Finding
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.soil import SoilTable
+from blocksim.scenario.placement import PlacedBody, place_bodies
+from blocksim.scenario.quantities import shown
+from blocksim.scenario.segments import TOLERANCE, place_segments, surface_heights
+
+UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+MOST_MEETINGS = 20
+
+
+def soil_tables(scenario: Scenario) -> list[SoilTable]:
+    """Return the soils of a scenario."""
+    return [table for table in scenario.systems.get("soils", ()) if isinstance(table, SoilTable)]
+
+
+def meetings(soil: SoilTable, key: str, scenario: Scenario) -> Iterator[tuple[str, str]]:
+    """Yield the key of an outline and what it meets: ground, walls, blocks, soils before it."""
+    corners = soil.corners
+    found = [*_boundaries(corners, scenario), *_blocks(corners, scenario), *_soils(soil, scenario)]
+    for what in found[:MOST_MEETINGS]:
+        yield key, f"soil {soil.name} meets {what}"
+
+
+def _boundaries(corners: NDArray[np.float64], scenario: Scenario) -> Iterator[str]:
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
+    for x, y in np.concatenate([corners, middles]):
+        if y < float(surface_heights(scenario, np.array([x]))[0]) - TOLERANCE:
+            yield f"the ground at x = {x:.6g} m"
+            return
+    walls = len(scenario.walls)
+    segments = place_segments(scenario)
+    for number, piece in enumerate(segments, start=1 - (len(segments) - walls)):
+        if polygons.cuts(np.array([piece.x0, piece.y0]), np.array([piece.x1, piece.y1]), corners):
+            yield f"wall {number}" if number > 0 else f"the ground near x = {piece.x1:.6g} m"
+
+
+def _blocks(corners: NDArray[np.float64], scenario: Scenario) -> Iterator[str]:
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    for body in place_bodies(scenario):
+        reach = 0.5 * float(np.hypot(body.size_x, body.size_y))
+        is_near = low[0] - reach < body.x < high[0] + reach and low[1] - reach < body.y < high[1] + reach
+        if is_near and polygons.overlap(corners, _rectangle(body)):
+            yield f"block {body.name}"
+
+
+def _rectangle(body: PlacedBody) -> NDArray[np.float64]:
+    u, v = (UNIT_CORNERS * (body.size_x, body.size_y)).T
+    cosine, sine = np.cos(body.angle), np.sin(body.angle)
+    return np.stack([body.x + cosine * u - sine * v, body.y + sine * u + cosine * v], axis=1)
+
+
+def _soils(soil: SoilTable, scenario: Scenario) -> Iterator[str]:
+    tables = soil_tables(scenario)
+    number = next(k for k, table in enumerate(tables) if table is soil)
+    for other in tables[:number]:
+        if other.name == soil.name:
+            yield "another soil of this name"
+        elif polygons.overlap(soil.corners, other.corners):
+            yield f"soil {other.name}"
+
+
+def unfit_soils(scenario: Scenario) -> Iterator[Finding]:
+    """Find blocks of soil, and a contact model that soil does not go with."""
+    for name, block in scenario.blocks.items():
+        material = scenario.materials.get(block.material)
+        if material is not None and material.is_soil:
+            message = f"{shown(block.material)} is soil, as it has a friction_angle; blocks are of other materials"
+            yield Finding(("blocks", name, "material"), message, relation=True)
+    if scenario.systems.get("soils") and scenario.contact.model != "surface":
+        message = f'{shown(scenario.contact.model)} does not go with soil; use model = "surface"'
+        yield Finding(("contact", "model"), message, relation=True)

@@ -1,0 +1,104 @@
+"""What soils are as numbers: elasticity, yield surface, and how their particles touch bodies."""
+
+import math
+from typing import Any
+
+from blocksim.kernels.arrays import INTERACTION, zeros
+from blocksim.kernels.soil.arrays import KIND
+from blocksim.scenario import GROUND, Material, Scenario, place_bodies, resolve_pair
+from blocksim.scenario.models.contact import PairFriction
+from blocksim.scenario.models.soil import SoilTable
+from blocksim.world.interactions import ContactClass, contact_classes
+
+SHEAR_RATIO = 0.8  # shear over normal stiffness of a contact
+DAMPING_RATIO = 0.3
+SETTLING = 5e-3  # damping while gravity grows, in (E / (rho h^2))^(1/2)
+SMOOTHING = 1.5  # smoothing length in spacings
+USUAL_DEPTH = 1.0  # m, out of the plane, where there are no blocks
+
+
+def lame_constants(material: Material) -> tuple[float, float]:
+    """Return Lame's first parameter and the shear modulus (Pa)."""
+    young, poisson = material.young_modulus, material.poisson_ratio
+    return young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)), young / (2.0 * (1.0 + poisson))
+
+
+def wave_speed(material: Material) -> float:
+    """Return the speed (m/s) of pressure waves."""
+    lame, shear = lame_constants(material)
+    return math.sqrt((lame + 2.0 * shear) / material.density)
+
+
+def yield_surface(material: Material) -> tuple[float, float]:
+    """Return a (-) and k (Pa) of the surface (J2)^(1/2) + a I1 = k.
+
+    mohr-coulomb: a = sin(phi)/3 and k = c cos(phi), which fails as Mohr and Coulomb say where the flow has no dilation
+    (kernels/soil/stress.py). plane-strain-associated: tan(phi)/(9 + 12 tan(phi)^2)^(1/2) and 3 c over the same root,
+    which does so for an associated flow, and is weaker without dilation: sin(phi) becomes 3 a.
+    """
+    angle, cohesion = material.friction_angle or 0.0, material.cohesion or 0.0
+    if material.yield_surface == "plane-strain-associated":
+        root = math.sqrt(9.0 + 12.0 * math.tan(angle) ** 2)
+        return math.tan(angle) / root, 3.0 * cohesion / root
+    return math.sin(angle) / 3.0, cohesion * math.cos(angle)
+
+
+def earth_pressure_at_rest(material: Material) -> float:
+    """Return horizontal over vertical stress: of elasticity, or the least one within the yield surface."""
+    poisson = material.poisson_ratio
+    slope = math.sqrt(3.0) * yield_surface(material)[0]
+    return max(poisson / (1.0 - poisson), (1.0 - slope) / (1.0 + 2.0 * slope))
+
+
+def depth_of_scene(scenario: Scenario) -> float:
+    """Return the extent (m) of all soil out of the plane: that of the deepest block."""
+    return max((body.depth for body in place_bodies(scenario)), default=USUAL_DEPTH)
+
+
+def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
+    """Return one KIND for each soil."""
+    records = zeros(len(tables), KIND)
+    depth = depth_of_scene(scenario)
+    for record, table in zip(records, tables, strict=True):
+        material = scenario.materials[table.material]
+        lame, shear = lame_constants(material)
+        record.density = material.density
+        record.volume = table.spacing**2 * depth
+        record.mass = material.density * record.volume
+        record.lame, record.shear, record.bulk = lame, shear, lame + 2.0 * shear / 3.0
+        record.slope, record.cohesion = yield_surface(material)
+        record.impedance = material.density * wave_speed(material)
+        smoothing = SMOOTHING * table.spacing
+        record.settling = SETTLING * math.sqrt(material.young_modulus / material.density) / smoothing
+        corrected = table.gradient == "corrected" if table.gradient else bool(material.cohesion)
+        record.is_corrected = corrected
+    return records
+
+
+def friction_with(scenario: Scenario, soil: str, partner: ContactClass) -> PairFriction:
+    """Return the friction of a soil's material with a class of bodies.
+
+    As [pairs] has it, else that of the soil itself, as on a rough face: [friction] is about blocks.
+    """
+    name = partner.material if partner.is_wall or not partner.is_ground else GROUND
+    pair = resolve_pair(scenario, soil, str(name), ground=partner.is_ground)
+    if pair.rules["friction"].startswith("pairs."):
+        return pair.friction
+    return PairFriction(static=math.tan(scenario.materials[soil].friction_angle or 0.0))
+
+
+def interactions_with(scenario: Scenario, tables: list[SoilTable]) -> Any:
+    """Return the parameters (soils, classes) of contacts with each class of bodies; see `world.interactions`."""
+    classes = contact_classes(scenario, place_bodies(scenario))
+    records = zeros((len(tables), len(classes)), INTERACTION)
+    depth = depth_of_scene(scenario)
+    for row, table in zip(records, tables, strict=True):
+        young = scenario.materials[table.material].young_modulus
+        for record, partner in zip(row, classes, strict=True):
+            friction = friction_with(scenario, table.material, partner)
+            record.normal_stiffness = young * min(depth, partner.depth)
+            record.shear_ratio = SHEAR_RATIO
+            record.normal_damping = record.shear_damping = DAMPING_RATIO
+            record.static_friction, record.kinetic_friction = friction.static, friction.kinetic
+            record.transition_speed = friction.transition_speed
+    return records
