@@ -20,7 +20,7 @@ from blocksim.kernels.soil.neighbours import (
     travelled,
 )
 from blocksim.kernels.soil.stress import strain
-from blocksim.kernels.soil.touches import make_touches
+from blocksim.kernels.soil.touches import make_touches, preload
 from blocksim.kernels.team import meet
 
 
@@ -98,6 +98,8 @@ def renew_lists(soils: Soils, world: World, k: int) -> None:
         sort_particles(soils)
         move_particles(soils)
         make_touches(soils, world)
+        if soils.controls[0].is_listed == 0:
+            preload(soils, world)
         soils.controls[0].is_listed = 1
     meet(world.team)
     first, last = particles_of_thread(soils, world, k)

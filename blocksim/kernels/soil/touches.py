@@ -9,8 +9,10 @@ from blocksim.kernels.arrays import Record, World
 from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.soil.neighbours import grid_of
-from blocksim.kernels.soil.shapes import is_near
+from blocksim.kernels.soil.shapes import from_body, is_near
 from blocksim.kernels.sph.cells import clipped_cell
+
+AT_TOUCH = 1e-3  # of the radius; what is nearer to touching a body than this at the start is in contact
 
 
 @rare_kernel
@@ -117,3 +119,25 @@ def make_touches(soils: Soils, world: World) -> None:
         state.count = soils.lengths[i]
         state.first = soils.order[i] - soils.lengths[i]
     controls.touch_count = count
+
+
+@rare_kernel
+def preload(soils: Soils, world: World) -> None:
+    """Press particles that touch a body at the start against it, as their stress wants it.
+
+    Otherwise every contact would begin without a force: the shock of the soil that drops on its supports, a few
+    micrometres deep, makes it flow, and the stresses that it leaves are not those of the start.
+    """
+    radius = soils.controls[0].radius
+    for e in range(soils.controls[0].touch_count):
+        touch = soils.touches[e]
+        point, state = soils.points[touch.particle], soils.states[touch.particle]
+        body = world.bodies[touch.body]
+        distance, nx, ny = from_body(body, touch.body == world.bodies.size - 1, point.x, point.y, radius)
+        pressure = -(state.sxx * nx * nx + 2.0 * state.sxy * nx * ny + state.syy * ny * ny)
+        if abs(distance - radius) < AT_TOUCH * radius and pressure > 0.0:
+            stiffness = soils.interactions[state.kind, body.contact_class].normal_stiffness
+            touch.normal_force = pressure * soils.kinds[state.kind].volume / (2.0 * radius)
+            touch.depth = touch.normal_force / stiffness
+            point.x -= (touch.depth - radius + distance) * nx
+            point.y -= (touch.depth - radius + distance) * ny

@@ -1,0 +1,96 @@
+"""Tables of soils and materials that are soils: what is refused, and where it is told."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from blocksim.errors import ScenarioError
+from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_to_toml
+from blocksim.scenario.models.soil import SoilTable
+from tests.soils import BLOCKS, MATERIALS, column, data_of, scene
+
+OUTLINE = {"name": "heap", "material": "rods", "spacing": 0.005}
+CORNERS = [[0.2, 0.0], [0.3, 0.0], [0.2, 0.05]]
+
+
+def problems(data: dict[str, Any]) -> list[str]:
+    """Return what is told about a scenario, each with its key."""
+    with pytest.raises(ScenarioError) as error:
+        scenario_from_mapping(data)
+    return [str(problem) for problem in error.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("soil", "told"),
+    [
+        ({"material": "soft"}, ("soils", "material", '"soft" is no soil; give this material a friction_angle')),
+        ({"material": "rod"}, ("soils", "material", "unknown material")),
+        ({"spacing": 0.006}, ("soils", "spacing", "above an eighth of the smallest side of the blocks: at most 5 mm")),
+        ({"x": [0.0, 0.019]}, ("soils", "spacing", "only 3 particles across")),
+        ({"x": [-0.99, 0.1]}, ("soils", "soil column meets block 1")),
+        ({"y": [-0.01, 0.1]}, ("soils", "soil column meets the ground")),
+        ({"x": [0.1, 0.0]}, ("soils", "x", "the end must be beyond the begin")),
+        ({"outline": CORNERS}, ("soils", "outline", "does not belong to kind")),
+        ({"start": "geostatc"}, ("soils", "start", "did you mean")),
+        ({"dilation": 0.0}, ("soils", "dilation", "unknown key")),
+    ],
+)
+def test_a_soil_that_does_not_fit_is_told_with_its_key(soil: dict[str, Any], told: tuple[str, ...]) -> None:
+    (problem,) = problems(data_of({**column(0.05, 0.05, 0.005), **soil}))
+    assert all(part in problem for part in told), problem
+
+
+@pytest.mark.parametrize(
+    ("corners", "told"),
+    [
+        (CORNERS[:2], "at least three corners"),
+        ([[0.2, 0.0], [0.3, 0.1], [0.3, 0.0], [0.2, 0.1]], "edges 1 and 3 of the outline meet"),
+        ([*CORNERS, [0.2, 0.0]], "two corners are the same"),
+        ([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]], "soil heap meets soil column"),
+        ([[0.2, 0.0], [0.3, 0.0], [0.3, 0.1], [0.2, 0.1]], "soil heap meets wall 1"),
+    ],
+)
+def test_an_outline_that_does_not_fit_is_told(corners: list[list[float]], told: str) -> None:
+    wall = {"from": [0.25, 0.05], "to": [0.25, 0.2]}
+    data = data_of(column(0.05, 0.05, 0.005), {**OUTLINE, "outline": corners}, walls=[wall])
+    (problem,) = problems(data)
+    assert told in problem
+
+
+def test_soils_may_touch_what_they_stand_beside() -> None:
+    wall = {"from": [0.05, 0.0], "to": [0.05, 0.2]}
+    beside = {**column(0.05, 0.05, 0.005), "name": "upper", "y": [0.05, 0.1]}
+    scene(column(0.05, 0.05, 0.005), beside, walls=[wall])
+
+
+@pytest.mark.parametrize(
+    ("material", "told"),
+    [
+        ({"cohesion": 100.0}, ("materials.soft.cohesion", "give friction_angle too")),
+        ({"friction_angle": "20 deg", "dilation": "5 deg"}, ("materials.soft.dilation", "dilates is not available")),
+        ({"friction_angle": "20 deg"}, ("blocks.far.material", '"soft" is soil')),
+        ({"friction_angle": 20}, ("materials.soft.friction_angle", 'write "20 deg"')),
+    ],
+)
+def test_a_material_is_soil_or_not(material: dict[str, Any], told: tuple[str, ...]) -> None:
+    materials = {**MATERIALS, "soft": {**MATERIALS["soft"], **material}}
+    (problem,) = problems(data_of(column(0.05, 0.05, 0.005), materials=materials))
+    assert all(part in problem for part in told), problem
+
+
+def test_soil_needs_springs_and_exact_shapes() -> None:
+    data = data_of(column(0.05, 0.05, 0.005), contact={"model": "kernel", "particle_spacing": 0.005})
+    assert any("does not go with soil" in one for one in problems(data))
+    rigid = data_of(column(0.05, 0.05, 0.005), time={"scheme": "nonsmooth", "end": 1.0})
+    assert any("soils need another scheme" in one for one in problems(rigid))
+
+
+def test_a_scenario_with_soil_is_written_and_read_back(tmp_path: Path) -> None:
+    before = scene({**OUTLINE, "outline": CORNERS})
+    (tmp_path / "soil.toml").write_text(scenario_to_toml(before))
+    after = load_scenario(tmp_path / "soil.toml")
+    (table,) = after.systems["soils"]
+    assert isinstance(table, SoilTable)
+    assert after == before
+    assert BLOCKS["far"]["width"] == after.blocks["far"].width

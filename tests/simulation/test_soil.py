@@ -1,0 +1,198 @@
+"""Soil among blocks and supports: what it conserves, how it rests, what it presses with, and the bits of it all."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import blocksim
+from blocksim.scenario import Scenario
+from blocksim.simulation.checkpoint_policy import CheckpointPolicy
+from blocksim.simulation.schemes import build_scene, ledger_names
+from blocksim.verification.scene import Simulation
+from tests.soils import DEPTH, FAR, LEFT, MATERIALS, UNIT_WEIGHT, column, right, scene
+
+SPACING = 0.005
+ANGLE = math.radians(21.9)
+
+
+class Soil(Simulation):
+    """A scene with soil under way."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Build and start it."""
+        super().__init__(build_scene(scenario))
+
+    @property
+    def soils(self) -> Any:
+        """The arrays of its soils."""
+        scene: Any = self.scene
+        return scene.systems[0]
+
+    @property
+    def weight(self) -> float:
+        """Weight (N) of the soil."""
+        kinds = self.soils.kinds["mass"][self.soils.states["kind"]]
+        return float(kinds.sum()) * 9.81
+
+    def force_on(self, body: int) -> Any:
+        """Return what the soil does to a body (N, x and y)."""
+        touches = self.soils.touches[: int(self.soils.controls.touch_count[0])]
+        on_it = touches[(touches["body"] == body) & (touches["normal_force"] > 0.0)]
+        return -np.array([on_it["fx"].sum(), on_it["fy"].sum()])
+
+    def mean_force_on(self, body: int, end: float) -> Any:
+        """Return the mean of that until a time (s)."""
+        found = []
+        while self.time < end:
+            self.to_step(self.steps + 20)
+            found.append(self.force_on(body))
+        return np.mean(found, axis=0)
+
+    def entries(self) -> dict[str, float]:
+        """Return the entries (J) of the ledger."""
+        return dict(zip(ledger_names(self.scene), self.measured().tolist(), strict=False))
+
+
+def flying(material: str) -> Soil:
+    """Return soil without gravity, whose particles fly in all directions."""
+    soil = Soil(scene({**column(0.05, 0.05, SPACING, material=material), "y": [0.1, 0.15]}, gravity=0.0))
+    random = np.random.default_rng(3)
+    for name in ("vx", "vy"):
+        soil.soils.points[name] = random.uniform(-0.5, 0.5, soil.soils.points.size)
+    return soil
+
+
+@pytest.mark.parametrize("material", ["rods", "clay"])  # raw and corrected gradient
+def test_soil_by_itself_keeps_its_momentum(material: str) -> None:
+    soil = flying(material)
+    points = soil.soils.points
+    before = [points["vx"].sum(), points["vy"].sum()]
+    moving = np.abs(points["vx"]).sum()
+    soil.to_step(400)
+    assert np.abs(points["vx"]).sum() < 0.9 * moving  # they have met
+    after = [points["vx"].sum(), points["vy"].sum()]
+    assert after == pytest.approx(before, abs=1e-12 * moving)
+
+
+@pytest.mark.parametrize("gradient", ["raw", "corrected"])
+def test_the_energy_of_a_collapse_adds_up(gradient: str) -> None:
+    soil = Soil(scene(column(0.05, 0.1, SPACING, gradient=gradient), walls=[LEFT]))
+    before = soil.entries()
+    soil.to_time(0.25)
+    after = soil.entries()
+    change = {name: after[name] - before[name] for name in after}
+    assert change["soils_potential"] < -0.2 * before["soils_potential"]
+    assert abs(sum(change.values())) < 0.002 * before["soils_potential"]
+    for loss in ("plastic", "viscosity", "dashpot", "friction"):
+        assert change[f"soils_{loss}"] > 0.0
+
+
+def test_a_column_between_smooth_walls_comes_to_rest_with_its_weight_on_the_ground() -> None:
+    table = column(0.05, 0.05, SPACING, start="ramp")
+    pairs = {"rods": {"smooth": {"friction": 0.0}, "ground": {"friction": 0.0}}}
+    soil = Soil(scene(table, walls=[LEFT, right(0.05)], pairs=pairs))
+    soil.to_time(0.2)
+    ground = soil.world.bodies.size - 1
+    _, base = soil.mean_force_on(ground, 0.25)
+    assert -base == pytest.approx(soil.weight, rel=0.005)
+    assert np.hypot(soil.soils.points["vx"], soil.soils.points["vy"]).max() < 1e-3
+    assert soil.soils.points["y"].max() == pytest.approx(0.05 - 0.5 * SPACING, abs=0.05 * SPACING)
+
+
+def test_soil_without_any_strength_presses_like_water() -> None:
+    table = column(0.05, 0.05, SPACING, start="ramp", material="water")
+    soil = Soil(scene(table, walls=[LEFT, right(0.05)]))
+    soil.to_time(0.15)
+    left, _ = soil.mean_force_on(1, 0.25)
+    assert -left == pytest.approx(0.5 * 10e3 * 0.05**2 * DEPTH, rel=0.03)
+
+
+def drawn_back() -> Scenario:
+    """Return soil behind a wall that is a fixed block; a fixed block moves on as it is told."""
+    blocks = {
+        "far": {"width": 0.04, "height": 0.04, "length": DEPTH, "material": "soft"},
+        "wall": {"width": 0.04, "height": 0.12, "length": DEPTH, "material": "smooth"},
+    }
+    return scene(
+        column(0.1, 0.06, SPACING),
+        blocks=blocks,
+        bodies=[{"block": "wall", "x": -0.02, "y": 0.06, "fixed": True}, FAR],
+        walls=[right(0.1)],
+        pairs={"rods": {"smooth": {"friction": 0.0}, "ground": {"friction": 0.0}}},
+    )
+
+
+def test_a_smooth_wall_that_is_drawn_back_feels_the_active_thrust() -> None:
+    soil = Soil(drawn_back())
+    soil.world.bodies.vx[0] = -0.01
+    soil.to_time(0.06)
+    thrust, _ = soil.mean_force_on(0, 0.08)
+    points = soil.soils.points
+    height = points["y"][points["x"] < 3.0 * SPACING].max() + 0.5 * SPACING
+    sine = math.sin(ANGLE)
+    assert soil.world.bodies.x[0] == pytest.approx(-0.02 - 0.01 * soil.time)
+    active = -2.0 * thrust / (UNIT_WEIGHT * height**2 * DEPTH)
+    assert active == pytest.approx((1.0 - sine) / (1.0 + sine), rel=0.05)  # 2 % at the full size
+
+
+def test_blocks_and_soil_act_on_one_another_with_opposite_forces() -> None:
+    blocks = {"any": {"width": 0.04, "height": 0.04, "length": DEPTH, "material": "smooth"}}
+    flying_block = {"block": "any", "x": -0.025, "y": 0.12, "velocity": [0.5, 0.0], "spin": 5.0}
+    table = {**column(0.05, 0.05, SPACING), "y": [0.1, 0.15], "start": "ramp"}
+    soil = Soil(scene(table, blocks=blocks, bodies=[flying_block], gravity=0.0))
+    body, mass = soil.bodies[0], float(soil.soils.kinds["mass"][0])
+    before = float(body.mass) * 0.5
+    soil.to_time(0.05)
+    points = soil.soils.points
+    assert body.vx < 0.4
+    for velocity, spread, start in ((body.vx, points["vx"], before), (body.vy, points["vy"], 0.0)):
+        assert velocity * body.mass + mass * spread.sum() == pytest.approx(start, abs=1e-12 * before)
+    entries = soil.entries()
+    lost = 0.5 * float(body.mass) * 0.25 + 0.5 * float(body.inertia) * 25.0
+    assert sum(entries.values()) == pytest.approx(lost, rel=0.002)
+
+
+def test_bits_do_not_depend_on_the_number_of_threads_nor_on_interruptions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("blocksim.simulation.team.useful_threads", lambda threads, *_: threads)
+    blocks = {"any": {"width": 0.04, "height": 0.04, "length": DEPTH, "material": "smooth"}}
+    carried = [{"block": "any", "x": 0.07, "y": 0.02}, {"block": "any", "x": 0.02, "y": 0.121}]
+    scenario = scene(
+        column(0.05, 0.1, SPACING), blocks=blocks, bodies=carried, walls=[LEFT], end=0.03, output={"every": 0.01}
+    )
+    whole = blocksim.run(scenario)
+    for threads in (2, 4):
+        again = blocksim.run(scenario, threads=threads)
+        assert again.summary.final_state_sha256 == whole.summary.final_state_sha256
+        assert again.summary.energy_J == whole.summary.energy_J
+    cut = CheckpointPolicy(wall_time=1e-9)
+    result = blocksim.run(scenario, out=tmp_path / "run", precautions=cut)
+    assert result.status == "interrupted"
+    result = blocksim.run(scenario, out=tmp_path / "run", resume=True)
+    assert result.summary.final_state_sha256 == whole.summary.final_state_sha256
+    for one, other in zip(result.frames.tracks, whole.frames.tracks, strict=True):
+        np.testing.assert_array_equal(one.values, other.values)
+
+
+def test_frames_name_particles_as_they_were_placed() -> None:
+    result = blocksim.run(scene(column(0.05, 0.05, SPACING), end=0.02, output={"every": 0.01}))
+    (soils,) = result.frames.others
+    first, last = soils["x"][0], soils["x"][-1]
+    assert soils.names[:2] == ("column.1", "column.2")
+    assert np.abs(last - first).max() < SPACING  # nobody has changed places
+    assert soils["syy"][0][0] < 0.0 < MATERIALS["rods"]["poisson_ratio"]
+    assert set(soils.columns()) >= {"x_mm", "sxx_Pa", "plastic_strain"}
+
+
+def test_particles_too_near_to_one_another_end_the_run() -> None:
+    soil = Soil(scene(column(0.05, 0.05, SPACING)))
+    soil.soils.points["x"][:80] = np.linspace(0.02, 0.021, 80)
+    soil.soils.points["y"][:80] = 0.02
+    soil.soils.controls.is_listed[0] = 0
+    soil.to_step(100_000)
+    assert soil.status != 0
+    assert soil.steps < 1000

@@ -1,0 +1,49 @@
+"""Small scenes with soil, for tests of kernels, world and simulation. SI units; everything 50 mm deep."""
+
+from typing import Any
+
+from blocksim.scenario import Scenario, scenario_from_mapping
+
+DEPTH = 0.05
+UNIT_WEIGHT = 20e3
+GRAVITY = 9.81
+MATERIALS = {
+    "rods": {"unit_weight": UNIT_WEIGHT, "young_modulus": 5.84e6, "poisson_ratio": 0.3, "friction_angle": "21.9 deg"},
+    "clay": {
+        "unit_weight": UNIT_WEIGHT,
+        "young_modulus": 5.84e6,
+        "poisson_ratio": 0.3,
+        "friction_angle": "20 deg",
+        "cohesion": 1e3,
+    },
+    "water": {"unit_weight": 10e3, "young_modulus": 3e6, "poisson_ratio": 0.45, "friction_angle": "0 deg"},
+    "soft": {"density": 2700.0, "young_modulus": 5.84e6, "poisson_ratio": 0.3},
+    "smooth": {"density": 2700.0, "young_modulus": 5.84e6, "poisson_ratio": 0.3},
+}
+BLOCKS = {"far": {"width": 0.04, "height": 0.04, "length": DEPTH, "material": "soft"}}
+FAR = {"block": "far", "x": -1.0, "y": 0.02}  # a scene needs a block; out of the way
+LEFT = {"from": [0.0, 0.3], "to": [0.0, 0.0], "material": "smooth"}
+SMOOTH_WALLS = {"rods": {"smooth": {"friction": 0.0}}}
+
+
+def right(x: float) -> dict[str, Any]:
+    """Return a smooth wall with its face to the left."""
+    return {"from": [x, 0.0], "to": [x, 0.3], "material": "smooth"}
+
+
+def column(width: float, height: float, spacing: float, **keys: Any) -> dict[str, Any]:
+    """Return the table of a rectangle on the ground at x = 0."""
+    rectangle = {"kind": "rectangle", "x": [0.0, width], "y": [0.0, height]}
+    return {"name": "column", "material": "rods", "spacing": spacing, **rectangle, **keys}
+
+
+def data_of(*soils: dict[str, Any], end: float = 1.0, **changes: Any) -> dict[str, Any]:
+    """Return the data of a scenario with these soils and a block far away."""
+    time = {"end": end, "stop_at_rest": False}
+    data = {"schema": 1, "name": "soil", "materials": MATERIALS, "blocks": BLOCKS, "bodies": [FAR], "time": time}
+    return {**data, "soils": list(soils), **changes}
+
+
+def scene(*soils: dict[str, Any], end: float = 1.0, **changes: Any) -> Scenario:
+    """Return a scenario with these soils and a block far away."""
+    return scenario_from_mapping(data_of(*soils, end=end, **changes))

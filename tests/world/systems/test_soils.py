@@ -1,0 +1,74 @@
+"""What soils are at time zero: yield surface, earth pressure at rest, stresses, friction with bodies."""
+
+import math
+
+import numpy as np
+import pytest
+
+from blocksim.errors import InvalidInputError
+from blocksim.scenario.models.contact import PairFriction
+from blocksim.simulation.schemes import build, build_scene
+from blocksim.world.interactions import contact_classes
+from blocksim.world.systems import INTERACTIONS
+from blocksim.world.systems.soil_kinds import earth_pressure_at_rest, friction_with, interactions_with, yield_surface
+from blocksim.world.systems.soils import SOILS
+from tests.soils import DEPTH, MATERIALS, SMOOTH_WALLS, UNIT_WEIGHT, column, right, scene
+
+ANGLE = math.radians(21.9)
+COLUMN = column(0.05, 0.1, 0.005)
+
+
+def test_the_two_yield_surfaces_are_those_that_are_printed() -> None:
+    weaker = {**MATERIALS["clay"], "yield_surface": "plane-strain-associated"}
+    materials = scene(COLUMN, materials={**MATERIALS, "weaker": weaker}).materials
+    angle = math.radians(20.0)
+    root = math.sqrt(9.0 + 12.0 * math.tan(angle) ** 2)
+    assert yield_surface(materials["clay"]) == pytest.approx((math.sin(angle) / 3.0, 1e3 * math.cos(angle)))
+    assert yield_surface(materials["weaker"]) == pytest.approx((math.tan(angle) / root, 3e3 / root))
+
+
+def test_the_start_is_within_the_yield_surface_and_carries_the_weight_above() -> None:
+    upper = {**column(0.05, 0.05, 0.005), "name": "upper", "y": [0.1, 0.15]}
+    elements = SOILS.elements(scene(COLUMN, upper))
+    x, y, _, _, sxx, syy, szz, sxy, _ = elements.start
+    np.testing.assert_allclose(syy, -UNIT_WEIGHT * (0.15 - y))
+    at_rest = earth_pressure_at_rest(scene(COLUMN).materials["rods"])
+    assert at_rest == pytest.approx(0.5484, abs=1e-4)
+    np.testing.assert_allclose(sxx, at_rest * syy)
+    deviator = np.sqrt(((sxx - syy) ** 2 + (syy - szz) ** 2 + (szz - sxx) ** 2) / 6.0 + sxy**2)
+    assert (deviator <= -math.sin(ANGLE) / 3.0 * (sxx + syy + szz) + 1e-9).all()
+    assert elements.constants[0].sum() == pytest.approx(UNIT_WEIGHT / 9.81 * 0.05 * 0.15 * DEPTH)
+    assert (elements.names[0], len(x)) == ("column.1", 300)
+
+
+def test_a_ramp_starts_without_stress() -> None:
+    assert not SOILS.elements(scene({**COLUMN, "start": "ramp"})).start[4:].any()
+
+
+def test_friction_is_of_the_pair_else_of_the_soil_itself() -> None:
+    walls = [right(0.05), {"from": [0.5, 0.0], "to": [0.5, 0.1], "material": "soft"}]
+    scenario = scene(COLUMN, walls=walls, pairs=SMOOTH_WALLS, friction={"block_ground": 0.1})
+    classes = contact_classes(scenario, build(scenario).placed)
+    assert friction_with(scenario, "rods", classes[0]) == PairFriction(static=math.tan(ANGLE))
+    found = {one.material: friction_with(scenario, "rods", one).static for one in classes if one.is_wall}
+    assert found == pytest.approx({"smooth": 0.0, "soft": math.tan(ANGLE)})
+
+
+def test_a_contact_is_as_stiff_as_its_soil_is_deep() -> None:
+    scenario = scene(COLUMN)
+    table = interactions_with(scenario, list(scenario.systems["soils"]))  # type: ignore[arg-type]  # they are soils
+    np.testing.assert_allclose(table["normal_stiffness"], 5.84e6 * DEPTH)
+
+
+def test_the_step_is_that_of_the_waves_in_the_soil() -> None:
+    modulus = 5.84e6 * 0.7 / (1.3 * 0.4)
+    expected = 0.4 * 1.5 * 0.005 / math.sqrt(modulus / (UNIT_WEIGHT / 9.81))
+    assert SOILS.largest_step is not None
+    assert SOILS.largest_step(scene(COLUMN)) == pytest.approx(expected)
+    assert build_scene(scene(COLUMN)).world.controls[0].step <= expected
+
+
+def test_soil_beside_a_system_that_nobody_thought_of_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(INTERACTIONS, ("soils", "blocks"))
+    with pytest.raises(InvalidInputError, match="soils and blocks cannot be in one scene"):
+        build(scene(COLUMN))
