@@ -141,7 +141,7 @@ def test_a_smooth_wall_that_is_drawn_back_feels_the_active_thrust() -> None:
 def test_blocks_and_soil_act_on_one_another_with_opposite_forces() -> None:
     blocks = {"any": {"width": 0.04, "height": 0.04, "length": DEPTH, "material": "smooth"}}
     flying_block = {"block": "any", "x": -0.025, "y": 0.12, "velocity": [0.5, 0.0], "spin": 5.0}
-    table = {**column(0.05, 0.05, SPACING), "y": [0.1, 0.15], "start": "ramp"}
+    table = {**column(0.05, 0.05, SPACING), "y": [0.1, 0.15]}
     soil = Soil(scene(table, blocks=blocks, bodies=[flying_block], gravity=0.0))
     body, mass = soil.bodies[0], float(soil.soils.kinds["mass"][0])
     before = float(body.mass) * 0.5

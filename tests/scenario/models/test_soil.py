@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from blocksim.errors import ScenarioError
-from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_to_toml
+from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_hash, scenario_to_toml
 from blocksim.scenario.models.soil import SoilTable
 from tests.soils import BLOCKS, MATERIALS, column, data_of, scene
 
@@ -84,6 +84,27 @@ def test_soil_needs_springs_and_exact_shapes() -> None:
     assert any("does not go with soil" in one for one in problems(data))
     rigid = data_of(column(0.05, 0.05, 0.005), time={"scheme": "nonsmooth", "end": 1.0})
     assert any("soils need another scheme" in one for one in problems(rigid))
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"friction_angle": "22 deg"},
+        {"cohesion": 1.0},
+        {"yield_surface": "plane-strain-associated"},
+        {"young_modulus": 6e6},
+    ],
+)
+def test_the_hash_changes_with_what_a_soil_is(changed: dict[str, Any]) -> None:
+    materials = {**MATERIALS, "rods": {**MATERIALS["rods"], **changed}}
+    table = column(0.05, 0.05, 0.005)
+    assert scenario_hash(scene(table, materials=materials)) != scenario_hash(scene(table))
+
+
+@pytest.mark.parametrize("changed", [{"y": [0.0, 0.06]}, {"spacing": 0.0025}, {"start": "ramp"}, {"gradient": "raw"}])
+def test_the_hash_changes_with_where_a_soil_is(changed: dict[str, Any]) -> None:
+    table = column(0.05, 0.05, 0.005)
+    assert scenario_hash(scene({**table, **changed})) != scenario_hash(scene(table))
 
 
 def test_a_scenario_with_soil_is_written_and_read_back(tmp_path: Path) -> None:
