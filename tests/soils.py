@@ -7,7 +7,7 @@ from blocksim.scenario import Scenario, scenario_from_mapping
 DEPTH = 0.05
 UNIT_WEIGHT = 20e3
 GRAVITY = 9.81
-MATERIALS = {
+MATERIALS: dict[str, dict[str, Any]] = {
     "rods": {"unit_weight": UNIT_WEIGHT, "young_modulus": 5.84e6, "poisson_ratio": 0.3, "friction_angle": "21.9 deg"},
     "clay": {
         "unit_weight": UNIT_WEIGHT,
@@ -20,7 +20,7 @@ MATERIALS = {
     "soft": {"density": 2700.0, "young_modulus": 5.84e6, "poisson_ratio": 0.3},
     "smooth": {"density": 2700.0, "young_modulus": 5.84e6, "poisson_ratio": 0.3},
 }
-BLOCKS = {"far": {"width": 0.04, "height": 0.04, "length": DEPTH, "material": "soft"}}
+BLOCKS: dict[str, dict[str, Any]] = {"far": {"width": 0.04, "height": 0.04, "length": DEPTH, "material": "soft"}}
 FAR = {"block": "far", "x": -1.0, "y": 0.02}  # a scene needs a block; out of the way
 LEFT = {"from": [0.0, 0.3], "to": [0.0, 0.0], "material": "smooth"}
 SMOOTH_WALLS = {"rods": {"smooth": {"friction": 0.0}}}

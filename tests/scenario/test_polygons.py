@@ -11,7 +11,7 @@ SLOPE = polygons.corners_of([(0.0, 0.0), (2.0, 0.0), (0.0, 1.0)])
 
 
 def moved(x: float, y: float) -> polygons.Floats:
-    return SQUARE + np.array([x, y])
+    return np.asarray(SQUARE + np.array([x, y]))
 
 
 def test_corners_run_counter_clockwise_however_they_are_given() -> None:

@@ -33,7 +33,7 @@ KIND = record_type(
     "lame shear bulk "  # Pa: Lame's first parameter, shear modulus, bulk modulus
     "slope cohesion "  # -, Pa: (J2)^(1/2) = cohesion - slope I1 is the yield surface
     "impedance "  # kg/(m2 s): density times wave speed
-    "settling",  # 1/s: rate of damping while gravity grows
+    "settling settled",  # 1/s, s: rate of damping at the start, and when it ends
     flags="is_corrected",
 )
 TOUCH = record_type(

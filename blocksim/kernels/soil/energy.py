@@ -16,7 +16,7 @@ ENERGIES = (
     "viscosity",
     "dashpot",
     "friction",
-    "settling",  # lost to damping while gravity grows
+    "settling",  # lost to damping at the start
     "ramp",  # what the missing part of gravity would have done meanwhile
 )
 

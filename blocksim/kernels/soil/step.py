@@ -1,6 +1,6 @@
 """The stages of a step: kick and drift, lists where they are due, stress and forces, kick.
 
-Velocity Verlet as for bodies; while gravity grows (`ramp`) velocities are damped as well.
+Velocity Verlet as for bodies; at the start, while gravity grows or contacts find their forces, velocities are damped.
 """
 
 import math
@@ -41,9 +41,9 @@ def kick(point: Record, state: Record, kind: Record, gx: float, gy: float, half:
 
 
 @kernel
-def damping_of(soils: Soils, kind: Record, half: float, time: float) -> float:
+def damping_of(kind: Record, half: float, time: float) -> float:
     """Return by which factor damping slows particles down in half a step (s) at a time (s)."""
-    return 1.0 / (1.0 + half * kind.settling) if time < soils.controls[0].ramp else 1.0
+    return 1.0 / (1.0 + half * kind.settling) if time < kind.settled else 1.0
 
 
 @rare_kernel
@@ -58,7 +58,7 @@ def start_group(soils: Soils, world: World, g: int, time: float, step: float) ->
     for i in range(GROUP * g, min(GROUP * (g + 1), soils.points.size)):
         point, state = soils.points[i], soils.states[i]
         kind = soils.kinds[state.kind]
-        damped = damping_of(soils, kind, half, time)
+        damped = damping_of(kind, half, time)
         lost = kick(point, state, kind, share * controls.gravity_x, share * controls.gravity_y, half, damped)
         book.settling += lost
         book.viscosity -= half * (state.drag_x * point.vx + state.drag_y * point.vy)
@@ -164,6 +164,6 @@ def finish(soils: Soils, world: World, k: int, step: float) -> None:
     for i in range(first, last):
         point, state = soils.points[i], soils.states[i]
         kind = soils.kinds[state.kind]
-        damped = damping_of(soils, kind, half, time)
+        damped = damping_of(kind, half, time)
         lost = kick(point, state, kind, share * controls.gravity_x, share * controls.gravity_y, half, damped)
         soils.books[i // GROUP].settling += lost

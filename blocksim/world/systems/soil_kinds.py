@@ -12,7 +12,12 @@ from blocksim.world.interactions import ContactClass, contact_classes
 
 SHEAR_RATIO = 0.8  # shear over normal stiffness of a contact
 DAMPING_RATIO = 0.3
-SETTLING = 5e-3  # damping while gravity grows, in (E / (rho h^2))^(1/2)
+RAMP = 0.1  # s, in which gravity grows
+SETTLING = 5e-3  # damping meanwhile, in (E / (rho h^2))^(1/2)
+# Stresses of a geostatic start are not quite in equilibrium: a kernel that is cut off at a wall spreads its pressure
+# over three layers, a contact gives it to the first one. For the time that a wave takes for that many smoothing lengths
+# that shock is damped, in wave speeds over smoothing length; later it would have made the soil flow.
+SHOCK_TIME, SHOCK_DAMPING = 60.0, 0.1
 SMOOTHING = 1.5  # smoothing length in spacings
 USUAL_DEPTH = 1.0  # m, out of the plane, where there are no blocks
 
@@ -68,11 +73,21 @@ def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
         record.lame, record.shear, record.bulk = lame, shear, lame + 2.0 * shear / 3.0
         record.slope, record.cohesion = yield_surface(material)
         record.impedance = material.density * wave_speed(material)
-        smoothing = SMOOTHING * table.spacing
-        record.settling = SETTLING * math.sqrt(material.young_modulus / material.density) / smoothing
+        record.settling, record.settled = settling_of(scenario, table)
         corrected = table.gradient == "corrected" if table.gradient else bool(material.cohesion)
         record.is_corrected = corrected
     return records
+
+
+def settling_of(scenario: Scenario, table: SoilTable) -> tuple[float, float]:
+    """Return the rate (1/s) of damping at the start, and the time (s) when it ends; none where nothing has weight."""
+    if scenario.gravity == 0.0:
+        return 0.0, 0.0
+    material = scenario.materials[table.material]
+    smoothing, speed = SMOOTHING * table.spacing, wave_speed(material)
+    if table.start == "ramp":
+        return SETTLING * math.sqrt(material.young_modulus / material.density) / smoothing, RAMP
+    return SHOCK_DAMPING * speed / smoothing, SHOCK_TIME * smoothing / speed
 
 
 def friction_with(scenario: Scenario, soil: str, partner: ContactClass) -> PairFriction:

@@ -12,14 +12,20 @@ from blocksim.kernels.sph.wendland_c2 import SUPPORT
 from blocksim.scenario import Scenario, place_bodies, place_segments, polygons
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.soil_places import soil_tables
-from blocksim.world.systems.soil_kinds import SMOOTHING, depth_of_scene, interactions_with, kind_records, wave_speed
+from blocksim.world.systems.soil_kinds import (
+    RAMP,
+    SMOOTHING,
+    depth_of_scene,
+    interactions_with,
+    kind_records,
+    wave_speed,
+)
 from blocksim.world.systems.soil_start import geostatic_stress
 from blocksim.world.systems.system import Elements, Floats, Indices, Output, Quantity, System, Track, discs, stored
 
 COURANT = 0.4  # step in smoothing lengths that a wave passes
 VISCOSITY = 0.03  # factor of artificial viscosity
 SKIN = 0.4  # of lists, in spacings
-RAMP = 0.1  # s
 MILLI = 1e3
 FEW_TOUCHES = 256
 QUANTITIES = (
