@@ -2,7 +2,11 @@
 
 from typing import Any
 
+import numpy as np
+
 from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.simulation.schemes import build_scene, ledger_names
+from blocksim.verification.scene import Simulation
 
 DEPTH = 0.05
 UNIT_WEIGHT = 20e3
@@ -47,3 +51,41 @@ def data_of(*soils: dict[str, Any], end: float = 1.0, **changes: Any) -> dict[st
 def scene(*soils: dict[str, Any], end: float = 1.0, **changes: Any) -> Scenario:
     """Return a scenario with these soils and a block far away."""
     return scenario_from_mapping(data_of(*soils, end=end, **changes))
+
+
+class Soil(Simulation):
+    """A scene with soil under way."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Build and start it."""
+        super().__init__(build_scene(scenario))
+
+    @property
+    def soils(self) -> Any:
+        """The arrays of its soils."""
+        scene: Any = self.scene
+        return scene.systems[0]
+
+    @property
+    def weight(self) -> float:
+        """Weight (N) of the soil."""
+        kinds = self.soils.kinds["mass"][self.soils.states["kind"]]
+        return float(kinds.sum()) * 9.81
+
+    def force_on(self, body: int) -> Any:
+        """Return what the soil does to a body (N, x and y)."""
+        touches = self.soils.touches[: int(self.soils.controls.touch_count[0])]
+        on_it = touches[(touches["body"] == body) & (touches["normal_force"] > 0.0)]
+        return -np.array([on_it["fx"].sum(), on_it["fy"].sum()])
+
+    def mean_force_on(self, body: int, end: float) -> Any:
+        """Return the mean of that until a time (s)."""
+        found = []
+        while self.time < end:
+            self.to_step(self.steps + 20)
+            found.append(self.force_on(body))
+        return np.mean(found, axis=0)
+
+    def entries(self) -> dict[str, float]:
+        """Return the entries (J) of the ledger."""
+        return dict(zip(ledger_names(self.scene), self.measured().tolist(), strict=False))

@@ -2,7 +2,6 @@
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -10,50 +9,10 @@ import pytest
 import blocksim
 from blocksim.scenario import Scenario
 from blocksim.simulation.checkpoint_policy import CheckpointPolicy
-from blocksim.simulation.schemes import build_scene, ledger_names
-from blocksim.verification.scene import Simulation
-from tests.soils import DEPTH, FAR, LEFT, MATERIALS, UNIT_WEIGHT, column, right, scene
+from tests.soils import DEPTH, FAR, LEFT, MATERIALS, UNIT_WEIGHT, Soil, column, right, scene
 
 SPACING = 0.005
 ANGLE = math.radians(21.9)
-
-
-class Soil(Simulation):
-    """A scene with soil under way."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        """Build and start it."""
-        super().__init__(build_scene(scenario))
-
-    @property
-    def soils(self) -> Any:
-        """The arrays of its soils."""
-        scene: Any = self.scene
-        return scene.systems[0]
-
-    @property
-    def weight(self) -> float:
-        """Weight (N) of the soil."""
-        kinds = self.soils.kinds["mass"][self.soils.states["kind"]]
-        return float(kinds.sum()) * 9.81
-
-    def force_on(self, body: int) -> Any:
-        """Return what the soil does to a body (N, x and y)."""
-        touches = self.soils.touches[: int(self.soils.controls.touch_count[0])]
-        on_it = touches[(touches["body"] == body) & (touches["normal_force"] > 0.0)]
-        return -np.array([on_it["fx"].sum(), on_it["fy"].sum()])
-
-    def mean_force_on(self, body: int, end: float) -> Any:
-        """Return the mean of that until a time (s)."""
-        found = []
-        while self.time < end:
-            self.to_step(self.steps + 20)
-            found.append(self.force_on(body))
-        return np.mean(found, axis=0)
-
-    def entries(self) -> dict[str, float]:
-        """Return the entries (J) of the ledger."""
-        return dict(zip(ledger_names(self.scene), self.measured().tolist(), strict=False))
 
 
 def flying(material: str) -> Soil:

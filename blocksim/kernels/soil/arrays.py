@@ -9,7 +9,7 @@ Losses are booked by groups of particles, in their order, so that the bits of a 
 
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import INTERACTION, Integers, Records, record_type
+from blocksim.kernels.arrays import Integers, Records, record_type
 
 GROUP = 64  # particles that share one book
 NEIGHBOURS = 64  # room in the list of a particle; undisturbed soil has 28, and 36 with the skin
@@ -58,6 +58,21 @@ CONTROLS = record_type(
 )
 
 
+ENERGIES = (
+    "kinetic",
+    "potential",
+    "elastic",  # strain energy of the particles
+    "contact",  # in the springs between particles and bodies
+    "plastic",
+    "viscosity",
+    "dashpot",
+    "friction",
+    "settling",  # lost to damping at the start
+    "ramp",  # what the missing part of gravity would have done meanwhile
+)
+"""J, as `energy.measure` writes them; the last six are losses."""
+
+
 class Soils(NamedTuple):
     """All soils of a scene."""
 
@@ -77,6 +92,3 @@ class Soils(NamedTuple):
     spare_point: Records  # (1,) POINT, work space
     spare_state: Records  # (1,) STATE
     controls: Records  # (1,) CONTROLS
-
-
-__all__ = ["BOOK", "CONTROLS", "GROUP", "INTERACTION", "KIND", "NEIGHBOURS", "POINT", "STATE", "TOUCH", "Soils"]

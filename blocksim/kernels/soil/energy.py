@@ -7,19 +7,6 @@ from blocksim.kernels.jit import rare_kernel
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.soil.stress import invariants, strain_energy
 
-ENERGIES = (
-    "kinetic",
-    "potential",
-    "elastic",  # strain energy of the particles
-    "contact",  # in the springs between particles and bodies
-    "plastic",
-    "viscosity",
-    "dashpot",
-    "friction",
-    "settling",  # lost to damping at the start
-    "ramp",  # what the missing part of gravity would have done meanwhile
-)
-
 
 @rare_kernel
 def survey(soils: Soils, world: World) -> tuple[float, float, float]:

@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 
 from blocksim.kernels.arrays import zeros
-from blocksim.kernels.soil.arrays import BOOK, CONTROLS, GROUP, NEIGHBOURS, POINT, STATE, TOUCH, Soils
-from blocksim.kernels.soil.energy import ENERGIES
-from blocksim.kernels.sph.wendland_c2 import SUPPORT
+from blocksim.kernels.soil.arrays import BOOK, CONTROLS, ENERGIES, GROUP, NEIGHBOURS, POINT, STATE, TOUCH, Soils
 from blocksim.scenario import Scenario, place_bodies, place_segments, polygons
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.soil_places import soil_tables
@@ -106,6 +104,8 @@ def _build(scenario: Scenario) -> Soils:
 
 
 def _controls(scenario: Scenario, tables: list[SoilTable]) -> Any:
+    from blocksim.kernels.sph.wendland_c2 import SUPPORT  # noqa: PLC0415 - as in _stages
+
     spacing = tables[0].spacing
     controls = zeros(1, CONTROLS)
     one = controls[0]

@@ -1,6 +1,8 @@
 """What soils are at time zero: yield surface, earth pressure at rest, stresses, friction with bodies."""
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -72,3 +74,8 @@ def test_soil_beside_a_system_that_nobody_thought_of_is_refused(monkeypatch: pyt
     monkeypatch.delitem(INTERACTIONS, ("soils", "blocks"))
     with pytest.raises(InvalidInputError, match="soils and blocks cannot be in one scene"):
         build(scene(COLUMN))
+
+
+def test_stored_runs_are_read_without_the_compiler() -> None:
+    code = "import sys, blocksim.world.systems; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
