@@ -16,7 +16,14 @@ from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
 from blocksim.scenario.units import STANDARD_GRAVITY
 from blocksim.study.rows import check_experiment
-from blocksim.world.describe import Description, MotionDescription, PairDescription, SagDescription, describe
+from blocksim.world.describe import (
+    Description,
+    MotionDescription,
+    PairDescription,
+    SagDescription,
+    StepLimits,
+    describe,
+)
 from blocksim.world.free_memory import readable
 from blocksim.world.memory import PROCESS_BYTES
 
@@ -24,6 +31,7 @@ MOST_BODIES = 12
 SIDES = ("along x", "upright", "depth mm", "mass kg", "inertia kg m²")
 NO_KEY = (DEFAULT, MATERIALS)
 LEAST_ROOM = 24
+FAR_APART = 10.0  # steps of blocks and of systems beside them that are told with a cure
 HARD_SPACE = "\N{NO-BREAK SPACE}"
 MILLI = 1e3
 MICRO = 1e6
@@ -146,6 +154,7 @@ def _wrapped(key: str, pairs: Iterable[str], room: int) -> Iterator[tuple[str, s
 def _cost(scenario: Scenario, description: Description) -> list[str]:
     return [
         f"time step  {description.step:.3e} s, at most {description.steps} steps",
+        *_limits(description.limits),
         *_sag(description.rigid),
         f"solving    at most about {duration(description.seconds)} on one core{_until_rest(scenario)}",
         f"memory     about {readable(description.memory)}, of which {readable(PROCESS_BYTES)} for the program itself",
@@ -157,6 +166,20 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
         *(f"{name:<10} {count}, beside the blocks" for name, count in description.systems.items()),
         f"neighbours checked up to {MILLI * description.skin:.3g} mm apart",
     ]
+
+
+def _limits(limits: StepLimits | None) -> list[str]:
+    """Return who decides the step; where the two are far apart, what makes them equal."""
+    if limits is None:
+        return []
+    steps = f"blocks allow {limits.blocks:.2e} s, the systems beside them {limits.systems:.2e} s"
+    ratio = limits.blocks / limits.systems
+    if 1.0 / FAR_APART < ratio < FAR_APART:
+        return [f"           {steps}"]
+    who = "blocks" if ratio < 1.0 else "systems beside the blocks"
+    more = f"{max(ratio, 1.0 / ratio):.0f} times as many steps as without them"
+    cure = f"contact.stiffness_scale = {limits.scale:.1g} makes both equal"
+    return [f"           {steps}", f"warning: because of the {who} {more}:", f"         {cure}"]
 
 
 def _until_rest(scenario: Scenario) -> str:

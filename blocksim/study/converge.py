@@ -16,6 +16,7 @@ from pathlib import Path
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, Source, load_scenario, place_bodies
 from blocksim.scenario.models.stepping import Explicit, Nonsmooth
+from blocksim.scenario.soil_places import soil_tables
 from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.provenance import run_hash
@@ -39,6 +40,7 @@ from blocksim.study.rows import FINISHED, Row, check_experiment
 from blocksim.world.nonsmooth import velocity_tolerance
 
 FOLDER = "converge"
+SOIL_SPACING = "soils.spacing"
 TOLERANCE_MM = 0.1
 LEVELS = 4  # refinements of the scenario's own value
 FEWEST_LEVELS = 2  # refinements that it takes to converge
@@ -187,12 +189,21 @@ def _joint(scenario: Scenario, settings: dict[str, float], studies: tuple[Study,
 def _notes(scenario: Scenario, runs: _Runs, studies: Iterable[str] | None) -> tuple[str, ...]:
     """Say what was not studied, and what the numbers cannot mean."""
     notes = []
-    if studies is None and not has_particles(scenario):
+    if soil_tables(scenario):
+        notes.append(_note_of_soil(studies))
+    elif studies is None and not has_particles(scenario):
         notes.append(f"{effects_note(scenario, ['spacing'])}: not studied")
     reasons = {str(row["reason"]) for row in runs.rows.values() if row["status"] == FINISHED}
     if scenario.time.stop_at_rest and "end of simulated time" in reasons:
         notes.append("some runs ended before everything was at rest: their final positions depend on time.end")
     return tuple(notes)
+
+
+def _note_of_soil(studies: Iterable[str] | None) -> str:
+    what = "distances are those of blocks, not of soil"
+    return (
+        what if studies is not None else f"{what}; --study spacing halves soils.spacing, eight times the cost a level"
+    )
 
 
 def refinements_of(scenario: Scenario, studies: Iterable[str] | None = None) -> tuple[Refinement, ...]:
@@ -206,6 +217,8 @@ def refinements_of(scenario: Scenario, studies: Iterable[str] | None = None) -> 
         message = f"'{unknown[0]}' unknown convergence study; choose {', '.join(STUDIES)}"
         raise InvalidInputError(message)
     chosen = tuple(one for one in _possible(scenario) if one.study in asked)
+    if studies is None:
+        chosen = tuple(one for one in chosen if one.key != SOIL_SPACING)
     if not chosen:
         raise InvalidInputError(f"nothing to study: {effects_note(scenario, asked)}")
     return chosen
@@ -215,7 +228,8 @@ def _possible(scenario: Scenario) -> list[Refinement]:
     if isinstance(scenario.time, Nonsmooth):
         return [_rigid_step(scenario), _tolerance(scenario, scenario.time)]
     spacing = [_spacing(scenario)] if has_particles(scenario) else []
-    return [_step(scenario, scenario.time), _stiffness(scenario), *spacing]
+    soil = [_soil_spacing(scenario)] if soil_tables(scenario) else []
+    return [_step(scenario, scenario.time), _stiffness(scenario), *spacing, *soil]
 
 
 def has_particles(scenario: Scenario) -> bool:
@@ -281,3 +295,8 @@ def _spacing(scenario: Scenario) -> Refinement:
     return Refinement(
         SPACING, "particle spacing", "contact.particle_spacing", scenario.contact.particle_spacing, 0.5, 1
     )
+
+
+def _soil_spacing(scenario: Scenario) -> Refinement:
+    """Halve the spacing of the particles of all soils; twice the scenario's may be too coarse to be admissible."""
+    return Refinement(SPACING, "spacing of soil", SOIL_SPACING, soil_tables(scenario)[0].spacing, 0.5, 0)

@@ -52,8 +52,11 @@ class Refinement:
 
 
 def with_setting(scenario: Scenario, key: str, value: float) -> Scenario:
-    """Return the scenario with a key `table.name` set."""
+    """Return the scenario with a key `table.name` set, of a system in all its tables."""
     table, name = key.split(".")
+    if table in scenario.systems:
+        tables = tuple(one.model_copy(update={name: value}) for one in scenario.systems[table])
+        return scenario.model_copy(update={"systems": {**scenario.systems, table: tables}})
     changed = getattr(scenario, table).model_copy(update={name: value})
     return scenario.model_copy(update={table: changed})
 

@@ -1,12 +1,13 @@
 """Summary of a scenario before it runs: masses, pair parameters, step, cost and size of the results."""
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from blocksim.kernels.arrays import Record, World
 from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, place_bodies
-from blocksim.scenario.models.stepping import Nonsmooth
+from blocksim.scenario.models.stepping import Explicit, Nonsmooth
 from blocksim.scenario.motion import motion_pieces
 from blocksim.scenario.motion_peaks import motion_peaks
 from blocksim.world.bodies import outline_of, with_freed
@@ -28,7 +29,8 @@ from blocksim.world.particles import particle_count
 from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
 from blocksim.world.scenes import stack_of_one
-from blocksim.world.systems import others_of
+from blocksim.world.step import step_of_contacts
+from blocksim.world.systems import largest_step, others_of
 from blocksim.world.systems.system import Present
 
 # measured on one core: a step costs about this for every body with its contacts
@@ -85,6 +87,15 @@ class SagDescription:
 
 
 @dataclass(frozen=True)
+class StepLimits:
+    """The longest steps of blocks and of the systems beside them, SI; the shorter one is the step of the scene."""
+
+    blocks: float  # s
+    systems: float  # s
+    scale: float  # contact.stiffness_scale with which both are the same
+
+
+@dataclass(frozen=True)
 class Description:
     """The resolved scene, SI."""
 
@@ -102,6 +113,7 @@ class Description:
     skin: float  # m, distance up to which bodies are listed as neighbours
     rigid: SagDescription | None  # where contacts are
     systems: Mapping[str, int]  # elements of each system beside blocks and supports
+    limits: StepLimits | None  # where there are any
 
 
 def describe(scenario: Scenario) -> Description:
@@ -130,6 +142,7 @@ def describe(scenario: Scenario) -> Description:
         skin=float(world.controls[0].skin),
         rigid=_rigid(scenario, placed, world, step),
         systems={one.system.name: one.count for one in others},
+        limits=_limits(scenario, placed, world) if others else None,
     )
 
 
@@ -159,6 +172,16 @@ def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
 def _seconds_of(others: Sequence[Present]) -> float:
     """Return what a step of further systems costs (s)."""
     return sum(one.count * one.system.cost.seconds for one in others)
+
+
+def _limits(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World) -> StepLimits | None:
+    systems = largest_step(scenario)
+    if not isinstance(scenario.time, Explicit) or systems == math.inf:
+        return None
+    outline = outline_of(scenario)
+    (bounds,) = bounds_of(with_freed(stack_of_one(world.bodies), [outline]), len(placed))
+    blocks = step_of_contacts(scenario, bounds, outline.interactions, scenario.time.safety)
+    return StepLimits(blocks, systems, scenario.contact.stiffness_scale * (blocks / systems) ** 2)
 
 
 def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, step: float) -> SagDescription | None:

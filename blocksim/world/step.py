@@ -110,6 +110,11 @@ def expected_load(scenario: Scenario, bounds: Bounds) -> Load:
     return Load(speed, (scenario.gravity + push) * bounds.mass)
 
 
+def step_of_contacts(scenario: Scenario, bounds: Bounds, table: Interactions, safety: float) -> float:
+    """Return the largest safe step (s) of the contacts of a scenario's blocks."""
+    return admissible_step(bounds, table, safety, scenario.contact.law, expected_load(scenario, bounds))
+
+
 def step_of_travel(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
     """Return the longest step (s) in which no block moves far; infinite where nothing moves."""
     speed = greatest_speed(scenario, bounds, table) + support_speed(scenario)
@@ -124,9 +129,8 @@ def choose_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> floa
         raise ValueError(message)  # noqa: TRY004 - the scenario is of the right type
     with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused below
         try:
-            load = expected_load(scenario, bounds)
-            limit = admissible_step(bounds, table, scenario.time.safety, scenario.contact.law, load)
-            limit = min(limit, step_of_travel(scenario, bounds, table), largest_step(scenario))
+            of_contacts = step_of_contacts(scenario, bounds, table, scenario.time.safety)
+            limit = min(of_contacts, step_of_travel(scenario, bounds, table), largest_step(scenario))
         except ArithmeticError:  # Python's own powers do not end in infinity
             limit = 0.0
     limit = min(limit, scenario.time.end)

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from blocksim.scenario import scenario_to_toml
 from tests.cli.conftest import SCENARIOS, Command
 from tests.golden import Golden
+from tests.soils import column, scene
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"
 SLIDE = (SCENARIOS / "slide.toml").read_text()
@@ -205,3 +207,13 @@ def test_friction_angle_without_its_unit_is_warned_of(blocksim: Command) -> None
     assert warning in blocksim("run", *settings).err
     assert warning in blocksim("sweep", *settings[:1], "--vary", "friction.block_ground=20,30", "--dry-run").err
     assert "warning" not in blocksim("check", *settings[:2], "friction.block_ground=30 deg").err
+
+
+def test_a_step_that_one_side_makes_ten_times_shorter_is_told_with_its_cure(blocksim: Command, tmp_path: Path) -> None:
+    (tmp_path / "soil.toml").write_text(scenario_to_toml(scene(column(0.05, 0.05, 0.005))))
+    told = blocksim("check", "soil.toml").out
+    assert "blocks allow" in told
+    assert "stiffness_scale" not in told.split("pair")[0]
+    told = blocksim("check", "soil.toml", "--set", "materials.soft.young_modulus=6e11").out
+    assert "warning: because of the blocks" in told
+    assert max(map(len, told.splitlines())) <= 80

@@ -10,12 +10,14 @@ import pytest
 
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Document, Scenario
+from blocksim.scenario.soil_places import soil_tables
 from blocksim.study import converge as converging
 from blocksim.study.converge import STUDIES, converge, refinements_of
 from blocksim.study.convergence import Coordinates, Refinement, Study, Verdict, judge, with_setting
 from blocksim.study.executors import Batch, Setting, Task
 from blocksim.study.executors import ensemble as folders
 from blocksim.study.executors.processes import DEAD
+from tests.soils import column, scene
 from tests.study.conftest import SCENARIOS
 
 if TYPE_CHECKING:
@@ -164,6 +166,15 @@ def test_spacing_is_refined_where_there_are_particles(slide: Scenario) -> None:
     contact = slide.contact.model_copy(update={"model": "particles"})
     *_, spacing = refinements_of(slide.model_copy(update={"contact": contact}))
     assert (spacing.key, spacing.value(0), spacing.value(1)) == ("contact.particle_spacing", 1e-3, 5e-4)
+
+
+def test_the_spacing_of_soil_is_halved_where_that_is_asked_for() -> None:
+    soil = scene(column(0.05, 0.05, 0.005))
+    assert {one.study for one in refinements_of(soil)} == {"step", "stiffness"}
+    (spacing,) = refinements_of(soil, ["spacing"])
+    assert (spacing.key, levels(spacing, 2)) == ("soils.spacing", [0.005, 0.0025, 0.00125])
+    (table,) = soil_tables(spacing.at(soil, 1))
+    assert table.spacing == pytest.approx(0.0025)
 
 
 def test_slide_converges_with_the_order_of_its_static_deflections(slide: Scenario, tmp_path: Path) -> None:

@@ -96,5 +96,6 @@ def json_schema() -> dict[str, Any]:
     """Describe the file for editors and other programs: quantities as SI numbers or as strings with a unit."""
     found = Scenario.model_json_schema(by_alias=True, mode="validation")
     for name, table in SYSTEMS.items():
-        found["properties"][name] = {"type": "array", "items": table.model_json_schema(by_alias=True)}
+        items = table.model_json_schema(by_alias=True)
+        found["properties"][name] = {"type": "array", "description": items["description"], "items": items}
     return {"$schema": DIALECT, **found}

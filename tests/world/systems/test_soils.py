@@ -10,6 +10,7 @@ import pytest
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.models.contact import PairFriction
 from blocksim.simulation.schemes import build, build_scene
+from blocksim.world.describe import describe
 from blocksim.world.interactions import contact_classes
 from blocksim.world.systems import INTERACTIONS
 from blocksim.world.systems.soil_kinds import earth_pressure_at_rest, friction_with, interactions_with, yield_surface
@@ -68,6 +69,15 @@ def test_the_step_is_that_of_the_waves_in_the_soil() -> None:
     assert SOILS.largest_step is not None
     assert SOILS.largest_step(scene(COLUMN)) == pytest.approx(expected)
     assert build_scene(scene(COLUMN)).world.controls[0].step <= expected
+
+
+def test_check_tells_whose_step_is_taken_and_which_stiffness_makes_both_equal() -> None:
+    limits = describe(scene(COLUMN)).limits
+    assert limits is not None
+    equal = describe(scene(COLUMN, contact={"stiffness_scale": limits.scale})).limits
+    assert equal is not None
+    assert equal.blocks == pytest.approx(equal.systems, rel=1e-3)
+    assert limits.blocks != pytest.approx(limits.systems, rel=0.1)
 
 
 def test_soil_beside_a_system_that_nobody_thought_of_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
