@@ -16,6 +16,8 @@ from blocksim.scenario.spelling import did_you_mean_or_list
 BLOCKS_BY_NAME = ("structures", "bodies")
 SPRING_CHOICES = ("model", "law")
 """Keys of [contact] that rigid contacts do not have."""
+WITH_OUTLINES: frozenset[tuple[str, str]] = frozenset()
+"""Schemes and contact models that know blocks with an outline; rigid contacts have the model "surface"."""
 
 
 def wrong_names(data: Data) -> Iterator[Finding]:
@@ -98,6 +100,7 @@ def unfit_choices(scenario: Scenario) -> Iterator[Finding]:
     if scenario.start.settle and scenario.systems:
         message = f"{', '.join(scenario.systems)} cannot settle: blocks and supports alone can"
         yield Finding(("start", "settle"), message, relation=True)
+    yield from _unmodelled_outlines(scenario)
     if not isinstance(scenario.time, Nonsmooth):
         return
     for name in SPRING_CHOICES:
@@ -106,6 +109,18 @@ def unfit_choices(scenario: Scenario) -> Iterator[Finding]:
         if chosen != usual:
             message = f'{shown(chosen)} needs springs, time.scheme = "explicit"; here contacts are rigid'
             yield Finding(("contact", name), message, relation=True)
+
+
+def _unmodelled_outlines(scenario: Scenario) -> Iterator[Finding]:
+    scheme, model = scenario.time.scheme, scenario.contact.model
+    if (scheme, model) in WITH_OUTLINES:
+        return
+    with_which = f"time.scheme = {shown(scheme)} and contact.model = {shown(model)}"
+    for name, block in scenario.blocks.items():
+        if block.polygon:
+            key = "outline" if block.outline is not None else "sides"
+            message = f"outlines are not modelled with {with_which}"
+            yield Finding(("blocks", name, key), message, at="key", relation=True)
 
 
 def unknown_provenance(data: Data) -> Iterator[Finding]:

@@ -7,7 +7,7 @@ from typing import Any, Literal, cast
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from blocksim.scenario.keys import MISSING, NAMED, KeyPath, field_at, follow, keys_of, table_at
+from blocksim.scenario.keys import MISSING, NAMED, KeyPath, field_at, follow, keys_of, marks_of, table_at
 from blocksim.scenario.models.drive import DRIVES
 from blocksim.scenario.models.history import HISTORIES
 from blocksim.scenario.models.loads import LOADS
@@ -117,7 +117,7 @@ def _missing(path: KeyPath, data: object) -> Finding:
         return Finding(path[:-1], f"this list is too short; {TWO_VALUES}")
     field = field_at(path, data)
     told = f": {field.description}" if field is not None else ""
-    wanted = next((m.wanted for m in field.metadata if hasattr(m, "wanted")), "") if field is not None else ""
+    wanted = next((m.wanted for m in marks_of(field) if hasattr(m, "wanted")), "") if field is not None else ""
     needed = f"; {wanted} is needed" if wanted else ""
     return Finding(path, f"this key is missing{told}{needed}", at="key")
 

@@ -215,8 +215,13 @@ def kinds_of(table: type[Table]) -> tuple[str, ...]:
 
 def si_unit(info: FieldInfo) -> str:
     """Return the SI unit of the values of a field, empty for plain numbers and words."""
-    kinds = (mark.kind if isinstance(mark, Quantity) else mark for mark in _marks(info.annotation, info.metadata))
+    kinds = (mark.kind if isinstance(mark, Quantity) else mark for mark in marks_of(info))
     return next((kind.unit for kind in kinds if isinstance(kind, Kind)), "")
+
+
+def marks_of(info: FieldInfo) -> Iterator[Any]:
+    """Yield what describes the values of a field: annotations of its type, and of the alternatives in it."""
+    yield from _marks(info.annotation, info.metadata)
 
 
 def _marks(annotation: Any, metadata: Iterable[Any]) -> Iterator[Any]:

@@ -1,15 +1,23 @@
-"""From declared structures and bodies to placed rectangles."""
+"""From declared structures and bodies to placed blocks."""
 
+import math
 import weakref
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 from blocksim.scenario.keys import KeyPath
+from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.outlines import Corners, box_of, section_of
 from blocksim.scenario.structures import Pose
 
 
 class PlacedBody(NamedTuple):
-    """One rectangle at the start: centre x, y, turned by angle, all in SI (m, kg/m³, rad, m/s, rad/s)."""
+    """One block at the start: centroid x, y, turned by angle, all in SI (m, kg/m³, rad, m/s, rad/s).
+
+    A rectangle is given by its sizes along its own axes. Any other block has an outline: its corners counter-clockwise
+    along these axes about the centroid; its sizes are then those of the bounding box, which need not be centred.
+    """
 
     name: str
     block: str
@@ -27,16 +35,36 @@ class PlacedBody(NamedTuple):
     fixed: bool  # held at the start: forces do not move it
     driven: bool = False  # by a motion of its own; fixed as well
     freed: bool = False  # by an event
+    outline: Corners = ()  # empty for a rectangle
 
     @property
     def mass(self) -> float:
         """Mass in kg."""
+        if self.outline:
+            return self.density * section_of(self.outline)[0] * self.depth
         return self.density * self.size_x * self.size_y * self.depth
 
     @property
     def inertia(self) -> float:
-        """Moment of inertia about the centre in kg m²."""
+        """Moment of inertia about the centroid in kg m²."""
+        if self.outline:
+            return self.density * section_of(self.outline)[1] * self.depth
         return self.mass * (self.size_x * self.size_x + self.size_y * self.size_y) / 12.0
+
+    @property
+    def corners(self) -> Corners:
+        """Corners in m along the body's own axes about its centroid, counter-clockwise; of a rectangle too."""
+        if self.outline:
+            return self.outline
+        x, y = 0.5 * self.size_x, 0.5 * self.size_y
+        return (-x, -y), (x, -y), (x, y), (-x, y)
+
+    @property
+    def radius(self) -> float:
+        """Distance of the farthest corner from the centroid in m."""
+        if self.outline:
+            return max(math.hypot(x, y) for x, y in self.outline)
+        return 0.5 * math.hypot(self.size_x, self.size_y)
 
 
 class _Placement(NamedTuple):
@@ -83,6 +111,7 @@ def _placed(scenario: Scenario) -> _Placement:
     for number, structure in enumerate(scenario.structures):
         poses = structure.start(scenario.blocks[structure.block])
         place = _placer(scenario, structure.block)
+        poses = _about_centroid(poses, scenario.blocks[structure.block])
         bodies += [place(str(index), pose, fixed=False) for index, pose in enumerate(poses, start=len(bodies) + 1)]
         origins.append((("structures", number), len(poses)))
     for number, spec in enumerate(scenario.bodies):
@@ -95,6 +124,21 @@ def _placed(scenario: Scenario) -> _Placement:
     return _Placement(weakref.ref(scenario, _forget), tuple(bodies), tuple(origins))
 
 
+def _about_centroid(poses: Sequence[Pose], block: Block) -> Sequence[Pose]:
+    """Return poses of the centroid for those of the middle of the bounding box, by which structures place blocks."""
+    low, high = box_of(block.polygon or ((0.0, 0.0),))
+    x, y = -0.5 * (low[0] + high[0]), -0.5 * (low[1] + high[1])
+    return [_moved(pose, x, y) for pose in poses] if x or y else poses
+
+
+def _moved(pose: Pose, x: float, y: float) -> Pose:
+    """Return the pose of a point x, y along the axes of a body."""
+    c, s = math.cos(pose.angle), math.sin(pose.angle)
+    dx, dy = c * x - s * y, s * x + c * y
+    moved = {"x": pose.x + dx, "y": pose.y + dy, "vx": pose.vx - pose.spin * dy, "vy": pose.vy + pose.spin * dx}
+    return pose._replace(**moved)
+
+
 class _Place(Protocol):
     def __call__(self, name: str, pose: Pose, *, fixed: bool) -> PlacedBody: ...
 
@@ -103,10 +147,10 @@ def _placer(scenario: Scenario, key: str) -> _Place:
     """Return a function that places one kind of block; looking up its sides every time would be slow."""
     block = scenario.blocks[key]
     material = block.material
-    size_x, size_y, depth = block.size_x, block.size_y, block.depth
+    size_x, size_y, depth, outline = block.size_x, block.size_y, block.depth, block.polygon
     density = scenario.materials[material].density
 
     def place(name: str, pose: Pose, *, fixed: bool) -> PlacedBody:
-        return PlacedBody(name, key, material, size_x, size_y, depth, density, *pose, fixed)
+        return PlacedBody(name, key, material, size_x, size_y, depth, density, *pose, fixed, outline=outline)
 
     return place

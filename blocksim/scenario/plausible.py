@@ -27,8 +27,8 @@ def _bare_numbers(scenario: Scenario) -> Iterator[str]:
         if material.young_modulus < SOFTEST:
             yield f"{key}.young_modulus = {material.young_modulus:.4g} Pa; write the unit that is meant"
     for name, block in scenario.blocks.items():
-        for side in ("width", "height", "length"):
-            if (size := getattr(block, side)) > LONGEST:
+        for side in ("width", "height", "length", "radius"):
+            if (size := getattr(block, side)) is not None and size > LONGEST:
                 yield f"{keys.format_key(('blocks', name, side))} = {size:.4g} m; write the unit that is meant"
 
 

@@ -13,6 +13,7 @@ from pydantic.fields import FieldInfo
 
 from blocksim.scenario.keys import si_unit
 from blocksim.scenario.models.contact import Friction, PairFriction
+from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.models.motion import FromTable, MotionTable
 from blocksim.scenario.models.motions import TABLED
 from blocksim.scenario.models.scenario import Scenario
@@ -110,6 +111,8 @@ def _plain(table: BaseModel) -> dict[str, Any]:
     entries |= systems if isinstance(systems, dict) else {}
     if isinstance(table, PairFriction) and table.kinetic_ratio is not None:
         entries["kinetic"] = None
+    if isinstance(table, Block):
+        entries = {key: entry for key, entry in entries.items() if table.has_key(key)}
     return {key: entry for key, entry in entries.items() if entry is not None}
 
 

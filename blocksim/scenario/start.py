@@ -15,6 +15,7 @@ from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.drive import MOST_BODY_TABLES
 from blocksim.scenario.models.motion import PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.outlines import section_of
 from blocksim.scenario.placement import PlacedBody, origins_of, place_bodies
 from blocksim.scenario.probes import unfit_probes
 from blocksim.scenario.quantities import shown
@@ -149,8 +150,11 @@ def _endless_places(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody
 def _impossible_masses(scenario: Scenario) -> Iterator[Finding]:
     """Find blocks with valid sizes but an invalid mass or inertia."""
     for name, block in scenario.blocks.items():
-        mass = scenario.materials[block.material].density * block.size_x * block.size_y * block.depth
+        density = scenario.materials[block.material].density
+        mass = density * block.size_x * block.size_y * block.depth
         inertia = mass * (block.size_x * block.size_x + block.size_y * block.size_y) / 12.0
+        if block.polygon:
+            mass, inertia = (density * block.depth * moment for moment in section_of(block.polygon))
         if not (0.0 < inertia < math.inf and 0.0 < mass < math.inf):
             message = f"a block of {mass:g} kg and {inertia:g} kg m^2 cannot be simulated"
             yield Finding(("blocks", name), f"{message}; check its sides and density")

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.scenario import load_scenario, place_bodies, scenario_from_mapping
+from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_from_mapping
+from blocksim.scenario.overrides import frozen
+from blocksim.scenario.placement import PlacedBody
 from tests.scenario.conftest import MATERIAL, data_of
 
 BRICK = {"width": "32 mm", "height": "25 mm", "length": "50 mm", "material": "aluminium"}
@@ -79,3 +81,37 @@ def test_a_scenario_is_placed_once_and_its_bodies_go_with_it() -> None:
     del scenario
     gc.collect()
     assert weak() is None
+
+
+def placed_outline(outline: list[list[float]], **tables: object) -> PlacedBody:
+    blocks = {"wedge": {"outline": outline, "depth": 0.5, "material": "aluminium"}, "brick": BRICK}
+    data = data_of(materials={"aluminium": MATERIAL}, blocks=blocks, **tables)
+    return place_bodies(Scenario.model_validate(frozen(data)))[0]
+
+
+def test_a_block_with_an_outline_is_placed_by_its_centroid() -> None:
+    body = placed_outline([[1, 2], [1, 5], [7, 2]], bodies=[{"block": "wedge", "x": 3, "y": 4, "angle": "30 deg"}])
+    assert (body.x, body.y) == (3.0, 4.0)
+    assert body.outline == body.corners == ((-2.0, -1.0), (4.0, -1.0), (-2.0, 2.0))
+    assert (body.size_x, body.size_y, body.depth) == (6.0, 3.0, 0.5)
+    assert body.mass == pytest.approx(1000 * 9 * 0.5)
+    assert body.inertia == pytest.approx(body.mass * (3**2 + 6**2) / 18)  # right-angled triangle
+    assert body.radius == pytest.approx(math.hypot(4, 1))
+
+
+def test_a_rectangle_as_an_outline_is_the_same_body() -> None:
+    (one,) = place_bodies(scenario_from_mapping(scenario_data(bodies=[{"block": "brick", "x": 0, "y": 1}])))
+    x, y = 0.5 * one.size_x, 0.5 * one.size_y
+    other = one._replace(outline=((-x, -y), (x, -y), (x, y), (-x, y)))
+    assert one.corners == other.corners
+    assert (other.mass, other.inertia, other.radius) == pytest.approx((one.mass, one.inertia, one.radius), rel=1e-15)
+
+
+def test_structures_line_up_the_bounding_boxes_of_outlines() -> None:
+    stack = {"kind": "stack", "block": "wedge", "count": 1, "left": 10, "bottom": 20}
+    body = placed_outline([[0, 0], [6, 0], [0, 3]], structures=[stack], bodies=[])
+    assert [(body.x + x, body.y + y) for x, y in body.corners] == [(10, 20), (16, 20), (10, 23)]
+    push = {"kind": "dominoes", "block": "wedge", "count": 1, "spacing": 1, "push": 1}
+    body = placed_outline([[0, 0], [6, 0], [0, 3]], structures=[push], bodies=[])
+    # pivots about the lower right corner at (6, 0)
+    assert (body.vx, body.vy) == pytest.approx((-body.spin * body.y, body.spin * (body.x - 6)))

@@ -19,6 +19,8 @@ from blocksim.scenario import (
     scenario_hash,
     scenario_to_toml,
 )
+from blocksim.scenario.overrides import frozen
+from blocksim.scenario.resolved import deciding_values
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -223,6 +225,8 @@ def flat(table: dict[str, Any], path: str = "") -> dict[str, Any]:
 HASHED = {key: value for line in OTHER_VALUES.splitlines() for key, value in flat(tomllib.loads(line)).items()}
 RAMP = {"kind": "ramp", "distance": 1, "duration": 1}
 HASHED |= {"bodies.0.motion": RAMP, "events": [{"at": 1, "remove": ["1"]}]}
+OTHER_SHAPES = {"blocks.b.outline", "blocks.b.sides", "blocks.b.radius", "blocks.b.depth"}
+"""Tried by themselves, below: a block has one shape."""
 SINGLE_CHOICE = {
     "schema",
     "time.scheme",
@@ -293,7 +297,37 @@ def test_every_key_is_either_hashed_or_known_not_to_matter(data: dict[str, Any])
     unmoved = {"description", "experiment", "sweep"}
     others = {key for key in found if key.startswith(("materials.n.", "blocks.c."))}
     others |= {f"materials.m.{key}" for key in OF_SOILS}
-    assert found - others - SINGLE_CHOICE - unmoved == set(HASHED)
+    assert found - others - OTHER_SHAPES - SINGLE_CHOICE - unmoved == set(HASHED)
+
+
+WEDGE = {"outline": [[0, 0], [1, 0], [0, 1]], "depth": 1, "material": "m"}
+HEXAGON = {"sides": 6, "radius": 1, "depth": 1, "material": "m"}
+
+
+@pytest.mark.parametrize(
+    ("block", "change"),
+    [
+        (WEDGE, {"depth": 2}),
+        (WEDGE, {"outline": [[0, 0], [1, 0], [0, 1.5]]}),
+        (HEXAGON, {"depth": 2}),
+        (HEXAGON, {"sides": 5}),
+        (HEXAGON, {"radius": 2}),
+    ],
+)
+def test_the_hash_changes_with_every_key_of_an_outline(
+    data: dict[str, Any], block: dict[str, Any], change: dict[str, Any]
+) -> None:
+    one, other = (Scenario.model_validate(frozen({**data, "blocks": {"b": b}})) for b in (block, {**block, **change}))
+    assert scenario_hash(one) != scenario_hash(other)
+    for scenario in (one, other):
+        text = scenario_to_toml(scenario)
+        assert Scenario.model_validate(frozen(tomllib.loads(text))) == scenario
+        assert "upright" not in text
+
+
+def test_rectangles_are_hashed_and_written_as_before_there_were_outlines(data: dict[str, Any]) -> None:
+    keys = {"width", "height", "length", "upright", "along", "material"}
+    assert set(deciding_values(scenario_from_mapping(data))["blocks"]["b"]) == keys
 
 
 @pytest.mark.parametrize(

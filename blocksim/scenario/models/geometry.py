@@ -1,20 +1,35 @@
 """Materials, blocks, single bodies, and the boundary: the ground and walls."""
 
 import math
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
-from typing import Annotated, Literal, Self, get_args
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from itertools import chain, pairwise
+from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import (
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
+from pydantic_core import PydanticKnownError
 
+from blocksim.scenario import outlines
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import Identifier, OneOf, Table
+from blocksim.scenario.models.base import Identifier, OneOf, Table, Whole
 from blocksim.scenario.models.drive import AnyDrive
 from blocksim.scenario.units import USUAL_GRAVITY
 
 Side = Literal["width", "height", "length"]
 YieldSurface = Literal["mohr-coulomb", "plane-strain-associated"]
 SIDES: tuple[Side, ...] = ("width", "height", "length")
+RECTANGLE_KEYS = (*SIDES, "upright", "along")
+OUTLINE_KEYS = {"outline": ("outline", "depth"), "sides": ("sides", "radius", "depth")}
+"""What a block needs that is no rectangle, by the key that tells so."""
+ABSENT = object()
+"""In place of a value that is missing."""
 Point = tuple[q.Length, q.Length]
 
 
@@ -75,21 +90,68 @@ class Material(Table):
 
 
 class Block(Table):
-    """A rectangular block by its three sides, and its orientation in the plane.
+    """A block by its three sides and its orientation in the plane, or by its outline and its depth.
 
     The names of the sides are only names: `upright` selects the one that stands upright and `along` the one along
-    x; the third is the depth.
+    x; the third is the depth. An outline is a convex polygon, or a regular one of a number of `sides`; its centroid is
+    the place of a body.
     """
 
-    width: q.PositiveLength = Field(description="width of the block")
-    height: q.PositiveLength = Field(description="height of the block")
-    length: q.PositiveLength = Field(description="length of the block")
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": [*keys]} for keys in (SIDES, *OUTLINE_KEYS.values())]}
+    )
+
+    width: q.PositiveLength | None = Field(default=None, description="width of the block")
+    height: q.PositiveLength | None = Field(default=None, description="height of the block")
+    length: q.PositiveLength | None = Field(default=None, description="length of the block")
     upright: Annotated[Side, OneOf(SIDES)] = Field(default="height", description="the side that stands upright")
     along: Annotated[Side, OneOf(SIDES)] = Field(
         default_factory=lambda known: "length" if known.get("upright") == "width" else "width",
         description="the side that lies along x (default: width, or length if width stands upright)",
     )
+    outline: tuple[Point, ...] | None = Field(
+        default=None,
+        description="corners [x, y] of a convex block, in either sense, in place of width, height and length; "
+        "x and y of a body are those of its centroid",
+        json_schema_extra={"minItems": outlines.FEWEST, "maxItems": outlines.MOST},
+    )
+    sides: Annotated[int, Whole(outlines.FEWEST, outlines.MOST)] | None = Field(
+        default=None, description="number of sides of a regular block, the lowest level, in place of an outline"
+    )
+    radius: q.PositiveLength | None = Field(default=None, description="distance of its corners from its centre")
+    given_depth: q.PositiveLength | None = Field(
+        default=None, alias="depth", description="extent out of the plane of a block with an outline or sides"
+    )
     material: str = Field(description="the name of the block's material")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _needs_its_shape(cls, data: object) -> object:
+        """Mark what is missing for the shape that is begun, so that each key is reported by itself."""
+        if not isinstance(data, Mapping):
+            return data
+        shape = next((key for key in OUTLINE_KEYS if key in data), "")
+        return {**dict.fromkeys(OUTLINE_KEYS.get(shape, SIDES), ABSENT), **data}
+
+    @field_validator(*SIDES, "outline", "sides", "radius", "given_depth", mode="before")
+    @classmethod
+    def _is_there(cls, value: object) -> object:
+        if value is ABSENT:
+            raise PydanticKnownError("missing")
+        return value
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        shape = next((key for key in OUTLINE_KEYS if getattr(self, key) is not None), "")
+        fields = type(self).model_fields
+        given = [fields[name].alias or name for name in fields if name in self.model_fields_set]
+        foreign = {*RECTANGLE_KEYS, *chain(*OUTLINE_KEYS.values())} - {*OUTLINE_KEYS.get(shape, RECTANGLE_KEYS)}
+        for key in given:
+            if key in foreign:
+                why = f"has no meaning beside {shape}" if shape else "belongs to a block with an outline or sides"
+                message = f"{key} {why}; keep one of them"
+                raise q.invalid(message, key, at="key")
+        return self
 
     @model_validator(mode="after")
     def _two_sides(self) -> Self:
@@ -99,24 +161,55 @@ class Block(Table):
             raise q.invalid(message, "along")
         return self
 
-    @property
-    def size_x(self) -> float:
-        """Extent along x in m."""
-        return self._side(self.along)
+    @model_validator(mode="after")
+    def _convex(self) -> Self:
+        for number, message in outlines.faults(self.outline) if self.outline is not None else ():
+            raise q.invalid(message, "outline", *(() if number is None else (number,)))
+        return self
 
-    @property
+    @model_serializer(mode="wrap")
+    def _own_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out the keys of other shapes: they decide nothing."""
+        data: dict[str, Any] = write(self)
+        return {key: value for key, value in data.items() if self.has_key(key)}
+
+    def has_key(self, key: str) -> bool:
+        """Return whether a key (or the name of its field) has a meaning for the shape of this block."""
+        if self.polygon:
+            return key not in RECTANGLE_KEYS and getattr(self, "given_depth" if key == "depth" else key) is not None
+        return key in {*RECTANGLE_KEYS, "material"}
+
+    @cached_property
+    def polygon(self) -> outlines.Corners:
+        """Corners (m) counter-clockwise about the centroid; empty for a rectangular block."""
+        if self.outline is not None:
+            return outlines.centred(self.outline)
+        return outlines.regular(self.sides, self.radius) if self.sides is not None and self.radius is not None else ()
+
+    @cached_property
+    def size_x(self) -> float:
+        """Extent along x in m; of an outline that of its bounding box."""
+        return self._extent(0) if self.polygon else self._side(self.along)
+
+    @cached_property
     def size_y(self) -> float:
-        """Extent upright in m."""
-        return self._side(self.upright)
+        """Extent upright in m; of an outline that of its bounding box."""
+        return self._extent(1) if self.polygon else self._side(self.upright)
 
     @property
     def depth(self) -> float:
         """Extent out of the plane in m."""
+        if self.given_depth is not None:
+            return self.given_depth
         (third,) = set(SIDES) - {self.along, self.upright}
         return self._side(third)
 
     def _side(self, name: Side) -> float:
-        return {"width": self.width, "height": self.height, "length": self.length}[name]
+        return {"width": self.width, "height": self.height, "length": self.length}[name] or math.nan
+
+    def _extent(self, axis: int) -> float:
+        low, high = outlines.box_of(self.polygon)
+        return high[axis] - low[axis]
 
 
 class BodySpec(Table):

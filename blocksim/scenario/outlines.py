@@ -1,0 +1,149 @@
+"""Outlines of blocks: convex polygons of few corners, their area, centroid and moments, and what is wrong with one."""
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+
+from blocksim.scenario.polygons import corners_of, self_crossings
+
+Corner = tuple[float, float]
+Corners = tuple[Corner, ...]
+"""Corners (m) counter-clockwise."""
+
+FEWEST, MOST = 3, 16
+SHORTEST = 1e-3
+"""Least length of an edge, and least thickness, in shares of the diagonal of the bounding box: below, contact would
+have to tell corners apart that lie closer to one another than the accuracy of a step."""
+STRAIGHT = math.radians(0.1)
+"""Least turn of the outline at a corner."""
+LEAST = 1e-18  # m; as for the sides of rectangles
+
+
+def area_of(corners: Sequence[Corner]) -> float:
+    """Return the area (m²), positive where corners run counter-clockwise."""
+    x0, y0 = corners[0]
+    local = [(x - x0, y - y0) for x, y in corners]  # no digits are lost far from the origin
+    return 0.5 * math.fsum(_cross(a, b) for a, b in _edges(local))
+
+
+def centred(points: Sequence[Corner]) -> Corners:
+    """Return corners counter-clockwise about their centroid; the first point stays the first."""
+    x0, y0 = points[0]
+    local = [(x - x0, y - y0) for x, y in points]
+    if area_of(local) < 0.0:
+        local = [local[0], *local[:0:-1]]
+    for _ in range(2):  # the second time removes the round-off of the first
+        cx, cy = centroid(local)
+        local = [(x - cx, y - cy) for x, y in local]
+    return tuple(local)
+
+
+def centroid(corners: Sequence[Corner]) -> Corner:
+    """Return the centroid (m) of a polygon that has an area."""
+    x0, y0 = corners[0]
+    local = [(x - x0, y - y0) for x, y in corners]
+    parts = [(_cross(a, b), a, b) for a, b in _edges(local)]
+    six = 3.0 * math.fsum(cross for cross, _, _ in parts)
+    x = math.fsum(cross * (a[0] + b[0]) for cross, a, b in parts) / six
+    y = math.fsum(cross * (a[1] + b[1]) for cross, a, b in parts) / six
+    return x0 + x, y0 + y
+
+
+@lru_cache(maxsize=256)
+def section_of(corners: Corners) -> tuple[float, float]:
+    """Return the area (m²) of corners about their centroid, and its polar second moment about it (m⁴).
+
+    The moment is the sum over triangles from the centroid: 1/12 Σ (a × b) (a·a + a·b + b·b).
+    """
+    polar = math.fsum(_cross(a, b) * (_dot(a, a) + _dot(a, b) + _dot(b, b)) for a, b in _edges(corners)) / 12.0
+    return area_of(corners), polar
+
+
+def box_of(corners: Sequence[Corner]) -> tuple[Corner, Corner]:
+    """Return the lower left and the upper right corner (m) of the bounding box."""
+    xs, ys = zip(*corners, strict=True)
+    return (min(xs), min(ys)), (max(xs), max(ys))
+
+
+def regular(sides: int, radius: float) -> Corners:
+    """Return a regular polygon about its centroid, corners at a radius (m), its lowest side level."""
+    first = -0.5 * math.pi - math.pi / sides
+    angles = (first + 2.0 * math.pi * number / sides for number in range(sides))
+    return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
+
+
+def faults(points: Sequence[Corner]) -> Iterator[tuple[int | None, str]]:
+    """Yield what is wrong with an outline, worst first, and the number (from 0) of the corner, None for all of it."""
+    if not FEWEST <= len(points) <= MOST:
+        yield None, f"{len(points)} corners; an outline has {FEWEST} to {MOST} corners [x, y]"
+        return
+    low, high = box_of(points)
+    extent = math.dist(low, high)
+    if extent < LEAST:
+        yield None, "all corners are at the same place"
+        return
+    local = [((x - points[0][0]) / extent, (y - points[0][1]) / extent) for x, y in points]
+    yield from _repeated(local, extent)
+    yield from _crossed(local)
+    yield from _bent(local)
+    yield from _thin(local, extent)
+
+
+def _repeated(local: Sequence[Corner], extent: float) -> Iterator[tuple[int, str]]:
+    for number, corner in enumerate(local):
+        edge = math.dist(corner, local[number - 1])
+        if edge == 0.0:
+            yield number, "the same corner as the one before"
+        elif edge < SHORTEST:
+            yield number, f"this corner is only {1e3 * edge * extent:.3g} mm from the one before; leave one of them out"
+
+
+def _crossed(local: Sequence[Corner]) -> Iterator[tuple[int, str]]:
+    for one, other in self_crossings(corners_of(local)):
+        first, second = sorted(_as_given(local, edge) for edge in (one, other))
+        meets = f"the edge from corner {second + 1} meets that from corner {first + 1}"
+        yield second, f"{meets}: the outline crosses itself"
+
+
+def _as_given(local: Sequence[Corner], edge: int) -> int:
+    """Return the number of an edge of the counter-clockwise outline in the order of the file."""
+    return edge if area_of(local) >= 0.0 else (len(local) - 2 - edge) % len(local)
+
+
+def _bent(local: Sequence[Corner]) -> Iterator[tuple[int, str]]:
+    sense = math.copysign(1.0, area_of(local))
+    for number, corner in enumerate(local):
+        before, after = _minus(corner, local[number - 1]), _minus(local[(number + 1) % len(local)], corner)
+        turn = sense * math.atan2(_cross(before, after), _dot(before, after))
+        if turn <= -STRAIGHT:
+            yield number, "the outline is not convex at this corner; divide the block into convex ones"
+        elif turn < STRAIGHT:
+            yield number, f"the outline is nearly straight here ({180.0 - math.degrees(turn):.6g} deg); leave it out"
+
+
+def _thin(local: Sequence[Corner], extent: float) -> Iterator[tuple[None, str]]:
+    thickness = min(_reach(local, a, b) for a, b in _edges(local))
+    if thickness < SHORTEST:
+        size = f"{1e3 * thickness * extent:.3g} mm thick and {1e3 * extent:.3g} mm long"
+        yield None, f"a sliver: {size}; at least {SHORTEST:g} of the length is needed"
+
+
+def _reach(local: Sequence[Corner], a: Corner, b: Corner) -> float:
+    along, length = _minus(b, a), math.dist(a, b)
+    return max(abs(_cross(along, _minus(corner, a))) for corner in local) / length if length else 0.0
+
+
+def _edges(corners: Sequence[Corner]) -> Iterator[tuple[Corner, Corner]]:
+    return zip(corners, (*corners[1:], corners[0]), strict=True)
+
+
+def _minus(a: Corner, b: Corner) -> Corner:
+    return a[0] - b[0], a[1] - b[1]
+
+
+def _cross(a: Corner, b: Corner) -> float:
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def _dot(a: Corner, b: Corner) -> float:
+    return a[0] * b[0] + a[1] * b[1]

@@ -1,0 +1,93 @@
+"""Area, centroid and moments of outlines against other ways to find them, and what outlines are refused."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blocksim.scenario.outlines import Corner, area_of, box_of, centred, centroid, faults, regular, section_of
+
+PLACE = st.floats(-1e3, 1e3)
+ANGLES = st.lists(st.integers(0, 71), min_size=3, max_size=16, unique=True).map(sorted)
+
+
+def on_ellipse(angles: list[int], wide: float) -> list[Corner]:
+    """Return a convex polygon, its corners on an ellipse, at multiples of 5 degrees."""
+    return [(wide * math.cos(math.radians(5.0 * a)), math.sin(math.radians(5.0 * a))) for a in angles]
+
+
+def told(points: list[Corner]) -> tuple[int | None, str]:
+    return next(faults(points), (None, ""))
+
+
+@given(ANGLES, st.floats(0.1, 10.0), PLACE, PLACE)
+def test_moments_are_those_of_the_triangles_from_the_first_corner(
+    angles: list[int], wide: float, x: float, y: float
+) -> None:
+    points = np.array([(x + u, y + v) for u, v in on_ellipse(angles, wide)])
+    fan = [np.array([points[0], points[k], points[k + 1]]) for k in range(1, len(points) - 1)]
+    areas = np.array([0.5 * abs(np.linalg.det(t[1:] - t[0])) for t in fan])
+    middles = np.array([t.mean(axis=0) for t in fan])
+    centre = areas @ middles / areas.sum()
+    # a triangle about its centroid: area/36 times the sum of its squared sides; then Huygens and Steiner
+    own = [a / 36.0 * sum(np.sum((t[i] - t[i - 1]) ** 2) for i in range(3)) for a, t in zip(areas, fan, strict=True)]
+    polar = sum(own) + float(areas @ np.sum((middles - centre) ** 2, axis=1))
+    assert centroid(points.tolist()) == pytest.approx(centre, abs=1e-9 * wide + 1e-12)
+    assert section_of(centred(points.tolist())) == pytest.approx((areas.sum(), polar), rel=1e-8)
+
+
+@given(ANGLES, st.floats(0.1, 10.0))
+def test_the_sense_of_the_corners_does_not_matter(angles: list[int], wide: float) -> None:
+    points = on_ellipse(angles, wide)
+    one, other = centred(points), centred([points[0], *points[:0:-1]])
+    assert one[0] == pytest.approx(other[0], abs=1e-12)
+    assert np.ravel(one) == pytest.approx(np.ravel(other), abs=1e-12)
+    assert centroid(one) == pytest.approx((0.0, 0.0), abs=1e-14)
+
+
+def test_an_outline_far_from_its_origin_keeps_its_digits() -> None:
+    near = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.25), (0.0, 0.25)]
+    far = [(x + 500_000.0, y + 5_500_000.0) for x, y in near]
+    assert centred(far) == centred(near) == ((-0.25, -0.125), (0.25, -0.125), (0.25, 0.125), (-0.25, 0.125))
+
+
+@pytest.mark.parametrize("sides", [3, 4, 6, 7, 16])
+def test_regular_blocks_stand_on_a_level_side(sides: int) -> None:
+    corners = regular(sides, 2.0)
+    assert corners[0][1] == pytest.approx(corners[1][1], abs=1e-12)
+    assert corners[0][1] == pytest.approx(box_of(corners)[0][1], abs=1e-12)
+    area, polar = section_of(corners)
+    assert area == pytest.approx(0.5 * sides * 4.0 * math.sin(2.0 * math.pi / sides))
+    assert polar == pytest.approx(area * 4.0 / 6.0 * (2.0 + math.cos(2.0 * math.pi / sides)))
+    assert told(list(corners)) == (None, "")
+
+
+@given(ANGLES, st.floats(0.1, 10.0))
+def test_convex_outlines_pass_in_both_senses(angles: list[int], wide: float) -> None:
+    points = on_ellipse(angles, wide)
+    assert told(points) == told(points[::-1]) == (None, "")
+    assert area_of(points) == pytest.approx(-area_of(points[::-1]))
+
+
+BAD = {
+    "pentagram": ([(math.cos(k * 0.8 * math.pi), math.sin(k * 0.8 * math.pi)) for k in range(5)], "crosses itself"),
+    "bow tie": ([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)], "crosses itself"),
+    "visits a corner twice": ([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0), (-1.0, 1.0)], "crosses itself"),
+    "back the same way": ([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (1.0, 0.0)], "crosses itself"),
+    "arrow": ([(0.0, 0.0), (1.0, 0.0), (0.2, 0.2), (0.0, 1.0)], "not convex"),
+    "straight": ([(0.0, 0.0), (0.5, -1e-4), (1.0, 0.0), (0.0, 1.0)], "nearly straight"),
+    "twice": ([(0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (0.0, 1.0)], "same corner"),
+    "first is last": ([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)], "same corner"),
+    "close": ([(0.0, 0.0), (1.0, 0.0), (1.0, 1e-4), (0.0, 1.0)], "from the one before"),
+    "sliver": ([(0.0, 0.0), (1.0, 0.0), (0.5, 9e-4)], "sliver"),
+    "point": ([(1.0, 1.0)] * 3, "same place"),
+    "two corners": ([(0.0, 0.0), (1.0, 1.0)], "3 to 16"),
+}
+
+
+@pytest.mark.parametrize(("points", "message"), BAD.values(), ids=BAD)
+def test_every_fault_is_told(points: list[Corner], message: str) -> None:
+    assert message in told(points)[1]
+    assert message in told(points[::-1])[1]
