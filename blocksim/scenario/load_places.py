@@ -7,7 +7,8 @@ from itertools import chain
 from blocksim.scenario.findings import Finding
 from blocksim.scenario.models.loads import Face, Force, Gravity, OnBody, Pressure
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.overlap import Rectangles, crossings, near_pairs, penetration
+from blocksim.scenario.outlines import Corner, edges_of, holds
+from blocksim.scenario.overlap import Outlines, Rectangles, crossings, near_pairs, penetration
 from blocksim.scenario.placement import PlacedBody
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.segments import profile_segments, wall_segments
@@ -23,6 +24,8 @@ NORMALS: Mapping[Face, tuple[float, float]] = {
     "bottom": (0.0, -1.0),
 }
 """Outward normals of faces, in the body."""
+PARALLEL = 1e-6
+"""Sine of the angle between the normal of a face and the axis of an outline that it is named after, at most."""
 
 
 def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
@@ -64,11 +67,13 @@ def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str,
     elif body.fixed:
         yield Finding(place, f"body {shown(load.body)} is fixed; a load has no effect on it")
     elif isinstance(load, Force):
-        half = (0.5 * body.size_x, 0.5 * body.size_y)
-        if any(abs(at) > side * (1.0 + STRIP) for at, side in zip(load.point, half, strict=True)):
+        if not _has(body, load.point):
             size = f"{1e3 * body.size_x:g} x {1e3 * body.size_y:g} mm"
-            message = f"the point lies outside of body {shown(load.body)}, {size} about its centre"
-            yield Finding(("loads", number, "point"), message)
+            about = f"an outline in a box of {size}" if body.outline else f"{size} about its centre"
+            yield Finding(("loads", number, "point"), f"the point lies outside of body {shown(load.body)}, {about}")
+    elif isinstance(load, Pressure) and face_of(body, load.face) is None:
+        message = f"the outline of body {shown(load.body)} has no face whose normal points exactly that way"
+        yield Finding(("loads", number, "face"), message)
     elif isinstance(load, Pressure):
         other = next(_covers(scenario, load, body, [*bodies.values()]), None)
         if other is not None:
@@ -76,38 +81,56 @@ def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str,
             yield Finding(("loads", number, "face"), message)
 
 
+def _has(body: PlacedBody, point: Corner) -> bool:
+    if body.outline:
+        return holds(body.outline, point, _margin(body))
+    half = (0.5 * body.size_x, 0.5 * body.size_y)
+    return all(abs(at) <= side * (1.0 + STRIP) for at, side in zip(point, half, strict=True))
+
+
+def face_of(body: PlacedBody, face: Face) -> tuple[Corner, Corner] | None:
+    """Return the middle of a face and half its extents along x and y (m, in the body); None where there is none."""
+    nx, ny = NORMALS[face]
+    for (ax, ay), (bx, by), (x, y) in edges_of(body.corners):
+        if nx * x + ny * y > 0.0 and abs(nx * y - ny * x) <= PARALLEL:
+            return (0.5 * (ax + bx), 0.5 * (ay + by)), (0.5 * abs(bx - ax), 0.5 * abs(by - ay))
+    return None
+
+
 def _covers(scenario: Scenario, load: Pressure, body: PlacedBody, bodies: Sequence[PlacedBody]) -> Iterator[str]:
     """Yield what lies against a part of a face that is more than a line."""
     strip = strip_before(body, load.face)
-    if scenario.ground.profile is None and float(Rectangles.of([strip]).bottom[0]) < -_margin(body):
+    if scenario.ground.profile is None and float(Outlines.of([strip]).bottom[0]) < -_margin(body):
         yield "the ground"
     for _, segment, depth in crossings([strip], (*profile_segments(scenario), *wall_segments(scenario))):
         if depth > _margin(body):
             yield "the ground" if segment < len(profile_segments(scenario)) else "a wall"
-    outlines = Rectangles.of([strip, *bodies])
-    for one, other in chain.from_iterable(zip(*pairs, strict=True) for pairs in near_pairs(outlines)):
+    boxes = Rectangles.of([strip, *bodies])
+    for one, other in chain.from_iterable(zip(*pairs, strict=True) for pairs in near_pairs(boxes)):
         first, second = sorted((int(one), int(other)))
         if first == 0 and bodies[second - 1] is not body:
-            depth = float(penetration(Rectangles.of([strip]), Rectangles.of([bodies[second - 1]]))[0])
+            depth = float(penetration(Outlines.of([strip]), Outlines.of([bodies[second - 1]]))[0])
             if depth > _margin(body):
                 yield f"body {shown(bodies[second - 1].name)}"
 
 
 def _margin(body: PlacedBody) -> float:
     """Return how far (m) anything may reach into the strip: half of it."""
-    return 0.5 * STRIP * min(body.size_x, body.size_y)
+    return 0.5 * STRIP * body.least_width
 
 
 def strip_before(body: PlacedBody, face: Face) -> PlacedBody:
     """Return the strip before a face of a body, a little shorter than the face at both ends."""
-    thickness = STRIP * min(body.size_x, body.size_y)
+    thickness = STRIP * body.least_width
     nx, ny = NORMALS[face]
-    away = 0.5 * (abs(nx) * body.size_x + abs(ny) * body.size_y + thickness)
-    size_x, size_y = (thickness, body.size_y - 2.0 * thickness) if nx else (body.size_x - 2.0 * thickness, thickness)
+    (x, y), (half_x, half_y) = face_of(body, face) or ((0.0, 0.0), (0.0, 0.0))
+    x, y = x + 0.5 * nx * thickness, y + 0.5 * ny * thickness
+    size_x, size_y = (thickness, 2.0 * (half_y - thickness)) if nx else (2.0 * (half_x - thickness), thickness)
     cosine, sine = math.cos(body.angle), math.sin(body.angle)
     return body._replace(
         size_x=size_x,
         size_y=size_y,
-        x=body.x + away * (cosine * nx - sine * ny),
-        y=body.y + away * (sine * nx + cosine * ny),
+        x=body.x + cosine * x - sine * y,
+        y=body.y + sine * x + cosine * y,
+        outline=(),
     )

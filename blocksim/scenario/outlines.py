@@ -65,6 +65,30 @@ def box_of(corners: Sequence[Corner]) -> tuple[Corner, Corner]:
     return (min(xs), min(ys)), (max(xs), max(ys))
 
 
+def middle_of(corners: Sequence[Corner]) -> Corner:
+    """Return the middle (m) of the bounding box."""
+    (left, bottom), (right, top) = box_of(corners)
+    return 0.5 * (left + right), 0.5 * (bottom + top)
+
+
+@lru_cache(maxsize=256)
+def least_width(corners: Corners) -> float:
+    """Return the least distance (m) of two parallel lines with all corners between them; one is along an edge."""
+    return min(_reach(corners, a, b) for a, b in _edges(corners))
+
+
+def holds(corners: Sequence[Corner], point: Corner, margin: float) -> bool:
+    """Return whether a point is inside, or outside by no more than a margin (all m)."""
+    return all(_cross(_minus(b, a), _minus(point, a)) >= -margin * math.dist(a, b) for a, b in _edges(corners))
+
+
+def edges_of(corners: Sequence[Corner]) -> Iterator[tuple[Corner, Corner, Corner]]:
+    """Yield the ends (m) of every edge, counter-clockwise, and its outward unit normal."""
+    for a, b in _edges(corners):
+        length = math.dist(a, b)
+        yield a, b, ((b[1] - a[1]) / length, (a[0] - b[0]) / length)
+
+
 def regular(sides: int, radius: float) -> Corners:
     """Return a regular polygon about its centroid, corners at a radius (m), its lowest side level."""
     first = -0.5 * math.pi - math.pi / sides
@@ -122,7 +146,7 @@ def _bent(local: Sequence[Corner]) -> Iterator[tuple[int, str]]:
 
 
 def _thin(local: Sequence[Corner], extent: float) -> Iterator[tuple[None, str]]:
-    thickness = min(_reach(local, a, b) for a, b in _edges(local))
+    thickness = least_width(tuple(local))
     if thickness < SHORTEST:
         size = f"{1e3 * thickness * extent:.3g} mm thick and {1e3 * extent:.3g} mm long"
         yield None, f"a sliver: {size}; at least {SHORTEST:g} of the length is needed"

@@ -1,4 +1,4 @@
-"""Overlap of placed rectangles with one another, the ground and walls, exactly (separating axes)."""
+"""Overlap of placed blocks with one another, the ground and walls, exactly (separating axes)."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -8,6 +8,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.scenario.outlines import Corners, middle_of
 from blocksim.scenario.placement import PlacedBody
 from blocksim.scenario.segments import TOLERANCE, PlacedSegment
 
@@ -20,6 +21,10 @@ MOST_AT_ONCE = 1_000_000
 FEW = 32
 """Number of boxes up to which all pairs are examined; sorting into cells would take longer."""
 ROOM = 1.01
+RECTANGLE = -1
+"""Number of the polygon of what is a rectangle."""
+POLYGONS_AT_ONCE = 10_000
+"""Pairs with a polygon that are examined together; each takes up to 2 kB."""
 
 
 class Rectangles(NamedTuple):
@@ -34,10 +39,14 @@ class Rectangles(NamedTuple):
 
     @classmethod
     def of(cls, bodies: Sequence[PlacedBody]) -> Self:
-        """Take the outlines of placed bodies."""
+        """Take the boxes along the own axes of placed bodies; of rectangles that is the body."""
         x, y, size_x, size_y = (_column(bodies, attrgetter(name)) for name in ("x", "y", "size_x", "size_y"))
         # math, as numpy's functions may differ in the last digit
         cosine, sine = (np.fromiter((of(body.angle) for body in bodies), np.float64) for of in (math.cos, math.sin))
+        for index in (number for number, body in enumerate(bodies) if body.outline):
+            middle_x, middle_y = middle_of(bodies[index].outline)
+            x[index] += cosine[index] * middle_x - sine[index] * middle_y
+            y[index] += sine[index] * middle_x + cosine[index] * middle_y
         return cls(x, y, 0.5 * size_x, 0.5 * size_y, cosine, sine)
 
     @classmethod
@@ -57,18 +66,93 @@ class Rectangles(NamedTuple):
         across = np.abs(axis_y * self.cosine - axis_x * self.sine)
         return self.half_x * along + self.half_y * across
 
+
+class Outlines(NamedTuple):
+    """Outlines of n bodies or straight pieces: rectangles, and polygons in boxes along their own axes."""
+
+    boxes: Rectangles
+    kinds: Integers  # (n,) number of the polygon, RECTANGLE for none
+    polygons: Floats  # (s, k, 2) corners (m) along these axes from the middle of the box, the last one repeated
+
+    @classmethod
+    def of(cls, bodies: Sequence[PlacedBody]) -> Self:
+        """Take those of placed bodies."""
+        numbers: dict[Corners, int] = {(): RECTANGLE}
+        kinds = (numbers.setdefault(body.outline, len(numbers) - 1) for body in bodies)
+        kind = np.fromiter(kinds, np.int64, len(bodies))
+        return cls(Rectangles.of(bodies), kind, _table([*numbers][1:]))
+
+    @classmethod
+    def along(cls, segments: Sequence[PlacedSegment]) -> Self:
+        """Take straight pieces as rectangles without height."""
+        return cls.rectangles(Rectangles.along(segments))
+
+    @classmethod
+    def rectangles(cls, boxes: Rectangles) -> Self:
+        """Take rectangles alone."""
+        return cls(boxes, np.full(boxes.x.size, RECTANGLE), _table([]))
+
+    def and_pieces(self, pieces: "Outlines") -> "Outlines":
+        """Return these and rectangles after them."""
+        both = (np.concatenate(values) for values in zip(self.boxes, pieces.boxes, strict=True))
+        return Outlines(Rectangles(*both), np.concatenate([self.kinds, pieces.kinds]), self.polygons)
+
+    def some(self, indices: Integers) -> "Outlines":
+        """Take some of them, in this order."""
+        return Outlines(self.boxes.some(indices), self.kinds[indices], self.polygons)
+
+    def corners(self) -> Floats:
+        """Return all corners (m), counter-clockwise, the last one repeated, (n, k, 2) with k of at least 4."""
+        boxes, count = self.boxes, max(4, self.polygons.shape[1])
+        signs = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), *[(-1.0, 1.0)] * (count - 3)])
+        local = signs * np.stack([boxes.half_x, boxes.half_y], axis=-1)[:, None]
+        polygon = self.kinds != RECTANGLE
+        local[polygon] = self.polygons[self.kinds[polygon]]
+        cosine, sine = boxes.cosine[:, None], boxes.sine[:, None]
+        x = boxes.x[:, None] + cosine * local[..., 0] - sine * local[..., 1]
+        y = boxes.y[:, None] + sine * local[..., 0] + cosine * local[..., 1]
+        return np.stack([x, y], axis=-1)
+
     @property
     def bottom(self) -> Floats:
         """Heights of the lowest corners."""
-        return self.y - self.half_extent(0.0, 1.0)
+        lowest = self.boxes.y - self.boxes.half_extent(0.0, 1.0)
+        polygon = np.flatnonzero(self.kinds != RECTANGLE)
+        for some in _portions(polygon):
+            lowest[some] = self.some(some).corners()[..., 1].min(axis=1)
+        return lowest
+
+
+def _table(polygons: Sequence[Corners]) -> Floats:
+    """Return corners (m) from the middles of their boxes, (s, k, 2), the last ones repeated up to a common number."""
+    if not polygons:
+        return np.zeros((0, 4, 2))
+    most = max(4, *map(len, polygons))
+    full = [(*corners, *corners[-1:] * (most - len(corners))) for corners in polygons]
+    middles = [middle_of(corners) for corners in polygons]
+    table: Floats = np.array(full) - np.array(middles)[:, None]
+    return table
+
+
+def _portions(indices: Integers) -> Iterator[Integers]:
+    return (indices[begin : begin + POLYGONS_AT_ONCE] for begin in range(0, indices.size, POLYGONS_AT_ONCE))
 
 
 def _column(bodies: Sequence[PlacedBody], value: Callable[[PlacedBody], float]) -> Floats:
     return np.fromiter(map(value, bodies), np.float64, len(bodies))
 
 
-def penetration(ones: Rectangles, others: Rectangles) -> Floats:
-    """Return the penetration depths (m) of pairs of rectangles; zero or negative where they are apart."""
+def penetration(ones: Outlines, others: Outlines) -> Floats:
+    """Return the penetration depths (m) of pairs of outlines; zero or negative where they are apart."""
+    depth = _of_boxes(ones.boxes, others.boxes)
+    polygon = (ones.kinds != RECTANGLE) | (others.kinds != RECTANGLE)
+    for some in _portions(np.flatnonzero(polygon & (depth > 0.0))):
+        one, other = ones.some(some).corners(), others.some(some).corners()
+        depth[some] = np.minimum(_least_reach(one, other), _least_reach(other, one))
+    return depth
+
+
+def _of_boxes(ones: Rectangles, others: Rectangles) -> Floats:
     x, y = others.x - ones.x, others.y - ones.y
     axes = [axis for r in (ones, others) for axis in ((r.cosine, r.sine), (-r.sine, r.cosine))]
     depths = [ones.half_extent(*axis) + others.half_extent(*axis) - np.abs(x * axis[0] + y * axis[1]) for axis in axes]
@@ -76,28 +160,39 @@ def penetration(ones: Rectangles, others: Rectangles) -> Floats:
     return least
 
 
+def _least_reach(ones: Floats, others: Floats) -> Floats:
+    """Return how far (m) other corners (m, k, 2) reach behind the edge of ones behind which they reach least."""
+    edges = np.roll(ones, -1, axis=1) - ones
+    lengths = np.hypot(edges[..., 0], edges[..., 1])
+    is_edge = lengths > 0.0
+    normals = np.stack([edges[..., 1], -edges[..., 0]], axis=-1) / np.where(is_edge, lengths, 1.0)[..., None]
+    offsets = np.einsum("mec,mec->me", normals, ones - ones[:, :1])
+    farthest = np.einsum("mec,mkc->mek", normals, others - ones[:, :1]).min(axis=2)
+    least: Floats = np.where(is_edge, offsets - farthest, np.inf).min(axis=1)
+    return least
+
+
 def overlapping_pairs(bodies: Sequence[PlacedBody]) -> Iterator[tuple[int, int, float]]:
     """Yield the indices (smaller first) of every overlapping pair and its penetration in m."""
-    yield from _penetrating(Rectangles.of(bodies), len(bodies), within=True)
+    yield from _penetrating(Outlines.of(bodies), len(bodies), within=True)
 
 
 def crossings(bodies: Sequence[PlacedBody], segments: Sequence[PlacedSegment]) -> Iterator[tuple[int, int, float]]:
     """Yield the body, the segment and the depth (m) where a body lies across a segment."""
     if not segments:
         return
-    outlines, pieces = Rectangles.of(bodies), Rectangles.along(segments)
-    both = Rectangles(*(np.concatenate(values) for values in zip(outlines, pieces, strict=True)))
+    both = Outlines.of(bodies).and_pieces(Outlines.along(segments))
     for body, piece, depth in _penetrating(both, len(bodies), within=False):
         yield body, piece - len(bodies), depth
 
 
-def _penetrating(rectangles: Rectangles, bodies: int, *, within: bool) -> Iterator[tuple[int, int, float]]:
-    """Yield the pairs among the first `bodies` rectangles, or of one of them and one of the others, that penetrate."""
-    for one, other in near_pairs(rectangles):
+def _penetrating(outlines: Outlines, bodies: int, *, within: bool) -> Iterator[tuple[int, int, float]]:
+    """Yield the pairs among the first `bodies` outlines, or of one of them and one of the others, that penetrate."""
+    for one, other in near_pairs(outlines.boxes):
         first, second = np.minimum(one, other), np.maximum(one, other)
         wanted = second < bodies if within else (first < bodies) & (second >= bodies)
         first, second = first[wanted], second[wanted]
-        depth = penetration(rectangles.some(first), rectangles.some(second))
+        depth = penetration(outlines.some(first), outlines.some(second))
         deep = depth > TOLERANCE
         yield from zip(first[deep].tolist(), second[deep].tolist(), depth[deep].tolist(), strict=True)
 

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 from blocksim.scenario.keys import KeyPath
 from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.outlines import Corners, box_of, section_of
+from blocksim.scenario.outlines import Corners, least_width, middle_of, section_of
 from blocksim.scenario.structures import Pose
 
 
@@ -58,6 +58,11 @@ class PlacedBody(NamedTuple):
             return self.outline
         x, y = 0.5 * self.size_x, 0.5 * self.size_y
         return (-x, -y), (x, -y), (x, y), (-x, y)
+
+    @property
+    def least_width(self) -> float:
+        """Smaller side in m; of an outline the least distance of two parallel lines with the block between them."""
+        return least_width(self.outline) if self.outline else min(self.size_x, self.size_y)
 
     @property
     def radius(self) -> float:
@@ -126,9 +131,8 @@ def _placed(scenario: Scenario) -> _Placement:
 
 def _about_centroid(poses: Sequence[Pose], block: Block) -> Sequence[Pose]:
     """Return poses of the centroid for those of the middle of the bounding box, by which structures place blocks."""
-    low, high = box_of(block.polygon or ((0.0, 0.0),))
-    x, y = -0.5 * (low[0] + high[0]), -0.5 * (low[1] + high[1])
-    return [_moved(pose, x, y) for pose in poses] if x or y else poses
+    x, y = middle_of(block.polygon or ((0.0, 0.0),))
+    return [_moved(pose, -x, -y) for pose in poses] if x or y else poses
 
 
 def _moved(pose: Pose, x: float, y: float) -> Pose:

@@ -10,6 +10,7 @@ from blocksim.scenario.findings import Finding
 from blocksim.scenario.keys import KeyPath
 from blocksim.scenario.models.probe import AnyProbe, ForceProbe, JointProbe, PointProbe
 from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.outlines import edges_of
 from blocksim.scenario.placement import PlacedBody
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.segments import TOLERANCE
@@ -91,39 +92,39 @@ def joint_between(a: PlacedBody, b: PlacedBody) -> Joint | None:
 
     The faces are parallel, and overlap along each other. Of several such pairs that with the widest gap is the joint.
     """
-    if abs(math.sin(2.0 * (b.angle - a.angle))) > 2.0 * PARALLEL:
-        return None
-    found = [one for one in (_facing(a, b, quarter) for quarter in range(4)) if one is not None]
+    found = [one for one in (_facing(a, b, *edge) for edge in edges_of(a.corners)) if one is not None]
     return max(found, key=lambda one: one[0])[1] if found else None
 
 
-def _facing(a: PlacedBody, b: PlacedBody, quarter: int) -> tuple[float, Joint] | None:
-    """Return the gap (m) and the joint at the face of a whose normal is turned by so many quarters from its x axis."""
-    normal = _turned((1.0, 0.0), quarter)
-    tangent = _turned(normal, 3)
-    corners = np.array([_local(a, *corner) for corner in _corners(b)])
-    across, along = corners @ np.array(normal), corners @ np.array(tangent)
-    half, side = (0.5 * a.size_x, 0.5 * a.size_y) if quarter % 2 == 0 else (0.5 * a.size_y, 0.5 * a.size_x)
+def _facing(a: PlacedBody, b: PlacedBody, begin: Point, end: Point, normal: Point) -> tuple[float, Joint] | None:
+    """Return the gap (m) and the joint between a face of a and the face of b opposite it."""
+    opposite = _opposite(a, b, normal)
+    if opposite is None:
+        return None
+    tangent = (normal[1], -normal[0])
+    across, along = np.array(opposite) @ np.array(normal), np.array(opposite) @ np.array(tangent)
+    half = _dot(begin, normal)
     gap = float(across.min()) - half
-    first, last = max(float(along.min()), -side), min(float(along.max()), side)
-    smallest = min(a.size_x, a.size_y, b.size_x, b.size_y)
+    first, last = max(float(along.min()), _dot(end, tangent)), min(float(along.max()), _dot(begin, tangent))
+    smallest = min(a.least_width, b.least_width)
     if gap < -max(TOLERANCE, PARALLEL * smallest) or last - first < PARALLEL * smallest:
         return None
     ends = [(half * normal[0] + s * tangent[0], half * normal[1] + s * tangent[1]) for s in (first, last)]
-    opposite = [(x + gap * normal[0], y + gap * normal[1]) for x, y in ends]
-    of_b = [_local(b, *_placed(a, *point)) for point in opposite]
+    places = [(x + gap * normal[0], y + gap * normal[1]) for x, y in ends]
+    of_b = [_local(b, *_placed(a, *point)) for point in places]
     return gap, Joint((ends[0], ends[1]), (of_b[0], of_b[1]), normal, tangent)
 
 
-def _turned(vector: Point, quarters: int) -> Point:
-    for _ in range(quarters):
-        vector = (-vector[1], vector[0])
-    return vector
+def _opposite(a: PlacedBody, b: PlacedBody, normal: Point) -> tuple[Point, Point] | None:
+    """Return the ends of the face of b that is parallel to one of a with this normal and faces it, in the axes of a."""
+    for begin, end, of_b in edges_of([_local(a, *_placed(b, *corner)) for corner in b.corners]):
+        if _dot(of_b, normal) < 0.0 and abs(of_b[0] * normal[1] - of_b[1] * normal[0]) <= PARALLEL:
+            return begin, end
+    return None
 
 
-def _corners(body: PlacedBody) -> list[Point]:
-    x, y = 0.5 * body.size_x, 0.5 * body.size_y
-    return [_placed(body, *corner) for corner in ((-x, -y), (x, -y), (x, y), (-x, y))]
+def _dot(one: Point, other: Point) -> float:
+    return one[0] * other[0] + one[1] * other[1]
 
 
 def _placed(body: PlacedBody, x: float, y: float) -> Point:

@@ -58,7 +58,8 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
     if endless:
         yield from endless
         return
-    smallest = min(map(min, {(body.size_x, body.size_y) for body in bodies}))
+    kinds = {(body.size_x, body.size_y, body.outline): body for body in bodies}
+    smallest = min(body.least_width for body in kinds.values())
     yield from _coarse_particles(scenario, smallest)
     yield from _fine_particles(scenario)
     farthest = max(max(abs(one) for one in ends) for ends in (_ends(bodies, "x"), _ends(bodies, "y")))
@@ -233,7 +234,7 @@ def _below_ground(
     if scenario.ground.profile is not None:
         yield from _below_profile(scenario, origins, bodies)
         return
-    bottom = overlap.Rectangles.of(bodies).bottom
+    bottom = overlap.Outlines.of(bodies).bottom
     for index in np.flatnonzero(bottom < -TOLERANCE)[:MAX_FINDINGS]:
         depth = _mm(-float(bottom[index]))
         yield Finding(origins[index], f"body {bodies[index].name} reaches {depth} below the ground (y = 0)")

@@ -111,7 +111,11 @@ class _Shapes(NamedTuple):
 def _shapes_of(placed: Sequence[PlacedBody]) -> _Shapes:
     sides = np.array([(body.size_x, body.size_y) for body in placed], dtype=np.float64).reshape(-1, 2)
     is_free = np.array([not body.fixed or body.freed for body in placed], dtype=np.bool_)
-    return _Shapes(sides.min(axis=1), 0.5 * np.hypot(*sides.T), is_free)
+    shortest, reach = sides.min(axis=1), 0.5 * np.hypot(*sides.T)
+    for number, body in enumerate(placed):
+        if body.outline:
+            shortest[number], reach[number] = body.least_width, body.radius
+    return _Shapes(shortest, reach, is_free)
 
 
 def _shares(shapes: _Shapes, way: Floats, turn: Floats) -> Floats:

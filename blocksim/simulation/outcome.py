@@ -18,7 +18,7 @@ from blocksim.kernels.depth import MIDDLE, ROWS_APART
 from blocksim.kernels.models import KERNEL, SURFACE
 from blocksim.kernels.nonsmooth.arrays import TOUCHING
 from blocksim.scenario import PlacedBody
-from blocksim.scenario.overlap import Rectangles, penetration
+from blocksim.scenario.overlap import Outlines, Rectangles, penetration
 from blocksim.simulation.ledger import RESIDUAL_LIMIT
 from blocksim.simulation.recorder import MOTION
 from blocksim.simulation.schemes import AnyScene
@@ -159,7 +159,8 @@ def _overlaps_of_springs(world: World) -> Pairs:
 def _penetrations(world: World, pairs: NDArray[Any]) -> NDArray[np.float64]:
     """Return how deep (m) the rectangles of pairs overlap, or the block lies below the ground."""
     bodies = world.bodies
-    rectangles = Rectangles(*(bodies[name] for name in ("x", "y", "half_x", "half_y", "cos", "sin")))
+    boxes = Rectangles(*(bodies[name] for name in ("x", "y", "half_x", "half_y", "cos", "sin")))
+    rectangles = Outlines.rectangles(boxes)
     is_ground = pairs["b"] == bodies.size - 1
     below = bodies[-1].y - rectangles.bottom[pairs["a"]]
     return np.where(is_ground, below, penetration(rectangles.some(pairs["a"]), rectangles.some(pairs["b"])))

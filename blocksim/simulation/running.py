@@ -329,7 +329,7 @@ def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResul
     for number in ended.pending if ended.outcome.is_finished else ():
         yield f"events.{number} has not happened, as nothing came to rest: {in_words(scenario.events[number])}"
     if isinstance(scenario.time, Nonsmooth) and ended.outcome.is_finished:
-        sunk = overlap_warning(ended.overlap, min(min(body.size_x, body.size_y) for body in placed))
+        sunk = overlap_warning(ended.overlap, min(body.least_width for body in placed))
         if sunk:
             yield sunk
 

@@ -282,7 +282,7 @@ class _Settling:
 
 def _smallest(placed: Sequence[PlacedBody]) -> float:
     """Return the smallest side (m) of all blocks."""
-    return min(min(body.size_x, body.size_y) for body in placed)
+    return min(body.least_width for body in placed)
 
 
 def _restore(scene: AnyScene, kept: Sequence[NDArray[Any]]) -> None:

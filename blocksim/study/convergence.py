@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
-from math import hypot, inf, isfinite, log, nan
+from math import inf, isfinite, log, nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,12 +164,12 @@ class Coordinates:
     """Final states as points in a space whose largest coordinate difference is the distance defined above (mm)."""
 
     def __init__(self, scenario: Scenario) -> None:
-        """Learn names and half diagonals of the blocks."""
+        """Learn names and sizes of the blocks."""
         placed = place_bodies(scenario)
         self.blocks = tuple(body.name for body in placed)
-        self._reach = np.array([0.5 * MILLI * hypot(body.size_x, body.size_y) for body in placed])
+        self._reach = np.array([MILLI * body.radius for body in placed])
         sides = MILLI * np.array([(body.size_x, body.size_y) for body in placed])
-        self._longest, self._shortest = sides.max(axis=1), sides.min(axis=1)
+        self._longest, self._shortest = sides.max(axis=1), np.array([MILLI * body.least_width for body in placed])
 
     def read(self, row: Row) -> tuple[Floats, Floats]:
         """Return final x (mm) and rotation (degrees) of every block, of no block where the run did not finish."""

@@ -8,9 +8,10 @@ import numpy as np
 
 from blocksim.kernels.arrays import LOAD, LOAD_FIELD, LOAD_FORCE, LOAD_PIECE, LOAD_TILT, LOAD_WATER, Records, zeros
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
-from blocksim.scenario.load_places import NORMALS
+from blocksim.scenario.load_places import NORMALS, face_of
 from blocksim.scenario.models.history import Stretch
-from blocksim.scenario.models.loads import AnyLoad, Force, Gravity, Horizontal, Moment, OnBody, Pressure
+from blocksim.scenario.models.loads import AnyLoad, Face, Force, Gravity, Horizontal, Moment, OnBody, Pressure
+from blocksim.scenario.outlines import Corner
 
 
 class Applied(NamedTuple):
@@ -76,11 +77,18 @@ def _values(scenario: Scenario, load: AnyLoad, body: PlacedBody | None) -> dict[
     return _pressure(load, body, tilt)
 
 
+def _face(body: PlacedBody, face: Face) -> tuple[Corner, Corner]:
+    """Return the middle of a face and half its extents (m, in the body), of which one is zero."""
+    nx, ny = NORMALS[face]
+    found = face_of(body, face)
+    assert found is not None  # noqa: S101 - a scenario without this face is refused
+    middle, (half_x, half_y) = found
+    return middle, (abs(ny) * half_x, abs(nx) * half_y)
+
+
 def _pressure(load: Pressure, body: PlacedBody, tilt: float) -> dict[str, float]:
     nx, ny = NORMALS[load.face]
-    half_x, half_y = 0.5 * body.size_x, 0.5 * body.size_y
-    x, y = nx * half_x, ny * half_y
-    along_x, along_y = abs(ny) * half_x, abs(nx) * half_y
+    (x, y), (along_x, along_y) = _face(body, load.face)
     length = 2.0 * (along_x + along_y)
     values = {"x": x, "y": y, "turns": 1.0}
     if load.magnitude is not None:
@@ -116,14 +124,14 @@ def _pushes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[float]
 
 def _push_on(load: OnBody, body: PlacedBody) -> float:
     """Return the largest acceleration (m/s2) of a point of a body for a factor of one."""
-    radius = 0.5 * math.hypot(body.size_x, body.size_y)
+    radius = body.radius
     if isinstance(load, Moment):
         return abs(load.magnitude) * radius / body.inertia
     if isinstance(load, Force):
         force, arm = abs(load.magnitude), math.hypot(*load.point)
     else:
-        nx, _ = NORMALS[load.face]
-        area = (body.size_y if nx else body.size_x) * body.depth
+        _, (along_x, along_y) = _face(body, load.face)
+        area = 2.0 * (along_x + along_y) * body.depth
         deepest = abs(load.magnitude or 0.0)
         if load.water_level is not None:
             deepest = load.unit_weight * (load.water_level + math.hypot(body.x, body.y) + radius)

@@ -10,6 +10,7 @@ from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, place_
 from blocksim.scenario.models.stepping import Explicit, Nonsmooth
 from blocksim.scenario.motion import motion_pieces
 from blocksim.scenario.motion_peaks import motion_peaks
+from blocksim.scenario.outlines import edges_of
 from blocksim.world.bodies import outline_of, with_freed
 from blocksim.world.bounds import bounds_of
 from blocksim.world.build import build_world
@@ -25,7 +26,7 @@ from blocksim.world.memory import (
     recorded_contacts,
 )
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
-from blocksim.world.particles import particle_count
+from blocksim.world.particles import division, particle_count
 from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
 from blocksim.world.scenes import stack_of_one
@@ -212,8 +213,15 @@ def _motion(scenario: Scenario) -> MotionDescription | None:
 
 def _particles(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> int:
     spacing = scenario.contact.particle_spacing
-    sizes = Counter((body.size_x, body.size_y) for body in placed)
-    return sum(count * particle_count(*size, spacing) for size, count in sizes.items())
+    counts = Counter((body.size_x, body.size_y, body.outline) for body in placed)
+    kinds = {(body.size_x, body.size_y, body.outline): body for body in placed}
+    return sum(counts[kind] * _particles_of(body, spacing) for kind, body in kinds.items())
+
+
+def _particles_of(body: PlacedBody, spacing: float) -> int:
+    if not body.outline:
+        return particle_count(body.size_x, body.size_y, spacing)
+    return sum(division(math.dist(a, b), spacing) for a, b, _ in edges_of(body.outline))
 
 
 def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> Iterator[PairDescription]:
@@ -247,7 +255,10 @@ def _rigid_pair(found: PairDescription, substep: float, touching: Sequence[Place
 
 def _softest(placed: Sequence[PlacedBody]) -> dict[ContactClass, PlacedBody]:
     """Return the block that gives way most of every class of blocks."""
-    kinds = {(body.material, body.depth, body.size_x, body.size_y, body.density, body.fixed): body for body in placed}
+    kinds = {
+        (body.material, body.depth, body.size_x, body.size_y, body.density, body.fixed, body.outline): body
+        for body in placed
+    }
     found: dict[ContactClass, PlacedBody] = {}
     for body in sorted(kinds.values(), key=inverse_mass):
         found[ContactClass(body.material, body.depth)] = body

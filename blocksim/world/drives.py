@@ -58,7 +58,7 @@ def driven_speed(scenario: Scenario) -> float:
 
 
 def _speed(drive: Drive, body: PlacedBody) -> float:
-    reach = math.dist((body.x, body.y), drive.about) + 0.5 * math.hypot(body.size_x, body.size_y)
+    reach = math.dist((body.x, body.y), drive.about) + body.radius
     return greatest_rate(drive.shift) + reach * greatest_rate(drive.turn)
 
 
@@ -76,5 +76,5 @@ def _rise(drive: Drive, scenario: Scenario) -> float:
     ends.append(c0 + length * (c1 + length * (c2 + length * c3)))
     up = max(0.0, float(np.max(drive.along[1] * np.concatenate(ends))))
     body = place_bodies(scenario)[drive.body]
-    reach = math.dist((body.x, body.y), drive.about) + 0.5 * math.hypot(body.size_x, body.size_y)
+    reach = math.dist((body.x, body.y), drive.about) + body.radius
     return up + (2.0 * reach if drive.turn.coefficients[:, 1:].any() else 0.0)

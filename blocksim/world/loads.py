@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from blocksim.scenario import PlacedBody
+from blocksim.scenario.outlines import box_of as corners_box
 
 TOUCHING = 1e-3  # of the smallest side: faces that near to each other touch
 
@@ -52,15 +53,23 @@ class _Carried:
 
 def box_of(body: PlacedBody) -> Box:
     """Return the bounding box of a block."""
+    if body.outline:
+        return _box_of_outline(body)
     c, s = abs(math.cos(body.angle)), abs(math.sin(body.angle))
     half_x, half_y = 0.5 * (c * body.size_x + s * body.size_y), 0.5 * (s * body.size_x + c * body.size_y)
     return Box(body.x - half_x, body.x + half_x, body.y - half_y, body.y + half_y)
 
 
+def _box_of_outline(body: PlacedBody) -> Box:
+    c, s = math.cos(body.angle), math.sin(body.angle)
+    (left, bottom), (right, top) = corners_box([(c * x - s * y, s * x + c * y) for x, y in body.outline])
+    return Box(body.x + left, body.x + right, body.y + bottom, body.y + top)
+
+
 def loads_at_rest(placed: Sequence[PlacedBody], gravity: float) -> Iterator[Load]:
     """Yield what the ends of all contacts below free blocks carry, from above downwards."""
     boxes = [box_of(body) for body in placed]
-    below = _Below(boxes, TOUCHING * min(min(body.size_x, body.size_y) for body in placed))
+    below = _Below(boxes, TOUCHING * min(body.least_width for body in placed))
     carried = [_Carried(body.mass * gravity, body.x) for body in placed]
     for upper in sorted(range(len(placed)), key=lambda i: -boxes[i].bottom):
         if not placed[upper].fixed:

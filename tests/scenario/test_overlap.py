@@ -1,4 +1,4 @@
-"""Overlap of rectangles, against polygons clipped another way, and over many bodies."""
+"""Overlap of rectangles and convex polygons, against polygons clipped another way, and over many bodies."""
 
 import math
 from itertools import combinations
@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.scenario.overlap import Rectangles, crossings, near_pairs, overlapping_pairs, penetration
+from blocksim.scenario.outlines import Corner, centred
+from blocksim.scenario.overlap import Outlines, Rectangles, crossings, near_pairs, overlapping_pairs, penetration
 from blocksim.scenario.placement import PlacedBody
 from blocksim.scenario.segments import PlacedSegment
 
@@ -18,9 +19,13 @@ def body(x: float, y: float, angle: float = 0.0, size_x: float = 0.04, size_y: f
 
 def corners(b: PlacedBody) -> list[tuple[float, float]]:
     c, s = math.cos(b.angle), math.sin(b.angle)
-    signs = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
-    local = [(i * b.size_x / 2, j * b.size_y / 2) for i, j in signs]
-    return [(b.x + c * u - s * v, b.y + s * u + c * v) for u, v in local]
+    return [(b.x + c * u - s * v, b.y + s * u + c * v) for u, v in b.corners]
+
+
+def polygon(x: float, y: float, points: list[Corner], angle: float = 0.0) -> PlacedBody:
+    outline = centred(points)
+    sizes = [max(values) - min(values) for values in zip(*outline, strict=True)]
+    return body(x, y, angle, *sizes)._replace(outline=outline)
 
 
 def common_area(one: PlacedBody, other: PlacedBody) -> float:
@@ -63,7 +68,7 @@ def length_inside(piece: PlacedSegment, b: PlacedBody) -> float:
 
 
 def depth_of(one: PlacedBody, other: PlacedBody) -> float:
-    (depth,) = penetration(Rectangles.of([one]), Rectangles.of([other]))
+    (depth,) = penetration(Outlines.of([one]), Outlines.of([other]))
     return float(depth)
 
 
@@ -191,5 +196,58 @@ def test_bodies_without_pieces_cross_none() -> None:
 
 
 def test_the_lowest_corner_of_a_turned_rectangle() -> None:
-    turned = Rectangles.of([body(0.0, 0.0, math.pi / 4)])
+    turned = Outlines.of([body(0.0, 0.0, math.pi / 4)])
     assert turned.bottom == pytest.approx([-0.03 * math.sqrt(0.5)], abs=1e-15)
+
+
+CORNERS = st.lists(st.integers(0, 23), min_size=3, max_size=7, unique=True).map(sorted)
+
+
+@st.composite
+def polygons(draw: st.DrawFn) -> PlacedBody:
+    """Draw a polygon with corners on an ellipse, or a rectangle."""
+    x, y, angle = draw(place), draw(place), draw(turn)
+    if draw(st.booleans()):
+        return body(x, y, angle)
+    angles = [math.radians(15.0 * number) for number in draw(CORNERS)]
+    return polygon(x, y, [(0.03 * math.cos(a), 0.02 * math.sin(a)) for a in angles], angle)
+
+
+@given(polygons(), polygons())
+def test_polygons_penetrate_where_they_have_an_area_in_common(one: PlacedBody, other: PlacedBody) -> None:
+    depth = depth_of(one, other)
+    assert (common_area(one, other) > 0) == (depth > 0) or abs(depth) < 1e-6
+    assert depth == pytest.approx(depth_of(other, one), abs=1e-15)
+    lowest = min(y for _, y in corners(one))
+    assert Outlines.of([other, one]).bottom[1] == pytest.approx(lowest, abs=1e-15)
+
+
+@given(st.lists(polygons(), max_size=40))
+def test_the_cells_find_polygons_too(bodies: list[PlacedBody]) -> None:
+    expected = {(i, j) for i, j in combinations(range(len(bodies)), 2) if depth_of(bodies[i], bodies[j]) > 1e-9}
+    assert {(i, j) for i, j, _ in overlapping_pairs(bodies)} == expected
+
+
+@given(polygons(), st.tuples(place, place, place, place).filter(lambda p: math.dist(p[:2], p[2:]) > 1e-4))
+def test_a_piece_crosses_a_polygon_where_a_part_of_it_is_inside(
+    block: PlacedBody, ends: tuple[float, float, float, float]
+) -> None:
+    found = list(crossings([block], [segment(*ends)]))
+    assert bool(found) == (length_inside(segment(*ends), block) > 0) or all(depth < 1e-6 for *_, depth in found)
+
+
+@given(polygons(), turn, turn)
+def test_a_rectangle_as_an_outline_penetrates_as_deep(one: PlacedBody, angle: float, way: float) -> None:
+    rectangle = body(one.x + 0.02 * math.cos(way), one.y + 0.02 * math.sin(way), angle)
+    depth = depth_of(one, rectangle)
+    assert depth_of(one, rectangle._replace(outline=rectangle.corners)) == pytest.approx(depth, abs=1e-15) or depth < 0
+
+
+def test_a_wedge_is_not_in_the_way_outside_of_its_own_edges() -> None:
+    wedge = polygon(0.0, 0.0, [(0.0, 0.0), (0.04, 0.0), (0.0, 0.04)])
+    beyond = body(wedge.x + 0.025, wedge.y + 0.025, size_x=0.01, size_y=0.01)
+    assert list(overlapping_pairs([wedge, beyond])) == []
+    touching = polygon(*(2 / 75, 2 / 75), [(0.04, 0.0), (0.04, 0.04), (0.0, 0.04)])
+    wedge = polygon(*(1 / 75, 1 / 75), [(0.0, 0.0), (0.04, 0.0), (0.0, 0.04)])
+    deeper = touching._replace(x=touching.x - 0.001)
+    assert [pair[:2] for pair in overlapping_pairs([wedge, deeper])] == [(0, 1)]

@@ -1,0 +1,123 @@
+"""Where blocks with an outline may be at the start, and where loads and joints find their faces."""
+
+import math
+from typing import Any
+
+import pytest
+
+from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.scenario.load_places import face_of, strip_before
+from blocksim.scenario.models.loads import Face
+from blocksim.scenario.overrides import frozen
+from blocksim.scenario.probes import joint_between
+from blocksim.scenario.start import impossible_starts
+from tests.scenario.conftest import data_of
+
+OAK = {"depth": 0.1, "material": "oak"}
+BLOCKS = {
+    "wedge": {"outline": [[0, 0], [0.3, 0], [0, 0.3]], **OAK},
+    "hexagon": {"sides": 6, "radius": 0.1, **OAK},
+    "keystone": {"outline": [[-0.1, 0], [0.1, 0], [0.2, 0.2], [-0.2, 0.2]], **OAK},
+}
+HIGH = 0.1 * math.sqrt(3.0) / 2.0
+
+
+def scenario(bodies: list[dict[str, Any]], **tables: object) -> Scenario:
+    return Scenario.model_validate(frozen(data_of(blocks=BLOCKS, bodies=bodies, **tables)))
+
+
+def told(bodies: list[dict[str, Any]], **tables: object) -> list[tuple[object, str]]:
+    return [(finding.path, finding.message) for finding in impossible_starts(scenario(bodies, **tables))]
+
+
+def placed(block: str, x: float, y: float, angle: float = 0.0) -> PlacedBody:
+    degrees = f"{math.degrees(angle)!r} deg" if angle else 0
+    return place_bodies(scenario([{"block": block, "x": x, "y": y, "angle": degrees}]))[0]
+
+
+def test_a_hexagon_stands_on_its_lowest_side_and_not_deeper() -> None:
+    assert told([{"block": "hexagon", "x": 0, "y": HIGH}]) == []
+    ((path, message),) = told([{"block": "hexagon", "x": 0, "y": HIGH - 0.002}])
+    assert (path, message) == (("bodies", 0), "body 1 reaches 2 mm below the ground (y = 0)")
+
+
+def test_wedges_may_fill_the_box_of_one_another_but_not_overlap() -> None:
+    first = {"block": "wedge", "x": 0.1, "y": 0.1}
+    assert told([first, {"block": "wedge", "x": 0.2, "y": 0.2, "angle": "180 deg"}]) == []
+    ((path, message),) = told([first, {"block": "wedge", "x": 0.18, "y": 0.2, "angle": "180 deg"}])
+    assert path == ("bodies", 1)
+    assert message == f"bodies 1 and 2 overlap by {20 / math.sqrt(2.0):.6g} mm; they may only touch"
+
+
+def test_a_wedge_lies_on_a_slope_of_its_own_angle() -> None:
+    slope = {"profile": [[0, 0.3], [0.3, 0]]}
+    body = {"block": "wedge", "x": 0.2, "y": 0.2, "angle": "180 deg"}
+    assert told([body], ground=slope) == []
+    ((_, message),) = told([{**body, "y": 0.19}], ground=slope)
+    assert message == f"body 1 reaches {10 / math.sqrt(2.0):.6g} mm into the ground's profile"
+    ((_, message),) = told([{**body, "y": -0.2}], ground=slope)
+    assert "lies below the ground's profile" in message
+
+
+def test_a_wall_may_pass_by_the_slanted_side() -> None:
+    body = {"block": "wedge", "x": 0.1, "y": 0.1}
+    assert told([body], walls=[{"from": [0.31, 0], "to": [0, 0.31]}]) == []
+    ((_, message),) = told([body], walls=[{"from": [0.29, 0], "to": [0, 0.29]}])
+    assert "body 1 and walls.0 overlap" in message
+
+
+@pytest.mark.parametrize(
+    ("load", "key"),
+    [
+        ({"kind": "force", "point": [0.15, 0.15]}, "point"),
+        ({"kind": "pressure", "face": "right"}, "face"),
+        ({"kind": "pressure", "face": "top"}, "face"),
+    ],
+)
+def test_loads_beside_an_outline_are_refused(load: dict[str, Any], key: str) -> None:
+    body = {"block": "wedge", "x": 0.1, "y": 0.1}
+    ((path, _),) = told([body], loads=[{"body": "1", "magnitude": 1, **load}])
+    assert path == ("loads", 0, key)
+
+
+def test_loads_on_an_outline_are_accepted() -> None:
+    body = {"block": "wedge", "x": 0.1, "y": 0.1}
+    force = {"kind": "force", "body": "1", "magnitude": 1, "point": [0.05, 0.05]}
+    assert told([body], loads=[force, {"kind": "pressure", "body": "1", "magnitude": 1, "face": "left"}]) == []
+
+
+@pytest.mark.parametrize(
+    ("face", "middle", "half"),
+    [("bottom", (0.05, -0.1), (0.15, 0.0)), ("left", (-0.1, 0.05), (0.0, 0.15)), ("top", None, None)],
+)
+def test_the_face_of_an_outline_is_that_whose_normal_points_that_way(face: Face, middle: Any, half: Any) -> None:
+    body = placed("wedge", 0.1, 0.1, math.radians(30))
+    found = face_of(body, face)
+    if middle is None:
+        assert found is None
+        return
+    assert found is not None
+    assert found[0] == pytest.approx(middle, abs=1e-15)
+    assert found[1] == pytest.approx(half, abs=1e-15)
+    strip = strip_before(body, face)
+    along, across = sorted((strip.size_x, strip.size_y), reverse=True)
+    assert (along, across) == pytest.approx((0.3 - 2.0 * across, 1e-3 * 0.3 / math.sqrt(2.0)))
+    assert strip.outline == ()
+
+
+def test_voussoirs_have_a_joint_along_their_slanted_faces() -> None:
+    slope, gap = math.atan2(0.2, 0.1), 0.01  # of the right face of the first
+    normal = (math.sin(slope), -math.cos(slope))
+    one = placed("keystone", 0.0, 1.0)
+    other = placed("keystone", 0.0, 0.0, 2.0 * slope - math.pi)  # its left face is turned into that direction
+    c, s = math.cos(other.angle), math.sin(other.angle)
+    (x, y), (foot_x, foot_y) = one.corners[1], other.corners[0]
+    moved = other._replace(
+        x=one.x + x + gap * normal[0] - (c * foot_x - s * foot_y),
+        y=one.y + y + gap * normal[1] - (s * foot_x + c * foot_y),
+    )
+    joint = joint_between(one, moved)
+    assert joint is not None
+    assert joint.normal == pytest.approx(normal)
+    assert math.dist(*joint.ends_of_a) == pytest.approx(math.hypot(0.1, 0.2))
+    assert joint_between(one, moved._replace(angle=moved.angle + 1e-3)) is None
