@@ -29,7 +29,7 @@ def export_command(
     """Write all frames of a run as CSV or VTKHDF.
 
     CSV: a row for each frame and block, with units in the heads; stored contacts go into a second file,
-    NAME_contacts.csv. VTKHDF: one file with all times, blocks as rectangles with number, velocity and rotation,
+    NAME_contacts.csv. VTKHDF: one file with all times, blocks with number, velocity and rotation,
     ground and walls with number 0; ParaView opens it. A run that was stopped or killed is written as far as it came.
 
     An older export is replaced; any other file only with --overwrite.

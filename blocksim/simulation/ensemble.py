@@ -42,7 +42,7 @@ from blocksim.simulation.settling import begun
 from blocksim.simulation.table import COLUMNS, Columns, as_frame, final_values
 from blocksim.simulation.team import ALONE
 from blocksim.world.scenes import Refusal, Stack, member, stack_of_one
-from blocksim.world.systems.blocks import blocks_placed, motion_of
+from blocksim.world.systems.blocks import blocks_placed, motion_of, outlines_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -351,7 +351,7 @@ class Closing:
         further = mass_of_systems(member(scenes, 0))  # in a stack of one, or zero
         masses = [float(np.sum(mass)) + further for mass in world.bodies["mass"]]  # one by one: the order matters
         self.in_play = [*map(InPlay, masses, moved)]
-        self.columns = final_values(self.motion, _shapes(placed)).tolist()
+        self.columns = final_values(self.motion, _shapes(placed), _outlines(placed)).tolist()
         support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
         self.end_speeds = end_speeds(placed, self.motion, support, [self._seconds(m) for m in range(len(placed))])
 
@@ -377,6 +377,12 @@ class Closing:
             first_move=first_move,
             end_speed=self.end_speeds[m],
         )
+
+
+def _outlines(placed: list[Placed]) -> NDArray[np.float64] | None:
+    """Return the corners (m, b, k, 2) of blocks; None where all are rectangles."""
+    outlines = outlines_of([one for member in placed for one in member])
+    return None if outlines is None else outlines.reshape(len(placed), -1, *outlines.shape[1:])
 
 
 def _shapes(placed: list[Placed]) -> NDArray[np.float64]:

@@ -44,6 +44,7 @@ class Frames:
     mass: Floats | None = None  # (b,) kg
     inertia: Floats | None = None  # (b,) kg m2
     others: tuple[Track, ...] = ()  # systems beside the blocks
+    outlines: Floats | None = None  # (b, k, 2) m, corners along the body's own axes, where any is no rectangle
 
     @property
     def tracks(self) -> tuple[Track, ...]:
@@ -51,7 +52,7 @@ class Frames:
         unknown = np.full(len(self.names), np.nan)
         shape = (self.size_x, self.size_y, unknown, *(unknown if one is None else one for one in self._inert))
         start = np.stack([unknown, unknown, self.start_angle, unknown, unknown, unknown])
-        blocks = Present(BLOCKS, Elements(self.names, np.stack(shape), start))
+        blocks = Present(BLOCKS, Elements(self.names, np.stack(shape), start, self.outlines))
         values = np.stack([getattr(self, one.name) for one in BLOCKS.quantities], axis=1)
         return (Track(blocks, values), *self.others)
 

@@ -215,4 +215,5 @@ def frames_from_rows(systems: Sequence[Present], time_step: float, rows: Rows) -
         start_angle=blocks.at_start("angle"),
         contacts=rows.contacts,
         others=tuple(others),
+        outlines=blocks.present.elements.outlines,
     )

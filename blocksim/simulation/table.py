@@ -16,6 +16,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.bounded_read import MEGABYTE, read_limited
 from blocksim.simulation.frames import Floats, Frames
+from blocksim.world.systems.blocks import boxes_around
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,34 +44,37 @@ def final_columns(frames: Frames) -> Columns:
     """Return the table of the last frame: a value a block, columns as in `COLUMNS`.
 
     x, y is the centre; rotation the angle turned since the start, counter-clockwise positive, not wrapped; left, right,
-    bottom and top are the extents of the turned rectangle.
+    bottom and top are the extents of the turned block.
     """
     motion = np.stack([one[-1] for one in (frames.x, frames.y, frames.angle, frames.vx, frames.vy, frames.spin)])
     shapes = np.stack([frames.size_x, frames.size_y, frames.start_angle])
-    return dict(zip(COLUMNS, (list(frames.names), *final_values(motion, shapes).tolist()), strict=True))
+    values = final_values(motion, shapes, frames.outlines)
+    return dict(zip(COLUMNS, (list(frames.names), *values.tolist()), strict=True))
 
 
-def final_values(motion: Floats, shapes: Floats) -> Floats:
+def final_values(motion: Floats, shapes: Floats, outlines: Floats | None = None) -> Floats:
     """Return the numbers (..., 10, b) of the tables of states, columns as in `COLUMNS`.
 
     `motion` (..., 6, b) holds x, y, angle and their rates, `shapes` (..., 3, b) sides along the body's own axes and the
-    angle at the start, all SI.
+    angle at the start, all SI. `outlines` (..., b, k, 2) are corners along these axes, where any is no rectangle.
     """
     x, y, angle, vx, vy, spin = (motion[..., k, :] for k in range(6))
     size_x, size_y, start_angle = (shapes[..., k, :] for k in range(3))
     # of one state at a time: what is computed together may decide on the last digit
     cos, sin = (np.reshape([turn(one) for one in angle.reshape(-1, x.shape[-1])], x.shape) for turn in (np.cos, np.sin))
-    cos, sin = np.abs(cos), np.abs(sin)
-    half_width = 0.5 * (cos * size_x + sin * size_y)
-    half_height = 0.5 * (sin * size_x + cos * size_y)
+    if outlines is None:
+        cos, sin = np.abs(cos), np.abs(sin)
+        half_width = 0.5 * (cos * size_x + sin * size_y)
+        half_height = 0.5 * (sin * size_x + cos * size_y)
+        extents = [x - half_width, x + half_width, y - half_height, y + half_height]
+    else:
+        low, high = boxes_around(outlines, x, y, angle)
+        extents = [low[..., 0], high[..., 0], low[..., 1], high[..., 1]]
     values = (
         MILLI * x,
         MILLI * y,
         np.degrees(angle - start_angle),
-        MILLI * (x - half_width),
-        MILLI * (x + half_width),
-        MILLI * (y - half_height),
-        MILLI * (y + half_height),
+        *(MILLI * one for one in extents),
         MILLI * vx,
         MILLI * vy,
         np.degrees(spin),

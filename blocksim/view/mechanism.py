@@ -21,7 +21,7 @@ from blocksim.view.forces import WithContacts, contacts_of
 from blocksim.view.layout import EDGE, LINE, OWN, Paper, add_axes, wrapped, write_heading, write_text
 from blocksim.view.paint import Paint, by_displacement, displacements, draw_key
 from blocksim.view.panel import Canvas, Page, finish_panel, page_for
-from blocksim.view.run_data import Floats, Support, drawable_frames
+from blocksim.view.run_data import Floats, Support, drawable_frames, shortest_sides
 from blocksim.view.scene import corners, draw_scene
 from blocksim.view.window import MILLIMETRES, Extent, extent_of
 
@@ -52,7 +52,7 @@ class Side:
         drawable = drawable_frames(self.frames)
         if not self.is_mechanism:
             return int(drawable[-1])
-        shortest = np.minimum(self.frames.size_x, self.frames.size_y)
+        shortest = shortest_sides(self.frames)
         seen = (displacements(self.frames, self.support)[drawable] > VISIBLE * shortest).any(axis=1)
         return int(drawable[int(np.argmax(seen))] if seen.any() else drawable[-1])
 
@@ -98,7 +98,7 @@ def _joint(frames: WithContacts, times: tuple[int, int], support: Support, rows:
 
 
 def _shortest(frames: WithContacts, body: int) -> float:
-    return float("inf") if body == SUPPORT else float(min(frames.size_x[body], frames.size_y[body]))
+    return float("inf") if body == SUPPORT else float(shortest_sides(frames)[body])
 
 
 def _angle(frames: WithContacts, body: int, times: tuple[int, int]) -> float:

@@ -14,6 +14,7 @@ from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, mo
 from blocksim.scenario.segments import wall_segments
 from blocksim.simulation.happened import Happened
 from blocksim.view.acting import Acting, acting_loads
+from blocksim.world.systems.blocks import least_widths, local_corners, placed_points, radii
 from blocksim.world.systems.system import Track
 
 PRINTED_DIGITS = 3  # of a time in s
@@ -61,6 +62,22 @@ class FramesLike(Protocol):
         """Names of the blocks."""
         ...
 
+    @property
+    def outlines(self) -> Floats | None:
+        """Corners (m) along the blocks' own axes, the last repeated, (b, k, 2); None where all are rectangles."""
+        ...
+
+
+def corners_of(frames: FramesLike, chosen: Indices) -> Floats:
+    """Return the corners (m) of all blocks in some frames, counter-clockwise, (f, b, k, 2)."""
+    local = local_corners(frames.size_x, frames.size_y, frames.outlines)
+    return placed_points(local, frames.x[chosen], frames.y[chosen], frames.angle[chosen])
+
+
+def shortest_sides(frames: FramesLike) -> Floats:
+    """Return the smaller sides (m) of blocks, of polygons their least widths, (b,)."""
+    return least_widths(frames.size_x, frames.size_y, frames.outlines)
+
 
 def others_of(frames: FramesLike) -> tuple[Track, ...]:
     """Return the systems beside the blocks over time; frames that know none have none."""
@@ -104,7 +121,7 @@ def path_travelled(frames: FramesLike, chosen: Indices, carried: Floats | None =
     A turn counts as the way of a corner: the angle times half the diagonal. `carried` is how far the support has moved
     along x and y (m) at the chosen frames, (len(chosen), 2): only the way relative to the support counts.
     """
-    radius = 0.5 * np.hypot(frames.size_x, frames.size_y)
+    radius = radii(frames.size_x, frames.size_y, frames.outlines)
     places = np.stack([frames.x[chosen], frames.y[chosen]], axis=-1)
     if carried is not None:
         places -= carried[:, None]

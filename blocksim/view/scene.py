@@ -11,15 +11,15 @@ from blocksim.view import style
 from blocksim.view.ground import draw_shift, draw_start, draw_support
 from blocksim.view.paint import Paint, by_block
 from blocksim.view.panel import Canvas
-from blocksim.view.run_data import Floats, FramesLike, Support, others_of, outlines_of
+from blocksim.view.run_data import Floats, FramesLike, Support, corners_of, others_of, outlines_of, shortest_sides
 from blocksim.view.window import MILLIMETRES
-from blocksim.world.systems.blocks import are_removed
+from blocksim.world.systems.blocks import are_removed, placed_points
 from blocksim.world.systems.system import Track
 
 Flags = NDArray[np.bool_]
-UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # counter-clockwise from lower left
 EDGE_INSET = 0.86  # where the mark of the upper side runs, as a part of half the height
 NAME_ROOM = 0.85, 0.7  # width and height for a block's name, as parts of its smaller side
+LEAST_SINE = 1e-9  # between two edges that are not parallel
 LETTERS = 100  # of a name; longer ones have no room anywhere
 FIXED_HATCH = "////"
 HALO = 2.0  # points around a name, so that paths of centres do not strike through it
@@ -38,15 +38,15 @@ class MeasuredRange:
 
 
 def corners(frames: FramesLike, frame: int) -> Floats:
-    """Return the corners (mm) of every block in one frame, (b, 4, 2), counter-clockwise."""
-    local = UNIT_CORNERS[None] * np.stack([frames.size_x, frames.size_y], axis=-1)[:, None, :]
-    return MILLIMETRES * _placed(local, frames, frame)
+    """Return the corners (mm) of every block in one frame, (b, k, 2), counter-clockwise, the last one repeated."""
+    (found,) = corners_of(frames, np.array([frame]))
+    return np.asarray(MILLIMETRES * found)
 
 
 def readable_scale(frames: FramesLike) -> float:
     """Return the least scale (points a mm) at which the name of every block fits into it."""
     wide, tall = (letter * style.SMALLEST_FONT / room for letter, room in zip(style.LETTER, NAME_ROOM, strict=True))
-    sizes = MILLIMETRES * np.minimum(frames.size_x, frames.size_y)
+    sizes = MILLIMETRES * shortest_sides(frames)
     lengths = np.array([len(name) for name in frames.names])
     return float((np.maximum(wide * lengths, tall) / sizes).max())
 
@@ -141,7 +141,7 @@ def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags,
     from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415 - see style
 
     outlines = corners(frames, frame)
-    smallest = MILLIMETRES * canvas.points_per_mm * float(min(frames.size_x.min(), frames.size_y.min()))
+    smallest = MILLIMETRES * canvas.points_per_mm * float(shortest_sides(frames).min())
     thin = min(style.LINE_WIDTH, 0.05 * smallest)
     line: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
     there = are_there(frames, frame)
@@ -161,7 +161,7 @@ def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags,
 
 def _draw_names(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags, fills: Sequence[str]) -> None:
     """Write the names of free and of fixed blocks, of either kind only where there is room for all."""
-    places = corners(frames, frame).mean(axis=1)
+    places = _centres(frames, frame)
     from matplotlib.patheffects import withStroke  # noqa: PLC0415 - see style
 
     fonts = _label_fonts(frames, canvas.points_per_mm)
@@ -191,23 +191,51 @@ def _label_fonts(frames: FramesLike, points_per_mm: float) -> Floats:
 
     Names on some blocks only would look like a difference between the blocks.
     """
-    sizes = MILLIMETRES * points_per_mm * np.minimum(frames.size_x, frames.size_y)
+    sizes = MILLIMETRES * points_per_mm * shortest_sides(frames)
     rooms = [(NAME_ROOM[0] * float(size), NAME_ROOM[1] * float(size)) for size in sizes]
     return np.array([style.fitting_font(name, room) for name, room in zip(frames.names, rooms, strict=True)])
 
 
+def _centres(frames: FramesLike, frame: int) -> Floats:
+    """Return where the names of blocks stand (mm), (b, 2): their middles, of polygons their centroids."""
+    if frames.outlines is None:
+        return np.asarray(corners(frames, frame).mean(axis=1))
+    return np.asarray(MILLIMETRES * np.stack([frames.x[frame], frames.y[frame]], axis=-1))
+
+
 def _upper_sides(frames: FramesLike, frame: int) -> Floats:
     """Return a line (mm) inside each block along its own upper side, which shows turns; (b, 2, 2)."""
+    return np.asarray(
+        MILLIMETRES * placed_points(upper_sides(frames), frames.x[frame], frames.y[frame], frames.angle[frame])
+    )
+
+
+def upper_sides(frames: FramesLike) -> Floats:
+    """Return the same lines along the blocks' own axes (m, (b, 2, 2))."""
+    if frames.outlines is not None:
+        return _upper_sides_of_polygons(frames.outlines, 0.5 * (1.0 - EDGE_INSET) * shortest_sides(frames))
     half_x, half_y = 0.5 * frames.size_x, 0.5 * frames.size_y
     inset = half_y - (1.0 - EDGE_INSET) * np.minimum(half_x, half_y)
     reach = half_x - (half_y - inset)
-    local = np.stack([np.stack([-reach, inset], axis=-1), np.stack([reach, inset], axis=-1)], axis=1)
-    return MILLIMETRES * _placed(local, frames, frame)
+    return np.stack([np.stack([-reach, inset], axis=-1), np.stack([reach, inset], axis=-1)], axis=1)
 
 
-def _placed(local: Floats, frames: FramesLike, frame: int) -> Floats:
-    """Turn and move points given in the blocks' own axes (m), (b, k, 2)."""
-    cosine, sine = np.cos(frames.angle[frame])[:, None], np.sin(frames.angle[frame])[:, None]
-    x = frames.x[frame][:, None] + cosine * local[..., 0] - sine * local[..., 1]
-    y = frames.y[frame][:, None] + sine * local[..., 0] + cosine * local[..., 1]
-    return np.stack([x, y], axis=-1)
+def _upper_sides_of_polygons(outlines: Floats, inset: Floats) -> Floats:
+    """Return the lines (m) that are an inset (m, (b,)) inside the edges whose normals point up most, and all others."""
+    edges = np.roll(outlines, -1, axis=1) - outlines
+    lengths = np.hypot(edges[..., 0], edges[..., 1])
+    is_edge = lengths > 0.0
+    normals = np.stack([edges[..., 1], -edges[..., 0]], axis=-1) / np.where(is_edge, lengths, 1.0)[..., None]
+    depth = np.einsum("bec,bec->be", normals, outlines) - inset[:, None]
+    blocks = np.arange(len(outlines))
+    upper = np.argmax(np.where(is_edge, normals[..., 1], -np.inf), axis=1)
+    normal = normals[blocks, upper]
+    start = outlines[blocks, upper] - inset[:, None] * normal
+    along = np.stack([-normal[:, 1], normal[:, 0]], axis=-1)
+    across = np.einsum("bec,bc->be", normals, along)
+    room = depth - np.einsum("bec,bc->be", normals, start)
+    others = is_edge & (np.abs(across) > LEAST_SINE)
+    shares = room / np.where(others, across, 1.0)
+    last = np.where(others & (across > 0.0), shares, np.inf).min(axis=1)
+    first = np.minimum(np.where(others & (across < 0.0), shares, -np.inf).max(axis=1), last)
+    return np.asarray(start[:, None] + np.stack([first, last], axis=1)[..., None] * along[:, None])

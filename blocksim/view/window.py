@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from blocksim.scenario.segments import ENDLESS
 from blocksim.view.run_data import Floats, FramesLike, Indices, Support, others_of, outlines_of
+from blocksim.world.systems.blocks import boxes_around
 
 Flags = NDArray[np.bool_]
 MILLIMETRES = 1e3  # per metre
@@ -132,16 +133,18 @@ def parts_within(line: Floats, low: Floats, high: Floats) -> Floats:
 
 def _reached(frames: FramesLike, chosen: Indices, support: Support) -> Floats:
     """Return points (m, picture) around all that each block and the ground below it take up, (3 n, b, 2)."""
-    angle = frames.angle[chosen] + support.tilt
-    cosine, sine = np.abs(np.cos(angle)), np.abs(np.sin(angle))
-    wide = cosine * frames.size_x + sine * frames.size_y
-    tall = sine * frames.size_x + cosine * frames.size_y
-    half = 0.5 * np.stack([wide, tall], axis=-1)
     x = frames.x[chosen]
     centres = np.stack([x, frames.y[chosen]], axis=-1)
     offsets = support.offset(frames.time[chosen])[:, None]
     below = np.stack([x, support.height(x - offsets[..., 0]) + offsets[..., 1]], axis=-1)
     centres, below = turned(centres, support.tilt), turned(below, support.tilt)
+    angle = frames.angle[chosen] + support.tilt
+    if frames.outlines is not None:
+        return np.concatenate([*boxes_around(frames.outlines, centres[..., 0], centres[..., 1], angle), below])
+    cosine, sine = np.abs(np.cos(angle)), np.abs(np.sin(angle))
+    wide = cosine * frames.size_x + sine * frames.size_y
+    tall = sine * frames.size_x + cosine * frames.size_y
+    half = 0.5 * np.stack([wide, tall], axis=-1)
     return np.concatenate([centres - half, centres + half, below])
 
 

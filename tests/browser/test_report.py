@@ -16,6 +16,7 @@ from blocksim.simulation.frames import Frames
 from blocksim.view.report.page import write_report
 from blocksim.view.report.runs import read_stored, run_subject
 from tests.browser.conftest import PLAYER, Open, Opened
+from tests.view.made_up import polygons
 from tests.view.report.folders import write_experiment, write_run, write_sweep
 
 pytestmark = pytest.mark.long
@@ -71,6 +72,22 @@ def middle_of(picture: NDArray[np.int64], colour: tuple[int, ...]) -> NDArray[np
     """Return the middle of all pixels of one colour: that of a rectangle, however it is turned."""
     rows, columns = np.nonzero((np.abs(picture - colour) <= 2).all(axis=-1))
     return 0.5 * np.array([columns.min() + columns.max() + 1, rows.min() + rows.max() + 1])
+
+
+def test_polygons_have_their_corners_and_are_found_under_the_pointer(tmp_path: Path, open_page: Open) -> None:
+    frames = write_run(tmp_path / "run", count=3)
+    wedge = ((-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02))
+    stored = replace(read_stored(tmp_path / "run"), frames=polygons(frames, wedge))
+    write_report([run_subject("part-1", stored)], tmp_path / "report.html", title="wedges", version="0")
+    one = open_page(tmp_path / "report.html")
+    one.page.evaluate(f"{PLAYER}.toggle('names')")
+    scale = one.state()["scale"]
+    own = np.count_nonzero((np.abs(pixels(one) - COLOURS[0]) <= 2).all(axis=-1))
+    whole = 0.5 * (30.0 * scale) ** 2
+    assert 0.85 * whole < own < whole  # less edges and the line along the upper side
+    found = one.page.evaluate(f"[[5, 0], [14, 14]].map(([x, y]) => {PLAYER}.drawing.frames.isIn(0, x, y))")
+    assert found == [True, False]
+    assert one.complaints == []
 
 
 def test_blocks_are_where_the_run_says_to_a_pixel(three: tuple[Path, Frames], open_page: Open) -> None:

@@ -1,6 +1,7 @@
 """The final table: extents of turned blocks, and back from its file to the last bit."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,13 @@ def test_extents_are_those_of_the_turned_block() -> None:
     assert [row["left_mm"], row["right_mm"]] == pytest.approx([75.0, 125.0])
     assert [row["bottom_mm"], row["top_mm"]] == pytest.approx([184.0, 216.0])
     assert [row["vx_mm_s"], row["vy_mm_s"], row["spin_deg_s"]] == pytest.approx([500.0, -250.0, 180.0])
+
+
+def test_extents_of_a_polygon_are_those_of_its_corners() -> None:
+    wedge = np.array([[[-0.01, -0.01], [0.02, -0.01], [-0.01, 0.02], [-0.01, 0.02]]])
+    row = final_table(replace(frames_of(np.pi / 2, 0.0), outlines=wedge)).iloc[0]
+    assert [row["left_mm"], row["right_mm"]] == pytest.approx([80.0, 110.0])
+    assert [row["bottom_mm"], row["top_mm"]] == pytest.approx([190.0, 220.0])
 
 
 def test_rotation_counts_from_the_start_and_is_not_wrapped() -> None:

@@ -1,5 +1,6 @@
 """Frames that no run has made: blocks in rows of ten that topple to the right."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -127,3 +128,12 @@ def overlapping(figure: Figure) -> list[tuple[str, str]]:
             if min(width, height) > 0.0:
                 found.append((one, other))
     return found
+
+
+def polygons(frames: Frames, *shapes: Sequence[tuple[float, float]]) -> Frames:
+    """Return the same frames of blocks with these corners (m) about the centroid, taken in turn."""
+    own = [shapes[number % len(shapes)] for number in range(len(frames.names))]
+    most = max(map(len, own))
+    outlines = np.array([[*shape, *[shape[-1]] * (most - len(shape))] for shape in own])
+    size_x, size_y = np.ptp(outlines, axis=1).T
+    return replace(frames, outlines=outlines, size_x=size_x, size_y=size_y)

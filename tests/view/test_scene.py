@@ -10,13 +10,14 @@ from matplotlib.path import Path as MatplotlibPath
 from numpy.typing import NDArray
 
 from blocksim.scenario.motion import MotionPieces
+from blocksim.scenario.outlines import holds, least_width, regular
 from blocksim.simulation.frames import Frames
 from blocksim.view.panel import Canvas
 from blocksim.view.run_data import Support
-from blocksim.view.scene import corners, draw_scene, readable_scale
+from blocksim.view.scene import corners, draw_scene, readable_scale, upper_sides
 from blocksim.view.style import GROUND_COLOUR, block_colour, styled_figure
 from blocksim.view.window import extent_of
-from tests.view.made_up import blocks_at
+from tests.view.made_up import blocks_at, polygons
 
 FRAMES = blocks_at([0.1, 0.2], [0.025, 0.016], [0.0, -np.pi / 2])
 PAIR = replace(blocks_at([[0.1, 0.2]], 0.025), names=("pier", "2"))
@@ -26,6 +27,41 @@ def test_a_block_turned_clockwise_lies_on_its_right_side() -> None:
     upright, lying = corners(FRAMES, 0)[0], corners(FRAMES, 1)[0]
     assert upright.tolist() == [pytest.approx(point) for point in ([84, 0], [116, 0], [116, 50], [84, 50])]
     assert lying.tolist() == [pytest.approx(point, abs=1e-9) for point in ([175, 32], [175, 0], [225, 0], [225, 32])]
+
+
+WEDGE = ((-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02))
+
+
+def test_a_polygon_is_drawn_by_its_corners_and_all_of_it_is_in_the_picture() -> None:
+    frames = polygons(blocks_at([[0.1, 0.2], [0.1, 0.2]], 0.05, np.pi / 2), WEDGE, regular(6, 0.03))
+    first = corners(frames, 0)[0, :3]
+    assert first == pytest.approx(np.array([[110, 40], [110, 70], [80, 40]]))
+    canvas = drawn(frames, Support())
+    wedge, hexagon = (points(path) for one in blocks_of(canvas) for path in one.get_paths())
+    assert wedge[:3] == pytest.approx(first)
+    assert len(hexagon) == 7  # and back to the first
+    extent = extent_of(frames, np.arange(2))
+    assert extent.left < 80.0
+    assert extent.right > 226.0
+
+
+@pytest.mark.parametrize(
+    "shape", [WEDGE, regular(6, 0.03), regular(5, 0.03), ((-0.03, -0.01), (0.03, -0.01), (0, 0.02))]
+)
+def test_the_line_along_the_upper_side_is_within_the_polygon(shape: tuple[tuple[float, float], ...]) -> None:
+    (ends,) = upper_sides(polygons(blocks_at([0.0]), shape))
+    width = least_width(shape)
+    assert all(holds(shape, (float(x), float(y)), -0.069 * width) for x, y in ends)
+    assert np.hypot(*(ends[1] - ends[0])) > 0.2 * width
+
+
+def test_the_line_of_a_rectangle_as_a_polygon_is_that_of_the_rectangle() -> None:
+    x, y = 0.016, 0.025
+    frames = blocks_at([0.0])
+    outlined = polygons(frames, ((-x, -y), (x, -y), (x, y), (-x, y)))
+    one, other = np.sort(upper_sides(frames)[0], axis=0), np.sort(upper_sides(outlined)[0], axis=0)
+    assert other == pytest.approx(one, abs=1e-15)
+    assert readable_scale(outlined) == pytest.approx(readable_scale(frames))
 
 
 def test_names_are_readable_from_the_scale_at_which_they_are_written() -> None:

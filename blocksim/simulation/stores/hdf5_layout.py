@@ -16,6 +16,7 @@ COMMITTED = "n_committed"
 STEP = f"{BLOCKS}/step"
 TIME = f"{BLOCKS}/time"
 SCENARIO_TEXT = "parameters/scenario"
+OUTLINES = "outlines"  # of every element, where they are no rectangles: (b, k, 2), the last corner repeated
 
 COUNTED_UNITS = {"contact_count": "1", "largest_overlap": "m"}
 TEXT_UNIT = "TOML"

@@ -125,6 +125,9 @@ class FrameFile:
             for one, values in zip(present.system.constants, present.elements.constants, strict=True):
                 place = f"{layout.PARTICLES}/{present.system.name}/{one.name}"
                 self.file.create_dataset(place, data=values).attrs["unit"] = one.stored_unit
+            if present.elements.outlines is not None:
+                place = f"{layout.PARTICLES}/{present.system.name}/{layout.OUTLINES}"
+                self.file.create_dataset(place, data=present.elements.outlines).attrs["unit"] = "m"
         text = self.file.create_dataset(layout.SCENARIO_TEXT, data=np.bytes_(scenario_toml.encode()))
         text.attrs["unit"] = layout.TEXT_UNIT
         self.file[layout.STEP].attrs["time_step"] = self.time_step  # s

@@ -60,7 +60,7 @@ def _finite(frames: Frames) -> Indices:
 
 
 def _write_grid(group: Any, tracks: Sequence[Track], times: Floats, chosen: Indices, check: Callable[[], None]) -> None:
-    corners = np.concatenate([np.full(len(one.names), _corners_of(one)) for one in tracks])
+    corners = np.concatenate([_corners_of(one) for one in tracks])
     data = _data_of(tracks)
     group.attrs["Version"] = np.array(VERSION, dtype=np.int64)
     group.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
@@ -69,9 +69,21 @@ def _write_grid(group: Any, tracks: Sequence[Track], times: Floats, chosen: Indi
     _write_times(group, tracks, chosen, corners, data, check)
 
 
-def _corners_of(track: Track) -> int:
-    """Return how many corners every element has."""
-    return int(track.system.outlines(track, np.zeros(1, dtype=np.intp)).shape[2])
+def _corners_of(track: Track) -> NDArray[np.int64]:
+    """Return how many corners each element has."""
+    outlines = track.present.elements.outlines
+    if outlines is None:
+        count = track.system.outlines(track, np.zeros(1, dtype=np.intp)).shape[2]
+        return np.full(len(track.names), count, dtype=np.int64)
+    return np.asarray(1 + (outlines[:, 1:] != outlines[:, :-1]).any(axis=-1).sum(axis=1), dtype=np.int64)
+
+
+def _points_of(track: Track, some: Indices) -> Floats:
+    """Return the corners (m) of all elements in some frames one after the other, (f, p, 2)."""
+    outlines = track.system.outlines(track, some)
+    if track.present.elements.outlines is None:
+        return outlines.reshape(len(some), -1, 2)
+    return np.asarray(outlines[:, np.arange(outlines.shape[2]) < _corners_of(track)[:, None]])
 
 
 def _data_of(tracks: Sequence[Track]) -> dict[str, int]:
@@ -129,8 +141,8 @@ def _write_times(
     for start in range(0, len(chosen), size):
         some = chosen[start : start + size]
         first, last = start * cells, (start + len(some)) * cells
-        outlines = [one.system.outlines(one, some).reshape(len(some), -1, 2) for one in tracks]
-        points[start * count : (start + len(some)) * count] = _in_space(np.concatenate(outlines, axis=1))
+        outlines = np.concatenate([_points_of(one, some) for one in tracks], axis=1)
+        points[start * count : (start + len(some)) * count] = _in_space(outlines)
         for name, values in data.items():
             values[first:last] = _cell_data(tracks, name, some)
         check()

@@ -19,9 +19,10 @@ from blocksim.view import style
 from blocksim.view.forces import force_scale, pushing_up
 from blocksim.view.report.elements import element_bytes, pack_systems
 from blocksim.view.report.packing import EXACT_VALUES, SHORT_BYTES, listed, pack
-from blocksim.view.run_data import Floats, Indices, drawable_frames, support_of
+from blocksim.view.run_data import Floats, Indices, drawable_frames, shortest_sides, support_of
+from blocksim.view.scene import upper_sides
 from blocksim.view.window import MILLIMETRES, extent_of
-from blocksim.world.systems.blocks import are_removed
+from blocksim.world.systems.blocks import are_removed, distinct
 
 MOST_BYTES = 12_000_000  # of the frames of one run, before they become text, which takes a third more
 CONTACT_BYTES = 16  # of a contact in a frame
@@ -62,6 +63,7 @@ def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
         "names": list(frames.names),
         "size_x": listed(MILLIMETRES * frames.size_x),
         "size_y": listed(MILLIMETRES * frames.size_y),
+        "outlines": _outlines(frames),
         "start_angle": listed(np.degrees(frames.start_angle)),
         "channels": {name: part for name, (part, _) in packed.items()},
         "energy": {name: pack(values[kept], exact=True)[0] for name, values in frames.energy.items()},
@@ -120,6 +122,23 @@ def _channels(frames: Frames, kept: Indices) -> dict[str, Floats]:
     lengths = {name: MILLIMETRES * getattr(frames, name)[kept] for name in ("x", "y", "vx", "vy")}
     turns = {"rotation": np.degrees(frames.rotation[kept]), "spin": np.degrees(frames.spin[kept])}
     return {name: {**lengths, **turns}[name] for name in CHANNELS}
+
+
+def _outlines(frames: Frames) -> dict[str, Any] | None:
+    """Return corners, upper side and least width (mm) of every shape, and which of them each block has.
+
+    None where all blocks are rectangles, whose sides tell the same.
+    """
+    if frames.outlines is None:
+        return None
+    kinds, first, which = np.unique(frames.outlines, axis=0, return_index=True, return_inverse=True)
+    uppers, widths = MILLIMETRES * upper_sides(frames)[first], MILLIMETRES * shortest_sides(frames)[first]
+    return {
+        "corners": [[listed(corner) for corner in MILLIMETRES * distinct(kind)] for kind in kinds],
+        "upper": [[listed(end) for end in upper] for upper in uppers],
+        "width": listed(widths),
+        "which": which.ravel().tolist(),
+    }
 
 
 def scene_data(frames: Frames, scenario: Scenario, kept: Indices, happened: Sequence[Happened] = ()) -> dict[str, Any]:

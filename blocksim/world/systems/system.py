@@ -51,6 +51,7 @@ class Elements:
     names: tuple[str, ...]
     constants: Floats  # (c, b), as `constants` of the system
     start: Floats  # (q, b) at time zero, as `quantities` of the system
+    outlines: Floats | None = None  # (b, k, 2) m, own axes, counter-clockwise, the last corner repeated; of polygons
 
 
 @dataclass(frozen=True)

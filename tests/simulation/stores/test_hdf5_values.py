@@ -43,3 +43,18 @@ def test_frames_beyond_what_was_committed_do_not_count(soft: Shipped, tmp_path: 
         stored["n_committed"][()] = 2  # killed after the third was written, before it was announced
     back = read_frames(path, scenario)
     assert (back.step.tolist(), back.x.shape) == ([0, 1], (2, 3))
+
+
+def test_outlines_are_stored_once_and_rectangles_store_none(soft: Shipped, tmp_path: Path) -> None:
+    scheme, scenario = SCHEMES["explicit"], soft()
+    first, *others = place_bodies(scenario)
+    wedge = ((-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02))
+    for placed, name in (((first, *others), "plain"), ((first._replace(outline=wedge), *others), "outlined")):
+        with FrameFile(tmp_path / name, placed, STEP, "schema = 1\n", ledger=scheme.ledger):
+            pass
+    with h5py.File(tmp_path / "plain") as plain, h5py.File(tmp_path / "outlined") as outlined:
+        assert "outlines" not in plain["particles/blocks"]
+        stored = outlined["particles/blocks/outlines"]
+        assert stored.attrs["unit"] == "m"
+        np.testing.assert_array_equal(stored[0], [*wedge, wedge[-1]])
+        np.testing.assert_array_equal(stored[1], others[0].corners)

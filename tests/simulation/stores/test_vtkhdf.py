@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError, OutputError
 from blocksim.scenario import load_scenario
+from blocksim.scenario.outlines import regular
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.stores import vtkhdf
 from blocksim.simulation.stores.vtkhdf import write_vtkhdf
 from blocksim.view.scene import corners
 from blocksim.world.systems.supports import support_quads
-from tests.view.made_up import HOSTILE, toppling
+from tests.view.made_up import HOSTILE, polygons, toppling
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 SLOPE = load_scenario(SCENARIOS / "slope.toml")
@@ -67,6 +68,20 @@ def test_cells_are_rectangles_of_consecutive_points(written: tuple[Frames, Path]
             16,
             16,
         ]
+
+
+def test_cells_of_polygons_have_their_own_corners(tmp_path: Path) -> None:
+    wedge, hexagon = [(-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02)], regular(6, 0.02)
+    frames = polygons(toppling(3, steps=4), wedge, hexagon)
+    write_vtkhdf(tmp_path / "run.vtkhdf", frames, LEVEL)
+    with h5py.File(tmp_path / "run.vtkhdf") as file:
+        group = file["VTKHDF"]
+        assert group["Types"][:].tolist() == [7, 7, 7, 9]
+        assert group["Offsets"][:].tolist() == [0, 3, 9, 12, 16]
+        start = int(group["Steps/PointOffsets"][3])
+        points = group["Points"][start : start + 12, :2]
+    expected = [corners(frames, 3)[block, :count] for block, count in ((0, 3), (1, 6), (2, 3))]
+    np.testing.assert_allclose(points, 1e-3 * np.concatenate(expected), atol=1e-15)
 
 
 def test_vtk_reads_back_every_time(written: tuple[Frames, Path]) -> None:

@@ -1,5 +1,6 @@
 """Frames as text: what comes back, how far it is off, what is left out; particles lie where the world has them."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,9 +9,11 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
+from blocksim.scenario.outlines import regular
 from blocksim.simulation.happened import Happened
 from blocksim.view.report.player import boundary_particles, pack_frames, scene_data
 from blocksim.world.build import build_world
+from tests.view.made_up import polygons, toppling
 from tests.view.report.folders import SCENARIOS, numbers, write_run
 
 
@@ -70,3 +73,15 @@ def test_particles_are_those_of_the_world(model: str) -> None:
     expected = np.unique(np.stack([own.x, own.y], axis=-1).round(9), axis=0)
     drawn = boundary_particles(scenario, 2.0 * float(body.half_x), 2.0 * float(body.half_y))
     assert np.unique(drawn.round(9), axis=0) == pytest.approx(expected)
+
+
+def test_polygons_are_packed_once_for_each_shape() -> None:
+    wedge, hexagon = ((-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02)), regular(6, 0.02)
+    packed = pack_frames(polygons(toppling(5, steps=3), wedge, hexagon)).data["outlines"]
+    assert [packed["corners"][kind] for kind in packed["which"]][:2] == [
+        [[1e3 * x for x in corner] for corner in wedge],
+        [[float(f"{1e3 * x:.7g}") for x in corner] for corner in hexagon],
+    ]
+    assert len(packed["corners"]) == len(packed["upper"]) == len(packed["width"]) == 2
+    assert packed["width"][packed["which"][1]] == pytest.approx(20.0 * math.sqrt(3.0))
+    assert pack_frames(toppling(5, steps=3)).data["outlines"] is None

@@ -6,6 +6,7 @@ class Frames {
     this.measured = data.measured ?? [];
     this.sizeX = data.size_x;
     this.sizeY = data.size_y;
+    this.outlines = data.outlines;
     this.startAngle = data.start_angle;
     this.time = decode(data.time);
     this.energy = Object.entries(data.energy).map(([name, part]) => [name, decode(part)]);
@@ -71,6 +72,27 @@ class Frames {
     return this.names.map((_, block) => block).sort((one, other) => way(other) - way(one) || one - other);
   }
 
+  // Corners of a block that is no rectangle, along its own axes (mm); null for a rectangle.
+  cornersOf(block) { return this.outlines && this.outlines.corners[this.outlines.which[block]]; }
+
+  // Its line along the upper side, from end to end.
+  upperOf(block) { return this.outlines.upper[this.outlines.which[block]]; }
+
+  // The smaller side of a block, or the least distance of two parallel lines around it (mm).
+  widthOf(block) {
+    return this.outlines ? this.outlines.width[this.outlines.which[block]] : Math.min(this.sizeX[block], this.sizeY[block]);
+  }
+
+  // Whether a place along the axes of a block (mm) is in it.
+  isIn(block, along, across) {
+    const corners = this.cornersOf(block);
+    if (!corners) return Math.abs(along) <= 0.5 * this.sizeX[block] && Math.abs(across) <= 0.5 * this.sizeY[block];
+    return corners.every(([x, y], index) => {
+      const [nextX, nextY] = corners[(index + 1) % corners.length];
+      return (nextX - x) * (across - y) - (nextY - y) * (along - x) >= 0;
+    });
+  }
+
   // The block at a place (mm), the one drawn last where there are several; -1 where there is none.
   blockAt(frame, x, y) {
     for (let block = this.blocks - 1; block >= 0; block -= 1) {
@@ -80,7 +102,7 @@ class Frames {
       const angle = this.angle(frame, block);
       const along = Math.cos(angle) * dx + Math.sin(angle) * dy;
       const across = Math.cos(angle) * dy - Math.sin(angle) * dx;
-      if (Math.abs(along) <= 0.5 * this.sizeX[block] && Math.abs(across) <= 0.5 * this.sizeY[block]) return block;
+      if (this.isIn(block, along, across)) return block;
     }
     return -1;
   }
