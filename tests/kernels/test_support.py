@@ -248,9 +248,11 @@ def test_uniformly_accelerated_support_is_gravity_from_the_side(
         gone, speed = 0.5 * pull * moving.time**2, pull * moving.time
         along, up = cos(direction), sin(direction)
         shift = np.array([gone * along, gone * up, 0.0, speed * along, speed * up, 0.0])
-        seen = moving.state() - shift
+        seen, expected = moving.state() - shift, resting.state()
+        for state in seen, expected:
+            state[:, 5] *= resting.bodies.radius[: len(state)]  # speed of a corner by spin; rounding grows in impacts
         free = resting.bodies.inverse_mass > 0.0
-        assert seen[free] == pytest.approx(resting.state()[free], abs=1e-9), time
+        assert seen[free] == pytest.approx(expected[free], abs=2e-10), time
         assert seen[~free, :2] == pytest.approx(resting.state()[~free, :2], abs=1e-12), time
     assert moving.residual() < 1e-3
 
