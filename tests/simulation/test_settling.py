@@ -70,7 +70,8 @@ def test_the_tilted_wall_starts_at_rest_and_the_ground_carries_its_weight(
     after = np.stack([scene.world.bodies["x"], scene.world.bodies["y"]])
     # the first substep of rigid contacts has half a kick, and is solved to the tolerance of the velocity pass
     assert np.abs(after - before)[:, :-1].max() < (1e-9 if scheme == "explicit" else 1e-4)
-    assert 0.0 < settled.largest_displacement_mm < 20.0
+    # a block on two halves of others is borne by as much spring as on one whole block, at its own two ends
+    assert 0.0 < settled.largest_displacement_mm < 30.0
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
