@@ -37,10 +37,15 @@ LEDGER = {  # name in run.json: name in the report
     "correction": "correction of positions",
     "to_support": "given to the support",
     "to_loads": "given to loads",
+    "events": "taken by events",
     "start": "at the start",
     "in_play": "in play",
     "residual": "residual",
 }
+
+ALWAYS = ("kinetic", "potential", "residual")
+ROUND_OFF = 1e-12  # of the energy in play
+RATIOS = ("relative_residual",)  # in run.json beside energies
 
 DRAWN = ("x", "y", "rotation")  # measured quantities that have a curve
 NO_FORCES = "This run has stored no contacts, so their forces cannot be shown; --set output.contacts=true stores them."
@@ -259,8 +264,10 @@ def _ledger(run: PartialRun) -> list[tuple[str, str]]:
         return []
     values = run.summary.energy_J.model_dump()
     # entries that a scheme does not have are zero
-    shown = {name: values[name] for name in LEDGER if values.get(name) != 0.0 or name in ("kinetic", "potential")}
-    return [(LEDGER[name], _joule(value)) for name, value in shown.items()]
+    names = [*(name for name in values if name not in (*LEDGER, *RATIOS)), *LEDGER]  # of other systems first
+    least = ROUND_OFF * abs(values["in_play"])
+    shown = [name for name in names if name in ALWAYS or not abs(values[name]) <= least]
+    return [(LEDGER.get(name, name.replace("_", " ")), _joule(values[name])) for name in shown]
 
 
 def _joule(value: float) -> str:

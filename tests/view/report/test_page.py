@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from blocksim.simulation.ledger import EnergyLedger
 from blocksim.simulation.movement import Manner, Movement
 from blocksim.view.report.page import labels, page_text
 from blocksim.view.report.runs import Subject, read_stored, run_subject
@@ -69,3 +70,21 @@ def test_report_names_the_outcome_and_the_block_that_moved_first(tmp_path: Path)
     assert rows["outcome"] == "fell"
     assert rows["first moved"] == "block 3 at 0.045 s"
     assert "outcome" not in dict(run_subject("a", stored).page["summary"])
+
+
+def test_ledger_has_all_entries_that_are_not_zero_and_no_empty_cell(tmp_path: Path) -> None:
+    write_run(tmp_path / "run", count=3)
+    stored = read_stored(tmp_path / "run")
+    assert stored.summary is not None
+    entries = {"kinetic": 0.1, "potential": 4.9, "events": -0.25, "start": 5.0, "in_play": 1.0}
+    further = {"sand_kinetic": 0.125, "friction": -1e-16}  # the second is round-off
+    ledger = EnergyLedger.model_validate({**entries, **further})
+    summary = stored.summary.model_copy(update={"energy_J": ledger})
+    subject = run_subject("part-1", replace(stored, summary=summary))
+    names = [name for name, _ in subject.page["ledger"]]
+    assert names == ["sand kinetic", "kinetic", "potential", "taken by events", "at the start", "in play", "residual"]
+    text = page_text([subject], title="a", version="0")
+    table = text.partition('<table class="ledger">')[2].partition("</table>")[0]
+    assert table.count("<tr>") == len(names)
+    assert "−0.25</td>" in table
+    assert "></td>" not in table
