@@ -46,7 +46,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH = 7.2  # inches
-LEFT, RIGHT, HEAD, FOOT = 0.72, 1.60, 0.36, 0.62  # inches; the legends stand on the right
+LEFT, RIGHT, HEAD, FOOT = 0.80, 1.60, 0.36, 0.62  # inches; the legends stand on the right
+LABEL = 0.16  # inches, from the edge of the page to the right of the name of an axis: seven digits fit beside it
 PANEL, GAP = 1.25, 0.14  # inches
 LOWEST, NARROWEST = 0.55, 1.0  # inches, of a panel on a page whose size was asked for
 MOST_BLOCKS = len(style.BLOCK_COLOURS)  # that get a line of their own, unless they are chosen
@@ -203,7 +204,7 @@ def _panels(figure: "Figure", foot: float, count: int, panel: float) -> list["Ax
         axes = figure.add_axes((LEFT / across, bottom / up, inside / across, panel / up))
         axes.spines[["right", "top"]].set_visible(False)
         axes.tick_params(axis="x", labelbottom=row == count - 1)
-        axes.yaxis.set_label_coords(-0.5 / inside, 0.5)
+        axes.yaxis.set_label_coords((LABEL - LEFT) / inside, 0.5)
         panels.append(axes)
     panels[-1].set_xlabel("time (s)", labelpad=2.0)
     return panels

@@ -28,6 +28,7 @@ SCENE = (ENERGY, CONTACTS, FORCE, GROUND)
 MOST_SLIPS = 2
 MOST_CHOSEN = 12  # blocks; more names have no room beside the panels
 LEAST_SPAN = 0.05  # mm, degrees, mm/s, degrees/s: an axis never shows less, so that round-off looks flat
+LEAST_SHARE = 4e-4  # of the largest value: nor less than that, so that numbers along it differ in five digits
 
 MOST_WEIGHTS = 3.0  # of all blocks: forces of supports beyond that are cut, those of impacts are far beyond
 SMALL_SHARE = 1e-3  # of the largest energy; what stays below is not drawn
@@ -210,7 +211,8 @@ def farthest_blocks(frames: FramesLike, chosen: Indices, support: Support, most:
 def limits_of(values: Floats) -> tuple[float, float]:
     """Return the ends of an axis around values, with a margin, never so near to each other that round-off is seen."""
     low, high = float(values.min()), float(values.max())
-    margin = max(0.05 * (high - low), 0.5 * (LEAST_SPAN - (high - low)), 1e-9 * max(abs(low), abs(high)))
+    least = max(LEAST_SPAN, LEAST_SHARE * max(abs(low), abs(high)))
+    margin = max(0.05 * (high - low), 0.5 * (least - (high - low)))
     return low - margin, high + margin
 
 

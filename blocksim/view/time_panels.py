@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 WIDTH = 7.2  # inches
 LEFT, RIGHT, HEAD, FOOT = 0.78, 1.75, 0.40, 0.42  # inches; texts stand on the right
+LABEL = 0.16  # inches, from the edge of the page to the right of the name of an axis
 PANEL, GAP = 1.3, 0.16  # inches
 LOWEST, NARROWEST = 0.6, 1.0  # inches, of a panel on a page whose size was asked for
 BESIDE = 0.1  # inches, from a panel to its text
@@ -74,7 +75,7 @@ def _drawn(panels: Sequence[TimePanel], title: str | None, note: str, paper: Pap
             _draw(axes, panel, span)
             drawn.append(axes)
             axes.tick_params(axis="x", labelbottom=row == len(panels) - 1)
-            axes.yaxis.set_label_coords(-0.55 / (width - LEFT - RIGHT), 0.5)
+            axes.yaxis.set_label_coords((LABEL - LEFT) / (width - LEFT - RIGHT), 0.5)
             _write_beside(figure, panel, width - RIGHT + BESIDE, bottom + height)
         drawn[-1].set_xlabel("time (s)", labelpad=2.0)
         write_heading(figure, title, 0.12, 0.08)

@@ -16,7 +16,7 @@ from blocksim.view.paint import by_speed
 from blocksim.view.run_data import Support
 from tests.golden import Golden
 from tests.view.drawings import MOVING
-from tests.view.made_up import pressed, toppling
+from tests.view.made_up import overlapping, pressed, toppling
 
 
 def lines_of(figure: Figure, panel: int) -> list[np.ndarray]:
@@ -93,6 +93,21 @@ def test_round_off_looks_flat(caught: list[Figure]) -> None:
         low, high = axes.get_ylim()
         assert high - low > 0.999 * LEAST_SPAN
         assert np.ptp(lines_of(caught[0], panel)[0]) < 1e-9 * (high - low)
+
+
+@pytest.mark.parametrize("speed", [123.456789, -0.123456789, 12.3456789, 0.0])
+def test_numbers_along_a_constant_differ_and_leave_room_for_its_name(caught: list[Figure], speed: float) -> None:
+    frames = toppling(1)
+    frames.vx[:] = speed + 1e-9 * np.sin(frames.time)[:, None]
+    draw_history(frames, "history.png", choice=Choice(("vx", "x")))
+    (figure,) = caught
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    low, high = axes.get_ylim()
+    shown = [tick.label1.get_text() for tick in axes.yaxis.get_major_ticks() if low <= tick.get_loc() <= high]
+    assert len(set(shown)) == len(shown) >= 3
+    assert all(len(text) <= 7 for text in shown)
+    assert overlapping(figure) == []
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ const PLACE = { left: 58, right: 20, top: 8, bottom: 34 };
 const DASHES = ["", "7 3", "2 3", "9 3 2 3", "12 4", "3 6"];
 const PALE = "#F0E442"; // drawn on a darker line
 const LEAST_SPAN = 0.05; // mm or degrees: no axis shows less, so that round-off looks flat
-const ROUND_OFF = 1e-6; // of the largest value
+const LEAST_SHARE = 4e-4; // of the largest value: nor less than that, so that numbers along it differ
 // An energy looks the same in every report; dashes tell apart what is alike in grey.
 const ENERGIES = {
   "kinetic": { colour: "#3D8FD1", dash: "" },
@@ -18,6 +18,8 @@ const ENERGIES = {
   "lost in impacts": { colour: "#8A63B8", dash: "7 3" },
   "correction of positions": { colour: "#8C8C8C", dash: "2 3" },
   "given to the support": { colour: "#56B4E9", dash: "3 6" },
+  "given to loads": { colour: "#A50026", dash: "3 6" },
+  "taken by events": { colour: "#8C8C8C", dash: "7 3" },
 };
 // What the potential energy is measured from means nothing, and would hide all other energies.
 const fromMinimum = ([name, values]) => {
@@ -69,7 +71,7 @@ class Chart {
     const ranges = lines.flatMap(({ measured }) => (measured ? [measured.minimum, measured.maximum] : []));
     const finite = [...values.flat(), ...ranges].filter(Number.isFinite);
     let [low, high] = finite.length ? [finite.reduce((a, b) => Math.min(a, b)), finite.reduce((a, b) => Math.max(a, b))] : [0, 1];
-    const least = Math.max(span, 1e-12, ROUND_OFF * Math.max(Math.abs(low), Math.abs(high)));
+    const least = Math.max(span, 1e-12, LEAST_SHARE * Math.max(Math.abs(low), Math.abs(high)));
     const more = Math.max(0.04 * (high - low), 0.5 * (least - (high - low)));
     low -= more;
     high += more;
