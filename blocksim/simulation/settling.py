@@ -4,8 +4,8 @@ Gravity and the loads of time zero grow in proportion, in small parts, so that t
 too, and friction is mobilised as far as the final load needs, not as far as a blow of the whole one would. After each
 part velocities are taken away whenever the kinetic energy has passed a peak (kinetic damping: P. A. Cundall, Explicit
 finite difference methods in geomechanics, Blacksburg 1976). Nothing of this damping is left at time zero: the time loop
-is that of any run, with other numbers in its arrays between two calls. Supports do not move, and time stands still
-for loads. Bodies that are held have no weight and no inverse mass until then.
+is that of any run, with other numbers in its arrays between two calls. Supports and driven bodies do not move, and time
+stands still for loads. Bodies that are held have no weight and no inverse mass until then.
 
 Supports that accelerate from time zero on (a pulse that begins at its peak) load the contacts at once. Springs would
 need a time of sqrt(m/k) to take that up, in which a block that is about to slip gains a velocity of a sqrt(m/k) that it
@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode
-from blocksim.kernels.arrays import REACHED
+from blocksim.kernels.arrays import REACHED, World
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
@@ -46,6 +46,7 @@ UNASKED_SHARE = 0.01  # of the smallest side of a block: way in settling that wa
 MOVED_SHARE = 0.25  # of the smallest side of a block: soft springs give way by as much as a tenth, what falls goes on
 HELD = ("inverse_mass", "inverse_inertia", "counts")
 FALLS = ("fx", "fy", "torque")
+PATHS = ("shift", "turn")  # pieces of driven bodies that hold
 MILLI = 1e3
 Floats = NDArray[np.float64]
 
@@ -116,8 +117,10 @@ class _Settling:
 
     @contextmanager
     def without_time(self) -> Iterator[None]:
-        """Keep what is held still, supports too, and loads as they are at time zero; give all back at the end."""
+        """Keep what is held or driven still, supports too, and loads as at time zero; give all back at the end."""
         world = self.scene.world
+        paths, driven = world.motion.copy(), world.moved.copy()
+        _freeze_paths(world)
         controls, loads, pieces = world.controls.copy(), world.loads.copy(), world.load_pieces.copy()
         held = {name: self.bodies[name][self.held].copy() for name in HELD}
         velocities = {name: self.bodies[name].copy() for name in ("vx", "vy", "spin")}
@@ -133,6 +136,9 @@ class _Settling:
         world = self.scene.world
         world.controls[...] = controls
         world.load_pieces[...] = pieces
+        world.motion[...] = paths
+        for name in PATHS:
+            world.moved[name] = driven[name]
         for name in (*FALLS, "last_piece"):
             world.loads[name] = loads[name]
         for name, values in held.items():
@@ -300,6 +306,18 @@ def _support_acceleration(scene: AnyScene) -> tuple[float, float]:
     now = begun[-1]
     rate = float(2.0 * now["c2"] - 6.0 * now["c3"] * now["start"])
     return rate * float(controls.motion_x), rate * float(controls.motion_y)
+
+
+def _freeze_paths(world: World) -> None:
+    """Let driven bodies stay where they are at time zero."""
+    for one in world.moved:
+        for first, end in ((one.shift, one.shift_end), (one.turn, one.turn_end)):
+            pieces = world.motion[int(first) : int(end)]
+            if len(pieces):
+                t = -pieces["start"][0]
+                rest = sum(pieces[f"c{power}"][0] * t**power for power in range(4))
+                for power in range(4):
+                    pieces[f"c{power}"] = rest if power == 0 else 0.0
 
 
 def _begin_rigid(scene: Nonsmooth) -> None:

@@ -98,6 +98,24 @@ def test_a_held_body_stays_where_it_is_and_falls_from_time_zero_on(scheme: str) 
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_driven_body_begins_its_way_at_time_zero(scheme: str) -> None:
+    ramp = {"kind": "ramp", "distance": 0.3, "speed": 1.0, "direction": "180 deg"}
+    wheel = {"kind": "rotation", "angle": "90 deg", "duration": 0.1}
+    driven = [
+        {"block": "b", "name": "ram", "x": 0.46, "y": 0.3, "motion": ramp},
+        {"block": "b", "name": "wheel", "x": 2.0, "y": 2.0, "motion": wheel},
+    ]
+    bodies = [{"block": "b", "x": 0.0, "y": 0.1 + 0.2 * k} for k in range(3)]
+    run = simulate(stack(scheme, bodies=[*bodies, *driven], friction={"block_block": 0.6, "block_ground": 0.6}))
+    assert run.frames.x[0, 3:] == pytest.approx([0.46, 2.0], abs=1e-12)
+    assert run.frames.angle[0, 4] == 0.0
+    assert np.abs(run.frames.x[0, :3]).max() < 1e-6
+    last = run.frames.time[-1]
+    assert run.frames.x[-1, 3] == pytest.approx(0.46 - last, abs=1e-9)
+    assert run.frames.angle[-1, 4] == pytest.approx(0.5 * np.pi * last / 0.1, rel=1e-9)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
 def test_velocities_are_those_of_the_release_and_books_begin_at_time_zero(scheme: str) -> None:
     bodies = [{"block": "b", "x": 0.0, "y": 0.1}, {"block": "b", "x": 1.0, "y": 0.1, "velocity": [0.5, 0.0]}]
     result = simulate(stack(scheme, bodies=bodies))
