@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blocksim.view import style
-from blocksim.view.layout import EDGE, LINE, OWN, Paper, add_axes, number_axis, wrapped, write_heading, write_text
+from blocksim.view.layout import OWN, Paper, number_axis
 from blocksim.view.run_data import Floats
+from blocksim.view.sheet import sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WIDTH, PANEL_HEIGHT = 5.2, 3.0  # inches
-LEFT, RIGHT, HEAD, FOOT = 0.55, 0.15, 0.38, 0.48  # inches
-NARROWEST, LOWEST = 1.8, 1.0  # inches, of the panel on a page whose size was asked for
+LEFT = 0.55  # inches
 WIDE = 8.0  # ratio of the largest to the smallest intensity from which on the axis is logarithmic
 MARGIN = 0.06  # of the axis beside the outermost points
 CURVE_COLOUR = "#0072B2"
@@ -64,25 +63,10 @@ def places(x: Floats) -> Floats:
 
 
 def draw_fragility(found: Fragility, path: Path | str, title: str | None = None, paper: Paper = OWN) -> None:
-    """Draw the picture and write it as PNG, SVG or PDF; the same input gives the same bytes.
-
-    Raises InvalidInputError for an unknown picture format or too small a page, OutputError when the file cannot be
-    written.
-    """
-    path = Path(path)
-    style.picture_suffix(path)
-    width = paper.width(WIDTH, LEFT + RIGHT + NARROWEST)
-    notes = wrapped(list(found.notes), width - LEFT - EDGE)
-    foot = FOOT + LINE * len(notes)
-    row = paper.panel(PANEL_HEIGHT, 1, HEAD + foot, LOWEST)
-    with style.styled_figure(width, paper.height(HEAD + row + foot), paper.dots) as figure:
-        axes = add_axes(figure, LEFT, foot, width - LEFT - RIGHT, row)
+    """Draw the picture and write it; raises as `sheet`."""
+    with sheet(path, title, found.notes, paper, LEFT) as axes:
         _draw_points(axes, found)
         _finish(axes, found)
-        for number, line in enumerate(reversed(notes)):
-            write_text(figure, LEFT, EDGE + LINE * number, line, color=style.FAINT_INK)
-        write_heading(figure, title, EDGE)
-        style.save_figure(figure, path)
 
 
 def _draw_points(axes: "Axes", found: Fragility) -> None:
@@ -112,7 +96,6 @@ def _finish(axes: "Axes", found: Fragility) -> None:
     axes.set_xlim(low, high)
     axes.set_ylim(0.0, 1.0)
     number_axis(axes.xaxis, MOST_NUMBERS, is_log=is_log)
-    axes.spines[["right", "top"]].set_visible(False)
     axes.set_xlabel(f"{found.key} ({found.unit})" if found.unit else found.key, labelpad=2.0)
     axes.set_ylabel("probability of failure")
     handles, labels = axes.get_legend_handles_labels()
