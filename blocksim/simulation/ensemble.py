@@ -7,7 +7,7 @@ with the same bits as from a run of its own.
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -68,6 +68,7 @@ class MemberEnd:
     rows: Rows = field(repr=False)  # one: the last
     first_move: FirstMove | None = None
     end_speed: EndSpeed | None = None
+    start: NDArray[np.float64] | None = field(default=None, repr=False)  # (3, b) x, y, angle (m, rad) where it settled
 
     @cached_property
     def frames(self) -> Frames:
@@ -187,6 +188,7 @@ class Ensemble:
         self.time_steps: list[float] = self.scenes.world.controls["step"][:, 0].tolist()
         own = zip([scenarios[number] for number in stack.numbers], self.placed, self.time_steps, strict=True)
         self.timelines = [Timeline(one, placed, step) if one.events else None for one, placed, step in own]
+        self.settle = [settles(scenarios[number]) for number in stack.numbers]
         ends = [scenarios[number].time.end for number in stack.numbers]
         self.last_steps = np.array([*map(last_step_of, ends, self.time_steps)], dtype=np.int64)
         self.starts = np.zeros((len(ends), len(self.scheme.measured)))
@@ -290,11 +292,19 @@ class Ensemble:
         self._see_ends()
         closing = Closing(self.scenes, self.placed, self._measured())
         return [
-            self._run_alone(m, self._start(m))
-            if code == PAIRS_FULL
-            else closing.end(m, self._start(m), code, self.moves.found[m])
+            self._from_rest(
+                m,
+                self._run_alone(m, self._start(m))
+                if code == PAIRS_FULL
+                else closing.end(m, self._start(m), code, self.moves.found[m]),
+            )
             for m, code in enumerate(self.codes.tolist())
         ]
+
+    def _from_rest(self, m: int, end: Ended) -> Ended:
+        """Return the end of a member with the places in which it settled, where it did."""
+        is_settled = self.settle[m] and isinstance(end, MemberEnd)
+        return replace(end, start=self.moves.start[m]) if is_settled else end
 
     def _measured(self) -> NDArray[np.float64]:
         """Return rows as `measured` of the scheme names them: a call that goes to no further step only measures."""

@@ -153,18 +153,26 @@ def end_speeds(
 
 
 def from_start_to_end(
-    placed: Sequence[PlacedBody], final: Columns, first: FirstMove | None, carried: Way = RESTED
+    placed: Sequence[PlacedBody],
+    final: Columns,
+    first: FirstMove | None,
+    carried: Way = RESTED,
+    start: Floats | None = None,
 ) -> tuple[Manner, float, float]:
     """Return manner, largest displacement of a centre (mm) and largest rotation (degrees), of a final table.
 
     `first` is the first move on the way, if there was any: it distinguishes what rocked back from what stands.
     `carried` is the way (m) of the support; of blocks that were removed on the way it is not known, and taken as none.
+    `start` is where blocks have settled before time zero, (3, b) as x, y (m), angle (rad); without it they began as
+    placed.
     """
     shapes = _shapes_of(placed)
     is_there = ~np.isnan(np.array(final["vx_mm_s"], dtype=np.float64))
-    dx = np.array(final["x_mm"]) / MILLI - [body.x for body in placed] - carried[0] * is_there
-    dy = np.array(final["y_mm"]) / MILLI - [body.y for body in placed] - carried[1] * is_there
-    turn = np.abs(np.array(final["rotation_deg"]))
+    drawn = np.array([(body.x, body.y, body.angle) for body in placed], dtype=np.float64).reshape(-1, 3).T
+    x, y, angle = drawn if start is None else start
+    dx = np.array(final["x_mm"]) / MILLI - x - carried[0] * is_there
+    dy = np.array(final["y_mm"]) / MILLI - y - carried[1] * is_there
+    turn = np.abs(np.array(final["rotation_deg"]) - np.degrees(angle - drawn[2]))
     way = np.hypot(dx, dy)
     manner = _with_way_there(_manner(shapes, way, -dy, np.radians(turn)), first)
     return manner, float(MILLI * (way * shapes.is_free).max()), float((turn * shapes.is_free).max())

@@ -13,6 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from blocksim.analysis.compare import compare_final, limits
 from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
 from blocksim.errors import BlocksimError, InvalidInputError
@@ -43,7 +46,10 @@ NUMBERS = "if"  # kinds of numpy
 
 
 class Course(NamedTuple):
-    """How a case that was run has gone; `seconds` are simulated, so they are the same on every machine."""
+    """How a case that was run has gone; `seconds` are simulated, so they are the same on every machine.
+
+    `start` is where its blocks have settled before time zero, (3, b) as x, y (m), angle (rad): they move from there.
+    """
 
     status: str
     reason: str
@@ -51,12 +57,15 @@ class Course(NamedTuple):
     first_move: FirstMove | None
     end_speed: EndSpeed | None = None
     carried: Way = RESTED  # m: of the support, from start to end
+    start: NDArray[np.float64] | None = None
 
 
 def row_of(course: Course, final: Columns, placed: Sequence[PlacedBody]) -> Row:
-    """Return the row of a case that was run; `placed` are the blocks at the start."""
+    """Return the row of a case that was run; `placed` are the blocks as they were placed."""
     row: Row = {"status": course.status, "reason": course.reason, "seconds": course.seconds}
-    manner, displacement, rotation = from_start_to_end(placed, final, course.first_move, course.carried)
+    manner, displacement, rotation = from_start_to_end(
+        placed, final, course.first_move, course.carried, course.start
+    )
     mover, moved = course.first_move or (None, None)
     _, speed, moves_on = course.end_speed or (None, None, None)
     values_of = (manner.value, mover, moved, displacement, rotation, None if speed is None else MILLI * speed, moves_on)

@@ -14,12 +14,15 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario, place_bodies
 from blocksim.simulation import MemberEnd, MemberFailure, Result, Summary, run_in_batches
 from blocksim.simulation import folder as files
 from blocksim.simulation.moving_support import MovingSupport
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash, run_hash
+from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import changed_results, read_summary
 from blocksim.simulation.table import Columns, read_table
 from blocksim.study.executors import Batch, BatchSize, Setting, Task, needs_nothing, take
@@ -105,7 +108,9 @@ def _row_of(member: MemberEnd | MemberFailure, scenario: Scenario) -> Row:
     if isinstance(member, MemberFailure):
         return row_of_error(member.error)
     outcome, carried = member.outcome, MovingSupport(scenario).way(member.seconds)
-    course = Course(outcome.status, outcome.reason, member.seconds, member.first_move, member.end_speed, carried)
+    course = Course(
+        outcome.status, outcome.reason, member.seconds, member.first_move, member.end_speed, carried, member.start
+    )
     return row_of(course, member.columns, member.placed)
 
 
@@ -154,7 +159,7 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
         row = _known_row(scenario, folder)
         if row is None:
             result = _run_on(scenario, folder)
-            row = row_of(_course(result.summary, scenario), result.columns, place_bodies(scenario))
+            row = row_of(_course(result.summary, folder, scenario), result.columns, place_bodies(scenario))
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         return row_of_error(error)
     return row
@@ -175,15 +180,18 @@ def _known_row(scenario: Scenario, folder: Path) -> Row | None:
         is_same = summary.run == run_hash(scenario)
         if is_same and _has_ended(folder, summary) and not changed_results(folder, summary):
             final = read_table(folder / files.FINAL)
-            return row_of(_course(summary, scenario), final, place_bodies(scenario))
+            return row_of(_course(summary, folder, scenario), final, place_bodies(scenario))
     return None
 
 
-def _course(summary: Summary, scenario: Scenario) -> Course:
+def _course(summary: Summary, folder: Path, scenario: Scenario) -> Course:
     moved = summary.movement
     first, end = (None, None) if moved is None else (moved.first_move, moved.end_speed)
-    seconds = summary.simulated_time_s
-    return Course(summary.status, summary.reason, seconds, first, end, MovingSupport(scenario).way(seconds))
+    seconds, start = summary.simulated_time_s, None
+    if summary.settled is not None:
+        frames = read_frames(folder / files.FRAMES, scenario)
+        start = np.stack([frames.x[0], frames.y[0], frames.angle[0]])
+    return Course(summary.status, summary.reason, seconds, first, end, MovingSupport(scenario).way(seconds), start)
 
 
 def _has_ended(folder: Path, summary: Summary) -> bool:

@@ -10,7 +10,7 @@ from blocksim.simulation import folder as files
 from blocksim.simulation import simulate
 from blocksim.simulation.checkpoint_policy import CheckpointPolicy
 from blocksim.simulation.summary import read_summary
-from blocksim.study.executors.ensemble import BATCH, run_case, run_members
+from blocksim.study.executors.ensemble import BATCH, rows_of, run_case, run_members
 from blocksim.study.run import run
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
@@ -47,6 +47,20 @@ def test_members_keep_their_order_beyond_a_batch(slide: Document) -> None:
     places = [final["x_mm"][0] for final in finals if final is not None]
     assert len(places) == len(ends)
     assert places == sorted(places)
+
+
+def test_blocks_that_settled_have_moved_from_where_they_settled_together_and_in_folders(
+    slide: Document, tmp_path: Path
+) -> None:
+    soft = {"contact.stiffness_scale": 3e-7, "start.settle": True, "bodies.0.velocity": [0.0, 0.0]}
+    scenario = slide.with_values({**soft, "ground.tilt": "5 deg"}).build()
+    (row,) = rows_of([scenario], 1)
+    assert row["outcome"] == "stands"
+    assert abs(float(str(row["displacement_mm"]))) < 1e-3
+    assert abs(float(str(row["turn_deg"]))) < 1e-3
+    assert 12.5 - float(str(row["block.y_mm"])) > 0.01 * 25.0  # that far a block has moved
+    assert run_case(scenario, tmp_path / "case") == row
+    assert run_case(scenario, tmp_path / "case") == row  # as the folder has it
 
 
 @pytest.mark.parametrize("lost", [None, "run.h5", "checkpoint.0"])
