@@ -9,6 +9,7 @@ import typer
 
 from blocksim.cli import completion, options
 from blocksim.cli.limit_curve import show_curve
+from blocksim.cli.limit_give import extrapolated, warn_of_give
 from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.sweep_output import leaving_unfinished_cases
@@ -22,7 +23,8 @@ from blocksim.study.executors import Execution
 from blocksim.study.limit import LimitResult, OnRun, find_limit
 from blocksim.study.limit_curve import OPTION as OVER
 from blocksim.study.limit_curve import read_curve
-from blocksim.study.limit_plan import OPTION, TOLERANCE, LimitPlan, is_soft, read_limit, variants
+from blocksim.study.limit_give import stiff_limits
+from blocksim.study.limit_plan import OPTION, TOLERANCE, LimitPlan, read_limit, variants
 from blocksim.study.limit_search import Change, Number
 from blocksim.study.rows import MOVEMENT, Row
 
@@ -131,8 +133,6 @@ def limit_command(
     for name, plan in plans.items():
         base = plan.scenario_at(plan.span.low)
         tell_compilation(kernels_of(base), quiet=silent)
-        if not silent and is_soft(base) and not stiffer:
-            note(f"warning: stiffness scale {base.contact.stiffness_scale:g} may shift the limit; see --stiffer")
         with leaving_unfinished_cases():
             found[name] = find_limit(
                 plan,
@@ -163,10 +163,13 @@ def _show(found: Mapping[str, LimitResult], *, as_json: bool, quiet: bool) -> No
     else:
         answer("\n\n".join("\n".join(_lines(name, one)) for name, one in found.items()))
         _compare(found)
+        for line in extrapolated(found):
+            answer(f"\n{line}")
     if quiet or as_json:
         return
     if any(Verdict.UNDECIDED in one.verdicts.values() for one in found.values()):
         note("undecided: the run ends while blocks move on; a larger time.end may decide")
+    warn_of_give(found.values(), hint="" if stiff_limits(found) else "; see --stiffer")
     for one in found.values():
         note(f"{len(one.rows)} runs, {one.run} of them now: {one.folder / 'limit.csv'}")
         if one.kept:

@@ -5,6 +5,7 @@ from typing import NoReturn
 
 import typer
 
+from blocksim.cli.limit_give import warn_of_give
 from blocksim.cli.output import answer, note, print_json, table_lines
 from blocksim.cli.sweep_output import leaving_unfinished_cases
 from blocksim.errors import ExitCode
@@ -29,6 +30,7 @@ def show_curve(
     else:
         answer("\n".join(_lines(found)))
     if not (quiet or as_json):
+        warn_of_give(found.searches.values(), hint="")
         note(f"limits: {found.folder / 'limits.csv'}; picture: blocksim plot {found.folder}")
     raise typer.Exit(ExitCode.SUCCESS if all(one.changes for one in found.searches.values()) else ExitCode.OUTSIDE)
 

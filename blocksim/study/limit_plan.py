@@ -22,11 +22,11 @@ MOST_SCANNED = 1000
 TOLERANCE = 1e-3
 LEAST_TOLERANCE = 1e-9
 OPTION = "--vary"
-SOFT = 0.1  # contact.stiffness_scale below which springs shift limits by more than a percent
 RATIO = 10.0  # of stiffness between a search and its repetition
 SPRINGS = "explicit"
 NAMES = {SPRINGS: "springs", "nonsmooth": "rigid contacts"}
 STIFFNESS = "contact.stiffness_scale"
+STIFFER = f"{NAMES[SPRINGS]}, stiffness scale"
 
 
 @dataclass(frozen=True)
@@ -148,12 +148,7 @@ def variants(document: Document, *, both_laws: bool = False, stiffer: bool = Fal
     if springs is None:
         raise InvalidInputError("rigid contacts have no stiffness: --stiffer is for springs (time.scheme explicit)")
     scale = RATIO * present.contact.stiffness_scale
-    return {**chosen, f"springs, stiffness scale {scale:g}": springs.with_values({STIFFNESS: scale})}
-
-
-def is_soft(scenario: Scenario) -> bool:
-    """Return True where springs are so soft that limits may shift by more than a percent."""
-    return scenario.time.scheme == SPRINGS and scenario.contact.stiffness_scale < SOFT
+    return {**chosen, f"{STIFFER} {scale:g}": springs.with_values({STIFFNESS: scale})}
 
 
 def with_scheme(document: Document, scheme: str) -> Document:

@@ -1,12 +1,14 @@
 """blocksim limit: what it prints, its exit codes, and a kill."""
 
 import json
+import math
 import signal
 import time
 from pathlib import Path
 
 import pytest
 
+from blocksim.scenario import scenario_from_mapping, scenario_to_toml
 from tests.cli.conftest import Command, Process
 from tests.golden import Golden
 
@@ -30,13 +32,49 @@ def test_the_dry_wall_falls_where_limit_analysis_says_in_at_most_25_runs(blocksi
 
 
 def test_both_laws_are_compared(blocksim: Command, golden: Golden) -> None:
-    soft = ("--set", "contact.stiffness_scale=0.001", "--set", "time.end=0.5 s")
+    soft = ("--set", "contact.stiffness_scale=0.001", "--set", "time.end=0.5 s", "--set", "start.settle=true")
     answer = blocksim(*WALL, "--vary", "ground.tilt=0 deg:40 deg:3", *ROUGH, "--both-laws", *soft)
     assert answer.code == 0
     assert "rigid contacts against springs: " in answer.out
     assert max(map(len, answer.out.splitlines())) <= 80
     assert {path.name for path in Path("out").iterdir()} == {"springs", "rigid-contacts"}
-    golden(answer.err.split("\n")[0])
+    golden("\n".join(line for line in answer.err.splitlines() if line.startswith("warning: ")))
+
+
+def on_soft_springs() -> dict[str, object]:
+    """Return a slender block on springs, whose toe sinks in by a hundredth of its width before it topples."""
+    width, height = 0.1, 0.2
+    weight = 2500 * width * height * 9.81  # of 1 m
+    return {
+        "schema": 1,
+        "name": "soft",
+        "materials": {"stone": {"density": 2500, "young_modulus": "30 GPa", "poisson_ratio": 0.2}},
+        "blocks": {"b": {"width": width, "height": height, "length": 1.0, "material": "stone"}},
+        "bodies": [{"block": "b", "x": 0.0, "y": 0.5 * height}],
+        "friction": {"block_ground": 2.0},
+        "contact": {"restitution": 0.0, "normal_stiffness": weight / (0.01 * width)},
+        "start": {"settle": True},
+        "time": {"end": 0.2},
+    }
+
+
+def test_springs_that_give_way_are_warned_of_by_what_they_shift_and_extrapolated(
+    blocksim: Command, tmp_path: Path
+) -> None:
+    (tmp_path / "soft.toml").write_text(scenario_to_toml(scenario_from_mapping(on_soft_springs())))
+    soft = ("limit", "soft.toml", "--vary", "ground.tilt=22deg:28deg:5", "--no-runs", "--to", "0.1%")
+    stiff = math.degrees(math.atan(0.5))
+    one = blocksim(*soft, "--out", "one")
+    (warning,) = (line for line in one.err.splitlines() if "springs give way" in line)
+    data = json.loads(blocksim(*soft, "--out", "one", "--json").out)
+    shift = 1.0 - 0.5 * (data[0]["changes"][0]["low"] + data[0]["changes"][0]["high"]) / stiff
+    assert 0.01 < shift < 0.04
+    assert float(warning.split(" some ")[1].split("%")[0]) == pytest.approx(100.0 * shift, rel=0.1)
+    both = blocksim(*soft, "--stiffer", "--out", "both")
+    found = float(both.out.split("stiff contacts: ")[1].split()[0])
+    assert found == pytest.approx(stiff, rel=2e-3)
+    over = blocksim(*soft, "--over", "friction.block_ground=1,2", "--out", "over")
+    assert over.err.count("the limit is off by some") == 2
 
 
 def test_nothing_that_changes_is_exit_code_1(blocksim: Command, golden: Golden) -> None:
