@@ -20,7 +20,16 @@ from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.study.criterion import Criterion, read_criterion
 from blocksim.study.design import Together, levels_of
 from blocksim.study.limit_plan import takes_whole
-from blocksim.study.plan import MOST_CASES, Cases, Values, Variations, cases_of, refuse_wrong_draws, varied
+from blocksim.study.plan import (
+    MOST_CASES,
+    Cases,
+    Values,
+    Variations,
+    cases_of,
+    refuse_wrong_draws,
+    table_digests,
+    varied,
+)
 from blocksim.study.rows import Head, heads_of, si_number
 from blocksim.study.sampling import Places, drawn, generator, open_interval
 from blocksim.study.typed_levels import typed_levels
@@ -64,6 +73,9 @@ class FragilityPlan:
         """A hash of all that decides a member; neither their number nor what counts as failure does."""
         levels = [self.head.key, *map(str, self.levels.values())]
         about = [scenario_hash(self.document.build()), levels, self.scatter.as_table(), self.seed, code_hash()]
+        tables = table_digests(self.document, self.scatter.vary)
+        if tables:
+            about.append(tables)
         return hashlib.sha256(json.dumps(about, default=str).encode()).hexdigest()[:HASH_DIGITS]
 
     @cached_property

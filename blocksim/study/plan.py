@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blocksim.errors import BlocksimError, InvalidInputError, ScenarioError
-from blocksim.scenario import Document, Scenario, Sweep
+from blocksim.scenario import Document, Scenario, Sweep, scenario_hash
 from blocksim.scenario.check import mistakes_of_value
 from blocksim.scenario.findings import Finding
+from blocksim.scenario.keys import parse_key
 from blocksim.scenario.models.motions import TABLED
-from blocksim.scenario.models.variation import Normal, written
+from blocksim.scenario.models.variation import Normal, Variation, written
 from blocksim.scenario.overrides import Override, frozen, with_value
 from blocksim.scenario.quantities import shown
 from blocksim.simulation.provenance import run_hash
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from blocksim.world.describe import Description
 
 MOST_CASES = 1_000_000
+TABLE = "table"  # last part of keys that name a file
 MOST_LOOKED_AT = 1_000
 """Cases that are built in search of one that can be simulated, before anything runs."""
 Values = Iterable[object] | Mapping[str, object]  # a list, { from, to, count }, { from, to } or { mean, sd }
@@ -165,6 +167,26 @@ def _ends(values: Normal, drawn: Iterable[object]) -> tuple[object, object]:
 def _mistakes(document: Document, key: str, value: object) -> Iterable[str]:
     """Return what is wrong with a value, each thing once: one number may set two keys."""
     return dict.fromkeys(found.message for found in mistakes_of_value(document.data, document.folder, key, value))
+
+
+def table_digests(document: Document, vary: Mapping[str, Variation]) -> dict[str, list[str]]:
+    """Return a hash of what a scenario with each of the files is that varied keys name, by key and in order.
+
+    A plan that is named by the paths alone would take rows of one record for those of another one of the same name.
+    """
+    bare = document.without_sweep()
+    return {
+        key: [_digest_of(bare, key, value) for value in values]
+        for key, values in vary.items()
+        if parse_key(key)[-1] == TABLE and isinstance(values, tuple)
+    }
+
+
+def _digest_of(document: Document, key: str, value: object) -> str:
+    try:
+        return scenario_hash(document.with_values({key: value}).build())
+    except BlocksimError:  # the case says so
+        return ""
 
 
 def _case(document: Document, values: Settings) -> Case:

@@ -8,7 +8,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,7 +23,7 @@ from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.simulation.stopping import stop_requests
 from blocksim.study.design import levels_of
 from blocksim.study.executors import Batch, Run, Setting, Task, chosen_executor, executor_named
-from blocksim.study.plan import Cases, Values, cases_of, with_sweep
+from blocksim.study.plan import Cases, Values, cases_of, table_digests, with_sweep
 from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Entry, Manifest, Shard, Timings, values_hash
 from blocksim.study.rows import FINISHED, TABLE, Ranges, Row, check_experiment, invalid_row
 from blocksim.study.sweep_folder import CASES, prepare, read_plan
@@ -77,7 +77,7 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     base = document.build()
     plan = _plan_of(base)
     cases = cases_of(document, plan)
-    name = sweep_hash(base, plan)
+    name = sweep_hash(base, plan, table_digests(document, plan.vary))
     folder = Path(out) if out is not None else files.RESULTS / base.name / f"sweep-{name}"
     setting = Setting(jobs or os.cpu_count() or 1, scheduler=scheduler, folder=folder / CASES if keep_cases else None)
     runner.check(setting)
@@ -122,9 +122,12 @@ def measured_ranges(base: Scenario) -> Ranges | None:
     return None if base.experiment is None else Ranges.read(base.experiment.table)
 
 
-def sweep_hash(base: Scenario, plan: Sweep) -> str:
-    """Return the name of a sweep: a hash of its scenario, of what it varies, and of the code."""
-    text = json.dumps([scenario_hash(base), plan.as_table(), code_hash()])
+def sweep_hash(base: Scenario, plan: Sweep, tables: Mapping[str, Sequence[str]]) -> str:
+    """Return the name of a sweep: a hash of its scenario, of what it varies, and of the code.
+
+    `tables` has the digests of the files that varied keys name.
+    """
+    text = json.dumps([scenario_hash(base), plan.as_table(), *([tables] if tables else []), code_hash()])
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.scenario import Document, load_scenario
+from blocksim.study.fragility_plan import read_fragility
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.progress import Manifest, Shard
 from blocksim.study.rows import MOVEMENT
@@ -127,6 +128,28 @@ def test_called_again_it_runs_only_what_is_missing(quick: Document, tmp_path: Pa
     assert sorted(json.loads(line)["number"] for line in lines(tmp_path) if line in whole) == [0, 1, 2]
     assert len(lines(tmp_path)) == 4
     assert (tmp_path / "sweep.csv").read_bytes() == table
+
+
+def test_a_record_that_was_edited_since_is_not_taken_for_the_one_that_was_run(tmp_path: Path) -> None:
+    for name, peak in (("one.csv", 0.1), ("two.csv", 0.2)):
+        (tmp_path / name).write_text(f"time_s,acceleration_g\n0,0\n0.01,{peak}\n0.02,0\n")
+    shaken = Document.from_mapping(
+        {**ROCKING, "motion": {"kind": "table", "table": "one.csv"}, "time": {"end": 0.001}}, tmp_path
+    )
+    vary: dict[str, Values] = {"motion.table": ["one.csv", "two.csv"]}
+    before = fragility_plan_of(shaken, vary)
+    for _ in range(2):
+        sweep(shaken, vary, out=tmp_path / "swept")
+    assert len(lines(tmp_path / "swept")) == 2
+    (tmp_path / "two.csv").write_text("time_s,acceleration_g\n0,0\n0.01,0.3\n0.02,0\n")
+    with pytest.raises(OutputExistsError, match="contains another sweep"):
+        sweep(shaken, vary, out=tmp_path / "swept")
+    assert fragility_plan_of(shaken, vary) != before
+
+
+def fragility_plan_of(document: Document, records: dict[str, Values]) -> str:
+    """Return the name of a fragility study whose members differ by their record."""
+    return read_fragility(document, {"motion.scale": [0.5, 1.0]}, records, members=4).name
 
 
 def test_failed_case_is_run_again_only_when_asked(quick: Document, tmp_path: Path) -> None:
