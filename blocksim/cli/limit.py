@@ -172,8 +172,10 @@ def _show(found: Mapping[str, LimitResult], *, as_json: bool, quiet: bool) -> No
     warn_of_give(found.values(), hint="" if stiff_limits(found) else "; see --stiffer")
     for one in found.values():
         note(f"{len(one.rows)} runs, {one.run} of them now: {one.folder / 'limit.csv'}")
-        if one.kept:
+        if one.pictured:
             note(f"picture of the mechanism: blocksim plot {one.folder}")
+        elif one.kept:
+            note("no picture of the mechanism: what falls before time zero (start.settle) has no run")
 
 
 def _folder(name: str) -> str:

@@ -68,6 +68,11 @@ class LimitResult:
         return [change for change in self.changes if {change.below, change.above} == both]
 
     @property
+    def pictured(self) -> list[Change[Verdict]]:
+        """The limits of which both sides are kept as runs: a side that does not settle has none."""
+        return [one for one in self.limits if {one.low, one.high} <= self.kept.keys()]
+
+    @property
     def table(self) -> "pd.DataFrame":
         """All runs as limit.csv has them."""
         import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import signal
 import time
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 from blocksim.scenario import scenario_from_mapping, scenario_to_toml
 from tests.cli.conftest import Command, Process
 from tests.golden import Golden
+from tests.study.test_limit import SLENDER, block_on_a_slope
 
 WALL = ("limit", "scenarios/tilting_wall.toml")
 TILT = ("--vary", "ground.tilt=20deg:40deg")
@@ -42,7 +44,7 @@ def test_both_laws_are_compared(blocksim: Command, golden: Golden) -> None:
 
 
 def on_soft_springs() -> dict[str, object]:
-    """Return a slender block on springs, whose toe sinks in by a hundredth of its width before it topples."""
+    """Return a slender block on springs, whose toe sinks in by 0.03 of its width before it topples."""
     width, height = 0.1, 0.2
     weight = 2500 * width * height * 9.81  # of 1 m
     return {
@@ -52,29 +54,48 @@ def on_soft_springs() -> dict[str, object]:
         "blocks": {"b": {"width": width, "height": height, "length": 1.0, "material": "stone"}},
         "bodies": [{"block": "b", "x": 0.0, "y": 0.5 * height}],
         "friction": {"block_ground": 2.0},
-        "contact": {"restitution": 0.0, "normal_stiffness": weight / (0.01 * width)},
+        "contact": {"restitution": 0.0, "normal_stiffness": weight / (0.03 * width)},
         "start": {"settle": True},
-        "time": {"end": 0.2},
+        "time": {"end": 0.5},
     }
 
 
+def test_springs_that_give_way_are_warned_of_over_another_key_too(blocksim: Command, tmp_path: Path) -> None:
+    (tmp_path / "soft.toml").write_text(scenario_to_toml(scenario_from_mapping(on_soft_springs())))
+    rough = ("--vary", "ground.tilt=24deg:28deg:2", "--to", "20%", "--over", "friction.block_ground=2", "--out", "out")
+    answer = blocksim("limit", "soft.toml", *rough)
+    (told,) = re.findall(r"blocks have turned by (\S+)° at 24 deg, .* off by some (\S+)%", answer.err)
+    # between its two corners the load has its centre at h/2 tan(tilt + turn): turn = 0.03 cos(tilt) h/b tan(tilt + turn)
+    assert (float(told[0]), float(told[1])) == pytest.approx((1.498, 6.24), abs=0.06)
+
+
+@pytest.mark.long
 def test_springs_that_give_way_are_warned_of_by_what_they_shift_and_extrapolated(
     blocksim: Command, tmp_path: Path
 ) -> None:
     (tmp_path / "soft.toml").write_text(scenario_to_toml(scenario_from_mapping(on_soft_springs())))
-    soft = ("limit", "soft.toml", "--vary", "ground.tilt=22deg:28deg:5", "--no-runs", "--to", "0.1%")
+    limit = ("limit", "soft.toml", "--vary", "ground.tilt=24.8deg:26.6deg:3", "--no-runs")
     stiff = math.degrees(math.atan(0.5))
-    one = blocksim(*soft, "--out", "one")
-    (warning,) = (line for line in one.err.splitlines() if "springs give way" in line)
-    data = json.loads(blocksim(*soft, "--out", "one", "--json").out)
-    shift = 1.0 - 0.5 * (data[0]["changes"][0]["low"] + data[0]["changes"][0]["high"]) / stiff
-    assert 0.01 < shift < 0.04
-    assert float(warning.split(" some ")[1].split("%")[0]) == pytest.approx(100.0 * shift, rel=0.1)
-    both = blocksim(*soft, "--stiffer", "--out", "both")
-    found = float(both.out.split("stiff contacts: ")[1].split()[0])
-    assert found == pytest.approx(stiff, rel=2e-3)
-    over = blocksim(*soft, "--over", "friction.block_ground=1,2", "--out", "over")
-    assert over.err.count("the limit is off by some") == 2
+    both = blocksim(*limit, "--to", "0.5%", "--stiffer", "--out", "both")
+    soft, stiffer = (float(one) for one in re.findall(r"stands up to (\S+) deg", both.out))
+    assert stiff - soft == pytest.approx(1.55, abs=0.1)  # 0.03 rad cos(tilt), on one corner
+    assert stiff - stiffer == pytest.approx(0.155, abs=0.1)
+    first, second = re.findall(r"the limit is off by some (\S+)%", both.err)
+    assert (float(first), float(second)) == pytest.approx((6.0, 0.6), rel=0.15)
+    assert float(both.out.split("stiff contacts: ")[1].split()[0]) == pytest.approx(stiff, rel=4e-3)
+
+
+def test_a_picture_is_named_only_where_both_sides_have_a_run_to_draw(blocksim: Command, tmp_path: Path) -> None:
+    for settles in (True, False):
+        scene = {**block_on_a_slope(SLENDER), "start": {"settle": settles}}
+        (tmp_path / "slender.toml").write_text(scenario_to_toml(scenario_from_mapping(scene)))
+        folder = f"settles-{settles}"
+        rough = ("--vary", "ground.tilt=5deg:30deg:2", "--to", "90%", *FELL, "--out", folder)
+        answer = blocksim("limit", "slender.toml", *rough)
+        assert answer.out.splitlines()[-1].startswith("stands up to 5 deg")
+        assert (f"\npicture of the mechanism: blocksim plot {folder}" in answer.err) is not settles
+        assert ("no picture of the mechanism" in answer.err) is settles
+    assert blocksim("plot", "settles-True").code == 65  # as it said
 
 
 def test_nothing_that_changes_is_exit_code_1(blocksim: Command, golden: Golden) -> None:
