@@ -65,7 +65,7 @@ def test_springs_that_give_way_are_warned_of_over_another_key_too(blocksim: Comm
     rough = ("--vary", "ground.tilt=24deg:28deg:2", "--to", "20%", "--over", "friction.block_ground=2", "--out", "out")
     answer = blocksim("limit", "soft.toml", *rough)
     (told,) = re.findall(r"blocks have turned by (\S+)° at 24 deg, .* off by some (\S+)%", answer.err)
-    # between its two corners the load has its centre at h/2 tan(tilt + turn): turn = 0.03 cos(tilt) h/b tan(tilt + turn)
+    # between its two corners the load has its centre at h/2 tan(tilt + turn): turn = 0.03 cos(tilt) h/b tan(tilt+turn)
     assert (float(told[0]), float(told[1])) == pytest.approx((1.498, 6.24), abs=0.06)
 
 
