@@ -63,9 +63,7 @@ class Course(NamedTuple):
 def row_of(course: Course, final: Columns, placed: Sequence[PlacedBody]) -> Row:
     """Return the row of a case that was run; `placed` are the blocks as they were placed."""
     row: Row = {"status": course.status, "reason": course.reason, "seconds": course.seconds}
-    manner, displacement, rotation = from_start_to_end(
-        placed, final, course.first_move, course.carried, course.start
-    )
+    manner, displacement, rotation = from_start_to_end(placed, final, course.first_move, course.carried, course.start)
     mover, moved = course.first_move or (None, None)
     _, speed, moves_on = course.end_speed or (None, None, None)
     values_of = (manner.value, mover, moved, displacement, rotation, None if speed is None else MILLI * speed, moves_on)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 from blocksim.kernels.loads import Pose, force_at, value_at
@@ -184,16 +185,11 @@ def test_water_on_a_turned_face_is_the_exact_integral_along_it() -> None:
     angle, level = 0.3, 1.05
     fx, fy, torque = water(level, angle=angle)
     count = 100_000
-    total, moment = 0.0, 0.0
-    for k in range(count):
-        s = HEIGHT * ((k + 0.5) / count - 0.5)
-        arm = (
-            -0.5 * WIDTH * math.cos(angle) - s * math.sin(angle),
-            -0.5 * WIDTH * math.sin(angle) + s * math.cos(angle),
-        )
-        size = 10e3 * max(level - 1.0 - arm[1], 0.0) * DEPTH * HEIGHT / count
-        total += size
-        moment += size * (arm[0] * math.sin(angle) - arm[1] * math.cos(angle))
+    s = HEIGHT * ((np.arange(count) + 0.5) / count - 0.5)
+    x = -0.5 * WIDTH * math.cos(angle) - s * math.sin(angle)
+    y = -0.5 * WIDTH * math.sin(angle) + s * math.cos(angle)
+    sizes = 10e3 * np.maximum(level - 1.0 - y, 0.0) * DEPTH * HEIGHT / count
+    total, moment = sizes.sum(), (sizes * (x * math.sin(angle) - y * math.cos(angle))).sum()
     assert (fx, fy) == pytest.approx((total * math.cos(angle), total * math.sin(angle)), rel=1e-6)
     assert torque == pytest.approx(moment, rel=1e-6)
 
