@@ -266,5 +266,8 @@ def taken_by(
     vx = a.vx - b.vx + vx_a - vx_b + free * gx
     vy = a.vy - b.vy + vy_a - vy_b + free * gy
     slip = slip_of(row, vx, vy, a.spin + spin_a, b.spin + spin_b)
-    given = free * given_to(row, a, b, normal_one, normal_two, shear)
+    if contacts.stepping[0].is_shaken:
+        given = free * given_to(row, a, b, normal_one, normal_two, shear)
+    else:
+        given = 0.0 * shear
     return slip.one * normal_one + slip.two * normal_two, slip.shear * shear, -given

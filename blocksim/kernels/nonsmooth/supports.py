@@ -20,7 +20,8 @@ def drive(scene: Nonsmooth, number: int) -> None:
     world = scene.world
     controls = world.controls[0]
     stepping = scene.contacts.stepping[0]
-    if not has_motion(controls):
+    stepping.is_shaken = has_motion(controls)
+    if not stepping.is_shaken:
         return
     h = stepping.substep
     begin = begin_of_part(scene) + number * h
