@@ -321,15 +321,14 @@ def _freeze_paths(world: World) -> None:
 
 
 def _begin_rigid(scene: Nonsmooth) -> None:
-    """Halve the impulses that hold against gravity, of which the first substep has half a kick, and clear the books."""
+    """Let the first substep begin with the impulses that hold against gravity, and clear the books."""
     contacts = scene.contacts
-    for name in ("normal_one", "normal_two", "shear"):
-        contacts.rows[name] *= 0.5
     for name in contacts.books.dtype.names or ():
         contacts.books[name] = 0.0
     for name in scene.pushes.dtype.names or ():
         scene.pushes[name] = 0.0
     contacts.stepping["sweeps"] = 0
+    contacts.stepping["is_settled"] = 1
 
 
 def _ways(change: Floats, radius: Floats) -> Floats:

@@ -6,10 +6,11 @@ from blocksim.kernels.advance import fastest_point
 from blocksim.kernels.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL, REACHED, STATUS, TEAM_SIZE
 from blocksim.kernels.energy import weights_power
 from blocksim.kernels.integrate import kinetic_energy, renew_rotations
-from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
+from blocksim.kernels.jit import entry_kernel, kernel
 from blocksim.kernels.lanes import WIDTH
 from blocksim.kernels.loads import are_loads_steady
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.kernels.nonsmooth.begin import is_start, load_lines
 from blocksim.kernels.nonsmooth.energy import has_excessive_overlap
 from blocksim.kernels.nonsmooth.groups import gather, pack_groups, unpack_groups
 from blocksim.kernels.nonsmooth.loads import show_velocities
@@ -126,23 +127,6 @@ def collide_rows(scene: Nonsmooth, begin: int, end: int) -> None:
             r += 1
 
 
-@rare_kernel
-def load_lines(scene: Nonsmooth) -> None:
-    """Bring velocities and inverse masses of all bodies into their lines: at the start of a run."""
-    controls = scene.world.controls[0]
-    h = scene.contacts.stepping[0].substep
-    for i in range(scene.world.bodies.size):
-        body = scene.world.bodies[i]
-        line = scene.contacts.lines[i]
-        line.vx = body.vx
-        line.vy = body.vy
-        line.spin = body.spin
-        line.inverse_mass = body.inverse_mass
-        line.inverse_inertia = body.inverse_inertia
-        line.dx = line.dy = line.turned = 0.0
-        scene.contacts.before[i].lifted = h * (controls.gravity_x * body.vx + controls.gravity_y * body.vy)
-
-
 @kernel
 def do_step(scene: Nonsmooth, k: int) -> int:
     """Take one step as thread k, in as many parts as it takes; return the status code."""
@@ -174,7 +158,7 @@ def do_part(scene: Nonsmooth, k: int) -> int:
     begin, end = part_of(0, contacts.stepping[0].group_count, k, size)
     pack_groups(contacts, begin, end)
     count = contacts.stepping[0].substeps
-    is_first = world.clock[0].steps == 0 and contacts.stepping[0].parts == 0
+    is_first = is_start(scene)
     for number in range(count):
         substep(scene, k, number, is_first)
     unpack_groups(contacts, begin, end)

@@ -117,6 +117,7 @@ STEPPING = record_type(
     "is_divided "  # flag: steps are cut at impacts; parts.py
     "is_guarded "  # flag: impacts go one after the other, in rounds
     "is_driven "  # flag: bodies move otherwise than the supports
+    "is_settled "  # flag: the run begins at rest, with impulses that hold against gravity
     "is_shaken "  # flag: supports or driven bodies move, so that impulses on them do work
     "has_rebounds "  # flag: anything rebounds in the substep under way
     "has_gain",  # flag: the last round has created energy in a cluster

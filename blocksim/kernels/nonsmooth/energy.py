@@ -15,6 +15,7 @@ from blocksim.kernels.energy import potential_energy, smallest_side
 from blocksim.kernels.integrate import kinetic_energy
 from blocksim.kernels.jit import entry_kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import AWAY, TOUCHING, Nonsmooth
+from blocksim.kernels.nonsmooth.begin import is_start
 
 DEEPEST = (
     0.5  # of the smallest side of a pair: what goes deeper comes out on the other side. Impacts of fast blocks that
@@ -46,7 +47,7 @@ def correction(scene: Nonsmooth) -> float:
     h = scene.contacts.stepping[0].substep
     hx = h * controls.gravity_x
     hy = h * controls.gravity_y
-    half = 0.5 if scene.world.clock[0].steps > 0 else 0.0
+    half = 0.0 if is_start(scene) else 0.5
     total = 0.0
     for i in range(scene.world.bodies.size - 1):
         body = scene.world.bodies[i]
@@ -63,7 +64,7 @@ def correction(scene: Nonsmooth) -> float:
 @rare_kernel
 def is_shown_by_loads(scene: Nonsmooth, i: int) -> bool:
     """Return True if the velocity shown of a body has half a kick of loads beyond that after the last substep."""
-    if scene.pushes.size == 1 or scene.world.clock[0].steps == 0:
+    if scene.pushes.size == 1 or is_start(scene):
         return False
     body = scene.world.bodies[i]
     line = scene.contacts.lines[i]

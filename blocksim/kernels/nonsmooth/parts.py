@@ -19,6 +19,7 @@ import math
 from blocksim.kernels.arrays import Record
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, Nonsmooth
+from blocksim.kernels.nonsmooth.begin import is_start
 
 FINE = 1.0 / 64.0  # of a step: the part in which an impact falls
 MOST_PARTS = 32  # of a step; what is left then is one more
@@ -107,8 +108,7 @@ def shift_velocities(scene: Nonsmooth, h: float) -> None:
     controls = scene.world.controls[0]
     stepping = scene.contacts.stepping[0]
     old = stepping.substep
-    is_start = scene.world.clock[0].steps == 0 and stepping.parts == 0  # velocities are those of the start
-    behind = 0.0 if is_start else 0.5
+    behind = 0.0 if is_start(scene) else 0.5
     mark_pressed(scene)
     for i in range(scene.world.bodies.size - 1):
         line = scene.contacts.lines[i]

@@ -25,9 +25,8 @@ def nonsmooth_contacts(scene: Nonsmooth, blocks: int) -> Rows:
     manifolds = manifolds[manifolds["reach"] != AWAY]
     points = np.stack([_points(scene, manifolds, "one", 0.0), _points(scene, manifolds, "two", 1.0)], axis=-1).ravel()
     rows = points[points["normal_force"] > 0.0]
-    kick = float(stepping.substep) * (0.5 if scene.world.clock[0].steps == 0 else 1.0)  # the first one of a run is half
     for name in ("normal_force", "shear_force"):
-        rows[name] /= kick
+        rows[name] /= float(stepping.substep)
     rows["body_b"][rows["body_b"] >= blocks] = SUPPORT
     return rows
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from blocksim.kernels.arrays import TEAM_SIZE
 from blocksim.kernels.integrate import renew_rotations
-from blocksim.kernels.nonsmooth.advance import collide_rows, load_lines
+from blocksim.kernels.nonsmooth.advance import collide_rows
+from blocksim.kernels.nonsmooth.begin import load_lines
 from blocksim.kernels.nonsmooth.groups import gather, pack_groups
 from blocksim.kernels.nonsmooth.neighbours import look
 from blocksim.kernels.nonsmooth.substep import substep
