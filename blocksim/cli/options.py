@@ -75,10 +75,10 @@ def paper_of(size: PageSize | None, dots: float | None) -> "Paper":
 
 def colour_name(text: object) -> str:
     """Return a way to colour blocks. Raises BadParameter for an unknown one."""
-    from blocksim.view.paint import PAINTS
+    from blocksim.view.paint import COLOURS
 
-    if text not in PAINTS:
-        raise typer.BadParameter(f"{str(text)[:MOST_SHOWN]!r} is unknown; choose {', '.join(PAINTS)}")
+    if text not in COLOURS:
+        raise typer.BadParameter(f"{str(text)[:MOST_SHOWN]!r} is unknown; choose {', '.join(COLOURS)}")
     return str(text)
 
 
@@ -110,7 +110,12 @@ Dots = Annotated[
 Colour = Annotated[
     str,
     typer.Option(
-        "--colour", "--color", parser=colour_name, metavar="BY", help="Colour blocks by block, material, speed or turn."
+        "--colour",
+        "--color",
+        parser=colour_name,
+        metavar="BY",
+        help="Colour blocks by block, material, speed or turn; soil by displacement (default), speed, plastic or "
+        "pressure.",
     ),
 ]
 

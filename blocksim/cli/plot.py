@@ -37,7 +37,8 @@ def plot_command(
         str | None,
         typer.Option(
             metavar="KIND",
-            help="Of a run: strip (default), final, history, motion (of the supports) or probe. Of a sweep: lines, "
+            help="Of a run: strip (default), final, history, profile (the surface of soil), motion (of the supports) "
+            "or probe. Of a sweep: lines, "
             "map (two inputs), matrix (every two inputs) or histogram; tornado for sensitivities (default: what "
             "suits).",
         ),
@@ -73,7 +74,8 @@ def plot_command(
     The strip shows the measured ranges below the final state. --kind final shows where the blocks end, with rotation
     and measured range below each of them; --kind history shows x, y, rotation, energies, contacts and the ground's
     motion over time, or the panels of --panels; --kind motion shows acceleration, velocity and displacement of the
-    supports with their peaks, also of a scenario that has not been run; --kind probe shows what [[probes]] recorded.
+    supports with their peaks, also of a scenario that has not been run; --kind probe shows what [[probes]] recorded;
+    --kind profile shows the surface of soil at several times.
     --forces draws contact forces as arrows, of runs that have stored them (output.contacts = true). A run that was
     stopped or killed is drawn as far as it came.
 

@@ -98,7 +98,8 @@ def show_result(result: Result, *, as_json: bool, quiet: bool) -> None:
     if not quiet:
         _tell_end(result)
     summary = result.summary.model_dump()
-    data = {"folder": str(result.folder), "final": rows_of(result.columns), "summary": summary}
+    endings = {name: rows_of(table) for name, table in result.endings.items()}
+    data = {"folder": str(result.folder), "final": rows_of(result.columns), **endings, "summary": summary}
     show(_answer_lines(result), data, as_json=as_json)
     if result.status != FINISHED:
         note(f"{result.name}: {result.status}: {result.reason}; partial results are in {result.folder}")
@@ -125,7 +126,18 @@ def _answer_lines(result: Result) -> list[str]:
     shown = count if count <= MOST_ROWS else FIRST_ROWS
     rows = [(block, *map(number, row)) for block, *row in islice(zip(blocks, *values, strict=True), shown)]
     lines = table_lines(("block", "x mm", "y mm", "rotation °"), rows)
-    return lines if shown == count else [*lines, f"... and {count - shown} more blocks in final.csv"]
+    more = [] if shown == count else [f"... and {count - shown} more blocks in final.csv"]
+    return [*lines, *more, *_ending_lines(result)]
+
+
+def _ending_lines(result: Result) -> list[str]:
+    """Return the tables of the systems beside the blocks."""
+    lines = []
+    for table in result.endings.values():
+        titles = [name.replace("_", " ") for name in table]
+        columns = [[number(cell) if isinstance(cell, float) else cell for cell in column] for column in table.values()]
+        lines += ["", *table_lines(titles, list(zip(*columns, strict=True)))]
+    return lines
 
 
 def _moved(found: Movement) -> str:

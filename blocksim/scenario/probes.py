@@ -36,8 +36,14 @@ def unfit_probes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[F
         seen.add(name)
     bodies = {body.name: body for body in placed}
     supports = support_words(scenario)
+    others = [name for tables in scenario.systems.values() for name in map(_name_of, tables) if name]
     for number, probe in enumerate(scenario.probes):
-        yield from _unfit(probe, ("probes", number), bodies, supports)
+        yield from _unfit(probe, ("probes", number), bodies, [*supports, *others])
+
+
+def _name_of(table: object) -> str:
+    """Return the name of a table of a system, such as a soil; those without one cannot be named."""
+    return str(getattr(table, "name", ""))
 
 
 def support_words(scenario: Scenario) -> list[str]:

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 from blocksim.scenario import PlacedBody, Scenario, place_segments
 from blocksim.scenario.models.probe import STEP, EnergyProbe, ForceProbe, JointProbe, PointProbe
 from blocksim.scenario.probes import GROUND, SUPPORTS, WALL, WALLS, Joint, joint_between, probe_names
-from blocksim.simulation.contacts import forces_on_a
+from blocksim.simulation.contacts import empty_rows, forces_on_a
 from blocksim.simulation.moving_support import AT_REST, MovingSupport
 from blocksim.simulation.probe_series import Column, ProbeSeries, columns_of, series_of
 
 if TYPE_CHECKING:
     from blocksim.simulation.schemes import AnyScene
+    from blocksim.world.systems.system import System, Touching
 
 Values = Sequence[float]
 Sampler = Callable[["Moment"], Values]
@@ -31,9 +32,9 @@ Sampler = Callable[["Moment"], Values]
 class Moment:
     """The scene at a step; what several probes need is worked out once."""
 
-    def __init__(self, scene: "AnyScene", support: MovingSupport) -> None:
-        """Take the scene as it is now."""
-        self.scene = scene
+    def __init__(self, scene: "AnyScene", support: MovingSupport, parts: "Sequence[tuple[System, int]]" = ()) -> None:
+        """Take the scene as it is now, with the systems beside blocks and supports and the numbers of their parts."""
+        self.scene, self.parts = scene, parts
         self.bodies = scene.world.bodies
         clock, controls = scene.world.clock[0], scene.world.controls[0]
         self.step = int(clock.steps)
@@ -42,13 +43,29 @@ class Moment:
 
     @cached_property
     def contacts(self) -> tuple[Any, NDArray[np.float64], NDArray[np.float64]]:
-        """Contacts with the numbers of all bodies, supports too; forces (N) on a, (c, 2); static frictions, (c,)."""
+        """Contacts with the numbers of all bodies, supports too; forces (N) on a, (c, 2); static frictions, (c,).
+
+        Parts of further systems have numbers after all bodies.
+        """
         from blocksim.simulation.schemes import scheme_of  # noqa: PLC0415 - numba, not for readers
 
         rows = scheme_of(self.scene).contacts(self.scene, self.bodies.size)
         classes = self.bodies["contact_class"]
         table = self.scene.world.interactions["static_friction"]
-        return rows, forces_on_a(rows), table[classes[rows["body_a"]], classes[rows["body_b"]]]
+        friction = table[classes[rows["body_a"]], classes[rows["body_b"]]]
+        for more in self._of_systems():
+            rows = np.concatenate([rows, rows_of(more)])
+            friction = np.concatenate([friction, more.friction])
+        return rows, forces_on_a(rows), friction
+
+    def _of_systems(self) -> "Iterator[Touching]":
+        """Yield the contacts of further systems with bodies, their parts numbered."""
+        first = self.bodies.size
+        for (system, count), arrays in zip(self.parts, getattr(self.scene, "systems", ()), strict=True):
+            if system.touching is not None:
+                found = system.touching(arrays, self.scene.world)
+                yield found._replace(part=first + found.part)
+            first += count
 
     @cached_property
     def carried(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -63,6 +80,15 @@ class Moment:
 
         found: list[float] = measured_row(self.scene)[: -len(COUNTED)].tolist()
         return found
+
+
+def rows_of(touching: "Touching") -> Any:
+    """Return contacts of a system as those of bodies a with parts b."""
+    rows = empty_rows(len(touching.body))
+    rows["body_a"], rows["body_b"] = touching.body, touching.part
+    (rows["x"], rows["y"]), (rows["normal_x"], rows["normal_y"]) = touching.place.T, touching.normal.T
+    rows["normal_force"], rows["shear_force"] = touching.normal_force, touching.shear_force
+    return rows
 
 
 def force_sampler(on: NDArray[np.bool_], by: NDArray[np.bool_]) -> Sampler:
@@ -176,9 +202,15 @@ class Probe:
 class Probes:
     """All probes of a run."""
 
-    def __init__(self, probes: Sequence[Probe], support: MovingSupport, time_step: float) -> None:
-        """Take the probes, the motion of the support and the step (s)."""
-        self.all, self.support, self.time_step = tuple(probes), support, time_step
+    def __init__(
+        self,
+        probes: Sequence[Probe],
+        support: MovingSupport,
+        time_step: float,
+        parts: "Sequence[tuple[System, int]]" = (),
+    ) -> None:
+        """Take the probes, the motion of the support, the step (s), further systems and the number of their parts."""
+        self.all, self.support, self.time_step, self.parts = tuple(probes), support, time_step, tuple(parts)
 
     def next_step(self, done: int) -> int:
         """Return the next step at which any probe is sampled after `done` steps."""
@@ -187,7 +219,7 @@ class Probes:
     def sample(self, scene: "AnyScene") -> None:
         """Add a sample of the present state to all probes that are due."""
         if self.all:
-            moment = Moment(scene, self.support)
+            moment = Moment(scene, self.support, self.parts)
             for probe in self.all:
                 probe.sample(moment)
 
@@ -216,6 +248,8 @@ NO_PROBES = Probes((), AT_REST, 1.0)
 
 def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float, ledger: Sequence[str]) -> Probes:
     """Return the probes of a scenario with steps of this length (s); `ledger` names its energies (J)."""
+    from blocksim.world.systems import systems_of  # noqa: PLC0415 - kernels, not for readers
+
     usual = scenario.output.every
     made = [
         Probe(name, probe.kind, columns_of(probe.kind, ledger), _period(probe.every, usual, time_step), sampler)
@@ -223,7 +257,12 @@ def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float
             scenario.probes, probe_names(scenario), _samplers(scenario, placed), strict=True
         )
     ]
-    return Probes(made, MovingSupport(scenario if made else None), time_step)
+    systems = [(one, len(_parts(one, scenario))) for one in systems_of(scenario)]
+    return Probes(made, MovingSupport(scenario if made else None), time_step, systems)
+
+
+def _parts(system: "System", scenario: Scenario) -> tuple[str, ...]:
+    return () if system.parts is None else system.parts(scenario)
 
 
 def _period(every: float | str | None, usual: float, step: float) -> float:
@@ -254,18 +293,23 @@ def _samplers(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[Samp
 
 
 def _chosen(name: str, scenario: Scenario, placed: Sequence[PlacedBody]) -> NDArray[np.bool_]:
-    """Return which bodies a name means: blocks first, then pieces of ground, walls and the half-plane."""
+    """Return which bodies a name means: blocks, pieces of ground, walls, the half-plane, then parts of systems."""
     walls, blocks = len(scenario.walls), len(placed)
     count = blocks + len(place_segments(scenario)) + 1
-    flags = np.zeros(count, dtype=np.bool_)
+    from blocksim.world.systems import systems_of  # noqa: PLC0415 - kernels, not for readers
+
+    parts = [part for system in systems_of(scenario) for part in _parts(system, scenario)]
+    flags = np.zeros(count + len(parts), dtype=np.bool_)
     own = [number for number, body in enumerate(placed) if body.name == name]
     if own:
         flags[own] = True
+    elif name in parts:
+        flags[count + parts.index(name)] = True
     elif name == SUPPORTS:
-        flags[blocks:] = True
+        flags[blocks:count] = True
         flags[:blocks] = [body.fixed for body in placed]
     elif name == GROUND:
-        flags[blocks:] = True
+        flags[blocks:count] = True
         flags[count - 1 - walls : count - 1] = False
     elif name == WALLS:
         flags[count - 1 - walls : count - 1] = True

@@ -51,6 +51,15 @@ class Result:
         return read_probes(self.folder / files.FRAMES, self.scenario)
 
     @cached_property
+    def endings(self) -> dict[str, Columns]:
+        """Where the systems beside the blocks ended, by their names: tables as in NAME.csv of a run folder."""
+        return {
+            track.system.name: track.system.ending(self.scenario, track)
+            for track in self.frames.others
+            if track.system.ending is not None
+        }
+
+    @cached_property
     def final(self) -> "pd.DataFrame":
         """The final table, one row per block."""
         return as_frame(self.columns)

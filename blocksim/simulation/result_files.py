@@ -28,13 +28,14 @@ EXPERIMENT = "experiment.csv"  # copy of the table that the scenario names
 MOTION = "motion.csv"  # copy of the table of the support's motion
 BODY_MOTIONS = tuple(f"motion-{k}.csv" for k in range(1, 1 + MOST_BODY_TABLES))  # of those of the motions of bodies
 FINAL = "final.csv"
+SOILS = "soils.csv"  # where soils ended, in scenarios that have any
 FRAMES = "run.h5"
 PROBE = "probe-"  # and its name: CSV of a probe
 PROBE_LEFTOVER = re.compile(r"\.probe-[A-Za-z0-9._-]+\.csv\.[a-z0-9_]{8}(?:\.csv)?")  # killed while it was written
 SUMMARY = "run.json"
 DONE = "done.json"  # written last: a folder without it is not finished
 CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run continues, removed when it has finished
-OURS = (SCENARIO, EXPERIMENT, MOTION, *BODY_MOTIONS, FINAL, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
+OURS = (SCENARIO, EXPERIMENT, MOTION, *BODY_MOTIONS, FINAL, SOILS, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
 HEAD_BYTES = 4096
 MOST_BYTES = 10 * MEGABYTE  # of a scenario or a summary
 TABLE_BYTES = MEGABYTE  # of a table of an experiment, which is not read if larger
@@ -79,6 +80,7 @@ def holds(*marks: bytes) -> Kind:
 RUN_KINDS: Mapping[str, Kind] = {
     SCENARIO: begins(RESOLVED),
     FINAL: has_header(COLUMNS),
+    SOILS: begins(b"soil,left_mm,"),
     FRAMES: is_frames,
     SUMMARY: holds(b'{\n  "name": "', b'"status": "', b'"scenario_hash": "'),
     DONE: begins(b'{"run": "'),

@@ -218,7 +218,7 @@ class Part:
         ) as sink:
             self.recorder.pour_into(sink)
             files.clear_remains(
-                self.folder, (files.FINAL, files.SUMMARY, *probe_tables(self.scenario))
+                self.folder, (files.FINAL, files.SOILS, files.SUMMARY, *probe_tables(self.scenario))
             )  # of the part before
             self.writer = self._writer(sink, precautions)
             watched = replace(attendance, keeper=self.writer, timeline=_timeline(self.scenario, self.recorder))
@@ -336,12 +336,14 @@ def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResul
 
 def _with_checksums(summary: Summary, folder: Path) -> Summary:
     tables = [name for name in summary.sha256 if name.startswith(PROBE)]
-    kept = [name for name in (*COPIES, files.FINAL, files.FRAMES, *tables) if (folder / name).is_file()]
+    kept = [name for name in (*COPIES, files.FINAL, files.SOILS, files.FRAMES, *tables) if (folder / name).is_file()]
     return summary.model_copy(update={"sha256": {name: sha256_of(folder / name) for name in kept}})
 
 
 def _keep_result(result: Result, summary: Summary, folder: Path) -> Result:
     write_text(folder / files.FINAL, csv_text(result.columns))
+    for name, table in result.endings.items():
+        write_text(folder / f"{name}.csv", csv_text(table))
     tables = _keep_probes(result.scenario, folder)
     summary = _with_checksums(summary.model_copy(update={"sha256": dict.fromkeys(tables, "")}), folder)
     write_text(folder / files.SUMMARY, summary.to_json())

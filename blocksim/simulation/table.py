@@ -105,7 +105,7 @@ def csv_text(columns: Columns) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     rows = zip(*columns.values(), strict=True)
-    writer.writerows([name, *("" if math.isnan(value) else value for value in values)] for name, *values in rows)
+    writer.writerows([name, *("" if value != value else value for value in values)] for name, *values in rows)  # noqa: PLR0124 - NaN alone is not itself, and other cells are words
     return text.getvalue()
 
 

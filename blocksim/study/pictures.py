@@ -20,7 +20,7 @@ from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import is_sweep
 from blocksim.view.history_panels import Choice
-from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, STRIP, SWEEP_KINDS, Kind, kind_for, run_kind
+from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, Kind, kind_for, run_kind
 from blocksim.view.layout import OWN, Paper
 from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.motion import draw_support_motion
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 FEWEST_LEVELS = 2  # to show a distance
 TORNADO = "tornado"
 MEANINGS = {
-    "--at": "selects frames of a run's strip or final picture",
+    "--at": "selects frames of a run's strip, final picture or profile",
     "--frames": "sets the number of panels of a run's strip",
     "--panels": "selects the panels of a run's history",
     "--block": "selects the blocks of a run's history",
@@ -184,7 +184,8 @@ class RunLook:
         """Return the options that were given and mean nothing for a kind of picture."""
         if kind == PROBE:
             return [option for option in self.of_runs() if option != "--probe"]
-        meant = {STRIP: self._of_histories(), FINAL: {**self._of_histories(), "--frames": self.frames is not None}}
+        of_one_panel = {**self._of_histories(), "--frames": self.frames is not None}
+        meant = {STRIP: self._of_histories(), FINAL: of_one_panel, PROFILE: of_one_panel}
         given = {**meant.get(kind, self._of_strips()), **self._of_probes()}
         return [option for option, is_given in given.items() if is_given]
 

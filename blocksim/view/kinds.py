@@ -7,11 +7,12 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
+from blocksim.view.profile import draw_profile
 from blocksim.view.strip import draw_strip
 from blocksim.view.sweeps import histogram, lines, matrix, outcome_map
 from blocksim.view.sweeps.data import SweepData
 
-STRIP, FINAL, HISTORY = "strip", "final", "history"
+STRIP, FINAL, HISTORY, PROFILE = "strip", "final", "history", "profile"
 MOTION = "motion"  # of the supports; needs no run
 PROBE = "probe"
 # Each draws frames to a path, with title, measured table and support.
@@ -19,6 +20,7 @@ RUN_KINDS: dict[str, Callable[..., None]] = {
     STRIP: draw_strip,
     FINAL: draw_final,
     HISTORY: draw_history,
+    PROFILE: draw_profile,
 }
 MOST_SLIPS = 2
 

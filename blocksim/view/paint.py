@@ -4,7 +4,7 @@ A block has the same colour in every picture: strip, final state, history, anima
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -12,12 +12,14 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.view import style
-from blocksim.view.run_data import Floats, FramesLike, Support, drawable_frames
+from blocksim.view.run_data import Floats, FramesLike, Support, drawable_frames, others_of
+from blocksim.world.systems.system import Shade
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEED_COLOURS = "YlGnBu"  # light at rest; darker in steps that are seen in grey as well
+ELEMENT_COLOURS = "viridis"  # of the elements of systems beside the blocks: seen on white at rest too
 TURN_COLOURS = "PuOr"  # distinguishable with every common colour blindness
 HALF_TURN = 180.0  # degrees; blocks that have turned farther share the colour
 LEAST_TURN = 1.0  # degrees
@@ -58,11 +60,15 @@ class Scale:
 
 @dataclass(frozen=True)
 class Paint:
-    """The fills (#rrggbb) of all blocks in a frame, and what explains them: named colours, a scale, or nothing."""
+    """The fills (#rrggbb) of all blocks in a frame, and what explains them: named colours, a scale, or nothing.
+
+    `elements` are those of the elements of each system beside the blocks; where there are any, the scale is theirs.
+    """
 
     fills: Fills
     entries: tuple[tuple[str, str], ...] = ()
     scale: Scale | None = None
+    elements: tuple[Fills | None, ...] = ()
 
     @property
     def height(self) -> float:
@@ -74,7 +80,11 @@ class Paint:
     @property
     def is_lasting(self) -> bool:
         """Whether a block keeps its colour throughout the run."""
-        return self.scale is None
+        return self.scale is None or any(self.elements)
+
+    def of_system(self, number: int) -> Fills | None:
+        """Return the fills of the elements of a system beside the blocks; None: all have the system's colour."""
+        return self.elements[number] if number < len(self.elements) else None
 
 
 def by_block(frames: FramesLike) -> Paint:
@@ -104,6 +114,31 @@ def by_speed(frames: MovingFrames) -> Paint:
     high = factor * (usual if is_cut else largest)
     scale = Scale(f"speed ({unit})", SPEED_COLOURS, 0.0, high, "max" if is_cut else "neither")
     return _scaled(factor * speeds, scale)
+
+
+def shades_of(frames: Any) -> list[Shade]:
+    """Return by what the elements of the systems beside the blocks can be coloured."""
+    return [shade for track in others_of(frames) for shade in track.system.shades]
+
+
+def shade_scale(shade: Shade, values: Floats) -> Scale:
+    """Return the scale of a shade; values beyond all but the rarest are cut, as of speeds."""
+    usual, largest = (float(np.quantile(values, share)) for share in (RARE, 1.0))
+    is_cut = largest > PEAK * usual > 0.0
+    high = (usual if is_cut else largest) or 1.0
+    return Scale(shade.label, ELEMENT_COLOURS, 0.0, high, "max" if is_cut else "neither")
+
+
+def with_shade(paint: Paint, frames: Any, name: str) -> Paint:
+    """Return a paint of blocks that also colours the elements of other systems, by a shade of this name."""
+    chosen = drawable_frames(frames)
+    tracks = others_of(frames)
+    found = [next((one for one in track.system.shades if one.name == name), None) for track in tracks]
+    values = [None if shade is None else shade.of(track) for shade, track in zip(found, tracks, strict=True)]
+    known = np.concatenate([one[chosen].ravel() for one in values if one is not None])
+    scale = shade_scale(next(shade for shade in found if shade is not None), known)
+    fills = tuple(None if one is None else _scaled(one, scale).fills for one in values)
+    return replace(paint, entries=(), scale=scale, elements=fills)
 
 
 def by_turn(frames: FramesLike) -> Paint:
@@ -148,12 +183,26 @@ PAINTS: dict[str, Callable[[Any, Scenario], Paint]] = {
 }
 
 
+SHADES = ("displacement", "speed", "plastic", "pressure")
+"""Of the elements of systems beside the blocks; those that blocks do not know leave them in their own colours."""
+COLOURS = tuple(dict.fromkeys((*PAINTS, *SHADES)))
+
+
 def paint_named(name: str, frames: Any, scenario: Scenario) -> Paint:
-    """Return the colours of a run by their meaning. Raises InvalidInputError for an unknown meaning."""
-    if name not in PAINTS:
-        message = f"unknown colour {name!r}; choose {', '.join(PAINTS)}"
+    """Return the colours of a run by their meaning. Raises InvalidInputError for a meaning that this run does not have.
+
+    Elements of other systems have their first shade, unless the meaning is one of theirs: then blocks keep their own
+    colours, and the scale is that of the elements.
+    """
+    shades = [shade.name for shade in shades_of(frames)]
+    known = tuple(dict.fromkeys((*PAINTS, *shades)))
+    if name not in known:
+        message = f"unknown colour {name!r} in this run; choose {', '.join(known)}"
         raise InvalidInputError(message)
-    return PAINTS[name](frames, scenario)
+    if name in shades:
+        return with_shade(by_block(frames), frames, name)
+    paint = PAINTS[name](frames, scenario)
+    return with_shade(paint, frames, shades[0]) if shades and paint.scale is None else paint
 
 
 def draw_key(figure: "Figure", paint: Paint, left: float, bottom: float) -> None:

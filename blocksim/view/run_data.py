@@ -119,7 +119,8 @@ def path_travelled(frames: FramesLike, chosen: Indices, carried: Floats | None =
     """Return the path (m) up to each chosen frame, summed over the blocks; (len(chosen),), never falling.
 
     A turn counts as the way of a corner: the angle times half the diagonal. `carried` is how far the support has moved
-    along x and y (m) at the chosen frames, (len(chosen), 2): only the way relative to the support counts.
+    along x and y (m) at the chosen frames, (len(chosen), 2): only the way relative to the support counts. The elements
+    of every system beside the blocks count as much as all blocks, with their mean way.
     """
     radius = radii(frames.size_x, frames.size_y, frames.outlines)
     places = np.stack([frames.x[chosen], frames.y[chosen]], axis=-1)
@@ -127,7 +128,11 @@ def path_travelled(frames: FramesLike, chosen: Indices, carried: Floats | None =
         places -= carried[:, None]
     moved = np.hypot(*np.moveaxis(np.diff(places, axis=0), -1, 0))
     turned = radius * np.abs(np.diff(frames.angle[chosen], axis=0))
-    return np.concatenate([[0.0], np.cumsum((moved + turned).sum(axis=1))])
+    way = (moved + turned).sum(axis=1)
+    for track in others_of(frames):
+        steps = np.hypot(*(np.diff(track[name][chosen], axis=0) for name in ("x", "y")))
+        way += len(frames.names) * steps.mean(axis=1)
+    return np.concatenate([[0.0], np.cumsum(way)])
 
 
 def moments_by_motion(frames: FramesLike, chosen: Indices, count: int, carried: Floats | None = None) -> Indices:

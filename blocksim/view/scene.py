@@ -70,26 +70,30 @@ def draw_standing(canvas: Canvas, frames: FramesLike, frame: int, support: Suppo
 def draw_blocks(canvas: Canvas, frames: FramesLike, frame: int, support: Support, paint: Paint | None = None) -> None:
     """Draw the blocks of one frame, free and fixed ones, with their names where there is room for all.
 
-    Other systems lie below them, each in one colour.
+    Other systems lie below them, each in one colour, or each element in that of the paint.
     """
-    for number, track in enumerate(others_of(frames), start=1):
-        _draw_system(canvas, track, frame, style.block_colour(number))
+    paint = paint or by_block(frames)
+    for number, track in enumerate(others_of(frames)):
+        of_elements = paint.of_system(number)
+        colours = style.block_colour(number + 1) if of_elements is None else of_elements(frame)
+        _draw_system(canvas, track, frame, colours)
     fixed = _fixed(frames, support)
-    own = (paint or by_block(frames)).fills(frame)
+    own = paint.fills(frame)
     fills = [style.GROUND_COLOUR if held else fill for held, fill in zip(fixed, own, strict=True)]
     _draw_outlines(canvas, frames, frame, fixed, fills)
     _draw_names(canvas, frames, frame, fixed, fills)
 
 
-def _draw_system(canvas: Canvas, track: Track, frame: int, colour: str) -> None:
-    """Draw the elements of a system in one frame."""
+def _draw_system(canvas: Canvas, track: Track, frame: int, colours: str | Sequence[str]) -> None:
+    """Draw the elements of a system in one frame; where each has a colour of its own, edges have it too."""
     from matplotlib.collections import PolyCollection  # noqa: PLC0415 - see style
 
     (outlines,) = MILLIMETRES * outlines_of(track, np.array([frame]))
     thin = min(
         style.LINE_WIDTH, 0.05 * canvas.points_per_mm * float(np.ptp(outlines[:, :, 0], axis=1).min(initial=1.0))
     )
-    drawn = PolyCollection(list(outlines), facecolors=colour, edgecolors=style.INK, linewidths=thin)
+    edges = style.INK if isinstance(colours, str) else "face"
+    drawn = PolyCollection(list(outlines), facecolors=colours, edgecolors=edges, linewidths=thin)
     drawn.set_transform(canvas.scene)
     canvas.axes.add_collection(drawn)
 

@@ -126,16 +126,19 @@ def preload(soils: Soils, world: World) -> None:
     """Press particles that touch a body at the start against it, as their stress wants it.
 
     Otherwise every contact would begin without a force: the shock of the soil that drops on its supports, a few
-    micrometres deep, makes it flow, and the stresses that it leaves are not those of the start.
+    micrometres deep, makes it flow, and the stresses that it leaves are not those of the start. What carries soil also
+    carries the half of the particle below its centre.
     """
     radius = soils.controls[0].radius
+    gravity_x, gravity_y = world.controls[0].gravity_x, world.controls[0].gravity_y
     for e in range(soils.controls[0].touch_count):
         touch = soils.touches[e]
         point, state = soils.points[touch.particle], soils.states[touch.particle]
         body = world.bodies[touch.body]
         distance, nx, ny = from_body(body, touch.body == world.bodies.size - 1, point.x, point.y, radius)
         pressure = -(state.sxx * nx * nx + 2.0 * state.sxy * nx * ny + state.syy * ny * ny)
-        if abs(distance - radius) < AT_TOUCH * radius and pressure > 0.0:
+        pressure -= radius * soils.kinds[state.kind].density * min(gravity_x * nx + gravity_y * ny, 0.0)
+        if abs(distance - radius) < AT_TOUCH * radius and state.syy < 0.0 and pressure > 0.0:
             stiffness = soils.interactions[state.kind, body.contact_class].normal_stiffness
             touch.normal_force = pressure * soils.kinds[state.kind].volume / (2.0 * radius)
             touch.depth = touch.normal_force / stiffness

@@ -10,18 +10,21 @@ import numpy as np
 
 from blocksim.simulation.frames import Frames
 from blocksim.view import style
+from blocksim.view.paint import ELEMENT_COLOURS, shade_scale
 from blocksim.view.report.packing import SHORT_BYTES, pack
 from blocksim.view.run_data import Floats, Indices, others_of, outlines_of
 from blocksim.view.window import MILLIMETRES
-from blocksim.world.systems.system import Track
+from blocksim.world.systems.system import Shade, Track
 
+STEPS = 24  # of the colours of elements: each is one path of the canvas
 SAME_SHAPE = 1e-6  # of its size, by which corners of an outline that only moves may be off
 
 
 def element_bytes(frames: Frames, drawable: Indices) -> int:
     """Return about how many bytes the elements of all systems take in one frame."""
     ends = drawable[[0, -1]]
-    return sum(SHORT_BYTES * _numbers(track, ends) * len(track.names) for track in others_of(frames))
+    tracks = others_of(frames)
+    return sum(SHORT_BYTES * (_numbers(track, ends) + len(track.system.shades)) * len(track.names) for track in tracks)
 
 
 def _numbers(track: Track, ends: Indices) -> int:
@@ -46,12 +49,32 @@ def pack_systems(frames: Frames, kept: Indices) -> list[dict[str, Any]]:
     """Return every system with its name, colour, number of elements and corners, and places in the kept frames.
 
     `x` and `y` are those of centres (f, b), with a `shape` of one outline for each element, or for all; without it
-    those of all corners (f, b, k).
+    those of all corners (f, b, k). `shades` are what elements can be coloured by: labels, values (f, b), and the value
+    of the last of the `palette`.
     """
     return [
-        {"name": track.system.name, "colour": style.block_colour(number), **_packed(track, kept)}
+        {
+            "name": track.system.name,
+            "colour": style.block_colour(number),
+            **_packed(track, kept),
+            "shades": [_shade(shade, track, kept) for shade in track.system.shades],
+            "palette": palette() if track.system.shades else [],
+        }
         for number, track in enumerate(others_of(frames), start=1)
     ]
+
+
+def _shade(shade: Shade, track: Track, kept: Indices) -> dict[str, Any]:
+    values = shade.of(track.some(kept))
+    return {"label": shade.label, "high": shade_scale(shade, values).high, "values": pack(values)[0]}
+
+
+def palette() -> list[str]:
+    """Return the colours of elements, in even steps from none to most."""
+    from matplotlib import colormaps  # noqa: PLC0415 - see style
+    from matplotlib.colors import to_hex  # noqa: PLC0415
+
+    return [to_hex(colour) for colour in colormaps[ELEMENT_COLOURS](np.linspace(0.0, 1.0, STEPS))]
 
 
 def _packed(track: Track, kept: Indices) -> dict[str, Any]:

@@ -174,6 +174,7 @@ def run_subject(
         "has_particles": bool(data and data["scene"]["particles"]),
         "has_forces": bool(data and data["forces"]),
         "has_loads": bool(data and data["loads"]),
+        "has_shades": bool(data and any(system["shades"] for system in data["systems"])),
         "has_measured": bool(data and data["measured"]),
     }
     return Subject(key, "run", run.name, page, {"kind": "run", "name": run.name, "frames": data})

@@ -46,10 +46,14 @@ def system_named(name: str) -> System:
     return found
 
 
+def systems_of(scenario: Scenario) -> tuple[System, ...]:
+    """Return what the systems beside blocks and supports declare, in the order in which they are registered."""
+    return tuple(system_named(name) for name in SYSTEMS if scenario.systems.get(name))
+
+
 def others_of(scenario: Scenario) -> tuple[Present, ...]:
     """Return the systems of a scenario beside blocks and supports, in the order in which they are registered."""
-    found = [system_named(name) for name in SYSTEMS if scenario.systems.get(name)]
-    return tuple(Present(system, system.elements(scenario)) for system in found)
+    return tuple(Present(system, system.elements(scenario)) for system in systems_of(scenario))
 
 
 def largest_step(scenario: Scenario) -> float:

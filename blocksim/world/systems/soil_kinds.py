@@ -1,14 +1,14 @@
 """What soils are as numbers: elasticity, yield surface, and how their particles touch bodies."""
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from blocksim.kernels.arrays import INTERACTION, zeros
-from blocksim.kernels.soil.arrays import KIND
 from blocksim.scenario import GROUND, Material, Scenario, place_bodies, resolve_pair
 from blocksim.scenario.models.contact import PairFriction
 from blocksim.scenario.models.soil import SoilTable
-from blocksim.world.interactions import ContactClass, contact_classes
+
+if TYPE_CHECKING:
+    from blocksim.world.interactions import ContactClass
 
 SHEAR_RATIO = 0.8  # shear over normal stiffness of a contact
 DAMPING_RATIO = 0.3
@@ -62,6 +62,9 @@ def depth_of_scene(scenario: Scenario) -> float:
 
 def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
     """Return one KIND for each soil."""
+    from blocksim.kernels.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
+    from blocksim.kernels.soil.arrays import KIND  # noqa: PLC0415
+
     records = zeros(len(tables), KIND)
     depth = depth_of_scene(scenario)
     for record, table in zip(records, tables, strict=True):
@@ -90,7 +93,7 @@ def settling_of(scenario: Scenario, table: SoilTable) -> tuple[float, float]:
     return SHOCK_DAMPING * speed / smoothing, SHOCK_TIME * smoothing / speed
 
 
-def friction_with(scenario: Scenario, soil: str, partner: ContactClass) -> PairFriction:
+def friction_with(scenario: Scenario, soil: str, partner: "ContactClass") -> PairFriction:
     """Return the friction of a soil's material with a class of bodies.
 
     As [pairs] has it, else that of the soil itself, as on a rough face: [friction] is about blocks.
@@ -104,6 +107,9 @@ def friction_with(scenario: Scenario, soil: str, partner: ContactClass) -> PairF
 
 def interactions_with(scenario: Scenario, tables: list[SoilTable]) -> Any:
     """Return the parameters (soils, classes) of contacts with each class of bodies; see `world.interactions`."""
+    from blocksim.kernels.arrays import INTERACTION, zeros  # noqa: PLC0415 - kernels, not for readers
+    from blocksim.world.interactions import contact_classes  # noqa: PLC0415
+
     classes = contact_classes(scenario, place_bodies(scenario))
     records = zeros((len(tables), len(classes)), INTERACTION)
     depth = depth_of_scene(scenario)

@@ -1,12 +1,10 @@
 """Soils: elasto-plastic bodies of particles; see blocksim/kernels/soil and the tables [[soils]] of scenarios."""
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.kernels.arrays import zeros
-from blocksim.kernels.soil.arrays import BOOK, CONTROLS, ENERGIES, GROUP, NEIGHBOURS, POINT, STATE, TOUCH, Soils
 from blocksim.scenario import Scenario, place_bodies, place_segments, polygons
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.models.stepping import Explicit
@@ -18,6 +16,15 @@ from blocksim.world.systems.soil_kinds import (
     interactions_with,
     kind_records,
     wave_speed,
+)
+from blocksim.world.systems.soil_shown import (
+    SHADES,
+    displacement,
+    ending,
+    part_names,
+    pressure,
+    surface,
+    touching,
 )
 from blocksim.world.systems.soil_start import geostatic_stress
 from blocksim.world.systems.system import (
@@ -33,10 +40,26 @@ from blocksim.world.systems.system import (
     stored,
 )
 
+if TYPE_CHECKING:
+    from blocksim.kernels.soil.arrays import Soils
+
 COURANT = 0.4  # step in smoothing lengths that a wave passes
 VISCOSITY = 0.03  # factor of artificial viscosity
 SKIN = 0.4  # of lists, in spacings
 MILLI = 1e3
+# J, as kernels/soil/energy.py measures them; the last six are losses
+ENERGIES = (
+    "kinetic",
+    "potential",
+    "elastic",
+    "contact",
+    "plastic",
+    "viscosity",
+    "dashpot",
+    "friction",
+    "settling",
+    "ramp",
+)
 FEW_TOUCHES = 256
 COST = Cost(seconds=400e-9, memory=560)  # measured
 QUANTITIES = (
@@ -80,11 +103,16 @@ def _elements(scenario: Scenario) -> Elements:
 
 def _words(count: int | tuple[int, int]) -> Any:
     """Return zeros that start on a cache line."""
+    from blocksim.kernels.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
+
     plain: Any = np.dtype(np.uint32)
     return zeros(count, plain).view(np.ndarray)
 
 
-def _build(scenario: Scenario) -> Soils:
+def _build(scenario: Scenario) -> "Soils":
+    from blocksim.kernels.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
+    from blocksim.kernels.soil.arrays import BOOK, GROUP, NEIGHBOURS, POINT, STATE, TOUCH, Soils  # noqa: PLC0415
+
     tables, places = soil_tables(scenario), _places(scenario)
     start = _elements(scenario).start
     n = start.shape[1]
@@ -117,7 +145,9 @@ def _build(scenario: Scenario) -> Soils:
 
 
 def _controls(scenario: Scenario, tables: list[SoilTable]) -> Any:
-    from blocksim.kernels.sph.wendland_c2 import SUPPORT  # noqa: PLC0415 - as in _stages
+    from blocksim.kernels.arrays import zeros  # noqa: PLC0415 - as in _stages
+    from blocksim.kernels.soil.arrays import CONTROLS  # noqa: PLC0415
+    from blocksim.kernels.sph.wendland_c2 import SUPPORT  # noqa: PLC0415
 
     spacing = tables[0].spacing
     controls = zeros(1, CONTROLS)
@@ -134,7 +164,7 @@ def _controls(scenario: Scenario, tables: list[SoilTable]) -> Any:
     return controls
 
 
-def _state(soils: Soils, count: int) -> Floats:
+def _state(soils: "Soils", count: int) -> Floats:
     number = soils.states["number"]
     values: Floats = np.empty((len(QUANTITIES), count))
     for row, quantity in enumerate(QUANTITIES):
@@ -195,10 +225,12 @@ SOILS = System(
         Output("y", "m", "place above the ground", "y_mm", stored("y"), MILLI),
         Output("vx", "m/s", "velocity along the ground", "vx_mm_s", stored("vx"), MILLI),
         Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", stored("vy"), MILLI),
+        Output("displacement", "m", "distance from where it began", "displacement_mm", displacement, MILLI),
         Output("sxx", "Pa", "stress along the ground, tension positive", "sxx_Pa", stored("sxx")),
         Output("syy", "Pa", "stress normal to the ground, tension positive", "syy_Pa", stored("syy")),
         Output("szz", "Pa", "stress out of the plane, tension positive", "szz_Pa", stored("szz")),
         Output("sxy", "Pa", "shear stress", "sxy_Pa", stored("sxy")),
+        Output("pressure", "Pa", "mean pressure, averaged over neighbours", "pressure_Pa", pressure),
         Output("plastic", "1", "accumulated plastic shear strain", "plastic_strain", stored("plastic")),
     ),
     elements=_elements,
@@ -209,4 +241,9 @@ SOILS = System(
     largest_step=_largest_step,
     stages=_stages,
     cost=COST,
+    parts=part_names,
+    touching=touching,
+    shades=SHADES,
+    ending=ending,
+    profile=surface,
 )

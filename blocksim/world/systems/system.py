@@ -5,7 +5,7 @@ See blocksim/world/README.md. Nothing in here needs the compiler: stored runs ar
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Table = dict[str, list[Any]]
+"""Columns of a table by their names."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,27 @@ class Elements:
     outlines: Floats | None = None  # (b, k, 2) m, own axes, counter-clockwise, the last corner repeated; of polygons
 
 
+class Touching(NamedTuple):
+    """Where k elements of a system press against bodies of the world; the normal points from them to the body."""
+
+    body: Indices  # (k,) blocks first, then supports
+    part: Indices  # (k,) which of the `parts` of the system the element belongs to
+    place: Floats  # (k, 2) m
+    normal: Floats  # (k, 2)
+    normal_force: Floats  # (k,) N
+    shear_force: Floats  # (k,) N, on the body, along the normal turned by +90 degrees
+    friction: Floats  # (k,) static
+
+
+@dataclass(frozen=True)
+class Shade:
+    """A number of every element by which it can be coloured in pictures."""
+
+    name: str
+    label: str  # with its unit
+    of: Callable[["Track"], Floats]  # (n, b), in that unit
+
+
 @dataclass(frozen=True)
 class Cost:
     """What an element takes of a run, as `blocksim check` estimates it."""
@@ -82,6 +105,11 @@ class System:
     largest_step: Callable[[Scenario], float] | None = None  # s; None: the scheme knows
     stages: Callable[[], "Stages"] | None = None  # its compiled functions, where they are not those of a scheme
     cost: Cost = field(default_factory=Cost)  # of every element, where it is not part of the blocks'
+    parts: Callable[[Scenario], tuple[str, ...]] | None = None  # names of its tables, which probes of force may name
+    touching: Callable[[Any, Any], Touching] | None = None  # of its arrays and the world
+    shades: tuple[Shade, ...] = ()  # the first one is the default
+    ending: Callable[[Scenario, "Track"], Table] | None = None  # of the last frame, one row a part
+    profile: Callable[["Track", int], list[Floats]] | None = None  # lines (m, (k, 2)) of its surface in a frame
 
 
 @dataclass(frozen=True)

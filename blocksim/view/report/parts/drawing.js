@@ -48,7 +48,7 @@ class Drawing {
     context.fillStyle = colours.stage;
     context.fillRect(0, 0, this.canvas.width, this.canvas.height);
     this.drawSupport(frame);
-    for (const system of this.frames.systems) this.drawSystem(system, frame);
+    for (const system of this.frames.systems) this.drawSystem(system, frame, system.shades[options.shade]);
     this.drawBlocks(frame);
     if (options.trails) this.drawTrails();
     if (options.particles) this.drawParticles(frame);
@@ -84,12 +84,15 @@ class Drawing {
     context.stroke();
   }
 
-  // Draws the elements of a system below the blocks, in one path. Those without a shape of their own have all corners.
-  drawSystem({ colour: fill, count, corners, shape, x, y }, frame) {
+  // Draws the elements of a system below the blocks, in one path a colour. Those without a shape of their own have all corners.
+  drawSystem({ colour: fill, count, corners, palette, shape, x, y }, frame, shade) {
     const { context, ratio, view } = this;
-    const path = new Path2D();
+    const fills = shade ? palette : [fill];
+    const paths = fills.map(() => new Path2D());
     for (let element = 0; element < count; element += 1) {
       const at = frame * count + element;
+      const level = shade ? Math.floor(fills.length * shade.values[at] / shade.high) : 0;
+      const path = paths[Math.min(Math.max(level || 0, 0), fills.length - 1)];
       for (let corner = 0; corner < corners; corner += 1) {
         const place = shape ? 2 * ((shape.length > 2 * corners ? element * corners : 0) + corner) : at * corners + corner;
         const [px, py] = shape ? view.toPixels(x[at] + shape[place], y[at] + shape[place + 1]) : view.toPixels(x[place], y[place]);
@@ -99,8 +102,10 @@ class Drawing {
       path.closePath();
     }
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.fillStyle = fill;
-    context.fill(path);
+    paths.forEach((path, level) => {
+      context.fillStyle = fills[level];
+      context.fill(path);
+    });
   }
 
   // Draws all blocks: one path for each colour and one for all edges, which takes half the time of a path for each.

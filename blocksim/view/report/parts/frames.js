@@ -12,7 +12,7 @@ class Frames {
     this.energy = Object.entries(data.energy).map(([name, part]) => [name, decode(part)]);
     this.contactCount = decode(data.contact_count);
     for (const [name, part] of Object.entries(data.channels)) this[name] = decode(part);
-    this.systems = data.systems.map((one) => ({ ...one, x: decode(one.x), y: decode(one.y), shape: one.shape && decode(one.shape) }));
+    this.systems = data.systems.map((one) => ({ ...one, x: decode(one.x), y: decode(one.y), shape: one.shape && decode(one.shape), shades: (one.shades ?? []).map((shade) => ({ ...shade, values: decode(shade.values) })) }));
     this.loads = data.loads && {
       ...data.loads,
       arrows: data.loads.arrows.map((one) => ({ ...one, ...Object.fromEntries(["x0", "y0", "x1", "y1"].map((name) => [name, decode(one[name])])) })),

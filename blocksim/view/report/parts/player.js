@@ -13,7 +13,7 @@ class Player {
     this.marked = -1;
     this.pinned = false;
     this.timer = 0;
-    this.options = { trails: false, particles: false, forces: false, measured: true, loads: Boolean(this.frames.loads), names: this.frames.blocks <= MOST_NAMES };
+    this.options = { trails: false, particles: false, forces: false, measured: true, loads: Boolean(this.frames.loads), names: this.frames.blocks <= MOST_NAMES, shade: 0 };
     this.listeners = [];
     this.chosen = [];
     this.wireControls();
@@ -38,13 +38,23 @@ class Player {
     const best = SPEEDS.reduce((one, other) => (Math.abs(Math.log(other / wanted)) < Math.abs(Math.log(one / wanted)) ? other : one));
     for (const speed of SPEEDS) this.speed.append(make("option", { value: speed, ...(speed === best && { selected: "" }) }, `${speed} ×`));
     this.speed.addEventListener("change", () => this.restartClock());
+    this.wireShades();
     for (const name of Object.keys(this.options)) {
       const box = this.part(`[data-option=${name}]`);
-      if (!box) continue;
+      if (!box || name === "shade") continue;
       box.checked = this.options[name];
       box.addEventListener("change", () => { this.options[name] = box.checked; this.redraw(); });
     }
     this.root.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  // What the elements of other systems are coloured by, with the value of the lightest colour.
+  wireShades() {
+    const select = this.part("[data-option=shade]");
+    if (!select) return;
+    const { shades } = this.frames.systems.find((system) => system.shades.length);
+    shades.forEach(({ label, high }, at) => select.append(make("option", { value: at }, `${label}, up to ${Number(high.toPrecision(3))}`)));
+    select.addEventListener("change", () => { this.options.shade = Number(select.value); this.redraw(); });
   }
 
   wireView() {

@@ -1,0 +1,161 @@
+"""What is shown of soils: where they press against bodies, how far they have come, their surface, smoothed pressure."""
+
+from typing import Any
+
+import numpy as np
+
+from blocksim.scenario import Scenario
+from blocksim.scenario.soil_places import soil_tables
+from blocksim.world.systems.system import Floats, Indices, Shade, Table, Touching, Track
+
+MILLI, KILO = 1e3, 1e-3
+GAP = 2.0  # spacings without a particle that end the connected part
+COLUMN = 2.0  # spacings, of the surface
+BACK = 2.0  # spacings from the end in which the height at the back is taken
+SMOOTHED = 2  # times that pressure is averaged over neighbouring cells of one spacing
+
+
+def touching(soils: Any, world: Any) -> Touching:
+    """Return the contacts of soils with bodies."""
+    touches = soils.touches[: int(soils.controls["touch_count"][0])]
+    touches = touches[touches["normal_force"] > 0.0].view(np.ndarray)
+    particle, body = touches["particle"], touches["body"]
+    kind = soils.states["kind"][particle]
+    push, rub = touches["normal_force"], touches["shear_force"]
+    fx, fy, square = touches["fx"], touches["fy"], push**2 + rub**2
+    normal = np.stack([push * fx - rub * fy, rub * fx + push * fy], axis=-1) / square[:, None]  # away from the body
+    apart = float(soils.controls["radius"][0]) - touches["depth"]
+    centre = np.stack([soils.points["x"][particle], soils.points["y"][particle]], axis=-1)
+    friction = soils.interactions["static_friction"][kind, world.bodies["contact_class"][body]]
+    return Touching(
+        body.astype(np.intp), kind.astype(np.intp), centre - apart[:, None] * normal, -normal, push, -rub, friction
+    )
+
+
+def part_names(scenario: Scenario) -> tuple[str, ...]:
+    """Return the names of the soils."""
+    return tuple(table.name for table in soil_tables(scenario))
+
+
+def parts_of(track: Track) -> dict[str, Indices]:
+    """Return the numbers of the particles of each soil; they are called SOIL.NUMBER."""
+    owners = np.array([name.rpartition(".")[0] for name in track.names])
+    return {str(name): np.flatnonzero(owners == name) for name in dict.fromkeys(owners.tolist())}
+
+
+def connected(x: Floats, gap: float) -> tuple[float, float]:
+    """Return the ends (m) of the part around the median that no gap (m) interrupts."""
+    ordered = np.sort(x)
+    breaks = np.flatnonzero(np.diff(ordered) > gap)
+    middle = len(ordered) // 2
+    first = breaks[breaks < middle].max(initial=-1) + 1
+    last = breaks[breaks >= middle].min(initial=len(ordered) - 1)
+    return float(ordered[first]), float(ordered[last])
+
+
+def ending(scenario: Scenario, track: Track) -> Table:
+    """Return the table of the last frame: a row for each soil.
+
+    left and right end the part without a gap of 2 spacings, first and last particle wherever they are; the back is the
+    end that has moved less, and the height there that of the highest particle within 2 spacings. At rest is what is
+    slower than time.rest_speed.
+    """
+    names = ("soil", "left_mm", "right_mm", "first_mm", "last_mm", "back", "back_height_mm", "at_rest")
+    rows = [_ending_of(track, own, scenario.time.rest_speed) for own in parts_of(track).values()]
+    columns = [list(parts_of(track)), *(list(column) for column in zip(*rows, strict=True))]
+    return dict(zip(names, columns, strict=True))
+
+
+def _ending_of(track: Track, own: Indices, rest_speed: float) -> tuple[Any, ...]:
+    spacing = float(track["spacing"][own[0]])
+    half = 0.5 * spacing
+    start = track.at_start("x")[own]
+    x, y, vx, vy = (track[name][-1, own] for name in ("x", "y", "vx", "vy"))
+    left, right = connected(x, GAP * spacing)
+    is_left = abs(left - start.min()) <= abs(right - start.max())
+    near = x <= left + BACK * spacing if is_left else x >= right - BACK * spacing
+    near &= (x >= left) & (x <= right)
+    ends = (left - half, right + half, x.min() - half, x.max() + half)
+    height = MILLI * float(y[near].max() + half)
+    rests = float(np.mean(np.hypot(vx, vy) < rest_speed))
+    return (*(MILLI * float(end) for end in ends), "left" if is_left else "right", height, rests)
+
+
+def surface(track: Track, frame: int) -> list[Floats]:
+    """Return for each soil lines (m, (k, 2)) through the highest points of columns of two spacings.
+
+    Columns in which there is no particle interrupt the line.
+    """
+    return [line for own in parts_of(track).values() for line in _surface_of(track, frame, own)]
+
+
+def _surface_of(track: Track, frame: int, own: Indices) -> list[Floats]:
+    spacing = float(track["spacing"][own[0]])
+    x, y = track["x"][frame, own], track["y"][frame, own]
+    width = COLUMN * spacing
+    first = int(np.floor(x.min() / width))
+    column = np.floor(x / width).astype(np.intp) - first
+    tops = np.full(int(column.max()) + 1, -np.inf)
+    np.maximum.at(tops, column, y)
+    there = np.flatnonzero(np.isfinite(tops))
+    line = np.stack([width * (first + there + 0.5), tops[there] + 0.5 * spacing], axis=-1)
+    return np.split(line, np.flatnonzero(np.diff(there) > 1) + 1)
+
+
+def displacement(track: Track) -> Floats:
+    """Return how far (m) particles are from where they began."""
+    return np.asarray(np.hypot(track["x"] - track.at_start("x"), track["y"] - track.at_start("y")))
+
+
+def speed(track: Track) -> Floats:
+    """Return speeds (m/s)."""
+    return np.asarray(np.hypot(track["vx"], track["vy"]))
+
+
+def pressure(track: Track) -> Floats:
+    """Return mean pressures (Pa), averaged over neighbours; for pictures only.
+
+    Particles share theirs out to the cells of a grid of one spacing, cells average over the next ones, and particles
+    take it back: all linear, about two spacings wide.
+    """
+    raw = -(track["sxx"] + track["syy"] + track["szz"]) / 3.0
+    spacing = float(track["spacing"][0])
+    return np.stack([_smoothed(*one, spacing) for one in zip(track["x"], track["y"], raw, strict=True)])
+
+
+def _smoothed(x: Floats, y: Floats, values: Floats, spacing: float) -> Floats:
+    known = np.isfinite(x + y + values)
+    if not known.any():
+        return values
+    u, v = ((one - one[known].min()) / spacing + SMOOTHED for one in (x, y))
+    i, j = (np.clip(np.nan_to_num(one), SMOOTHED, 1e7).astype(np.int64) for one in (u, v))
+    cells, at = np.unique(np.stack([i, j], axis=-1)[known], axis=0, return_inverse=True)
+    at = at.ravel()
+    count: Floats = np.bincount(at).astype(np.float64)
+    total: Floats = np.bincount(at, values[known]).astype(np.float64)
+    for _ in range(SMOOTHED):
+        count, total = _shared(cells, count, total)
+    result = values.copy()
+    result[known] = (total / count)[at]
+    return result
+
+
+def _shared(cells: Any, count: Floats, total: Floats) -> tuple[Floats, Floats]:
+    """Return what cells hold, (k, 2) of them, after each has given a half to the four next to it, where they are."""
+    keys = cells[:, 0] * (cells[:, 1].max() + 3) + cells[:, 1]  # in order, as cells are
+    own = np.arange(len(cells))
+    found = [count.copy(), total.copy()]
+    for step in (cells[:, 1].max() + 3, -(cells[:, 1].max() + 3), 1, -1):
+        place = np.searchsorted(keys, keys + step).clip(max=len(keys) - 1)
+        there = keys[place] == keys + step
+        for held, gets in zip((count, total), found, strict=True):
+            gets[own[there]] += 0.5 * held[place[there]]
+    return found[0], found[1]
+
+
+SHADES = (
+    Shade("displacement", "displacement (mm)", lambda track: MILLI * displacement(track)),
+    Shade("speed", "speed (mm/s)", lambda track: MILLI * speed(track)),
+    Shade("plastic", "plastic shear strain", lambda track: track["plastic"]),
+    Shade("pressure", "mean pressure (kPa), smoothed", lambda track: KILO * pressure(track)),
+)
