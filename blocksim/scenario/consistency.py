@@ -12,6 +12,7 @@ from blocksim.scenario.pairs import GROUND
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.soil_places import unfit_soils
 from blocksim.scenario.spelling import did_you_mean_or_list
+from blocksim.scenario.structures import Shaped
 
 BLOCKS_BY_NAME = ("structures", "bodies")
 SPRING_CHOICES = ("model", "law")
@@ -121,6 +122,10 @@ def _unmodelled_outlines(scenario: Scenario) -> Iterator[Finding]:
             key = "outline" if block.outline is not None else "sides"
             message = f"outlines are not modelled with {with_which}"
             yield Finding(("blocks", name, key), message, at="key", relation=True)
+    for number, structure in enumerate(scenario.structures):
+        if isinstance(structure, Shaped):
+            message = f"outlines are not modelled with {with_which}"
+            yield Finding(("structures", number, "kind"), message, relation=True)
 
 
 def unknown_provenance(data: Data) -> Iterator[Finding]:

@@ -8,8 +8,9 @@ from typing import NamedTuple, Protocol
 from blocksim.scenario.keys import KeyPath
 from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.outlines import Corners, least_width, middle_of, section_of
-from blocksim.scenario.structures import Pose
+from blocksim.scenario.outlines import Corners, box_of, least_width, middle_of, section_of
+from blocksim.scenario.structures import Pose, Shaped, Structure
+from blocksim.scenario.structures.shaped import Cell
 
 
 class PlacedBody(NamedTuple):
@@ -114,11 +115,9 @@ def _placed(scenario: Scenario) -> _Placement:
     bodies: list[PlacedBody] = []
     origins: list[tuple[KeyPath, int]] = []
     for number, structure in enumerate(scenario.structures):
-        poses = structure.start(scenario.blocks[structure.block])
-        place = _placer(scenario, structure.block)
-        poses = _about_centroid(poses, scenario.blocks[structure.block])
-        bodies += [place(str(index), pose, fixed=False) for index, pose in enumerate(poses, start=len(bodies) + 1)]
-        origins.append((("structures", number), len(poses)))
+        built = _built(scenario, structure, len(bodies) + 1)
+        bodies += [body._replace(freed=True) if body.fixed and body.name in freed else body for body in built]
+        origins.append((("structures", number), structure.size))
     for number, spec in enumerate(scenario.bodies):
         pose = Pose(spec.x, spec.y, spec.angle, *spec.velocity, spec.spin)
         name = spec.name or str(len(bodies) + 1)
@@ -127,6 +126,27 @@ def _placed(scenario: Scenario) -> _Placement:
         bodies.append(body._replace(driven=is_driven, freed=name in freed) if is_driven or freed else body)
         origins.append((("bodies", number), 1))
     return _Placement(weakref.ref(scenario, _forget), tuple(bodies), tuple(origins))
+
+
+def _built(scenario: Scenario, structure: Structure, first: int) -> list[PlacedBody]:
+    """Return the bodies of a structure, called by their numbers from a first one on."""
+    poses = structure.start(scenario.blocks[structure.block])
+    if isinstance(structure, Shaped):
+        numbered = enumerate(zip(structure.cells, structure.shapes, poses, strict=True), start=first)
+        return [_shaped(scenario, structure.block, str(index), *one) for index, one in numbered]
+    place = _placer(scenario, structure.block)
+    poses = _about_centroid(poses, scenario.blocks[structure.block])
+    return [place(str(index), pose, fixed=False) for index, pose in enumerate(poses, start=first)]
+
+
+def _shaped(scenario: Scenario, usual: str, number: str, cell: Cell, outline: Corners, pose: Pose) -> PlacedBody:
+    key = cell.block or usual
+    block = scenario.blocks[key]
+    (left, bottom), (right, top) = box_of(outline)
+    sizes = right - left, top - bottom, block.depth
+    density = scenario.materials[block.material].density
+    name = cell.name or number
+    return PlacedBody(name, key, block.material, *sizes, density, *pose, cell.fixed, outline=outline)
 
 
 def _about_centroid(poses: Sequence[Pose], block: Block) -> Sequence[Pose]:

@@ -15,15 +15,17 @@ from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.drive import MOST_BODY_TABLES
 from blocksim.scenario.models.motion import PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.outlines import section_of
+from blocksim.scenario.outlines import faults, section_of
 from blocksim.scenario.placement import PlacedBody, origins_of, place_bodies
 from blocksim.scenario.probes import unfit_probes
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.resolved import body_table_contents
 from blocksim.scenario.segments import TOLERANCE, profile_segments, surface_heights, wall_segments
-from blocksim.scenario.structures import MAX_BLOCKS, UnfitError
+from blocksim.scenario.spelling import did_you_mean_or_list
+from blocksim.scenario.structures import MAX_BLOCKS, Polygons, Shaped, UnfitError
 
 MAX_SEGMENTS = 1000
+SHAPES = "give it width, height and length, an outline, or sides"
 MAX_OVERLAPS = 20
 MAX_PIECES = 1_000_000
 MAX_INTERVALS = 65_000
@@ -42,9 +44,9 @@ distances are differences of a few rounded places."""
 
 def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
     """Place everything and find impossible starts; the scenario is valid otherwise."""
-    too_many = list(_too_many(scenario))
-    if too_many:
-        yield from too_many
+    unplaceable = list(_too_many(scenario)) or list(_shapeless(scenario))
+    if unplaceable:
+        yield from unplaceable
         return
     yield from _endless_motion(scenario)
     yield from _fixed_stiffnesses(scenario)
@@ -54,7 +56,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
     except UnfitError:
         yield from _unfit_structures(scenario)
         return
-    endless = list(_endless_places(origins, bodies))
+    endless = list(_endless_places(origins, bodies)) or list(_impossible_shapes(origins, bodies))
     if endless:
         yield from endless
         return
@@ -124,12 +126,47 @@ def _fixed_stiffnesses(scenario: Scenario) -> Iterator[Finding]:
                 yield Finding(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
 
 
+def _shapeless(scenario: Scenario) -> Iterator[Finding]:
+    """Find blocks without a shape where one is needed, and drawn blocks that do not exist."""
+    for number, spec in enumerate(scenario.bodies):
+        if not scenario.blocks[spec.block].is_shaped:
+            yield Finding(("bodies", number, "block"), f"block {shown(spec.block)} has no shape; {SHAPES}")
+    for number, structure in enumerate(scenario.structures):
+        if not isinstance(structure, Shaped):
+            if not scenario.blocks[structure.block].is_shaped:
+                yield Finding(("structures", number, "block"), f"block {shown(structure.block)} has no shape; {SHAPES}")
+        elif isinstance(structure, Polygons):
+            yield from _unknown_blocks(number, structure, scenario)
+
+
+def _unknown_blocks(number: int, structure: Polygons, scenario: Scenario) -> Iterator[Finding]:
+    for place, cell in enumerate(structure.drawn):
+        if cell.block is not None and cell.block not in scenario.blocks:
+            hint = did_you_mean_or_list(cell.block, scenario.blocks)
+            path = ("structures", number, "cells", place, "block")
+            yield Finding(path, f"unknown block {shown(cell.block)}, {hint}")
+
+
 def _unfit_structures(scenario: Scenario) -> Iterator[Finding]:
     for number, structure in enumerate(scenario.structures):
         try:
             structure.start(scenario.blocks[structure.block])
         except UnfitError as error:
             yield Finding(("structures", number, error.key), str(error))
+
+
+def _impossible_shapes(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+    """Find blocks that a structure gave an outline that no block may have, or a mass beyond all numbers."""
+    told = set()
+    for origin, body in zip(origins, bodies, strict=True):
+        if not body.outline or origin in told:
+            continue
+        why = next((message for _, message in faults(body.outline)), "")
+        if not why and not (0.0 < body.inertia < math.inf and 0.0 < body.mass < math.inf):
+            why = f"a block of {body.mass:g} kg and {body.inertia:g} kg m^2 cannot be simulated"
+        if why:
+            told.add(origin)
+            yield Finding(origin, f"body {body.name}: {why}")
 
 
 def _endless_places(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
@@ -151,6 +188,8 @@ def _endless_places(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody
 def _impossible_masses(scenario: Scenario) -> Iterator[Finding]:
     """Find blocks with valid sizes but an invalid mass or inertia."""
     for name, block in scenario.blocks.items():
+        if not block.is_shaped:
+            continue
         density = scenario.materials[block.material].density
         mass = density * block.size_x * block.size_y * block.depth
         inertia = mass * (block.size_x * block.size_x + block.size_y * block.size_y) / 12.0

@@ -90,15 +90,15 @@ class Material(Table):
 
 
 class Block(Table):
-    """A block by its three sides and its orientation in the plane, or by its outline and its depth.
+    """A block by its three sides and its orientation in the plane, by its outline and its depth, or by its depth alone.
 
     The names of the sides are only names: `upright` selects the one that stands upright and `along` the one along
     x; the third is the depth. An outline is a convex polygon, or a regular one of a number of `sides`; its centroid is
-    the place of a body.
+    the place of a body. Structures that divide a whole into blocks, such as arches, give blocks of a depth their shape.
     """
 
     model_config = ConfigDict(
-        json_schema_extra={"oneOf": [{"required": [*keys]} for keys in (SIDES, *OUTLINE_KEYS.values())]}
+        json_schema_extra={"oneOf": [{"required": [*keys]} for keys in (SIDES, *OUTLINE_KEYS.values(), ["depth"])]}
     )
 
     width: q.PositiveLength | None = Field(default=None, description="width of the block")
@@ -120,7 +120,9 @@ class Block(Table):
     )
     radius: q.PositiveLength | None = Field(default=None, description="distance of its corners from its centre")
     given_depth: q.PositiveLength | None = Field(
-        default=None, alias="depth", description="extent out of the plane of a block with an outline or sides"
+        default=None,
+        alias="depth",
+        description="extent out of the plane of a block with an outline or sides, or with a shape from its structure",
     )
     material: str = Field(description="the name of the block's material")
 
@@ -131,7 +133,8 @@ class Block(Table):
         if not isinstance(data, Mapping):
             return data
         shape = next((key for key in OUTLINE_KEYS if key in data), "")
-        return {**dict.fromkeys(OUTLINE_KEYS.get(shape, SIDES), ABSENT), **data}
+        needed = OUTLINE_KEYS.get(shape, () if "depth" in data and data.keys().isdisjoint(SIDES) else SIDES)
+        return {**dict.fromkeys(needed, ABSENT), **data}
 
     @field_validator(*SIDES, "outline", "sides", "radius", "given_depth", mode="before")
     @classmethod
@@ -142,13 +145,15 @@ class Block(Table):
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
-        shape = next((key for key in OUTLINE_KEYS if getattr(self, key) is not None), "")
+        shape = next((key for key in (*OUTLINE_KEYS, "width", "depth") if self._has(key)), "")
         fields = type(self).model_fields
         given = [fields[name].alias or name for name in fields if name in self.model_fields_set]
-        foreign = {*RECTANGLE_KEYS, *chain(*OUTLINE_KEYS.values())} - {*OUTLINE_KEYS.get(shape, RECTANGLE_KEYS)}
+        own = {"width": RECTANGLE_KEYS, "depth": ("depth",)} | OUTLINE_KEYS
+        foreign = {*RECTANGLE_KEYS, *chain(*OUTLINE_KEYS.values())} - {*own[shape]}
         for key in given:
             if key in foreign:
-                why = f"has no meaning beside {shape}" if shape else "belongs to a block with an outline or sides"
+                elsewhere = "belongs to a block with an outline or sides"
+                why = elsewhere if shape == "width" else f"has no meaning beside {shape}"
                 message = f"{key} {why}; keep one of them"
                 raise q.invalid(message, key, at="key")
         return self
@@ -175,9 +180,17 @@ class Block(Table):
 
     def has_key(self, key: str) -> bool:
         """Return whether a key (or the name of its field) has a meaning for the shape of this block."""
-        if self.polygon:
-            return key not in RECTANGLE_KEYS and getattr(self, "given_depth" if key == "depth" else key) is not None
+        if self.width is None:
+            return key not in RECTANGLE_KEYS and self._has(key)
         return key in {*RECTANGLE_KEYS, "material"}
+
+    def _has(self, key: str) -> bool:
+        return getattr(self, "given_depth" if key == "depth" else key) is not None
+
+    @property
+    def is_shaped(self) -> bool:
+        """Whether the block has a shape; without one it has only a depth and a material."""
+        return self.width is not None or bool(self.polygon)
 
     @cached_property
     def polygon(self) -> outlines.Corners:
@@ -205,7 +218,7 @@ class Block(Table):
         return self._side(third)
 
     def _side(self, name: Side) -> float:
-        return {"width": self.width, "height": self.height, "length": self.length}[name] or math.nan
+        return {"width": self.width, "height": self.height, "length": self.length}[name] or 0.0
 
     def _extent(self, axis: int) -> float:
         low, high = outlines.box_of(self.polygon)

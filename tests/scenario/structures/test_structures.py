@@ -7,14 +7,19 @@ import pytest
 from blocksim.scenario import Block
 from blocksim.scenario.structures import (
     KINDS,
+    Arch,
     BlockWall,
+    Column,
     Dominoes,
     Grid,
+    Polygons,
     Pose,
     Pyramid,
+    Rubble,
     Stack,
     Staircase,
     UnfitError,
+    Voronoi,
 )
 
 BRICK = Block(width=0.032, height=0.025, length=0.05, material="aluminium")
@@ -28,6 +33,11 @@ def test_every_kind_is_registered_under_its_own_name() -> None:
         "pyramid": Pyramid,
         "dominoes": Dominoes,
         "grid": Grid,
+        "arch": Arch,
+        "column": Column,
+        "voronoi": Voronoi,
+        "rubble": Rubble,
+        "polygons": Polygons,
     } == KINDS
 
 

@@ -1,0 +1,153 @@
+"""Outlines of blocks in drawings: polygons of a GeoJSON file and closed polylines of a DXF file."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from blocksim.errors import BlocksimError
+from blocksim.extras import loaded
+from blocksim.scenario import outlines
+from blocksim.scenario.bounded_read import MEGABYTE, read_limited
+from blocksim.scenario.outlines import Corner
+from blocksim.scenario.quantities import shown
+
+MOST_BYTES = 20 * MEGABYTE
+MOST_OUTLINES, MOST_CORNERS = 2000, 16_000
+"""In a drawing; the scenario that is kept with the results has them all, and a scenario has a megabyte at most."""
+STRAY = 1e-6
+"""Distance of a point from the line through its neighbours, in sizes of the block, up to which it is left out."""
+DXF = "dxf"
+FARTHEST = 1e12
+COLLECTIONS = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
+DEEPEST = 20
+DAMAGE = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
+"""What readers raise for a file that is no drawing."""
+
+
+class Drawn(NamedTuple):
+    """One outline of a drawing, its coordinates as they are there."""
+
+    outline: list[Corner]
+    name: str  # for messages
+    properties: Mapping[str, Any]  # block, fixed, name
+
+
+class DrawingError(ValueError):
+    """A drawing that cannot be read, or an outline in it that no block can have; the text says which."""
+
+
+def read_drawing(path: Path) -> list[Drawn]:
+    """Return the outlines in a drawing; points within straight edges are left out.
+
+    Raises DrawingError, and UnavailableError for DXF without its package.
+    """
+    found = _dxf(path) if path.suffix.lower() == f".{DXF}" else _geojson(path)
+    if not found:
+        raise DrawingError("no polygon in it" if path.suffix.lower() != f".{DXF}" else "no closed polyline in it")
+    if len(found) > MOST_OUTLINES or sum(len(one.outline) for one in found) > MOST_CORNERS:
+        message = f"{len(found)} outlines are too many; at most {MOST_OUTLINES} with {MOST_CORNERS} corners are allowed"
+        raise DrawingError(message)
+    return [one._replace(outline=_checked(one)) for one in found]
+
+
+def _checked(drawn: Drawn) -> list[Corner]:
+    corners = simplified(drawn.outline)
+    for number, message in outlines.faults(corners):
+        place = "" if number is None else f", corner ({corners[number][0]:g}, {corners[number][1]:g})"
+        raise DrawingError(f"{drawn.name}{place}: {message}")
+    return corners
+
+
+def simplified(points: Sequence[Corner]) -> list[Corner]:
+    """Return an outline without points that repeat or lie within a straight edge, and not closed."""
+    corners = [point for number, point in enumerate(points) if point != points[(number + 1) % len(points)]]
+    low, high = outlines.box_of(corners) if corners else ((0.0, 0.0), (0.0, 0.0))
+    near = STRAY * math.dist(low, high)
+    number = 0
+    while number < len(corners) > outlines.FEWEST:
+        before, here, after = corners[number - 1], corners[number], corners[(number + 1) % len(corners)]
+        if _is_between(before, here, after, near):
+            corners.pop(number)
+        else:
+            number += 1
+    return corners
+
+
+def _is_between(before: Corner, here: Corner, after: Corner, near: float) -> bool:
+    x, y = after[0] - before[0], after[1] - before[1]
+    u, v = here[0] - before[0], here[1] - before[1]
+    length = math.hypot(x, y)
+    return length > 0.0 and abs(x * v - y * u) <= near * length and 0.0 <= x * u + y * v <= length * length
+
+
+def _geojson(path: Path) -> list[Drawn]:
+    try:
+        data = json.loads(read_limited(path, MOST_BYTES))
+        return [*_polygons(data, {}, DEEPEST)]
+    except DrawingError:
+        raise
+    except BlocksimError as error:
+        raise DrawingError(str(error)) from None
+    except DAMAGE as error:
+        message = f"not a GeoJSON file: {str(error)[:100]}"
+        raise DrawingError(message) from None
+
+
+def _polygons(node: Any, properties: Mapping[str, Any], depth: int) -> Iterator[Drawn]:
+    kind = node.get("type") if isinstance(node, dict) else None
+    if depth == 0:
+        raise DrawingError("collections are nested too deeply")
+    if kind in COLLECTIONS:
+        for number, part in enumerate(node[COLLECTIONS[kind]], start=1):
+            name = f"feature {number}" if kind == "FeatureCollection" else f"geometry {number}"
+            yield from (one._replace(name=name) for one in _polygons(part, properties, depth - 1))
+    elif kind == "Feature":
+        yield from _polygons(node["geometry"], node.get("properties") or {}, depth - 1)
+    elif kind in ("Polygon", "MultiPolygon"):
+        several = [node["coordinates"]] if kind == "Polygon" else node["coordinates"]
+        yield from (_polygon(rings, properties) for rings in several)
+    else:
+        raise DrawingError(f"{shown(kind)} is not a polygon" if kind else "not a GeoJSON file: it has no type")
+
+
+def _polygon(rings: Any, properties: Mapping[str, Any]) -> Drawn:
+    if len(rings) != 1:
+        raise DrawingError(f"a polygon with {len(rings) - 1} holes; blocks have none")
+    return Drawn([_point(point) for point in rings[0]], "polygon", properties)
+
+
+def _point(values: Any) -> Corner:
+    x, y = (float(value) for value in values[:2])
+    if not (abs(x) < FARTHEST and abs(y) < FARTHEST):
+        raise DrawingError(f"({x:g}, {y:g}) is not a place")
+    return x, y
+
+
+def _dxf(path: Path) -> list[Drawn]:
+    ezdxf = loaded("ezdxf", f"reading {path.name}", DXF)
+    try:
+        read_limited(path, MOST_BYTES)  # no file that is larger, no pipe
+        document = ezdxf.readfile(path)
+        return [*_polylines(document.modelspace())]
+    except DrawingError:
+        raise
+    except BlocksimError as error:
+        raise DrawingError(str(error)) from None
+    except (ezdxf.DXFError, *DAMAGE) as error:
+        message = f"not a DXF file: {str(error)[:100]}"
+        raise DrawingError(message) from None
+
+
+def _polylines(space: Any) -> Iterator[Drawn]:
+    for entity in space.query("LWPOLYLINE POLYLINE"):
+        name = f"polyline {entity.dxf.handle} in layer {entity.dxf.layer}"
+        is_light = entity.dxftype() == "LWPOLYLINE"
+        places = entity.get_points("xy") if is_light else [(place.x, place.y) for place in entity.points()]
+        points = [_point(place) for place in places]
+        if not (entity.closed if is_light else entity.is_closed) and points[:1] != points[-1:]:
+            continue
+        if entity.has_arc:
+            raise DrawingError(f"{name}: has arcs; blocks have straight edges")
+        yield Drawn(points, name, {} if entity.dxf.layer == "0" else {"block": entity.dxf.layer})

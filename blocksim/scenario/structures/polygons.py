@@ -1,0 +1,92 @@
+"""Blocks by their corners where they are: written out, or taken from a drawing."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, Self
+
+from pydantic import Field, ValidationInfo, model_validator
+
+from blocksim.scenario import outlines
+from blocksim.scenario import quantities as q
+from blocksim.scenario.drawings import MOST_OUTLINES, DrawingError, Drawn, read_drawing
+from blocksim.scenario.models.base import Identifier, Table, table_path
+from blocksim.scenario.models.geometry import Point
+from blocksim.scenario.structures.shaped import Cell, Shaped
+
+
+class DrawnBlock(Table):
+    """One block of a drawing."""
+
+    outline: tuple[Point, ...] = Field(
+        description="corners [x, y] of a convex block, in either sense",
+        json_schema_extra={"minItems": outlines.FEWEST, "maxItems": outlines.MOST},
+    )
+    block: str | None = Field(default=None, description="the name of its block (default: that of the structure)")
+    fixed: bool = Field(default=False, description="true for a body that never moves")
+    name: Identifier | None = Field(default=None, description="name in tables (default: its number, from 1)")
+
+    @model_validator(mode="after")
+    def _convex(self) -> Self:
+        for number, message in outlines.faults(self.outline):
+            raise q.invalid(message, "outline", *(() if number is None else (number,)))
+        return self
+
+
+class Polygons(Shaped):
+    """Blocks in `cells`, or in a GeoJSON or DXF file, of which results keep the blocks and not the file.
+
+    A polygon of GeoJSON may have the properties block, fixed and name; the layer of a DXF polyline other than 0 is the
+    name of its block.
+    """
+
+    kind: Literal["polygons"] = Field(description="kind of structure")
+    cells_given: tuple[DrawnBlock, ...] = Field(
+        default=(), alias="cells", description="blocks, each with its outline; give these or table"
+    )
+    table: str | None = Field(default=None, description="GeoJSON or DXF file with an outline for each block")
+    unit: q.PositiveLength = Field(default=1.0, description="unit of the coordinates in the file")
+    in_place: bool = Field(default=False, description="true keeps all coordinates, whatever left and bottom are")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, data: object, info: ValidationInfo) -> object:
+        if not isinstance(data, Mapping) or "table" not in data:
+            return data
+        if "cells" in data:
+            raise q.invalid("table and cells are both given; keep one of them", "table")
+        unit = _unit(data.get("unit", 1.0))
+        path = table_path(data["table"], (info.context or {}).get("folder"), "wall.geojson")
+        try:
+            drawn = read_drawing(path)
+        except DrawingError as error:
+            message = f"{path.name}: {error}"
+            raise q.invalid(message, "table") from None
+        others = {key: value for key, value in data.items() if key not in ("table", "unit")}
+        return {**others, "cells": tuple(_table(one, unit) for one in drawn)}
+
+    @model_validator(mode="after")
+    def _some(self) -> Self:
+        if not 0 < len(self.cells_given) <= MOST_OUTLINES:
+            message = f"{len(self.cells_given)} blocks; 1 to {MOST_OUTLINES} are allowed, in cells or in the file table"
+            raise q.invalid(message)
+        return self
+
+    @property
+    def drawn(self) -> Sequence[Cell]:
+        """All blocks in their order."""
+        return [Cell(one.outline, one.fixed, one.block, one.name) for one in self.cells_given]
+
+    @property
+    def shift(self) -> tuple[float, float]:
+        """How far all blocks move (m)."""
+        return (0.0, 0.0) if self.in_place else super().shift
+
+
+def _unit(value: object) -> float:
+    return q.Quantity(q.LENGTH, above=0.0).read(value)
+
+
+def _table(drawn: Drawn, unit: float) -> dict[str, Any]:
+    """Return an outline of a drawing in the form of a scenario."""
+    known = {key: value for key, value in drawn.properties.items() if key in ("block", "fixed", "name")}
+    outline = tuple((x * unit, y * unit) for x, y in drawn.outline)
+    return {"outline": outline, **{key: value for key, value in known.items() if value is not None}}

@@ -1,0 +1,157 @@
+"""Drawings: what polygons of GeoJSON and polylines of DXF become, and that nothing else passes."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from blocksim.errors import InvalidInputError, ScenarioError, UnavailableError
+from blocksim.scenario import Scenario, consistency, load_scenario, place_bodies, scenario_hash, scenario_to_toml
+from blocksim.scenario.document import Document
+from blocksim.scenario.drawings import DrawingError, read_drawing, simplified
+
+SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
+WEDGE = [[1, 0], [1.5, 0.0], [2, 0], [1, 1], [1, 0]]
+TEXT = """
+schema = 1
+name = "drawn"
+materials.stone = { density = 2000, young_modulus = 1e9, poisson_ratio = 0.2 }
+blocks.stone = { depth = 1, material = "stone" }
+blocks.pier = { depth = 2, material = "stone" }
+structures = [{ kind = "polygons", block = "stone", table = "wall.geojson", unit = "1 cm" }]
+time.scheme = "nonsmooth"
+"""
+
+
+@pytest.fixture(autouse=True)
+def rigid_outlines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(consistency, "WITH_OUTLINES", frozenset({("nonsmooth", "surface")}))
+
+
+def feature(*rings: Any, **properties: Any) -> dict[str, Any]:
+    return {"type": "Feature", "properties": properties, "geometry": {"type": "Polygon", "coordinates": [*rings]}}
+
+
+def collection(*features: Any) -> dict[str, Any]:
+    return {"type": "FeatureCollection", "features": [*features]}
+
+
+def written(folder: Path, data: object, name: str = "wall.geojson") -> Path:
+    (folder / name).write_text(data if isinstance(data, str) else json.dumps(data))
+    (folder / "scene.toml").write_text(TEXT)
+    return folder / name
+
+
+def loaded(folder: Path) -> Scenario:
+    return load_scenario(folder / "scene.toml")
+
+
+def test_every_polygon_is_a_block_and_its_properties_are_taken(tmp_path: Path) -> None:
+    written(tmp_path, collection(feature(SQUARE, block="pier", fixed=True, name="A1", other=3), feature(WEDGE)))
+    pier, wedge = place_bodies(loaded(tmp_path))
+    assert (pier.name, pier.block, pier.depth, pier.fixed) == ("A1", "pier", 2.0, True)
+    assert (wedge.name, wedge.block, wedge.fixed) == ("2", "stone", False)
+    assert len(wedge.outline) == 3  # the point within the straight edge is left out
+    assert (pier.x, pier.y) == pytest.approx((0.005, 0.005))
+    assert wedge.mass == pytest.approx(2000 * 0.5e-4)
+
+
+def test_results_keep_the_blocks_and_need_the_drawing_no_more(tmp_path: Path) -> None:
+    drawing = written(tmp_path, collection(feature(SQUARE), feature(WEDGE)))
+    first = loaded(tmp_path)
+    text = scenario_to_toml(first)
+    drawing.unlink()
+    again = Document.parse(text).build()
+    assert place_bodies(again) == place_bodies(first)
+    assert scenario_hash(again) == scenario_hash(first)
+
+
+@pytest.mark.parametrize("kind", ["Polygon", "MultiPolygon", "GeometryCollection"])
+def test_geometries_without_features_are_read(tmp_path: Path, kind: str) -> None:
+    polygon = {"type": "Polygon", "coordinates": [SQUARE]}
+    data = {
+        "Polygon": polygon,
+        "MultiPolygon": {"type": kind, "coordinates": [[SQUARE], [WEDGE]]},
+        "GeometryCollection": {"type": kind, "geometries": [polygon, polygon]},
+    }[kind]
+    assert len(read_drawing(written(tmp_path, data))) == (1 if kind == "Polygon" else 2)
+
+
+WRONG = {
+    "concave": (collection(feature([[0, 0], [1, 0], [0.2, 0.2], [0, 1], [0, 0]])), "feature 1, corner (0.2, 0.2)"),
+    "hole": (collection(feature(SQUARE, SQUARE)), "1 holes"),
+    "too small": (collection(feature(SQUARE), feature([[0, 0], [1, 0], [0, 1e-4], [0, 0]])), "feature 2"),
+    "line": ({"type": "LineString", "coordinates": [[0, 0], [1, 1]]}, '"LineString" is not a polygon'),
+    "empty": (collection(), "no polygon in it"),
+    "no JSON": ("{", "not a GeoJSON file"),
+    "another JSON": ([1, 2], "it has no type"),
+    "text for a place": (collection(feature([["a", 0], [1, 0], [0, 1]])), "not a GeoJSON file"),
+    "endless": (collection(feature([[1e300, 0], [1, 0], [0, 1]])), "is not a place"),
+    "not a number": ('{"type": "Polygon", "coordinates": [[[NaN, 0], [1, 0], [0, 1]]]}', "is not a place"),
+    "too many": (collection(*[feature(SQUARE)] * 2001), "2001 outlines are too many"),
+    "too deep": ('{"type": "Feature", "geometry": ' * 30 + "null" + "}" * 30, "nested too deeply"),
+    "overlap": (collection(feature(SQUARE), feature(SQUARE)), "bodies 1 and 2 overlap by 10 mm"),
+    "unknown block": (collection(feature(SQUARE, block="peer")), "unknown block \"peer\", did you mean 'pier'?"),
+}
+
+
+@pytest.mark.parametrize(("data", "message"), WRONG.values(), ids=WRONG)
+def test_what_is_no_drawing_of_blocks_is_refused_at_its_key(tmp_path: Path, data: object, message: str) -> None:
+    written(tmp_path, data)
+    with pytest.raises(ScenarioError) as caught:
+        loaded(tmp_path)
+    assert message in str(caught.value)
+    assert "scene.toml:7" in str(caught.value)
+
+
+def test_drawings_may_not_lie_outside(tmp_path: Path) -> None:
+    (tmp_path / "inner").mkdir()
+    written(tmp_path, collection(feature(SQUARE)))
+    written(tmp_path / "inner", "")
+    text = TEXT.replace("wall.geojson", "../wall.geojson")
+    (tmp_path / "inner" / "scene.toml").write_text(text)
+    with pytest.raises(ScenarioError, match="outside"):
+        load_scenario(tmp_path / "inner" / "scene.toml")
+
+
+def test_dxf_without_its_package_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "ezdxf", None)
+    with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[dxf\]'"):
+        read_drawing(written(tmp_path, "", "wall.dxf"))
+
+
+def test_closed_polylines_of_a_dxf_file_are_blocks_by_their_layers(tmp_path: Path) -> None:
+    ezdxf = pytest.importorskip("ezdxf", reason="reading DXF needs the extra dxf")
+    document = ezdxf.new()
+    space = document.modelspace()
+    space.add_lwpolyline([(0, 0), (1, 0), (1, 1), (0, 1)], close=True, dxfattribs={"layer": "pier"})
+    space.add_polyline2d([(1, 0), (2, 0), (1, 1)], close=True)
+    space.add_lwpolyline([(0, 0), (5, 5)])
+    space.add_line((0, 0), (1, 1))
+    document.saveas(tmp_path / "wall.dxf")
+    first, second = read_drawing(tmp_path / "wall.dxf")
+    assert (first.outline, first.properties) == ([(0, 0), (1, 0), (1, 1), (0, 1)], {"block": "pier"})
+    assert (second.outline, second.properties) == ([(1, 0), (2, 0), (1, 1)], {})
+    space.add_lwpolyline([(0, 0, 0.5), (1, 0, 0), (1, 1, 0)], format="xyb", close=True)
+    document.saveas(tmp_path / "arcs.dxf")
+    with pytest.raises(DrawingError, match="has arcs"):
+        read_drawing(tmp_path / "arcs.dxf")
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"no drawing", b"\0" * 100, b"0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n90\nx\n"]
+)
+def test_damaged_dxf_files_are_refused(tmp_path: Path, content: bytes) -> None:
+    pytest.importorskip("ezdxf", reason="reading DXF needs the extra dxf")
+    (tmp_path / "wall.dxf").write_bytes(content)
+    with pytest.raises((DrawingError, InvalidInputError)):
+        read_drawing(tmp_path / "wall.dxf")
+
+
+def test_only_points_within_straight_edges_are_left_out() -> None:
+    square = [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (1.0, 1.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)]
+    assert simplified(square) == [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+    polygon = [(math.cos(0.4 * k), math.sin(0.4 * k)) for k in range(15)]
+    assert simplified(polygon) == polygon
