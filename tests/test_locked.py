@@ -11,7 +11,7 @@ LOCKED = sorted((ROOT / "tests").glob("constraints*.txt"))
 ENTRY = re.compile(r"^([a-z0-9][a-z0-9-]*)==([^ ;\\]+)", flags=re.MULTILINE)
 EXTRAS = {
     "constraints.txt": ("study",),
-    "constraints-dev.txt": ("study", "dev"),
+    "constraints-dev.txt": ("study", "dev", "dxf"),
     "constraints-bench.txt": ("bench",),
     "constraints-paraview-check.txt": ("paraview-check",),
 }

@@ -18,7 +18,8 @@ from blocksim.study.stored_run import stored_run
 def export_command(
     run: options.StoredRunPath,
     kind: Annotated[
-        str, typer.Option("--format", metavar="FORMAT", help="csv for spreadsheets, vtkhdf for ParaView.")
+        str,
+        typer.Option("--format", metavar="FORMAT", help="csv, vtkhdf for ParaView, geojson or dxf."),
     ] = "csv",
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="File to write (default: NAME.csv, NAME.vtkhdf).")
@@ -26,11 +27,13 @@ def export_command(
     overwrite: options.Replace = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Write all frames of a run as CSV or VTKHDF.
+    """Write all frames of a run as CSV or VTKHDF, or where its blocks ended as GeoJSON or DXF.
 
     CSV: a row for each frame and block, with units in the heads; stored contacts go into a second file,
     NAME_contacts.csv. VTKHDF: one file with all times, blocks with number, velocity and rotation,
-    ground and walls with number 0; ParaView opens it. A run that was stopped or killed is written as far as it came.
+    ground and walls with number 0; ParaView opens it. GeoJSON and DXF: the outlines of all blocks in the last frame, in
+    m, which a structure of kind "polygons" takes up again. A run that was stopped or killed is written as far as it
+    came.
 
     An older export is replaced; any other file only with --overwrite.
 
@@ -44,7 +47,7 @@ def export_command(
     refuse_foreign(file, form.is_own, overwrite=overwrite)
     if form.write_contacts is not None and stored.frames.contacts is not None:
         refuse_foreign(beside, is_table(*CONTACT_COLUMNS), overwrite=overwrite)
-    told = [f"file: {file} ({replacement(file)}{form.write(file, stored.frames, stored.scenario)} frames)"]
+    told = [f"file: {file} ({replacement(file)}{form.write(file, stored.frames, stored.scenario)} {form.counted})"]
     if form.write_contacts is not None and stored.frames.contacts is not None:
         older = replacement(beside)
         count = form.write_contacts(beside, stored.frames, stored.frames.contacts)

@@ -31,6 +31,9 @@ REPORT = b'<meta name="generator" content="blocksim report">'
 REPORT_HEAD = 2000  # bytes in which a report says so
 BENCH_KEYS = {"machine", "measurements"}
 VTKHDF_NAMES = "blocksim/block_names"
+GEOJSON_MARK = '"generator": "blocksim"'
+DXF_PROPERTY = "generator", "blocksim"
+DXF_MARK = re.compile(rb"\$CUSTOMPROPERTYTAG\s+1\s+generator\s+9\s+\$CUSTOMPROPERTY\s+1\s+blocksim\s")
 IsOwn = Callable[[BinaryIO], bool]
 
 
@@ -141,6 +144,16 @@ def is_table_from(*columns: str) -> IsOwn:
         return head == line or head.startswith(line + b",")
 
     return is_own
+
+
+def is_geojson(file: BinaryIO) -> bool:
+    """Return True for an export as GeoJSON."""
+    return file.read(HEAD_BYTES).startswith(b"{" + GEOJSON_MARK.encode())
+
+
+def is_dxf(file: BinaryIO) -> bool:
+    """Return True for an export as DXF."""
+    return DXF_MARK.search(file.read(HEAD_BYTES)) is not None
 
 
 def is_vtkhdf(file: BinaryIO) -> bool:
