@@ -108,8 +108,10 @@ def faults(points: Sequence[Corner]) -> Iterator[tuple[int | None, str]]:
         return
     local = [((x - points[0][0]) / extent, (y - points[0][1]) / extent) for x, y in points]
     yield from _repeated(local, extent)
-    yield from _crossed(local)
-    yield from _bent(local)
+    turns = _turns(local)
+    if min(turns) <= 0.0 or sum(turns) > 1.5 * 2.0 * math.pi:  # slow, and cannot happen to others
+        yield from _crossed(local)
+    yield from _bent(turns)
     yield from _thin(local, extent)
 
 
@@ -134,11 +136,15 @@ def _as_given(local: Sequence[Corner], edge: int) -> int:
     return edge if area_of(local) >= 0.0 else (len(local) - 2 - edge) % len(local)
 
 
-def _bent(local: Sequence[Corner]) -> Iterator[tuple[int, str]]:
+def _turns(local: Sequence[Corner]) -> list[float]:
+    """Return the angles (rad) by which the outline turns at its corners, positive where it is convex."""
     sense = math.copysign(1.0, area_of(local))
-    for number, corner in enumerate(local):
-        before, after = _minus(corner, local[number - 1]), _minus(local[(number + 1) % len(local)], corner)
-        turn = sense * math.atan2(_cross(before, after), _dot(before, after))
+    ways = [_minus(b, a) for a, b in _edges(local)]
+    return [sense * math.atan2(_cross(a, b), _dot(a, b)) for a, b in zip((ways[-1], *ways), ways, strict=False)]
+
+
+def _bent(turns: Sequence[float]) -> Iterator[tuple[int, str]]:
+    for number, turn in enumerate(turns):
         if turn <= -STRAIGHT:
             yield number, "the outline is not convex at this corner; divide the block into convex ones"
         elif turn < STRAIGHT:

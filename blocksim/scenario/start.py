@@ -15,7 +15,7 @@ from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.drive import MOST_BODY_TABLES
 from blocksim.scenario.models.motion import PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.outlines import faults, section_of
+from blocksim.scenario.outlines import section_of
 from blocksim.scenario.placement import PlacedBody, origins_of, place_bodies
 from blocksim.scenario.probes import unfit_probes
 from blocksim.scenario.quantities import shown
@@ -56,7 +56,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
     except UnfitError:
         yield from _unfit_structures(scenario)
         return
-    endless = list(_endless_places(origins, bodies)) or list(_impossible_shapes(origins, bodies))
+    endless = list(_endless_places(origins, bodies)) or list(_endless_masses(origins, bodies))
     if endless:
         yield from endless
         return
@@ -155,18 +155,16 @@ def _unfit_structures(scenario: Scenario) -> Iterator[Finding]:
             yield Finding(("structures", number, error.key), str(error))
 
 
-def _impossible_shapes(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
-    """Find blocks that a structure gave an outline that no block may have, or a mass beyond all numbers."""
+def _endless_masses(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+    """Find blocks with an outline whose mass is beyond all numbers."""
     told = set()
     for origin, body in zip(origins, bodies, strict=True):
         if not body.outline or origin in told:
             continue
-        why = next((message for _, message in faults(body.outline)), "")
-        if not why and not (0.0 < body.inertia < math.inf and 0.0 < body.mass < math.inf):
-            why = f"a block of {body.mass:g} kg and {body.inertia:g} kg m^2 cannot be simulated"
-        if why:
+        if not (0.0 < body.inertia < math.inf and 0.0 < body.mass < math.inf):
             told.add(origin)
-            yield Finding(origin, f"body {body.name}: {why}")
+            message = f"a block of {body.mass:g} kg and {body.inertia:g} kg m^2 cannot be simulated"
+            yield Finding(origin, f"body {body.name}: {message}")
 
 
 def _endless_places(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:

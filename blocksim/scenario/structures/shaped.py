@@ -35,7 +35,11 @@ class Shaped(Structure):
     def cells(self) -> tuple[Cell, ...]:
         """All blocks where they start; raises UnfitError."""
         dx, dy = self.shift
-        return tuple(cell._replace(corners=[(x + dx, y + dy) for x, y in cell.corners]) for cell in self._as_drawn)
+        cells = tuple(cell._replace(corners=[(x + dx, y + dy) for x, y in cell.corners]) for cell in self._as_drawn)
+        for number, cell in enumerate(cells, start=1):
+            for _, message in outlines.faults(cell.corners):
+                raise UnfitError("kind", f"block {number} of this structure: {message}")
+        return cells
 
     @cached_property
     def _as_drawn(self) -> Sequence[Cell]:
