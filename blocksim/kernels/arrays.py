@@ -35,6 +35,7 @@ CACHE_LINE = 64  # bytes
 NO_FACE = -1
 SUPPORT, DRIVEN, REMOVED = 1, 2, 3  # moves with the support, along a path of its own; is not there any more
 ALL = 15  # bits of all four faces or corners
+OUTLINE = 16  # in place of the bits of faces: those of a table, as the body is a polygon and no rectangle
 
 # status codes that `advance` returns
 REACHED, AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL, TOO_FAST = range(6)
@@ -81,7 +82,7 @@ BODY = on_own_lines(
             "vx vy spin "  # m/s, m/s, rad/s
             "ax ay spin_rate "  # m/s2, m/s2, rad/s2: of the last force evaluation
             "fx fy torque "  # N, N, N m: contact totals of the evaluation under way
-            "half_x half_y "  # m: half sides along the body's own axes
+            "half_x half_y "  # m: half sides along the body's own axes; no corner of a polygon is farther along them
             "inverse_mass inverse_inertia",  # 1/kg, 1/(kg m2): zero for fixed bodies and the ground
             indices="contact_class",  # index into the interaction table; class 0 is the ground
             small="pairs_now pairs_before",  # pairs in contact in this evaluation and the one before
@@ -96,10 +97,13 @@ BODY = on_own_lines(
             "mass inertia "  # kg, kg m2 about the centre, out of the plane: zero for fixed bodies too
             "list_x list_y list_angle "  # m, m, rad: where the body was when the pair list was made
             "k_xx k_xy k_yy "  # N/m: stiffness of all contacts along their normals; see inertia.py
-            "k_x k_y",  # N: the same times the lever arms of the normals
-            indices="first_particle particle_count",  # its part of the particles
+            "k_x k_y "  # N: the same times the lever arms of the normals
+            "least_width",  # m: of a polygon, between two parallel lines; zero for rectangles
+            indices="first_particle particle_count "  # its part of the particles
+            "first_corner",  # its part of the corners, also of rectangles beside polygons; zero where there are none
             small="row_x row_y "  # intervals between particles on the faces along x and along y
             "seats coming "  # pairs in those sums; pairs about to touch
+            "corner_count "
             "is_asked",  # flag: contacts of one of its pairs have changed, or its sums are being made
         ),
     )
@@ -110,6 +114,11 @@ PARTICLE = record_type(
     "mx my "  # -: that of the other face at a corner, elsewhere the same
     "length "  # m: tributary length
     "share"  # -: tributary length over face length, summed over both faces at a corner that is one particle
+)
+CORNER = record_type(
+    "x y "  # m: place about the centroid, in the body frame; counter-clockwise
+    "nx ny "  # -: outward normal of the face from this corner to the next, in the body frame
+    "distance half"  # m: of that face from the centroid, and half of its length
 )
 PAIR = record_type(
     "limit "  # m: a deeper overlap ends the run
@@ -251,6 +260,7 @@ class World(NamedTuple):
     operators: Records  # (p, 2) OPERATOR, dashpots along the normals and the tangents
     interactions: Records  # (k, k) INTERACTION
     particles: Any  # (q,) PARTICLE, body after body; None, a type of its own, for the surface model
+    corners: Any  # (q,) CORNER, shape after shape; None, a type of its own, where all blocks are rectangles
     points: Records  # (s + 1,) POINT, work space of one pair; the last one for contacts that end
     spare_pairs: Records  # (p,) PAIR, the list being built
     spare_candidates: Any  # (p, s) as candidates

@@ -2,7 +2,7 @@
 
 import math
 
-from blocksim.kernels.arrays import ALL, Floats, Record, Records, World
+from blocksim.kernels.arrays import ALL, OUTLINE, Floats, Record, Records, World
 from blocksim.kernels.integrate import kinetic_energy
 from blocksim.kernels.jit import entry_kernel, rare_kernel
 from blocksim.kernels.laws import stored_energy
@@ -108,6 +108,8 @@ def measure(world: World, row: Floats) -> None:
 
 @rare_kernel
 def smallest_side(body: Record) -> float:
-    """Return the smaller side (m) of a body; infinite for the ground and its pieces, which have none."""
+    """Return the smaller side (m) of a body, of a polygon its least width; infinite for the ground and its pieces."""
+    if body.faces == OUTLINE:
+        return float(body.least_width)
     half = min(body.half_x, body.half_y)
     return 2.0 * half if half > 0.0 and body.faces == ALL else math.inf

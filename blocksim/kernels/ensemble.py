@@ -8,11 +8,11 @@ from blocksim.kernels.watch import Watched, frame_to_watch, watch
 
 
 @kernel
-def member_particles(particles: Records | None, m: int) -> Records | None:
-    """Return the particles of one member; None where there are none."""
-    if particles is None:
+def of_member(records: Records | None, m: int) -> Records | None:
+    """Return the particles or corners of one member; None where there are none."""
+    if records is None:
         return None
-    return particles[m]
+    return records[m]
 
 
 @rare_kernel
@@ -25,7 +25,8 @@ def member(worlds: World, m: int) -> World:
         worlds.candidates[m],
         worlds.operators[m],
         worlds.interactions[m],
-        member_particles(worlds.particles, m),
+        of_member(worlds.particles, m),
+        of_member(worlds.corners, m),
         worlds.points[m],
         worlds.spare_pairs[m],
         worlds.spare_candidates[m],

@@ -141,7 +141,7 @@ class Simulation:
 class Scene:
     """Single bodies on the ground, each with sides of its own (default: the paper's block)."""
 
-    bodies: Sequence[Mapping[str, object]]  # keys of [[bodies]] without `block`, and width, height, length
+    bodies: Sequence[Mapping[str, object]]  # keys of [[bodies]] without `block`; width, height, length, or outline
     restitution: float = 0.2
     friction: float = 0.31  # between blocks
     ground_friction: float = 0.38
@@ -149,6 +149,7 @@ class Scene:
     tilt: float = 0.0  # rad
     contact: Mapping[str, object] = field(default_factory=dict)  # more keys of [contact]
     time: Mapping[str, object] = field(default_factory=dict)  # more keys of [time]
+    ground: Mapping[str, object] = field(default_factory=dict)  # more keys of [ground]
 
     def start(self, change: Callable[[World], None] | None = None) -> Simulation:
         """Start it; `change` edits the world before the first contacts are found."""
@@ -162,7 +163,7 @@ class Scene:
         return scenario_of(
             self.bodies,
             gravity=self.gravity,
-            ground={"tilt": in_radians(self.tilt)},
+            ground={"tilt": in_radians(self.tilt), **self.ground},
             friction={"block_block": self.friction, "block_ground": self.ground_friction},
             contact={"restitution": self.restitution, **self.contact},
             time={"stop_at_rest": False, **self.time},
@@ -186,12 +187,15 @@ def scenario_of(bodies: Sequence[Mapping[str, object]], **tables: Any) -> Scenar
 
 def block_type(body: Mapping[str, object]) -> dict[str, object]:
     """Return the block table of one body."""
+    if "outline" in body:
+        return {"outline": body["outline"], "depth": body.get("length", DEPTH), "material": "aluminium"}
     return {key: body.get(key, size) for key, size in SIZES.items()} | {"material": "aluminium"}
 
 
 def placement(body: Mapping[str, object]) -> dict[str, object]:
     """Return the body table without what belongs to its block."""
-    return {key: in_radians(value) if key == "angle" else value for key, value in body.items() if key not in SIZES}
+    shape = {*SIZES, "outline"}
+    return {key: in_radians(value) if key == "angle" else value for key, value in body.items() if key not in shape}
 
 
 def in_radians(angle: object) -> object:

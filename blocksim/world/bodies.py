@@ -12,12 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.arrays import ALL, BODY, DRIVEN, MOTION_PIECE, MOVED, SUPPORT, Record, Records, zeros
+from blocksim.kernels.arrays import ALL, BODY, DRIVEN, MOTION_PIECE, MOVED, OUTLINE, SUPPORT, Record, Records, zeros
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments
 from blocksim.scenario.motion import motion_direction, motion_pieces
 from blocksim.world.applied import Applied, applied_loads
 from blocksim.world.drives import DriveRecords, drive_records, piece_records
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
+from blocksim.world.shapes import Corners, Shapes, half_sides, least_width, shapes_of
 
 # A piece of ground is a slab of which only the upper face counts; its thickness is a share of the smallest side of all
 # blocks: more than any overlap, less than a ledge that is worth modelling.
@@ -38,6 +39,7 @@ class Outline(NamedTuple):
     motion: Records  # (m,) MOTION_PIECE, of driven bodies and then of the support
     drives: DriveRecords
     applied: Applied
+    shapes: Shapes | None
 
     @property
     def shape(self) -> tuple[object, ...]:
@@ -45,7 +47,8 @@ class Outline(NamedTuple):
         model = self.scenario.contact.model
         drives = (*self.drives.driven["body"].tolist(), self.drives.paths.size)
         loads = self.applied.loads.size, self.applied.pieces.size
-        return model, len(self.placed), len(self.segments), len(self.classes), self.motion.size, drives, loads
+        shapes = None if self.shapes is None else (self.shapes.firsts, self.shapes.sizes)
+        return model, len(self.placed), len(self.segments), len(self.classes), self.motion.size, drives, loads, shapes
 
 
 Outlines = Sequence[Outline]
@@ -63,7 +66,8 @@ def outline_of(scenario: Scenario) -> Outline:
         both[: drives.paths.size], both[drives.paths.size :] = drives.paths, motion
         motion = both
     applied = applied_loads(scenario, placed)
-    return Outline(scenario, placed, place_segments(scenario), classes, interactions, motion, drives, applied)
+    segments, shapes = place_segments(scenario), shapes_of(placed)
+    return Outline(scenario, placed, segments, classes, interactions, motion, drives, applied, shapes)
 
 
 def body_records(outlines: Outlines) -> Records:
@@ -76,6 +80,9 @@ def body_records(outlines: Outlines) -> Records:
     bodies["cos"] = 1.0  # the half-plane's, last
     bodies["faces"] = bodies["corners"] = ALL
     _fill_blocks(bodies[:, :blocks], outlines)
+    for records, outline in zip(bodies, outlines, strict=True):
+        if outline.shapes is not None:
+            _fill_polygons(records[:blocks], outline.placed, outline.shapes)
     if pieces:
         for records, outline in zip(bodies, outlines, strict=True):
             _fill_slabs(records[blocks:-1].view(np.recarray), outline)
@@ -120,6 +127,21 @@ def _fill_blocks(records: NDArray[np.record], outlines: Outlines) -> None:
     records["contact_class"] = column(code for outline in outlines for code in _codes(outline))
 
 
+def _fill_polygons(records: NDArray[np.record], placed: Sequence[PlacedBody], shapes: Shapes) -> None:
+    """Tell where the corners of blocks are, and which blocks are polygons."""
+    records["first_corner"] = shapes.firsts
+    records["corner_count"] = shapes.sizes
+    widths: dict[Corners, float] = {}
+    for record, body in zip(records, placed, strict=True):
+        if body.outline:
+            if body.outline not in widths:
+                widths[body.outline] = least_width(body.outline)
+            record["least_width"] = widths[body.outline]
+            record["half_x"], record["half_y"] = half_sides(body)
+            record["radius"] = body.radius
+            record["faces"] = OUTLINE
+
+
 def _codes(outline: Outline) -> Iterator[int]:
     """Return the class of every block."""
     codes = {(one.material, one.depth): code for code, one in enumerate(outline.classes) if not one.is_ground}
@@ -127,7 +149,9 @@ def _codes(outline: Outline) -> Iterator[int]:
 
 
 def _fill_slabs(records: Records, outline: Outline) -> None:
-    smallest = min(min(body.size_x, body.size_y) for body in outline.placed)
+    smallest = min(
+        least_width(body.outline) if body.outline else min(body.size_x, body.size_y) for body in outline.placed
+    )
     thickness = max(SLAB_SHARE * smallest, 2.0 * (outline.scenario.contact.max_overlap or 0.0))
     for record, segment in zip(records, outline.segments, strict=True):
         _fill_slab(record, segment, thickness)

@@ -5,11 +5,13 @@ Time steps and skins are chosen by these bounds, known before anything moves.
 
 import itertools
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.kernels.arrays import OUTLINE
 from blocksim.scenario import Scenario
 from blocksim.scenario.drives import greatest_rate
 from blocksim.scenario.motion import motion_pieces
@@ -44,7 +46,7 @@ def bounds_of(bodies: NDArray[np.record], blocks: int) -> list[Bounds]:
     """Return the bounds of scenes, given their bodies (m, n + 1) of which so many are blocks."""
     all_blocks = bodies[:, :blocks]
     columns = {name: np.ascontiguousarray(all_blocks[name]) for name in ("radius", "half_x", "half_y", "mass")}
-    smallest = 2.0 * np.minimum(columns["half_x"].min(axis=1), columns["half_y"].min(axis=1))
+    smallest = _smallest_sides(all_blocks, columns)
     top = np.max(all_blocks["y"] + columns["radius"], axis=1)
     speed = np.max(
         np.hypot(all_blocks["vx"], all_blocks["vy"]) + columns["radius"] * np.abs(all_blocks["spin"]), axis=1
@@ -59,6 +61,17 @@ def bounds_of(bodies: NDArray[np.record], blocks: int) -> list[Bounds]:
         Bounds(side, height, pace, mass, count, frozenset(map(Kind, *kind)), frozenset(ground))
         for side, height, pace, mass, count, kind, ground in rows
     ]
+
+
+def _smallest_sides(blocks: NDArray[np.record], columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return the smallest sides (m) of scenes, of polygons their least width."""
+    is_polygon = blocks["faces"] == OUTLINE
+    if not is_polygon.any():
+        smallest: NDArray[np.float64] = 2.0 * np.minimum(columns["half_x"].min(axis=1), columns["half_y"].min(axis=1))
+        return smallest
+    sides = np.where(is_polygon, blocks["least_width"], 2.0 * np.minimum(columns["half_x"], columns["half_y"]))
+    least: NDArray[np.float64] = sides.min(axis=1)
+    return least
 
 
 def fastest_fall(scenario: Scenario, bounds: Bounds) -> float:

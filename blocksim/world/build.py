@@ -94,6 +94,7 @@ def assembled(parts: Parts, controls: Records, **arrays: Any) -> World:
         bodies=bodies,
         **arrays,
         particles=parts.particles,
+        corners=_corners(parts),
         **_grid(parts),
         interactions=interaction_tables([outline.interactions for outline in parts.outlines]),
         ledger=zeros((members, count // GROUP + 1), LEDGER),
@@ -121,6 +122,13 @@ def without_lists(parts: Parts, controls: Records) -> World:
     before = zeros((members, 1), CONTACT)
     lists = empty_lists(1, 1, before)
     return assembled(parts, controls, points=_points(members, 1), before=before, **lists)
+
+
+def _corners(parts: Parts) -> Records | None:
+    """Return the corners (m, q) of the shapes of scenes; None where all blocks are rectangles."""
+    shapes = [outline.shapes for outline in parts.outlines]
+    tables = [one.table for one in shapes if one is not None]
+    return joined(tables) if tables else None
 
 
 def _kinetic_energies(bodies: Records) -> list[float]:

@@ -123,7 +123,7 @@ def collide_rows(scene: Nonsmooth, begin: int, end: int) -> None:
             row = rows[r]
             lines = contacts.lines
             place = Place(contacts.stepping[0].margin, ahead, 0.5 * h, row.b == ground)
-            collide(row, bodies[row.a], bodies[row.b], lines[row.a], lines[row.b], place)
+            collide(row, bodies[row.a], bodies[row.b], lines[row.a], lines[row.b], place, scene.world.corners)
             r += 1
 
 

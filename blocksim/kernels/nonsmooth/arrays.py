@@ -29,7 +29,8 @@ ROW = record_type(
     "bend shear_bend",  # m/s: what the velocities at the points gain within half a substep, as bodies turn; bends.py
     indices="a b touch",  # bodies; place in the table of interactions
     # of the manifold in the step under way: AWAY, OPEN or TOUCHING; its impulses are those of impacts that are over
-    flags="reach is_struck",
+    flags="reach is_struck "
+    "corner_one corner_two",  # of a polygon's pair: the corners that the points are, see polygons.py; else zero
 )
 # four active rows of one colour, field by field; see groups.py
 LANE_FLOATS = (
@@ -88,6 +89,7 @@ SPOT = record_type(
 KEPT = record_type(
     "nx ny normal_one normal_two shear",  # of a row whose pair is in the next list too
     indices="a b colour next",  # bodies of a listed pair, its colour; the next old row with the same body a, from 1
+    flags="corner_one corner_two",
 )
 STEPPING = record_type(
     "substep "  # s

@@ -35,6 +35,8 @@ def forget(one: Record) -> None:
     one.normal_one = 0.0
     one.normal_two = 0.0
     one.shear = 0.0
+    one.corner_one = 0
+    one.corner_two = 0
 
 
 @kernel
@@ -45,6 +47,8 @@ def copy_impulses(source: Record, target: Record) -> None:
     target.normal_one = source.normal_one
     target.normal_two = source.normal_two
     target.shear = source.shear
+    target.corner_one = source.corner_one
+    target.corner_two = source.corner_two
 
 
 @rare_kernel

@@ -1,6 +1,7 @@
 """Where two bodies touch or will: the ends of the overlap of two faces, with their gaps.
 
-Of all faces the reference is the one beyond which the other body reaches least (separating axes).
+Of all faces the reference is the one beyond which the other body reaches least (separating axes). This is about
+rectangles, four pairs at a time; polygons: polygons.py.
 
 Contacts that press are looked for where the bodies will be half a step ahead: normals and arms are then those of the
 middle of the step for which they are kept, so that turning about an edge and sliding along a slope are right to second
@@ -10,7 +11,8 @@ are: bodies that meet half a step too deep would be taken for neighbours side by
 
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import ALL, Record, Records
+from blocksim.kernels.arrays import ALL, OUTLINE, Record, Records
+from blocksim.kernels.energy import smallest_side
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.lanes import (
     WIDTH,
@@ -43,7 +45,9 @@ from blocksim.kernels.nonsmooth.faces import (
     points_of,
 )
 from blocksim.kernels.nonsmooth.pieces import points_on_ground, points_on_piece
+from blocksim.kernels.nonsmooth.polygons import corners_on_ground, follow_corners, points_of_polygons
 from blocksim.kernels.nonsmooth.slip import Motion
+from blocksim.kernels.outlines import hull_of
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller half side: two faces that face each other over less are passed by
@@ -207,20 +211,18 @@ def are_four_of_blocks(rows: Records, first: int, bodies: Records) -> bool:
 
 
 @rare_kernel
-def collide(row: Record, a: Record, b: Record, line_a: Record, line_b: Record, place: Place) -> None:
-    """Find the contact manifold of a pair; without one its impulses are forgotten."""
+def collide(
+    row: Record, a: Record, b: Record, line_a: Record, line_b: Record, place: Place, corners: Records | None
+) -> None:
+    """Find the contact manifold of a pair; without one its impulses are forgotten.
+
+    `corners` are those of all polygons; where there are none, the compiler leaves them out altogether.
+    """
     is_pressed = row.normal_one + row.normal_two > 0.0
     ahead = place.ahead if is_pressed else 0.0
     one = block_ahead(block_of(a), line_a.vx, line_a.vy, line_a.spin, ahead)
     two = block_ahead(block_of(b), line_b.vx, line_b.vy, line_b.spin, ahead)
-    if place.is_ground:
-        points, is_near = points_on_ground(one, two, place.margin)
-    elif a.faces != ALL:
-        points, is_near = points_on_piece(two, one, a.corners, False, place.margin)
-    elif b.faces != ALL:
-        points, is_near = points_on_piece(one, two, b.corners, True, place.margin)
-    else:
-        points, is_near = points_of_blocks(one, two, place.margin)
+    points, is_near = points_of_pair(row, a, one, b, two, place, corners)
     if is_near:
         half = place.half if is_pressed else 0.0
         motion = Motion(line_a.vx - line_b.vx, line_a.vy - line_b.vy, line_a.spin, line_b.spin, ahead, half)
@@ -229,3 +231,54 @@ def collide(row: Record, a: Record, b: Record, line_a: Record, line_b: Record, p
     else:
         row.normal_one = row.normal_two = row.shear = 0.0
         row.reach = AWAY
+
+
+@kernel
+def points_of_pair(
+    row: Record, a: Record, one: Block, b: Record, two: Block, place: Place, corners: Records | None
+) -> tuple[Points, bool]:
+    """Return the contact manifold of two bodies, that are in `one` and `two`, and whether there is one."""
+    if corners is None:
+        return points_of_rectangles(a, one, b, two, place)
+    if a.faces == OUTLINE or b.faces == OUTLINE:
+        return points_with_polygon(row, a, one, b, two, place, corners)
+    return points_of_rectangles(a, one, b, two, place)
+
+
+@kernel
+def points_of_rectangles(a: Record, one: Block, b: Record, two: Block, place: Place) -> tuple[Points, bool]:
+    """Return the contact manifold of a rectangle and another or the ground, and whether there is one."""
+    if place.is_ground:
+        return points_on_ground(one, None, two, place.margin)
+    if a.faces != ALL:
+        return points_on_piece(two, None, one, a.corners, False, place.margin)
+    if b.faces != ALL:
+        return points_on_piece(one, None, two, b.corners, True, place.margin)
+    return points_of_blocks(one, two, place.margin)
+
+
+@rare_kernel
+def points_with_polygon(
+    row: Record, a: Record, one: Block, b: Record, two: Block, place: Place, corners: Records
+) -> tuple[Points, bool]:
+    """Return the contact manifold of a polygon and another, a rectangle or the ground, and whether there is one."""
+    hull_a = hull_of(a, corners)
+    hull_b = hull_of(b, corners)
+    if hull_a.size > 0 and hull_b.size > 0:
+        found = points_of_polygons(
+            one, hull_a, two, hull_b, 0.5 * min(smallest_side(a), smallest_side(b)), place.margin
+        )
+        if found.is_near:
+            follow_corners(row, found.one, found.two)
+        return found.points, found.is_near
+    is_first = hull_a.size > 0
+    if place.is_ground:
+        points, is_near = points_on_ground(one, hull_a, two, place.margin)
+    elif is_first:
+        points, is_near = points_on_piece(one, hull_a, two, b.corners, True, place.margin)
+    else:
+        points, is_near = points_on_piece(two, hull_b, one, a.corners, False, place.margin)
+    if is_near:
+        first, second = corners_on_ground(points, one if is_first else two, hull_a if is_first else hull_b, is_first)
+        follow_corners(row, first, second)
+    return points, is_near

@@ -1,6 +1,6 @@
 """Where a block touches the ground: the half-plane, or a piece of it, of which only the upper face counts.
 
-A piece is a line with the solid below. Of its face and the four of the block, the one beyond which the other reaches
+A piece is a line with the solid below. Of its face and those of the block, the one beyond which the other reaches
 least tells how the two meet (separating axes: S. Gottschalk, TR96-024, UNC Chapel Hill (1996)), and all four count,
 whichever way they look: a block beside a step reaches far below the upper face of that step, but it is its side that is
 in touch, and a block on a step reaches as far behind the riser as it is long, but it is its lower face. Where it is a
@@ -21,9 +21,10 @@ from blocksim.kernels.nonsmooth.faces import (
     face_of,
     has_point,
     in_frame,
-    opposite_edge,
     points_of,
 )
+from blocksim.kernels.nonsmooth.polygons import edge_opposite, face_count, face_numbered
+from blocksim.kernels.outlines import AnyHull
 
 TIE = 1e-7  # m: by so much a face of the block has to be better than that of the piece
 FACING = -0.01  # cosine: faces of a block that look more away than that from a piece of ground do not touch its edge
@@ -42,10 +43,10 @@ class Meeting(NamedTuple):
 
 
 @rare_kernel
-def points_on_ground(block: Block, ground: Block, margin: float) -> tuple[Points, bool]:
+def points_on_ground(block: Block, hull: AnyHull, ground: Block, margin: float) -> tuple[Points, bool]:
     """Return the contact manifold of a block and the half-plane, and whether there is one within the margin (m)."""
     face = Face(0.0, 1.0, block.x, ground.y, 0.0, FAR)
-    edge = opposite_edge(face, block)
+    edge = edge_opposite(face, block, hull)
     points = points_of(face, edge, block, ground, True, margin)
     return points, min(edge.left_gap, edge.right_gap) <= margin
 
@@ -64,23 +65,19 @@ def upper_edge(face: Face, piece: Block, corners: int) -> Edge:
 
 
 @kernel
-def meeting_on(block: Block, piece: Block, corners: int, number: int) -> Meeting:
-    """Return how a piece of ground lies before one of the four faces of a block."""
-    sign = 1.0 if number < 2 else -1.0
-    along_x = number % 2 == 0
-    mx = sign * (block.cos if along_x else -block.sin)
-    my = sign * (block.sin if along_x else block.cos)
-    face = face_of(block, mx, my, along_x)
+def meeting_on(block: Block, hull: AnyHull, piece: Block, corners: int, number: int) -> Meeting:
+    """Return how a piece of ground lies before one of the faces of a block."""
+    face = face_numbered(block, hull, number)
     edge = upper_edge(face, piece, corners)
-    return Meeting(face, edge, min(edge.left_gap, edge.right_gap), my * piece.cos - mx * piece.sin)
+    return Meeting(face, edge, min(edge.left_gap, edge.right_gap), face.ny * piece.cos - face.nx * piece.sin)
 
 
 @kernel
-def best_meeting(block: Block, piece: Block, corners: int) -> Meeting:
+def best_meeting(block: Block, hull: AnyHull, piece: Block, corners: int) -> Meeting:
     """Return how a piece of ground meets the face of a block that it reaches beyond least."""
-    best = meeting_on(block, piece, corners, 0)
-    for number in range(1, 4):
-        other = meeting_on(block, piece, corners, number)
+    best = meeting_on(block, hull, piece, corners, 0)
+    for number in range(1, face_count(hull)):
+        other = meeting_on(block, hull, piece, corners, number)
         if other.gap > best.gap:
             best = other
     return best
@@ -107,18 +104,20 @@ def touches_edge(meeting: Meeting, corners: int) -> bool:
 
 
 @rare_kernel
-def points_on_piece(block: Block, piece: Block, corners: int, is_first: bool, margin: float) -> tuple[Points, bool]:
+def points_on_piece(
+    block: Block, hull: AnyHull, piece: Block, corners: int, is_first: bool, margin: float
+) -> tuple[Points, bool]:
     """Return the contact manifold of a block and a piece of ground, and whether there is one within the margin (m).
 
     `is_first` tells whether the block is body a. Where an end of the piece is an edge that blocks can touch, as the
     bits `corners` tell, a face of the block that looks down on it may be the reference.
     """
     face = face_of(piece, -piece.sin, piece.cos, False)
-    edge = opposite_edge(face, block)
+    edge = edge_opposite(face, block, hull)
     gap = min(edge.left_gap, edge.right_gap)
     edge = clip(edge, face.half)
     is_near = min(edge.left_gap, edge.right_gap) >= -2.0 * piece.half_y
-    meeting = best_meeting(block, piece, corners)
+    meeting = best_meeting(block, hull, piece, corners)
     is_of_block = meeting.gap > gap + TIE and (is_edge(meeting) or meeting.cosine > PARALLEL)
     if is_of_block:
         face = meeting.face

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 STEP = 1e-3  # s, unless a test says otherwise
 ENDLESS = 1e3  # s: tests step as far as they want
+RIGID = {"scheme": "nonsmooth"}
 NAMES = ("x", "y", "angle", "vx", "vy", "spin")
 
 
@@ -56,16 +57,21 @@ class Block:
     width: float = WIDTH
     height: float = HEIGHT
     fixed: bool = False
+    outline: tuple[tuple[float, float], ...] = ()  # m, in place of width and height
+
+    @property
+    def shape(self) -> dict[str, object]:
+        """Return what its body table has for it in a Scene."""
+        sides: dict[str, object] = {"width": self.width, "height": self.height}
+        return {"outline": [list(corner) for corner in self.outline]} if self.outline else sides
 
 
 def posed(blocks: Sequence[Block], **values: Any) -> Nonsmooth:
     """Return blocks in any poses, overlapping ones too, before their first step; keywords of [time] go there."""
     stepping = {name: values.pop(name) for name in list(values) if name in Stepping.model_fields}
-    apart = [
-        {"x": 3.0 * i, "y": 2.0, "width": one.width, "height": one.height, "fixed": one.fixed}
-        for i, one in enumerate(blocks)
-    ]
-    scene: Any = build_scene(rigid(Scene(apart, **values).scenario(), end=ENDLESS, **stepping))
+    size = max([1.0, *(abs(place) for one in blocks for corner in one.outline for place in corner)])
+    apart = [{"x": 3.0 * size * i, "y": 2.0 * size, "fixed": one.fixed, **one.shape} for i, one in enumerate(blocks)]
+    scene: Any = build_scene(rigid(Scene(apart, time=RIGID, **values).scenario(), end=ENDLESS, **stepping))
     place(scene, blocks)
     load_lines(scene)
     scene.world.clock[0].is_started = 1

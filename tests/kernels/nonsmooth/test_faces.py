@@ -72,7 +72,7 @@ def test_block_ahead_turns_to_third_order_in_the_angle() -> None:
 
 def on_ground(body: Record, ground: Record, margin: float) -> Record:
     row, lines = zeros(1, ROW)[0], zeros(2, LINE)
-    collide(row, body, ground, lines[0], lines[1], Place(margin, 0.0, 0.0, True))
+    collide(row, body, ground, lines[0], lines[1], Place(margin, 0.0, 0.0, True), None)
     return row
 
 

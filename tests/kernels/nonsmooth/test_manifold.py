@@ -42,7 +42,7 @@ def pairs(make_body: MakeBody, pace: int) -> list[tuple[Record, Record]]:
 def row_of(a: Record, b: Record, margin: float = MARGIN) -> Record:
     """Return the row of two bodies at rest that have not touched before."""
     row, lines = zeros(1, ROW)[0], zeros(2, LINE)
-    collide(row, a, b, lines[0], lines[1], Place(margin, 0.0, 0.0, False))
+    collide(row, a, b, lines[0], lines[1], Place(margin, 0.0, 0.0, False), None)
     return row
 
 
@@ -170,7 +170,7 @@ def test_impulses_are_kept_until_the_normal_has_turned_by_25_degrees(
     row, lines = zeros(1, ROW)[0], zeros(2, LINE)
     row.normal_one, row.normal_two, row.shear = 3.0, 2.0, 1.0
     row.nx, row.ny = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
-    collide(row, a, b, lines[0], lines[1], Place(MARGIN, 0.0, 0.0, False))
+    collide(row, a, b, lines[0], lines[1], Place(MARGIN, 0.0, 0.0, False), None)
     expected = (3.0, 2.0, 1.0) if is_kept else (0.0, 0.0, 0.0)
     assert (row.normal_one, row.normal_two, row.shear) == expected
 
@@ -178,7 +178,9 @@ def test_impulses_are_kept_until_the_normal_has_turned_by_25_degrees(
 def test_impulses_are_forgotten_where_blocks_have_parted(make_body: MakeBody) -> None:
     row, lines = zeros(1, ROW)[0], zeros(2, LINE)
     row.normal_one, row.normal_two, row.shear, row.ny, row.reach = 3.0, 2.0, 1.0, 1.0, TOUCHING
-    collide(row, make_body(0.0, 0.025 + 2 * MARGIN), make_body(), lines[0], lines[1], Place(MARGIN, 0.0, 0.0, False))
+    collide(
+        row, make_body(0.0, 0.025 + 2 * MARGIN), make_body(), lines[0], lines[1], Place(MARGIN, 0.0, 0.0, False), None
+    )
     assert (row.normal_one, row.normal_two, row.shear, row.reach) == (0.0, 0.0, 0.0, AWAY)
 
 
@@ -192,7 +194,7 @@ def test_contact_that_presses_has_the_normal_and_arms_of_the_middle_of_the_step(
     lines, row = zeros(2, LINE), zeros(1, ROW)[0]
     lines.vx, lines.vy, lines.spin = (0.4, -0.1), (-0.3, 0.2), (8.0, -9.0)
     row.normal_one, row.nx, row.ny = float(pressed), 0.0, 1.0
-    collide(row, a, b, lines[0], lines[1], Place(MARGIN, ahead, 0.5e-3, False))
+    collide(row, a, b, lines[0], lines[1], Place(MARGIN, ahead, 0.5e-3, False), None)
     time = ahead if pressed else 0.0
     late_a, late_b = (
         make_body(body.x + time * line.vx, body.y + time * line.vy, body.angle + time * line.spin)

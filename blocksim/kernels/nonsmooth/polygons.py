@@ -1,0 +1,242 @@
+"""Where convex polygons touch or will: faces by separating axes, points by clipping, as of rectangles (manifold.py).
+
+Of all faces of both the reference is the one beyond which the other body reaches least. The face of the other body that
+looks most against it is clipped to its length: that gives at most two points. Each of them is a corner of one of the
+bodies, and impulses go with these corners from step to step: where a polygon rolls over a corner, what carried its one
+face at the right carries the next one at the left.
+"""
+
+import math
+from typing import NamedTuple
+
+from blocksim.kernels.arrays import Record
+from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.nonsmooth.arrays import FAR
+from blocksim.kernels.nonsmooth.faces import (
+    Block,
+    Edge,
+    Face,
+    Points,
+    clip,
+    face_of,
+    has_point,
+    in_frame,
+    opposite_edge,
+)
+from blocksim.kernels.nonsmooth.faces import points_of as points_on
+from blocksim.kernels.nonsmooth.slip import Rows
+from blocksim.kernels.outlines import AnyHull, Hull, corner_at, face_towards, least_along, next_corner
+
+TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
+EDGE = 0.01  # of half the least width: two faces that face each other over less are passed by
+LEVEL = -0.99498743710662  # cosine: two faces within 0.1 rad of each other can meet as faces
+OF_B = 32  # added to the number of a corner of body b, which counts from 1
+RECTANGLE = 4
+
+
+class Best(NamedTuple):
+    """The face of a body beyond which another reaches least, the gap (m) there, and the next best of its faces."""
+
+    gap: float
+    face: int
+    second_gap: float
+    second_face: int
+
+
+class Clipped(NamedTuple):
+    """A reference face, what of the other body's face lies over it, and the corners that its ends are."""
+
+    face: Face
+    edge: Edge
+    left: int
+    right: int
+
+
+class Found(NamedTuple):
+    """A manifold of polygons, whether there is one, and the corners that its points are."""
+
+    points: Points
+    is_near: bool
+    one: int
+    two: int
+
+
+@kernel
+def face_count(hull: AnyHull) -> int:
+    """Return the number of faces of a body; a rectangle has no hull."""
+    if hull is None:
+        return RECTANGLE
+    return hull.size
+
+
+@kernel
+def face_numbered(body: Block, hull: AnyHull, number: int) -> Face:
+    """Return one of the faces of a body."""
+    if hull is None:
+        sign = 1.0 if number < 2 else -1.0
+        along_x = number % 2 == 0
+        mx = sign * (body.cos if along_x else -body.sin)
+        my = sign * (body.sin if along_x else body.cos)
+        return face_of(body, mx, my, along_x)
+    return outline_face(body, hull, number)
+
+
+@kernel
+def outline_face(body: Block, hull: Hull, number: int) -> Face:
+    """Return one of the faces of a polygon, seen from its middle."""
+    corner = corner_at(hull, number)
+    px = corner.x - corner.half * corner.ny
+    py = corner.y + corner.half * corner.nx
+    return Face(
+        body.cos * corner.nx - body.sin * corner.ny,
+        body.sin * corner.nx + body.cos * corner.ny,
+        body.x + body.cos * px - body.sin * py,
+        body.y + body.sin * px + body.cos * py,
+        0.0,
+        1.0 * corner.half,
+    )
+
+
+@kernel
+def edge_opposite(face: Face, body: Block, hull: AnyHull) -> Edge:
+    """Return the face of a body that looks most towards a reference face."""
+    if hull is None:
+        return opposite_edge(face, body)
+    return outline_edge(face, body, hull, number_opposite(face.nx, face.ny, body, hull))
+
+
+@kernel
+def number_opposite(nx: float, ny: float, body: Block, hull: Hull) -> int:
+    """Return the number of the face of a body that looks most against a direction."""
+    return face_towards(hull, -(body.cos * nx + body.sin * ny), body.sin * nx - body.cos * ny)
+
+
+@kernel
+def outline_edge(face: Face, body: Block, hull: Hull, number: int) -> Edge:
+    """Return a face of a polygon that looks towards a reference face: it begins at the left."""
+    one = corner_at(hull, number)
+    two = corner_at(hull, next_corner(hull, number))
+    cos = body.cos
+    sin = body.sin
+    left, left_gap = in_frame(face, body.x + cos * one.x - sin * one.y, body.y + sin * one.x + cos * one.y)
+    right, right_gap = in_frame(face, body.x + cos * two.x - sin * two.y, body.y + sin * two.x + cos * two.y)
+    are_all = abs(left) >= 0.0
+    return Edge(left, left_gap, right, right_gap, are_all, are_all)
+
+
+@rare_kernel
+def best_face(body: Block, hull: Hull, other: Block, other_hull: Hull) -> Best:
+    """Return the face of a body beyond which another one reaches least."""
+    dx = other.x - body.x
+    dy = other.y - body.y
+    px = body.cos * dx + body.sin * dy
+    py = body.cos * dy - body.sin * dx
+    # a direction in the frame of the body, in that of the other
+    c = body.cos * other.cos + body.sin * other.sin
+    s = body.sin * other.cos - body.cos * other.sin
+    best = second = -math.inf
+    number = next_number = 0
+    for k in range(hull.size):
+        one = hull.table[hull.first + k]
+        away = one.nx * px + one.ny * py - one.distance
+        gap = away + least_along(other_hull, c * one.nx - s * one.ny, s * one.nx + c * one.ny)
+        if gap > best:
+            second, next_number = best, number
+            best, number = gap, k
+        elif gap > second:
+            second, next_number = gap, k
+    return Best(best, number, second, next_number)
+
+
+@rare_kernel
+def clipped_on(body: Block, hull: Hull, number: int, other: Block, other_hull: Hull) -> Clipped:
+    """Return what of another body lies over a face; its corners count from 1, those of the body from OF_B + 1."""
+    face = outline_face(body, hull, number)
+    against = number_opposite(face.nx, face.ny, other, other_hull)
+    whole = outline_edge(face, other, other_hull, against)
+    left = 1 + against if whole.left >= -face.half else OF_B + 1 + next_corner(hull, number)
+    right = 1 + next_corner(other_hull, against) if whole.right <= face.half else OF_B + 1 + number
+    return Clipped(face, clip(whole, face.half), left, right)
+
+
+@kernel
+def can_meet(body: Block, hull: Hull, number: int, other: Block, other_hull: Hull) -> bool:
+    """Return True if another body has a face that is nearly parallel to one."""
+    corner = corner_at(hull, number)
+    nx = body.cos * corner.nx - body.sin * corner.ny
+    ny = body.sin * corner.nx + body.cos * corner.ny
+    against = corner_at(other_hull, number_opposite(nx, ny, other, other_hull))
+    mx = other.cos * against.nx - other.sin * against.ny
+    my = other.sin * against.nx + other.cos * against.ny
+    return nx * mx + ny * my < LEVEL
+
+
+@rare_kernel
+def met_on(best: Best, body: Block, hull: Hull, other: Block, other_hull: Hull, thin: float) -> Clipped:
+    """Return how another body lies over the best face of a body, or over the next best.
+
+    Where two faces face each other over a sliver only, the bodies meet at other faces, if these are nearly parallel: a
+    block that slides over the flush joint of two others would else be stopped by the side of the second, as it sinks in
+    by a little. `thin` is half of the least width of both (m).
+    """
+    found = clipped_on(body, hull, best.face, other, other_hull)
+    is_sliver = found.edge.right - found.edge.left < EDGE * thin and best.second_gap > -EDGE * thin
+    if is_sliver and can_meet(body, hull, best.second_face, other, other_hull):
+        return clipped_on(body, hull, best.second_face, other, other_hull)
+    return found
+
+
+@kernel
+def nothing() -> Found:
+    """Return that there is no manifold."""
+    return Found(Points(Rows(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), FAR, FAR, True), False, 0, 0)
+
+
+@rare_kernel
+def points_of_polygons(a: Block, hull_a: Hull, b: Block, hull_b: Hull, thin: float, margin: float) -> Found:
+    """Return the contact manifold of two convex polygons within the margin (m); `thin` as in `met_on`."""
+    best_b = best_face(b, hull_b, a, hull_a)
+    if best_b.gap > margin:
+        return nothing()
+    best_a = best_face(a, hull_a, b, hull_b)
+    if best_a.gap > margin:
+        return nothing()
+    if best_b.gap + TIE >= best_a.gap:
+        met = met_on(best_b, b, hull_b, a, hull_a, thin)
+        if met.edge.right > met.edge.left or best_b.gap > best_a.gap:
+            return found_on(met, a, b, True, margin)
+    return found_on(met_on(best_a, a, hull_a, b, hull_b, thin), a, b, False, margin)
+
+
+@kernel
+def found_on(met: Clipped, a: Block, b: Block, is_of_b: bool, margin: float) -> Found:
+    """Return a manifold on a reference face. Point one is the right one of a face of b, the left one of a face of a."""
+    points = points_on(met.face, met.edge, a, b, is_of_b, margin)
+    is_near = met.edge.right > met.edge.left and has_point(points)
+    if is_of_b:
+        return Found(points, is_near, met.right, met.left)
+    return Found(points, is_near, OF_B ^ met.left, OF_B ^ met.right)
+
+
+@kernel
+def corners_on_ground(points: Points, block: Block, hull: Hull, is_first: bool) -> tuple[int, int]:
+    """Return the corners of a polygon at the points of a manifold with the ground, which `is_first` has as body a."""
+    if is_first:
+        number = number_opposite(points.row.nx, points.row.ny, block, hull)
+        return 1 + next_corner(hull, number), 1 + number
+    number = number_opposite(-points.row.nx, -points.row.ny, block, hull)
+    return OF_B + 1 + number, OF_B + 1 + next_corner(hull, number)
+
+
+@kernel
+def follow_corners(row: Record, one: int, two: int) -> None:
+    """Have impulses of the last step go with their corners; where a corner has not changed places they stay."""
+    normal_one = row.normal_one
+    normal_two = row.normal_two
+    total = normal_one + normal_two
+    if total > 0.0 and (one == row.corner_two or two == row.corner_one):
+        row.normal_one = normal_two if one == row.corner_two else 0.0
+        row.normal_two = normal_one if two == row.corner_one else 0.0
+        row.shear *= (row.normal_one + row.normal_two) / total
+    row.corner_one = one
+    row.corner_two = two

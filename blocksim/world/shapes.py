@@ -1,0 +1,59 @@
+"""The corners of all blocks of a scene, each shape once, where any block is a polygon and no rectangle."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from blocksim.kernels.arrays import CORNER, Records, zeros
+from blocksim.scenario import PlacedBody
+
+Corners = tuple[tuple[float, float], ...]  # m, counter-clockwise about the centroid
+
+
+class Shapes(NamedTuple):
+    """The shapes of a scene, and where each of its blocks has its corners."""
+
+    table: Records  # (q,) CORNER
+    firsts: tuple[int, ...]  # (b,)
+    sizes: tuple[int, ...]  # (b,) numbers of corners
+
+
+def shapes_of(placed: Sequence[PlacedBody]) -> Shapes | None:
+    """Return the corners of all blocks, of rectangles too; None where there are only these."""
+    if not any(body.outline for body in placed):
+        return None
+    places: dict[Corners, int] = {}
+    rows: list[tuple[float, ...]] = []
+    for body in placed:
+        if body.corners not in places:
+            places[body.corners] = len(rows)
+            rows += corner_rows(body.corners)
+    table = zeros(len(rows), CORNER)
+    for name, column in zip(CORNER.names or (), zip(*rows, strict=True), strict=True):
+        table[name] = column
+    return Shapes(table, tuple(places[body.corners] for body in placed), tuple(len(body.corners) for body in placed))
+
+
+def corner_rows(corners: Corners) -> list[tuple[float, ...]]:
+    """Return the fields of CORNER of the corners of one shape."""
+    rows: list[tuple[float, ...]] = []
+    for (x, y), (next_x, next_y) in zip(corners, (*corners[1:], corners[0]), strict=True):
+        length = math.hypot(next_x - x, next_y - y)
+        nx, ny = (next_y - y) / length, (x - next_x) / length
+        rows.append((x, y, nx, ny, nx * x + ny * y, 0.5 * length))
+    return rows
+
+
+def half_sides(body: PlacedBody) -> tuple[float, float]:
+    """Return how far (m) a block reaches along its own axes, to either side of its centroid."""
+    if not body.outline:
+        return 0.5 * body.size_x, 0.5 * body.size_y
+    return max(abs(x) for x, _ in body.outline), max(abs(y) for _, y in body.outline)
+
+
+def least_width(corners: Corners) -> float:
+    """Return the least distance (m) of two parallel lines between which a convex polygon lies: one is along a face."""
+    heights = np.array([row[2:4] for row in corner_rows(corners)]) @ np.array(corners).T
+    return float(np.min(heights.max(axis=1) - heights.min(axis=1)))

@@ -1,0 +1,177 @@
+"""Contact manifolds of convex polygons: against polygons clipped another way, and against those of rectangles."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from blocksim.kernels.nonsmooth.advance import collide_rows
+from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, OPEN, ROW, TOUCHING
+from tests.kernels.nonsmooth import references
+from tests.kernels.nonsmooth.polygons import HEXAGON, depth_below, random_outline, rectangle, turned
+from tests.kernels.nonsmooth.scenes import Block, listed, listed_rows, place, posed
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+
+PAIRS = 25
+
+
+@pytest.fixture(autouse=True)
+def outlines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have the references take the corners of polygons."""
+    monkeypatch.setattr(references, "corners", lambda body: body.places)
+
+
+class Outlined:
+    """A body of a scene with its corners in world axes, for the references."""
+
+    def __init__(self, body: Any, block: Block) -> None:
+        """Take its pose."""
+        self.x, self.y = float(body.x), float(body.y)
+        outline = block.outline or rectangle(block.width, block.height)
+        self.places = turned(outline, block.angle) + np.array([block.x, block.y])
+
+
+def manifolds(scene: Nonsmooth, blocks: Sequence[Block]) -> Any:
+    """Return the rows of a scene whose blocks have been put elsewhere."""
+    place(scene, blocks)
+    scene.world.clock[0].rebuilds = 0
+    scene = listed(scene)
+    rows = listed_rows(scene)
+    for name in ("normal_one", "normal_two", "shear"):
+        rows[name] = 0.0
+    collide_rows(scene, 0, rows.size)
+    return rows
+
+
+def near_one_another(random: Any, one: Block, other: Block) -> Block:
+    """Return `other` in a pose with a gap or an overlap of up to 1 mm."""
+    angle, way, gap = (float(random.uniform(*ends)) for ends in ((-4.0, 4.0), (-math.pi, math.pi), (-1e-3, 1e-3)))
+    near, far, put = 0.0, 0.2, other
+    while far - near > 1e-8:
+        middle = 0.5 * (near + far)
+        put = Block(one.x + middle * math.cos(way), one.y + middle * math.sin(way), angle, outline=other.outline)
+        apart = references.apart(*(Outlined(put, block) for block in (one, put)))
+        near, far = (near, middle) if apart > gap else (middle, far)
+    return put
+
+
+def pairs(random: Any, is_rectangle: bool = False) -> list[tuple[Block, Block]]:
+    """Return polygons two by two, all far from one another."""
+    found = []
+    for k in range(PAIRS):
+        shapes = [rectangle(*random.uniform(0.02, 0.06, 2)) if is_rectangle else random_outline(random) for _ in "ab"]
+        one = Block(0.5 * k, 2.0, float(random.uniform(-4.0, 4.0)), vx=0.4, outline=shapes[0])  # a margin of 1 mm
+        found.append((one, near_one_another(random, one, Block(outline=shapes[1]))))
+    return found
+
+
+def test_manifold_is_what_two_clipped_polygons_have() -> None:
+    random = np.random.default_rng(3)
+    seen = []
+    for two in pairs(random), pairs(random), pairs(random):
+        blocks = [block for pair in two for block in pair]
+        scene = posed(blocks)
+        rows = {(int(row.a), int(row.b)): row for row in manifolds(scene, blocks)}
+        margin = float(scene.contacts.stepping[0].margin)
+        for k in range(PAIRS):
+            a, b = (Outlined(scene.world.bodies[2 * k + i], blocks[2 * k + i]) for i in (0, 1))
+            expected: Any = references.meeting(a, b, margin)
+            row = rows.get((2 * k, 2 * k + 1))
+            is_near = references.apart(a, b) <= margin and expected.gaps.size > 0
+            assert (row is not None and bool(row.reach != AWAY)) is is_near
+            if row is None or not is_near:
+                continue
+            seen.append(int(row.reach))
+            assert (row.nx, row.ny) == pytest.approx(expected.normal, abs=1e-9)
+            gaps = np.array([row.gap_one, row.gap_two])
+            assert gaps[gaps < FAR] == pytest.approx(expected.gaps, abs=1e-9)
+            for body, of_a in ((a, True), (b, False)):
+                places = references.places_of(row, body, of_a=of_a)
+                assert places[gaps < FAR] == pytest.approx(expected.places, abs=1e-9)
+    assert min(seen.count(reach) for reach in (OPEN, TOUCHING)) > 10
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+def test_rectangles_given_as_outlines_have_the_same_manifolds(mixed: bool) -> None:
+    """All of them, or one of every two."""
+    random = np.random.default_rng(5)
+    outlined = [block for pair in pairs(random, is_rectangle=True) for block in pair]
+
+    def plain(block: Block) -> Block:
+        sides = 2.0 * np.array(block.outline).max(axis=0)
+        return Block(block.x, block.y, block.angle, vx=block.vx, width=float(sides[0]), height=float(sides[1]))
+
+    rectangles = [plain(block) for block in outlined]
+    others = [rectangles[i] if mixed and i % 2 else block for i, block in enumerate(outlined)]
+    one, other = (manifolds(posed(blocks), blocks) for blocks in (rectangles, others))
+    known = {(int(row.a), int(row.b)): row for row in one}
+    near = 0
+    for row in other:
+        same = known[int(row.a), int(row.b)]
+        assert row.reach == same.reach
+        if row.reach != AWAY:
+            near += 1
+            names = [name for name in ROW.names or () if not name.startswith("corner")]
+            assert [row[name] for name in names] == pytest.approx([same[name] for name in names], abs=1e-9)
+    assert near > PAIRS // 2
+
+
+def test_polygon_that_has_sunk_in_a_little_is_not_stopped_by_the_side_of_the_next() -> None:
+    """A hexagon slides over the flush joint of two blocks, and overlaps the side of the second by a hair only."""
+    sunk = 5e-5
+    below = depth_below(HEXAGON)
+    foot = 0.5 * float(np.ptp([x for x, y in HEXAGON if y < -0.99 * below]))
+    flush = [Block(0.0, 0.0), Block(0.032, 0.0)]
+    slider = Block(0.016 - foot + 0.01 * sunk, 0.0125 + below - sunk, outline=HEXAGON)
+    blocks = [*flush, slider]
+    rows = {(int(row.a), int(row.b)): row for row in manifolds(posed(blocks), blocks)}
+    for first in (0, 1):
+        row = rows[first, 2]
+        if row.reach != AWAY:
+            assert (row.nx, row.ny) == pytest.approx((0.0, -1.0), abs=1e-12)
+    assert rows[0, 2].reach == TOUCHING
+
+
+def test_honeycomb_cells_meet_at_whole_faces() -> None:
+    """Their corners coincide with those of the next faces, which face one another as well."""
+    below = depth_below(HEXAGON)
+    blocks = [Block(0.0, 2.0, outline=HEXAGON), Block(0.0, 2.0 + 2.0 * below - 1e-6, outline=HEXAGON)]
+    (row,) = [row for row in manifolds(posed(blocks), blocks) if row.b == 1]
+    assert (row.nx, row.ny) == pytest.approx((0.0, -1.0), abs=1e-12)
+    assert row.width == pytest.approx(0.02, rel=1e-9)
+    assert (row.gap_one, row.gap_two) == pytest.approx((-1e-6, -1e-6), abs=1e-12)
+
+
+@pytest.mark.parametrize("ground", ["half-plane", "piece", "block"])
+def test_impulses_go_with_the_corner_that_a_polygon_rolls_over(ground: str) -> None:
+    """What carried one face at the right carries the next face at the left; the new corner has none."""
+    level = 1.0 if ground == "block" else 0.0
+    table = [Block(0.0, level - 0.1, width=1.0, height=0.2, fixed=True)] if level else []
+    scene = posed([Block(outline=HEXAGON), *table], ground={"profile": [[-1, 0], [1, 0]]} if ground == "piece" else {})
+    pivot: list[str] = []
+    row: Any = None
+    for degrees in (-29.0, -31.0):
+        angle = math.radians(degrees)
+        hexagon = Block(0.0, level + depth_below(HEXAGON, angle) - 1e-6, angle, outline=HEXAGON)
+        place(scene, [hexagon, *table])
+        scene.world.clock[0].rebuilds = 0
+        scene = listed(scene)
+        rows = listed_rows(scene)
+        collide_rows(scene, 0, rows.size)
+        (row,) = [row for row in rows if row.reach != AWAY and row.a == 0]
+        if not pivot:
+            pressed = "one" if row.gap_one < row.gap_two else "two"
+            row[f"normal_{pressed}"] = 3.0
+            row.shear = 1.0
+        pivot.append("one" if row.gap_one < row.gap_two else "two")
+    assert pivot[0] != pivot[1]
+    assert row[f"normal_{pivot[1]}"] == 3.0
+    assert row[f"normal_{pivot[0]}"] == 0.0
+    assert row.shear == 1.0

@@ -1,0 +1,83 @@
+"""Corners of blocks as kernels have them, of polygons and of rectangles beside them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from blocksim.kernels.arrays import ALL, OUTLINE
+from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario.outlines import regular
+from blocksim.world.bodies import body_records, outline_of
+from blocksim.world.bounds import bounds_of
+from blocksim.world.nonsmooth import build_nonsmooth
+from blocksim.world.shapes import least_width
+
+TRIANGLE = [[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]]
+
+
+def scenario(**blocks: dict[str, object]) -> Scenario:
+    """Return blocks high up and apart; a triangle, two bricks and a hexagon unless told."""
+    tables = blocks or {
+        "triangle": {"outline": TRIANGLE, "depth": 0.1},
+        "brick": {"width": 0.2, "height": 0.1, "length": 0.1},
+        "hexagon": {"sides": 6, "radius": 0.2, "depth": 0.1},
+    }
+    return scenario_from_mapping(
+        {
+            "schema": 1,
+            "name": "shapes",
+            "materials": {"stone": {"density": 2000.0, "young_modulus": 1e9, "poisson_ratio": 0.2}},
+            "blocks": {name: {**table, "material": "stone"} for name, table in tables.items()},
+            "bodies": [{"block": name, "x": float(i), "y": 2.0} for i, name in enumerate([*tables, *tables])],
+            "time": {"scheme": "nonsmooth", "end": 1.0},
+        }
+    )
+
+
+def test_every_shape_is_in_the_table_once_with_outward_normals() -> None:
+    world = build_nonsmooth(scenario()).world
+    assert world.corners.size == 3 + 4 + 6
+    assert world.bodies.first_corner[:6].tolist() == [0, 3, 7] * 2
+    assert world.bodies.corner_count.tolist() == [3, 4, 6] * 2 + [0]
+    assert world.bodies.faces[:6].tolist() == [OUTLINE, ALL, OUTLINE] * 2
+    for body in world.bodies[:6]:
+        own = world.corners[body.first_corner : body.first_corner + body.corner_count]
+        heights = np.stack([own.nx, own.ny], axis=-1) @ np.stack([own.x, own.y])
+        assert (heights <= own.distance[:, np.newaxis] + 1e-15).all()
+        assert np.hypot(own.nx, own.ny) == pytest.approx(1.0, abs=1e-15)
+        assert 2.0 * own.half == pytest.approx(np.hypot(own.x - np.roll(own.x, -1), own.y - np.roll(own.y, -1)))
+
+
+def test_mass_and_inertia_of_a_polygon_are_about_its_centroid() -> None:
+    body = build_nonsmooth(scenario()).world.bodies[0]
+    assert body.mass == pytest.approx(2000.0 * 0.06 * 0.1, rel=1e-14)
+    assert body.inertia == pytest.approx(body.mass * (0.4**2 + 0.3**2) / 18.0, rel=1e-14)
+    assert body.radius == pytest.approx(math.hypot(0.4 - 0.4 / 3.0, 0.1), rel=1e-14)
+
+
+def test_box_about_the_centroid_holds_all_corners() -> None:
+    world = build_nonsmooth(scenario()).world
+    for body in world.bodies[:6]:
+        own = world.corners[body.first_corner : body.first_corner + body.corner_count]
+        assert body.half_x == pytest.approx(np.abs(own.x).max(), rel=1e-14)
+        assert body.half_y == pytest.approx(np.abs(own.y).max(), rel=1e-14)
+
+
+def test_least_width_is_the_least_height_over_a_face() -> None:
+    assert least_width(tuple((x, y) for x, y in TRIANGLE)) == pytest.approx(0.24, rel=1e-14)  # over the hypotenuse
+    assert least_width(regular(6, 0.2)) == pytest.approx(math.sqrt(3.0) * 0.2, rel=1e-14)
+
+
+def test_steps_are_bounded_by_the_least_width_of_a_polygon() -> None:
+    outline = outline_of(scenario(sliver={"outline": [[0.0, 0.0], [1.0, 1.0], [0.98, 1.02]], "depth": 0.1}))
+    (bounds,) = bounds_of(body_records([outline]), len(outline.placed))
+    assert bounds.smallest == pytest.approx(0.028, rel=0.02)
+
+
+def test_scenes_of_rectangles_have_no_table() -> None:
+    world = build_nonsmooth(scenario(brick={"width": 0.2, "height": 0.1, "length": 0.1})).world
+    assert world.corners is None
+    assert not world.bodies.corner_count.any()
