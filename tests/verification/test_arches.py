@@ -1,0 +1,80 @@
+"""Arches of voussoirs with rigid contacts: least thickness and tilt, bracketed within a percent."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from blocksim.scenario.outlines import centred
+from blocksim.verification.scene import Simulation
+from tests.kernels.nonsmooth.scenes import Block, posed
+
+if TYPE_CHECKING:
+    from blocksim.scenario.outlines import Corners
+
+RADIUS = 10.0  # m, mean
+STEP = 2.5e-4  # s: contacts give way by 1.5 mm at four times as long a step, and friction holds an arch by less
+FALLS, STANDS = 0.02, 2e-3  # m/s: of the fastest voussoir after a second
+
+
+def voussoir(ends: tuple[float, float], thickness: float) -> list[tuple[float, float]]:
+    """Return the corners of a voussoir between two angles (rad) from the right, on the circles."""
+    inner, outer = RADIUS - 0.5 * thickness, RADIUS + 0.5 * thickness
+    places = ((inner, ends[0]), (outer, ends[0]), (outer, ends[1]), (inner, ends[1]))
+    return [(radius * math.cos(angle), radius * math.sin(angle)) for radius, angle in places]
+
+
+def abutment(angle: float, thickness: float) -> list[tuple[float, float]]:
+    """Return the corners of a block that carries an arch at an angle (rad), beyond the joint there."""
+    along = np.array([math.cos(angle), math.sin(angle)])
+    away = np.array([math.sin(angle), -math.cos(angle)]) * (1.0 if angle < math.pi / 2 else -1.0)
+    places = ((-1, 0), (-1, 0.2), (1, 0.2), (1, 0))
+    return [tuple(RADIUS * along + u * thickness * along + v * RADIUS * away) for u, v in places]
+
+
+def block(corners: list[tuple[float, float]], *, fixed: bool = False) -> Block:
+    """Return a block with corners at some places, above all ground."""
+    outline: Corners = centred(corners)
+    first = min(outline, key=lambda one: math.hypot(one[0] - outline[0][0], one[1] - outline[0][1]))
+    x, y = corners[0][0] - first[0], corners[0][1] - first[1]
+    return Block(x, y + 2.0 * RADIUS, fixed=fixed, outline=outline)
+
+
+def arch(count: int, thickness: float, embrace: float, **values: Any) -> Simulation:
+    """Return an arch under way on two fixed abutments."""
+    begin = 0.5 * (math.pi - embrace)
+    angles = np.linspace(begin, begin + embrace, count + 1).tolist()
+    stones = [block(voussoir(ends, thickness)) for ends in pairwise(angles)]
+    feet = [block(abutment(angle, thickness), fixed=True) for angle in (angles[0], angles[-1])]
+    return Simulation(posed([*stones, *feet], restitution=0.0, step=STEP, **values))
+
+
+def fastest(run: Simulation) -> float:
+    """Return the speed (m/s) of the fastest voussoir after a second."""
+    run.to_time(1.0)
+    return float(np.hypot(run.bodies.vx, run.bodies.vy).max())
+
+
+@pytest.mark.parametrize(("friction", "least"), [(0.4, 0.10672), (0.375, 0.12597), (0.35, 0.15118), (0.325, 0.17821)])
+def test_least_thickness_of_a_semicircular_arch_is_that_of_limit_analysis(friction: float, least: float) -> None:
+    """27 voussoirs, thickness over mean radius; below a friction of 0.396 their joints slide."""
+    for share, stands in ((0.99, False), (1.01, True)):
+        speed = fastest(arch(27, share * least * RADIUS, math.pi, friction=friction))
+        assert speed < STANDS if stands else speed > FALLS
+
+
+@pytest.mark.parametrize(("share", "stands"), [(0.99, True), (1.01, False)])
+def test_arch_on_a_tilting_table_falls_at_20_49_degrees(share: float, stands: bool) -> None:
+    """Seven voussoirs over 157.5 degrees: tan = 0.37361."""
+    tilt = math.atan(share * 0.37361)
+    run = arch(7, 1.5, math.radians(157.5), friction=0.75, tilt=tilt)
+    speed = fastest(run)
+    assert speed < STANDS if stands else speed > FALLS
+    if not stands:  # four hinges: three parts of the arch turn, in turn one way and the other
+        spins = run.to_time(1.5).bodies.spin[:7]
+        parts = 1 + np.count_nonzero(np.abs(np.diff(spins)) > 0.1 * np.abs(spins).max())
+        assert parts == 3
