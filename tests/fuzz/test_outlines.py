@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tests.fuzz.child import Child
 
 MAGNITUDE = st.sampled_from([1.0] * 12 + [1e-320, 1e-18, 1e-9, 1e-3, 1e9, 1e30, 1e200, 1e308])
-NUMBER = st.one_of(
+NUMBER: st.SearchStrategy[Any] = st.one_of(
     st.floats(-1.0, 1.0),
     st.sampled_from([0.0, -0.0, 1.0, math.nan, math.inf, -math.inf, 1e308, 5e-324, 2**70, True, "1 m", "x", [], None]),
 )
