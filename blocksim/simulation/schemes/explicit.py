@@ -10,6 +10,7 @@ from blocksim.kernels.advance import advance, advance_in_team
 from blocksim.kernels.arrays import HALF, World
 from blocksim.kernels.energy import LEDGER_ROW, measure
 from blocksim.kernels.ensemble import advance_members
+from blocksim.kernels.laws import HERTZ_MINDLIN, LINEAR
 from blocksim.simulation.contacts import SUPPORT, UNITS, Rows, empty_rows
 from blocksim.simulation.schemes.coupled import coupled_scheme
 from blocksim.simulation.schemes.scheme import Scheme
@@ -17,6 +18,7 @@ from blocksim.world.build import EXPLICIT as CONSTRUCTION
 from blocksim.world.build import with_more_room, with_threads
 
 WORK_SPACE = ("points", "matrices", "before", "action")
+ENERGIES = {LINEAR: (0.5, 2.0), HERTZ_MINDLIN: (0.4, 2.5)}  # stored per stiffness: factor, power of the overlap
 Indices = NDArray[np.intp]
 SIDES_X, SIDES_Y = (-1.0, 1.0, 1.0, -1.0), (-1.0, -1.0, 1.0, 1.0)  # of the corners, counter-clockwise from lower left
 
@@ -37,7 +39,23 @@ def explicit_contacts(world: World, blocks: int) -> Rows:
     rows["overlap"] = contacts["depth"]
     rows["normal_force"] = contacts["normal_force"]
     rows["shear_force"] = -contacts["shear_force"]  # kept as the resistance to slip of a along the tangent
+    if "nx" not in (contacts.dtype.names or ()):
+        _add_bearing(rows, world, pairs[pair])
     return rows
+
+
+def _add_bearing(rows: Rows, world: World, pairs: Any) -> None:
+    """Add what a stiffness does that changes by slip and tilt: a force along the tangent, and a couple.
+
+    The couple is a normal force that acts a little beside its corner. Without a normal force there is no such place.
+    """
+    factor, power = ENERGIES[int(world.controls[0].law)]
+    energy = factor * rows["overlap"] ** power
+    rows["shear_force"] -= pairs["slide"] * energy
+    normal = rows["normal_force"]
+    way = np.divide(pairs["turn"] * energy, normal, out=np.zeros_like(normal), where=normal > 0.0)
+    rows["x"] -= way * rows["normal_y"]
+    rows["y"] += way * rows["normal_x"]
 
 
 def _kept_places(contacts: Any) -> list[Any]:
