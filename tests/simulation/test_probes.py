@@ -70,8 +70,11 @@ def test_base_shear_and_support_force_are_mass_times_acceleration_and_weight(sch
 def test_a_sliding_block_mobilises_all_friction_and_its_joint_slips(scheme: str) -> None:
     motion = {"kind": "pulse", "shape": "rectangular", "amplitude": 3.0, "duration": 1.0}
     friction = {"block_block": 0.1, "block_ground": 0.9}
-    found = probed(scheme, PROBES[1:4], motion=motion, friction=friction)
-    assert found["force1"]["mobilised"][-20:] == pytest.approx(1.0, abs=1e-6)
+    # half off its seat a block leans on its springs, and slides down that slope: 0.5 % of its speed at a stiffness of
+    # 0.01, 0.05 % here; and the springs of a shrinking face push along it, by 0.03 % of friction here
+    contact = {"stiffness_scale": 0.1} if scheme == "explicit" else {}
+    found = probed(scheme, PROBES[1:4], motion=motion, friction=friction, contact=contact)
+    assert found["force1"]["mobilised"][-20:] == pytest.approx(1.0, abs=1e-6 if scheme == "nonsmooth" else 5e-4)
     slip = -0.5 * (3.0 - 0.981) * 0.3**2  # of the upper block, towards -x
     assert found["joint3"]["slip"][-1] == pytest.approx(slip, rel=5e-3)
     assert found["point2"]["relative_dx"][-1] == pytest.approx(slip, rel=5e-3)
