@@ -4,11 +4,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from blocksim.simulation.ensemble import MemberEnd, MemberFailure, run_ensemble, run_in_batches
+    from blocksim.simulation.ensemble import run_ensemble, run_in_batches
     from blocksim.simulation.frames import Frames
+    from blocksim.simulation.keeping import renew_copies
     from blocksim.simulation.loop import Progress, Watcher
+    from blocksim.simulation.member_end import MemberEnd, MemberFailure
     from blocksim.simulation.result import Result, read_result
-    from blocksim.simulation.running import renew_copies, simulate, simulate_into
+    from blocksim.simulation.running import simulate, simulate_into
     from blocksim.simulation.summary import Summary
 
 __all__ = [
@@ -30,14 +32,14 @@ __all__ = [
 # found when first asked for, so that stored results can be read without waiting for numba and the kernels
 _HOMES = {
     "Frames": "frames",
-    "MemberEnd": "ensemble",
-    "MemberFailure": "ensemble",
+    "MemberEnd": "member_end",
+    "MemberFailure": "member_end",
     "Progress": "loop",
     "Result": "result",
     "Summary": "summary",
     "Watcher": "loop",
     "read_result": "result",
-    "renew_copies": "running",
+    "renew_copies": "keeping",
     "run_ensemble": "ensemble",
     "run_in_batches": "ensemble",
     "simulate": "running",

@@ -3,8 +3,6 @@
 `simulate` does so in memory, `simulate_into` in a folder, with checkpoints.
 """
 
-import json
-import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,27 +10,26 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from blocksim.errors import OutputError
 from blocksim.scenario import PlacedBody, Scenario, scenario_hash
 from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.simulation import folder as files
-from blocksim.simulation.atomic import sha256_of, write_text
 from blocksim.simulation.checkpoint import origin_of, restored
 from blocksim.simulation.checkpoint_policy import DEFAULTS, NO_PAST, CheckpointPolicy, CheckpointWriter, Past
 from blocksim.simulation.compilation import compile_kernels, compile_systems, kernels_of
+from blocksim.simulation.disk_room import refuse_full_disk
 from blocksim.simulation.events import Timeline
-from blocksim.simulation.folder import CHECKPOINTS, folder_lock
+from blocksim.simulation.folder import folder_lock
 from blocksim.simulation.happened import in_words
+from blocksim.simulation.keeping import keep_result
 from blocksim.simulation.ledger import RESIDUAL_PROMISE
-from blocksim.simulation.loop import Attendance, LoopResult, Watcher, last_step_of, run_loop
+from blocksim.simulation.loop import Attendance, LoopResult, Watcher, run_loop
 from blocksim.simulation.moving_support import MovingSupport
 from blocksim.simulation.onset import onset_warning
-from blocksim.simulation.probe_series import bytes_of_series
 from blocksim.simulation.probes import probes_of
 from blocksim.simulation.provenance import environment, run_hash, state_hash
 from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.result import Result
-from blocksim.simulation.result_files import PROBE, keep_scenario, probe_tables, read_tables
+from blocksim.simulation.result_files import keep_scenario, probe_tables, read_tables
 from blocksim.simulation.resumption import (
     NEW,
     Resumption,
@@ -46,19 +43,14 @@ from blocksim.simulation.schemes import AnyScene, build, ledger_names
 from blocksim.simulation.settled import Settled
 from blocksim.simulation.settling import begun
 from blocksim.simulation.stopping import WallTime, stop_requests
-from blocksim.simulation.stores.hdf5_probes import read_probes
 from blocksim.simulation.stores.hdf5_writer import FrameFile
-from blocksim.simulation.summary import Summary, read_summary
-from blocksim.simulation.table import csv_text, final_columns
+from blocksim.simulation.summary import Summary
+from blocksim.simulation.table import final_columns
 from blocksim.simulation.team import Team, team_for
-from blocksim.world.free_memory import readable
-from blocksim.world.memory import file_bytes, is_shorter_than_step, output_count, recorded_contacts
+from blocksim.world.memory import is_shorter_than_step
 from blocksim.world.sag import overlap_warning
-from blocksim.world.scenes import Built, arrays_of
+from blocksim.world.scenes import Built
 from blocksim.world.systems import others_of
-
-CHECKPOINT_FILES = len(CHECKPOINTS) + 1  # the last one while it is written
-COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION, *files.BODY_MOTIONS)
 
 
 def _ignore(_: object) -> None:
@@ -130,7 +122,7 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
             toml = part.prepare(tables, overwrite=overwrite or resume)
             ended = part.run(toml, precautions, team, attendance)
             result = _result(scenario, part.recorder, ended, time.perf_counter() - began, settled)
-            return _keep_result(result, part.account(result.summary), folder)
+            return keep_result(result, part.account(result.summary), folder)
 
 
 def _compiled(scenario: Scenario, listener: Listener = SILENT) -> float:
@@ -259,23 +251,6 @@ class Part:
         )
 
 
-def renew_copies(scenario: Scenario, folder: Path) -> None:
-    """Bring the resolved scenario and the experiment table in a finished run's folder up to date.
-
-    Neither decides the motion, so both may have changed since the run: another table, or another description.
-    """
-    tables = read_tables(scenario)
-    old = tuple(_bytes_of(folder / name) for name in COPIES)
-    keep_scenario(scenario, tables, folder)
-    if old != tuple(_bytes_of(folder / name) for name in COPIES):
-        summary = _with_checksums(read_summary(folder / files.SUMMARY), folder)
-        write_text(folder / files.SUMMARY, summary.to_json())
-
-
-def _bytes_of(path: Path) -> bytes | None:
-    return path.read_bytes() if path.is_file() else None
-
-
 def _result(
     scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float, settled: Settled | None
 ) -> Result:
@@ -332,55 +307,3 @@ def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResul
         sunk = overlap_warning(ended.overlap, min(body.least_width for body in placed))
         if sunk:
             yield sunk
-
-
-def _with_checksums(summary: Summary, folder: Path) -> Summary:
-    tables = [name for name in summary.sha256 if name.startswith(PROBE)]
-    kept = [name for name in (*COPIES, files.FINAL, files.SOILS, files.FRAMES, *tables) if (folder / name).is_file()]
-    return summary.model_copy(update={"sha256": {name: sha256_of(folder / name) for name in kept}})
-
-
-def _keep_result(result: Result, summary: Summary, folder: Path) -> Result:
-    write_text(folder / files.FINAL, csv_text(result.columns))
-    for name, table in result.endings.items():
-        write_text(folder / f"{name}.csv", csv_text(table))
-    tables = _keep_probes(result.scenario, folder)
-    summary = _with_checksums(summary.model_copy(update={"sha256": dict.fromkeys(tables, "")}), folder)
-    write_text(folder / files.SUMMARY, summary.to_json())
-    if result.status == "finished":
-        write_text(folder / files.DONE, json.dumps({"run": summary.run, "status": summary.status}) + "\n")
-        files.clear_remains(folder, files.CHECKPOINTS)
-    return Result(result.name, result.columns, summary, result.scenario, folder)
-
-
-def _keep_probes(scenario: Scenario, folder: Path) -> list[str]:
-    """Write a CSV for each probe, from what the run file has of it; return their names. Raises OutputError."""
-    tables = probe_tables(scenario)
-    for name, series in zip(tables, read_probes(folder / files.FRAMES, scenario).values(), strict=True):
-        write_text(folder / name, "".join(series.csv_lines()))
-    return tables
-
-
-def refuse_full_disk(folder: Path, scenario: Scenario, scene: AnyScene) -> None:
-    """Raise OutputError where a run may leave more than there is room for on the disk of a folder (yet to be made)."""
-    needed = bytes_needed(scenario, scene)
-    place = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
-    free = shutil.disk_usage(place).free
-    if needed > free:
-        raise OutputError(
-            f"{folder}: the results may take {readable(needed)}, but only {readable(free)} are free there; write "
-            "elsewhere with --out DIR, or store fewer frames (output.every, time.end)"
-        )
-
-
-def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
-    """Return the bytes that the frames of a run and its checkpoints take at most."""
-    steps = last_step_of(scenario.time.end, float(scene.world.controls[0].step))
-    frames = output_count(steps, scenario.time.end, scenario.output.every) + 2  # the first, and wherever it ends
-    bodies, particles = scene.world.bodies.size - 1, scene.world.particles
-    contacts = recorded_contacts(bodies, 0 if particles is None else particles.size) if scenario.output.contacts else 0
-    values = sum(one.values for one in others_of(scenario))
-    arrays = sum(array.nbytes for array in arrays_of(scene))
-    step = float(scene.world.controls[0].step)
-    series = bytes_of_series(scenario, steps, step, len(ledger_names(scene)))
-    return series + file_bytes(bodies, frames, contacts, values) + CHECKPOINT_FILES * arrays

@@ -10,7 +10,8 @@ from blocksim.bench.scenes import pushed_wall
 from blocksim.errors import ExitCode
 from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import ensemble, simulate
-from blocksim.simulation.ensemble import Ended, Ensemble, MemberEnd, MemberFailure, run_ensemble, run_in_batches
+from blocksim.simulation.ensemble import Ensemble, run_ensemble, run_in_batches
+from blocksim.simulation.member_end import Ended, MemberEnd, MemberFailure
 from blocksim.simulation.schemes import build_stacks
 from blocksim.world import build, memory, scenes
 from blocksim.world.memory import SceneSize, SceneTooLargeError

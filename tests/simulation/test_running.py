@@ -19,7 +19,8 @@ from blocksim.errors import InputMissingError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario, load_scenario, placement
 from blocksim.simulation import Progress, Result, read_result, simulate, simulate_into
 from blocksim.simulation.compilation import compile_kernels
-from blocksim.simulation.running import Listener, bytes_needed
+from blocksim.simulation.disk_room import bytes_needed
+from blocksim.simulation.running import Listener
 from blocksim.simulation.schemes import build_scene
 from blocksim.world.step import StepTooLargeError
 from tests.simulation.sliding import sliding
