@@ -52,8 +52,8 @@ def fragility_command(
         typer.Option(
             FAILS,
             metavar="CONDITIONS",
-            help='What counts as failure, such as "moved > 50 mm" or "outcome = slid | fell"; with commas all of '
-            f'several, repeated any of them (default: "{COLLAPSE}").',
+            help='What counts as failure, such as "moved > 50 mm" or "outcome = slid | fell". Separated by '
+            f'commas: all must hold; repeated: any one suffices (default: "{COLLAPSE}").',
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, metavar="S", help="Random seed.")] = 0,
@@ -81,9 +81,9 @@ def fragility_command(
     """Find the probability of collapse over an intensity.
 
     Draws members at every intensity, independently, counts those that fail with exact (Clopper-Pearson) limits, and
-    fits a lognormal curve by maximum likelihood: median, dispersion and their intervals. Runs that do not finish count
-    nowhere and are named (exit code 77). The same command again, also after a kill or with more members, runs only what
-    is missing. Needs the extra blocksim[study]. Exit code 1: no curve fits, as nothing or everything fails.
+    fits a lognormal curve by maximum likelihood: median, dispersion and their intervals. Runs that do not finish are
+    listed and not counted (exit code 77). The same command again, also after a kill or with more members, runs only
+    what is missing. Needs the extra blocksim[study]. Exit code 1: no curve fits, as nothing or everything fails.
 
     Example: blocksim fragility mine.toml --intensity motion.scale=0.5:2:7 --scatter friction.block_block=0.6+-0.05
     """

@@ -1,6 +1,7 @@
 """blocksim limit: the values of a key between which the structure stands and falls."""
 
 import re
+import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +11,7 @@ import typer
 from blocksim.cli import completion, options
 from blocksim.cli.limit_curve import show_curve
 from blocksim.cli.limit_give import extrapolated, warn_of_give
-from blocksim.cli.output import answer, note, number, print_json, table_lines
+from blocksim.cli.output import answer, note, number, print_json, table_lines, width_of_screen
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.sweep_output import leaving_unfinished_cases
 from blocksim.cli.vary import RANGE, read_variations
@@ -62,12 +63,12 @@ def limit_command(
         str,
         typer.Option(
             metavar="CONDITIONS",
-            help='What counts as standing, such as "moved < 5 mm", "turned < 10 deg" or "outcome != fell"; several '
-            "with commas.",
+            help='What counts as standing, such as "moved < 5 mm", "turned < 10 deg" or "outcome != fell". '
+            "Separated by commas: all must hold.",
         ),
     ] = DEFAULT,
     to: Annotated[
-        float, typer.Option(metavar="SHARE", parser=_share, help="Width of a bracket, relative to the value.")
+        float, typer.Option(metavar="SHARE", parser=_share, help="Width of a bracket over its value, such as 0.1%.")
     ] = TOLERANCE,
     over: Annotated[
         str | None,
@@ -101,8 +102,8 @@ def limit_command(
     """Find the value of a key at which the structure falls.
 
     Scans the range, as there may be more than one change, and then narrows every change between neighbours to a
-    bracket. A run that fails is told as such. The same command again, also after a kill, does no run twice. Exit code
-    1: nothing changes within the range.
+    bracket. Failed runs are reported. The same command again, also after a kill, repeats no run. Exit code 1: nothing
+    changes within the range.
 
     Example: blocksim limit scenarios/tilting_wall.toml --vary ground.tilt=20deg:40deg
     """
@@ -193,7 +194,7 @@ def _telling(shown: Callable[[Number], str]) -> OnRun:
 def _lines(name: str, found: LimitResult) -> list[str]:
     """Return both sides of every change, and what that comes to."""
     plan = found.plan
-    title = f'{plan.key}, {name}: stands means "{plan.criterion.text}"'
+    title = textwrap.wrap(f'{plan.key}, {name}: stands means "{plan.criterion.text}"', width_of_screen())
     if found.changes:
         sides = [side for one in found.changes for side in ((one.low, one.below), (one.high, one.above))]
         told = [_told(found, one) for one in found.changes]
@@ -204,7 +205,7 @@ def _lines(name: str, found: LimitResult) -> list[str]:
         told = [f"no change from {span}: {ends[0][1].value} at all {len(ends)} values"]
     heads = (f"value {plan.unit}".rstrip(), *HEADS)
     rows = [_cells(value, verdict, found.rows[value]) for value, verdict in dict.fromkeys(sides)]
-    return [title, "", *table_lines(heads, rows, left=4), "", *told]
+    return [*title, "", *table_lines(heads, rows, left=4), "", *told]
 
 
 def _cells(value: Number, verdict: Verdict, row: Row) -> list[str]:

@@ -1,12 +1,13 @@
 """What `blocksim limit --over` shows: a limit at each value of another key."""
 
+import textwrap
 from pathlib import Path
 from typing import NoReturn
 
 import typer
 
 from blocksim.cli.limit_give import warn_of_give
-from blocksim.cli.output import answer, note, print_json, table_lines
+from blocksim.cli.output import answer, note, print_json, table_lines, width_of_screen
 from blocksim.cli.sweep_output import leaving_unfinished_cases
 from blocksim.errors import ExitCode
 from blocksim.study.executors import Execution
@@ -49,4 +50,4 @@ def _lines(found: CurveResult) -> list[str]:
             rows.append([shown, "–", "–", verdict, verdict])
     heads = (plan.head.key, f"from {unit}".rstrip(), f"to {unit}".rstrip(), "below", "above")
     title = f'{key} over {plan.head.key}: stands means "{plan.one.criterion.text}"'
-    return [title, "", *table_lines(heads, rows, left=1)]
+    return [*textwrap.wrap(title, width_of_screen()), "", *table_lines(heads, rows, left=1)]

@@ -104,6 +104,13 @@ def test_nothing_that_changes_is_exit_code_1(blocksim: Command, golden: Golden) 
     golden(answer.out)
 
 
+def test_long_conditions_stay_within_the_screen(blocksim: Command) -> None:
+    stands = "outcome = stands | rocked back | slid, moved < 500 mm, turned < 80 deg"
+    answer = blocksim(*WALL, "--vary", "ground.tilt=1deg:2deg:2", *ROUGH, "--stands", stands)
+    assert " ".join(answer.out.split()).startswith(f'ground.tilt, rigid contacts: stands means "{stands}"')
+    assert max(map(len, answer.out.splitlines())) <= 80
+
+
 def test_what_falls_before_time_zero_has_a_row(blocksim: Command) -> None:
     answer = blocksim(*WALL, "--vary", "ground.tilt=60deg:70deg:2", "--set", "start.settle=true", *ROUGH)
     assert answer.code == 1
