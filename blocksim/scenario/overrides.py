@@ -156,11 +156,20 @@ def _put(node: object, parts: Sequence[str | int], value: object, done: list[str
         hint = did_you_mean_or_list(part, node)
         message = f"{done[0]} has no {shown(part)}, {hint}"
         raise UnfitOverrideError(message)
+    if child is MISSING and not done and len(parts) > 1 and _is_list(part):
+        message = f"this scenario has no [[{part}]], so no {shown(str(parts[1]))} among them"
+        raise UnfitOverrideError(message)
     done.append(part)
     return {
         **_without_synonym(node, part),
         part: _put(_opened(tuple(done), child) if len(parts) > 1 else child, parts[1:], value, done),
     }
+
+
+def _is_list(key: str) -> bool:
+    """Return True for the key of a list of tables, as [[loads]]."""
+    field = field_at((key,), {})
+    return field is not None and isinstance(field.default, tuple)
 
 
 def _without_synonym(node: Data, part: str) -> Data:
@@ -175,6 +184,10 @@ def _index(entries: Sequence[object], part: str | int, done: Sequence[str | int]
     named = [index for index, entry in enumerate(entries) if isinstance(entry, Mapping) and entry.get("name") == part]
     if len(named) == 1:
         return named[0]
+    names = [entry["name"] for entry in entries if isinstance(entry, Mapping) and "name" in entry]
+    if names and not str(part).isdecimal():
+        message = f"{format_key(done)} has no {shown(part)}, {did_you_mean_or_list(str(part), names)}"
+        raise UnfitOverrideError(message)
     message = f"{format_key(done)} is a list of {len(entries)}, numbered from 0; {shown(part)} does not exist"
     raise UnfitOverrideError(message)
 

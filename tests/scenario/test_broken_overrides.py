@@ -2,6 +2,7 @@
 
 import pytest
 
+from blocksim.scenario.overrides import UnfitOverrideError, with_value
 from tests.golden import Golden
 from tests.scenario.conftest import VALID, Overrides, Refusal, edited
 
@@ -36,6 +37,18 @@ def test_settings(refusal: Refusal, golden: Golden, setting: str) -> None:
     code, message = refusal(VALID, [setting])
     assert code == 65
     golden(message)
+
+
+@pytest.mark.parametrize(
+    ("loads", "told"),
+    [
+        (({"name": "water"}, {"kind": "moment"}), r"loads has no \"watr\", did you mean 'water'\?"),
+        ((), r'this scenario has no \[\[loads\]\], so no "watr" among them'),
+    ],
+)
+def test_load_of_another_name_is_told_with_those_there_are(loads: tuple[object, ...], told: str) -> None:
+    with pytest.raises(UnfitOverrideError, match=told):
+        with_value({"loads": loads} if loads else {}, ("loads", "watr", "magnitude"), 1.0)
 
 
 MIXED = {
