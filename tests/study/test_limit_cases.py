@@ -1,5 +1,6 @@
 """Limits of the literature, in both schemes: Goodman & Bray's slope, and diamonds of half-overlapped rows."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -7,11 +8,13 @@ import pytest
 
 from blocksim.scenario import Document, load_scenario
 from blocksim.study.limit import limit
-from blocksim.study.limit_plan import with_scheme
+from blocksim.study.limit_give import gives_of, stiff_limits
+from blocksim.study.limit_plan import STIFFNESS, variants, with_scheme
 from blocksim.study.run import run
 
 SCHEMES = ("nonsmooth", "explicit")
-SLOPE = Path(__file__).parents[2] / "scenarios" / "toppling_slope.toml"
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SLOPE, WALL = SCENARIOS / "toppling_slope.toml", SCENARIOS / "tilting_wall.toml"
 FRICTION = "friction.block_block"
 WIDTH, HEIGHT = 0.2, 0.1  # m
 STONE = {"density": 2500, "young_modulus": "30 GPa", "poisson_ratio": 0.2}
@@ -41,6 +44,31 @@ def test_the_limit_of_the_slope_is_that_of_goodman_and_bray_within_a_tenth_of_a_
     assert (change.low, change.high) == pytest.approx((38.15, 38.15), abs=0.1)
 
 
+# kN/m: normal forces of columns 13 on 12, 12 on 11, ... 2 on 1 at 38.15 degrees; columns 1 to 3 slide, others topple
+BETWEEN_COLUMNS = [292.5, 825.7, 1556.0, 2826.7, 3922.0, 4594.8, 4837.0, 4637.0, 3978.0, 2825.5, 1413.0, 472.0]
+
+
+@pytest.mark.parametrize(("scheme", "end", "within"), [("explicit", 0.001, 5e-3), ("nonsmooth", 0.5, 1e-2)])
+def test_columns_about_to_topple_press_on_one_another_as_in_their_limit_equilibrium(
+    scheme: str, end: float, within: float
+) -> None:
+    document = with_scheme(Document.read(SLOPE), scheme)
+    friction = {FRICTION: "38.22 deg", "friction.block_ground": "38.22 deg"}
+    kept = {"start.settle": True, "time.end": end, "time.stop_at_rest": False, "output.contacts": True}
+    result = run(document.with_values({**friction, **kept, "output.every": end}).build())
+    contacts = result.frames.contacts
+    assert contacts is not None
+    last = contacts.at(len(result.frames.time) - 1)
+    joints = zip(last["body_a"], last["body_b"], last["normal_force"], strict=True)
+    found = [0.0] * len(BETWEEN_COLUMNS)
+    for one, other, force in joints:
+        if other == one + 1 and other <= len(BETWEEN_COLUMNS):
+            found[len(BETWEEN_COLUMNS) - other] += force / 1e3
+    assert found[:10] == pytest.approx(BETWEEN_COLUMNS[:10], rel=within)
+    if scheme == "explicit":  # those that slide hold more than they need, until they do: rigid contacts are off by 18 %
+        assert found[10:] == pytest.approx(BETWEEN_COLUMNS[10:], rel=3e-2)
+
+
 def rows_of(*counts: int, scheme: str) -> dict[str, Any]:
     """Return rows of so many blocks from below, each centred: half overlapped where they differ by one."""
     time = {"step": 2e-4} if scheme == "nonsmooth" else {}  # with 1 ms, what contacts give way grows to a fall
@@ -59,6 +87,26 @@ def rows_of(*counts: int, scheme: str) -> dict[str, Any]:
         "time": {"scheme": scheme, "end": 0.4, **time},
         "output": {"every": 0.05},
     }
+
+
+@pytest.mark.long
+def test_the_limits_of_a_dry_wall_on_springs_agree_between_stiffnesses_once_their_give_is_known(tmp_path: Path) -> None:
+    """Ferris & Tin-Loi: at the stiffness scale 0.001 the wall falls 5.8 % too early, at 0.01 0.6 %."""
+    wall = with_scheme(Document.read(WALL), "explicit").with_values({"start.settle": True})
+    span = {"ground.tilt": {"from": "29 deg", "to": "33.5 deg", "count": 4}}
+    stiff: list[float] = []
+    for scale, off in ((0.001, 0.058), (0.01, 0.006)):
+        searches = {
+            name: limit(one, span, out=tmp_path / f"{scale} {name}", tolerance=2e-3, keep_runs=False)
+            for name, one in variants(wall.with_values({STIFFNESS: scale}), stiffer=True).items()
+        }
+        stiff += stiff_limits(searches)
+        (give,) = gives_of(searches["springs"])
+        assert give.share == pytest.approx(off, rel=0.2)
+        assert 1.0 - give.value / stiff[-1] == pytest.approx(give.share, rel=0.1, abs=2e-3)
+    assert stiff[0] == pytest.approx(stiff[1], rel=5e-3)
+    for one in stiff:
+        assert math.degrees(math.atan(0.6398)) * 0.997 < one < math.degrees(math.atan(0.64286))
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
