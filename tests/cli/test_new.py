@@ -1,12 +1,15 @@
 """blocksim new: every template works as it is, and nothing is replaced."""
 
 import errno
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from blocksim.cli.new import templates
-from blocksim.scenario import load_scenario
+from blocksim.scenario import Document, load_scenario
+from blocksim.simulation import simulate
 from tests.cli.conftest import Command
 
 SCENARIOS = [kind for kind, file in templates().items() if file.name.endswith(".toml")]
@@ -38,6 +41,18 @@ def test_a_line_left_in_a_comment_works_too(blocksim: Command, kind: str, key: s
     assert text.count(f"# {key} = ") == 1
     Path("mine.toml").write_text(text.replace(f"# {key} = ", f"{key} = "))
     assert blocksim("check", "mine.toml").code == 0
+
+
+@pytest.mark.parametrize("kind", ["wall", "pyramid"])
+def test_a_new_structure_stands_up_to_one_percent_below_the_tilt_of_its_friction(blocksim: Command, kind: str) -> None:
+    blocksim("new", kind, "mine")
+    document = Document.read(Path("mine.toml"))
+    still = replace(document, data={key: table for key, table in document.data.items() if key != "motion"})
+    pushed = {"structures.0.shear_velocity": 0.0} if kind == "wall" else {}
+    tilt = 0.99 * math.degrees(math.atan(0.31))
+    result = simulate(still.with_values({**pushed, "ground.tilt": f"{tilt} deg", "time.end": 0.05}).build())
+    assert result.summary.movement is not None
+    assert result.summary.movement.outcome == "stands"
 
 
 @pytest.mark.parametrize("kind", SWEEPS)
