@@ -26,6 +26,10 @@ class Pulse(Table):
     half-sine A sin wt over half a cycle, rectangular A over half a cycle. The velocity that a half-sine (2 A/w), a
     rectangle (A duration) or an incomplete cycle leaves stays; a full sine leaves no velocity but the displacement
     2 pi A cycles/w^2, a full cosine neither.
+
+    A cosine or rectangle at time zero finds blocks that have settled into it, as with `start.settle`, as far as
+    friction carries its inertial force: see simulation/settling.py. One that begins later finds springs that carry
+    none of it; run.json warns where that makes a slip too large.
     """
 
     kind: Literal["pulse"] = Field(description="kind of motion")

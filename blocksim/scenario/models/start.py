@@ -9,7 +9,10 @@ from blocksim.scenario.models.base import Table
 
 
 class Start(Table):
-    """What happens before time zero: nothing, or the blocks settle under gravity and the loads of time zero."""
+    """What happens before time zero: nothing, or the blocks settle under gravity and the loads of time zero.
+
+    They also do under a pulse that begins at its peak at time zero; see `blocksim.scenario.motion.settles`.
+    """
 
     settle: bool = Field(
         default=False, description="true to bring all to rest before time zero, with the contact forces that hold it"
