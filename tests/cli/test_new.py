@@ -17,7 +17,9 @@ SWEEPS = [kind for kind in SCENARIOS if kind.startswith("sweep-")]
 
 
 def test_all_promised_kinds_are_there() -> None:
-    promised = "dominoes experiment pyramid slope stack sweep-grid sweep-normal sweep-sobol three-blocks wall"
+    promised = (
+        "arch dominoes experiment pyramid slope stack sweep-grid sweep-normal sweep-sobol three-blocks voronoi wall"
+    )
     assert list(templates()) == promised.split()
 
 
@@ -33,7 +35,12 @@ def test_a_new_scenario_passes_the_check(blocksim: Command, kind: str) -> None:
 
 @pytest.mark.parametrize(
     ("kind", "key"),
-    [("wall", "missing"), ("sweep-grid", '"contact.stiffness_scale"'), ("sweep-sobol", '"contact.stiffness_scale"')],
+    [
+        ("wall", "missing"),
+        ("voronoi", "smallest"),
+        ("sweep-grid", '"contact.stiffness_scale"'),
+        ("sweep-sobol", '"contact.stiffness_scale"'),
+    ],
 )
 def test_a_line_left_in_a_comment_works_too(blocksim: Command, kind: str, key: str) -> None:
     blocksim("new", kind, "mine")
