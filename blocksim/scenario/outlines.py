@@ -16,7 +16,7 @@ SHORTEST = 1e-3
 have to tell corners apart that lie closer to one another than the accuracy of a step."""
 STRAIGHT = math.radians(0.1)
 """Least turn of the outline at a corner."""
-LEAST = 1e-18  # m; as for the sides of rectangles
+LEAST = 1e-6  # m; a thousand times the distance at which things touch
 
 
 def area_of(corners: Sequence[Corner]) -> float:
@@ -104,7 +104,7 @@ def faults(points: Sequence[Corner]) -> Iterator[tuple[int | None, str]]:
     low, high = box_of(points)
     extent = math.dist(low, high)
     if extent < LEAST:
-        yield None, "all corners are at the same place"
+        yield None, f"all corners are within {1e6 * LEAST:g} µm"
         return
     local = [((x - points[0][0]) / extent, (y - points[0][1]) / extent) for x, y in points]
     yield from _repeated(local, extent)

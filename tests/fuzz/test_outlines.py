@@ -92,7 +92,11 @@ def scenes(draw: st.DrawFn) -> dict[str, Any]:
         "time": {"scheme": "nonsmooth", "end": 0.01},
     }
     if draw(st.booleans()):
-        block = draw(st.fixed_dictionaries({"outline": OUTLINE}, optional={"upright": NUMBER} if draw(ODD) else {}))
+        block = (
+            {"sides": draw(COUNT), "radius": draw(LENGTH)}
+            if draw(ODD)
+            else draw(st.fixed_dictionaries({"outline": OUTLINE}, optional={"upright": NUMBER} if draw(ODD) else {}))
+        )
         body = {"block": "b", "x": draw(LENGTH), "y": draw(st.just(10.0) | LENGTH)}
         return data | {"blocks": {"b": {"depth": 1, "material": "stone", **block}}, "bodies": [body]}
     return data | {
@@ -104,7 +108,7 @@ def scenes(draw: st.DrawFn) -> dict[str, Any]:
 def _without_none(value: Any) -> Any:
     match value:
         case dict():
-            return {key: _without_none(one) for key, one in value.items()}
+            return {key: _without_none(one) for key, one in value.items() if one is not None}
         case list():
             return [_without_none(one) for one in value if one is not None]
         case _:

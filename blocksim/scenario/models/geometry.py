@@ -170,6 +170,8 @@ class Block(Table):
     def _convex(self) -> Self:
         for number, message in outlines.faults(self.outline) if self.outline is not None else ():
             raise q.invalid(message, "outline", *(() if number is None else (number,)))
+        for _, message in outlines.faults(self.polygon) if self.sides is not None and self.radius is not None else ():
+            raise q.invalid(message, "radius")
         return self
 
     @model_serializer(mode="wrap")
