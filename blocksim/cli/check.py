@@ -172,6 +172,8 @@ def _limits(limits: StepLimits | None) -> list[str]:
     """Return who decides the step; where the two are far apart, what makes them equal."""
     if limits is None:
         return []
+    if not math.isfinite(limits.blocks):
+        return [f"           that of {limits.systems:.2e} s of the systems beside the blocks"]
     steps = f"blocks allow {limits.blocks:.2e} s, the systems beside them {limits.systems:.2e} s"
     ratio = limits.blocks / limits.systems
     if 1.0 / FAR_APART < ratio < FAR_APART:

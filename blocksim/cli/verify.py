@@ -1,5 +1,6 @@
 """blocksim verify: run the verification cases and print their table."""
 
+from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated
 
@@ -12,7 +13,7 @@ from blocksim.cli.progress import one_by_one
 from blocksim.errors import ExitCode
 from blocksim.simulation.compilation import kernel_set
 from blocksim.verification.case import Row, Setting, Verdict
-from blocksim.verification.cases import chosen, left_out, refuse_springs
+from blocksim.verification.cases import SettingError, chosen, chosen_of_soil, left_out, refuse_springs
 from blocksim.verification.verify import (
     Outcome,
     error_text,
@@ -52,6 +53,7 @@ def verify_command(
     model: Annotated[Model, typer.Option(help="Contact model.")] = Model.SURFACE,
     law: Annotated[Law, typer.Option(help="Force law.")] = Law.LINEAR,
     scheme: Annotated[Scheme, typer.Option(help="Stepping: springs or impulses.")] = Scheme.EXPLICIT,
+    soil: Annotated[bool, typer.Option("--soil", help="The cases of soil, S1 to S10.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Run a reduced version; the last lines say how.")] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -59,14 +61,16 @@ def verify_command(
     """Run the verification cases and show the table.
 
     Exit code 1: a number is outside its tolerance. All cases take about four minutes on one core, half a minute with
-    --scheme nonsmooth, which leaves out the cases about springs.
+    --scheme nonsmooth, which leaves out the cases about springs. --soil runs those of soil instead, four minutes.
 
     Example: blocksim verify V3 V7 --law hertz-mindlin
     """
     silent = quiet or as_json
     setting = Setting(model.value, law.value, quick, scheme.value)
     refuse_springs(setting)
-    wanted = chosen(cases or [], setting.scheme)
+    if soil and (setting.rigid or setting != replace(Setting(), quick=quick)):
+        raise SettingError("--soil has one setting: the surface model, linear springs, the explicit scheme")
+    wanted = chosen_of_soil(cases or []) if soil else chosen(cases or [], setting.scheme)
     tell_compilation(kernel_set(setting.scheme, setting.model), quiet=silent)
     outcomes: list[Outcome] = []
     try:
@@ -79,7 +83,7 @@ def verify_command(
             show(grouped_lines(COLUMNS, groups), data, as_json=as_json)
         if outcomes and not silent:
             _tell_end(outcomes)
-    if not (silent or cases):
+    if not (silent or cases or soil):
         _tell_left_out(setting)
     inside = all(outcome.inside for outcome in outcomes)
     raise typer.Exit(ExitCode.SUCCESS if inside else ExitCode.OUTSIDE)

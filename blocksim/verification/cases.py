@@ -16,6 +16,7 @@ from blocksim.verification import (
     toppling,
 )
 from blocksim.verification.case import Case, Setting
+from blocksim.verification.soil import SOIL_CASES
 
 # Why models with particles miss tolerances; printed only where a case is outside.
 BUMPS = "equal spacings of the two boundaries interlock, so bodies climb over bumps as high as (1 − √3/2) spacing"
@@ -205,6 +206,16 @@ def chosen(ids: list[str], scheme: str = "explicit") -> tuple[Case, ...]:
     if foreign:
         raise SettingError(f"not for --scheme {scheme}: {'; '.join(foreign)}")
     return tuple(case for case in CASES if scheme not in case.not_for and (not wanted or case.id in wanted))
+
+
+def chosen_of_soil(ids: list[str]) -> tuple[Case, ...]:
+    """Return the cases of soil of some ids (upper or lower case), in the order of the table; without ids all."""
+    wanted = {name.upper() for name in ids}
+    unknown = sorted(wanted - {case.id for case in SOIL_CASES})
+    if unknown:
+        known = ", ".join(case.id for case in SOIL_CASES)
+        raise UnknownCaseError(f"{', '.join(unknown)}: no such case of soil; choose {known}")
+    return tuple(case for case in SOIL_CASES if not wanted or case.id in wanted)
 
 
 def left_out(scheme: str) -> tuple[str, ...]:
