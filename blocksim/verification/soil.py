@@ -155,7 +155,8 @@ def columns_of_rods(setting: Setting) -> Iterator[Row]:
         run_out = 3.25 * ratio**0.96 if ratio <= 1.5 else 3.80 * ratio**0.73  # noqa: PLR2004 - of the source
         yield relative(f"{name}: height left", "", left, height / TALL, 0.07)
         yield relative(f"{name}: run-out, connected", "", run_out, (front - place) / place, 0.15)
-        yield relative(f"{name}: run-out, last particle", "", run_out, (float(x.max()) - place) / place, 0.15)
+        last = float(x.max()) + 0.5 * spacing
+        yield relative(f"{name}: run-out, last particle", "", run_out, (last - place) / place, 0.15)
 
 
 def energy_kept(setting: Setting) -> Iterator[Row]:
@@ -168,11 +169,23 @@ def energy_kept(setting: Setting) -> Iterator[Row]:
         yield absolute(f"energy left, s {1e3 * spacing:g} mm", "", 0.691, left, 0.03)
 
 
+ROUGH_BASE = "a rough base carries part of the thrust; the formula knows none"
+SHOCK = "soil on its yield surface keeps part of the sideways stress of the shock at the start"
+SHORT = "fronts of few particles stop early, and the viscosity takes a part: shorter the coarser and the taller"
 SOIL_CASES = (
-    Case("S1", "column at rest between smooth walls", "pressure at rest", at_rest, quick="5 mm instead of 2.5 mm"),
+    Case(
+        "S1",
+        "column at rest between smooth walls",
+        "pressure at rest",
+        at_rest,
+        quick="5 mm instead of 2.5 mm",
+        remarks={"surface": SHOCK},
+    ),
     Case("S2", "smooth wall drawn back, smooth base", "active pressure, Mohr and Coulomb", active),
     Case("S3", "smooth wall drawn back, rough base", "below S2", active_on_rough_base, quick="5 mm only"),
-    Case("S5", "three blocks hold 75 mm", "½ K_a γ H² / W", friction_needed, quick="smooth base only"),
+    Case(
+        "S5", "three blocks hold 75 mm", "½ K_a γ H² / W", friction_needed, "smooth base only", {"surface": ROUGH_BASE}
+    ),
     Case("S6", "walls of blocks that stand and topple", "moments about the toe", toppling, quick="two and four blocks"),
     Case("S7", "energy of a collapse", "conservation", conservation),
     Case(
@@ -181,6 +194,7 @@ SOIL_CASES = (
         "true two-dimensional rods, arXiv 1512.05180",
         columns_of_rods,
         quick="one column, 5 mm",
+        remarks={"surface": SHORT},
     ),
     Case("S10", "energy that a column 200 × 100 mm keeps", "SPHinXsys", energy_kept, quick="5 mm only"),
 )

@@ -21,6 +21,7 @@ from blocksim.verification.verify import error_text, expected_text, number, run_
 BEGIN = "<!-- soil: written by `python -m blocksim.verification.soil_reference` -->"
 END = "<!-- end of soil -->"
 STORE = Path("results") / "verify_soil.json"  # below the current folder
+SURFACE = Setting().model
 HEADS = ("case", "source", "quantity", "expected", "tolerance", "measured", "error")
 Stored = dict[str, list[dict[str, Any]]]  # by case
 
@@ -31,8 +32,12 @@ def rows_of(stored: Stored, case: Case) -> list[Row]:
 
 
 def table(stored: Stored) -> str:
-    """Return the table as Markdown, misses among it."""
-    return markdown(HEADS, [cells for case in SOIL_CASES for cells in _cells(case, rows_of(stored, case))])
+    """Return the table as Markdown, misses among it, and their reasons."""
+    kept = {case.id: rows_of(stored, case) for case in SOIL_CASES}
+    lines = markdown(HEADS, [cells for case in SOIL_CASES for cells in _cells(case, kept[case.id])])
+    missed = [case for case in SOIL_CASES if any(row.verdict == Verdict.OUTSIDE for row in kept[case.id])]
+    reasons = [f"* {case.id}: {case.remarks[SURFACE]}" for case in missed if SURFACE in case.remarks]
+    return "\n".join([lines, *(["", "Where a tolerance is missed:", "", *reasons] if reasons else [])])
 
 
 def _cells(case: Case, rows: list[Row]) -> Iterator[list[str]]:

@@ -1,0 +1,47 @@
+"""Cases of soil mechanics: the quick ones here, all at their full sizes in the long tier, against the printed table."""
+
+from pathlib import Path
+
+import pytest
+
+from blocksim.verification.case import Case, Setting, Verdict
+from blocksim.verification.cases import UnknownCaseError, chosen_of_soil
+from blocksim.verification.soil import SOIL_CASES
+from blocksim.verification.soil_reference import STORE, read_store, rows_of, with_soil_table
+from blocksim.verification.verify import run_case
+
+ROOT = Path(__file__).parents[2]
+
+
+def outside(case: Case, setting: Setting) -> list[str]:
+    """Return the quantities of a case that miss their tolerances."""
+    return [row.quantity for row in run_case(case, setting).rows if row.verdict != Verdict.INSIDE]
+
+
+def test_active_thrust_is_that_of_mohr_and_coulomb() -> None:
+    (case,) = chosen_of_soil(["s2"])
+    assert outside(case, Setting(quick=True)) == []
+
+
+def test_the_ledger_of_a_collapse_closes_with_both_gradients() -> None:
+    (case,) = chosen_of_soil(["S7"])
+    assert outside(case, Setting(quick=True)) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("case", SOIL_CASES, ids=lambda case: case.id)
+def test_cases_are_as_the_table_has_them(case: Case) -> None:
+    kept = rows_of(read_store(ROOT / STORE), case)
+    assert outside(case, Setting()) == [row.quantity for row in kept if row.verdict != Verdict.INSIDE]
+
+
+def test_the_table_of_the_page_is_what_is_kept() -> None:
+    page = (ROOT / "blocksim/verification/README.md").read_text(encoding="utf-8")
+    stored = read_store(ROOT / STORE)
+    assert [case.id for case in SOIL_CASES] == list(stored)
+    assert with_soil_table(page, stored) == page
+
+
+def test_an_unknown_case_is_told_with_those_there_are() -> None:
+    with pytest.raises(UnknownCaseError, match="S4: no such case of soil; choose S1, S2"):
+        chosen_of_soil(["S4"])
