@@ -18,6 +18,7 @@ class Hull(NamedTuple):
     table: Records
     first: int
     size: int  # number of corners
+    inner: float  # m, from the centroid to the nearest face
 
 
 AnyHull = Any  # None, a type of its own, for rectangles among themselves, whose corners are in no table
@@ -28,7 +29,7 @@ def hull_of(body: Record, table: Records) -> Hull:
     """Return the corners of a body, of a polygon or a rectangle."""
     first: Any = np.int64(body.first_corner)  # compiled code makes floats of signed and unsigned ones together
     size: Any = np.int64(body.corner_count)
-    return Hull(table, first, size)
+    return Hull(table, first, size, body.inner_radius)
 
 
 @kernel

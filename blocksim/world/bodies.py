@@ -131,6 +131,7 @@ def _fill_polygons(records: NDArray[np.record], placed: Sequence[PlacedBody], sh
     """Tell where the corners of blocks are, and which blocks are polygons."""
     records["first_corner"] = shapes.firsts
     records["corner_count"] = shapes.sizes
+    records["inner_radius"] = [shapes.inner[body.corners] for body in placed]
     widths: dict[Corners, float] = {}
     for record, body in zip(records, placed, strict=True):
         if body.outline:

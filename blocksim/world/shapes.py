@@ -1,7 +1,7 @@
 """The corners of all blocks of a scene, each shape once, where any block is a polygon and no rectangle."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ class Shapes(NamedTuple):
     table: Records  # (q,) CORNER
     firsts: tuple[int, ...]  # (b,)
     sizes: tuple[int, ...]  # (b,) numbers of corners
+    inner: Mapping[Corners, float]  # m: from the centroid to the nearest face
 
 
 def shapes_of(placed: Sequence[PlacedBody]) -> Shapes | None:
@@ -33,7 +34,9 @@ def shapes_of(placed: Sequence[PlacedBody]) -> Shapes | None:
     table = zeros(len(rows), CORNER)
     for name, column in zip(CORNER.names or (), zip(*rows, strict=True), strict=True):
         table[name] = column
-    return Shapes(table, tuple(places[body.corners] for body in placed), tuple(len(body.corners) for body in placed))
+    firsts, sizes = ([of(body.corners) for body in placed] for of in (places.__getitem__, len))
+    inner = {corners: float(table["distance"][place : place + len(corners)].min()) for corners, place in places.items()}
+    return Shapes(table, tuple(firsts), tuple(sizes), inner)
 
 
 def corner_rows(corners: Corners) -> list[tuple[float, ...]]:

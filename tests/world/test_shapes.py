@@ -12,7 +12,8 @@ from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.outlines import regular
 from blocksim.world.bodies import body_records, outline_of
 from blocksim.world.bounds import bounds_of
-from blocksim.world.nonsmooth import build_nonsmooth
+from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth
+from blocksim.world.scenes import Stack, build_stacks, member
 from blocksim.world.shapes import least_width
 
 TRIANGLE = [[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]]
@@ -47,6 +48,7 @@ def test_every_shape_is_in_the_table_once_with_outward_normals() -> None:
         own = world.corners[body.first_corner : body.first_corner + body.corner_count]
         heights = np.stack([own.nx, own.ny], axis=-1) @ np.stack([own.x, own.y])
         assert (heights <= own.distance[:, np.newaxis] + 1e-15).all()
+        assert body.inner_radius == own.distance.min()
         assert np.hypot(own.nx, own.ny) == pytest.approx(1.0, abs=1e-15)
         assert 2.0 * own.half == pytest.approx(np.hypot(own.x - np.roll(own.x, -1), own.y - np.roll(own.y, -1)))
 
@@ -75,6 +77,19 @@ def test_steps_are_bounded_by_the_least_width_of_a_polygon() -> None:
     outline = outline_of(scenario(sliver={"outline": [[0.0, 0.0], [1.0, 1.0], [0.98, 1.02]], "depth": 0.1}))
     (bounds,) = bounds_of(body_records([outline]), len(outline.placed))
     assert bounds.smallest == pytest.approx(0.028, rel=0.02)
+
+
+def test_members_of_a_stack_have_corners_of_their_own() -> None:
+    """Of one shape where they have equally many corners; rectangles are in a stack without any."""
+    wedges = [scenario(wedge={"outline": [[0.0, 0.0], [0.4, 0.0], [0.1, h]], "depth": 0.1}) for h in (0.2, 0.3)]
+    hexagon = scenario(hexagon={"sides": 6, "radius": 0.2, "depth": 0.1})
+    brick = scenario(brick={"width": 0.2, "height": 0.1, "length": 0.1})
+    stacks = [one for one in build_stacks([*wedges, hexagon, brick], NONSMOOTH) if isinstance(one, Stack)]
+    assert [stack.numbers for stack in stacks] == [[0, 1], [2], [3]]
+    assert stacks[-1].scenes.world.corners is None
+    for m, wedge in enumerate(wedges):
+        alone = build_nonsmooth(wedge).world.corners
+        assert member(stacks[0].scenes, m).world.corners.tobytes() == alone.tobytes()
 
 
 def test_scenes_of_rectangles_have_no_table() -> None:

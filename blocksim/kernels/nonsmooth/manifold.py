@@ -12,7 +12,6 @@ are: bodies that meet half a step too deep would be taken for neighbours side by
 from typing import NamedTuple
 
 from blocksim.kernels.arrays import ALL, OUTLINE, Record, Records
-from blocksim.kernels.energy import smallest_side
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.lanes import (
     WIDTH,
@@ -257,7 +256,7 @@ def points_of_rectangles(a: Record, one: Block, b: Record, two: Block, place: Pl
     return points_of_blocks(one, two, place.margin)
 
 
-@rare_kernel
+@kernel
 def points_with_polygon(
     row: Record, a: Record, one: Block, b: Record, two: Block, place: Place, corners: Records
 ) -> tuple[Points, bool]:
@@ -265,9 +264,7 @@ def points_with_polygon(
     hull_a = hull_of(a, corners)
     hull_b = hull_of(b, corners)
     if hull_a.size > 0 and hull_b.size > 0:
-        found = points_of_polygons(
-            one, hull_a, two, hull_b, 0.5 * min(smallest_side(a), smallest_side(b)), place.margin
-        )
+        found = points_of_polygons(one, hull_a, two, hull_b, place.margin)
         if found.is_near:
             follow_corners(row, found.one, found.two)
         return found.points, found.is_near

@@ -28,7 +28,7 @@ from blocksim.kernels.nonsmooth.slip import Rows
 from blocksim.kernels.outlines import AnyHull, Hull, corner_at, face_towards, least_along, next_corner
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
-EDGE = 0.01  # of half the least width: two faces that face each other over less are passed by
+EDGE = 0.01  # of the smaller inner radius: two faces that face each other over less are passed by
 LEVEL = -0.99498743710662  # cosine: two faces within 0.1 rad of each other can meet as faces
 OF_B = 32  # added to the number of a corner of body b, which counts from 1
 RECTANGLE = 4
@@ -124,9 +124,12 @@ def outline_edge(face: Face, body: Block, hull: Hull, number: int) -> Edge:
     return Edge(left, left_gap, right, right_gap, are_all, are_all)
 
 
-@rare_kernel
-def best_face(body: Block, hull: Hull, other: Block, other_hull: Hull) -> Best:
-    """Return the face of a body beyond which another one reaches least."""
+@kernel
+def best_above(least: float, body: Block, hull: Hull, other: Block, other_hull: Hull) -> Best:
+    """Return the face of a body beyond which another one reaches least, of those with a gap above `least` (m).
+
+    The other body reaches beyond a face at least by its inner radius, from its centroid: most faces are out with that.
+    """
     dx = other.x - body.x
     dy = other.y - body.y
     px = body.cos * dx + body.sin * dy
@@ -134,21 +137,37 @@ def best_face(body: Block, hull: Hull, other: Block, other_hull: Hull) -> Best:
     # a direction in the frame of the body, in that of the other
     c = body.cos * other.cos + body.sin * other.sin
     s = body.sin * other.cos - body.cos * other.sin
-    best = second = -math.inf
-    number = next_number = 0
+    best = second = least
+    number = next_number = -1
     for k in range(hull.size):
         one = hull.table[hull.first + k]
         away = one.nx * px + one.ny * py - one.distance
-        gap = away + least_along(other_hull, c * one.nx - s * one.ny, s * one.nx + c * one.ny)
-        if gap > best:
-            second, next_number = best, number
-            best, number = gap, k
-        elif gap > second:
-            second, next_number = gap, k
+        if away - other_hull.inner > second:
+            gap = away + least_along(other_hull, c * one.nx - s * one.ny, s * one.nx + c * one.ny)
+            if gap > best:
+                second, next_number = best, number
+                best, number = gap, k
+            elif gap > second:
+                second, next_number = gap, k
     return Best(best, number, second, next_number)
 
 
+@kernel
+def best_face(body: Block, hull: Hull, other: Block, other_hull: Hull, thin: float) -> Best:
+    """Return the face of a body beyond which another one reaches least; the next best only where `met_on` may ask."""
+    best = best_above(-EDGE * thin, body, hull, other, other_hull)
+    if best.face < 0:
+        return best_of_all(body, hull, other, other_hull)
+    return best
+
+
 @rare_kernel
+def best_of_all(body: Block, hull: Hull, other: Block, other_hull: Hull) -> Best:
+    """Return the same where bodies lie deep in one another."""
+    return best_above(-math.inf, body, hull, other, other_hull)
+
+
+@kernel
 def clipped_on(body: Block, hull: Hull, number: int, other: Block, other_hull: Hull) -> Clipped:
     """Return what of another body lies over a face; its corners count from 1, those of the body from OF_B + 1."""
     face = outline_face(body, hull, number)
@@ -171,18 +190,25 @@ def can_meet(body: Block, hull: Hull, number: int, other: Block, other_hull: Hul
     return nx * mx + ny * my < LEVEL
 
 
-@rare_kernel
+@kernel
 def met_on(best: Best, body: Block, hull: Hull, other: Block, other_hull: Hull, thin: float) -> Clipped:
     """Return how another body lies over the best face of a body, or over the next best.
 
     Where two faces face each other over a sliver only, the bodies meet at other faces, if these are nearly parallel: a
     block that slides over the flush joint of two others would else be stopped by the side of the second, as it sinks in
-    by a little. `thin` is half of the least width of both (m).
+    by a little. `thin` is the smaller inner radius of both (m).
     """
     found = clipped_on(body, hull, best.face, other, other_hull)
-    is_sliver = found.edge.right - found.edge.left < EDGE * thin and best.second_gap > -EDGE * thin
-    if is_sliver and can_meet(body, hull, best.second_face, other, other_hull):
-        return clipped_on(body, hull, best.second_face, other, other_hull)
+    if found.edge.right - found.edge.left < EDGE * thin and best.second_gap > -EDGE * thin:
+        return met_beside(found, best.second_face, body, hull, other, other_hull)
+    return found
+
+
+@rare_kernel
+def met_beside(found: Clipped, number: int, body: Block, hull: Hull, other: Block, other_hull: Hull) -> Clipped:
+    """Return how another body lies over the next best face, if it has one that is nearly parallel; else `found`."""
+    if can_meet(body, hull, number, other, other_hull):
+        return clipped_on(body, hull, number, other, other_hull)
     return found
 
 
@@ -192,19 +218,23 @@ def nothing() -> Found:
     return Found(Points(Rows(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), FAR, FAR, True), False, 0, 0)
 
 
-@rare_kernel
-def points_of_polygons(a: Block, hull_a: Hull, b: Block, hull_b: Hull, thin: float, margin: float) -> Found:
-    """Return the contact manifold of two convex polygons within the margin (m); `thin` as in `met_on`."""
-    best_b = best_face(b, hull_b, a, hull_a)
+@kernel
+def points_of_polygons(a: Block, hull_a: Hull, b: Block, hull_b: Hull, margin: float) -> Found:
+    """Return the contact manifold of two convex polygons within the margin (m).
+
+    All of it is inlined: a call that hands over two bodies with their corners takes as long as what it does.
+    """
+    thin = min(hull_a.inner, hull_b.inner)
+    best_b = best_face(b, hull_b, a, hull_a, thin)
     if best_b.gap > margin:
         return nothing()
-    best_a = best_face(a, hull_a, b, hull_b)
+    best_a = best_face(a, hull_a, b, hull_b, thin)
     if best_a.gap > margin:
         return nothing()
     if best_b.gap + TIE >= best_a.gap:
-        met = met_on(best_b, b, hull_b, a, hull_a, thin)
-        if met.edge.right > met.edge.left or best_b.gap > best_a.gap:
-            return found_on(met, a, b, True, margin)
+        found = found_on(met_on(best_b, b, hull_b, a, hull_a, thin), a, b, True, margin)
+        if found.is_near or best_b.gap > best_a.gap:
+            return found
     return found_on(met_on(best_a, a, hull_a, b, hull_b, thin), a, b, False, margin)
 
 

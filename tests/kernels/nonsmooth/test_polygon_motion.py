@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import math
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
+from blocksim.kernels.arrays import TEAM_SIZE
+from blocksim.kernels.nonsmooth.advance import advance_nonsmooth_in_team
+from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
+from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
+from blocksim.kernels.watch import Watched
 from blocksim.scenario.outlines import centred, regular, section_of
-from blocksim.verification.scene import Simulation
+from blocksim.verification.scene import Scene, Simulation
+from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth, with_more_threads
+from blocksim.world.scenes import build_stacks, only
 from tests.kernels.nonsmooth.polygons import HEXAGON, RADIUS, TRIANGLE, depth_below, random_outline, turned
-from tests.kernels.nonsmooth.scenes import Block, listed, place, posed
+from tests.kernels.nonsmooth.scenes import RIGID, Block, listed, place, posed, rigid
 
 if TYPE_CHECKING:
     from blocksim.scenario.outlines import Corners
@@ -164,6 +172,48 @@ def test_polygons_heaped_up_between_walls_come_to_rest_without_falling_through()
     assert np.hypot(run.bodies.vx, run.bodies.vy)[:10].max() < 0.01
     assert run.measured()[-1] < 5e-4
     assert run.residual() < 1e-9
+
+
+@pytest.mark.usefixtures("compiler")
+def test_heap_of_polygons_has_the_same_bits_for_any_number_of_threads_and_calls() -> None:
+    random = np.random.default_rng(7)
+    heap = [
+        Block(
+            0.045 * (i % 6), 0.03 + 0.045 * (i // 6), float(random.uniform(-3.0, 3.0)), outline=random_outline(random)
+        )
+        for i in range(24)
+    ]
+    values = {"restitution": 0.3, "friction": 0.5}
+    whole, parts = started(heap, **values).to_step(150), started(heap, **values).to_step(70).to_step(150)
+    assert np.array_equal(whole.state(), parts.state())
+    scene = with_more_threads(posed(heap, **values), 2)
+    scene.world.team[TEAM_SIZE] = 2
+    threads = [Thread(target=advance_nonsmooth_in_team, args=(scene, 150, k)) for k in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for name in ("x", "y", "angle", "vx", "vy", "spin"):
+        assert np.array_equal(scene.world.bodies[name], whole.world.bodies[name])
+
+
+@pytest.mark.long  # compiles all once more
+def test_members_of_an_ensemble_of_polygons_have_the_same_bits() -> None:
+    def dropped(radius: float) -> Any:
+        corners = [list(corner) for corner in regular(5, radius)]
+        return rigid(Scene([{"outline": corners, "y": 1.2 * radius, "spin": 3.0}], time=RIGID).scenario())
+
+    scenarios = [dropped(radius) for radius in (0.02, 0.03)]
+    alone = [Simulation(build_nonsmooth(scenario)).to_step(100) for scenario in scenarios]
+    scenes = only(build_stacks(scenarios, NONSMOOTH)).scenes
+    codes, starts = np.zeros(2, dtype=np.int64), np.zeros((2, len(NONSMOOTH_LEDGER) + 2))
+    places, lengths = np.zeros((2, 1, 3)), np.zeros((2, 1))
+    watched = Watched(np.zeros(2), np.zeros(2, dtype=np.int64), places, places, lengths, lengths)  # no frames
+    advance_nonsmooth_members(scenes, np.arange(2), np.full(2, 100), starts, codes, watched)
+    for m in range(2):
+        assert codes[m] == alone[m].status
+        assert np.array_equal(scenes.world.bodies[m].angle, alone[m].world.bodies.angle)
+        assert np.array_equal(scenes.world.bodies[m].y, alone[m].world.bodies.y)
 
 
 BETA = math.radians(20.0)
