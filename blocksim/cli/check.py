@@ -1,5 +1,6 @@
 """blocksim check: validate a scenario and summarise it."""
 
+import math
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
