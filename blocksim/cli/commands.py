@@ -31,7 +31,7 @@ COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command
     "bench": "Measure speed and memory, and show the table.",
     "plot": "Draw a run, a sweep or a table of sensitivities.",
     "animate": "Show a run as an animation, GIF or MP4.",
-    "export": "Write all frames of a run as CSV or VTKHDF.",
+    "export": "Write all frames as CSV or VTKHDF, or final outlines as GeoJSON or DXF.",
     "report": "Write runs and sweeps into one HTML file.",
     "new": "Write a commented scenario, sweep or table from a template.",
     "schema": "Print the JSON Schema of scenario files, for editors.",

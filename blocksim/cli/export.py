@@ -27,7 +27,7 @@ def export_command(
     overwrite: options.Replace = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Write all frames of a run as CSV or VTKHDF, or where its blocks ended as GeoJSON or DXF.
+    """Write all frames as CSV or VTKHDF, or final outlines as GeoJSON or DXF.
 
     CSV: a row for each frame and block, with units in the heads; stored contacts go into a second file,
     NAME_contacts.csv. VTKHDF: one file with all times, blocks with number, velocity and rotation,
