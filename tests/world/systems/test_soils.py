@@ -70,6 +70,8 @@ def test_the_step_is_that_of_the_waves_in_the_soil() -> None:
     assert SOILS.largest_step is not None
     assert SOILS.largest_step(scene(COLUMN)) == pytest.approx(expected)
     assert build_scene(scene(COLUMN)).world.controls[0].step <= expected
+    assert SOILS.largest_step(scene(COLUMN, time={"end": 1.0, "safety": 0.025})) == pytest.approx(0.5 * expected)
+    assert SOILS.largest_step(scene(COLUMN, time={"end": 1.0, "safety": 0.1})) == pytest.approx(expected)
 
 
 def test_check_tells_whose_step_is_taken_and_which_stiffness_makes_both_equal() -> None:
