@@ -261,9 +261,9 @@ def test_step_and_tolerance_of_rigid_contacts_are_refined_from_what_the_run_take
     step, tolerance = refinements_of(rigid("slide"))
     assert (step.key, step.factor, step.coarser) == ("time.step", 0.5, 2)
     assert step.own == pytest.approx(1e-3 / 13)  # what "auto" takes for a single block of 25 mm
-    assert (tolerance.key, tolerance.own) == ("time.velocity_tolerance", 1e-3)
-    assert [tolerance.value(level) for level in (-2, 0, 2)] == pytest.approx([1e-2, 1e-3, 1e-4])
-    assert tolerance.at(rigid("slide"), 2).time.velocity_tolerance == pytest.approx(1e-4)  # type: ignore[union-attr]
+    assert (tolerance.key, tolerance.own) == ("time.velocity_tolerance", 1e-6)  # of a single block
+    assert [tolerance.value(level) for level in (-2, 0, 2)] == pytest.approx([1e-5, 1e-6, 1e-7])
+    assert tolerance.at(rigid("slide"), 2).time.velocity_tolerance == pytest.approx(1e-7)  # type: ignore[union-attr]
     step, tolerance = refinements_of(rigid("wall", time__step=5e-4))  # a crowd has a tolerance of its own
     assert (step.own, tolerance.own) == (5e-4, 0.1)
     assert refinements_of(rigid("three_blocks_nominal", time__step=6e-3))[0].coarser == 0  # 12 ms would be refused

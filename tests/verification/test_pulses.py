@@ -93,11 +93,18 @@ COSINE = {"shape": "cosine", "amplitude": 8.0, "cycles": 2, "duration": 4 * np.p
 SLIP = 4.3486e-3  # m: the first way of a block on friction 0.8, in 0.339 s
 
 
-@pytest.mark.parametrize(("scheme", "within"), [("explicit", 5e-3), ("nonsmooth", 1e-3)])
-def test_stick_and_slip_on_a_table_that_starts_at_its_largest_acceleration(scheme: str, within: float) -> None:
-    """The table accelerates by -8 cos t m/s^2 from rest on friction 0.8: slip of 4.3486 mm, back and forth."""
+@pytest.mark.parametrize(
+    ("scheme", "height", "within"), [("explicit", 0.1, 5e-3), ("nonsmooth", 0.1, 1e-4), ("nonsmooth", 0.5, 1e-4)]
+)
+def test_stick_and_slip_on_a_table_that_starts_at_its_largest_acceleration(
+    scheme: str, height: float, within: float
+) -> None:
+    """The table accelerates by -8 cos t m/s^2 from rest on friction 0.8: slip of 4.3486 mm, back and forth.
+
+    A thick slab is as much turned by friction as it is pushed: forces agree only where every substep is solved.
+    """
     softer = {"stiffness_scale": 0.1} if scheme == "explicit" else {}
-    time, slip, _ = sliding(scheme, (1.0, 0.1, 0.8, 8.05), "50 ms", **COSINE, **softer)
+    time, slip, _ = sliding(scheme, (1.0, height, 0.8, 8.05), "50 ms", **COSINE, **softer)
     found = np.interp([2.0, 5.0, 8.0], time, slip)
     assert found == pytest.approx([SLIP, -2.0 * SLIP, SLIP], rel=within)
 

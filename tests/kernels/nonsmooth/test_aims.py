@@ -40,7 +40,7 @@ def test_impact_reverses_the_approach_of_the_point_by_its_restitution(restitutio
         all_of = dense(scene)
         after = all_of.normals @ velocities(scene.contacts.lines).ravel()
         before = all_of.normals @ velocities(scene.contacts.before).ravel()
-        if restitution > 0.5:  # impacts go in rounds: their velocities before are no longer kept
+        if restitution > 0.0:  # impacts of few go in rounds: their velocities before are no longer kept
             before = all_of.normals @ np.array([[0.3, -0.9, block.spin], *[[0.0] * 3] * (1 + len(floor))]).ravel()
         is_met = all_of.gaps < FAR / 2
         assert after[is_met] == pytest.approx(-restitution * before[is_met], abs=1e-9)
@@ -75,7 +75,8 @@ def test_point_that_parts_beside_one_that_meets_is_not_made_to_rebound() -> None
     block = Block(0.0, HALF - 1e-3, vx=0.2, vy=-0.25, spin=-45.0)
     scene = after_substep([block], restitution=0.4, gravity=0.0, **SMOOTH)
     all_of = dense(scene)
-    before, after = (all_of.normals @ velocities(one).ravel() for one in (scene.contacts.before, scene.contacts.lines))
+    before = all_of.normals @ np.array([block.vx, block.vy, block.spin, 0.0, 0.0, 0.0])
+    after = all_of.normals @ velocities(scene.contacts.lines).ravel()
     heel, toe = np.argmin(before), np.argmax(before)
     assert before[toe] > 0.3
     assert after[heel] == pytest.approx(-0.4 * before[heel], abs=1e-9)
