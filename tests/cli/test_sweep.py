@@ -29,7 +29,7 @@ def test_grid_from_the_command_line(blocksim: Command) -> None:
         ("0.3", "0.3"),
     ]
     lines = answer.out.splitlines()
-    assert "4 stands; largest displacement 0.18 mm, rotation 0.33°" in answer.err  # after a hundredth of a second
+    assert "4 stands; largest displacement 0.20 mm, rotation 0.38°" in answer.err  # after a hundredth of a second
     assert {row["outcome"] for row in rows()} == {"stands"}
     assert all(0.2 < float(row["turn_deg"]) < 0.34 for row in rows())
     assert lines[0].startswith("block_block.kinetic  block_ground.kinetic  inside   2.x_mm   3.x_mm")

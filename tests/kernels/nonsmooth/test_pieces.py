@@ -52,7 +52,8 @@ def test_rock_slope_topples_at_33_degrees_of_friction_and_stands_at_38_6(scheme:
     assert falls.bodies.x[9] < 95.0 - 2.0  # the tallest, downhill
     assert np.degrees(falls.bodies.angle[9]) > 5.0
     assert np.abs(stands.bodies.vx[blocks]).max() < 1e-3
-    assert np.abs(stands.bodies.angle[blocks]).max() < math.radians(0.5)
+    # springs give way under the toes, those of half a face by twice as much
+    assert np.abs(stands.bodies.angle[blocks]).max() < math.radians(0.75 if scheme == "explicit" else 0.5)
 
 
 def bare(bodies: list[Mapping[str, object]], **tables: Any) -> Scenario:

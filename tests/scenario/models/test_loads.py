@@ -119,5 +119,5 @@ def test_a_load_is_set_by_its_name() -> None:
     named = data_with(FORCE, {**FORCE, "name": "push"})
     changed = load_scenario(named, {"loads.push.magnitude": "5 kN"})
     assert [getattr(load, "magnitude", None) for load in changed.loads] == [2000.0, 5000.0]
-    with pytest.raises(ScenarioError, match="does not exist"):
+    with pytest.raises(ScenarioError, match='loads has no "pull", known: push'):
         load_scenario(named, {"loads.pull.magnitude": "5 kN"})
