@@ -29,7 +29,7 @@ from typing import NamedTuple
 
 from blocksim.kernels.apart import gap_along
 from blocksim.kernels.arrays import ALL, HALF, SHEAR, Record, Records, World
-from blocksim.kernels.geometry import corner_offset
+from blocksim.kernels.geometry import corner_offset, ground_gap
 from blocksim.kernels.jit import kernel, rare_kernel
 from blocksim.kernels.models import SURFACE
 from blocksim.kernels.models.surface import slot_normal
@@ -108,12 +108,43 @@ def steps_apart(pair: Record, a: Record, b: Record, controls: Record) -> float:
 
 
 @rare_kernel
+def mean_velocity(bodies: Records) -> tuple[float, float]:
+    """Return the mean velocity (m/s) of the free bodies."""
+    vx = 0.0
+    vy = 0.0
+    count = 0
+    for i in range(bodies.size - 1):
+        if bodies[i].inverse_mass > 0.0:
+            vx += bodies[i].vx
+            vy += bodies[i].vy
+            count += 1
+    return (vx / count, vy / count) if count > 0 else (0.0, 0.0)
+
+
+@rare_kernel
+def steps_to_ground(body: Record, ground: Record, controls: Record) -> float:
+    """Return after how many steps a body that is not near the half-plane may touch it at the earliest."""
+    gap = ground_gap(body) - ground.y
+    closing = ground.vy - body.vy + body.radius * abs(body.spin)
+    return gap / (controls.step * closing) if gap >= controls.approach and closing > 0.0 else math.inf
+
+
+@rare_kernel
 def steps_to_approach(bodies: Records, controls: Record) -> float:
-    """Return after how many steps two bodies that are not near may touch at the earliest."""
+    """Return after how many steps two bodies that are not near may touch at the earliest.
+
+    Speeds are those against the mean of the free bodies: blocks that fly together have the same sums in any frame.
+    """
+    vx, vy = mean_velocity(bodies)
+    ground = bodies[bodies.size - 1]
     fastest = 0.0
-    for body in bodies:
-        fastest = max(fastest, math.sqrt(body.vx**2 + body.vy**2) + body.radius * abs(body.spin))
-    return 0.5 * controls.approach / (controls.step * fastest) if fastest > 0.0 else math.inf
+    soonest = math.inf
+    for i in range(bodies.size - 1):
+        body = bodies[i]
+        fastest = max(fastest, math.sqrt((body.vx - vx) ** 2 + (body.vy - vy) ** 2) + body.radius * abs(body.spin))
+        if body.inverse_mass > 0.0:
+            soonest = min(soonest, steps_to_ground(body, ground, controls))
+    return min(soonest, 0.5 * controls.approach / (controls.step * fastest)) if fastest > 0.0 else soonest
 
 
 @rare_kernel

@@ -12,6 +12,7 @@ from tests.symmetries.scenes import (
     EXPLICIT,
     RIGID,
     RIGID_STEP,
+    ROUND_OFF,
     Body,
     Stack,
     allowed,
@@ -28,11 +29,9 @@ MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0])  # x, y, angle, vx, vy, sp
 SCHEMES = pytest.mark.parametrize("scheme", [EXPLICIT, RIGID])
 FAR_UP = 5.0  # m above the ground
 APPROACH = 20.0  # m/s for each metre between the blocks
-# Springs: blocks that fly faster renew the sums of stiffness that share out their dashpots at other steps (inertia.py),
-# which shows in the eighth digit of a place. Rigid contacts: round-off may have blocks meet, or part, one step sooner
-# or later, and by then they have come nearer by the speed of the farthest (0.16 m away) times a step; once for each, as
-# they meet in turn.
-SAME_COLLISION = {EXPLICIT: 2e-8, RIGID: APPROACH * 0.16 * RIGID_STEP}  # m
+# Springs: round-off. Rigid contacts: round-off may have blocks meet, or part, one step sooner or later, and by then
+# they have come nearer by the speed of the farthest (0.16 m away) times a step; once for each, as they meet in turn.
+SAME_COLLISION = {EXPLICIT: ROUND_OFF, RIGID: APPROACH * 0.16 * RIGID_STEP}  # m
 
 
 @SCHEMES
