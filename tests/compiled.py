@@ -12,7 +12,7 @@ from typing import Any
 
 JOBS = 2
 SPH = "sph"
-OPEN = ("with-particles", "surface", "nonsmooth", SPH)  # those that take longest first
+OPEN = ("with-particles", "outlines", "surface", "nonsmooth", SPH)  # those that take longest first
 AS_USERS_HAVE_THEM = ("surface", "nonsmooth")  # for commands that tests run as processes
 
 

@@ -116,15 +116,16 @@ def _unmodelled_outlines(scenario: Scenario) -> Iterator[Finding]:
     scheme, model = scenario.time.scheme, scenario.contact.model
     if (scheme, model) in WITH_OUTLINES:
         return
-    with_which = f"time.scheme = {shown(scheme)} and contact.model = {shown(model)}"
+    where = f"with time.scheme = {shown(scheme)} and contact.model = {shown(model)}"
+    modelled = " or ".join(f"{shown(one)} and {shown(other)}" for one, other in sorted(WITH_OUTLINES))
     for name, block in scenario.blocks.items():
         if block.polygon:
             key = "outline" if block.outline is not None else "sides"
-            message = f"outlines are not modelled with {with_which}"
+            message = f"outlines are not modelled {where}; use {modelled}"
             yield Finding(("blocks", name, key), message, at="key", relation=True)
     for number, structure in enumerate(scenario.structures):
         if isinstance(structure, Shaped):
-            message = f"outlines are not modelled with {with_which}"
+            message = f"outlines are not modelled {where}; use {modelled}"
             yield Finding(("structures", number, "kind"), message, relation=True)
 
 

@@ -93,6 +93,12 @@ def place_bodies(scenario: Scenario) -> tuple[PlacedBody, ...]:
     return _placement(scenario).bodies
 
 
+def has_outlines(scenario: Scenario) -> bool:
+    """Return True if any block is no rectangle, without placing them."""
+    shaped = any(isinstance(structure, Shaped) for structure in scenario.structures)
+    return shaped or any(block.polygon for block in scenario.blocks.values())
+
+
 def origins_of(scenario: Scenario) -> list[KeyPath]:
     """Return for every placed body the path of the structure or body that it comes from."""
     return [path for path, count in _placement(scenario).origins for _ in range(count)]

@@ -10,16 +10,23 @@ from blocksim.kernels import jit
 from blocksim.kernels.compiler import compiling
 from blocksim.kernels.watch import Watched
 from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario.placement import has_outlines
 from blocksim.simulation.schemes import SCHEMES, AnyScene, build_scene, measured_row, scheme_of
 from blocksim.simulation.schemes.explicit import PARTICLES, SURFACE
 from blocksim.simulation.schemes.nonsmooth import RIGID
 from blocksim.simulation.team import ALONE
 from blocksim.world.scenes import stack_of_one
 
+OUTLINED = "outlines"  # rigid contacts of blocks that are no rectangles
+
 CHANGES: dict[str, dict[str, object]] = {  # in the smallest scene, so that it needs them
     SURFACE: {},
     PARTICLES: {"contact": {"model": "kernel", "particle_spacing": 0.1}},  # the code serves all models with particles
     RIGID: {"time": {"scheme": "nonsmooth"}},
+    OUTLINED: {
+        "time": {"scheme": "nonsmooth"},
+        "blocks": {"any": {"sides": 4, "radius": 0.5, "depth": 1.0, "material": "any"}},
+    },
 }
 
 SMALLEST_SCENE = {
@@ -33,7 +40,8 @@ SMALLEST_SCENE = {
 
 def kernels_of(scenario: Scenario) -> str:
     """Return which set of kernels a scenario needs."""
-    return kernel_set(scenario.time.scheme, scenario.contact.model)
+    kernels = kernel_set(scenario.time.scheme, scenario.contact.model)
+    return OUTLINED if kernels == RIGID and has_outlines(scenario) else kernels
 
 
 def kernel_set(scheme: str, model: str) -> str:
@@ -71,7 +79,7 @@ def _compile(kernels: str) -> None:
     change = CHANGES.get(kernels, {"time": {"scheme": kernels}})  # a scheme beside the usual ones has its own set
     scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **change})), 0)
     measured_row(scene)
-    if kernels == RIGID:
+    if kernels in {RIGID, OUTLINED}:
         _compile_ensemble(stack_of_one(scene))
     if kernels != SURFACE:
         jit.mark(kernels)

@@ -18,7 +18,7 @@ from blocksim.errors import InputMissingError, InvalidInputError, StoppedEarlyEr
 from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
 from blocksim.scenario.models.study import Sweep
 from blocksim.simulation import folder as files
-from blocksim.simulation.compilation import compile_kernels, kernel_set
+from blocksim.simulation.compilation import compile_kernels, kernel_set, kernels_of
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.simulation.stopping import stop_requests
 from blocksim.study.design import levels_of
@@ -137,7 +137,8 @@ def kernels_for(document: Document) -> tuple[str, ...]:
     vary = base.sweep.vary if base.sweep else {}
     schemes = (base.time.scheme, *map(str, levels_of(vary.get("time.scheme", ()))))
     models = (base.contact.model, *map(str, levels_of(vary.get("contact.model", ()))))
-    return tuple(dict.fromkeys(kernel_set(scheme, model) for scheme in schemes for model in models))
+    sets = (kernel_set(scheme, model) for scheme in schemes for model in models)
+    return tuple(dict.fromkeys((kernels_of(base), *sets)))
 
 
 class Ended(NamedTuple):

@@ -5,6 +5,7 @@ import errno
 import pytest
 
 from blocksim.errors import OutputError
+from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation import compilation
 
 
@@ -19,3 +20,11 @@ def test_full_disk_of_the_kernel_cache_is_named(monkeypatch: pytest.MonkeyPatch)
         OutputError, match=r"^/disk/blocksim/0123: the compiled solver cannot be stored there: No space"
     ):
         compilation.compile_kernels()
+
+
+def test_blocks_with_outlines_have_a_set_of_kernels_of_their_own() -> None:
+    changes = compilation.CHANGES[compilation.OUTLINED]
+    outlined = scenario_from_mapping({**compilation.SMALLEST_SCENE, **changes})
+    rectangular = scenario_from_mapping({**compilation.SMALLEST_SCENE, "time": {"scheme": "nonsmooth"}})
+    assert compilation.kernels_of(outlined) == compilation.OUTLINED
+    assert compilation.kernels_of(rectangular) == "nonsmooth"
