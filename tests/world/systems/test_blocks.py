@@ -17,6 +17,7 @@ from blocksim.simulation.stores.csv_tables import FIRST_COLUMNS, write_frames_cs
 from blocksim.simulation.stores.vtkhdf import write_vtkhdf
 from blocksim.view.history_panels import MOTIONS, Seen
 from blocksim.view.run_data import Support, drawable_frames
+from blocksim.world.systems.blocks import placed_points
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 
@@ -57,3 +58,9 @@ def test_exports_of_earlier_versions_are_recognised(more: str, is_own: bool) -> 
     head = ",".join(FIRST_COLUMNS) + more + "\r\n"
     assert FIRST_COLUMNS[-1] == "spin_deg_s"
     assert is_table_from(*FIRST_COLUMNS)(io.BytesIO(head.encode())) is is_own
+
+
+def test_corners_turn_counter_clockwise_with_their_block() -> None:
+    corners = np.array([[[1.0, 0.0], [0.0, 2.0]]])
+    found = placed_points(corners, np.array([3.0]), np.array([4.0]), np.array([np.pi / 2.0]))
+    np.testing.assert_allclose(found, [[[3.0, 5.0], [1.0, 4.0]]], atol=1e-15)
