@@ -18,7 +18,7 @@ from blocksim.scenario.motion import motion_direction, motion_pieces
 from blocksim.world.applied import Applied, applied_loads
 from blocksim.world.drives import DriveRecords, drive_records, piece_records
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
-from blocksim.world.shapes import Corners, Shapes, half_sides, least_width, shapes_of
+from blocksim.world.shapes import Shapes, half_sides, shapes_of
 
 # A piece of ground is a slab of which only the upper face counts; its thickness is a share of the smallest side of all
 # blocks: more than any overlap, less than a ledge that is worth modelling.
@@ -132,12 +132,9 @@ def _fill_polygons(records: NDArray[np.record], placed: Sequence[PlacedBody], sh
     records["first_corner"] = shapes.firsts
     records["corner_count"] = shapes.sizes
     records["inner_radius"] = [shapes.inner[body.corners] for body in placed]
-    widths: dict[Corners, float] = {}
     for record, body in zip(records, placed, strict=True):
         if body.outline:
-            if body.outline not in widths:
-                widths[body.outline] = least_width(body.outline)
-            record["least_width"] = widths[body.outline]
+            record["least_width"] = body.least_width
             record["half_x"], record["half_y"] = half_sides(body)
             record["radius"] = body.radius
             record["faces"] = OUTLINE
@@ -150,9 +147,7 @@ def _codes(outline: Outline) -> Iterator[int]:
 
 
 def _fill_slabs(records: Records, outline: Outline) -> None:
-    smallest = min(
-        least_width(body.outline) if body.outline else min(body.size_x, body.size_y) for body in outline.placed
-    )
+    smallest = min(body.least_width for body in outline.placed)
     thickness = max(SLAB_SHARE * smallest, 2.0 * (outline.scenario.contact.max_overlap or 0.0))
     for record, segment in zip(records, outline.segments, strict=True):
         _fill_slab(record, segment, thickness)

@@ -4,8 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from blocksim.kernels.arrays import CORNER, Records, zeros
 from blocksim.scenario import PlacedBody
 
@@ -54,9 +52,3 @@ def half_sides(body: PlacedBody) -> tuple[float, float]:
     if not body.outline:
         return 0.5 * body.size_x, 0.5 * body.size_y
     return max(abs(x) for x, _ in body.outline), max(abs(y) for _, y in body.outline)
-
-
-def least_width(corners: Corners) -> float:
-    """Return the least distance (m) of two parallel lines between which a convex polygon lies: one is along a face."""
-    heights = np.array([row[2:4] for row in corner_rows(corners)]) @ np.array(corners).T
-    return float(np.min(heights.max(axis=1) - heights.min(axis=1)))

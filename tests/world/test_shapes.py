@@ -9,12 +9,11 @@ import pytest
 
 from blocksim.kernels.arrays import ALL, OUTLINE
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.scenario.outlines import regular
+from blocksim.scenario.outlines import least_width, regular
 from blocksim.world.bodies import body_records, outline_of
 from blocksim.world.bounds import bounds_of
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth
 from blocksim.world.scenes import Stack, build_stacks, member
-from blocksim.world.shapes import least_width
 
 TRIANGLE = [[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]]
 
