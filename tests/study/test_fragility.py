@@ -252,7 +252,7 @@ def test_counts_and_members_are_the_same_from_processes(tmp_path: Path, whole: F
 @pytest.mark.long
 def test_counts_and_members_are_the_same_from_a_cluster(tmp_path: Path, whole: FragilityResult) -> None:
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
         slides(tmp_path, scheduler=cluster.scheduler_address)
     for name in ("fragility.csv", "members.csv"):
         assert (tmp_path / name).read_bytes() == (whole.folder / name).read_bytes()

@@ -20,7 +20,7 @@ from blocksim.study.sweep import sweep
 from blocksim.scenario import Document
 
 if __name__ == "__main__":
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster:
         workers = [worker.process.pid for worker in cluster.workers.values()]
 
         def on_row(done, total, row):
