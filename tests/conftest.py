@@ -20,7 +20,7 @@ from blocksim.world.build import build_world
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from blocksim.kernels.arrays import World
+    from blocksim.kernels.common.arrays import World
 
 __all__ = ["PaperBlock", "Simulation"]  # defined elsewhere, used by all tests
 

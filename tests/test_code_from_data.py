@@ -15,7 +15,7 @@ FLAGS = {"shell", "allow_pickle"}
 
 EXCEPTIONS = {
     "bench/startup.py: subprocess.run": "measures how long `blocksim --help` takes to start: its own fixed command",
-    "kernels/cache.py: pickle": "machine code, as numba itself keeps it: from a cache folder that belongs to this user",
+    "kernels/common/cache.py: pickle": "machine code, as numba keeps it: from a cache folder of this user",
     "view/animation_files.py: subprocess.run": "asks the ffmpeg on the PATH which encoders it has: a fixed command",
     "view/animation_files.py: subprocess.Popen": "gives pixels to the ffmpeg on the PATH: fixed options, its path",
 }

@@ -16,7 +16,7 @@ from blocksim.world.scenes import arrays_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from blocksim.kernels.arrays import World
+    from blocksim.kernels.common.arrays import World
     from blocksim.scenario import Scenario
     from blocksim.simulation.outcome import Outcome
     from blocksim.simulation.schemes import AnyScene

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InvalidInputError
-from blocksim.kernels.arrays import zeros
+from blocksim.kernels.common.arrays import zeros
 from blocksim.scenario import Scenario
 from blocksim.scenario.resolved import deciding_values
 from blocksim.simulation.atomic import writing

@@ -6,9 +6,9 @@ import time
 import numpy as np
 
 from blocksim.errors import OutputError
-from blocksim.kernels import jit
-from blocksim.kernels.compiler import compiling
-from blocksim.kernels.watch import Watched
+from blocksim.kernels.common import jit
+from blocksim.kernels.common.compiler import compiling
+from blocksim.kernels.common.watch import Watched
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.placement import has_outlines
 from blocksim.simulation.schemes import SCHEMES, AnyScene, build_scene, measured_row, scheme_of

@@ -2,9 +2,9 @@
 
 The normal points from body b to body a, and the tangent is the normal turned by +90 degrees. What a contact does to
 body a is `normal_force` along the normal and `shear_force` along the tangent; body b gets the opposite. With springs
-these are the forces at the time of the frame, what a changing stiffness does (kernels/tributary.py) among them: the
-shear force may be above the friction limit by the normal force times overlap over length. With rigid contacts they are
-the impulses of the last substep over its length, so that an impact shows as one very large force.
+these are the forces at the time of the frame, what a changing stiffness does (kernels/explicit/tributary.py) among
+them: the shear force may be above the friction limit by the normal force times overlap over length. With rigid
+contacts they are the impulses of the last substep over its length, so that an impact shows as one very large force.
 """
 
 from collections.abc import Sequence

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
-from blocksim.kernels.arrays import PAIRS_FULL, REACHED
-from blocksim.kernels.frame_times import next_frame
-from blocksim.kernels.watch import Watched
+from blocksim.kernels.common.arrays import PAIRS_FULL, REACHED
+from blocksim.kernels.common.frame_times import next_frame
+from blocksim.kernels.common.watch import Watched
 from blocksim.scenario import Scenario
 from blocksim.scenario.motion import settles
 from blocksim.simulation.compilation import compile_kernels, kernels_of

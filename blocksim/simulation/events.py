@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.kernels.arrays import AT_REST, DRIVEN, REACHED, REMOVED, SUPPORT, Record, Records, World, zeros
+from blocksim.kernels.common.arrays import AT_REST, DRIVEN, REACHED, REMOVED, SUPPORT, Record, Records, World, zeros
 from blocksim.kernels.nonsmooth.arrays import AWAY, Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.events import in_order, wall_names
@@ -28,7 +28,7 @@ NOT_THERE = {"mass", "inertia", "inverse_mass", "inverse_inertia"}
 RATES = ("vx", "vy", "spin")
 ACCELERATIONS = ("ax", "ay", "spin_rate")
 OF_CONTACTS = ("fx", "fy", "torque", "pairs_now", "pairs_before", "pairs_changed")
-OF_PIECES = ("seats", "coming", "is_asked", "sums_changed")  # see kernels/inertia.py
+OF_PIECES = ("seats", "coming", "is_asked", "sums_changed")  # see kernels/explicit/inertia.py
 
 
 class Timeline:
@@ -113,7 +113,7 @@ class Timeline:
         clock.rebuilds = 0
         if isinstance(scene, Nonsmooth):
             return scene, REACHED
-        clock.next_look = clock.next_share = clock.steps
+        clock.next_update = clock.next_share = clock.steps
         clock.is_started = 0
         scene.world.bodies["is_asked"] = 1
         for name in ("normal_left", "shear_left"):
@@ -224,7 +224,7 @@ def _renew_lines(scene: Nonsmooth, old: Records) -> None:
     All velocities begin anew half a substep back, as those at the start of a run do: what was held falls from now on.
     The correction in the ledger stays what it is; `old` are the bodies before the event.
     """
-    bodies, lines, before = scene.world.bodies, scene.contacts.lines, scene.contacts.before
+    bodies, lines, before = scene.world.bodies, scene.contacts.states, scene.contacts.before
     controls, h = scene.world.controls[0], float(scene.contacts.stepping[0].substep)
     hx, hy = h * float(controls.gravity_x), h * float(controls.gravity_y)
     was_free, is_free = old["inverse_mass"] > 0.0, bodies["inverse_mass"] > 0.0
@@ -238,7 +238,7 @@ def _renew_lines(scene: Nonsmooth, old: Records) -> None:
     before["lifted"] = np.where(is_free, kept + lines["vx"] * hx + lines["vy"] * hy, before["lifted"])
     for name in RATES:
         before[name] = lines[name]
-    rows = scene.contacts.rows[: int(scene.contacts.stepping[0].row_count)]
+    rows = scene.contacts.constraints[: int(scene.contacts.stepping[0].constraint_count)]
     is_gone = (bodies["is_moved"][rows["a"]] == REMOVED) | (bodies["is_moved"][rows["b"]] == REMOVED)
     for name in ("normal_one", "normal_two", "shear"):
         rows[name][is_gone] = 0.0

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from blocksim.kernels.arrays import REACHED
+from blocksim.kernels.common.arrays import REACHED
 from blocksim.simulation import outcome as ends
 from blocksim.simulation.checkpoint import Position
 from blocksim.simulation.checkpoint_policy import KEEPS_NOTHING, Keeper, Standing

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from blocksim.kernels.arrays import World
+from blocksim.kernels.common.arrays import World
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.models.pulse import Pulse
 from blocksim.scenario.motion import displacement_and_velocity, motion_pieces

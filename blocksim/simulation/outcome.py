@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import ExitCode
-from blocksim.kernels import arrays
-from blocksim.kernels.arrays import ALL, NOT_FINITE, OVERLAP_LIMIT, World
-from blocksim.kernels.depth import MIDDLE, ROWS_APART
-from blocksim.kernels.models import KERNEL, SURFACE
+from blocksim.kernels.common import arrays
+from blocksim.kernels.common.arrays import ALL, NOT_FINITE, OVERLAP_LIMIT, World
+from blocksim.kernels.explicit.depth import MIDDLE, ROWS_APART
+from blocksim.kernels.explicit.models import KERNEL, SURFACE
 from blocksim.kernels.nonsmooth.arrays import TOUCHING
 from blocksim.scenario import PlacedBody
 from blocksim.scenario.overlap import Outlines, Rectangles, penetration
@@ -102,7 +102,9 @@ def _fastest(scene: AnyScene, names: Sequence[str]) -> str:
 
 def _deepest(scene: AnyScene, names: Sequence[str]) -> str:
     world = scene.world
-    one, other, overlap, limit = _overlaps_of_springs(scene) if isinstance(scene, World) else _overlaps_of_rows(scene)
+    one, other, overlap, limit = (
+        _overlaps_of_springs(scene) if isinstance(scene, World) else _overlaps_of_constraints(scene)
+    )
     worst = int(np.nanargmax(overlap / limit))
     pair = " and ".join(_name(world, names, int(i[worst])) for i in (one, other))
     is_capped = limit[worst] < world.controls[0].max_overlap
@@ -126,7 +128,7 @@ def _lost_particles(scene: AnyScene) -> str:
 
 
 def _reach(world: World) -> float:
-    """Return how deep (m) the particles of boundaries may lie in one another; see blocksim.kernels.depth."""
+    """Return how deep (m) the particles of boundaries may lie in one another; see blocksim.kernels.explicit.depth."""
     controls = world.controls[0]
     return float(controls.support if controls.model == KERNEL else ROWS_APART * controls.particle_size)
 
@@ -166,13 +168,13 @@ def _penetrations(world: World, pairs: NDArray[Any]) -> NDArray[np.float64]:
     return np.where(is_ground, below, penetration(rectangles.some(pairs["a"]), rectangles.some(pairs["b"])))
 
 
-def _overlaps_of_rows(scene: Any) -> Pairs:
-    rows = scene.contacts.rows[: int(scene.contacts.stepping[0].row_count)]
-    depth = np.maximum(-rows["gap_one"], -rows["gap_two"])
-    limit = np.ones(rows.size)
+def _overlaps_of_constraints(scene: Any) -> Pairs:
+    constraints = scene.contacts.constraints[: int(scene.contacts.stepping[0].constraint_count)]
+    depth = np.maximum(-constraints["gap_one"], -constraints["gap_two"])
+    limit = np.ones(constraints.size)
     if not scene.world.controls[0].max_overlap > 0.0:
-        limit = _smallest_sides(scene.world, rows["a"], rows["b"])
-    return rows["a"], rows["b"], np.where(rows["reach"] == TOUCHING, depth, 0.0), limit
+        limit = _smallest_sides(scene.world, constraints["a"], constraints["b"])
+    return constraints["a"], constraints["b"], np.where(constraints["reach"] == TOUCHING, depth, 0.0), limit
 
 
 def _smallest_sides(world: World, one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.float64]:

@@ -168,7 +168,7 @@ class Probe:
 
     def next_step(self, done: int) -> int:
         """Return the next step to sample after `done` steps."""
-        from blocksim.kernels.frame_times import next_frame  # noqa: PLC0415 - kernels, not for readers
+        from blocksim.kernels.common.frame_times import next_frame  # noqa: PLC0415 - kernels, not for readers
 
         return next_frame(done, self.period)
 

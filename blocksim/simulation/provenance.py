@@ -30,7 +30,7 @@ def code_version() -> str:
 @functools.cache
 def code_hashes() -> dict[str, str]:
     """Return a hash of the code of each room that decides the bits of a run, with the versions it is compiled with."""
-    from blocksim.kernels.jit import source_hash  # noqa: PLC0415 - numba, which reading a folder does not need
+    from blocksim.kernels.common.jit import source_hash  # noqa: PLC0415 - numba, which reading a folder does not need
 
     package = Path(__file__).resolve().parents[1]
     return {room: source_hash(package / room) for room in ROOMS}

@@ -92,7 +92,7 @@ class Recorder:
 
     def next_step(self, done: int) -> int:
         """Return the next step to record after `done` steps, wherever those end."""
-        from blocksim.kernels.frame_times import next_frame  # noqa: PLC0415 - kernels, not for readers
+        from blocksim.kernels.common.frame_times import next_frame  # noqa: PLC0415 - kernels, not for readers
 
         return next_frame(done, self.steps_per_frame)
 

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode
-from blocksim.kernels.arrays import REACHED, World
+from blocksim.kernels.common.arrays import REACHED, World
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
@@ -245,7 +245,7 @@ class _Settling:
         for name in ("vx", "vy", "spin"):
             self.bodies[name] = 0.0
             if isinstance(self.scene, Nonsmooth):
-                self.scene.contacts.lines[name][: self.count] = 0.0
+                self.scene.contacts.states[name][: self.count] = 0.0
         self.energy = 0.0
 
     def _kinetic(self) -> float:
@@ -323,8 +323,8 @@ def _freeze_paths(world: World) -> None:
 def _begin_rigid(scene: Nonsmooth) -> None:
     """Let the first substep begin with the impulses that hold against gravity, and clear the books."""
     contacts = scene.contacts
-    for name in contacts.books.dtype.names or ():
-        contacts.books[name] = 0.0
+    for name in contacts.tallies.dtype.names or ():
+        contacts.tallies[name] = 0.0
     for name in scene.pushes.dtype.names or ():
         scene.pushes[name] = 0.0
     contacts.stepping["sweeps"] = 0

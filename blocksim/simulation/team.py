@@ -6,8 +6,8 @@ from types import TracebackType
 from typing import Self
 
 from blocksim.errors import InvalidInputError
-from blocksim.kernels.arrays import PAIRS_FULL, TEAM_SIZE
-from blocksim.kernels.jit import config
+from blocksim.kernels.common.arrays import PAIRS_FULL, TEAM_SIZE
+from blocksim.kernels.common.jit import config
 from blocksim.simulation.schemes import SCHEMES, AnyScene, Scene, scheme_of
 
 BODIES_A_THREAD = SCHEMES["explicit"].least_bodies

@@ -12,7 +12,7 @@ from blocksim.verification.scene import Scene, Simulation
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from blocksim.kernels.arrays import World
+    from blocksim.kernels.common.arrays import World
 
 
 VELOCITY_TOLERANCE = 1e-6

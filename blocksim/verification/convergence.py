@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from blocksim.kernels.arrays import World
+    from blocksim.kernels.common.arrays import World
 
 ORDER = 1.8
 REFINEMENTS = (1, 2, 4)

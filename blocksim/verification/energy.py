@@ -9,7 +9,7 @@ from math import log2, nan, radians
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.kernels.arrays import AT_REST, REACHED
+from blocksim.kernels.common.arrays import AT_REST, REACHED
 from blocksim.scenario import Document, Scenario, load_scenario, place_bodies
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.case import Row, Setting, absolute, at_least

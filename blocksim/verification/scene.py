@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.kernels.arrays import REACHED
+from blocksim.kernels.common.arrays import REACHED
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.simulation.ledger import energy_ledger, start_energy
 from blocksim.simulation.schemes import AnyScene, build_scene, measured_row, scheme_of
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from blocksim.kernels.arrays import World
+    from blocksim.kernels.common.arrays import World
 
 HELD = {"kinetic", "potential", "stored_normal", "stored_shear"}  # entries of a ledger that are no losses
 WIDTH, HEIGHT, DEPTH = 0.032, 0.025, 0.05  # m, the paper's block in the literal reading
@@ -64,7 +64,7 @@ class Simulation:
 
     @property
     def bodies(self) -> Any:
-        """All bodies without the ground: a record array, as in blocksim.kernels.arrays."""
+        """All bodies without the ground: a record array, as in blocksim.kernels.common.arrays."""
         return self.world.bodies[:-1]
 
     @property

@@ -6,7 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.arrays import LOAD, LOAD_FIELD, LOAD_FORCE, LOAD_PIECE, LOAD_TILT, LOAD_WATER, Records, zeros
+from blocksim.kernels.common.arrays import (
+    LOAD,
+    LOAD_FIELD,
+    LOAD_FORCE,
+    LOAD_PIECE,
+    LOAD_TILT,
+    LOAD_WATER,
+    Records,
+    zeros,
+)
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.load_places import NORMALS, face_of
 from blocksim.scenario.models.history import Stretch

@@ -12,7 +12,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.arrays import ALL, BODY, DRIVEN, MOTION_PIECE, MOVED, OUTLINE, SUPPORT, Record, Records, zeros
+from blocksim.kernels.common.arrays import (
+    ALL,
+    BODY,
+    DRIVEN,
+    MOTION_PIECE,
+    MOVED,
+    OUTLINE,
+    SUPPORT,
+    Record,
+    Records,
+    zeros,
+)
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments
 from blocksim.scenario.motion import motion_direction, motion_pieces
 from blocksim.world.applied import Applied, applied_loads
@@ -23,7 +34,7 @@ from blocksim.world.shapes import Shapes, half_sides, shapes_of
 # A piece of ground is a slab of which only the upper face counts; its thickness is a share of the smallest side of all
 # blocks: more than any overlap, less than a ledge that is worth modelling.
 SLAB_SHARE = 0.25
-UPPER_FACE = 1 << 1  # bits as in kernels/arrays.py
+UPPER_FACE = 1 << 1  # bits as in kernels/common/arrays.py
 UPPER_RIGHT, UPPER_LEFT = 1 << 2, 1 << 3
 SHARP_RIGHT, SHARP_LEFT = 1 << 4, 1 << 5
 

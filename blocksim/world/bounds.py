@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.arrays import OUTLINE
+from blocksim.kernels.common.arrays import OUTLINE
 from blocksim.scenario import Scenario
 from blocksim.scenario.drives import greatest_rate
 from blocksim.scenario.motion import motion_pieces

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from blocksim.kernels.arrays import (
+from blocksim.kernels.common.arrays import (
     ACTION,
     CLOCK,
     CONTACT,
@@ -24,9 +24,9 @@ from blocksim.kernels.arrays import (
     World,
     zeros,
 )
-from blocksim.kernels.broad_phase import TRAVELLED
-from blocksim.kernels.laws import LAW_CODES
-from blocksim.kernels.models import MODEL_CODES
+from blocksim.kernels.explicit.broad_phase import TRAVELLED
+from blocksim.kernels.explicit.laws import LAW_CODES
+from blocksim.kernels.explicit.models import MODEL_CODES
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import Scenario
 from blocksim.world.applied import stacked
@@ -46,7 +46,7 @@ GROWTH = 1.25  # of the room for pairs, each time that it does not suffice
 
 
 def build_world(scenario: Scenario) -> World:
-    """Return the world at time zero: arrays as described in blocksim.kernels.arrays, pair lists still empty.
+    """Return the world at time zero: arrays as described in blocksim.kernels.common.arrays, pair lists still empty.
 
     Raises SceneTooLargeError when there is not enough memory for it, StepTooLargeError when the scenario asks for an
     inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from blocksim.kernels.systems import Act, Coupled, Plan, plan
+from blocksim.kernels.common.systems import Act, Coupled, Plan, plan
 from blocksim.scenario import Scenario
 from blocksim.world.systems import acts_of
 from blocksim.world.systems.system import Present

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from blocksim.kernels.arrays import Record, World
+from blocksim.kernels.common.arrays import Record, World
 from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, place_bodies
 from blocksim.scenario.models.stepping import Explicit, Nonsmooth
 from blocksim.scenario.motion import motion_pieces
@@ -151,7 +151,7 @@ def _built(scenario: Scenario, count: int) -> tuple[World, SceneSize | RigidSize
     """Build the scene of so many bodies; return the arrays that all schemes have, and its size."""
     if isinstance(scenario.time, Nonsmooth):
         scene = build_nonsmooth(scenario)
-        return scene.world, RigidSize(count, scene.contacts.rows.size)
+        return scene.world, RigidSize(count, scene.contacts.constraints.size)
     world = build_world(scenario)
     if scenario.systems:
         couple(scenario, world, others_of(scenario))  # refuses pairs that are not modelled

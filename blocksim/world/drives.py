@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.arrays import MOTION_PIECE, MOVED, Records, zeros
+from blocksim.kernels.common.arrays import MOTION_PIECE, MOVED, Records, zeros
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.drives import Drive, drives_of, greatest_rate
 from blocksim.scenario.motion import MotionPieces

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.arrays import INTERACTION, Records, zeros
+from blocksim.kernels.common.arrays import INTERACTION, Records, zeros
 from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, resolve_pair
 from blocksim.world.restitution import damping_ratio
 

@@ -1,6 +1,6 @@
 """Memory that a run needs, known before anything is allocated.
 
-Sizes follow from the types in blocksim.kernels.arrays, so that they change with them.
+Sizes follow from the types in blocksim.kernels.common.arrays, so that they change with them.
 """
 
 from abc import ABC, abstractmethod
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.kernels.arrays import BODY, CONTACT, CONTACTS, OPERATOR, PAIR, PARTICLE_CONTACT, POINT
-from blocksim.kernels.lanes import WIDTH
-from blocksim.kernels.nonsmooth.arrays import ASIDE, BEFORE, BOOK, GROUP, IMPACT, KEPT, LINE, PART, ROW, SPOT
+from blocksim.kernels.common.arrays import BODY, CONTACT, CONTACTS, OPERATOR, PAIR, PARTICLE_CONTACT, POINT
+from blocksim.kernels.common.simd import WIDTH
+from blocksim.kernels.nonsmooth.arrays import ASIDE, BEFORE, CONSTRAINT, GROUP, IMPACT, KEPT, LISTED, PART, STATE, TALLY
 from blocksim.world.free_memory import available_bytes, readable
 
 LISTS = 2  # of candidate pairs: the present one and the one being built
@@ -102,10 +102,16 @@ class RigidSize(Size):
     def world_bytes(self) -> int:
         """As Size."""
         body = (
-            BODY.itemsize + LINE.itemsize + BEFORE.itemsize + IMPACT.itemsize + SPOT.itemsize + 2 * VALUE + OBJECT_BYTES
+            BODY.itemsize
+            + STATE.itemsize
+            + BEFORE.itemsize
+            + IMPACT.itemsize
+            + LISTED.itemsize
+            + 2 * VALUE
+            + OBJECT_BYTES
         )
         group = GROUP.itemsize + ASIDE.itemsize
-        pair = ROW.itemsize + KEPT.itemsize + -(-group // WIDTH) + -(-BOOK.itemsize // (WIDTH * PART))
+        pair = CONSTRAINT.itemsize + KEPT.itemsize + -(-group // WIDTH) + -(-TALLY.itemsize // (WIDTH * PART))
         return self.bodies * body + self.pairs * pair
 
 

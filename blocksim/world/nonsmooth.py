@@ -5,22 +5,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from blocksim.kernels.arrays import CACHE_LINE, Records, World, zeros
-from blocksim.kernels.lanes import WIDTH
+from blocksim.kernels.common.arrays import CACHE_LINE, Records, World, zeros
+from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth.arrays import (
     ASIDE,
     BEFORE,
-    BOOK,
     COLOURS,
+    CONSTRAINT,
     GROUP,
     IMPACT,
     KEPT,
-    LINE,
+    LISTED,
     PART,
     PUSH,
-    ROW,
-    SPOT,
+    STATE,
     STEPPING,
+    TALLY,
     Contacts,
     Nonsmooth,
 )
@@ -130,7 +130,7 @@ def _stepping(outline: Outline, stride: Stride) -> dict[str, float]:
     time = stepping_of(outline.scenario)
     substep = stride.step / time.substeps
     soft = soft_contact(substep)
-    restitution = max(touch.restitution for row in outline.interactions for touch in row)
+    restitution = max(material.restitution for row in outline.interactions for material in row)
     free = sum(not body.fixed for body in outline.placed)
     rounds = has_impacts_in_rounds(outline.scenario, restitution, free)
     return {
@@ -155,18 +155,18 @@ def _stepping(outline: Outline, stride: Stride) -> dict[str, float]:
 
 
 def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1) -> Nonsmooth:
-    """Return worlds (one, or a stack) with empty rows, as many as there is room for pairs."""
+    """Return worlds (one, or a stack) with empty constraints, as many as there is room for pairs."""
     *members, bodies = world.bodies.shape
     groups = groups_for(capacity)
     follows = bool(stepping["is_guarded"].any())
     contacts = Contacts(
-        lines=zeros((*members, bodies), LINE),
+        states=zeros((*members, bodies), STATE),
         before=zeros((*members, bodies), BEFORE),
-        rows=zeros((*members, capacity), ROW),
+        constraints=zeros((*members, capacity), CONSTRAINT),
         groups=zeros((*members, groups), GROUP),
         ends=numbers((*members, COLOURS + 1), np.int64),
-        touches=world.interactions.reshape(*members, -1).view(np.recarray),
-        books=zeros((*members, groups // PART + 1), BOOK),
+        materials=world.interactions.reshape(*members, -1).view(np.recarray),
+        tallies=zeros((*members, groups // PART + 1), TALLY),
         impacts=zeros((*members, bodies if follows else 1), IMPACT),
         asides=zeros((*members, groups if follows else 1), ASIDE),
         residuals=numbers((*members, 2, LINE_WORDS * threads), np.float64),
@@ -176,7 +176,7 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
         world=world,
         contacts=contacts,
         kept=zeros((*members, capacity), KEPT),
-        spots=zeros((*members, bodies), SPOT),
+        listed=zeros((*members, bodies), LISTED),
         firsts=numbers((*members, bodies), np.int64),
         begins=numbers((*members, COLOURS + 1), np.int64),
         used=numbers((*members, bodies), np.int64),
@@ -194,16 +194,16 @@ def threads_of(scene: Nonsmooth) -> int:
     return int(scene.contacts.residuals.shape[1]) // LINE_WORDS
 
 
-def with_more_rows(scene: Nonsmooth) -> Nonsmooth:
+def with_more_constraints(scene: Nonsmooth) -> Nonsmooth:
     """Return the same scene with more room for pairs. Raises SceneTooLargeError."""
     old = scene.contacts
-    capacity = math.ceil(GROWTH * old.rows.size)
+    capacity = math.ceil(GROWTH * old.constraints.size)
     refuse_if_too_large(RigidSize(scene.world.bodies.size, capacity))
     larger = with_lists(scene.world, old.stepping, capacity)
-    for name in ("rows", "books"):
+    for name in ("constraints", "tallies"):
         getattr(larger.contacts, name)[: getattr(old, name).size] = getattr(old, name)
-    contacts = larger.contacts._replace(lines=old.lines, before=old.before, ends=old.ends, residuals=old.residuals)
-    return larger._replace(contacts=contacts, spots=scene.spots, begins=scene.begins, pushes=scene.pushes)
+    contacts = larger.contacts._replace(states=old.states, before=old.before, ends=old.ends, residuals=old.residuals)
+    return larger._replace(contacts=contacts, listed=scene.listed, begins=scene.begins, pushes=scene.pushes)
 
 
 def with_more_threads(scene: Nonsmooth, threads: int) -> Nonsmooth:

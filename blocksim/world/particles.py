@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.arrays import ALL, PARTICLE, SLOTS, Record, Records, zeros
-from blocksim.kernels.models.particles import PER_PARTICLE
+from blocksim.kernels.common.arrays import ALL, PARTICLE, SLOTS, Record, Records, zeros
+from blocksim.kernels.explicit.models.particles import PER_PARTICLE
 
 CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 NORMALS = ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))

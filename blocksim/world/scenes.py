@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
-from blocksim.kernels.arrays import SLOTS, Records, zeros
+from blocksim.kernels.common.arrays import SLOTS, Records, zeros
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.world.bodies import Outline, Outlines, body_records, outline_of, with_freed
 from blocksim.world.bounds import Bounds, bounds_of

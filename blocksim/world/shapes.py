@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import CORNER, Records, zeros
+from blocksim.kernels.common.arrays import CORNER, Records, zeros
 from blocksim.scenario import PlacedBody
 
 Corners = tuple[tuple[float, float], ...]  # m, counter-clockwise about the centroid

@@ -10,17 +10,17 @@ or 2K/m; the inverse masses of both bodies add, so for a pair w2 = w2_a + w2_b. 
 for w dt < 2. Faces that overlap by next to nothing, with both points at one end, are up to 10 % faster at Mindlin's
 k/K = 0.82 and 29 % as k/K goes to 0; a safety of 0.05 leaves room for that.
 
-Stiffness by tributary length (kernels/tributary.py) only lowers that of a corner: the bound holds, and a body on
-several others is in all as stiff as on one.
+Stiffness by tributary length (kernels/explicit/tributary.py) only lowers that of a corner: the bound holds, and a body
+on several others is in all as stiff as on one.
 
 Damping. The dashpot of a pair is implicit in the pair's own force and takes the forces of other pairs from the step
 before. Alone, a pair is then stable for w dt < 2 at any damping ratio z. Where p pairs bear a body, each stands for a
-piece of it (kernels/inertia.py) and sees p times the inverse mass. So pairs that act alike are one pair p times as
-stiff, and stable as that at any z. Where they act against one another, the own force counts for more than it does; the
-recurrence of position, velocity and lagged force is then stable for p (w dt)^2 < 2, at any z as well: a test scans it.
-A thin plank on narrow seats at its ends rocks with three times the inverse mass of its pieces; and in the models with
-particles pairs have the whole body each and count their own force q = max(1, p/2) times (kernels/contact.py). Where the
-own force counts q times of p, the recurrence is stable up to
+piece of it (kernels/explicit/inertia.py) and sees p times the inverse mass. So pairs that act alike are one pair p
+times as stiff, and stable as that at any z. Where they act against one another, the own force counts for more than it
+does; the recurrence of position, velocity and lagged force is then stable for p (w dt)^2 < 2, at any z as well: a test
+scans it. A thin plank on narrow seats at its ends rocks with three times the inverse mass of its pieces; and in the
+models with particles pairs have the whole body each and count their own force q = max(1, p/2) times
+(kernels/explicit/contact.py). Where the own force counts q times of p, the recurrence is stable up to
 
     z w dt = (1 - p (w dt)^2 / 4) / (2 (p - q))   (for small w dt and p = 2, 3, 4, 6: 0.5, 0.33, 0.25, 0.17)
 

@@ -22,7 +22,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.kernels.inertia import APPROACH_STEPS
+from blocksim.kernels.explicit.inertia import APPROACH_STEPS
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Explicit, Nonsmooth
 from blocksim.world.applied import greatest_push, steepest_tilt

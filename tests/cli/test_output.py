@@ -53,7 +53,7 @@ def test_compiled_solver_that_cannot_be_kept_is_reported(
 ) -> None:
     monkeypatch.setattr(compilation, "is_compiled", lambda _: False)
     monkeypatch.setattr(compilation, "compile_kernels", lambda _: 30.0)
-    monkeypatch.setattr("blocksim.kernels.jit.cache_folder", lambda: Path("/disk/blocksim/0123"))
+    monkeypatch.setattr("blocksim.kernels.common.jit.cache_folder", lambda: Path("/disk/blocksim/0123"))
     tell_compilation("surface", quiet=False)
     told = capsys.readouterr().err.splitlines()
     assert told[-1].startswith("/disk/blocksim/0123: the compiled solver cannot be stored there; free some space")

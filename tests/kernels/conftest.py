@@ -16,18 +16,18 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from blocksim.kernels.arrays import ALL, BODY, zeros
-from blocksim.kernels.broad_phase import rebuild_pairs
-from blocksim.kernels.geometry import place_corners
-from blocksim.kernels.integrate import renew_rotations
-from blocksim.kernels.jit import config
+from blocksim.kernels.common.arrays import ALL, BODY, zeros
+from blocksim.kernels.common.geometry import place_corners
+from blocksim.kernels.common.integrate import renew_rotations
+from blocksim.kernels.common.jit import config
+from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.verification.scene import Simulation, scenario_of
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from blocksim.kernels.arrays import Record, Records, World
+    from blocksim.kernels.common.arrays import Record, Records, World
 
 IS_INTERPRETED = bool(config.DISABLE_JIT)
 BODY_STEPS = 1000  # a test, times bodies: a second or two of an interpreter

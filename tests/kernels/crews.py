@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.bench.scenes import pushed_wall
-from blocksim.kernels.advance import advance, advance_in_team
-from blocksim.kernels.arrays import MOTION_PIECE, PAIRS_FULL, TEAM_SIZE, World, zeros
-from blocksim.kernels.broad_phase import rebuild_pairs
+from blocksim.kernels.common.arrays import MOTION_PIECE, PAIRS_FULL, TEAM_SIZE, World, zeros
+from blocksim.kernels.explicit.broad_phase import rebuild_pairs
+from blocksim.kernels.explicit.step import advance, advance_in_team
 from blocksim.verification.scene import HEIGHT, scenario_of
 from blocksim.world.build import build_world, with_more_room, with_threads
 

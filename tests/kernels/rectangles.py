@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from blocksim.kernels.arrays import Record
+    from blocksim.kernels.common.arrays import Record
 
     Floats = NDArray[np.float64]
 

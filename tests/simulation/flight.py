@@ -6,7 +6,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from blocksim.kernels.arrays import REACHED, Floats, World
+from blocksim.kernels.common.arrays import REACHED, Floats, World
 from blocksim.scenario.models.stepping import Time
 from blocksim.simulation.schemes.scheme import Scheme
 from blocksim.world.bodies import Outline

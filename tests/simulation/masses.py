@@ -9,9 +9,9 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.arrays import Floats, Records, World, record_type, zeros
-from blocksim.kernels.jit import rare_kernel
-from blocksim.kernels.systems import Stages, part_of_thread
+from blocksim.kernels.common.arrays import Floats, Records, World, record_type, zeros
+from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.common.systems import Stages, part_of_thread
 from blocksim.scenario import Scenario
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import Whole

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError, OutputError
-from blocksim.kernels.arrays import CACHE_LINE
+from blocksim.kernels.common.arrays import CACHE_LINE
 from blocksim.simulation.checkpoint import (
     DIGEST_BYTES,
     Position,

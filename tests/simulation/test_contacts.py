@@ -125,7 +125,7 @@ def test_there_are_as_many_as_are_counted_and_they_keep_within_the_cone(soft: Sh
     np.testing.assert_array_equal(counts, result.frames.contact_count)
     rows = contacts.rows
     assert (rows["normal_force"] >= 0.0).all()
-    # N: springs of 950 kN/m push along a face of 32 mm or more that shrinks by slip, see kernels/tributary.py
+    # N: springs of 950 kN/m push along a face of 32 mm or more that shrinks by slip, see kernels/explicit/tributary.py
     push = 0.5 * 9.5e5 * rows["overlap"] ** 2 / 0.032 if scheme == "explicit" else 0.0
     assert (np.abs(rows["shear_force"]) <= 0.38 * rows["normal_force"] * (1.0 + 1e-9) + push).all()
     np.testing.assert_allclose(np.hypot(rows["normal_x"], rows["normal_y"]), 1.0, rtol=1e-9)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import ExitCode
-from blocksim.kernels.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED
+from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED
 from blocksim.scenario import place_bodies
 from blocksim.simulation import run_ensemble, running, simulate, simulate_into
 from blocksim.simulation.checkpoint import read_checkpoint

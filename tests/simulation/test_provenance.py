@@ -9,7 +9,7 @@ import llvmlite.binding
 import numba
 import pytest
 
-from blocksim.kernels.jit import source_hash
+from blocksim.kernels.common.jit import source_hash
 from blocksim.simulation import Result, provenance
 from blocksim.simulation.summary import read_summary
 from tests.simulation.conftest import Shipped
@@ -25,7 +25,7 @@ def test_rooms_are_reported_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     def edited(folder: Path) -> str:
         return source_hash(folder) + ("edited" if folder.name == "world" else "")
 
-    monkeypatch.setattr("blocksim.kernels.jit.source_hash", edited)
+    monkeypatch.setattr("blocksim.kernels.common.jit.source_hash", edited)
     after = provenance.code_hashes.__wrapped__()
     assert {room for room in after if after[room] != before[room]} == {"world"}
 

@@ -17,7 +17,7 @@ from blocksim.world import build
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
-    from blocksim.kernels.arrays import World
+    from blocksim.kernels.common.arrays import World
     from blocksim.scenario import Scenario
 
 STEPS = 1500

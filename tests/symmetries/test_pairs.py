@@ -14,7 +14,7 @@ from tests.symmetries.scenes import EXPLICIT, RIGID, RIGID_STEP, for_all, some
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from blocksim.kernels.arrays import World
+    from blocksim.kernels.common.arrays import World
     from blocksim.verification.scene import Simulation
 
     Change = Callable[[World], None]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from blocksim.kernels.arrays import AT_REST
+from blocksim.kernels.common.arrays import AT_REST
 from blocksim.verification.case import Setting
 from blocksim.verification.collapse import BEFORE_FIRST_IMPACT, FINAL, collapse, staircase
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from blocksim.bench.scenes import pushed_wall
-from blocksim.kernels.arrays import REACHED
-from blocksim.kernels.broad_phase import list_reach
+from blocksim.kernels.common.arrays import REACHED
+from blocksim.kernels.explicit.broad_phase import list_reach
 from blocksim.verification.scene import Simulation
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.kernels.arrays import World
+    from blocksim.kernels.common.arrays import World
     from tests.conftest import PaperBlock, Start
 
 # work space
@@ -140,7 +140,7 @@ def test_friction_force_does_not_jump_at_a_new_pair_list(start: Start, paper_blo
     forces = []
     for k in range(200):
         if k % 10 == 5:
-            scene.world.clock[0].next_look = scene.steps
+            scene.world.clock[0].next_update = scene.steps
             scene.bodies.list_x[0] += 1.0  # as if it had come that far
         scene.to_step(scene.steps + 1)
         forces.append(scene.touching.shear_force.copy())

@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from blocksim.kernels.arrays import REACHED
+from blocksim.kernels.common.arrays import REACHED
 from blocksim.world.restitution import damping_ratio
 
 if TYPE_CHECKING:
-    from blocksim.kernels.arrays import World
+    from blocksim.kernels.common.arrays import World
     from tests.conftest import PaperBlock, Simulation, Start
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import REACHED
+from blocksim.kernels.common.arrays import REACHED
 from blocksim.scenario import place_bodies, place_segments
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.build import build_world
@@ -18,7 +18,7 @@ from blocksim.world.build import build_world
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from blocksim.kernels.arrays import Record, Records
+    from blocksim.kernels.common.arrays import Record, Records
 
 SOFT = 1e-3  # of the material's stiffness
 FRICTION = 0.3

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import ExitCode
-from blocksim.kernels.arrays import (
+from blocksim.kernels.common.arrays import (
     ARRIVED,
     CACHE_LINE,
     CONTACT,
@@ -21,8 +21,8 @@ from blocksim.kernels.arrays import (
     TEAM_WORDS,
     zeros,
 )
-from blocksim.kernels.arrays import BODY as BODY_RECORD
-from blocksim.kernels.energy import booked
+from blocksim.kernels.common.arrays import BODY as BODY_RECORD
+from blocksim.kernels.explicit.energy import tallied
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.world import memory
 from blocksim.world.bounds import bounds_of
@@ -43,7 +43,7 @@ from blocksim.world.step import StepTooLargeError, admissible_step
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from blocksim.kernels.arrays import Records
+    from blocksim.kernels.common.arrays import Records
 
 W, H, D = 0.032, 0.025, 0.05
 BODY = {"block": "brick", "x": 0.1, "y": 0.2}
@@ -102,11 +102,11 @@ def test_tilted_ground_turns_gravity_so_that_positive_tilt_raises_the_far_end(ti
 def test_world_starts_without_contacts_time_or_losses() -> None:
     world = build_world(scenario({"velocity": [3.0, 0.0], "spin": 2.0}))
     assert not world.pairs.active.any()
-    assert world.clock[0].next_look == 0
+    assert world.clock[0].next_update == 0
     assert world.clock[0].steps == 0
     assert world.clock[0].pair_count == 0
     ledger, body = world.ledger[0], world.bodies[0]
-    assert booked(world.ledger) == (0.0, 0.0, 0.0)
+    assert tallied(world.ledger) == (0.0, 0.0, 0.0)
     assert (ledger.to_support, ledger.travel_work) == (0.0, 0.0)
     assert ledger.largest_kinetic == pytest.approx(0.5 * (body.mass * 9.0 + body.inertia * 4.0))
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from blocksim.kernels.arrays import INTERACTION
+from blocksim.kernels.common.arrays import INTERACTION
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.world.interactions import (
     ContactClass,
@@ -23,7 +23,7 @@ from blocksim.world.restitution import damping_ratio
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from blocksim.kernels.arrays import Records
+    from blocksim.kernels.common.arrays import Records
 
 ALUMINIUM = {"unit_weight": 26.7e3, "young_modulus": 69e9, "poisson_ratio": 0.3}
 OAK = {"density": 700.0, "young_modulus": 11e9, "poisson_ratio": 0.4}

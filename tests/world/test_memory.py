@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import ExitCode
-from blocksim.kernels.arrays import World
+from blocksim.kernels.common.arrays import World
 from blocksim.scenario import load_scenario, place_bodies
 from blocksim.simulation.recorder import Recorder
 from blocksim.world import build_world, memory

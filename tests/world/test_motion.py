@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.support import acceleration, displacement, piece_at
+from blocksim.kernels.common.supports import acceleration, displacement, piece_at
 from blocksim.verification.scene import scenario_of
 from blocksim.world.bodies import motion_records, moved_records, support_direction
 from blocksim.world.build import build_world

@@ -16,7 +16,7 @@ from blocksim.world.particles import particle_count, slots_of_a_pair
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from blocksim.kernels.arrays import Records, World
+    from blocksim.kernels.common.arrays import Records, World
     from blocksim.scenario import Scenario
 
 sides = st.floats(1e-2, 0.1)

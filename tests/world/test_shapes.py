@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from blocksim.kernels.arrays import ALL, OUTLINE
+from blocksim.kernels.common.arrays import ALL, OUTLINE
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.outlines import least_width, regular
 from blocksim.world.bodies import body_records, outline_of

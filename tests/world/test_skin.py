@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from blocksim.errors import ExitCode
-from blocksim.kernels.arrays import REACHED
-from blocksim.kernels.broad_phase import list_reach
+from blocksim.kernels.common.arrays import REACHED
+from blocksim.kernels.explicit.broad_phase import list_reach
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.verification.scene import Simulation
 from blocksim.world import build_world

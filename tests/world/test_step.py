@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.arrays import AT_REST, REACHED
-from blocksim.kernels.laws import HERTZ_MINDLIN, tangent_stiffness
+from blocksim.kernels.common.arrays import AT_REST, REACHED
+from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, tangent_stiffness
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.bounds import bounds_of
 from blocksim.world.build import build_world
@@ -19,7 +19,7 @@ from blocksim.world.step import MOST_STEPS, StepTooLargeError, UncountableStepsE
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from blocksim.kernels.arrays import World
+    from blocksim.kernels.common.arrays import World
 
 G = 9.81
 RADIUS = hypot(WIDTH, HEIGHT) / 2

@@ -1,29 +1,31 @@
-"""What the velocity pass has to reach at the points of rows: rebounds, and no approach elsewhere."""
+"""What the velocity pass has to reach at the points of constraints: rebounds, and no approach elsewhere."""
 
-from blocksim.kernels.arrays import Record
-from blocksim.kernels.jit import kernel
-from blocksim.kernels.lanes import Lane, Lanes, fields_0, greater, is_all, lesser, load, root, select, store
+from blocksim.kernels.common.arrays import Record
+from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.simd import Lane, Lanes, fields_0, greater, is_all, lesser, load, root, select, store
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
 from blocksim.kernels.nonsmooth.groups import Bodies
-from blocksim.kernels.nonsmooth.slip import Rows, Slip, slip_of
+from blocksim.kernels.nonsmooth.slip import Constraints, Slip, slip_of
 
 
 @kernel
-def gaps(group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies, bend_time: float) -> tuple[Lanes, Lanes]:
-    """Return both gaps (m) as they are now; `bend_time` (s) is that of bends.py now."""
-    slip = slip_of(row, a.dx - b.dx, a.dy - b.dy, a.turned, b.turned)
+def gaps(
+    group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies, bend_time: float
+) -> tuple[Lanes, Lanes]:
+    """Return both gaps (m) as they are now; `bend_time` (s) is that of gap_curvature.py now."""
+    slip = slip_of(constraint, a.dx - b.dx, a.dy - b.dy, a.turned, b.turned)
     bent = bend_time * load(lane, group.bend)
     return load(lane, group.gap_one) + slip.one + bent, load(lane, group.gap_two) + slip.two + bent
 
 
 @kernel
-def pulls(row: Rows, a: Bodies, b: Bodies, stepping: Record) -> Lanes:
-    """Return by how much gravity changes J v of rows in a substep (m/s) as long as nothing touches.
+def pulls(constraint: Constraints, a: Bodies, b: Bodies, stepping: Record) -> Lanes:
+    """Return by how much gravity changes J v of constraints in a substep (m/s) as long as nothing touches.
 
     So do loads that act on all bodies. Those on single ones are left out: a rebound is off by their share of a kick.
     """
     free = select(a.inverse_mass > 0.0, 1.0, 0.0) - select(b.inverse_mass > 0.0, 1.0, 0.0)
-    return free * (row.nx * stepping.pull_x + row.ny * stepping.pull_y)
+    return free * (constraint.nx * stepping.pull_x + constraint.ny * stepping.pull_y)
 
 
 @kernel
@@ -36,7 +38,7 @@ def rebound(approach: Lanes, start: Lanes, pull: Lanes, restitution: Lanes, step
 
         t + pull / 2 = e sqrt((u + pull / 2)^2 - 2 (pull / h) start)
 
-    With t = -e u an impact at speed u lost 3 g h / u of its energy, on average, for ever so elastic blocks.
+    With t = -e u an impact at speed u lost 3 g h / u of its energy, on average, however elastic the blocks.
     """
     now = approach + stepping.lag * pull
     square = now * now - 2.0 * stepping.open_bias * pull * greater(start, 0.0)
@@ -54,10 +56,12 @@ def target(impulse: Lanes, gap: Lanes, least: Lanes) -> Lanes:
 
 
 @kernel
-def aim(contacts: Contacts, group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes]:
-    """Fix what the velocity pass has to reach at the points of rows."""
+def aim(
+    contacts: Contacts, group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies
+) -> tuple[Lanes, Lanes]:
+    """Set what the velocity pass has to reach at the points of constraints."""
     stepping = contacts.stepping[0]
-    gap_one, gap_two = gaps(group, lane, row, a, b, stepping.next_bend_time)
+    gap_one, gap_two = gaps(group, lane, constraint, a, b, stepping.next_bend_time)
     normal_one = load(lane, group.normal_one)
     normal_two = load(lane, group.normal_two)
     if is_all((lesser(gap_one, gap_two) > 0.0) & (greater(normal_one, normal_two) <= 0.0)):
@@ -67,11 +71,11 @@ def aim(contacts: Contacts, group: Record, lane: Lane, row: Rows, a: Bodies, b: 
         return none, none
     vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
     vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
-    u = slip_of(row, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
+    u = slip_of(constraint, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
     t_one = target(normal_one, gap_one, -greater(gap_one, 0.0) * stepping.open_bias)
     t_two = target(normal_two, gap_two, -greater(gap_two, 0.0) * stepping.open_bias)
     if not is_all((lesser(u.one, u.two) >= -stepping.threshold) | (greater(t_one, t_two) <= -FAR)):
-        t_one, t_two = with_rebounds(contacts, group, lane, row, a, b, u, t_one, t_two)
+        t_one, t_two = with_rebounds(contacts, group, lane, constraint, a, b, u, t_one, t_two)
     store(lane, group.target_one, t_one)
     store(lane, group.target_two, t_two)
     return t_one, t_two
@@ -82,17 +86,17 @@ def with_rebounds(
     contacts: Contacts,
     group: Record,
     lane: Lane,
-    row: Rows,
+    constraint: Constraints,
     a: Bodies,
     b: Bodies,
     u: Slip,
     t_one: Lanes,
     t_two: Lanes,
 ) -> tuple[Lanes, Lanes]:
-    """Return the targets (m/s) of rows with those of points that rebound, which approach with u."""
+    """Return the targets (m/s) of constraints with those of points that rebound, which approach with u."""
     stepping = contacts.stepping[0]
     restitution = load(lane, group.restitution)
-    pull = pulls(row, a, b, stepping)
+    pull = pulls(constraint, a, b, stepping)
     after_one = rebound(u.one, load(lane, group.start_one), pull, restitution, stepping)
     after_two = rebound(u.two, load(lane, group.start_two), pull, restitution, stepping)
     is_elastic = restitution > 0.0

@@ -1,52 +1,53 @@
-"""The arrays of the non-smooth scheme beside those of the world; SI units and signs as in blocksim.kernels.arrays.
+"""The arrays of the non-smooth scheme beside those of the world; units and signs as in common/arrays.py.
 
-A step walks through lines and rows many times, so both are as small as they can be: one cache line a body, two a row.
+A step walks through states and constraints many times, so both are as small as they can be: one cache line a body, two
+a constraint.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.arrays import Floats, Integers, Records, World, on_own_lines, record_type
-from blocksim.kernels.lanes import WIDTH
+from blocksim.kernels.common.arrays import Floats, Integers, Records, World, on_own_lines, record_type
+from blocksim.kernels.common.simd import WIDTH
 
-LINE = record_type(
+STATE = record_type(
     "vx vy spin "  # m/s, m/s, rad/s
     "inverse_mass inverse_inertia "  # 1/kg, 1/(kg m2): zero for what is fixed
     "dx dy turned"  # m, m, rad: since the step began
 )
 BEFORE = record_type(
     "vx vy spin "  # m/s, m/s, rad/s: when the substep began, before gravity
-    "lifted"  # J/kg: work of the weight on the ways so far, less that on the ways that the velocities alone would give
+    "lifted"  # J/kg: work of the weight so far, less that along displacements by the velocities alone
 )
-ROW = record_type(
+CONSTRAINT = record_type(
     "nx ny "  # normal, from body b to body a; the tangent is the normal turned by +90 degrees
     "arm_a arm_b "  # m: r x n of point one about both bodies; that of point two is smaller by the width
     "width "  # m: from point one to point two along the tangent
     "shear_arm_a shear_arm_b "  # m: r x t, the same for both points, as they lie on one face
     "gap_one gap_two "  # m: when the step began; FAR where there is no such point
     "normal_one normal_two shear "  # N s: impulses of the last substep: pushing apart, on body a along the tangent
-    "bend shear_bend",  # m/s: what the velocities at the points gain within half a substep, as bodies turn; bends.py
-    indices="a b touch",  # bodies; place in the table of interactions
-    # of the manifold in the step under way: AWAY, OPEN or TOUCHING; its impulses are those of impacts that are over
+    "bend shear_bend",  # m/s: gain of the velocities at the points in half a substep, as bodies turn; gap_curvature.py
+    indices="a b material",  # bodies; place in the table of interactions
+    # of the manifold in the current step: AWAY, OPEN or TOUCHING; its impulses are those of impacts that are over
     flags="reach is_struck "
     "corner_one corner_two",  # of a polygon's pair: the corners that the points are, see polygons.py; else zero
 )
-# four active rows of one colour, field by field; see groups.py
+# four active constraints of one colour, field by field; see groups.py
 LANE_FLOATS = (
-    "nx ny arm_a arm_b width shear_arm_a shear_arm_b gap_one gap_two normal_one normal_two shear "  # as in ROW
-    "bend shear_bend "  # as in ROW
+    "nx ny arm_a arm_b width shear_arm_a shear_arm_b gap_one gap_two normal_one normal_two shear "  # as in CONSTRAINT
+    "bend shear_bend "  # as in CONSTRAINT
     "friction restitution "  # -: coefficients of kinetic friction and of restitution
     "start_one start_two "  # m: gaps when the substep began
     "target_one target_two"  # m/s: least approach that the velocity pass leaves; -FAR where a point does not count
 )
-LANE_INDICES = "a b row"  # bodies; number of the row
+LANE_INDICES = "a b constraint"  # bodies; number of the constraint
 GROUP = on_own_lines(
     np.dtype(
         [(name, np.float64, (WIDTH,)) for name in LANE_FLOATS.split()]
         + [(name, np.uint32, (WIDTH,)) for name in LANE_INDICES.split()]
         + [
-            ("count", np.uint8),  # of rows, the others are copies
+            ("count", np.uint8),  # of constraints, the others are copies
             ("are_simple", np.uint8),  # flag: static friction is the kinetic one
         ],
         align=True,
@@ -65,7 +66,7 @@ IMPACT = on_own_lines(
         "between "  # J: of their difference
         "stale",  # -: what the solution that stays counts for
         counters="root",  # the body that stands for the cluster
-        # anything in the cluster rebounds in the substep; its share is sought for; what its last solution is kept as
+        # anything in the cluster rebounds in the substep; its share is being sought; what its last solution is kept as
         flags="is_hit is_open side",
     )
 )
@@ -81,14 +82,14 @@ ASIDE_LANES = (
 ASIDE = on_own_lines(
     np.dtype([*((name, np.float64, (WIDTH,)) for name in ASIDE_LANES.split()), ("is_hit", np.uint8)], align=True)
 )
-SPOT = record_type(
+LISTED = record_type(
     "x y "  # m
     "radius "  # m: half diagonal and reach
-    "reach",  # m: how far beyond itself the body's neighbours were looked for
+    "reach",  # m: how far beyond itself the body's neighbours were sought
 )
 KEPT = record_type(
-    "nx ny normal_one normal_two shear",  # of a row whose pair is in the next list too
-    indices="a b colour next",  # bodies of a listed pair, its colour; the next old row with the same body a, from 1
+    "nx ny normal_one normal_two shear",  # of a constraint whose pair is in the next list too
+    indices="a b colour next",  # bodies of a listed pair, its colour; the next old one with the same body a, from 1
     flags="corner_one corner_two",
 )
 STEPPING = record_type(
@@ -99,54 +100,54 @@ STEPPING = record_type(
     "softness "  # -: gamma / A of points in contact
     "threshold "  # m/s: slower approaches do not rebound
     "tolerance "  # m/s: the velocity pass ends when no impulse changes a velocity by more
-    "margin "  # m: points with a larger gap are left out of the step under way
-    "support_vx support_vy "  # m/s: of the ground and all that is fixed, in the substep under way
+    "margin "  # m: points with a larger gap are left out of the current step
+    "support_vx support_vy "  # m/s: of the ground and all that is fixed, in the current substep
     "support_x support_y "  # m: how far they have come
     "listed_x listed_y "  # m: how far they had come when the pair list was made
     "fall_x fall_y "  # m/s: what a substep of gravity adds to velocities
     "pull_x pull_y "  # m/s: the same of gravity and of loads that act on all bodies
-    "lag "  # -: of a substep of gravity, what velocities lack when the substep under way begins
-    "bend_share "  # -: of the bend of a row, what velocities gain up to the middle of the substep under way
+    "lag "  # -: of a substep of gravity, what velocities lack when the current substep begins
+    "bend_share "  # -: of the bend of a constraint, what velocities gain up to the middle of the current substep
     "bend_time next_bend_time "  # s: times the bend, by how much gaps at its start and end are off
     "rest_gap "  # m: points with no larger one touch others at an impact
     "frequency damping "  # 1/s, -: w and zeta of points in contact
-    "length gone",  # s: of the part of a step under way, and of the step before it; parts.py
+    "length gone",  # s: of the current part of a step, and of the step before it; parts.py
     "substeps "
     "velocity_sweeps "  # at most
-    "colours row_count active_count group_count "  # now
+    "colours constraint_count active_count group_count "  # now
     "sweeps "  # of the velocity pass, in all so far
-    "parts "  # of the step under way, before this one
+    "parts "  # of the current step, before this one
     "is_divided "  # flag: steps are cut at impacts; parts.py
     "is_guarded "  # flag: impacts go one after the other, in rounds
-    "is_driven "  # flag: bodies move otherwise than the supports
+    "is_driven "  # flag: bodies move differently from the supports
     "is_settled "  # flag: the run begins at rest, with impulses that hold against gravity
     "is_shaken "  # flag: supports or driven bodies move, so that impulses on them do work
-    "has_rebounds "  # flag: anything rebounds in the substep under way
+    "has_rebounds "  # flag: anything rebounds in the current substep
     "has_gain",  # flag: the last round has created energy in a cluster
 )
 PUSH = record_type(
-    "ax ay rate "  # m/s2, m/s2, rad/s2: of loads, in the substep under way
+    "ax ay rate "  # m/s2, m/s2, rad/s2: of loads, in the current substep
     "last_ax last_ay last_rate "  # in the one before
     "work"  # J: that loads have done on the body
 )
-BOOK = record_type("impacts friction to_support")  # J: what normal and shear impulses have taken, and given, so far
+TALLY = record_type("impacts friction to_support")  # J: what normal and shear impulses have taken, and given, so far
 
 FAR = 1e9  # m or m/s: of points that are not there, or do not count
 AWAY, OPEN, TOUCHING = range(3)  # no point within the margin; a gap at all points; a point that touches or pressed
 COLOURS = 64  # the last one is for pairs that found no other; one thread goes through it
-PART = 4  # groups that share a book; threads take whole ones
+PART = 4  # groups that share a tally; threads take whole ones
 
 
 class Contacts(NamedTuple):
     """What a substep needs, and nothing else: compiled functions pass every array as several numbers."""
 
-    lines: Records  # (n + 1,) LINE
+    states: Records  # (n + 1,) STATE
     before: Records  # (n + 1,) BEFORE
-    rows: Records  # (p,) ROW, colour after colour, in the order of the pair list
-    groups: Records  # (g,) GROUP of the rows with a point within the margin, colour after colour
+    constraints: Records  # (p,) CONSTRAINT, colour after colour, in the order of the pair list
+    groups: Records  # (g,) GROUP of the constraints with a point within the margin, colour after colour
     ends: Integers  # (COLOURS + 1,) where every colour begins among the groups, and where the last one ends
-    touches: Records  # (k k,) INTERACTION of all pairs of contact classes, those of the world in one row
-    books: Records  # (p / PART + 1,) BOOK
+    materials: Records  # (k k,) INTERACTION of all pairs of contact classes, those of the world in one row
+    tallies: Records  # (p / PART + 1,) TALLY
     impacts: Records  # (n + 1,) IMPACT; one of no use where nothing rebounds that much
     asides: Records  # (g,) ASIDE; likewise
     residuals: Floats  # (2, 8 t) m/s: the largest change of velocity that each thread found in a sweep, twice
@@ -159,8 +160,8 @@ class Nonsmooth(NamedTuple):
     world: World
     contacts: Contacts
     kept: Records  # (p,) KEPT, work space of a new pair list
-    spots: Records  # (n + 1,) SPOT, where bodies were when the list was made
-    firsts: Integers  # (n + 1,) work space: the first old row of a body a, from 1; 0 where there is none
-    begins: Integers  # (COLOURS + 1,) where every colour begins among the rows
+    listed: Records  # (n + 1,) LISTED, where bodies were when the list was made
+    firsts: Integers  # (n + 1,) work space: the first old constraint of a body a, from 1; 0 where there is none
+    begins: Integers  # (COLOURS + 1,) where every colour begins among the constraints
     used: Integers  # (n + 1,) work space: bits of the colours that a body's pairs have
     pushes: Records  # (n + 1,) PUSH; one of no use without loads

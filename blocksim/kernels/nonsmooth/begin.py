@@ -7,9 +7,9 @@ substep: those of blocks at rest by nothing, that of a block that was held and i
 substep is one like all others then.
 """
 
-from blocksim.kernels.arrays import Record
-from blocksim.kernels.jit import kernel, rare_kernel
-from blocksim.kernels.loads import accelerations
+from blocksim.kernels.common.arrays import Record
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.loads import accelerations
 from blocksim.kernels.nonsmooth.arrays import AWAY, Nonsmooth
 
 
@@ -21,25 +21,25 @@ def is_start(scene: Nonsmooth) -> bool:
 
 
 @rare_kernel
-def load_lines(scene: Nonsmooth) -> None:
-    """Bring velocities and inverse masses of all bodies into their lines: at the start of a run."""
+def load_states(scene: Nonsmooth) -> None:
+    """Bring velocities and inverse masses of all bodies into their states: at the start of a run."""
     controls = scene.world.controls[0]
     stepping = scene.contacts.stepping[0]
     h = stepping.substep
     for i in range(scene.world.bodies.size):
         body = scene.world.bodies[i]
-        line = scene.contacts.lines[i]
-        line.vx = body.vx
-        line.vy = body.vy
-        line.spin = body.spin
-        line.inverse_mass = body.inverse_mass
-        line.inverse_inertia = body.inverse_inertia
-        line.dx = line.dy = line.turned = 0.0
+        state = scene.contacts.states[i]
+        state.vx = body.vx
+        state.vy = body.vy
+        state.spin = body.spin
+        state.inverse_mass = body.inverse_mass
+        state.inverse_inertia = body.inverse_inertia
+        state.dx = state.dy = state.turned = 0.0
     if stepping.is_settled and scene.world.clock[0].steps == 0:
         go_back(scene)
     for i in range(scene.world.bodies.size):
-        line = scene.contacts.lines[i]
-        scene.contacts.before[i].lifted = h * (controls.gravity_x * line.vx + controls.gravity_y * line.vy)
+        state = scene.contacts.states[i]
+        scene.contacts.before[i].lifted = h * (controls.gravity_x * state.vx + controls.gravity_y * state.vy)
 
 
 @rare_kernel
@@ -51,28 +51,32 @@ def go_back(scene: Nonsmooth) -> None:
     half = 0.5 * contacts.stepping[0].substep
     count = world.bodies.size - 1
     if world.loads.size > 0:
-        accelerations(world, contacts.lines, scene.pushes, 0, count, 0.0)
+        accelerations(world, contacts.states, scene.pushes, 0, count, 0.0)
     for i in range(count):
-        line = contacts.lines[i]
-        if line.inverse_mass > 0.0:
-            line.vx -= half * controls.gravity_x
-            line.vy -= half * controls.gravity_y
+        state = contacts.states[i]
+        if state.inverse_mass > 0.0:
+            state.vx -= half * controls.gravity_x
+            state.vy -= half * controls.gravity_y
             if world.loads.size > 0:
-                line.vx -= half * scene.pushes[i].ax
-                line.vy -= half * scene.pushes[i].ay
-                line.spin -= half * scene.pushes[i].rate
-    for r in range(contacts.stepping[0].row_count):
-        row = contacts.rows[r]
-        if row.reach != AWAY:
-            push_back(row, contacts.lines[row.a], 1.0, row.arm_a, row.shear_arm_a)
-            push_back(row, contacts.lines[row.b], -1.0, row.arm_b, row.shear_arm_b)
+                state.vx -= half * scene.pushes[i].ax
+                state.vy -= half * scene.pushes[i].ay
+                state.spin -= half * scene.pushes[i].rate
+    for r in range(contacts.stepping[0].constraint_count):
+        constraint = contacts.constraints[r]
+        if constraint.reach != AWAY:
+            push_back(constraint, contacts.states[constraint.a], 1.0, constraint.arm_a, constraint.shear_arm_a)
+            push_back(constraint, contacts.states[constraint.b], -1.0, constraint.arm_b, constraint.shear_arm_b)
 
 
 @rare_kernel
-def push_back(row: Record, line: Record, sign: float, arm: float, shear_arm: float) -> None:
-    """Take half of what the impulses of a row do to a body, with their `sign` and its arms (m), from its velocity."""
+def push_back(constraint: Record, state: Record, sign: float, arm: float, shear_arm: float) -> None:
+    """Take half of what the impulses of a constraint do to a body, with its arms (m), from its velocity."""
     share = -0.5 * sign
-    normal = row.normal_one + row.normal_two
-    line.vx += share * line.inverse_mass * (row.nx * normal - row.ny * row.shear)
-    line.vy += share * line.inverse_mass * (row.ny * normal + row.nx * row.shear)
-    line.spin += share * line.inverse_inertia * (arm * normal - row.width * row.normal_two + shear_arm * row.shear)
+    normal = constraint.normal_one + constraint.normal_two
+    state.vx += share * state.inverse_mass * (constraint.nx * normal - constraint.ny * constraint.shear)
+    state.vy += share * state.inverse_mass * (constraint.ny * normal + constraint.nx * constraint.shear)
+    state.spin += (
+        share
+        * state.inverse_inertia
+        * (arm * normal - constraint.width * constraint.normal_two + shear_arm * constraint.shear)
+    )

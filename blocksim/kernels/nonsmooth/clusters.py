@@ -1,10 +1,10 @@
 """Clusters: the free bodies that touch one another in a substep, supports apart, and the energy of their impacts.
 
-What is fixed joins nobody, as it moves under no impulse: two blocks on one table do not know of each other.
+Fixed bodies join no cluster, as no impulse moves them: two blocks on one table are independent.
 """
 
-from blocksim.kernels.arrays import Record, Records
-from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.common.arrays import Record, Records
+from blocksim.kernels.common.jit import rare_kernel
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
 
 ROUND_OFF = 1e-9  # of the kinetic energy of a cluster; impacts are solved no better
@@ -28,35 +28,35 @@ def join(bodies: Records, i: int, j: int) -> None:
 
 
 @rare_kernel
-def of_row(contacts: Contacts, group: Record, lane: int) -> Record:
-    """Return the record of a free body of a row."""
+def of_constraint(contacts: Contacts, group: Record, lane: int) -> Record:
+    """Return the record of a free body of a constraint."""
     a = group.a[lane]
-    return contacts.impacts[a if contacts.lines[a].inverse_mass > 0.0 else group.b[lane]]
+    return contacts.impacts[a if contacts.states[a].inverse_mass > 0.0 else group.b[lane]]
 
 
 @rare_kernel
 def join_touching(contacts: Contacts, group: Record) -> None:
-    """Join the free bodies of the rows of a group with a point that counts."""
-    lines = contacts.lines
+    """Join the free bodies of the constraints of a group with a point that counts."""
+    states = contacts.states
     for lane in range(group.count):
         a, b = group.a[lane], group.b[lane]
-        are_free = lines[a].inverse_mass > 0.0 and lines[b].inverse_mass > 0.0
+        are_free = states[a].inverse_mass > 0.0 and states[b].inverse_mass > 0.0
         if are_free and max(group.target_one[lane], group.target_two[lane]) > -FAR:
             join(contacts.impacts, a, b)
 
 
 @rare_kernel
 def mark_rebounds(contacts: Contacts, group: Record) -> None:
-    """Mark the clusters of the rows of a group with a point that rebounds."""
+    """Mark the clusters of the constraints of a group with a point that rebounds."""
     bodies = contacts.impacts
     for lane in range(group.count):
         if max(group.target_one[lane], group.target_two[lane]) > 0.0:
-            bodies[root_of(bodies, of_row(contacts, group, lane).root)].is_hit = 1
+            bodies[root_of(bodies, of_constraint(contacts, group, lane).root)].is_hit = 1
 
 
 @rare_kernel
 def find_clusters(contacts: Contacts) -> None:
-    """Join the bodies of all rows with a point that counts, and mark the clusters in which anything rebounds."""
+    """Join the bodies of all constraints with a point that counts, and mark the clusters in which anything rebounds."""
     bodies = contacts.impacts
     for i in range(bodies.size):
         bodies[i].root = i
@@ -71,33 +71,33 @@ def find_clusters(contacts: Contacts) -> None:
 
 
 @rare_kernel
-def energy(contacts: Contacts, line: Record, vx: float, vy: float, spin: float) -> float:
+def energy(contacts: Contacts, state: Record, vx: float, vy: float, spin: float) -> float:
     """Return the kinetic energy (J) of a body, seen from the supports: those that move may well bring energy in."""
     ux = vx - contacts.stepping[0].support_vx
     uy = vy - contacts.stepping[0].support_vy
-    return 0.5 * ((ux * ux + uy * uy) / line.inverse_mass + spin * spin / line.inverse_inertia)
+    return 0.5 * ((ux * ux + uy * uy) / state.inverse_mass + spin * spin / state.inverse_inertia)
 
 
 @rare_kernel
 def count_work(contacts: Contacts) -> None:
     """Take the work of driven bodies, seen from the supports, out of the energies of clusters after a round.
 
-    What a body that moves otherwise than the supports brings in is no gain of impacts.
+    What a body that moves differently from the supports brings in is not created by impacts.
     """
     stepping = contacts.stepping[0]
     for m in range(stepping.group_count if stepping.is_driven else 0):
         group = contacts.groups[m]
         for lane in range(group.count if contacts.asides[m].is_hit else 0):
-            root = contacts.impacts[of_row(contacts, group, lane).root]
+            root = contacts.impacts[of_constraint(contacts, group, lane).root]
             root.now -= work_of(contacts, group, lane)
 
 
 @rare_kernel
 def work_of(contacts: Contacts, group: Record, lane: int) -> float:
-    """Return the work (J) that the impulses of a row bring into its free body, seen from the supports."""
-    lines = contacts.lines
-    is_b = lines[group.a[lane]].inverse_mass > 0.0
-    fixed = lines[group.b[lane] if is_b else group.a[lane]]
+    """Return the work (J) that the impulses of a constraint bring into its free body, seen from the supports."""
+    states = contacts.states
+    is_b = states[group.a[lane]].inverse_mass > 0.0
+    fixed = states[group.b[lane] if is_b else group.a[lane]]
     if fixed.inverse_mass > 0.0:
         return 0.0
     ux = fixed.vx - contacts.stepping[0].support_vx
@@ -121,16 +121,16 @@ def has_gain(root: Record) -> bool:
 @rare_kernel
 def weigh(contacts: Contacts) -> bool:
     """Sum up the energies of all clusters before and after a round; return whether any has gained."""
-    lines = contacts.lines
+    states = contacts.states
     bodies = contacts.impacts
     for body in bodies:
         body.then = body.now = 0.0
     for i in range(bodies.size):
         body = bodies[i]
-        if body.is_hit and lines[i].inverse_mass > 0.0:
+        if body.is_hit and states[i].inverse_mass > 0.0:
             root = bodies[body.root]
-            root.then += energy(contacts, lines[i], body.vx, body.vy, body.spin)
-            root.now += energy(contacts, lines[i], lines[i].vx, lines[i].vy, lines[i].spin)
+            root.then += energy(contacts, states[i], body.vx, body.vy, body.spin)
+            root.now += energy(contacts, states[i], states[i].vx, states[i].vy, states[i].spin)
     count_work(contacts)
     gains = False
     for body in bodies:

@@ -1,12 +1,12 @@
-"""The rows of a new pair list: colours, and impulses carried over.
+"""The constraints of a new pair list: colours, and impulses carried over.
 
 No two pairs of one colour share a free body, so that threads can go through a colour in parts, and what comes out does
 not depend on who takes which part. Greedy in the order of the list: the same list has the same colours.
 """
 
-from blocksim.kernels.arrays import Record
-from blocksim.kernels.jit import kernel, rare_kernel
-from blocksim.kernels.lanes import WIDTH
+from blocksim.kernels.common.arrays import Record
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, Nonsmooth
 
 ONE = 1
@@ -29,7 +29,7 @@ def bit_of(colour: int) -> int:
 
 @kernel
 def forget(one: Record) -> None:
-    """Set what a row keeps from step to step to zero."""
+    """Set what a constraint keeps from step to step to zero."""
     one.nx = 0.0
     one.ny = 0.0
     one.normal_one = 0.0
@@ -41,7 +41,7 @@ def forget(one: Record) -> None:
 
 @kernel
 def copy_impulses(source: Record, target: Record) -> None:
-    """Copy what a row keeps from step to step."""
+    """Copy what a constraint keeps from step to step."""
     target.nx = source.nx
     target.ny = source.ny
     target.normal_one = source.normal_one
@@ -54,29 +54,29 @@ def copy_impulses(source: Record, target: Record) -> None:
 @rare_kernel
 def keep_impulses(scene: Nonsmooth, count: int) -> None:
     """Copy the impulses of pairs that are in the old list and in the new one of `count` pairs."""
-    rows = scene.contacts.rows
+    constraints = scene.contacts.constraints
     kept = scene.kept
     for i in range(scene.firsts.size):
         scene.firsts[i] = 0
-    for r in range(scene.contacts.stepping[0].row_count):
-        if rows[r].reach != AWAY:
-            kept[r].next = scene.firsts[rows[r].a]
-            scene.firsts[rows[r].a] = r + 1
+    for r in range(scene.contacts.stepping[0].constraint_count):
+        if constraints[r].reach != AWAY:
+            kept[r].next = scene.firsts[constraints[r].a]
+            scene.firsts[constraints[r].a] = r + 1
     for p in range(count):
         one = kept[p]
         r = scene.firsts[one.a]
-        while r > 0 and rows[r - 1].b != one.b:
+        while r > 0 and constraints[r - 1].b != one.b:
             r = kept[r - 1].next
         if r > 0:
-            copy_impulses(rows[r - 1], one)
+            copy_impulses(constraints[r - 1], one)
         else:
             forget(one)
 
 
 @rare_kernel
 def colour_pairs(scene: Nonsmooth, count: int) -> None:
-    """Give every pair a colour, and fix where the rows of every colour begin."""
-    lines = scene.contacts.lines
+    """Give every pair a colour, and set where the constraints of every colour begin."""
+    states = scene.contacts.states
     used = scene.used
     for i in range(used.size):
         used[i] = 0
@@ -85,8 +85,8 @@ def colour_pairs(scene: Nonsmooth, count: int) -> None:
     last = 0
     for p in range(count):
         pair = scene.kept[p]
-        free_a = lines[pair.a].inverse_mass > 0.0
-        free_b = lines[pair.b].inverse_mass > 0.0
+        free_a = states[pair.a].inverse_mass > 0.0
+        free_b = states[pair.b].inverse_mass > 0.0
         colour = lowest_free((used[pair.a] if free_a else 0) | (used[pair.b] if free_b else 0))
         if free_a:
             used[pair.a] |= bit_of(colour)
@@ -102,7 +102,7 @@ def colour_pairs(scene: Nonsmooth, count: int) -> None:
 
 @rare_kernel
 def most_groups(scene: Nonsmooth) -> int:
-    """Return how many groups the rows of all colours can make; those of the last colour are solved one by one."""
+    """Return how many groups all constraints can make; those of the last colour are solved one by one."""
     count = 0
     for colour in range(COLOURS):
         size = scene.begins[colour + 1] - scene.begins[colour]
@@ -111,8 +111,8 @@ def most_groups(scene: Nonsmooth) -> int:
 
 
 @rare_kernel
-def place_rows(scene: Nonsmooth, count: int) -> None:
-    """Make the rows of all pairs, sorted by colour, with the impulses that were kept."""
+def place_constraints(scene: Nonsmooth, count: int) -> None:
+    """Make the constraints of all pairs, sorted by colour, with the impulses that were kept."""
     bodies = scene.world.bodies
     classes = scene.world.interactions.shape[0]
     next_place = scene.contacts.ends
@@ -120,11 +120,11 @@ def place_rows(scene: Nonsmooth, count: int) -> None:
         next_place[colour] = scene.begins[colour]
     for p in range(count):
         pair = scene.kept[p]
-        row = scene.contacts.rows[next_place[pair.colour]]
+        constraint = scene.contacts.constraints[next_place[pair.colour]]
         next_place[pair.colour] += 1
-        row.a = pair.a
-        row.b = pair.b
-        row.touch = bodies[pair.a].contact_class * classes + bodies[pair.b].contact_class
-        row.reach = AWAY
-        copy_impulses(pair, row)
-    scene.contacts.stepping[0].row_count = count
+        constraint.a = pair.a
+        constraint.b = pair.b
+        constraint.material = bodies[pair.a].contact_class * classes + bodies[pair.b].contact_class
+        constraint.reach = AWAY
+        copy_impulses(pair, constraint)
+    scene.contacts.stepping[0].constraint_count = count

@@ -1,6 +1,6 @@
 """Energy ledger of the non-smooth scheme.
 
-Impulses are booked when they are final: what those along the normals take is lost in impacts, those along the tangents
+Impulses are tallied when they are final: what those along the normals take is lost in impacts, those along the tangents
 in friction. A drift moves bodies by velocities that have the position pass in them, which are gone afterwards: what the
 weights work on that way is the correction, negative where the pass lifts bodies. The sum is exact to round-off: with x
 at t and v at t - h/2, K(v + h g/2) + V(x) changes in a substep by  J ((v1 + v2)/2 - h g/2) + h g (J - J_p), where the
@@ -10,10 +10,10 @@ Loads that kick by h a add their impulse m h a times the mean of the velocities 
 from (J + m h (g + a)) times that mean, the change of K(v). So their work needs no place, nor the position pass.
 """
 
-from blocksim.kernels.arrays import Floats, Records
-from blocksim.kernels.energy import potential_energy, smallest_side
-from blocksim.kernels.integrate import kinetic_energy
-from blocksim.kernels.jit import entry_kernel, rare_kernel
+from blocksim.kernels.common.arrays import Floats, Records
+from blocksim.kernels.common.energy import potential_energy, smallest_side
+from blocksim.kernels.common.integrate import kinetic_energy
+from blocksim.kernels.common.jit import entry_kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import AWAY, TOUCHING, Nonsmooth
 from blocksim.kernels.nonsmooth.begin import is_start
 
@@ -25,21 +25,21 @@ NONSMOOTH_LEDGER = ("kinetic", "potential", "impacts", "friction", "correction",
 
 
 @rare_kernel
-def booked(books: Records) -> tuple[float, float, float]:
-    """Return what has gone (J) into impacts, friction and supports, summed over all books in order."""
+def tallied(tallies: Records) -> tuple[float, float, float]:
+    """Return what has gone (J) into impacts, friction and supports, summed over all tallies in order."""
     impacts = 0.0
     friction = 0.0
     to_support = 0.0
-    for book in books:
-        impacts += book.impacts
-        friction += book.friction
-        to_support += book.to_support
+    for tally in tallies:
+        impacts += tally.impacts
+        friction += tally.friction
+        to_support += tally.to_support
     return impacts, friction, to_support
 
 
 @rare_kernel
 def correction(scene: Nonsmooth) -> float:
-    """Return the work (J) of the weights on the ways of the position passes.
+    """Return the work (J) of the weights on the displacements of the position passes.
 
     With it goes what the velocities that are shown, `bodies`, have less than those half a kick after the last substep.
     """
@@ -51,11 +51,11 @@ def correction(scene: Nonsmooth) -> float:
     total = 0.0
     for i in range(scene.world.bodies.size - 1):
         body = scene.world.bodies[i]
-        line = scene.contacts.lines[i]
+        state = scene.contacts.states[i]
         if body.inverse_mass > 0.0:
-            vx = line.vx + half * hx
-            vy = line.vy + half * hy
-            total += body.mass * (scene.contacts.before[i].lifted - line.vx * hx - line.vy * hy)
+            vx = state.vx + half * hx
+            vy = state.vy + half * hy
+            total += body.mass * (scene.contacts.before[i].lifted - state.vx * hx - state.vy * hy)
             if not is_shown_by_loads(scene, i):
                 total += 0.5 * body.mass * (vx * vx - body.vx * body.vx + vy * vy - body.vy * body.vy)
     return total
@@ -67,8 +67,8 @@ def is_shown_by_loads(scene: Nonsmooth, i: int) -> bool:
     if scene.pushes.size == 1 or is_start(scene):
         return False
     body = scene.world.bodies[i]
-    line = scene.contacts.lines[i]
-    return body.vx != line.vx or body.vy != line.vy or body.spin != line.spin
+    state = scene.contacts.states[i]
+    return body.vx != state.vx or body.vy != state.vy or body.spin != state.spin
 
 
 @rare_kernel
@@ -84,11 +84,11 @@ def given_to_loads(scene: Nonsmooth) -> float:
         total -= scene.pushes[i].work
         if is_shown_by_loads(scene, i):
             body = scene.world.bodies[i]
-            line = scene.contacts.lines[i]
-            vx = line.vx + 0.5 * h * controls.gravity_x
-            vy = line.vy + 0.5 * h * controls.gravity_y
+            state = scene.contacts.states[i]
+            vx = state.vx + 0.5 * h * controls.gravity_x
+            vy = state.vy + 0.5 * h * controls.gravity_y
             total -= 0.5 * body.mass * (body.vx * body.vx - vx * vx + body.vy * body.vy - vy * vy)
-            total -= 0.5 * body.inertia * (body.spin * body.spin - line.spin * line.spin)
+            total -= 0.5 * body.inertia * (body.spin * body.spin - state.spin * state.spin)
     return total
 
 
@@ -97,11 +97,11 @@ def contact_points(scene: Nonsmooth) -> tuple[int, float]:
     """Return how many points press, and the largest overlap (m), of the last substep and of the start of the step."""
     count = 0
     largest = 0.0
-    for r in range(scene.contacts.stepping[0].row_count):
-        row = scene.contacts.rows[r]
-        if row.reach != AWAY:
-            count += (1 if row.normal_one > 0.0 else 0) + (1 if row.normal_two > 0.0 else 0)
-            largest = max(largest, -row.gap_one, -row.gap_two)
+    for r in range(scene.contacts.stepping[0].constraint_count):
+        constraint = scene.contacts.constraints[r]
+        if constraint.reach != AWAY:
+            count += (1 if constraint.normal_one > 0.0 else 0) + (1 if constraint.normal_two > 0.0 else 0)
+            largest = max(largest, -constraint.gap_one, -constraint.gap_two)
     return count, largest
 
 
@@ -110,11 +110,11 @@ def has_excessive_overlap(scene: Nonsmooth) -> bool:
     """Return True if an overlap exceeds the limit given, or a share of the smallest side of its pair."""
     given = scene.world.controls[0].max_overlap
     bodies = scene.world.bodies
-    for r in range(scene.contacts.stepping[0].row_count):
-        row = scene.contacts.rows[r]
-        overlap = max(-row.gap_one, -row.gap_two)
-        if row.reach == TOUCHING and overlap > 0.0:
-            side = min(smallest_side(bodies[row.a]), smallest_side(bodies[row.b]))
+    for r in range(scene.contacts.stepping[0].constraint_count):
+        constraint = scene.contacts.constraints[r]
+        overlap = max(-constraint.gap_one, -constraint.gap_two)
+        if constraint.reach == TOUCHING and overlap > 0.0:
+            side = min(smallest_side(bodies[constraint.a]), smallest_side(bodies[constraint.b]))
             if overlap > (given if given > 0.0 else DEEPEST * side):
                 return True
     return False
@@ -122,10 +122,10 @@ def has_excessive_overlap(scene: Nonsmooth) -> bool:
 
 @entry_kernel
 def measure_nonsmooth(scene: Nonsmooth, row: Floats) -> None:
-    """Write one row of the ledger: energies (J) as in `NONSMOOTH_LEDGER`, number of contacts, largest overlap (m)."""
+    """Write one row of the ledger: energies (J) as in `NONSMOOTH_LEDGER`, contacts, largest overlap (m)."""
     row[0] = kinetic_energy(scene.world)
     row[1] = potential_energy(scene.world)
-    row[2], row[3], row[5] = booked(scene.contacts.books)
+    row[2], row[3], row[5] = tallied(scene.contacts.tallies)
     row[4] = correction(scene)
     row[6] = given_to_loads(scene)
     row[7] = scene.world.ledger[0].events

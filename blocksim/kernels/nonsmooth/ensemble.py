@@ -1,12 +1,12 @@
 """Many copies of one scene with different numbers in them, one after the other in one compiled call."""
 
-from blocksim.kernels.arrays import REACHED, Floats, Integers
-from blocksim.kernels.ensemble import member as world_of
-from blocksim.kernels.jit import entry_kernel, rare_kernel
-from blocksim.kernels.nonsmooth.advance import march_alone
+from blocksim.kernels.common.arrays import REACHED, Floats, Integers
+from blocksim.kernels.common.jit import entry_kernel, rare_kernel
+from blocksim.kernels.common.members import member as world_of
+from blocksim.kernels.common.watch import Watched, frame_to_watch, watch
 from blocksim.kernels.nonsmooth.arrays import Contacts, Nonsmooth
 from blocksim.kernels.nonsmooth.energy import measure_nonsmooth
-from blocksim.kernels.watch import Watched, frame_to_watch, watch
+from blocksim.kernels.nonsmooth.step import advance_single
 
 
 @rare_kernel
@@ -16,20 +16,20 @@ def member(scenes: Nonsmooth, m: int) -> Nonsmooth:
     return Nonsmooth(
         world_of(scenes.world, m),
         Contacts(
-            contacts.lines[m],
+            contacts.states[m],
             contacts.before[m],
-            contacts.rows[m],
+            contacts.constraints[m],
             contacts.groups[m],
             contacts.ends[m],
-            contacts.touches[m],
-            contacts.books[m],
+            contacts.materials[m],
+            contacts.tallies[m],
             contacts.impacts[m],
             contacts.asides[m],
             contacts.residuals[m],
             contacts.stepping[m],
         ),
         scenes.kept[m],
-        scenes.spots[m],
+        scenes.listed[m],
         scenes.firsts[m],
         scenes.begins[m],
         scenes.used[m],
@@ -38,9 +38,9 @@ def member(scenes: Nonsmooth, m: int) -> Nonsmooth:
 
 
 @rare_kernel
-def march_member(scene: Nonsmooth, last_step: int) -> int:
+def advance_member(scene: Nonsmooth, last_step: int) -> int:
     """Step one member; see advance."""
-    return march_alone(scene, last_step)
+    return advance_single(scene, last_step)
 
 
 @entry_kernel
@@ -49,16 +49,16 @@ def advance_nonsmooth_members(
 ) -> None:
     """Advance some members from their start to their last step, or to what ends them before.
 
-    As blocksim.kernels.ensemble.advance_members, with rows of `measure_nonsmooth`.
+    As blocksim.kernels.explicit.ensemble.advance_members, with rows of `measure_nonsmooth`.
     """
     for m in members:
         scene = member(scenes, m)
-        codes[m] = march_member(scene, 0)
+        codes[m] = advance_member(scene, 0)
         measure_nonsmooth(scene, starts[m])
         clock = scene.world.clock[0]
         while codes[m] == REACHED and clock.steps < last_steps[m]:
             frame = frame_to_watch(watched, m, clock.steps)
             stop = min(frame, last_steps[m]) if frame > 0 else last_steps[m]
-            codes[m] = march_member(scene, stop)
+            codes[m] = advance_member(scene, stop)
             if clock.steps == frame:
                 watch(scene.world.bodies, watched, m, frame)

@@ -6,11 +6,11 @@ is clipped to its length.
 
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import Record
-from blocksim.kernels.jit import kernel
-from blocksim.kernels.lanes import Lanes, Mask, lesser, select
+from blocksim.kernels.common.arrays import Record
+from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.simd import Lanes, Mask, lesser, select
 from blocksim.kernels.nonsmooth.arrays import FAR
-from blocksim.kernels.nonsmooth.slip import Motion, Rows, slip_of
+from blocksim.kernels.nonsmooth.slip import Constraints, Motion, slip_of
 
 SLIVER = 1e-5  # of the smaller half side: with less between them two points are one
 
@@ -52,9 +52,9 @@ class Block(NamedTuple):
 
 
 class Points(NamedTuple):
-    """A manifold: its row, and its gaps (m), FAR where there is no such point."""
+    """A manifold: its constraint, and its gaps (m), FAR where there is no such point."""
 
-    row: Rows
+    constraint: Constraints
     gap_one: Lanes
     gap_two: Lanes
     is_of_b: Mask  # the reference face is one of body b
@@ -150,7 +150,7 @@ def points_of(face: Face, edge: Edge, a: Block, b: Block, is_of_b: Mask, margin:
     # point one in world axes, on the face
     x = face.x + face.nx * face.distance + face.ny * one
     y = face.y + face.ny * face.distance - face.nx * one
-    row = Rows(
+    constraint = Constraints(
         nx,
         ny,
         (x - a.x) * ny - (y - a.y) * nx,
@@ -159,7 +159,7 @@ def points_of(face: Face, edge: Edge, a: Block, b: Block, is_of_b: Mask, margin:
         (x - a.x) * nx + (y - a.y) * ny,
         (x - b.x) * nx + (y - b.y) * ny,
     )
-    return Points(row, select(is_of_b, right_gap, left_gap), select(is_of_b, left_gap, right_gap), is_of_b)
+    return Points(constraint, select(is_of_b, right_gap, left_gap), select(is_of_b, left_gap, right_gap), is_of_b)
 
 
 @kernel
@@ -181,6 +181,6 @@ def block_ahead(body: Block, vx: Lanes, vy: Lanes, spin: Lanes, ahead: Lanes) ->
 @kernel
 def at_start(points: Points, motion: Motion) -> Points:
     """Return a manifold found ahead of time with the gaps it has now, along its own normal and arms."""
-    slip = slip_of(points.row, motion.vx, motion.vy, motion.spin_a, motion.spin_b)
+    slip = slip_of(points.constraint, motion.vx, motion.vy, motion.spin_a, motion.spin_b)
     gap_one = points.gap_one - motion.ahead * slip.one
-    return Points(points.row, gap_one, points.gap_two - motion.ahead * slip.two, points.is_of_b)
+    return Points(points.constraint, gap_one, points.gap_two - motion.ahead * slip.two, points.is_of_b)

@@ -1,14 +1,15 @@
-"""Rows in fours: the active rows of a step, packed for the registers of a processor, and their impulses brought back.
+"""Active constraints in fours, packed for the registers of a processor, and their impulses brought back.
 
-The rows of a group are of one colour, so they share no free body and can be solved at the same time. A group that is
-not full has its last row several times: all of these copies find the same, so that no lane needs to be left out.
+The constraints of a group are of one colour, so they share no free body and can be solved at the same time. A group
+that is not full has its last constraint several times: all of these copies find the same, so that no lane needs to be
+left out.
 """
 
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import Integers, Record
-from blocksim.kernels.jit import kernel
-from blocksim.kernels.lanes import (
+from blocksim.kernels.common.arrays import Integers, Record
+from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.simd import (
     WIDTH,
     Lane,
     Lanes,
@@ -21,11 +22,11 @@ from blocksim.kernels.lanes import (
     store,
 )
 from blocksim.kernels.nonsmooth.arrays import COLOURS, OPEN, TOUCHING, Contacts
-from blocksim.kernels.nonsmooth.slip import Rows
+from blocksim.kernels.nonsmooth.slip import Constraints
 
 
 class Bodies(NamedTuple):
-    """Four bodies, fields as in LINE."""
+    """Four bodies, fields as in STATE."""
 
     vx: Lanes
     vy: Lanes
@@ -38,9 +39,9 @@ class Bodies(NamedTuple):
 
 
 @kernel
-def rows_of(group: Record, lane: Lane) -> Rows:
-    """Return the rows of a group."""
-    return Rows(
+def constraints_of(group: Record, lane: Lane) -> Constraints:
+    """Return the constraints of a group."""
+    return Constraints(
         load(lane, group.nx),
         load(lane, group.ny),
         load(lane, group.arm_a),
@@ -54,25 +55,25 @@ def rows_of(group: Record, lane: Lane) -> Rows:
 @kernel
 def bodies_at(contacts: Contacts, places: Integers, lane: Lane) -> Bodies:
     """Return the bodies of a group."""
-    vx, vy, spin, inverse_mass = fields_0(lane, contacts.lines, places)
-    inverse_inertia, dx, dy, turned = fields_4(lane, contacts.lines, places)
+    vx, vy, spin, inverse_mass = fields_0(lane, contacts.states, places)
+    inverse_inertia, dx, dy, turned = fields_4(lane, contacts.states, places)
     return Bodies(vx, vy, spin, inverse_mass, inverse_inertia, dx, dy, turned)
 
 
 @kernel
-def touch_of(contacts: Contacts, group: Record, k: int) -> Record:
-    """Return how the bodies of one row of a group interact."""
-    return contacts.touches[contacts.rows[group.row[k]].touch]
+def material_of(contacts: Contacts, group: Record, k: int) -> Record:
+    """Return how the bodies of one constraint of a group interact."""
+    return contacts.materials[contacts.constraints[group.constraint[k]].material]
 
 
 @kernel
 def gather(contacts: Contacts, begins: Integers) -> None:
-    """Make groups of the rows within the margin, colour after colour.
+    """Make groups of the constraints within the margin, colour after colour.
 
     Those that touch come first, so that groups of which none does can be passed by.
     """
     stepping = contacts.stepping[0]
-    rows = contacts.rows
+    constraints = contacts.constraints
     count = 0
     number = 0
     for colour in range(stepping.colours):
@@ -81,8 +82,8 @@ def gather(contacts: Contacts, begins: Integers) -> None:
         lane = 0
         for reach in (TOUCHING, OPEN):
             for r in range(begins[colour], begins[colour + 1]):
-                if rows[r].reach == reach:
-                    contacts.groups[number].row[lane] = r
+                if constraints[r].reach == reach:
+                    contacts.groups[number].constraint[lane] = r
                     lane += 1
                     count += 1
                     if lane == most:
@@ -99,15 +100,15 @@ def gather(contacts: Contacts, begins: Integers) -> None:
 
 @kernel
 def close(group: Record, count: int) -> None:
-    """Fill a group of `count` rows up with the last one."""
+    """Fill a group of `count` constraints up with the last one."""
     group.count = count
     for lane in range(count, WIDTH):
-        group.row[lane] = group.row[count - 1]
+        group.constraint[lane] = group.constraint[count - 1]
 
 
 @kernel
 def pack_groups(contacts: Contacts, begin: int, end: int) -> None:
-    """Copy the rows of some groups into them."""
+    """Copy the constraints of some groups into them."""
     for m in range(begin, end):
         group = contacts.groups[m]
         if group.count == 1:
@@ -116,23 +117,23 @@ def pack_groups(contacts: Contacts, begin: int, end: int) -> None:
             pack(contacts, group, None)
         group.are_simple = 1
         for lane in range(1 if group.count == 1 else WIDTH):
-            row = contacts.rows[group.row[lane]]
-            group.a[lane] = row.a
-            group.b[lane] = row.b
-            touch = contacts.touches[row.touch]
-            group.friction[lane] = touch.kinetic_friction
-            group.restitution[lane] = touch.restitution
-            if touch.static_friction != touch.kinetic_friction:
+            constraint = contacts.constraints[group.constraint[lane]]
+            group.a[lane] = constraint.a
+            group.b[lane] = constraint.b
+            material = contacts.materials[constraint.material]
+            group.friction[lane] = material.kinetic_friction
+            group.restitution[lane] = material.restitution
+            if material.static_friction != material.kinetic_friction:
                 group.are_simple = 0
 
 
 @kernel
 def pack(contacts: Contacts, group: Record, lane: Lane) -> None:
-    """Copy the numbers of the rows of a group into it."""
-    nx, ny, arm_a, arm_b = fields_0(lane, contacts.rows, group.row)
-    width, shear_arm_a, shear_arm_b, gap_one = fields_4(lane, contacts.rows, group.row)
-    gap_two, normal_one, normal_two, shear = fields_8(lane, contacts.rows, group.row)
-    bend, shear_bend, _, _ = fields_12(lane, contacts.rows, group.row)
+    """Copy the numbers of the constraints of a group into it."""
+    nx, ny, arm_a, arm_b = fields_0(lane, contacts.constraints, group.constraint)
+    width, shear_arm_a, shear_arm_b, gap_one = fields_4(lane, contacts.constraints, group.constraint)
+    gap_two, normal_one, normal_two, shear = fields_8(lane, contacts.constraints, group.constraint)
+    bend, shear_bend, _, _ = fields_12(lane, contacts.constraints, group.constraint)
     store(lane, group.bend, bend)
     store(lane, group.shear_bend, shear_bend)
     store(lane, group.nx, nx)
@@ -151,14 +152,14 @@ def pack(contacts: Contacts, group: Record, lane: Lane) -> None:
 
 @kernel
 def unpack_groups(contacts: Contacts, begin: int, end: int) -> None:
-    """Bring the impulses of some groups back to their rows."""
+    """Bring the impulses of some groups back to their constraints."""
     for m in range(begin, end):
         group = contacts.groups[m]
         for lane in range(group.count):
-            row = contacts.rows[group.row[lane]]
-            row.normal_one = group.normal_one[lane]
-            row.normal_two = group.normal_two[lane]
-            row.shear = group.shear[lane]
+            constraint = contacts.constraints[group.constraint[lane]]
+            constraint.normal_one = group.normal_one[lane]
+            constraint.normal_two = group.normal_two[lane]
+            constraint.shear = group.shear[lane]
 
 
 @kernel

@@ -8,7 +8,7 @@ are hit, with u as it is then:
     0 <= lambda  complementary to  J v + e u >= 0
 
 Points that touched when the substep began and neither approach nor part push back at once (target zero): blocks that
-press on one another are struck as one. All other points wait until they are hit in a round to come. Rounds continue
+press on one another are struck as one. All other points wait until they are hit in a later round. Rounds continue
 until nothing approaches; then gravity and what rests are solved as ever, and points that were hit keep their rebound.
 
 Without friction the energy of a round changes by -(1 - e) / 2 sum(lambda |u|): none is created, and with e = 1 none is
@@ -19,8 +19,9 @@ creates none: with lambda_n t = 0 and friction against the slip that is left the
 energy that it had: restraint.py.
 """
 
-from blocksim.kernels.arrays import TEAM_SIZE, Integers, Record, Records
-from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.common.arrays import TEAM_SIZE, Integers, Record, Records
+from blocksim.kernels.common.barrier import barrier
+from blocksim.kernels.common.jit import rare_kernel
 from blocksim.kernels.nonsmooth.arrays import Contacts
 from blocksim.kernels.nonsmooth.clusters import find_clusters, weigh
 from blocksim.kernels.nonsmooth.iterate import VELOCITY, agree, velocity_pass
@@ -31,13 +32,12 @@ from blocksim.kernels.nonsmooth.restraint import (
     judge,
     keep_all,
     keep_bodies,
-    keep_rows,
+    keep_constraints,
     settle_bodies,
-    settle_rows,
+    settle_constraints,
 )
-from blocksim.kernels.nonsmooth.rounds import aim_rest, aim_round, book_round, bring_back, set_aside
+from blocksim.kernels.nonsmooth.rounds import aim_rest, aim_round, bring_back, set_aside, tally_round
 from blocksim.kernels.nonsmooth.sweeps import part_of
-from blocksim.kernels.team import meet
 
 MOST_ROUNDS = 100  # what approaches then does not rebound
 MOST_TRIES = 30  # shares of rebounds; what energy is left then is made up between the last two
@@ -56,11 +56,11 @@ def rewind(contacts: Contacts, first: int, last: int) -> None:
     """Bring the bodies of clusters that are hit back to their velocities before the substep."""
     for i in range(first, last):
         if contacts.impacts[i].is_hit:
-            line = contacts.lines[i]
+            state = contacts.states[i]
             before = contacts.before[i]
-            line.vx = before.vx
-            line.vy = before.vy
-            line.spin = before.spin
+            state.vx = before.vx
+            state.vy = before.vy
+            state.spin = before.spin
 
 
 @rare_kernel
@@ -68,10 +68,10 @@ def note(contacts: Contacts, first: int, last: int) -> None:
     """Keep the velocities at the start of a round; those of supports too."""
     for i in range(first, last):
         body = contacts.impacts[i]
-        line = contacts.lines[i]
-        body.vx = line.vx
-        body.vy = line.vy
-        body.spin = line.spin
+        state = contacts.states[i]
+        body.vx = state.vx
+        body.vy = state.vy
+        body.spin = state.spin
 
 
 @rare_kernel
@@ -80,10 +80,10 @@ def undo(contacts: Contacts, first: int, last: int) -> None:
     for i in range(first, last):
         body = contacts.impacts[i]
         if body.is_hit:
-            line = contacts.lines[i]
-            body.after_vx, line.vx = line.vx, body.vx
-            body.after_vy, line.vy = line.vy, body.vy
-            body.after_spin, line.spin = line.spin, body.spin
+            state = contacts.states[i]
+            body.after_vx, state.vx = state.vx, body.vx
+            body.after_vy, state.vy = state.vy, body.vy
+            body.after_spin, state.spin = state.spin, body.spin
 
 
 @rare_kernel
@@ -91,13 +91,13 @@ def resume(contacts: Contacts, first: int, last: int, gx: float, gy: float) -> N
     """Let the substep of the bodies of clusters that were hit begin after the last impact, with gravity (m/s)."""
     for i in range(first, last):
         if contacts.impacts[i].is_hit:
-            line = contacts.lines[i]
+            state = contacts.states[i]
             before = contacts.before[i]
-            before.vx = line.vx
-            before.vy = line.vy
-            before.spin = line.spin
-            line.vx += gx
-            line.vy += gy
+            before.vx = state.vx
+            before.vy = state.vy
+            before.spin = state.spin
+            state.vx += gx
+            state.vy += gy
 
 
 @rare_kernel
@@ -106,24 +106,24 @@ def restrain(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int]
     stepping = contacts.stepping[0]
     keep_all(contacts, groups[0], groups[1])
     undo(contacts, bodies[0], bodies[1])
-    meet(team)
+    barrier(team)
     if k == 0:
         begin_search(contacts)
-    meet(team)
+    barrier(team)
     for number in range(MOST_TRIES):
         aim_share(contacts, groups[0], groups[1])
-        meet(team)
+        barrier(team)
         velocity_pass(contacts, team, k, VELOCITY, tolerance_of(stepping))
-        meet(team)
+        barrier(team)
         if k == 0:
             stepping.has_gain = judge(contacts, number == MOST_TRIES - 1)
-        meet(team)
-        keep_rows(contacts, groups[0], groups[1])
+        barrier(team)
+        keep_constraints(contacts, groups[0], groups[1])
         keep_bodies(contacts, bodies[0], bodies[1])
-        meet(team)
+        barrier(team)
         if not stepping.has_gain:
             break
-    settle_rows(contacts, groups[0], groups[1])
+    settle_constraints(contacts, groups[0], groups[1])
     settle_bodies(contacts, bodies[0], bodies[1])
 
 
@@ -131,13 +131,13 @@ def restrain(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int]
 def go_round(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int], groups: tuple[int, int]) -> None:
     """Solve one round that has been aimed."""
     velocity_pass(contacts, team, k, VELOCITY, tolerance_of(contacts.stepping[0]))
-    meet(team)
+    barrier(team)
     if k == 0:
         contacts.stepping[0].has_gain = weigh(contacts)
-    meet(team)
+    barrier(team)
     if contacts.stepping[0].has_gain:
         restrain(contacts, team, k, bodies, groups)
-        meet(team)
+        barrier(team)
 
 
 @rare_kernel
@@ -152,10 +152,10 @@ def follow_impacts(
     groups = part_of(0, stepping.group_count, k, team[TEAM_SIZE])
     if k == 0:
         find_clusters(contacts)
-    meet(team)
+    barrier(team)
     rewind(contacts, bodies[0], bodies[1])
     set_aside(contacts, groups[0], groups[1])
-    meet(team)
+    barrier(team)
     for number in range(MOST_ROUNDS):
         note(contacts, bodies[0], bodies[1] + (k == team[TEAM_SIZE] - 1))  # the ground, which may move, is the last
         hits = aim_round(contacts, groups[0], groups[1], number == 0)
@@ -163,14 +163,14 @@ def follow_impacts(
             break
         go_round(contacts, team, k, bodies, groups)
         lacks = 2.0 * stepping.lag  # once before the round, once after it
-        book_round(contacts, groups[0], groups[1], lacks * stepping.fall_x, lacks * stepping.fall_y)
-        meet(team)
+        tally_round(contacts, groups[0], groups[1], lacks * stepping.fall_x, lacks * stepping.fall_y)
+        barrier(team)
     resume(contacts, bodies[0], bodies[1], share * stepping.fall_x, share * stepping.fall_y)
     if pushes.size > 1:
         kick_again(contacts, pushes, bodies[0], bodies[1], share)
-    meet(team)
+    barrier(team)
     aim_rest(contacts, groups[0], groups[1])
-    meet(team)
+    barrier(team)
     velocity_pass(contacts, team, k, VELOCITY, min(tolerance_of(stepping), stepping.tolerance))
     bring_back(contacts, groups[0], groups[1], False)
-    meet(team)
+    barrier(team)

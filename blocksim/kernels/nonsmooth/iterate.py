@@ -2,17 +2,17 @@
 
 import math
 
-from blocksim.kernels.arrays import TEAM_SIZE, Integers
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.common.arrays import TEAM_SIZE, Integers
+from blocksim.kernels.common.barrier import barrier
+from blocksim.kernels.common.jit import kernel
 from blocksim.kernels.nonsmooth.arrays import COLOURS, Contacts
 from blocksim.kernels.nonsmooth.sweeps import (
-    first_velocity_rows,
+    first_velocity_constraints,
     part_of,
-    position_rows,
-    velocity_rows,
-    warm_rows,
+    position_constraints,
+    velocity_constraints,
+    warm_constraints,
 )
-from blocksim.kernels.team import meet
 
 WARM, POSITION, FIRST_VELOCITY, VELOCITY = range(4)
 
@@ -21,13 +21,13 @@ WARM, POSITION, FIRST_VELOCITY, VELOCITY = range(4)
 def go_through(contacts: Contacts, task: int, begin: int, end: int) -> float:
     """Do one task for some groups; return the largest change of velocity (m/s) where it is of interest."""
     if task == WARM:
-        warm_rows(contacts, begin, end)
+        warm_constraints(contacts, begin, end)
     elif task == POSITION:
-        position_rows(contacts, begin, end)
+        position_constraints(contacts, begin, end)
     elif task == FIRST_VELOCITY:
-        return first_velocity_rows(contacts, begin, end)
+        return first_velocity_constraints(contacts, begin, end)
     else:
-        return velocity_rows(contacts, begin, end)
+        return velocity_constraints(contacts, begin, end)
     return 0.0
 
 
@@ -42,19 +42,19 @@ def sweep(contacts: Contacts, task: int, team: Integers, k: int) -> float:
             first, last = part_of(begin, end, k, 1 if colour == COLOURS - 1 else size)
             if colour < COLOURS - 1 or k == 0:
                 largest = max(largest, go_through(contacts, task, first, last))
-            meet(team)
+            barrier(team)
     return largest
 
 
 @kernel
 def agree(contacts: Contacts, team: Integers, k: int, number: int, largest: float) -> float:
-    """Return the largest of what all threads have found; `number` tells one question from the next."""
+    """Return the largest of what all threads have found; `number` distinguishes one question from the next."""
     size = team[TEAM_SIZE]
     if size == 1:
         return largest
     slot = number % 2
     contacts.residuals[slot, 8 * k] = largest
-    meet(team)
+    barrier(team)
     for other in range(size):
         largest = max(largest, contacts.residuals[slot, 8 * other])
     return largest

@@ -5,9 +5,9 @@ velocities before and after it. What the kick brings a body is its impulse times
 after the substep, contacts included; so their work adds up exactly, see energy.py.
 """
 
-from blocksim.kernels.arrays import LOAD_FORCE, Records, World
-from blocksim.kernels.jit import rare_kernel
-from blocksim.kernels.loads import acceleration_at, accelerations
+from blocksim.kernels.common.arrays import LOAD_FORCE, Records, World
+from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.common.loads import acceleration_at, accelerations
 from blocksim.kernels.nonsmooth.arrays import Contacts, Nonsmooth
 from blocksim.kernels.nonsmooth.motion import IN_FLIGHT
 
@@ -33,16 +33,16 @@ def kick_by_loads(scene: Nonsmooth, number: int, first: int, last: int, share: f
     """
     h = scene.contacts.stepping[0].substep
     time = scene.world.clock[0].steps * scene.world.controls[0].step + number * h
-    accelerations(scene.world, scene.contacts.lines, scene.pushes, first, last, time)
+    accelerations(scene.world, scene.contacts.states, scene.pushes, first, last, time)
     new = share * h
     old = last_share * h
     for i in range(first, last):
-        line = scene.contacts.lines[i]
+        state = scene.contacts.states[i]
         one = scene.pushes[i]
-        if line.inverse_mass > 0.0:
-            line.vx += new * one.ax - old * one.last_ax
-            line.vy += new * one.ay - old * one.last_ay
-            line.spin += new * one.rate - old * one.last_rate
+        if state.inverse_mass > 0.0:
+            state.vx += new * one.ax - old * one.last_ax
+            state.vy += new * one.ay - old * one.last_ay
+            state.spin += new * one.rate - old * one.last_rate
 
 
 @rare_kernel
@@ -50,25 +50,25 @@ def kick_again(contacts: Contacts, pushes: Records, first: int, last: int, share
     """Add the kick of loads to bodies of clusters that were hit, whose substep begins after the last impact."""
     kick = share * contacts.stepping[0].substep
     for i in range(first, last):
-        if contacts.impacts[i].is_hit and contacts.lines[i].inverse_mass > 0.0:
-            line = contacts.lines[i]
-            line.vx += kick * pushes[i].ax
-            line.vy += kick * pushes[i].ay
-            line.spin += kick * pushes[i].rate
+        if contacts.impacts[i].is_hit and contacts.states[i].inverse_mass > 0.0:
+            state = contacts.states[i]
+            state.vx += kick * pushes[i].ax
+            state.vy += kick * pushes[i].ay
+            state.spin += kick * pushes[i].rate
 
 
 @rare_kernel
-def book_loads(scene: Nonsmooth, first: int, last: int, share: float) -> None:
-    """Book what loads have brought the bodies from `first` to before `last` in a substep with that share of a kick."""
+def tally_loads(scene: Nonsmooth, first: int, last: int, share: float) -> None:
+    """Tally what loads have brought the bodies from `first` to before `last` in a substep with that share of a kick."""
     half = 0.5 * share * scene.contacts.stepping[0].substep
     for i in range(first, last):
-        line = scene.contacts.lines[i]
-        if line.inverse_mass > 0.0:
+        state = scene.contacts.states[i]
+        if state.inverse_mass > 0.0:
             body = scene.world.bodies[i]
             before = scene.contacts.before[i]
             one = scene.pushes[i]
-            along = one.ax * (before.vx + line.vx) + one.ay * (before.vy + line.vy)
-            turning = one.rate * (before.spin + line.spin)
+            along = one.ax * (before.vx + state.vx) + one.ay * (before.vy + state.vy)
+            turning = one.rate * (before.spin + state.spin)
             one.work += half * (body.mass * along + body.inertia * turning)
 
 
@@ -81,15 +81,15 @@ def show_velocities(scene: Nonsmooth, first: int, last: int, share: float) -> No
     h = scene.contacts.stepping[0].substep
     controls = scene.world.controls[0]
     for i in range(first, last):
-        line = scene.contacts.lines[i]
-        if line.inverse_mass > 0.0:
+        state = scene.contacts.states[i]
+        if state.inverse_mass > 0.0:
             body = scene.world.bodies[i]
             before = scene.contacts.before[i]
             one = scene.pushes[i]
             kx = h * (controls.gravity_x + one.ax)
             ky = h * (controls.gravity_y + one.ay)
-            off = abs(line.vx - before.vx - share * kx) + abs(line.vy - before.vy - share * ky)
+            off = abs(state.vx - before.vx - share * kx) + abs(state.vy - before.vy - share * ky)
             flies = off <= IN_FLIGHT * (abs(kx) + abs(ky))
-            body.vx = line.vx + (0.5 * kx if flies else 0.0)
-            body.vy = line.vy + (0.5 * ky if flies else 0.0)
-            body.spin = line.spin + (0.5 * h * one.rate if flies else 0.0)
+            body.vx = state.vx + (0.5 * kx if flies else 0.0)
+            body.vy = state.vy + (0.5 * ky if flies else 0.0)
+            body.spin = state.spin + (0.5 * h * one.rate if flies else 0.0)

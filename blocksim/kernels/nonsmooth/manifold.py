@@ -3,7 +3,7 @@
 Of all faces the reference is the one beyond which the other body reaches least (separating axes). This is about
 rectangles, four pairs at a time; polygons: polygons.py.
 
-Contacts that press are looked for where the bodies will be half a step ahead: normals and arms are then those of the
+Contacts that press are sought where the bodies will be half a step ahead: normals and arms are then those of the
 middle of the step for which they are kept, so that turning about an edge and sliding along a slope are right to second
 order in the step. Their gaps are those at the start, along the same normal and arms. Contacts to come are taken as they
 are: bodies that meet half a step too deep would be taken for neighbours side by side.
@@ -11,9 +11,10 @@ are: bodies that meet half a step too deep would be taken for neighbours side by
 
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import ALL, OUTLINE, Record, Records
-from blocksim.kernels.jit import kernel, rare_kernel
-from blocksim.kernels.lanes import (
+from blocksim.kernels.common.arrays import ALL, OUTLINE, Record, Records
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.outlines import hull_of
+from blocksim.kernels.common.simd import (
     WIDTH,
     Lanes,
     Mask,
@@ -30,7 +31,6 @@ from blocksim.kernels.lanes import (
     write_fields_8,
 )
 from blocksim.kernels.nonsmooth.arrays import AWAY, OPEN, TOUCHING, Contacts
-from blocksim.kernels.nonsmooth.bends import bend_of
 from blocksim.kernels.nonsmooth.faces import (
     Block,
     Points,
@@ -43,10 +43,10 @@ from blocksim.kernels.nonsmooth.faces import (
     opposite_edge,
     points_of,
 )
+from blocksim.kernels.nonsmooth.gap_curvature import bend_of
 from blocksim.kernels.nonsmooth.pieces import points_on_ground, points_on_piece
 from blocksim.kernels.nonsmooth.polygons import corners_on_ground, follow_corners, points_of_polygons
 from blocksim.kernels.nonsmooth.slip import Motion
-from blocksim.kernels.outlines import hull_of
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller half side: two faces that face each other over less are passed by
@@ -55,7 +55,7 @@ TURNED = 0.906307787036650  # cosine of 25 degrees
 
 
 class Place(NamedTuple):
-    """Where and when contacts of a pair are looked for."""
+    """Where and when contacts of a pair are sought."""
 
     margin: float  # m
     ahead: float  # s: those that press
@@ -64,23 +64,23 @@ class Place(NamedTuple):
 
 
 @kernel
-def write_points(row: Record, points: Points, motion: Motion) -> None:
-    """Write a manifold into a row. Impulses along another normal are forgotten."""
-    found = points.row
-    if found.nx * row.nx + found.ny * row.ny < TURNED:
-        row.normal_one = row.normal_two = row.shear = 0.0
-    row.nx = found.nx
-    row.ny = found.ny
-    row.arm_a = found.arm_a
-    row.arm_b = found.arm_b
-    row.width = found.width
-    row.shear_arm_a = found.shear_arm_a
-    row.shear_arm_b = found.shear_arm_b
-    row.gap_one = points.gap_one
-    row.gap_two = points.gap_two
-    bend = bend_of(found, motion, points.is_of_b, row.normal_two > row.normal_one)
-    row.bend = bend.normal
-    row.shear_bend = bend.shear
+def write_points(constraint: Record, points: Points, motion: Motion) -> None:
+    """Write a manifold into a constraint. Impulses along another normal are forgotten."""
+    found = points.constraint
+    if found.nx * constraint.nx + found.ny * constraint.ny < TURNED:
+        constraint.normal_one = constraint.normal_two = constraint.shear = 0.0
+    constraint.nx = found.nx
+    constraint.ny = found.ny
+    constraint.arm_a = found.arm_a
+    constraint.arm_b = found.arm_b
+    constraint.width = found.width
+    constraint.shear_arm_a = found.shear_arm_a
+    constraint.shear_arm_b = found.shear_arm_b
+    constraint.gap_one = points.gap_one
+    constraint.gap_two = points.gap_two
+    bend = bend_of(found, motion, points.is_of_b, constraint.normal_two > constraint.normal_one)
+    constraint.bend = bend.normal
+    constraint.shear_bend = bend.shear
 
 
 @kernel
@@ -111,7 +111,7 @@ def chosen(is_one: Mask, one: Block, two: Block) -> Block:
 def points_of_blocks(a: Block, b: Block, margin: float) -> tuple[Points, Mask]:
     """Return the contact manifold of two blocks within the margin (m), and whether there is one.
 
-    Which faces meet no processor can guess, so that nothing branches.
+    No processor can predict which faces meet, so the code has no branches.
     """
     dx = a.x - b.x
     dy = a.y - b.y
@@ -140,107 +140,116 @@ def points_of_blocks(a: Block, b: Block, margin: float) -> tuple[Points, Mask]:
 
 
 @kernel
-def reach_of(row: Record) -> int:
-    """Return True if a row within the margin has a point that touches or pressed in the last substep."""
-    is_touching = min(row.gap_one, row.gap_two) <= 0.0 or row.normal_one > 0.0 or row.normal_two > 0.0
+def reach_of(constraint: Record) -> int:
+    """Return True if a constraint within the margin has a point that touches or pressed in the last substep."""
+    is_touching = (
+        min(constraint.gap_one, constraint.gap_two) <= 0.0 or constraint.normal_one > 0.0 or constraint.normal_two > 0.0
+    )
     return TOUCHING if is_touching else OPEN
 
 
 @kernel
 def blocks_at(
-    bodies: Records, lines: Records, places: tuple[int, int, int, int], ahead: Lanes
+    bodies: Records, states: Records, places: tuple[int, int, int, int], ahead: Lanes
 ) -> tuple[Block, Lanes, Lanes, Lanes]:
     """Return four blocks as they will be a time `ahead` (s), and their velocities (m/s, m/s, rad/s)."""
     x, y, _, cos = fields_0(None, bodies, places)
     sin, _, _, _ = fields_4(None, bodies, places)
     _, _, half_x, half_y = fields_16(None, bodies, places)
-    vx, vy, spin, _ = fields_0(None, lines, places)
+    vx, vy, spin, _ = fields_0(None, states, places)
     return block_ahead(Block(x, y, cos, sin, half_x, half_y), vx, vy, spin, ahead), vx, vy, spin
 
 
 @kernel
 def collide_four(contacts: Contacts, bodies: Records, first: int, ahead: float) -> None:
-    """Find the contact manifolds of four pairs of blocks, from row `first` on, those that press a time `ahead` (s)."""
-    rows = contacts.rows
+    """Find the manifolds of four pairs of blocks from constraint `first` on; those that press a time `ahead` (s)."""
+    constraints = contacts.constraints
     places = (first, first + 1, first + 2, first + 3)
-    one, two, three, four = rows[first], rows[first + 1], rows[first + 2], rows[first + 3]
-    _, normal_one, normal_two, _ = fields_8(None, rows, places)
+    one, two, three, four = constraints[first], constraints[first + 1], constraints[first + 2], constraints[first + 3]
+    _, normal_one, normal_two, _ = fields_8(None, constraints, places)
     are_pressed = normal_one + normal_two > 0.0
     times = select(are_pressed, ahead, 0.0)
     half = select(are_pressed, 0.5 * contacts.stepping[0].substep, 0.0)
-    a, vx_a, vy_a, spin_a = blocks_at(bodies, contacts.lines, (one.a, two.a, three.a, four.a), times)
-    b, vx_b, vy_b, spin_b = blocks_at(bodies, contacts.lines, (one.b, two.b, three.b, four.b), times)
+    a, vx_a, vy_a, spin_a = blocks_at(bodies, contacts.states, (one.a, two.a, three.a, four.a), times)
+    b, vx_b, vy_b, spin_b = blocks_at(bodies, contacts.states, (one.b, two.b, three.b, four.b), times)
     points, is_near = points_of_blocks(a, b, contacts.stepping[0].margin)
     motion = Motion(vx_a - vx_b, vy_a - vy_b, spin_a, spin_b, times, half)
-    write_four(rows, places, at_start(points, motion), motion, is_near)
+    write_four(constraints, places, at_start(points, motion), motion, is_near)
 
 
 @kernel
-def write_four(rows: Records, places: tuple[int, int, int, int], points: Points, motion: Motion, is_near: Mask) -> None:
-    """Write the manifolds of four rows; without one the impulses are forgotten."""
-    found = points.row
-    nx, ny, _, _ = fields_0(None, rows, places)
-    _, normal_one, normal_two, shear = fields_8(None, rows, places)
+def write_four(
+    constraints: Records, places: tuple[int, int, int, int], points: Points, motion: Motion, is_near: Mask
+) -> None:
+    """Write the manifolds of four constraints; without one the impulses are forgotten."""
+    found = points.constraint
+    nx, ny, _, _ = fields_0(None, constraints, places)
+    _, normal_one, normal_two, shear = fields_8(None, constraints, places)
     are_kept = is_near & (found.nx * nx + found.ny * ny >= TURNED)
     normal_one = select(are_kept, normal_one, 0.0)
     normal_two = select(are_kept, normal_two, 0.0)
     shear = select(are_kept, shear, 0.0)
     are_all = abs(found.width) >= 0.0
-    write_fields_0(None, rows, places, are_all, (found.nx, found.ny, found.arm_a, found.arm_b))
+    write_fields_0(None, constraints, places, are_all, (found.nx, found.ny, found.arm_a, found.arm_b))
     columns = (found.width, found.shear_arm_a, found.shear_arm_b, points.gap_one)
-    write_fields_4(None, rows, places, are_all, columns)
-    write_fields_8(None, rows, places, are_all, (points.gap_two, normal_one, normal_two, shear))
+    write_fields_4(None, constraints, places, are_all, columns)
+    write_fields_8(None, constraints, places, are_all, (points.gap_two, normal_one, normal_two, shear))
     bend = bend_of(found, motion, points.is_of_b, normal_two > normal_one)
     is_touching = (lesser(points.gap_one, points.gap_two) <= 0.0) | (greater(normal_one, normal_two) > 0.0)
     reach = select(is_near, select(is_touching, 1.0 * TOUCHING, 1.0 * OPEN), 1.0 * AWAY)
-    one, two, three, four = rows[places[0]], rows[places[1]], rows[places[2]], rows[places[3]]
+    one, two, three, four = (
+        constraints[places[0]],
+        constraints[places[1]],
+        constraints[places[2]],
+        constraints[places[3]],
+    )
     one.bend, two.bend, three.bend, four.bend = split(bend.normal)
     one.shear_bend, two.shear_bend, three.shear_bend, four.shear_bend = split(bend.shear)
     one.reach, two.reach, three.reach, four.reach = split(reach)
 
 
 @kernel
-def are_four_of_blocks(rows: Records, first: int, bodies: Records) -> bool:
-    """Return True if four pairs, from row `first` on, are of blocks only, not of pieces of ground or the ground."""
+def are_four_of_blocks(constraints: Records, first: int, bodies: Records) -> bool:
+    """Return True if four pairs, from constraint `first` on, are of blocks only, none of ground."""
     for r in range(first, first + WIDTH):
-        row = rows[r]
-        if row.b == bodies.size - 1 or bodies[row.a].faces != ALL or bodies[row.b].faces != ALL:
+        constraint = constraints[r]
+        if constraint.b == bodies.size - 1 or bodies[constraint.a].faces != ALL or bodies[constraint.b].faces != ALL:
             return False
     return True
 
 
 @rare_kernel
 def collide(
-    row: Record, a: Record, b: Record, line_a: Record, line_b: Record, place: Place, corners: Records | None
+    constraint: Record, a: Record, b: Record, line_a: Record, line_b: Record, place: Place, corners: Records | None
 ) -> None:
     """Find the contact manifold of a pair; without one its impulses are forgotten.
 
     `corners` are those of all polygons; where there are none, the compiler leaves them out altogether.
     """
-    is_pressed = row.normal_one + row.normal_two > 0.0
+    is_pressed = constraint.normal_one + constraint.normal_two > 0.0
     ahead = place.ahead if is_pressed else 0.0
     one = block_ahead(block_of(a), line_a.vx, line_a.vy, line_a.spin, ahead)
     two = block_ahead(block_of(b), line_b.vx, line_b.vy, line_b.spin, ahead)
-    points, is_near = points_of_pair(row, a, one, b, two, place, corners)
+    points, is_near = points_of_pair(constraint, a, one, b, two, place, corners)
     if is_near:
         half = place.half if is_pressed else 0.0
         motion = Motion(line_a.vx - line_b.vx, line_a.vy - line_b.vy, line_a.spin, line_b.spin, ahead, half)
-        write_points(row, at_start(points, motion), motion)
-        row.reach = reach_of(row)
+        write_points(constraint, at_start(points, motion), motion)
+        constraint.reach = reach_of(constraint)
     else:
-        row.normal_one = row.normal_two = row.shear = 0.0
-        row.reach = AWAY
+        constraint.normal_one = constraint.normal_two = constraint.shear = 0.0
+        constraint.reach = AWAY
 
 
 @kernel
 def points_of_pair(
-    row: Record, a: Record, one: Block, b: Record, two: Block, place: Place, corners: Records | None
+    constraint: Record, a: Record, one: Block, b: Record, two: Block, place: Place, corners: Records | None
 ) -> tuple[Points, bool]:
     """Return the contact manifold of two bodies, that are in `one` and `two`, and whether there is one."""
     if corners is None:
         return points_of_rectangles(a, one, b, two, place)
     if a.faces == OUTLINE or b.faces == OUTLINE:
-        return points_with_polygon(row, a, one, b, two, place, corners)
+        return points_with_polygon(constraint, a, one, b, two, place, corners)
     return points_of_rectangles(a, one, b, two, place)
 
 
@@ -258,7 +267,7 @@ def points_of_rectangles(a: Record, one: Block, b: Record, two: Block, place: Pl
 
 @kernel
 def points_with_polygon(
-    row: Record, a: Record, one: Block, b: Record, two: Block, place: Place, corners: Records
+    constraint: Record, a: Record, one: Block, b: Record, two: Block, place: Place, corners: Records
 ) -> tuple[Points, bool]:
     """Return the contact manifold of a polygon and another, a rectangle or the ground, and whether there is one."""
     hull_a = hull_of(a, corners)
@@ -266,7 +275,7 @@ def points_with_polygon(
     if hull_a.size > 0 and hull_b.size > 0:
         found = points_of_polygons(one, hull_a, two, hull_b, place.margin)
         if found.is_near:
-            follow_corners(row, found.one, found.two)
+            follow_corners(constraint, found.one, found.two)
         return found.points, found.is_near
     is_first = hull_a.size > 0
     if place.is_ground:
@@ -277,5 +286,5 @@ def points_with_polygon(
         points, is_near = points_on_piece(two, hull_b, one, a.corners, False, place.margin)
     if is_near:
         first, second = corners_on_ground(points, one if is_first else two, hull_a if is_first else hull_b, is_first)
-        follow_corners(row, first, second)
+        follow_corners(constraint, first, second)
     return points, is_near

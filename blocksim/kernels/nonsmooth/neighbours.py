@@ -1,10 +1,10 @@
-"""The pair list: when it has to be made again, and who is in it.
+"""The pair list: when it has to be rebuilt, and what is in it.
 
 Every body looks for neighbours within its reach: farther where it is faster, so that a few that fly do not have the
-list of all made again at every step. A pair is listed where two reaches meet, and the list is good until a body has
-used up its own, less what it may move in the step to come.
+whole list rebuilt at every step. A pair is listed where two reaches meet, and the list is good until a body has
+used up its own, less what it may move in the next step.
 
-Bodies that all move alike come no nearer to each other, and over level ground only their way down counts. So travel is
+Bodies that all move alike come no nearer to each other, and over level ground only their descent counts. So travel is
 measured against the mean motion along x, unless something fixed stands in its way: then against that of the supports,
 which are at rest or move together.
 """
@@ -12,21 +12,21 @@ which are at rest or move together.
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import Record
-from blocksim.kernels.broad_phase import bucket, cell_of, fill_grid
-from blocksim.kernels.driven import way_over
-from blocksim.kernels.geometry import ground_gap, separation
-from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.common.arrays import Record
+from blocksim.kernels.common.driven import way_over
+from blocksim.kernels.common.geometry import ground_gap, separation
+from blocksim.kernels.common.grid import bucket, cell_of, fill_grid
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.supports import has_motion, is_driven
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-from blocksim.kernels.nonsmooth.colours import colour_pairs, keep_impulses, most_groups, place_rows
-from blocksim.kernels.support import has_motion, is_driven
+from blocksim.kernels.nonsmooth.colours import colour_pairs, keep_impulses, most_groups, place_constraints
 
 STEPS = 16.0  # that a body should be able to continue before its reach is used up
 MOST_MARGIN = 0.5  # of the least reach of two bodies
 
 
 class Frame(NamedTuple):
-    """Motion that brings nobody nearer to anything: way since the list was made (m), and velocity (m/s)."""
+    """Motion that brings no two bodies nearer: displacement since the list was built (m), and velocity (m/s)."""
 
     x: float
     y: float
@@ -53,7 +53,7 @@ def common_frame(scene: Nonsmooth) -> Frame:
         body = bodies[i]
         if body.inverse_mass == 0.0:
             return frame_of_supports(scene)
-        way += body.x - scene.spots[i].x
+        way += body.x - scene.listed[i].x
         speed += body.vx
     count = max(1, bodies.size - 1)
     return Frame(way / count, 0.0, speed / count, 0.0)
@@ -69,21 +69,21 @@ def corner_speed(body: Record, frame: Frame) -> float:
 def travel(scene: Nonsmooth, i: int, frame: Frame) -> float:
     """Return how far (m) a corner of a body may have come in a frame since the pair list was made."""
     body = scene.world.bodies[i]
-    dx = body.x - scene.spots[i].x - frame.x
-    dy = body.y - scene.spots[i].y - frame.y
+    dx = body.x - scene.listed[i].x - frame.x
+    dy = body.y - scene.listed[i].y - frame.y
     return math.sqrt(dx * dx + dy * dy) + body.radius * abs(body.angle - body.list_angle)
 
 
 @rare_kernel
-def look_at_driven(scene: Nonsmooth, frame: Frame) -> tuple[float, bool]:
-    """Return the speed (m/s) of the fastest driven body in the step to come, and whether none uses up its reach."""
+def update_driven(scene: Nonsmooth, frame: Frame) -> tuple[float, bool]:
+    """Return the speed (m/s) of the fastest driven body in the next step, and whether none uses up its reach."""
     step = scene.world.controls[0].step
     fastest = 0.0
     is_good = True
     for one in scene.world.moved:
         if is_driven(one):
             rate = coming_speed(scene, one, frame)
-            reach = scene.spots[one.body].reach
+            reach = scene.listed[one.body].reach
             fastest = max(fastest, rate)
             is_good = is_good and travel(scene, one.body, frame) + min(rate * step, MOST_MARGIN * reach) <= reach
     return fastest, is_good
@@ -91,9 +91,9 @@ def look_at_driven(scene: Nonsmooth, frame: Frame) -> tuple[float, bool]:
 
 @rare_kernel
 def coming_speed(scene: Nonsmooth, one: Record, frame: Frame) -> float:
-    """Return an upper bound (m/s) of the mean speed of the points of a driven body in the step to come, in a frame.
+    """Return an upper bound (m/s) of the mean speed of the points of a driven body in the next step, in a frame.
 
-    A path may begin, end or turn back at once: the velocity until now does not tell.
+    A path may begin, end or turn back at once: the velocity until now does not show it.
     """
     world = scene.world
     step = world.controls[0].step
@@ -103,8 +103,8 @@ def coming_speed(scene: Nonsmooth, one: Record, frame: Frame) -> float:
 
 
 @kernel
-def look(scene: Nonsmooth) -> bool:
-    """Fix the margin of the step to come, and make the pair list again if bodies have come too far.
+def update_pairs(scene: Nonsmooth) -> bool:
+    """Set the margin of the next step, and rebuild the pair list if bodies have come too far.
 
     Returns False where the list does not fit into its arrays; nothing has changed then.
     """
@@ -118,14 +118,14 @@ def look(scene: Nonsmooth) -> bool:
     is_finite = True
     for i in range(world.bodies.size - 1):
         body = world.bodies[i]
-        spot = scene.spots[i]
+        listed = scene.listed[i]
         rate = corner_speed(body, frame) + falls
         fastest = max(fastest, rate)
         gone = travel(scene, i, frame)
         is_finite = is_finite and math.isfinite(rate + gone)
-        is_good = is_good and gone + min(2.0 * rate * controls.step, MOST_MARGIN * spot.reach) <= spot.reach
+        is_good = is_good and gone + min(2.0 * rate * controls.step, MOST_MARGIN * listed.reach) <= listed.reach
     if controls.driven != 0:
-        coming, stays = look_at_driven(scene, frame)
+        coming, stays = update_driven(scene, frame)
         fastest = max(fastest, coming)
         is_good = is_good and stays
     stepping.margin = min(2.0 * controls.step * fastest, 2.0 * MOST_MARGIN * stepping.least_reach)
@@ -141,12 +141,12 @@ def note_places(scene: Nonsmooth, frame: Frame) -> None:
     stepping.listed_y = stepping.support_y
     for i in range(world.bodies.size):
         body = world.bodies[i]
-        spot = scene.spots[i]
+        listed = scene.listed[i]
         ahead = STEPS * world.controls[0].step * corner_speed(body, frame)
-        spot.x = body.x
-        spot.y = body.y
-        spot.reach = min(max(ahead, stepping.least_reach), stepping.most_reach)
-        spot.radius = body.radius + spot.reach
+        listed.x = body.x
+        listed.y = body.y
+        listed.reach = min(max(ahead, stepping.least_reach), stepping.most_reach)
+        listed.radius = body.radius + listed.reach
         body.list_angle = body.angle
 
 
@@ -162,15 +162,15 @@ def add(scene: Nonsmooth, count: int, i: int, j: int) -> int:
 @kernel
 def are_near(scene: Nonsmooth, i: int, j: int) -> bool:
     """Return True if the reaches of two bodies meet, at least one of them free."""
-    one = scene.spots[i]
-    two = scene.spots[j]
+    one = scene.listed[i]
+    two = scene.listed[j]
     dx = one.x - two.x
     dy = one.y - two.y
     limit = one.radius + two.radius
     if dx * dx + dy * dy > limit * limit:
         return False
-    lines = scene.contacts.lines
-    if lines[i].inverse_mass + lines[j].inverse_mass == 0.0:
+    states = scene.contacts.states
+    if states[i].inverse_mass + states[j].inverse_mass == 0.0:
         return False
     return separation(scene.world.bodies[i], scene.world.bodies[j]) <= one.reach + two.reach
 
@@ -183,7 +183,7 @@ def add_from_cell(scene: Nonsmooth, i: int, column: int, row: int, least: int, c
     j = world.heads[bucket(column, row, world.heads.size)]
     while j > 0:
         if j > least and are_near(scene, i, j - 1):
-            other = scene.spots[j - 1]  # cells share buckets
+            other = scene.listed[j - 1]  # cells share buckets
             if cell_of(other.x, width) == column and cell_of(other.y, width) == row:
                 count = add(scene, count, i, j - 1)
         j = world.links[j - 1]
@@ -204,7 +204,7 @@ def add_large(scene: Nonsmooth, i: int, count: int) -> int:
 def list_pairs(scene: Nonsmooth) -> int:
     """List all pairs whose reaches meet; return how many there are, fitting or not.
 
-    Every two neighbouring cells are looked at from one of them only.
+    Every two neighbouring cells are visited from one of them only.
     """
     world = scene.world
     width = world.controls[0].cell_width
@@ -222,14 +222,14 @@ def list_pairs(scene: Nonsmooth) -> int:
             for x in range(column - 1, column + 2):
                 count = add_from_cell(scene, i, x, row + 1, 0, count)
         count = add_large(scene, i, count)
-        if body.inverse_mass > 0.0 and ground_gap(body) <= level + scene.spots[i].reach:
+        if body.inverse_mass > 0.0 and ground_gap(body) <= level + scene.listed[i].reach:
             count = add(scene, count, i, ground)
     return count
 
 
 @rare_kernel
 def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
-    """Make the pair list again; return False, with the rows untouched, where it does not fit."""
+    """Rebuild the pair list; return False, with the constraints untouched, where it does not fit."""
     note_places(scene, frame)
     count = list_pairs(scene)
     if count > scene.kept.size:
@@ -240,7 +240,7 @@ def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
     if most_groups(scene) > scene.contacts.groups.size:
         scene.world.clock[0].rebuilds = 0
         return False
-    place_rows(scene, count)
+    place_constraints(scene, count)
     scene.world.clock[0].pair_count = count
     scene.world.clock[0].rebuilds += 1
     return True

@@ -4,11 +4,11 @@ A block that meets something stays where it touches until the substep ends, thou
 already, and it is struck with the arms that it had when the part began. So an impact is off by what happens in the
 rest of its substep, first order in the length of that. Hops multiply it: a change of restitution from 0.8 to 0.80008
 moves the fourth peak of a block of 32 x 50 mm that rocks by 0.9 %. So the time t at which the next point meets
-something is foretold from gap s, approach u and the pull p of gravity,
+something is predicted from gap s, approach u and the pull p of gravity,
 
     s + u t + p t^2 / 2 = 0,
 
-a part ends just before it, one of FINE of a step follows, then it is foretold anew. Substeps of parts are as many as
+a part ends just before it, one of FINE of a step follows, then it is predicted again. Substeps of parts are as many as
 those of a step. The springs of the position pass keep their stiffness in seconds, so that what is at rest does not
 move when the length changes, and impulses that a substep begins with go with it. Velocities live half a substep behind:
 in flight they are shifted by half of what the substep changes by; what something holds has its velocity at any time.
@@ -16,8 +16,8 @@ in flight they are shifted by half of what the substep changes by; what somethin
 
 import math
 
-from blocksim.kernels.arrays import Record
-from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.common.arrays import Record
+from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, Nonsmooth
 from blocksim.kernels.nonsmooth.begin import is_start
 
@@ -27,20 +27,20 @@ MOST_PARTS = 32  # of a step; what is left then is one more
 
 @kernel
 def begin_of_part(scene: Nonsmooth) -> float:
-    """Return the time (s) at which the part under way begins."""
+    """Return the time (s) at which the current part begins."""
     return scene.world.clock[0].steps * scene.world.controls[0].step + scene.contacts.stepping[0].gone
 
 
 @kernel
 def is_cut(scene: Nonsmooth) -> bool:
-    """Return True if the step goes on after the part under way."""
+    """Return True if the step goes on after the current part."""
     stepping = scene.contacts.stepping[0]
     return stepping.length < scene.world.controls[0].step - stepping.gone
 
 
 @kernel
 def end_of_part(scene: Nonsmooth) -> float:
-    """Return the time (s) at which the part under way ends; a step ends at a multiple of its length."""
+    """Return the time (s) at which the current part ends; a step ends at a multiple of its length."""
     if is_cut(scene):
         return begin_of_part(scene) + scene.contacts.stepping[0].length
     return (scene.world.clock[0].steps + 1) * scene.world.controls[0].step
@@ -58,7 +58,7 @@ def begin_step(scene: Nonsmooth) -> None:
 
 @rare_kernel
 def begin_next_part(scene: Nonsmooth) -> None:
-    """Go on with a step that was cut, with a part as long as what is left of it."""
+    """Continue a step that was cut, with a part as long as what is left of it."""
     stepping = scene.contacts.stepping[0]
     stepping.parts += 1
     stepping.gone += stepping.length
@@ -67,7 +67,7 @@ def begin_next_part(scene: Nonsmooth) -> None:
 
 @rare_kernel
 def set_length(scene: Nonsmooth, length: float) -> None:
-    """Give the part to come a length (s)."""
+    """Give the next part a length (s)."""
     stepping = scene.contacts.stepping[0]
     h = length / stepping.substeps
     if h == stepping.substep:
@@ -75,11 +75,11 @@ def set_length(scene: Nonsmooth, length: float) -> None:
         return
     shift_velocities(scene, h)
     ratio = h / stepping.substep
-    for r in range(stepping.row_count):
-        row = scene.contacts.rows[r]
-        row.normal_one *= ratio
-        row.normal_two *= ratio
-        row.shear *= ratio
+    for r in range(stepping.constraint_count):
+        constraint = scene.contacts.constraints[r]
+        constraint.normal_one *= ratio
+        constraint.normal_two *= ratio
+        constraint.shear *= ratio
     turn = stepping.frequency * h
     stepping.length = length
     stepping.substep = h
@@ -92,18 +92,19 @@ def set_length(scene: Nonsmooth, length: float) -> None:
 def mark_pressed(scene: Nonsmooth) -> None:
     """Mark the bodies with a contact that presses, not only in an impact."""
     scene.used[:] = 0
-    for r in range(scene.contacts.stepping[0].row_count):
-        row = scene.contacts.rows[r]
-        if row.normal_one + row.normal_two > 0.0 and not row.is_struck:
-            scene.used[row.a] = 1
-            scene.used[row.b] = 1
+    for r in range(scene.contacts.stepping[0].constraint_count):
+        constraint = scene.contacts.constraints[r]
+        if constraint.normal_one + constraint.normal_two > 0.0 and not constraint.is_struck:
+            scene.used[constraint.a] = 1
+            scene.used[constraint.b] = 1
 
 
 @rare_kernel
 def shift_velocities(scene: Nonsmooth, h: float) -> None:
     """Bring velocities from half of the last substep behind to half of the next, h (s), but of what something holds.
 
-    The ledger (energy.py) counts with velocities half a substep on, and with the ways that velocities alone would give.
+    The ledger (energy.py) counts with velocities half a substep on, and with the displacements that velocities alone
+    would give.
     """
     controls = scene.world.controls[0]
     stepping = scene.contacts.stepping[0]
@@ -111,18 +112,18 @@ def shift_velocities(scene: Nonsmooth, h: float) -> None:
     behind = 0.0 if is_start(scene) else 0.5
     mark_pressed(scene)
     for i in range(scene.world.bodies.size - 1):
-        line = scene.contacts.lines[i]
-        if line.inverse_mass > 0.0:
+        state = scene.contacts.states[i]
+        if state.inverse_mass > 0.0:
             share = 0.0 if scene.used[i] else behind
-            vx = line.vx + share * (old - h) * controls.gravity_x
-            vy = line.vy + share * (old - h) * controls.gravity_y
+            vx = state.vx + share * (old - h) * controls.gravity_x
+            vy = state.vy + share * (old - h) * controls.gravity_y
             lifted = h * (controls.gravity_x * vx + controls.gravity_y * vy)
-            lifted -= old * (controls.gravity_x * line.vx + controls.gravity_y * line.vy)
+            lifted -= old * (controls.gravity_x * state.vx + controls.gravity_y * state.vy)
             lifted -= kinetic_ahead(vx, vy, behind * h, controls)
-            lifted += kinetic_ahead(line.vx, line.vy, behind * old, controls)
+            lifted += kinetic_ahead(state.vx, state.vy, behind * old, controls)
             scene.contacts.before[i].lifted += lifted
-            line.vx = vx
-            line.vy = vy
+            state.vx = vx
+            state.vy = vy
 
 
 @rare_kernel
@@ -135,7 +136,7 @@ def kinetic_ahead(vx: float, vy: float, time: float, controls: Record) -> float:
 
 @rare_kernel
 def cut(scene: Nonsmooth) -> bool:
-    """Cut the part under way, which ends with the step, before or after the next impact; return True if it was cut."""
+    """Cut the current part, which ends with the step, before or after the next impact; return True if it was cut."""
     stepping = scene.contacts.stepping[0]
     if is_cut(scene) or stepping.parts >= MOST_PARTS:
         return False
@@ -155,16 +156,21 @@ def time_to_impact(scene: Nonsmooth) -> float:
     bodies = scene.world.bodies
     controls = scene.world.controls[0]
     least = math.inf
-    for r in range(contacts.stepping[0].row_count):
-        row = contacts.rows[r]
-        if row.reach != AWAY and contacts.touches[row.touch].restitution > 0.0:
-            a, b = bodies[row.a], bodies[row.b]
+    for r in range(contacts.stepping[0].constraint_count):
+        constraint = contacts.constraints[r]
+        if constraint.reach != AWAY and contacts.materials[constraint.material].restitution > 0.0:
+            a, b = bodies[constraint.a], bodies[constraint.b]
             free = (1.0 if a.inverse_mass > 0.0 else 0.0) - (1.0 if b.inverse_mass > 0.0 else 0.0)
-            pull = free * (row.nx * controls.gravity_x + row.ny * controls.gravity_y)
-            one = row.nx * (a.vx - b.vx) + row.ny * (a.vy - b.vy) + row.arm_a * a.spin - row.arm_b * b.spin
-            two = one - row.width * (a.spin - b.spin)
-            least = min(least, meeting_time(row.gap_one, one, pull, contacts.stepping[0]))
-            least = min(least, meeting_time(row.gap_two, two, pull, contacts.stepping[0]))
+            pull = free * (constraint.nx * controls.gravity_x + constraint.ny * controls.gravity_y)
+            one = (
+                constraint.nx * (a.vx - b.vx)
+                + constraint.ny * (a.vy - b.vy)
+                + constraint.arm_a * a.spin
+                - constraint.arm_b * b.spin
+            )
+            two = one - constraint.width * (a.spin - b.spin)
+            least = min(least, meeting_time(constraint.gap_one, one, pull, contacts.stepping[0]))
+            least = min(least, meeting_time(constraint.gap_two, two, pull, contacts.stepping[0]))
     return least
 
 

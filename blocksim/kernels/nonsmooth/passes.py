@@ -1,14 +1,14 @@
-"""What a substep does to the rows, four at a time: warm start, position pass, velocity pass, books.
+"""What a substep does to the constraints, four at a time: warm start, position pass, velocity pass, tallies.
 
-Formulas: __init__.py. Velocities are read, changed by all impulses of a row and written back; effective masses are
-computed again each time, which is cheaper than to load them. Bodies that are fixed are never written to, so that rows
-of one colour share nothing that changes.
+Formulas: __init__.py. Velocities are read, changed by all impulses of a constraint and written back; effective masses
+are computed again each time, which is cheaper than to load them. Bodies that are fixed are never written to, so that
+constraints of one colour share nothing that changes.
 """
 
-from blocksim.kernels.arrays import Record, Records
-from blocksim.kernels.friction import friction_coefficient
-from blocksim.kernels.jit import kernel
-from blocksim.kernels.lanes import (
+from blocksim.kernels.common.arrays import Record, Records
+from blocksim.kernels.common.friction import friction_coefficient
+from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.simd import (
     Lane,
     Lanes,
     fields_0,
@@ -24,20 +24,27 @@ from blocksim.kernels.lanes import (
 )
 from blocksim.kernels.nonsmooth.aims import aim, gaps
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
-from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, rows_of, touch_of
-from blocksim.kernels.nonsmooth.slip import Rows, slip_of
+from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, constraints_of, material_of
+from blocksim.kernels.nonsmooth.slip import Constraints, slip_of
 from blocksim.kernels.nonsmooth.solve import solve_two
 
 
 @kernel
 def push(
-    contacts: Contacts, group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies, normal: Lanes, second: Lanes
+    contacts: Contacts,
+    group: Record,
+    lane: Lane,
+    constraint: Constraints,
+    a: Bodies,
+    b: Bodies,
+    normal: Lanes,
+    second: Lanes,
 ) -> None:
     """Change the velocities of the bodies by a normal impulse (N s) in all, of which `second` at point two."""
-    turn = row.width * second
-    turn_a = row.arm_a * normal - turn
-    turn_b = row.arm_b * normal - turn
-    shove(contacts, group, lane, a, b, (row.nx * normal, row.ny * normal, turn_a, turn_b))
+    turn = constraint.width * second
+    turn_a = constraint.arm_a * normal - turn
+    turn_b = constraint.arm_b * normal - turn
+    shove(contacts, group, lane, a, b, (constraint.nx * normal, constraint.ny * normal, turn_a, turn_b))
 
 
 @kernel
@@ -45,7 +52,7 @@ def push_and_drag(
     contacts: Contacts,
     group: Record,
     lane: Lane,
-    row: Rows,
+    constraint: Constraints,
     a: Bodies,
     b: Bodies,
     normal: Lanes,
@@ -53,11 +60,11 @@ def push_and_drag(
     shear: Lanes,
 ) -> None:
     """Change the velocities of the bodies by normal impulses, as push does, and by one along the tangent (N s)."""
-    px = row.nx * normal - row.ny * shear
-    py = row.ny * normal + row.nx * shear
-    turn = row.width * second
-    turn_a = row.arm_a * normal - turn + row.shear_arm_a * shear
-    turn_b = row.arm_b * normal - turn + row.shear_arm_b * shear
+    px = constraint.nx * normal - constraint.ny * shear
+    py = constraint.ny * normal + constraint.nx * shear
+    turn = constraint.width * second
+    turn_a = constraint.arm_a * normal - turn + constraint.shear_arm_a * shear
+    turn_b = constraint.arm_b * normal - turn + constraint.shear_arm_b * shear
     shove(contacts, group, lane, a, b, (px, py, turn_a, turn_b))
 
 
@@ -70,22 +77,22 @@ def shove(
     vx = a.vx + a.inverse_mass * px
     vy = a.vy + a.inverse_mass * py
     spin = a.spin + a.inverse_inertia * turn_a
-    write_fields_0(lane, contacts.lines, group.a, a.inverse_mass > 0.0, (vx, vy, spin, a.inverse_mass))
+    write_fields_0(lane, contacts.states, group.a, a.inverse_mass > 0.0, (vx, vy, spin, a.inverse_mass))
     vx = b.vx - b.inverse_mass * px
     vy = b.vy - b.inverse_mass * py
     spin = b.spin - b.inverse_inertia * turn_b
-    write_fields_0(lane, contacts.lines, group.b, b.inverse_mass > 0.0, (vx, vy, spin, b.inverse_mass))
+    write_fields_0(lane, contacts.states, group.b, b.inverse_mass > 0.0, (vx, vy, spin, b.inverse_mass))
 
 
 @kernel
-def masses(row: Rows, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes, Lanes]:
+def masses(constraint: Constraints, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes, Lanes]:
     """Return A (1/kg) of the two normals: of one, mixed, of two."""
     together = a.inverse_mass + b.inverse_mass
-    two_a = row.arm_a - row.width
-    two_b = row.arm_b - row.width
-    turned_a = a.inverse_inertia * row.arm_a
-    turned_b = b.inverse_inertia * row.arm_b
-    one = together + turned_a * row.arm_a + turned_b * row.arm_b
+    two_a = constraint.arm_a - constraint.width
+    two_b = constraint.arm_b - constraint.width
+    turned_a = a.inverse_inertia * constraint.arm_a
+    turned_b = b.inverse_inertia * constraint.arm_b
+    one = together + turned_a * constraint.arm_a + turned_b * constraint.arm_b
     mixed = together + turned_a * two_a + turned_b * two_b
     two = together + a.inverse_inertia * two_a * two_a + b.inverse_inertia * two_b * two_b
     return one, mixed, two
@@ -99,21 +106,21 @@ def warm_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     if not is_all(normal <= 0.0):
         a = bodies_at(contacts, group.a, lane)
         b = bodies_at(contacts, group.b, lane)
-        push_and_drag(contacts, group, lane, rows_of(group, lane), a, b, normal, second, load(lane, group.shear))
+        push_and_drag(contacts, group, lane, constraints_of(group, lane), a, b, normal, second, load(lane, group.shear))
 
 
 @kernel
 def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
-    """Solve both normals of rows with soft contacts and gaps that may just close."""
+    """Solve both normals of constraints with soft contacts and gaps that may just close."""
     stepping = contacts.stepping[0]
-    row = rows_of(group, lane)
+    constraint = constraints_of(group, lane)
     a = bodies_at(contacts, group.a, lane)
     b = bodies_at(contacts, group.b, lane)
-    gap_one, gap_two = gaps(group, lane, row, a, b, stepping.bend_time)
+    gap_one, gap_two = gaps(group, lane, constraint, a, b, stepping.bend_time)
     store(lane, group.start_one, gap_one)
     store(lane, group.start_two, gap_two)
-    slip = slip_of(row, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
-    one, mixed, two = masses(row, a, b)
+    slip = slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
+    one, mixed, two = masses(constraint, a, b)
     old_one = load(lane, group.normal_one)
     old_two = load(lane, group.normal_two)
     k_one = one + select(gap_one > 0.0, 0.0, stepping.softness) * one
@@ -129,28 +136,28 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     store(lane, group.normal_one, new_one)
     store(lane, group.normal_two, new_two)
     second = new_two - old_two
-    push(contacts, group, lane, row, a, b, new_one - old_one + second, second)
+    push(contacts, group, lane, constraint, a, b, new_one - old_one + second, second)
 
 
 @kernel
-def shear_limit(touch: Record, normal: float, needed: float, mass: float) -> float:
+def shear_limit(material: Record, normal: float, needed: float, mass: float) -> float:
     """Return the largest shear impulse (N s), given the one that stops all slip and A (1/kg) along the tangent.
 
     Static friction holds what it can stop within the substep; else kinetic friction at the slip that it leaves.
     """
-    static = touch.static_friction
-    kinetic = touch.kinetic_friction
+    static = material.static_friction
+    kinetic = material.kinetic_friction
     if static == kinetic:
         return kinetic * normal
     if needed <= static * normal:
         return static * normal
     slip = (needed - kinetic * normal) * mass
-    return normal * friction_coefficient(static, kinetic, touch.transition_speed, slip)
+    return normal * friction_coefficient(static, kinetic, material.transition_speed, slip)
 
 
 @kernel
 def shear_limits(contacts: Contacts, group: Record, lane: Lane, normal: Lanes, needed: Lanes, mass: Lanes) -> Lanes:
-    """Return the largest shear impulses (N s) of rows; see shear_limit."""
+    """Return the largest shear impulses (N s) of constraints; see shear_limit."""
     if group.are_simple:
         return load(lane, group.friction) * normal
     n_0, n_1, n_2, n_3 = split(normal)
@@ -158,41 +165,48 @@ def shear_limits(contacts: Contacts, group: Record, lane: Lane, normal: Lanes, n
     m_0, m_1, m_2, m_3 = split(mass)
     return four(
         lane,
-        shear_limit(touch_of(contacts, group, 0), n_0, s_0, m_0),
-        shear_limit(touch_of(contacts, group, 1), n_1, s_1, m_1),
-        shear_limit(touch_of(contacts, group, 2), n_2, s_2, m_2),
-        shear_limit(touch_of(contacts, group, 3), n_3, s_3, m_3),
+        shear_limit(material_of(contacts, group, 0), n_0, s_0, m_0),
+        shear_limit(material_of(contacts, group, 1), n_1, s_1, m_1),
+        shear_limit(material_of(contacts, group, 2), n_2, s_2, m_2),
+        shear_limit(material_of(contacts, group, 3), n_3, s_3, m_3),
     )
 
 
 @kernel
 def first_velocity_group(contacts: Contacts, group: Record, lane: Lane) -> Lanes:
-    """Begin the velocity pass of rows; return the largest changes of velocity (m/s)."""
-    row = rows_of(group, lane)
+    """Begin the velocity pass of constraints; return the largest changes of velocity (m/s)."""
+    constraint = constraints_of(group, lane)
     a = bodies_at(contacts, group.a, lane)
     b = bodies_at(contacts, group.b, lane)
-    t_one, t_two = aim(contacts, group, lane, row, a, b)
-    return reach(contacts, group, lane, row, a, b, t_one, t_two)
+    t_one, t_two = aim(contacts, group, lane, constraint, a, b)
+    return reach(contacts, group, lane, constraint, a, b, t_one, t_two)
 
 
 @kernel
 def velocity_group(contacts: Contacts, group: Record, lane: Lane) -> Lanes:
-    """Go on with the velocity pass of rows; return the largest changes of velocity (m/s)."""
-    row = rows_of(group, lane)
+    """Continue the velocity pass of constraints; return the largest changes of velocity (m/s)."""
+    constraint = constraints_of(group, lane)
     a = bodies_at(contacts, group.a, lane)
     b = bodies_at(contacts, group.b, lane)
-    return reach(contacts, group, lane, row, a, b, load(lane, group.target_one), load(lane, group.target_two))
+    return reach(contacts, group, lane, constraint, a, b, load(lane, group.target_one), load(lane, group.target_two))
 
 
 @kernel
 def reach(
-    contacts: Contacts, group: Record, lane: Lane, row: Rows, a: Bodies, b: Bodies, t_one: Lanes, t_two: Lanes
+    contacts: Contacts,
+    group: Record,
+    lane: Lane,
+    constraint: Constraints,
+    a: Bodies,
+    b: Bodies,
+    t_one: Lanes,
+    t_two: Lanes,
 ) -> Lanes:
-    """Solve both normals of rows without softness, then friction; return the largest changes of velocity (m/s)."""
+    """Solve both normals without softness, then friction; return the largest changes of velocity (m/s)."""
     if is_all((greater(t_one, t_two) <= -FAR) & (abs(load(lane, group.shear)) <= 0.0)):
         return 0.0 * t_one  # no normal impulse, so no friction either
-    slip = slip_of(row, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
-    one, mixed, two = masses(row, a, b)
+    slip = slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
+    one, mixed, two = masses(constraint, a, b)
     old_one = load(lane, group.normal_one)
     old_two = load(lane, group.normal_two)
     old_shear = load(lane, group.shear)
@@ -207,56 +221,62 @@ def reach(
     d_two = new_two - old_two
     normal = d_one + d_two
     # slip along the tangent after the normal impulses
-    coupled_a = a.inverse_inertia * row.shear_arm_a
-    coupled_b = b.inverse_inertia * row.shear_arm_b
-    turn = row.width * d_two
+    coupled_a = a.inverse_inertia * constraint.shear_arm_a
+    coupled_b = b.inverse_inertia * constraint.shear_arm_b
+    turn = constraint.width * d_two
     rate = (
         slip.shear
         + share * load(lane, group.shear_bend)
-        + coupled_a * (row.arm_a * normal - turn)
-        + coupled_b * (row.arm_b * normal - turn)
+        + coupled_a * (constraint.arm_a * normal - turn)
+        + coupled_b * (constraint.arm_b * normal - turn)
     )
-    mass = a.inverse_mass + b.inverse_mass + coupled_a * row.shear_arm_a + coupled_b * row.shear_arm_b
+    mass = a.inverse_mass + b.inverse_mass + coupled_a * constraint.shear_arm_a + coupled_b * constraint.shear_arm_b
     needed = old_shear - rate * (1.0 / mass)
     limit = shear_limits(contacts, group, lane, new_one + new_two, abs(needed), mass)
     shear = lesser(greater(needed, -limit), limit)
     d_shear = shear - old_shear
     store(lane, group.shear, shear)
-    push_and_drag(contacts, group, lane, row, a, b, normal, d_two, d_shear)
+    push_and_drag(contacts, group, lane, constraint, a, b, normal, d_two, d_shear)
     return (a.inverse_mass + b.inverse_mass) * greater(greater(abs(d_one), abs(d_two)), abs(d_shear))
 
 
 @kernel
-def given_to(row: Rows, a: Bodies, b: Bodies, normal_one: Lanes, normal_two: Lanes, shear: Lanes) -> Lanes:
-    """Return the work (J) of the impulses on body a of rows, did it move as the fixed body of the row does."""
+def given_to(
+    constraint: Constraints, a: Bodies, b: Bodies, normal_one: Lanes, normal_two: Lanes, shear: Lanes
+) -> Lanes:
+    """Return the work (J) of the impulses on body a, did it move as the fixed body of its constraint does."""
     is_b = a.inverse_mass > 0.0
     vx = select(is_b, b.vx, a.vx)
     vy = select(is_b, b.vy, a.vy)
     spin = select(is_b, b.spin, a.spin)
     normal = normal_one + normal_two
-    moment = select(is_b, row.arm_b, row.arm_a) * normal - row.width * normal_two
-    moment = moment + select(is_b, row.shear_arm_b, row.shear_arm_a) * shear
-    return normal * (row.nx * vx + row.ny * vy) + shear * (row.nx * vy - row.ny * vx) + spin * moment
+    moment = select(is_b, constraint.arm_b, constraint.arm_a) * normal - constraint.width * normal_two
+    moment = moment + select(is_b, constraint.shear_arm_b, constraint.shear_arm_a) * shear
+    return (
+        normal * (constraint.nx * vx + constraint.ny * vy)
+        + shear * (constraint.nx * vy - constraint.ny * vx)
+        + spin * moment
+    )
 
 
 @kernel
 def taken_by(
     contacts: Contacts, then: Records, group: Record, lane: Lane, gx: float, gy: float
 ) -> tuple[Lanes, Lanes, Lanes]:
-    """Return what normal and shear impulses of rows have taken from the energy in this substep (J), both twice.
+    """Return what normal and shear impulses of constraints have taken from the energy in this substep (J), both twice.
 
     The third is what they have brought into the supports (J).
 
     An impulse times the mean of the velocities before (`then`, fields as in BEFORE) and after all impulses is the
-    energy that it brings; summed over all rows that is exact, whatever the order in which impulses were found. Both
-    velocities together lack (`gx`, `gy`), m/s, of gravity: they live half a substep before positions, but those after
-    a whole kick count without it, as a supported body does not fall.
+    energy that it brings; summed over all constraints that is exact, whatever the order in which impulses were found.
+    Both velocities together lack (`gx`, `gy`), m/s, of gravity: they live half a substep before positions, but those
+    after a whole kick count without it, as a supported body does not fall.
     """
     normal_one = load(lane, group.normal_one)
     normal_two = load(lane, group.normal_two)
     if is_all(normal_one + normal_two <= 0.0):
         return 0.0 * normal_one, 0.0 * normal_one, 0.0 * normal_one
-    row = rows_of(group, lane)
+    constraint = constraints_of(group, lane)
     shear = load(lane, group.shear)
     a = bodies_at(contacts, group.a, lane)
     b = bodies_at(contacts, group.b, lane)
@@ -265,9 +285,9 @@ def taken_by(
     free = select(a.inverse_mass > 0.0, 1.0, 0.0) - select(b.inverse_mass > 0.0, 1.0, 0.0)
     vx = a.vx - b.vx + vx_a - vx_b + free * gx
     vy = a.vy - b.vy + vy_a - vy_b + free * gy
-    slip = slip_of(row, vx, vy, a.spin + spin_a, b.spin + spin_b)
+    slip = slip_of(constraint, vx, vy, a.spin + spin_a, b.spin + spin_b)
     if contacts.stepping[0].is_shaken:
-        given = free * given_to(row, a, b, normal_one, normal_two, shear)
+        given = free * given_to(constraint, a, b, normal_one, normal_two, shear)
     else:
         given = 0.0 * shear
     return slip.one * normal_one + slip.two * normal_two, slip.shear * shear, -given

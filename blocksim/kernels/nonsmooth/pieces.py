@@ -1,7 +1,7 @@
 """Where a block touches the ground: the half-plane, or a piece of it, of which only the upper face counts.
 
 A piece is a line with the solid below. Of its face and those of the block, the one beyond which the other reaches
-least tells how the two meet (separating axes: S. Gottschalk, TR96-024, UNC Chapel Hill (1996)), and all four count,
+least shows how the two meet (separating axes: S. Gottschalk, TR96-024, UNC Chapel Hill (1996)), and all four count,
 whichever way they look: a block beside a step reaches far below the upper face of that step, but it is its side that is
 in touch, and a block on a step reaches as far behind the riser as it is long, but it is its lower face. Where it is a
 face of the block, an end of the piece is what it touches, or nothing: ends at which the ground continues belong to one
@@ -10,7 +10,8 @@ of the two pieces or are no edges.
 
 from typing import NamedTuple
 
-from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.outlines import AnyHull
 from blocksim.kernels.nonsmooth.arrays import FAR
 from blocksim.kernels.nonsmooth.faces import (
     Block,
@@ -24,7 +25,6 @@ from blocksim.kernels.nonsmooth.faces import (
     points_of,
 )
 from blocksim.kernels.nonsmooth.polygons import edge_opposite, face_count, face_numbered
-from blocksim.kernels.outlines import AnyHull
 
 TIE = 1e-7  # m: by so much a face of the block has to be better than that of the piece
 FACING = -0.01  # cosine: faces of a block that look more away than that from a piece of ground do not touch its edge

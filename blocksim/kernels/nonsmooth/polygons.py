@@ -9,8 +9,9 @@ face at the right carries the next one at the left.
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import Record
-from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.common.arrays import Record
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.outlines import AnyHull, Hull, corner_at, face_towards, least_along, next_corner
 from blocksim.kernels.nonsmooth.arrays import FAR
 from blocksim.kernels.nonsmooth.faces import (
     Block,
@@ -24,8 +25,7 @@ from blocksim.kernels.nonsmooth.faces import (
     opposite_edge,
 )
 from blocksim.kernels.nonsmooth.faces import points_of as points_on
-from blocksim.kernels.nonsmooth.slip import Rows
-from blocksim.kernels.outlines import AnyHull, Hull, corner_at, face_towards, least_along, next_corner
+from blocksim.kernels.nonsmooth.slip import Constraints
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller inner radius: two faces that face each other over less are passed by
@@ -215,7 +215,7 @@ def met_beside(found: Clipped, number: int, body: Block, hull: Hull, other: Bloc
 @kernel
 def nothing() -> Found:
     """Return that there is no manifold."""
-    return Found(Points(Rows(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), FAR, FAR, True), False, 0, 0)
+    return Found(Points(Constraints(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), FAR, FAR, True), False, 0, 0)
 
 
 @kernel
@@ -252,21 +252,21 @@ def found_on(met: Clipped, a: Block, b: Block, is_of_b: bool, margin: float) -> 
 def corners_on_ground(points: Points, block: Block, hull: Hull, is_first: bool) -> tuple[int, int]:
     """Return the corners of a polygon at the points of a manifold with the ground, which `is_first` has as body a."""
     if is_first:
-        number = number_opposite(points.row.nx, points.row.ny, block, hull)
+        number = number_opposite(points.constraint.nx, points.constraint.ny, block, hull)
         return 1 + next_corner(hull, number), 1 + number
-    number = number_opposite(-points.row.nx, -points.row.ny, block, hull)
+    number = number_opposite(-points.constraint.nx, -points.constraint.ny, block, hull)
     return OF_B + 1 + number, OF_B + 1 + next_corner(hull, number)
 
 
 @kernel
-def follow_corners(row: Record, one: int, two: int) -> None:
+def follow_corners(constraint: Record, one: int, two: int) -> None:
     """Have impulses of the last step go with their corners; where a corner has not changed places they stay."""
-    normal_one = row.normal_one
-    normal_two = row.normal_two
+    normal_one = constraint.normal_one
+    normal_two = constraint.normal_two
     total = normal_one + normal_two
-    if total > 0.0 and (one == row.corner_two or two == row.corner_one):
-        row.normal_one = normal_two if one == row.corner_two else 0.0
-        row.normal_two = normal_one if two == row.corner_one else 0.0
-        row.shear *= (row.normal_one + row.normal_two) / total
-    row.corner_one = one
-    row.corner_two = two
+    if total > 0.0 and (one == constraint.corner_two or two == constraint.corner_one):
+        constraint.normal_one = normal_two if one == constraint.corner_two else 0.0
+        constraint.normal_two = normal_one if two == constraint.corner_one else 0.0
+        constraint.shear *= (constraint.normal_one + constraint.normal_two) / total
+    constraint.corner_one = one
+    constraint.corner_two = two

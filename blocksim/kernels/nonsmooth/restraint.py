@@ -19,11 +19,11 @@ approaches, so what lies between them does too.
 
 import math
 
-from blocksim.kernels.arrays import Record
-from blocksim.kernels.jit import rare_kernel
-from blocksim.kernels.lanes import WIDTH, load, store
+from blocksim.kernels.common.arrays import Record
+from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.common.simd import WIDTH, load, store
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
-from blocksim.kernels.nonsmooth.clusters import ROUND_OFF, count_work, energy, has_gain, of_row
+from blocksim.kernels.nonsmooth.clusters import ROUND_OFF, count_work, energy, has_gain, of_constraint
 from blocksim.kernels.nonsmooth.rounds import clear
 
 NEITHER, LOW, HIGH = range(3)  # what the last solution of a cluster is kept as: that with too little or too much energy
@@ -67,7 +67,7 @@ def aim_share(contacts: Contacts, begin: int, end: int) -> None:
             group = contacts.groups[m]
             clear(group)
             for lane in range(WIDTH):
-                body = of_row(contacts, group, min(lane, group.count - 1))
+                body = of_constraint(contacts, group, min(lane, group.count - 1))
                 group.target_one[lane] = part_of_target(aside.all_one[lane], body)
                 group.target_two[lane] = part_of_target(aside.all_two[lane], body)
 
@@ -82,7 +82,7 @@ def part_of_target(target: float, body: Record) -> float:
 
 @rare_kernel
 def judge(contacts: Contacts, is_last: bool) -> bool:
-    """Fix as what the solutions just found are to be kept, and what is to be tried next; return whether anything is.
+    """Decide as what the solutions just found are to be kept, and what is to be tried next; return whether anything is.
 
     Clusters that are done have in `share` where they are between their two solutions.
     """
@@ -107,14 +107,14 @@ def judge(contacts: Contacts, is_last: bool) -> bool:
 @rare_kernel
 def weigh_again(contacts: Contacts) -> None:
     """Sum up the energies of all clusters that are not done."""
-    lines = contacts.lines
+    states = contacts.states
     bodies = contacts.impacts
     for body in bodies:
         if body.is_open:
             body.now = 0.0
     for i in range(bodies.size):
-        if bodies[i].is_open and lines[i].inverse_mass > 0.0:
-            bodies[bodies[i].root].now += energy(contacts, lines[i], lines[i].vx, lines[i].vy, lines[i].spin)
+        if bodies[i].is_open and states[i].inverse_mass > 0.0:
+            bodies[bodies[i].root].now += energy(contacts, states[i], states[i].vx, states[i].vy, states[i].spin)
     count_work(contacts)
 
 
@@ -135,8 +135,8 @@ def close_in(root: Record) -> None:
 
 @rare_kernel
 def find_between(contacts: Contacts) -> None:
-    """Sum up the energy of the difference between the two solutions of every cluster, and tell its bodies the side."""
-    lines = contacts.lines
+    """Sum up the energy of the difference between the two solutions of every cluster, and give its bodies the side."""
+    states = contacts.states
     bodies = contacts.impacts
     ux = contacts.stepping[0].support_vx
     uy = contacts.stepping[0].support_vy
@@ -144,20 +144,20 @@ def find_between(contacts: Contacts) -> None:
         body.between = 0.0
     for i in range(bodies.size):
         body = bodies[i]
-        line = lines[i]
+        state = states[i]
         root = bodies[body.root]
         body.side = root.side
-        if body.side != NEITHER and line.inverse_mass > 0.0:
+        if body.side != NEITHER and state.inverse_mass > 0.0:
             is_low = body.side == LOW
-            vx = line.vx - (body.after_vx if is_low else body.low_vx) + ux
-            vy = line.vy - (body.after_vy if is_low else body.low_vy) + uy
-            spin = line.spin - (body.after_spin if is_low else body.low_spin)
-            root.between += energy(contacts, line, vx, vy, spin)
+            vx = state.vx - (body.after_vx if is_low else body.low_vx) + ux
+            vy = state.vy - (body.after_vy if is_low else body.low_vy) + uy
+            spin = state.spin - (body.after_spin if is_low else body.low_spin)
+            root.between += energy(contacts, state, vx, vy, spin)
 
 
 @rare_kernel
 def try_next(root: Record, is_last: bool) -> None:
-    """Fix the share that a cluster tries next, or where it ends up between its two solutions."""
+    """Set the share that a cluster tries next, or where it ends up between its two solutions."""
     room = root.then - root.least
     excess = root.most - root.then
     if is_last or room <= 0.0 or abs(root.now - root.then) <= ROUND_OFF * root.then:
@@ -185,14 +185,14 @@ def share_of(room: float, gain: float, between: float) -> float:
 
 
 @rare_kernel
-def keep_rows(contacts: Contacts, begin: int, end: int) -> None:
+def keep_constraints(contacts: Contacts, begin: int, end: int) -> None:
     """Keep the impulses just found, on the side that their cluster is on."""
     for m in range(begin, end):
         aside = contacts.asides[m]
         if aside.is_hit:
             group = contacts.groups[m]
             for lane in range(WIDTH):
-                side = of_row(contacts, group, min(lane, group.count - 1)).side
+                side = of_constraint(contacts, group, min(lane, group.count - 1)).side
                 if side == LOW:
                     aside.low_one[lane] = group.normal_one[lane]
                     aside.low_two[lane] = group.normal_two[lane]
@@ -208,24 +208,24 @@ def keep_bodies(contacts: Contacts, first: int, last: int) -> None:
     """Keep the velocities just found, on the side that their cluster is on, and go back to the start of the round."""
     for i in range(first, last):
         body = contacts.impacts[i]
-        line = contacts.lines[i]
+        state = contacts.states[i]
         if body.side == LOW:
-            body.low_vx, body.low_vy, body.low_spin = line.vx, line.vy, line.spin
+            body.low_vx, body.low_vy, body.low_spin = state.vx, state.vy, state.spin
         elif body.side == HIGH:
-            body.after_vx, body.after_vy, body.after_spin = line.vx, line.vy, line.spin
+            body.after_vx, body.after_vy, body.after_spin = state.vx, state.vy, state.spin
         if body.is_hit:
-            line.vx, line.vy, line.spin = body.vx, body.vy, body.spin
+            state.vx, state.vy, state.spin = body.vx, body.vy, body.spin
 
 
 @rare_kernel
-def settle_rows(contacts: Contacts, begin: int, end: int) -> None:
-    """Give rows the impulses that their cluster ends up with."""
+def settle_constraints(contacts: Contacts, begin: int, end: int) -> None:
+    """Give constraints the impulses that their cluster ends up with."""
     for m in range(begin, end):
         aside = contacts.asides[m]
         if aside.is_hit:
             group = contacts.groups[m]
             for lane in range(WIDTH):
-                s = of_row(contacts, group, min(lane, group.count - 1)).share
+                s = of_constraint(contacts, group, min(lane, group.count - 1)).share
                 group.normal_one[lane] = between(aside.low_one[lane], aside.after_one[lane], s)
                 group.normal_two[lane] = between(aside.low_two[lane], aside.after_two[lane], s)
                 group.shear[lane] = between(aside.low_shear[lane], aside.after_shear[lane], s)
@@ -237,10 +237,10 @@ def settle_bodies(contacts: Contacts, first: int, last: int) -> None:
     for i in range(first, last):
         body = contacts.impacts[i]
         if body.is_hit:
-            line = contacts.lines[i]
-            line.vx = between(body.low_vx, body.after_vx, body.share)
-            line.vy = between(body.low_vy, body.after_vy, body.share)
-            line.spin = between(body.low_spin, body.after_spin, body.share)
+            state = contacts.states[i]
+            state.vx = between(body.low_vx, body.after_vx, body.share)
+            state.vy = between(body.low_vy, body.after_vy, body.share)
+            state.spin = between(body.low_spin, body.after_spin, body.share)
 
 
 @rare_kernel

@@ -1,12 +1,12 @@
-"""What a round of impacts does to the rows of the clusters that are hit; see impacts.py."""
+"""What a round of impacts does to the constraints of the clusters that are hit; see impacts.py."""
 
-from blocksim.kernels.arrays import Record
-from blocksim.kernels.jit import rare_kernel
-from blocksim.kernels.lanes import WIDTH, Lane, Lanes, Mask, fields_0, greater, load, select, store
+from blocksim.kernels.common.arrays import Record
+from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.common.simd import WIDTH, Lane, Lanes, Mask, fields_0, greater, load, select, store
 from blocksim.kernels.nonsmooth.aims import gaps, pulls
 from blocksim.kernels.nonsmooth.arrays import FAR, PART, Contacts
-from blocksim.kernels.nonsmooth.clusters import of_row
-from blocksim.kernels.nonsmooth.groups import bodies_at, highest, rows_of, total
+from blocksim.kernels.nonsmooth.clusters import of_constraint
+from blocksim.kernels.nonsmooth.groups import bodies_at, constraints_of, highest, total
 from blocksim.kernels.nonsmooth.passes import taken_by
 from blocksim.kernels.nonsmooth.slip import slip_of
 
@@ -22,7 +22,7 @@ def clear(group: Record) -> None:
 
 @rare_kernel
 def set_aside(contacts: Contacts, begin: int, end: int) -> None:
-    """Keep what the velocity pass has found for some groups, and leave all rows out of those to come."""
+    """Keep what the velocity pass has found for some groups, and leave all constraints out of those to come."""
     for m in range(begin, end):
         group = contacts.groups[m]
         aside = contacts.asides[m]
@@ -36,7 +36,7 @@ def set_aside(contacts: Contacts, begin: int, end: int) -> None:
         store(None, aside.rise_two, none)
         aside.is_hit = 0
         for lane in range(group.count):
-            if of_row(contacts, group, lane).is_hit:
+            if of_constraint(contacts, group, lane).is_hit:
                 aside.is_hit = 1
         forget_hits(contacts, group, aside)
         store(None, group.target_one, none)
@@ -46,9 +46,9 @@ def set_aside(contacts: Contacts, begin: int, end: int) -> None:
 
 @rare_kernel
 def forget_hits(contacts: Contacts, group: Record, aside: Record) -> None:
-    """Begin to sum up the impulses of rows of clusters that are hit; leave the other rows of their group out."""
+    """Begin to sum up the impulses of constraints of clusters that are hit; leave out others of their group."""
     for lane in range(WIDTH if aside.is_hit else 0):
-        if of_row(contacts, group, min(lane, group.count - 1)).is_hit:
+        if of_constraint(contacts, group, min(lane, group.count - 1)).is_hit:
             aside.normal_one[lane] = aside.normal_two[lane] = aside.shear[lane] = 0.0
         else:
             aside.target_one[lane] = aside.target_two[lane] = -FAR
@@ -56,7 +56,7 @@ def forget_hits(contacts: Contacts, group: Record, aside: Record) -> None:
 
 @rare_kernel
 def aim_point(u: Lanes, start: Lanes, active: Lanes, after: Lanes, bend: Lanes, stepping: Record) -> tuple[Lanes, Mask]:
-    """Return the target (m/s) of a point in the round to come, and whether it is hit and has to reach `after`."""
+    """Return the target (m/s) of a point in the next round, and whether it is hit and has to reach `after`."""
     counts = active > -FAR
     is_hit = counts & (u < -stepping.threshold)
     rests = counts & (abs(u) <= stepping.threshold) & (start <= stepping.rest_gap)
@@ -74,17 +74,17 @@ def least_after(u: Lanes, last: Lanes, pull: Lanes, e: Lanes) -> Lanes:
 
 @rare_kernel
 def aim_group(contacts: Contacts, m: int, lane: Lane, is_first: bool) -> Lanes:
-    """Fix what a round has to reach at the points of a group; return 1 for rows that are hit, 0 for others."""
+    """Set what a round has to reach at the points of a group; return 1 for constraints that are hit, 0 for others."""
     stepping = contacts.stepping[0]
     group = contacts.groups[m]
     aside = contacts.asides[m]
-    row = rows_of(group, lane)
+    constraint = constraints_of(group, lane)
     a = bodies_at(contacts, group.a, lane)
     b = bodies_at(contacts, group.b, lane)
-    u = slip_of(row, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
+    u = slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
     e = load(lane, group.restitution)
     bend = stepping.bend_share * load(lane, group.bend)
-    pull = pulls(row, a, b, stepping)
+    pull = pulls(constraint, a, b, stepping)
     old_one = load(lane, aside.target_one)
     old_two = load(lane, aside.target_two)
     last_one = old_one if is_first else -e * u.one - 0.5 * pull
@@ -120,23 +120,23 @@ def aim_round(contacts: Contacts, begin: int, end: int, is_first: bool) -> float
 
 
 @rare_kernel
-def book_round(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None:
-    """Book a round for some groups, and sum up its impulses; (gx, gy) as in taken_by."""
+def tally_round(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None:
+    """Tally a round for some groups, and sum up its impulses; (gx, gy) as in taken_by."""
     for m in range(begin, end):
         aside = contacts.asides[m]
         if aside.is_hit:
             group = contacts.groups[m]
-            book = contacts.books[m // PART]
+            tally = contacts.tallies[m // PART]
             if group.count == 1:
                 normal, shear, given = taken_by(contacts, contacts.impacts, group, 0, gx, gy)
-                book.impacts -= 0.5 * normal
-                book.friction -= 0.5 * shear
-                book.to_support += given
+                tally.impacts -= 0.5 * normal
+                tally.friction -= 0.5 * shear
+                tally.to_support += given
             else:
                 normals, shears, gifts = taken_by(contacts, contacts.impacts, group, None, gx, gy)
-                book.impacts -= 0.5 * total(normals, group.count)
-                book.friction -= 0.5 * total(shears, group.count)
-                book.to_support += total(gifts, group.count)
+                tally.impacts -= 0.5 * total(normals, group.count)
+                tally.friction -= 0.5 * total(shears, group.count)
+                tally.to_support += total(gifts, group.count)
             store(None, aside.normal_one, load(None, aside.normal_one) + load(None, group.normal_one))
             store(None, aside.normal_two, load(None, aside.normal_two) + load(None, group.normal_two))
             store(None, aside.shear, load(None, aside.shear) + load(None, group.shear))
@@ -144,17 +144,17 @@ def book_round(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -
 
 @rare_kernel
 def aim_rest_of(contacts: Contacts, m: int, lane: Lane) -> None:
-    """Fix what the points of a group keep after all impacts: their rebound against gravity, else no approach."""
+    """Set what the points of a group keep after all impacts: their rebound against gravity, else no approach."""
     stepping = contacts.stepping[0]
     group = contacts.groups[m]
     aside = contacts.asides[m]
-    row = rows_of(group, lane)
+    constraint = constraints_of(group, lane)
     a = bodies_at(contacts, group.a, lane)
     b = bodies_at(contacts, group.b, lane)
-    gap_one, gap_two = gaps(group, lane, row, a, b, stepping.next_bend_time)
+    gap_one, gap_two = gaps(group, lane, constraint, a, b, stepping.next_bend_time)
     vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
     vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
-    u = slip_of(row, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
+    u = slip_of(constraint, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
     bend = stepping.bend_share * load(lane, group.bend)
     one = kept(u.one, load(lane, aside.rise_one), bend, gap_one, stepping)
     two = kept(u.two, load(lane, aside.rise_two), bend, gap_two, stepping)
@@ -184,7 +184,7 @@ def aim_rest(contacts: Contacts, begin: int, end: int) -> None:
 
 @rare_kernel
 def bring_back(contacts: Contacts, begin: int, end: int, are_hit: bool) -> None:
-    """Give rows of clusters that were not hit their impulses back, or those that were hit the impulses of all rounds.
+    """Restore the impulses of clusters that were not hit; give those that were hit the impulses of all rounds.
 
     Impacts are over, so that no substep begins with their impulses; at the end of a step they are reported.
     """
@@ -192,10 +192,10 @@ def bring_back(contacts: Contacts, begin: int, end: int, are_hit: bool) -> None:
         group = contacts.groups[m]
         aside = contacts.asides[m]
         for lane in range(WIDTH):  # copies find the same
-            is_hit = of_row(contacts, group, min(lane, group.count - 1)).is_hit == 1
+            is_hit = of_constraint(contacts, group, min(lane, group.count - 1)).is_hit == 1
             if is_hit == are_hit:
                 if aside.normal_one[lane] + aside.normal_two[lane] > 0.0 and is_hit:
-                    contacts.rows[group.row[lane]].is_struck = 1
+                    contacts.constraints[group.constraint[lane]].is_struck = 1
                 group.normal_one[lane] += aside.normal_one[lane]
                 group.normal_two[lane] += aside.normal_two[lane]
                 group.shear[lane] += aside.shear[lane]
@@ -203,9 +203,9 @@ def bring_back(contacts: Contacts, begin: int, end: int, are_hit: bool) -> None:
 
 @rare_kernel
 def forget_struck(contacts: Contacts, begin: int, end: int) -> None:
-    """Let some rows begin a step without the impulses of impacts: nothing presses or turns about them any more."""
+    """Let some constraints begin a step without the impulses of impacts: nothing presses on them any more."""
     for r in range(begin, end):
-        row = contacts.rows[r]
-        if row.is_struck:
-            row.is_struck = 0
-            row.normal_one = row.normal_two = row.shear = 0.0
+        constraint = contacts.constraints[r]
+        if constraint.is_struck:
+            constraint.is_struck = 0
+            constraint.normal_one = constraint.normal_two = constraint.shear = 0.0

@@ -1,13 +1,13 @@
-"""How bodies move at the points of a row."""
+"""How bodies move at the points of a constraint."""
 
 from typing import NamedTuple
 
-from blocksim.kernels.jit import kernel
-from blocksim.kernels.lanes import Lanes
+from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.simd import Lanes
 
 
-class Rows(NamedTuple):
-    """What rows are, the same for all substeps of a step; fields as in ROW."""
+class Constraints(NamedTuple):
+    """What constraints are, the same for all substeps of a step; fields as in CONSTRAINT."""
 
     nx: Lanes
     ny: Lanes
@@ -29,7 +29,7 @@ class Slip(NamedTuple):
 class Motion(NamedTuple):
     """How two bodies move, and how far into the step that is followed.
 
-    Velocity of centre a against centre b (m/s), both spins (rad/s), how far `ahead` (s) contacts are looked for, and
+    Velocity of centre a against centre b (m/s), both spins (rad/s), how far `ahead` (s) contacts are sought, and
     `half` a substep (s); both zero for contacts that do not press.
     """
 
@@ -42,8 +42,8 @@ class Motion(NamedTuple):
 
 
 @kernel
-def slip_of(row: Rows, vx: Lanes, vy: Lanes, spin_a: Lanes, spin_b: Lanes) -> Slip:
+def slip_of(constraint: Constraints, vx: Lanes, vy: Lanes, spin_a: Lanes, spin_b: Lanes) -> Slip:
     """Return the velocities at the points, given that of centre a against centre b and both spins."""
-    one = row.nx * vx + row.ny * vy + row.arm_a * spin_a - row.arm_b * spin_b
-    shear = row.nx * vy - row.ny * vx + row.shear_arm_a * spin_a - row.shear_arm_b * spin_b
-    return Slip(one, one - row.width * (spin_a - spin_b), shear)
+    one = constraint.nx * vx + constraint.ny * vy + constraint.arm_a * spin_a - constraint.arm_b * spin_b
+    shear = constraint.nx * vy - constraint.ny * vx + constraint.shear_arm_a * spin_a - constraint.shear_arm_b * spin_b
+    return Slip(one, one - constraint.width * (spin_a - spin_b), shear)

@@ -1,14 +1,14 @@
 """Impulses of two contact points, exactly."""
 
-from blocksim.kernels.jit import kernel
-from blocksim.kernels.lanes import Lane, Lanes, greater, select
+from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.simd import Lane, Lanes, greater, select
 
 
 @kernel
 def solve_two(
     lane: Lane, k_one: Lanes, k_mixed: Lanes, k_two: Lanes, q_one: Lanes, q_two: Lanes
 ) -> tuple[Lanes, Lanes]:
-    """Return x >= 0 with K x + q >= 0 and x (K x + q) = 0, K symmetric and positive definite: of one row, or of four.
+    """Return x >= 0 with K x + q >= 0 and x (K x + q) = 0, K symmetric, positive definite: of one or four constraints.
 
     Of the four cases (both positive, one of them, none) exactly one holds for such a K (K. G. Murty, Linear Algebra
     Appl. 5 (1972) 65-108), so the first that holds is the answer. A very large q leaves a point out.
@@ -20,10 +20,10 @@ def solve_two(
 
 @kernel
 def solve_single(k_one: float, k_mixed: float, k_two: float, q_one: float, q_two: float) -> tuple[float, float]:
-    """Return the same for a single row, bit by bit.
+    """Return the same for a single constraint, bit by bit.
 
-    Few blocks have single rows, which are in the same case for many substeps: the processor predicts it, and what
-    follows does not wait.
+    Few blocks have single constraints, which are in the same case for many substeps: the processor predicts it, and
+    what follows does not wait.
     """
     both = 1.0 / (k_one * k_two - k_mixed * k_mixed)
     one = (k_mixed * q_two - k_two * q_one) * both
@@ -38,9 +38,9 @@ def solve_single(k_one: float, k_mixed: float, k_two: float, q_one: float, q_two
 
 @kernel
 def solve_four(k_one: Lanes, k_mixed: Lanes, k_two: Lanes, q_one: Lanes, q_two: Lanes) -> tuple[Lanes, Lanes]:
-    """Return the same for four rows; numbers will do for lanes.
+    """Return the same for four constraints; numbers will do for lanes.
 
-    All cases are computed and one is chosen: which one, no processor can guess, and a wrong guess costs more.
+    All cases are computed and one is chosen: a branch would be unpredictable, and a wrong prediction costs more.
     """
     both = 1.0 / (k_one * k_two - k_mixed * k_mixed)  # division is slow; so it does not wait for velocities
     one = (k_mixed * q_two - k_two * q_one) * both

@@ -1,17 +1,17 @@
-"""One substep of all bodies and rows, shared by threads."""
+"""One substep of all bodies and constraints, shared by threads."""
 
-from blocksim.kernels.arrays import TEAM_SIZE
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.common.arrays import TEAM_SIZE
+from blocksim.kernels.common.barrier import barrier
+from blocksim.kernels.common.jit import kernel
 from blocksim.kernels.nonsmooth.arrays import Contacts, Nonsmooth
-from blocksim.kernels.nonsmooth.bends import follow_bends
+from blocksim.kernels.nonsmooth.gap_curvature import follow_curvature
 from blocksim.kernels.nonsmooth.impacts import follow_impacts
 from blocksim.kernels.nonsmooth.iterate import FIRST_VELOCITY, POSITION, WARM, sweep, velocity_pass
-from blocksim.kernels.nonsmooth.loads import book_loads, kick_by_loads, pull_of_loads
+from blocksim.kernels.nonsmooth.loads import kick_by_loads, pull_of_loads, tally_loads
 from blocksim.kernels.nonsmooth.motion import drift_all, kick_all, kick_all_warm
 from blocksim.kernels.nonsmooth.rounds import bring_back
 from blocksim.kernels.nonsmooth.supports import drive
-from blocksim.kernels.nonsmooth.sweeps import book_rows, part_of
-from blocksim.kernels.team import meet
+from blocksim.kernels.nonsmooth.sweeps import part_of, tally_constraints
 
 
 @kernel
@@ -22,8 +22,8 @@ def kick_share(number: int, is_first_step: bool) -> float:
 
 @kernel
 def bodies_of(contacts: Contacts, k: int, size: int) -> tuple[int, int]:
-    """Return the bodies of thread k, from the first to before the last; the ground is nobody's."""
-    count = contacts.lines.size - 1
+    """Return the bodies of thread k, from the first to before the last; the ground belongs to no thread."""
+    count = contacts.states.size - 1
     if size == 1:
         return 0, count
     return count * k // size, count * (k + 1) // size
@@ -31,11 +31,11 @@ def bodies_of(contacts: Contacts, k: int, size: int) -> tuple[int, int]:
 
 @kernel
 def prepare(scene: Nonsmooth, number: int, share: float) -> None:
-    """Fix what is the same for all bodies and rows in substep `number`, with that share of a kick of gravity."""
+    """Set what is the same for all bodies and constraints in substep `number`, with that share of a kick of gravity."""
     controls = scene.world.controls[0]
     stepping = scene.contacts.stepping[0]
     drive(scene, number)
-    follow_bends(stepping, number)
+    follow_curvature(stepping, number)
     stepping.fall_x = stepping.substep * controls.gravity_x
     stepping.fall_y = stepping.substep * controls.gravity_y
     stepping.pull_x = stepping.fall_x
@@ -60,32 +60,32 @@ def start(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
     share = kick_share(number, is_first_step)
     first, last = bodies_of(contacts, k, team[TEAM_SIZE])
     if number == 0:
-        kick_all(contacts.lines, contacts.before, first, last, share, hx, hy)
+        kick_all(contacts.states, contacts.before, first, last, share, hx, hy)
         if scene.world.loads.size > 0:
             kick_by_loads(scene, number, first, last, share, 0.0)
-        meet(team)
+        barrier(team)
         sweep(contacts, WARM, team, k)
     else:
         last_share = kick_share(number - 1, is_first_step)
-        kick_all_warm(contacts.lines, contacts.before, first, last, last_share, hx, hy)
+        kick_all_warm(contacts.states, contacts.before, first, last, last_share, hx, hy)
         if scene.world.loads.size > 0:
             kick_by_loads(scene, number, first, last, share, last_share)
-        meet(team)
+        barrier(team)
 
 
 @kernel
-def book(scene: Nonsmooth, k: int, share: float) -> tuple[int, int]:
-    """Book the bodies and rows of thread k, whose groups are returned, in a substep with that share of a kick."""
+def tally(scene: Nonsmooth, k: int, share: float) -> tuple[int, int]:
+    """Tally bodies and constraints of thread k, whose groups are returned, in a substep with that share of a kick."""
     contacts = scene.contacts
     stepping = contacts.stepping[0]
     team = scene.world.team
     if scene.world.loads.size > 0:
         first, last = bodies_of(contacts, k, team[TEAM_SIZE])
-        book_loads(scene, first, last, share)
+        tally_loads(scene, first, last, share)
     first, last = part_of(0, stepping.group_count, k, team[TEAM_SIZE])
     hx = stepping.substep * scene.world.controls[0].gravity_x
     hy = stepping.substep * scene.world.controls[0].gravity_y
-    book_rows(contacts, first, last, (share - 1.0) * hx, (share - 1.0) * hy)
+    tally_constraints(contacts, first, last, (share - 1.0) * hx, (share - 1.0) * hy)
     return first, last
 
 
@@ -102,13 +102,13 @@ def substep(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
     start(scene, k, number, is_first_step)
     sweep(contacts, POSITION, team, k)
     ground = last + (k == team[TEAM_SIZE] - 1)  # which may move, is the last
-    drift_all(contacts.lines, first, ground, stepping.substep)
-    meet(team)
+    drift_all(contacts.states, first, ground, stepping.substep)
+    barrier(team)
     velocity_pass(contacts, team, k, FIRST_VELOCITY, stepping.tolerance)
     if stepping.has_rebounds:
-        meet(team)
+        barrier(team)
         follow_impacts(contacts, team, k, (first, last), share, scene.pushes)
-    first, last = book(scene, k, share)
+    first, last = tally(scene, k, share)
     if stepping.has_rebounds and number == stepping.substeps - 1:
         bring_back(contacts, first, last, True)
-    meet(team)
+    barrier(team)

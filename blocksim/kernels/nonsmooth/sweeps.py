@@ -1,7 +1,7 @@
-"""Sweeps over the rows, colour after colour. Rows of one colour share no free body: threads divide them."""
+"""Sweeps over the constraints, colour after colour. Those of one colour share no free body: threads divide them."""
 
-from blocksim.kernels.jit import kernel
-from blocksim.kernels.lanes import greater, spread
+from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.simd import greater, spread
 from blocksim.kernels.nonsmooth.arrays import PART, Contacts
 from blocksim.kernels.nonsmooth.groups import highest, total
 from blocksim.kernels.nonsmooth.passes import first_velocity_group, position_group, taken_by, velocity_group, warm_group
@@ -9,7 +9,7 @@ from blocksim.kernels.nonsmooth.passes import first_velocity_group, position_gro
 
 @kernel
 def part_of(begin: int, end: int, k: int, size: int) -> tuple[int, int]:
-    """Return where the part of thread k begins and ends: whole books, so that no two threads write to one."""
+    """Return where the part of thread k begins and ends: whole tallies, so that no two threads write to one."""
     if size == 1:
         return begin, end
     blocks = (end - begin + PART - 1) // PART
@@ -17,8 +17,8 @@ def part_of(begin: int, end: int, k: int, size: int) -> tuple[int, int]:
 
 
 @kernel
-def warm_rows(contacts: Contacts, begin: int, end: int) -> None:
-    """Warm-start the rows of some groups."""
+def warm_constraints(contacts: Contacts, begin: int, end: int) -> None:
+    """Warm-start the constraints of some groups."""
     for m in range(begin, end):
         group = contacts.groups[m]
         if group.count == 1:
@@ -28,7 +28,7 @@ def warm_rows(contacts: Contacts, begin: int, end: int) -> None:
 
 
 @kernel
-def position_rows(contacts: Contacts, begin: int, end: int) -> None:
+def position_constraints(contacts: Contacts, begin: int, end: int) -> None:
     """Go through the position pass of some groups."""
     for m in range(begin, end):
         group = contacts.groups[m]
@@ -39,7 +39,7 @@ def position_rows(contacts: Contacts, begin: int, end: int) -> None:
 
 
 @kernel
-def first_velocity_rows(contacts: Contacts, begin: int, end: int) -> float:
+def first_velocity_constraints(contacts: Contacts, begin: int, end: int) -> float:
     """Begin the velocity pass of some groups; return the largest change of velocity (m/s)."""
     largest = spread(0.0)
     single = 0.0
@@ -53,7 +53,7 @@ def first_velocity_rows(contacts: Contacts, begin: int, end: int) -> float:
 
 
 @kernel
-def velocity_rows(contacts: Contacts, begin: int, end: int) -> float:
+def velocity_constraints(contacts: Contacts, begin: int, end: int) -> float:
     """Go once more through the velocity pass of some groups; return the largest change of velocity (m/s)."""
     largest = spread(0.0)
     single = 0.0
@@ -67,18 +67,18 @@ def velocity_rows(contacts: Contacts, begin: int, end: int) -> float:
 
 
 @kernel
-def book_rows(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None:
-    """Book the rows of some groups; (gx, gy), m/s, is what velocities lack of gravity."""
+def tally_constraints(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None:
+    """Tally the constraints of some groups; (gx, gy), m/s, is what velocities lack of gravity."""
     for m in range(begin, end):
         group = contacts.groups[m]
-        book = contacts.books[m // PART]
+        tally = contacts.tallies[m // PART]
         if group.count == 1:
             normal, shear, given = taken_by(contacts, contacts.before, group, 0, gx, gy)
-            book.impacts -= 0.5 * normal
-            book.friction -= 0.5 * shear
-            book.to_support += given
+            tally.impacts -= 0.5 * normal
+            tally.friction -= 0.5 * shear
+            tally.to_support += given
         else:
             normals, shears, gifts = taken_by(contacts, contacts.before, group, None, gx, gy)
-            book.impacts -= 0.5 * total(normals, group.count)
-            book.friction -= 0.5 * total(shears, group.count)
-            book.to_support += total(gifts, group.count)
+            tally.impacts -= 0.5 * total(normals, group.count)
+            tally.friction -= 0.5 * total(shears, group.count)
+            tally.to_support += total(gifts, group.count)

@@ -4,14 +4,14 @@
 forces and energies are those of blocks. Stresses are positive in tension. Particles are kept in the order of their
 cells; `number` names them for whoever looks from outside.
 
-Losses are booked by groups of particles, in their order, so that the bits of a sum depend on no number of threads.
+Losses are tallied by groups of particles, in their order, so that the bits of a sum depend on no number of threads.
 """
 
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import Integers, Records, record_type
+from blocksim.kernels.common.arrays import Integers, Records, record_type
 
-GROUP = 64  # particles that share one book
+GROUP = 64  # particles that share one tally
 NEIGHBOURS = 64  # room in the list of a particle; undisturbed soil has 28, and 36 with the skin
 
 POINT = record_type(
@@ -21,7 +21,7 @@ POINT = record_type(
 STATE = record_type(
     "sxx syy szz sxy "  # Pa, tension positive
     "plastic "  # -: accumulated plastic shear strain, the integral of (2 e:e)^(1/2) of the plastic rate e
-    "fx fy "  # N: all forces but gravity in the evaluation under way
+    "fx fy "  # N: all forces but gravity in the current evaluation
     "drag_x drag_y",  # N: what artificial viscosity contributes to them
     indices="number "  # as in the scenario
     "first",  # its first touch
@@ -42,9 +42,9 @@ TOUCH = record_type(
     "fx fy",  # N: on the particle
     indices="particle body",
 )
-BOOK = record_type(
+TALLY = record_type(
     "plastic viscosity dashpot friction settling ramp "  # J, lost so far; ramp: what the missing weight would have done
-    "fastest",  # m/s: highest speed in the drift under way
+    "fastest",  # m/s: highest speed in the current drift
 )
 CONTROLS = record_type(
     "area smoothing reach skin "  # m2, m, m, m: s^2; h; support radius; how much farther lists reach
@@ -88,7 +88,7 @@ class Soils(NamedTuple):
     kept: Records  # (t,) TOUCH, the same before the lists are made again
     by_body: Integers  # (t,) uint32: touches sorted by body
     begins: Integers  # (bodies + 1,) uint32: where those of a body begin
-    books: Records  # (n / GROUP, rounded up) BOOK
+    tallies: Records  # (n / GROUP, rounded up) TALLY
     spare_point: Records  # (1,) POINT, work space
     spare_state: Records  # (1,) STATE
     controls: Records  # (1,) CONTROLS

@@ -8,14 +8,14 @@ the springs have gained, by the trapezoid rule, which is exactly the work that t
 
 import math
 
-from blocksim.kernels.arrays import Record, World
-from blocksim.kernels.friction import clip_to_cone, draw_same_spring
-from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.common.arrays import Record, World
+from blocksim.kernels.common.barrier import barrier
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.supports import has_motion
+from blocksim.kernels.common.systems import part_of_thread
+from blocksim.kernels.explicit.friction import clip_to_cone, draw_same_spring
 from blocksim.kernels.soil.arrays import GROUP, Soils
 from blocksim.kernels.soil.shapes import from_body
-from blocksim.kernels.support import has_motion
-from blocksim.kernels.systems import part_of_thread
-from blocksim.kernels.team import meet
 
 
 @kernel
@@ -76,13 +76,13 @@ def book_touch(
     depth: float,
     spring: float,
 ) -> None:
-    """Book the losses (J) of a drift with these displacements (m), and keep forces (N) and springs (m) for the next."""
-    book = soils.books[touch.particle // GROUP]
+    """Tally the losses (J) of a drift of these displacements (m), and keep forces (N) and springs (m) for the next."""
+    tally = soils.tallies[touch.particle // GROUP]
     stiffness = values.normal_stiffness
     gained = 0.5 * stiffness * (depth - touch.depth) * (depth + touch.depth)
-    book.dashpot += 0.5 * (touch.normal_force + normal) * closing - gained
+    tally.dashpot += 0.5 * (touch.normal_force + normal) * closing - gained
     gained = 0.5 * values.shear_ratio * stiffness * (spring - touch.spring) * (spring + touch.spring)
-    book.friction += 0.5 * (touch.shear_force + resistance) * slip - gained
+    tally.friction += 0.5 * (touch.shear_force + resistance) * slip - gained
     touch.normal_force = normal
     touch.shear_force = resistance
     touch.depth = depth
@@ -115,7 +115,7 @@ def press_all(soils: Soils, world: World, k: int, step: float, of_blocks: bool) 
 @kernel
 def particles_of_thread(soils: Soils, world: World, k: int) -> tuple[int, int]:
     """Return where the particles of thread k begin and end: whole groups."""
-    first, last = part_of_thread(soils.books.size, world, k)
+    first, last = part_of_thread(soils.tallies.size, world, k)
     return min(GROUP * first, soils.points.size), min(GROUP * last, soils.points.size)
 
 
@@ -144,7 +144,7 @@ def load_bodies(soils: Soils, world: World, first: int, last: int) -> None:
 def touch_blocks(soils: Soils, _: World, world: World, k: int, step: float) -> None:
     """Let soils and blocks act on one another."""
     press_all(soils, world, k, step, True)
-    meet(world.team)
+    barrier(world.team)
     first, last = part_of_thread(soils.controls[0].blocks, world, k)
     load_bodies(soils, world, first, last)
 
@@ -154,6 +154,6 @@ def touch_supports(soils: Soils, _: World, world: World, k: int, step: float) ->
     """Let soils and supports act on one another; what supports get matters where they move."""
     press_all(soils, world, k, step, False)
     if has_motion(world.controls[0]):
-        meet(world.team)
+        barrier(world.team)
         if k == 0:
             load_bodies(soils, world, soils.controls[0].blocks, world.bodies.size)

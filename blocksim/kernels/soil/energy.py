@@ -2,8 +2,8 @@
 
 import math
 
-from blocksim.kernels.arrays import Floats, World
-from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.common.arrays import Floats, World
+from blocksim.kernels.common.jit import rare_kernel
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.soil.stress import invariants, strain_energy
 
@@ -55,10 +55,10 @@ def measure(soils: Soils, world: World, row: Floats) -> None:
         row[2] += strain_energy(kind, total, deviator)
         row[10] += kind.mass
     row[3] = measure_touches(soils, world)
-    for book in soils.books:
-        row[4] += book.plastic
-        row[5] += book.viscosity
-        row[6] += book.dashpot
-        row[7] += book.friction
-        row[8] += book.settling
-        row[9] += book.ramp
+    for tally in soils.tallies:
+        row[4] += tally.plastic
+        row[5] += tally.viscosity
+        row[6] += tally.dashpot
+        row[7] += tally.friction
+        row[8] += tally.settling
+        row[9] += tally.ramp

@@ -10,7 +10,7 @@ exact for linear fields where corrected. Forces (momentum.py) are the adjoint of
 
 import math
 
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.common.jit import kernel
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.sph.wendland_c2 import fading, steepness
 

@@ -11,7 +11,7 @@ that approach one another. Both are odd in the particles bit by bit: momentum ch
 
 import math
 
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.common.jit import kernel
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.sph.wendland_c2 import fading, steepness
 

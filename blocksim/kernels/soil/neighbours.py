@@ -7,8 +7,8 @@ but the order of sums, and follows from the state alone, so that it is the same 
 
 import math
 
-from blocksim.kernels.arrays import World
-from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.common.arrays import World
+from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.sph.cells import CellGrid, cell_number, clipped_cell
 
@@ -28,10 +28,10 @@ def fastest_body(world: World) -> float:
 
 @rare_kernel
 def travelled(soils: Soils, world: World, step: float) -> float:
-    """Return how far (m) anything may have moved since the lists were made, the drift under way included."""
+    """Return how far (m) anything may have moved since the lists were made, the current drift included."""
     fastest = fastest_body(world)
-    for book in soils.books:
-        fastest = max(fastest, book.fastest)
+    for tally in soils.tallies:
+        fastest = max(fastest, tally.fastest)
     return soils.controls[0].travel + step * fastest
 
 

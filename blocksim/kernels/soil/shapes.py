@@ -6,8 +6,8 @@ beyond an end is its neighbour's affair. The half-plane, the last of all bodies,
 
 import math
 
-from blocksim.kernels.arrays import ALL, Record
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.common.arrays import ALL, Record
+from blocksim.kernels.common.jit import kernel
 
 UPPER_RIGHT, UPPER_LEFT = 4, 8  # bits of corners that can be touched
 

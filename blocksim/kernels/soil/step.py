@@ -5,8 +5,9 @@ Velocity Verlet as for bodies; at the start, while gravity grows or contacts fin
 
 import math
 
-from blocksim.kernels.arrays import Record, World
-from blocksim.kernels.jit import kernel, rare_kernel
+from blocksim.kernels.common.arrays import Record, World
+from blocksim.kernels.common.barrier import barrier
+from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.soil.arrays import GROUP, Soils
 from blocksim.kernels.soil.contact import particles_of_thread
 from blocksim.kernels.soil.gradient import correction, raw_gradient
@@ -21,7 +22,6 @@ from blocksim.kernels.soil.neighbours import (
 )
 from blocksim.kernels.soil.stress import strain
 from blocksim.kernels.soil.touches import make_touches, preload
-from blocksim.kernels.team import meet
 
 
 @kernel
@@ -50,7 +50,7 @@ def damping_of(kind: Record, half: float, time: float) -> float:
 def start_group(soils: Soils, world: World, g: int, time: float, step: float) -> None:
     """Half a kick and the drift of the particles of a group; `time` (s) is that before the step."""
     controls = world.controls[0]
-    book = soils.books[g]
+    tally = soils.tallies[g]
     half = 0.5 * step
     share = share_of_gravity(soils, time)
     missing = 1.0 - 0.5 * (share + share_of_gravity(soils, time + step))
@@ -60,17 +60,17 @@ def start_group(soils: Soils, world: World, g: int, time: float, step: float) ->
         kind = soils.kinds[state.kind]
         damped = damping_of(kind, half, time)
         lost = kick(point, state, kind, share * controls.gravity_x, share * controls.gravity_y, half, damped)
-        book.settling += lost
-        book.viscosity -= half * (state.drag_x * point.vx + state.drag_y * point.vy)
+        tally.settling += lost
+        tally.viscosity -= half * (state.drag_x * point.vx + state.drag_y * point.vy)
         if missing > 0.0:
             fall = controls.gravity_x * point.vx + controls.gravity_y * point.vy
-            book.ramp += missing * kind.mass * step * fall
+            tally.ramp += missing * kind.mass * step * fall
         point.x += step * point.vx
         point.y += step * point.vy
         state.fx = 0.0
         state.fy = 0.0
         fastest = max(fastest, point.vx * point.vx + point.vy * point.vy)
-    book.fastest = math.sqrt(fastest)
+    tally.fastest = math.sqrt(fastest)
 
 
 @rare_kernel
@@ -80,10 +80,10 @@ def start(soils: Soils, world: World, k: int, step: float) -> None:
     time = world.shares[k].steps * world.controls[0].step - step
     for g in range(first // GROUP, (last + GROUP - 1) // GROUP):
         start_group(soils, world, g, time, step)
-    meet(world.team)
+    barrier(world.team)
     travel = travelled(soils, world, step)
     is_due = are_lists_due(soils, travel)
-    meet(world.team)
+    barrier(world.team)
     if k == 0:
         soils.controls[0].travel = 0.0 if is_due else travel
     if is_due:
@@ -101,7 +101,7 @@ def renew_lists(soils: Soils, world: World, k: int) -> None:
         if soils.controls[0].is_listed == 0:
             preload(soils, world)
         soils.controls[0].is_listed = 1
-    meet(world.team)
+    barrier(world.team)
     first, last = particles_of_thread(soils, world, k)
     list_neighbours(soils, first, last)
 
@@ -109,7 +109,7 @@ def renew_lists(soils: Soils, world: World, k: int) -> None:
 @rare_kernel
 def stress_group(soils: Soils, g: int, step: float) -> None:
     """Advance the stresses of the particles of a group; nothing that others read of them changes before."""
-    book = soils.books[g]
+    tally = soils.tallies[g]
     for i in range(GROUP * g, min(GROUP * (g + 1), soils.points.size)):
         point, state = soils.points[i], soils.states[i]
         kind = soils.kinds[state.kind]
@@ -119,7 +119,7 @@ def stress_group(soils: Soils, g: int, step: float) -> None:
             bxx, bxy, byy = correction(soils, i)
             ux, uy = ux * bxx + uy * bxy, ux * bxy + uy * byy
             wx, wy = wx * bxx + wy * bxy, wx * bxy + wy * byy
-        book.plastic += strain(state, kind, ux, uy, wx, wy, step)
+        tally.plastic += strain(state, kind, ux, uy, wx, wy, step)
         point.pxx = state.sxx * bxx + state.sxy * bxy
         point.pxy = state.sxx * bxy + state.sxy * byy
         point.pyx = state.sxy * bxx + state.syy * bxy
@@ -129,7 +129,7 @@ def stress_group(soils: Soils, g: int, step: float) -> None:
 @rare_kernel
 def force_group(soils: Soils, g: int, step: float) -> None:
     """Add the forces between particles to those of a group."""
-    book = soils.books[g]
+    tally = soils.tallies[g]
     half = 0.5 * step
     for i in range(GROUP * g, min(GROUP * (g + 1), soils.points.size)):
         point, state = soils.points[i], soils.states[i]
@@ -138,7 +138,7 @@ def force_group(soils: Soils, g: int, step: float) -> None:
         state.fy += fy + drag_y
         state.drag_x = drag_x
         state.drag_y = drag_y
-        book.viscosity -= half * (drag_x * point.vx + drag_y * point.vy)
+        tally.viscosity -= half * (drag_x * point.vx + drag_y * point.vy)
 
 
 @rare_kernel
@@ -148,7 +148,7 @@ def flow(soils: Soils, _: Soils, world: World, k: int, step: float) -> None:
     groups = range(first // GROUP, (last + GROUP - 1) // GROUP)
     for g in groups:
         stress_group(soils, g, step)
-    meet(world.team)
+    barrier(world.team)
     for g in groups:
         force_group(soils, g, step)
 
@@ -166,4 +166,4 @@ def finish(soils: Soils, world: World, k: int, step: float) -> None:
         kind = soils.kinds[state.kind]
         damped = damping_of(kind, half, time)
         lost = kick(point, state, kind, share * controls.gravity_x, share * controls.gravity_y, half, damped)
-        soils.books[i // GROUP].settling += lost
+        soils.tallies[i // GROUP].settling += lost

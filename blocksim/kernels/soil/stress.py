@@ -15,8 +15,8 @@ I1 = 3 (s_1 + s_2)/2: with a = sin(phi)/3 and k = c cos(phi) the surface is Mohr
 
 import math
 
-from blocksim.kernels.arrays import Record
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.common.arrays import Record
+from blocksim.kernels.common.jit import kernel
 
 
 @kernel

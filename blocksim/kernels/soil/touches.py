@@ -5,8 +5,8 @@ Made when the lists of neighbours are, by one thread, as few particles are near 
 
 import math
 
-from blocksim.kernels.arrays import Record, World
-from blocksim.kernels.jit import rare_kernel
+from blocksim.kernels.common.arrays import Record, World
+from blocksim.kernels.common.jit import rare_kernel
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.soil.neighbours import grid_of
 from blocksim.kernels.soil.shapes import from_body, is_near

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.arrays import Floats, Integers
-from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
+from blocksim.kernels.common.arrays import Floats, Integers
+from blocksim.kernels.common.jit import entry_kernel, kernel, rare_kernel
 
 NOTHING: Integers = np.empty(0, np.int64)
 

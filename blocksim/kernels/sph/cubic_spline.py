@@ -2,7 +2,7 @@
 
 import math
 
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.common.jit import kernel
 
 SUPPORT = 2.0  # smoothing lengths
 SCALE = 10.0 / (7.0 * math.pi)  # makes the integral over the plane one

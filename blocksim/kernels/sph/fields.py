@@ -24,7 +24,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blocksim.kernels.arrays import Floats
+from blocksim.kernels.common.arrays import Floats
 from blocksim.kernels.sph.cells import Neighbours, find_neighbours
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.kernels.sph.operators import (

@@ -1,4 +1,4 @@
-"""Smoothing functions W(r, h) in the plane and the one place that knows them all.
+"""Smoothing functions W(r, h) in the plane and their dispatch.
 
 A smoothing function is one file with `value(r, h)`, `slope(r, h)` and `SUPPORT`, one code here and one branch in each
 dispatcher below (on an integer code, for the reason given in kernels/laws). All are functions of q = r/h alone up to a
@@ -6,7 +6,7 @@ factor, positive and falling within their support, zero beyond it, and normalise
 The smoothing length h is the scale of q, not the support radius: that is 2 h or 3 h.
 """
 
-from blocksim.kernels.jit import entry_kernel
+from blocksim.kernels.common.jit import entry_kernel
 from blocksim.kernels.sph import cubic_spline, quintic_spline, wendland_c2
 
 WENDLAND_C2, CUBIC_SPLINE, QUINTIC_SPLINE = range(3)

@@ -22,8 +22,8 @@ h/dx = 1.3, and falling about as (h/dx)^-5 (-4).
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.arrays import Floats, Integers
-from blocksim.kernels.jit import entry_kernel, kernel, rare_kernel
+from blocksim.kernels.common.arrays import Floats, Integers
+from blocksim.kernels.common.jit import entry_kernel, kernel, rare_kernel
 from blocksim.kernels.sph.functions import kernel_slope, kernel_value
 
 PLAIN = 0

@@ -6,7 +6,7 @@ Its Fourier transform is positive, so that particles do not pair up however many
 
 import math
 
-from blocksim.kernels.jit import kernel
+from blocksim.kernels.common.jit import kernel
 
 SUPPORT = 2.0  # smoothing lengths
 SCALE = 7.0 / (4.0 * math.pi)  # makes the integral over the plane one

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
-from blocksim.kernels.systems import Coupled, measure_systems, plan_of
+from blocksim.kernels.common.systems import Coupled, measure_systems, plan_of
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES as TABLES
 from blocksim.scenario.motion import settles

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from blocksim.kernels.advance import advance_coupled_alone, advance_coupled_in_team
-from blocksim.kernels.systems import Coupled
+from blocksim.kernels.common.systems import Coupled
+from blocksim.kernels.explicit.step import advance_coupled_alone, advance_coupled_in_team
 from blocksim.simulation.contacts import Rows
 from blocksim.simulation.schemes.scheme import Scheme
 

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.advance import advance, advance_in_team
-from blocksim.kernels.arrays import HALF, World
-from blocksim.kernels.energy import LEDGER_ROW, measure
-from blocksim.kernels.ensemble import advance_members
-from blocksim.kernels.laws import HERTZ_MINDLIN, LINEAR
+from blocksim.kernels.common.arrays import HALF, World
+from blocksim.kernels.explicit.energy import LEDGER_ROW, measure
+from blocksim.kernels.explicit.ensemble import advance_members
+from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR
+from blocksim.kernels.explicit.step import advance, advance_in_team
 from blocksim.simulation.contacts import SUPPORT, UNITS, Rows, empty_rows
 from blocksim.simulation.schemes.coupled import coupled_scheme
 from blocksim.simulation.schemes.scheme import Scheme

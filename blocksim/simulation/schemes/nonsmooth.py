@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from blocksim.kernels.nonsmooth.advance import advance_nonsmooth, advance_nonsmooth_in_team
 from blocksim.kernels.nonsmooth.arrays import AWAY, Nonsmooth
 from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER, measure_nonsmooth
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
+from blocksim.kernels.nonsmooth.step import advance_nonsmooth, advance_nonsmooth_in_team
 from blocksim.simulation.contacts import SUPPORT, Rows, empty_rows
 from blocksim.simulation.schemes.scheme import Scheme
 from blocksim.world.nonsmooth import NONSMOOTH as CONSTRUCTION
-from blocksim.world.nonsmooth import threads_of, with_more_rows, with_more_threads
+from blocksim.world.nonsmooth import threads_of, with_more_constraints, with_more_threads
 
 
 def nonsmooth_contacts(scene: Nonsmooth, blocks: int) -> Rows:
     """Return all points that press, those of a manifold beside one another; bodies from `blocks` on are the support."""
     stepping = scene.contacts.stepping[0]
-    manifolds = scene.contacts.rows[: int(stepping.row_count)]
+    manifolds = scene.contacts.constraints[: int(stepping.constraint_count)]
     manifolds = manifolds[manifolds["reach"] != AWAY]
     points = np.stack([_points(scene, manifolds, "one", 0.0), _points(scene, manifolds, "two", 1.0)], axis=-1).ravel()
     rows = points[points["normal_force"] > 0.0]
@@ -58,7 +58,7 @@ NONSMOOTH = Scheme(
     advance=advance_nonsmooth,
     advance_in_team=advance_nonsmooth_in_team,
     advance_members=advance_nonsmooth_members,
-    with_more_room=with_more_rows,
+    with_more_room=with_more_constraints,
     with_threads=with_more_threads,
     threads_of=threads_of,
     for_another_thread=lambda scene: scene,  # rows are solved in registers

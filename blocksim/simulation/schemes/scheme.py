@@ -5,9 +5,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from blocksim.kernels.arrays import World
+from blocksim.kernels.common.arrays import World
+from blocksim.kernels.common.systems import Coupled
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-from blocksim.kernels.systems import Coupled
 from blocksim.simulation.contacts import Rows, empty_rows
 from blocksim.world.scenes import Construction
 

@@ -20,7 +20,7 @@ IN_WORLD = (BLOCKS, SUPPORTS)
 """Systems of every scene, whose arrays are the world, and whose steps, bounds and energies are the scheme's own."""
 Function = Callable[..., None]
 Interaction = Callable[[], Function] | None
-"""Gives the compiled function of a pair (`blocksim.kernels.systems.Act`); None: nothing happens between the two."""
+"""Gives the compiled function of a pair (`Act` in kernels/common/systems.py); None: nothing happens between the two."""
 
 
 def by_scheme() -> Function:

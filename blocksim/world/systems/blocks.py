@@ -121,7 +121,7 @@ def _elements(scenario: Scenario) -> Elements:
 
 def motion_of(bodies: Any) -> Floats:
     """Return the quantities (..., 6, b) of bodies (..., b): a removed one is where it was and has no velocity: NaN."""
-    from blocksim.kernels.arrays import REMOVED  # noqa: PLC0415 - kernels, not for readers
+    from blocksim.kernels.common.arrays import REMOVED  # noqa: PLC0415 - kernels, not for readers
 
     plain = bodies.view(np.ndarray)  # a record array takes five times as long for a field
     values = np.stack([plain[one.name] for one in QUANTITIES], axis=-2)

@@ -62,7 +62,7 @@ def depth_of_scene(scenario: Scenario) -> float:
 
 def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
     """Return one KIND for each soil."""
-    from blocksim.kernels.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
+    from blocksim.kernels.common.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
     from blocksim.kernels.soil.arrays import KIND  # noqa: PLC0415
 
     records = zeros(len(tables), KIND)
@@ -107,7 +107,7 @@ def friction_with(scenario: Scenario, soil: str, partner: "ContactClass") -> Pai
 
 def interactions_with(scenario: Scenario, tables: list[SoilTable]) -> Any:
     """Return the parameters (soils, classes) of contacts with each class of bodies; see `world.interactions`."""
-    from blocksim.kernels.arrays import INTERACTION, zeros  # noqa: PLC0415 - kernels, not for readers
+    from blocksim.kernels.common.arrays import INTERACTION, zeros  # noqa: PLC0415 - kernels, not for readers
     from blocksim.world.interactions import contact_classes  # noqa: PLC0415
 
     classes = contact_classes(scenario, place_bodies(scenario))

@@ -103,15 +103,15 @@ def _elements(scenario: Scenario) -> Elements:
 
 def _words(count: int | tuple[int, int]) -> Any:
     """Return zeros that start on a cache line."""
-    from blocksim.kernels.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
+    from blocksim.kernels.common.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
 
     plain: Any = np.dtype(np.uint32)
     return zeros(count, plain).view(np.ndarray)
 
 
 def _build(scenario: Scenario) -> "Soils":
-    from blocksim.kernels.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
-    from blocksim.kernels.soil.arrays import BOOK, GROUP, NEIGHBOURS, POINT, STATE, TOUCH, Soils  # noqa: PLC0415
+    from blocksim.kernels.common.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
+    from blocksim.kernels.soil.arrays import GROUP, NEIGHBOURS, POINT, STATE, TALLY, TOUCH, Soils  # noqa: PLC0415
 
     tables, places = soil_tables(scenario), _places(scenario)
     start = _elements(scenario).start
@@ -137,7 +137,7 @@ def _build(scenario: Scenario) -> "Soils":
         kept=zeros(room, TOUCH),
         by_body=_words(room),
         begins=_words(bodies + 1),
-        books=zeros(math.ceil(n / GROUP), BOOK),
+        tallies=zeros(math.ceil(n / GROUP), TALLY),
         spare_point=zeros(1, POINT),
         spare_state=zeros(1, STATE),
         controls=_controls(scenario, tables),
@@ -145,7 +145,7 @@ def _build(scenario: Scenario) -> "Soils":
 
 
 def _controls(scenario: Scenario, tables: list[SoilTable]) -> Any:
-    from blocksim.kernels.arrays import zeros  # noqa: PLC0415 - as in _stages
+    from blocksim.kernels.common.arrays import zeros  # noqa: PLC0415 - as in _stages
     from blocksim.kernels.soil.arrays import CONTROLS  # noqa: PLC0415
     from blocksim.kernels.sph.wendland_c2 import SUPPORT  # noqa: PLC0415
 
@@ -187,9 +187,9 @@ def _largest_step(scenario: Scenario) -> float:
 
 
 def _stages() -> Any:
+    from blocksim.kernels.common.systems import Stages  # noqa: PLC0415
     from blocksim.kernels.soil.energy import measure, survey  # noqa: PLC0415 - readers of stored runs compile nothing
     from blocksim.kernels.soil.step import finish, start  # noqa: PLC0415
-    from blocksim.kernels.systems import Stages  # noqa: PLC0415
 
     return Stages(start, finish, survey, measure)
 

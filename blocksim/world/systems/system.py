@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from blocksim.scenario import Scenario
 
 if TYPE_CHECKING:
-    from blocksim.kernels.systems import Stages
+    from blocksim.kernels.common.systems import Stages
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
-from blocksim.kernels.geometry import separation
+from blocksim.kernels.common.geometry import separation
 from blocksim.kernels.nonsmooth.arrays import FAR
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from blocksim.kernels.arrays import Record
+    from blocksim.kernels.common.arrays import Record
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
     from tests.kernels.conftest import MakeBody
 
@@ -69,7 +69,7 @@ def apart(a: Record, b: Record) -> float:
 
 
 def clipped(side: Side, other: Side) -> list[Vector]:
-    """Return the ends of what of another face lies over a face, cut by the lines at its two ends."""
+    """Return the ends of what of another face lies over a face, cut by the states at its two ends."""
     along = (side.end - side.begin) / np.linalg.norm(side.end - side.begin)
     ends = [other.begin, other.end]
     for place, sign in ((side.begin, 1.0), (side.end, -1.0)):
@@ -97,13 +97,13 @@ def meeting(a: Record, b: Record, margin: float) -> Meeting:
     return Meeting(normal, np.array([p for p, _ in near]), np.array([gap for _, gap in near]), is_of_b)
 
 
-def places_of(row: Record, body: Record, *, of_a: bool) -> Vector:
-    """Return the places (2, 2) of both points of a row, from its arms about one of its bodies."""
-    n = np.array([row.nx, row.ny])
-    t = np.array([-row.ny, row.nx])
-    arm, shear_arm = (row.arm_a, row.shear_arm_a) if of_a else (row.arm_b, row.shear_arm_b)
+def places_of(constraint: Record, body: Record, *, of_a: bool) -> Vector:
+    """Return the places (2, 2) of both points of a constraint, from its arms about one of its bodies."""
+    n = np.array([constraint.nx, constraint.ny])
+    t = np.array([-constraint.ny, constraint.nx])
+    arm, shear_arm = (constraint.arm_a, constraint.shear_arm_a) if of_a else (constraint.arm_b, constraint.shear_arm_b)
     one = (body.x, body.y) + shear_arm * n - arm * t  # arm = r x n = -r t, shear arm = r x t = r n
-    return np.array([one, one + row.width * t])
+    return np.array([one, one + constraint.width * t])
 
 
 def brought_near(make_body: MakeBody, b: Record, sides_of_a: Vector, angle: float, way: float, gap: float) -> Record:
@@ -119,9 +119,9 @@ def brought_near(make_body: MakeBody, b: Record, sides_of_a: Vector, angle: floa
 
 
 class Dense(NamedTuple):
-    """All points and rows of the groups of a scene, with matrices over all velocities (vx, vy, spin of every body)."""
+    """All points and constraints of a scene, with matrices over all velocities (vx, vy, spin of every body)."""
 
-    normals: Vector  # (2 r, 3 n) J of the points, two a row
+    normals: Vector  # (2 r, 3 n) J of the points, two a constraint
     tangents: Vector  # (r, 3 n)
     inverse_mass: Vector  # (3 n,) diagonal
     impulses: Vector  # (2 r,) N s
@@ -143,46 +143,49 @@ class Dense(NamedTuple):
 
 def jacobian(n: Vector, r_a: Vector, r_b: Vector, a: int, b: int, bodies: int) -> Vector:
     """Return what all velocities are multiplied by to get that of a at r_a against b at r_b, along a direction."""
-    line = np.zeros(3 * bodies)
-    line[3 * a : 3 * a + 3] = n[0], n[1], r_a[0] * n[1] - r_a[1] * n[0]
-    line[3 * b : 3 * b + 3] = -n[0], -n[1], -(r_b[0] * n[1] - r_b[1] * n[0])
-    return line
+    state = np.zeros(3 * bodies)
+    state[3 * a : 3 * a + 3] = n[0], n[1], r_a[0] * n[1] - r_a[1] * n[0]
+    state[3 * b : 3 * b + 3] = -n[0], -n[1], -(r_b[0] * n[1] - r_b[1] * n[0])
+    return state
 
 
 def dense(scene: Nonsmooth) -> Dense:
     """Return the matrices of the packed groups of a scene; its bodies have not been placed since they were made."""
     contacts, bodies = scene.contacts, scene.world.bodies
-    points, tangents, rows, starts, targets, impulses, shears = [], [], [], [], [], [], []
+    points, tangents, constraints, starts, targets, impulses, shears = [], [], [], [], [], [], []
     for group in contacts.groups[: contacts.stepping[0].group_count]:
         for k in range(group["count"]):
-            row = contacts.rows[group.row[k]]
-            rows.append(row)
-            n, t = np.array([row.nx, row.ny]), np.array([-row.ny, row.nx])
-            a, b = bodies[row.a], bodies[row.b]
-            of_a, of_b = (place - (a.x, a.y) for place in places_of(row, a, of_a=True)), places_of(row, b, of_a=False)
+            constraint = contacts.constraints[group.constraint[k]]
+            constraints.append(constraint)
+            n, t = np.array([constraint.nx, constraint.ny]), np.array([-constraint.ny, constraint.nx])
+            a, b = bodies[constraint.a], bodies[constraint.b]
+            of_a, of_b = (
+                (place - (a.x, a.y) for place in places_of(constraint, a, of_a=True)),
+                places_of(constraint, b, of_a=False),
+            )
             ends = [(r_a, place - (b.x, b.y)) for r_a, place in zip(of_a, of_b, strict=True)]
-            points += [jacobian(n, r_a, r_b, row.a, row.b, bodies.size) for r_a, r_b in ends]
-            tangents.append(jacobian(t, *ends[0], row.a, row.b, bodies.size))
+            points += [jacobian(n, r_a, r_b, constraint.a, constraint.b, bodies.size) for r_a, r_b in ends]
+            tangents.append(jacobian(t, *ends[0], constraint.a, constraint.b, bodies.size))
             impulses += [group.normal_one[k], group.normal_two[k]]
             starts += [group.start_one[k], group.start_two[k]]
             targets += [group.target_one[k], group.target_two[k]]
             shears.append(group.shear[k])
-    lines = contacts.lines
-    inverse = np.array([lines.inverse_mass, lines.inverse_mass, lines.inverse_inertia]).T.ravel()
-    touches = contacts.touches[[int(row.touch) for row in rows]]
-    gaps = [gap for row in rows for gap in (row.gap_one, row.gap_two)]
-    columns = (impulses, shears, targets, touches["kinetic_friction"], gaps, starts)
+    states = contacts.states
+    inverse = np.array([states.inverse_mass, states.inverse_mass, states.inverse_inertia]).T.ravel()
+    materials = contacts.materials[[int(constraint.material) for constraint in constraints]]
+    gaps = [gap for constraint in constraints for gap in (constraint.gap_one, constraint.gap_two)]
+    columns = (impulses, shears, targets, materials["kinetic_friction"], gaps, starts)
     return Dense(np.array(points), np.array(tangents), inverse, *(np.array(one) for one in columns))
 
 
-def least_change(start: Vector, constraints: Vector, least: Vector, inverse_mass: Vector) -> Vector:
+def least_change(start: Vector, rows: Vector, least: Vector, inverse_mass: Vector) -> Vector:
     """Return the velocities with J v >= least that differ least from `start`, in kinetic energy.
 
     That is Gauss's principle for impulses without friction. Solved as least distance programming (C. L. Lawson and
     R. J. Hanson, Solving Least Squares Problems (1974), chapter 23): min |x| with G x >= h, x = M^(1/2) (v - start).
     """
-    g = constraints * np.sqrt(inverse_mass)
-    h = least - constraints @ start
+    g = rows * np.sqrt(inverse_mass)
+    h = least - rows @ start
     if h.max() <= 0.0:
         return start.copy()
     scale = float(np.abs(h).max())

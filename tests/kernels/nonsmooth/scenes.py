@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.kernels.arrays import TEAM_SIZE
-from blocksim.kernels.integrate import renew_rotations
-from blocksim.kernels.nonsmooth.advance import collide_rows
-from blocksim.kernels.nonsmooth.begin import load_lines
+from blocksim.kernels.common.arrays import TEAM_SIZE
+from blocksim.kernels.common.integrate import renew_rotations
+from blocksim.kernels.nonsmooth.begin import load_states
 from blocksim.kernels.nonsmooth.groups import gather, pack_groups
-from blocksim.kernels.nonsmooth.neighbours import look
+from blocksim.kernels.nonsmooth.neighbours import update_pairs
+from blocksim.kernels.nonsmooth.step import find_manifolds
 from blocksim.kernels.nonsmooth.substep import substep
 from blocksim.scenario.models.stepping import Nonsmooth as Stepping
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import HEIGHT, WIDTH, Scene
-from blocksim.world.nonsmooth import with_more_rows
+from blocksim.world.nonsmooth import with_more_constraints
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from blocksim.kernels.arrays import Records
+    from blocksim.kernels.common.arrays import Records
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
     from blocksim.scenario import Scenario
 
@@ -73,7 +73,7 @@ def posed(blocks: Sequence[Block], **values: Any) -> Nonsmooth:
     apart = [{"x": 3.0 * size * i, "y": 2.0 * size, "fixed": one.fixed, **one.shape} for i, one in enumerate(blocks)]
     scene: Any = build_scene(rigid(Scene(apart, time=RIGID, **values).scenario(), end=ENDLESS, **stepping))
     place(scene, blocks)
-    load_lines(scene)
+    load_states(scene)
     scene.world.clock[0].is_started = 1
     scene.world.team[TEAM_SIZE] = 1
     return scene  # type: ignore[no-any-return]
@@ -89,22 +89,22 @@ def place(scene: Nonsmooth, blocks: Sequence[Block]) -> None:
 
 def listed(scene: Nonsmooth) -> Nonsmooth:
     """Return a scene with the pairs of its bodies as they are now, in arrays large enough."""
-    while not look(scene):
-        scene = with_more_rows(scene)
+    while not update_pairs(scene):
+        scene = with_more_constraints(scene)
     return scene
 
 
 def collided(scene: Nonsmooth) -> Nonsmooth:
     """Return a scene with the manifolds of its pairs, packed in groups."""
     scene = listed(scene)
-    collide_rows(scene, 0, int(scene.contacts.stepping[0].row_count))
+    find_manifolds(scene, 0, int(scene.contacts.stepping[0].constraint_count))
     gather(scene.contacts, scene.begins)
     pack_groups(scene.contacts, 0, int(scene.contacts.stepping[0].group_count))
     return scene
 
 
 def after_substep(blocks: Sequence[Block], *, is_first: bool = False, **values: Any) -> Nonsmooth:
-    """Return blocks after the first substep of a step; the impulses are in the groups, velocities in the lines."""
+    """Return blocks after the first substep of a step; the impulses are in the groups, velocities in the states."""
     scene = collided(posed(blocks, **values))
     substep(scene, 0, 0, is_first)
     return scene
@@ -112,18 +112,18 @@ def after_substep(blocks: Sequence[Block], *, is_first: bool = False, **values: 
 
 def pairs_of(scene: Nonsmooth) -> set[tuple[int, int]]:
     """Return the bodies of all listed pairs."""
-    rows = listed_rows(scene)
-    return set(zip(rows.a.tolist(), rows.b.tolist(), strict=True))
+    constraints = listed_constraints(scene)
+    return set(zip(constraints.a.tolist(), constraints.b.tolist(), strict=True))
 
 
-def listed_rows(scene: Nonsmooth) -> Any:
-    """Return the rows there are."""
-    return scene.contacts.rows[: scene.contacts.stepping[0].row_count]
+def listed_constraints(scene: Nonsmooth) -> Any:
+    """Return the constraints there are."""
+    return scene.contacts.constraints[: scene.contacts.stepping[0].constraint_count]
 
 
-def velocities(lines: Records) -> NDArray[np.float64]:
+def velocities(states: Records) -> NDArray[np.float64]:
     """Return vx, vy and spin of all records, a row each."""
-    return np.array([lines[name] for name in ("vx", "vy", "spin")]).T.copy()
+    return np.array([states[name] for name in ("vx", "vy", "spin")]).T.copy()
 
 
 def pile(random: np.random.Generator, columns: int, rows: int, rate: float = 0.3) -> list[Block]:

@@ -42,7 +42,7 @@ def test_impact_reverses_the_approach_of_the_point_by_its_restitution(
         block = Block(0.004, level + lowest(angle) + 1e-5, angle, 0.3, -0.9, 4.0 * (angle != 0.0))
         scene = after_substep([block, *floor, *far], restitution=restitution, gravity=0.0, **SMOOTH)
         all_of = dense(scene)
-        after = all_of.normals @ velocities(scene.contacts.lines).ravel()
+        after = all_of.normals @ velocities(scene.contacts.states).ravel()
         before = all_of.normals @ velocities(scene.contacts.before).ravel()
         if restitution > (0.5 if far else 0.0):  # in rounds: their velocities before are no longer kept
             rest = [[0.0] * 3] * (1 + len(floor) + len(far))
@@ -56,7 +56,7 @@ def test_impact_reverses_the_approach_of_the_point_by_its_restitution(
 def test_two_free_blocks_part_with_their_restitution(restitution: float) -> None:
     blocks = [Block(0.0, 1.0, vy=0.4, vx=0.1), Block(0.0, 1.0 + 2 * HALF + 1e-5, vy=-0.6, width=0.02, vx=-0.3)]
     scene = after_substep(blocks, restitution=restitution, gravity=0.0, **SMOOTH)
-    one, two = velocities(scene.contacts.lines)[:2]
+    one, two = velocities(scene.contacts.states)[:2]
     assert two[1] - one[1] == pytest.approx(restitution, abs=1e-9)
     assert [one[0], two[0]] == pytest.approx([0.1, -0.3], abs=1e-12)
 
@@ -65,14 +65,14 @@ def test_two_free_blocks_part_with_their_restitution(restitution: float) -> None
 def test_slower_impacts_than_the_threshold_do_not_rebound(rate: float, rebounds: bool) -> None:
     block = Block(0.0, HALF - 1e-7, vy=-rate)
     scene = after_substep([block], restitution=0.5, gravity=0.0, restitution_threshold=0.02, **SMOOTH)
-    assert velocities(scene.contacts.lines)[0, 1] == pytest.approx(0.5 * rate if rebounds else 0.0, abs=1e-9)
+    assert velocities(scene.contacts.states)[0, 1] == pytest.approx(0.5 * rate if rebounds else 0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
 def test_gap_that_does_not_close_in_the_substep_takes_nothing_from_an_approach(restitution: float) -> None:
     block = Block(0.0, HALF + 1.1e-3, vy=-1.0)
     scene = after_substep([block], restitution=restitution, gravity=0.0, **SMOOTH)
-    assert velocities(scene.contacts.lines)[0].tolist() == [0.0, -1.0, 0.0]
+    assert velocities(scene.contacts.states)[0].tolist() == [0.0, -1.0, 0.0]
 
 
 @pytest.mark.parametrize("others", [0, 2])  # in rounds, and not
@@ -83,12 +83,12 @@ def test_point_that_parts_beside_one_that_meets_is_not_made_to_rebound(others: i
     scene = after_substep([block, *far], restitution=0.4, gravity=0.0, **SMOOTH)
     all_of = dense(scene)
     before = all_of.normals @ np.array([block.vx, block.vy, block.spin, *[0.0] * 3 * (1 + others)])
-    after = all_of.normals @ velocities(scene.contacts.lines).ravel()
+    after = all_of.normals @ velocities(scene.contacts.states).ravel()
     heel, toe = np.argmin(before), np.argmax(before)
     assert before[toe] > 0.3
     assert after[heel] == pytest.approx(-0.4 * before[heel], abs=1e-9)
     assert all_of.impulses[toe] == 0.0
-    assert velocities(scene.contacts.lines)[0, 0] == pytest.approx(0.2, abs=1e-12)
+    assert velocities(scene.contacts.states)[0, 0] == pytest.approx(0.2, abs=1e-12)
 
 
 def test_point_that_is_still_open_beside_one_in_touch_is_not_slowed_down() -> None:
@@ -98,7 +98,7 @@ def test_point_that_is_still_open_beside_one_in_touch_is_not_slowed_down() -> No
     block = Block(0.0, lowest(angle) - 1e-9, angle, lowest(angle) * -spin, x * spin, spin)
     scene = after_substep([block], restitution=0.0, gravity=0.0, **SMOOTH)
     assert dense(scene).gaps.max() < FAR / 2  # both are looked at
-    assert velocities(scene.contacts.lines)[0].tolist() == pytest.approx([block.vx, block.vy, spin], abs=1e-6)
+    assert velocities(scene.contacts.states)[0].tolist() == pytest.approx([block.vx, block.vy, spin], abs=1e-6)
 
 
 @pytest.mark.parametrize("restitution", [0.4, 0.8])
@@ -131,10 +131,10 @@ def test_block_in_touch_neither_sinks_nor_slides_nor_is_lifted_by_the_velocity_p
     for overlap in (0.0, 1e-5, 1e-4):
         values: dict[str, Any] = {"restitution": 0.0, "tilt": tilt, "substeps": 1, "velocity_tolerance": 1e-11}
         scene = after_substep([Block(0.0, HALF - overlap)], **values)
-        assert np.abs(velocities(scene.contacts.lines)[0, :2]).max() < 1e-9
+        assert np.abs(velocities(scene.contacts.states)[0, :2]).max() < 1e-9
 
 
 @pytest.mark.parametrize("restitution", [0.4, 0.9])
 def test_row_that_parts_already_is_left_alone(restitution: float) -> None:
     scene = after_substep([Block(0.0, HALF - 1e-6, vy=0.5)], restitution=restitution, gravity=0.0, **SMOOTH)
-    assert velocities(scene.contacts.lines)[0].tolist() == pytest.approx([0.0, 0.5, 0.0], abs=1e-12)
+    assert velocities(scene.contacts.states)[0].tolist() == pytest.approx([0.0, 0.5, 0.0], abs=1e-12)

@@ -11,12 +11,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from blocksim.bench.scenes import pushed_wall, three_blocks
-from blocksim.kernels.arrays import AT_REST, REACHED, TEAM_SIZE
-from blocksim.kernels.nonsmooth.advance import advance_nonsmooth_in_team
+from blocksim.kernels.common.arrays import AT_REST, REACHED, TEAM_SIZE
+from blocksim.kernels.common.watch import Watched
 from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
 from blocksim.kernels.nonsmooth.solve import solve_two
-from blocksim.kernels.watch import Watched
+from blocksim.kernels.nonsmooth.step import advance_nonsmooth_in_team
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth, with_more_threads
 from blocksim.world.scenes import build_stacks, only

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from blocksim.kernels.nonsmooth.arrays import FAR
 from blocksim.kernels.nonsmooth.clusters import find_clusters
-from tests.kernels.nonsmooth.scenes import Block, after_substep, collided, listed_rows, posed, velocities
+from tests.kernels.nonsmooth.scenes import Block, after_substep, collided, listed_constraints, posed, velocities
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,7 +37,7 @@ def knots(seed: int, count: int, size: int) -> list[Block]:
 def kinetic(scene: Nonsmooth) -> NDArray[np.float64]:
     """Return the kinetic energy (J) of every block."""
     bodies: Any = scene.world.bodies[:-1]
-    vx, vy, spin = velocities(scene.contacts.lines)[:-1].T
+    vx, vy, spin = velocities(scene.contacts.states)[:-1].T
     return np.asarray(0.5 * (bodies.mass * (vx**2 + vy**2) + bodies.inertia * spin**2))
 
 
@@ -65,9 +65,9 @@ def test_impacts_elsewhere_do_not_change_a_group(restitution: float, pace: int) 
     count, size = (3, 3) if pace == 1 else (2, 2)
     for seed in range(3 if pace == 1 else 1):
         blocks = knots(seed, count, size)
-        together = velocities(after_substep(blocks, **values).contacts.lines)[:-1].reshape(count, size, 3)
+        together = velocities(after_substep(blocks, **values).contacts.states)[:-1].reshape(count, size, 3)
         for k in range(count):
-            alone = velocities(after_substep(blocks[size * k : size * k + size], **values).contacts.lines)[:-1]
+            alone = velocities(after_substep(blocks[size * k : size * k + size], **values).contacts.states)[:-1]
             apart = np.abs(together[k] - alone) * (1.0, 1.0, 0.02)  # m/s
             assert apart.max() < 1e-5  # all are gone through until the last one is solved
 
@@ -75,7 +75,7 @@ def test_impacts_elsewhere_do_not_change_a_group(restitution: float, pace: int) 
 def test_block_that_stands_keeps_its_impulses_while_another_lands() -> None:
     blocks = [Block(0.0, HALF), Block(1.0, HALF + 1e-5, vy=-1.0)]
     scene = after_substep(blocks, restitution=0.9, substeps=2)
-    assert float(scene.contacts.lines.vy[1]) > 0.8
+    assert float(scene.contacts.states.vy[1]) > 0.8
     (group,) = scene.contacts.groups[: scene.contacts.stepping[0].group_count]
     pressing = group.normal_one[:2] + group.normal_two[:2]
     weight = float(scene.world.bodies.mass[0]) * 9.81 * 0.5e-3
@@ -98,7 +98,7 @@ def aimed(seed: int, count: int) -> Nonsmooth:
 def test_clusters_are_the_free_blocks_joined_by_points_that_count(seed: int) -> None:
     scene = aimed(seed, 40)
     count = scene.world.bodies.size
-    free = scene.contacts.lines.inverse_mass > 0.0
+    free = scene.contacts.states.inverse_mass > 0.0
     joined, struck = [], np.zeros(count, dtype=bool)
     for group in scene.contacts.groups[: scene.contacts.stepping[0].group_count]:
         for lane in range(group["count"]):
@@ -116,4 +116,4 @@ def test_clusters_are_the_free_blocks_joined_by_points_that_count(seed: int) -> 
     hit = {int(label) for label in labels[struck]}
     assert impacts.is_hit[free].astype(bool).tolist() == [int(label) in hit for label in labels[free]]
     assert 0 < len(hit) < len(set(labels[free].tolist()))
-    assert listed_rows(scene).size > len(joined)
+    assert listed_constraints(scene).size > len(joined)

@@ -12,7 +12,7 @@ from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, TOUCHING
 from blocksim.kernels.nonsmooth.colours import most_groups
 from blocksim.kernels.nonsmooth.groups import gather
 from blocksim.kernels.nonsmooth.neighbours import frame_of_supports, rebuild
-from tests.kernels.nonsmooth.scenes import Block, listed, listed_rows, pairs_of, place, posed
+from tests.kernels.nonsmooth.scenes import Block, listed, listed_constraints, pairs_of, place, posed
 
 if TYPE_CHECKING:
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
@@ -33,18 +33,18 @@ def comb() -> list[Block]:
 
 def of_colours(scene: Nonsmooth) -> list[list[tuple[int, int]]]:
     """Return the pairs of every colour that there is."""
-    rows = listed_rows(scene)
+    constraints = listed_constraints(scene)
     used = int(scene.contacts.stepping[0].colours)
     assert scene.begins[0] == 0
-    assert np.all(scene.begins[used:] == rows.size)
+    assert np.all(scene.begins[used:] == constraints.size)
     return [
-        list(zip(rows.a[i:j].tolist(), rows.b[i:j].tolist(), strict=True))
+        list(zip(constraints.a[i:j].tolist(), constraints.b[i:j].tolist(), strict=True))
         for i, j in pairwise(scene.begins[: used + 1])
     ]
 
 
 def free_bodies(scene: Nonsmooth, pairs: list[tuple[int, int]]) -> list[int]:
-    return [i for pair in pairs for i in pair if scene.contacts.lines.inverse_mass[i] > 0.0]
+    return [i for pair in pairs for i in pair if scene.contacts.states.inverse_mass[i] > 0.0]
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -57,7 +57,7 @@ def test_no_two_pairs_of_a_colour_share_a_free_body_and_all_have_one(seed: int) 
         assert pairs
         assert len(set(free)) == len(free)
     everything = [pair for pairs in colours for pair in pairs]
-    assert len(set(everything)) == len(everything) == listed_rows(scene).size
+    assert len(set(everything)) == len(everything) == listed_constraints(scene).size
     meets = np.bincount(free_bodies(scene, everything))
     assert meets.max() <= len(colours) <= 2 * meets.max() - 1  # of a greedy colouring
 
@@ -75,8 +75,8 @@ def test_pairs_beyond_the_last_colour_are_solved_one_by_one() -> None:
         free = free_bodies(scene, pairs)
         assert len(set(free)) == len(free)
     assert sum(0 in pair for pair in colours[-1]) > 1  # they all push the beam
-    rows: Any = listed_rows(scene)
-    rows.reach = TOUCHING
+    constraints: Any = listed_constraints(scene)
+    constraints.reach = TOUCHING
     gather(scene.contacts, scene.begins)
     first, last = scene.contacts.ends[COLOURS - 1 : COLOURS + 1]
     assert last - first == len(colours[-1])
@@ -86,30 +86,34 @@ def test_pairs_beyond_the_last_colour_are_solved_one_by_one() -> None:
 
 def test_rows_know_how_the_materials_of_their_bodies_touch() -> None:
     scene = listed(posed(crowd(0), friction=0.25, ground_friction=0.75))
-    for row in listed_rows(scene):
-        expected = 0.75 if row.b == scene.world.bodies.size - 1 else 0.25
-        assert scene.contacts.touches[row.touch].kinetic_friction == expected
+    for constraint in listed_constraints(scene):
+        expected = 0.75 if constraint.b == scene.world.bodies.size - 1 else 0.25
+        assert scene.contacts.materials[constraint.material].kinetic_friction == expected
 
 
 def test_impulses_go_with_their_pair_into_the_next_list() -> None:
     scene = listed(posed(crowd(1)))
-    rows: Any = listed_rows(scene)
+    constraints: Any = listed_constraints(scene)
     names = ("nx", "ny", "normal_one", "normal_two", "shear")
     random = np.random.default_rng(0)
     for name in names:
-        rows[name] = random.uniform(1.0, 2.0, rows.size)
-    rows["reach"] = np.where(np.arange(rows.size) % 3 == 0, AWAY, TOUCHING)
-    kept = {(int(row.a), int(row.b)): [row[name] for name in names] for row in rows if row.reach != AWAY}
+        constraints[name] = random.uniform(1.0, 2.0, constraints.size)
+    constraints["reach"] = np.where(np.arange(constraints.size) % 3 == 0, AWAY, TOUCHING)
+    kept = {
+        (int(constraint.a), int(constraint.b)): [constraint[name] for name in names]
+        for constraint in constraints
+        if constraint.reach != AWAY
+    }
     before = pairs_of(scene)
     moved = [Block(one.x + 0.01 * (i % 3), one.y, one.angle) for i, one in enumerate(crowd(1))]
     place(scene, moved)
     assert rebuild(scene, frame_of_supports(scene))
-    after = listed_rows(scene)
+    after = listed_constraints(scene)
     assert before - pairs_of(scene)
     assert pairs_of(scene) - before
     carried = 0
-    for row in after:
-        expected = kept.get((int(row.a), int(row.b)))
-        assert [row[name] for name in names] == (expected or [0.0] * 5)
+    for constraint in after:
+        expected = kept.get((int(constraint.a), int(constraint.b)))
+        assert [constraint[name] for name in names] == (expected or [0.0] * 5)
         carried += expected is not None
     assert carried > 20

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.bench.scenes import pushed_wall
-from blocksim.kernels.arrays import NOT_FINITE, OVERLAP_LIMIT
+from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT
 from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
 from blocksim.verification.scene import HEIGHT, Simulation
 
@@ -83,5 +83,5 @@ def test_overlap_beyond_the_limit_stops_the_run(single: Callable[..., Simulation
 def test_state_that_is_not_finite_stops_the_run(single: Callable[..., Simulation], name: str) -> None:
     run = single([{"y": 0.1}]).to_step(3)
     run.world.bodies[name][0] = np.nan
-    run.scene.contacts.lines.vy[0] = np.nan
+    run.scene.contacts.states.vy[0] = np.nan
     assert run.to_step(10).status == NOT_FINITE

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import zeros
-from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, LINE, ROW
+from blocksim.kernels.common.arrays import zeros
+from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, STATE
 from blocksim.kernels.nonsmooth.faces import Block, Edge, Face, block_ahead, block_of, clip, face_towards, in_frame
 from blocksim.kernels.nonsmooth.manifold import Place, collide
 from tests.kernels.nonsmooth.references import corners, places_of
 
 if TYPE_CHECKING:
-    from blocksim.kernels.arrays import Record
+    from blocksim.kernels.common.arrays import Record
     from tests.kernels.conftest import MakeBody
 
 angles = st.floats(-4.0, 4.0)
@@ -71,9 +71,9 @@ def test_block_ahead_turns_to_third_order_in_the_angle() -> None:
 
 
 def on_ground(body: Record, ground: Record, margin: float) -> Record:
-    row, lines = zeros(1, ROW)[0], zeros(2, LINE)
-    collide(row, body, ground, lines[0], lines[1], Place(margin, 0.0, 0.0, True), None)
-    return row
+    constraint, states = zeros(1, CONSTRAINT)[0], zeros(2, STATE)
+    collide(constraint, body, ground, states[0], states[1], Place(margin, 0.0, 0.0, True), None)
+    return constraint
 
 
 @given(angle=angles, height=st.floats(-2e-3, 2e-3), level=places)
@@ -85,12 +85,12 @@ def test_ground_is_met_by_all_corners_within_the_margin(
     body.y = level + height - corners(body)[:, 1].min()
     near = [corner for corner in corners(body).tolist() if corner[1] - level <= margin]
     near.sort(reverse=True)  # along the tangent of an upward normal, which points to the left
-    row = on_ground(body, ground, margin)
-    assert bool(row.reach == AWAY) is (not near)
+    constraint = on_ground(body, ground, margin)
+    assert bool(constraint.reach == AWAY) is (not near)
     if not near:
         return
-    assert (row.nx, row.ny) == (0.0, 1.0)
-    gaps = np.array([row.gap_one, row.gap_two])
+    assert (constraint.nx, constraint.ny) == (0.0, 1.0)
+    gaps = np.array([constraint.gap_one, constraint.gap_two])
     assert gaps[gaps < FAR] == pytest.approx([y - level for _, y in near], abs=1e-12)
-    found = places_of(row, body, of_a=True)[gaps < FAR]
+    found = places_of(constraint, body, of_a=True)[gaps < FAR]
     assert found == pytest.approx(np.array([(x, level) for x, _ in near]), abs=1e-12)

@@ -1,4 +1,4 @@
-"""Groups of four rows: every active row once, in its colour, and back again; a block is solved as alone."""
+"""Groups of four: every active constraint once, in its colour, and back again; a block is solved as alone."""
 
 from __future__ import annotations
 
@@ -7,11 +7,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.lanes import WIDTH
+from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth.arrays import AWAY, TOUCHING
 from blocksim.kernels.nonsmooth.groups import gather, pack_groups, unpack_groups
 from blocksim.kernels.nonsmooth.substep import substep
-from tests.kernels.nonsmooth.scenes import Block, after_substep, collided, listed, listed_rows, pile, posed, velocities
+from tests.kernels.nonsmooth.scenes import (
+    Block,
+    after_substep,
+    collided,
+    listed,
+    listed_constraints,
+    pile,
+    posed,
+    velocities,
+)
 
 if TYPE_CHECKING:
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
@@ -21,52 +30,52 @@ OF_ROW = ("nx", "ny", "arm_a", "arm_b", "width", "shear_arm_a", "shear_arm_b", "
 
 
 def members(scene: Nonsmooth) -> list[list[int]]:
-    """Return the rows of all groups, without copies."""
+    """Return the constraints of all groups, without copies."""
     groups = scene.contacts.groups[: scene.contacts.stepping[0].group_count]
-    return [group.row[: group["count"]].tolist() for group in groups]
+    return [group.constraint[: group["count"]].tolist() for group in groups]
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_every_row_within_the_margin_is_in_one_group_of_its_colour(seed: int) -> None:
     random = np.random.default_rng(seed)
     scene = listed(posed([Block(*random.uniform(0.0, (0.15, 0.15, 6.0))) for _ in range(25)]))
-    rows: Any = listed_rows(scene)
-    rows["reach"] = random.integers(3, size=rows.size)
+    constraints: Any = listed_constraints(scene)
+    constraints["reach"] = random.integers(3, size=constraints.size)
     gather(scene.contacts, scene.begins)
     groups = members(scene)
-    assert sorted(r for group in groups for r in group) == np.flatnonzero(rows.reach != AWAY).tolist()
-    assert scene.contacts.stepping[0].active_count == np.count_nonzero(rows.reach != AWAY)
+    assert sorted(r for group in groups for r in group) == np.flatnonzero(constraints.reach != AWAY).tolist()
+    assert scene.contacts.stepping[0].active_count == np.count_nonzero(constraints.reach != AWAY)
     for colour in range(scene.contacts.stepping[0].colours):
         first, last = scene.contacts.ends[colour : colour + 2]
         inside = [r for group in groups[first:last] for r in group]
         assert all(scene.begins[colour] <= r < scene.begins[colour + 1] for r in inside)
-        touching = [rows.reach[r] == TOUCHING for r in inside]
+        touching = [constraints.reach[r] == TOUCHING for r in inside]
         assert touching == sorted(touching, reverse=True)  # those that touch first
         assert all(len(group) == WIDTH for group in groups[first : last - 1])
     for group, inside in zip(scene.contacts.groups, groups, strict=False):
-        assert group.row.tolist() == inside + [inside[-1]] * (WIDTH - len(inside))
+        assert group.constraint.tolist() == inside + [inside[-1]] * (WIDTH - len(inside))
 
 
 def test_rows_are_packed_as_they_are_and_get_their_impulses_back() -> None:
     random = np.random.default_rng(4)
     scene = collided(posed(pile(random, 4, 3)))
-    rows: Any = listed_rows(scene)
+    constraints: Any = listed_constraints(scene)
     for name in BACK:
-        rows[name] = random.uniform(size=rows.size)
-    before = rows.copy()
+        constraints[name] = random.uniform(size=constraints.size)
+    before = constraints.copy()
     count = int(scene.contacts.stepping[0].group_count)
     pack_groups(scene.contacts, 0, count)
     for group, inside in zip(scene.contacts.groups, members(scene), strict=False):
         for name in (*OF_ROW, *BACK, "bend", "shear_bend", "a", "b"):
-            assert group[name][: len(inside)].tolist() == rows[name][inside].tolist(), name
+            assert group[name][: len(inside)].tolist() == constraints[name][inside].tolist(), name
     for name in BACK:
-        rows[name] = -1.0
+        constraints[name] = -1.0
     unpack_groups(scene.contacts, 0, count)
-    near = rows.reach != AWAY
-    assert 0 < near.sum() < rows.size
+    near = constraints.reach != AWAY
+    assert 0 < near.sum() < constraints.size
     for name in BACK:
-        assert np.array_equal(rows[name][near], before[name][near])
-        assert np.all(rows[name][~near] == -1.0)
+        assert np.array_equal(constraints[name][near], before[name][near])
+        assert np.all(constraints[name][~near] == -1.0)
 
 
 def test_rows_of_one_group_have_the_restitution_and_friction_of_their_own_materials() -> None:
@@ -76,13 +85,13 @@ def test_rows_of_one_group_have_the_restitution_and_friction_of_their_own_materi
     for x in (0.2, 0.3):
         blocks += [Block(x, 0.0125, fixed=True), Block(x, 0.0375 + 1e-5, **landing)]
     scene = posed(blocks, restitution=0.5, gravity=0.0, friction=0.25, ground_friction=0.5, substeps=1)
-    touches: Any = scene.contacts.touches
-    on_ground = touches["kinetic_friction"] == 0.5
-    touches["restitution"] = np.where(on_ground, 0.125, 0.5)
+    materials: Any = scene.contacts.materials
+    on_ground = materials["kinetic_friction"] == 0.5
+    materials["restitution"] = np.where(on_ground, 0.125, 0.5)
     scene = collided(scene)
     assert members(scene) == [[0, 1, 2, 3]]
     substep(scene, 0, 0, False)
-    found = velocities(scene.contacts.lines)[[0, 1, 3, 5]]
+    found = velocities(scene.contacts.states)[[0, 1, 3, 5]]
     assert found[:, 1] == pytest.approx([0.125, 0.125, 0.5, 0.5], abs=1e-9)
     assert found[:, 0] == pytest.approx([3.0 - 0.5 * 1.125] * 2 + [3.0 - 0.25 * 1.5] * 2, abs=1e-9)
 
@@ -94,8 +103,8 @@ def test_block_beside_others_of_its_group_has_the_bits_that_it_has_alone(count: 
     blocks = [Block(0.2 * i, 0.0126, angle, vx, -1.0, spin) for i, (vx, angle, spin) in enumerate(motions)]
     values: dict[str, Any] = {"restitution": 0.3, "velocity_sweeps": 1}
     far = [Block(50.0, 5.0), Block(60.0, 5.0)]  # so that neither is a scene of one or two, whose impacts go in rounds
-    together = velocities(after_substep([*blocks, *far], **values).contacts.lines)
+    together = velocities(after_substep([*blocks, *far], **values).contacts.states)
     for i, block in enumerate(blocks):
-        alone = velocities(after_substep([block, *far], **values).contacts.lines)
+        alone = velocities(after_substep([block, *far], **values).contacts.states)
         assert alone[0].tolist() == together[i].tolist()
         assert alone[0, 1] > 0.0

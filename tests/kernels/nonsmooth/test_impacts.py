@@ -27,11 +27,11 @@ def box(count: int, side: float) -> list[dict[str, Any]]:
     random = np.random.default_rng(SEED)
     bodies = [{"x": -wall / 2, **upright}, {"x": side + wall / 2, **upright}, lid]
     for i in range(count):
-        row, column = divmod(i, math.ceil(math.sqrt(count)))
+        constraint, column = divmod(i, math.ceil(math.sqrt(count)))
         bodies.append(
             {
                 "x": (column + 0.5) * pitch,
-                "y": (row + 0.5) * pitch,
+                "y": (constraint + 0.5) * pitch,
                 "width": 0.03,
                 "height": 0.024,
                 "angle": float(random.uniform(0.0, 6.0)),
@@ -63,8 +63,8 @@ def test_elastic_block_comes_back_to_where_it_fell_from(single: Callable[..., Si
     assert run.residual() < 1e-12
 
 
-def row(gap: float) -> list[dict[str, Any]]:
-    """Return five blocks in a row (m between them), of which the first meets the second within a substep."""
+def constraint(gap: float) -> list[dict[str, Any]]:
+    """Return five blocks in a constraint (m between them), of which the first meets the second within a substep."""
     blocks: list[dict[str, Any]] = [{"x": i * (WIDTH + gap), "y": 0.2} for i in range(5)]
     blocks[0] |= {"x": -1.3e-4, "velocity": [1.0, 0.0]}
     return blocks
@@ -75,7 +75,7 @@ def row(gap: float) -> list[dict[str, Any]]:
 def test_row_of_blocks_apart_passes_a_blow_on(
     single: Callable[..., Simulation], gap: float, within: float, is_divided: int
 ) -> None:
-    run = single(row(gap), restitution=1.0, gravity=0.0, **SMOOTH)
+    run = single(constraint(gap), restitution=1.0, gravity=0.0, **SMOOTH)
     run.scene.contacts.stepping[0].is_divided = is_divided
     run.to_time(0.02)
     assert run.bodies.vx == pytest.approx([0.0, 0.0, 0.0, 0.0, 1.0], abs=within)
@@ -87,26 +87,26 @@ def test_row_of_blocks_apart_loses_at_every_blow_what_newton_says(
 ) -> None:
     """Up to 0.5 that takes substeps in which no block is struck and strikes."""
     more = {**SMOOTH, "substeps": substeps}
-    run = single(row(1e-4), restitution=restitution, gravity=0.0, **more).to_time(0.002)
+    run = single(constraint(1e-4), restitution=restitution, gravity=0.0, **more).to_time(0.002)
     assert run.bodies.vx[4] == pytest.approx((0.5 + 0.5 * restitution) ** 4, abs=1e-6)
 
 
 def test_blocks_that_touch_at_rest_are_struck_as_one(single: Callable[..., Simulation]) -> None:
-    run = single(row(0.0), restitution=1.0, gravity=0.0, **SMOOTH).to_time(0.02)
+    run = single(constraint(0.0), restitution=1.0, gravity=0.0, **SMOOTH).to_time(0.02)
     assert run.bodies.vx == pytest.approx([-0.6, 0.4, 0.4, 0.4, 0.4], abs=2e-3)
 
 
 def test_contacts_report_the_impulses_of_all_rounds(single: Callable[..., Simulation]) -> None:
-    run = single(row(1e-4), restitution=1.0, gravity=0.0, substeps=1, **SMOOTH)
+    run = single(constraint(1e-4), restitution=1.0, gravity=0.0, substeps=1, **SMOOTH)
     run.scene.contacts.stepping[0].is_divided = 0  # it would be in a part each
     before = run.bodies.vx.copy()
     run.to_step(1)
-    rows = run.scene.contacts.rows[: run.scene.contacts.stepping[0].row_count]
-    impulses = rows["nx"] * (rows["normal_one"] + rows["normal_two"])
+    constraints = run.scene.contacts.constraints[: run.scene.contacts.stepping[0].constraint_count]
+    impulses = constraints["nx"] * (constraints["normal_one"] + constraints["normal_two"])
     assert np.count_nonzero(impulses) == 3  # one after the other, within this substep
     gained = np.zeros(len(before) + 1)  # of momentum (kg m/s); the ground is the last
-    np.add.at(gained, rows["a"], impulses)
-    np.add.at(gained, rows["b"], -impulses)
+    np.add.at(gained, constraints["a"], impulses)
+    np.add.at(gained, constraints["b"], -impulses)
     assert gained[:-1] == pytest.approx(run.bodies.mass * (run.bodies.vx - before), abs=1e-12)
 
 

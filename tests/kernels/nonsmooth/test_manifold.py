@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.arrays import zeros
-from blocksim.kernels.nonsmooth.advance import collide_rows
-from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, LINE, OPEN, ROW, TOUCHING
+from blocksim.kernels.common.arrays import zeros
+from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, STATE, TOUCHING
 from blocksim.kernels.nonsmooth.manifold import Place, collide
+from blocksim.kernels.nonsmooth.step import find_manifolds
 from tests.kernels.nonsmooth.references import apart, brought_near, meeting, places_of
-from tests.kernels.nonsmooth.scenes import Block, listed, listed_rows, posed
+from tests.kernels.nonsmooth.scenes import Block, listed, listed_constraints, posed
 
 if TYPE_CHECKING:
-    from blocksim.kernels.arrays import Record
+    from blocksim.kernels.common.arrays import Record
     from tests.kernels.conftest import MakeBody
 
 MARGIN = 2e-3  # m
@@ -40,28 +40,28 @@ def pairs(make_body: MakeBody, pace: int) -> list[tuple[Record, Record]]:
 
 
 def row_of(a: Record, b: Record, margin: float = MARGIN) -> Record:
-    """Return the row of two bodies at rest that have not touched before."""
-    row, lines = zeros(1, ROW)[0], zeros(2, LINE)
-    collide(row, a, b, lines[0], lines[1], Place(margin, 0.0, 0.0, False), None)
-    return row
+    """Return the constraint of two bodies at rest that have not touched before."""
+    constraint, states = zeros(1, CONSTRAINT)[0], zeros(2, STATE)
+    collide(constraint, a, b, states[0], states[1], Place(margin, 0.0, 0.0, False), None)
+    return constraint
 
 
 def test_manifold_is_what_two_clipped_polygons_have(pairs: list[tuple[Record, Record]]) -> None:
     found = []
     for a, b in pairs:
-        row, expected = row_of(a, b), meeting(a, b, MARGIN)
+        constraint, expected = row_of(a, b), meeting(a, b, MARGIN)
         is_near = apart(a, b) <= MARGIN and expected.gaps.size > 0
-        assert bool(row.reach != AWAY) is is_near
-        found.append(row.reach)
+        assert bool(constraint.reach != AWAY) is is_near
+        found.append(constraint.reach)
         if not is_near:
             continue
-        assert (row.nx, row.ny) == pytest.approx(expected.normal, abs=1e-6)  # round-off
-        gaps = np.array([row.gap_one, row.gap_two])
+        assert (constraint.nx, constraint.ny) == pytest.approx(expected.normal, abs=1e-6)  # round-off
+        gaps = np.array([constraint.gap_one, constraint.gap_two])
         near = gaps < FAR
         assert gaps[near] == pytest.approx(expected.gaps, abs=1e-8)
         for body, of_a in ((a, True), (b, False)):
-            assert places_of(row, body, of_a=of_a)[near] == pytest.approx(expected.places, abs=1e-7)
-        assert row.reach == (TOUCHING if gaps.min() <= 0.0 else OPEN)
+            assert places_of(constraint, body, of_a=of_a)[near] == pytest.approx(expected.places, abs=1e-7)
+        assert constraint.reach == (TOUCHING if gaps.min() <= 0.0 else OPEN)
     assert min(found.count(reach) for reach in (AWAY, OPEN, TOUCHING)) > len(pairs) // 10
 
 
@@ -70,12 +70,14 @@ def test_blocks_pushed_apart_by_the_deepest_point_just_touch(
 ) -> None:
     touching = 0
     for a, b in pairs:
-        row = row_of(a, b)
-        if row.reach != TOUCHING:
+        constraint = row_of(a, b)
+        if constraint.reach != TOUCHING:
             continue
-        depth = -min(row.gap_one, row.gap_two)
+        depth = -min(constraint.gap_one, constraint.gap_two)
         assert depth == pytest.approx(-apart(a, b), abs=1e-12)
-        moved = make_body(a.x + depth * row.nx, a.y + depth * row.ny, a.angle, width=2 * a.half_x, height=2 * a.half_y)
+        moved = make_body(
+            a.x + depth * constraint.nx, a.y + depth * constraint.ny, a.angle, width=2 * a.half_x, height=2 * a.half_y
+        )
         assert apart(moved, b) == pytest.approx(0.0, abs=1e-12)
         touching += 1
     assert touching > len(pairs) // 10
@@ -97,12 +99,12 @@ def mirrored(body: Record, make_body: MakeBody) -> Record:
 
 def test_mirror_image_has_the_mirrored_points(make_body: MakeBody, pairs: list[tuple[Record, Record]]) -> None:
     for a, b in pairs:
-        row, image = row_of(a, b), row_of(mirrored(a, make_body), mirrored(b, make_body))
-        assert row.reach == image.reach
-        if row.reach != AWAY:
-            assert (-row.nx, row.ny) == pytest.approx((image.nx, image.ny), abs=1e-15)
-            assert (row.gap_one, row.gap_two) == pytest.approx((image.gap_two, image.gap_one), abs=1e-15)
-            expected = (places_of(row, a, of_a=True) * (-1.0, 1.0))[::-1]
+        constraint, image = row_of(a, b), row_of(mirrored(a, make_body), mirrored(b, make_body))
+        assert constraint.reach == image.reach
+        if constraint.reach != AWAY:
+            assert (-constraint.nx, constraint.ny) == pytest.approx((image.nx, image.ny), abs=1e-15)
+            assert (constraint.gap_one, constraint.gap_two) == pytest.approx((image.gap_two, image.gap_one), abs=1e-15)
+            expected = (places_of(constraint, a, of_a=True) * (-1.0, 1.0))[::-1]
             assert places_of(image, mirrored(a, make_body), of_a=True) == pytest.approx(expected, abs=1e-15)
 
 
@@ -110,10 +112,10 @@ def test_mirror_image_has_the_mirrored_points(make_body: MakeBody, pairs: list[t
 def test_faces_that_lie_flat_on_one_another_have_the_ends_of_their_overlap(make_body: MakeBody, quarter: int) -> None:
     """Whichever faces they are: the upper block is turned by right angles."""
     upper = make_body(0.01, 0.0125 + 0.016 + 1e-4, quarter * math.pi / 2, width=0.032, height=0.032)
-    row = row_of(upper, make_body(0.0, 0.0, width=0.032, height=0.025))
-    assert (row.nx, row.ny) == pytest.approx((0.0, 1.0), abs=1e-15)
-    assert (row.gap_one, row.gap_two) == pytest.approx((1e-4, 1e-4), abs=1e-15)
-    assert sorted(places_of(row, upper, of_a=True)[:, 0].tolist()) == pytest.approx([-0.006, 0.016], abs=1e-12)
+    constraint = row_of(upper, make_body(0.0, 0.0, width=0.032, height=0.025))
+    assert (constraint.nx, constraint.ny) == pytest.approx((0.0, 1.0), abs=1e-15)
+    assert (constraint.gap_one, constraint.gap_two) == pytest.approx((1e-4, 1e-4), abs=1e-15)
+    assert sorted(places_of(constraint, upper, of_a=True)[:, 0].tolist()) == pytest.approx([-0.006, 0.016], abs=1e-12)
 
 
 @pytest.mark.parametrize(("sunk", "way"), [(5e-6, -1.0), (5e-6, 1.0), (5e-5, 1.0)])
@@ -122,15 +124,15 @@ def test_block_that_has_sunk_in_a_little_is_not_stopped_by_the_side_of_the_next(
 ) -> None:
     """It overlaps the side of the next block by less than it has sunk into it: separating axes alone would stop it."""
     slider = make_body(way * (0.032 - 0.1 * sunk), 0.025 - sunk)
-    row = row_of(slider, make_body())
-    assert (row.nx, row.ny) == (0.0, 1.0)
-    assert min(row.gap_one, row.gap_two) == pytest.approx(-sunk, abs=1e-15)
+    constraint = row_of(slider, make_body())
+    assert (constraint.nx, constraint.ny) == (0.0, 1.0)
+    assert min(constraint.gap_one, constraint.gap_two) == pytest.approx(-sunk, abs=1e-15)
 
 
 def test_block_that_stands_beside_another_is_held_by_its_side(make_body: MakeBody) -> None:
-    row = row_of(make_body(0.032 - 1e-5, 0.02), make_body())
-    assert (row.nx, row.ny) == (1.0, 0.0)
-    assert (row.gap_one, row.gap_two) == pytest.approx((-1e-5, -1e-5), abs=1e-15)
+    constraint = row_of(make_body(0.032 - 1e-5, 0.02), make_body())
+    assert (constraint.nx, constraint.ny) == (1.0, 0.0)
+    assert (constraint.gap_one, constraint.gap_two) == pytest.approx((-1e-5, -1e-5), abs=1e-15)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -140,24 +142,26 @@ def test_four_pairs_at_a_time_have_the_bits_of_each_alone(seed: int, pace: int) 
     count = 20 if pace == 1 else 8
     blocks = [Block(*random.uniform(0.0, (0.1, 0.1, 6.0)), *random.normal(size=2)) for _ in range(count)]
     scene = listed(posed(blocks, substeps=4))
-    rows: Any = listed_rows(scene)
-    collide_rows(scene, 0, rows.size)
-    angles = np.arctan2(rows.ny, rows.nx) + random.uniform(-0.8, 0.8, rows.size)
-    rows["normal_one"] = random.uniform(0.0, 1.0, rows.size) * (random.uniform(size=rows.size) < 0.5)
-    rows["normal_two"], rows["shear"] = rows["normal_one"] / 2, -rows["normal_one"] / 3
-    rows["nx"], rows["ny"] = np.cos(angles), np.sin(angles)
-    alone = rows.copy()
-    collide_rows(scene, 0, rows.size)
-    fours = rows.copy()
-    rows[:] = alone
-    for r in range(rows.size):
-        collide_rows(scene, r, r + 1)
-    assert np.array_equal(rows.reach, fours.reach)
+    constraints: Any = listed_constraints(scene)
+    find_manifolds(scene, 0, constraints.size)
+    angles = np.arctan2(constraints.ny, constraints.nx) + random.uniform(-0.8, 0.8, constraints.size)
+    constraints["normal_one"] = random.uniform(0.0, 1.0, constraints.size) * (
+        random.uniform(size=constraints.size) < 0.5
+    )
+    constraints["normal_two"], constraints["shear"] = constraints["normal_one"] / 2, -constraints["normal_one"] / 3
+    constraints["nx"], constraints["ny"] = np.cos(angles), np.sin(angles)
+    alone = constraints.copy()
+    find_manifolds(scene, 0, constraints.size)
+    fours = constraints.copy()
+    constraints[:] = alone
+    for r in range(constraints.size):
+        find_manifolds(scene, r, r + 1)
+    assert np.array_equal(constraints.reach, fours.reach)
     for name in ("normal_one", "normal_two", "shear"):
-        assert np.array_equal(rows[name], fours[name]), name
-    near = rows.reach != AWAY
-    for name in ROW.names or ():
-        assert np.array_equal(rows[name][near], fours[name][near]), name
+        assert np.array_equal(constraints[name], fours[name]), name
+    near = constraints.reach != AWAY
+    for name in CONSTRAINT.names or ():
+        assert np.array_equal(constraints[name][near], fours[name][near]), name
     assert near.sum() > 4
     assert 0 < np.count_nonzero(fours["normal_one"]) < np.count_nonzero(alone["normal_one"])
 
@@ -167,21 +171,33 @@ def test_impulses_are_kept_until_the_normal_has_turned_by_25_degrees(
     make_body: MakeBody, degrees: float, is_kept: bool
 ) -> None:
     a, b = make_body(0.0, 0.025), make_body()
-    row, lines = zeros(1, ROW)[0], zeros(2, LINE)
-    row.normal_one, row.normal_two, row.shear = 3.0, 2.0, 1.0
-    row.nx, row.ny = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
-    collide(row, a, b, lines[0], lines[1], Place(MARGIN, 0.0, 0.0, False), None)
+    constraint, states = zeros(1, CONSTRAINT)[0], zeros(2, STATE)
+    constraint.normal_one, constraint.normal_two, constraint.shear = 3.0, 2.0, 1.0
+    constraint.nx, constraint.ny = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
+    collide(constraint, a, b, states[0], states[1], Place(MARGIN, 0.0, 0.0, False), None)
     expected = (3.0, 2.0, 1.0) if is_kept else (0.0, 0.0, 0.0)
-    assert (row.normal_one, row.normal_two, row.shear) == expected
+    assert (constraint.normal_one, constraint.normal_two, constraint.shear) == expected
 
 
 def test_impulses_are_forgotten_where_blocks_have_parted(make_body: MakeBody) -> None:
-    row, lines = zeros(1, ROW)[0], zeros(2, LINE)
-    row.normal_one, row.normal_two, row.shear, row.ny, row.reach = 3.0, 2.0, 1.0, 1.0, TOUCHING
-    collide(
-        row, make_body(0.0, 0.025 + 2 * MARGIN), make_body(), lines[0], lines[1], Place(MARGIN, 0.0, 0.0, False), None
+    constraint, states = zeros(1, CONSTRAINT)[0], zeros(2, STATE)
+    constraint.normal_one, constraint.normal_two, constraint.shear, constraint.ny, constraint.reach = (
+        3.0,
+        2.0,
+        1.0,
+        1.0,
+        TOUCHING,
     )
-    assert (row.normal_one, row.normal_two, row.shear, row.reach) == (0.0, 0.0, 0.0, AWAY)
+    collide(
+        constraint,
+        make_body(0.0, 0.025 + 2 * MARGIN),
+        make_body(),
+        states[0],
+        states[1],
+        Place(MARGIN, 0.0, 0.0, False),
+        None,
+    )
+    assert (constraint.normal_one, constraint.normal_two, constraint.shear, constraint.reach) == (0.0, 0.0, 0.0, AWAY)
 
 
 @pytest.mark.parametrize("pressed", [True, False])
@@ -191,19 +207,19 @@ def test_contact_that_presses_has_the_normal_and_arms_of_the_middle_of_the_step(
     """One to come is taken as it is. Gaps are those of now, along that normal and those arms."""
     ahead = 1e-3
     a, b = make_body(0.004, 0.0262, 0.06), make_body(0.0, 0.0, 0.02)
-    lines, row = zeros(2, LINE), zeros(1, ROW)[0]
-    lines.vx, lines.vy, lines.spin = (0.4, -0.1), (-0.3, 0.2), (8.0, -9.0)
-    row.normal_one, row.nx, row.ny = float(pressed), 0.0, 1.0
-    collide(row, a, b, lines[0], lines[1], Place(MARGIN, ahead, 0.5e-3, False), None)
+    states, constraint = zeros(2, STATE), zeros(1, CONSTRAINT)[0]
+    states.vx, states.vy, states.spin = (0.4, -0.1), (-0.3, 0.2), (8.0, -9.0)
+    constraint.normal_one, constraint.nx, constraint.ny = float(pressed), 0.0, 1.0
+    collide(constraint, a, b, states[0], states[1], Place(MARGIN, ahead, 0.5e-3, False), None)
     time = ahead if pressed else 0.0
     late_a, late_b = (
-        make_body(body.x + time * line.vx, body.y + time * line.vy, body.angle + time * line.spin)
-        for body, line in zip((a, b), lines, strict=True)
+        make_body(body.x + time * state.vx, body.y + time * state.vy, body.angle + time * state.spin)
+        for body, state in zip((a, b), states, strict=True)
     )
     expected = row_of(late_a, late_b)
     names = ["nx", "ny", "arm_a", "arm_b", "width", "shear_arm_a", "shear_arm_b"]
-    assert [row[name] for name in names] == pytest.approx([expected[name] for name in names], abs=1e-6)
-    rate = row.nx * 0.5 + row.ny * -0.5 + row.arm_a * 8.0 + row.arm_b * 9.0
-    assert row.gap_one == pytest.approx(expected.gap_one - time * rate, abs=1e-7)
-    assert row.gap_two == pytest.approx(expected.gap_two - time * (rate - row.width * 17.0), abs=1e-7)
-    assert bool(row.bend != 0.0) is pressed
+    assert [constraint[name] for name in names] == pytest.approx([expected[name] for name in names], abs=1e-6)
+    rate = constraint.nx * 0.5 + constraint.ny * -0.5 + constraint.arm_a * 8.0 + constraint.arm_b * 9.0
+    assert constraint.gap_one == pytest.approx(expected.gap_one - time * rate, abs=1e-7)
+    assert constraint.gap_two == pytest.approx(expected.gap_two - time * (rate - constraint.width * 17.0), abs=1e-7)
+    assert bool(constraint.bend != 0.0) is pressed

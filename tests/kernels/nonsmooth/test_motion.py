@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import zeros
-from blocksim.kernels.nonsmooth.arrays import BEFORE, LINE
+from blocksim.kernels.common.arrays import zeros
+from blocksim.kernels.nonsmooth.arrays import BEFORE, STATE
 from blocksim.kernels.nonsmooth.motion import drift_all, is_in_flight, kick, kick_warm, place
 from tests.kernels.nonsmooth.references import corners
 
 if TYPE_CHECKING:
-    from blocksim.kernels.arrays import Record
+    from blocksim.kernels.common.arrays import Record
     from tests.kernels.conftest import MakeBody
 
 H = 1e-3
@@ -24,16 +24,16 @@ GRAVITY = (0.5, -9.0)  # m/s2
 KICK = (0.5 * H, -9.0 * H)
 
 
-def line(vx: float, vy: float, spin: float) -> tuple[Record, Record]:
+def state(vx: float, vy: float, spin: float) -> tuple[Record, Record]:
     """Return the line of a free body and what is kept from before the substep."""
-    one, before = zeros(1, LINE)[0], zeros(1, BEFORE)[0]
+    one, before = zeros(1, STATE)[0], zeros(1, BEFORE)[0]
     one.vx, one.vy, one.spin, one.inverse_mass, one.inverse_inertia = vx, vy, spin, 10.0, 1e4
     return one, before
 
 
 @given(share=st.sampled_from([0.5, 1.0]), vx=st.floats(-3.0, 3.0), vy=st.floats(-3.0, 3.0))
 def test_kick_adds_its_share_of_gravity_and_remembers_the_velocity(share: float, vx: float, vy: float) -> None:
-    one, before = line(vx, vy, 7.0)
+    one, before = state(vx, vy, 7.0)
     kick(one, before, share, *KICK)
     assert (before.vx, before.vy, before.spin) == (vx, vy, 7.0)
     assert (one.vx, one.vy, one.spin) == pytest.approx((vx + share * KICK[0], vy + share * KICK[1], 7.0), abs=1e-15)
@@ -41,7 +41,7 @@ def test_kick_adds_its_share_of_gravity_and_remembers_the_velocity(share: float,
 
 @pytest.mark.parametrize("last", [0.5, 1.0])
 def test_warm_kick_gives_again_what_impulses_gave_and_one_whole_kick(last: float) -> None:
-    one, before = line(1.0, -2.0, 3.0)
+    one, before = state(1.0, -2.0, 3.0)
     kick(one, before, last, *KICK)
     pushed = np.array([0.1, 0.4, -5.0])
     one.vx, one.vy, one.spin = np.array([one.vx, one.vy, one.spin]) + pushed
@@ -52,13 +52,13 @@ def test_warm_kick_gives_again_what_impulses_gave_and_one_whole_kick(last: float
 
 
 def test_drift_moves_by_velocity_times_time() -> None:
-    lines = zeros(3, LINE)
-    lines.vx, lines.vy, lines.spin = (1.0, 2.0, 3.0), (-1.0, 0.5, 4.0), (10.0, 20.0, 30.0)
+    states = zeros(3, STATE)
+    states.vx, states.vy, states.spin = (1.0, 2.0, 3.0), (-1.0, 0.5, 4.0), (10.0, 20.0, 30.0)
     for _ in range(2):
-        drift_all(lines, 1, 3, H)
-    assert lines.dx.tolist() == pytest.approx([0.0, 4e-3, 6e-3])
-    assert lines.dy.tolist() == pytest.approx([0.0, 1e-3, 8e-3])
-    assert lines.turned.tolist() == pytest.approx([0.0, 0.04, 0.06])
+        drift_all(states, 1, 3, H)
+    assert states.dx.tolist() == pytest.approx([0.0, 4e-3, 6e-3])
+    assert states.dy.tolist() == pytest.approx([0.0, 1e-3, 8e-3])
+    assert states.turned.tolist() == pytest.approx([0.0, 0.04, 0.06])
 
 
 @pytest.mark.parametrize("turned", [1e-4, -0.3])
@@ -68,7 +68,7 @@ def test_step_ends_with_the_pose_that_the_drifts_add_up_to(
 ) -> None:
     """Velocities of bodies in flight are brought up by half a kick; a support holds against that."""
     body = make_body(0.2, 0.1, 0.6)
-    one, before = line(1.0, -2.0, 3.0)
+    one, before = state(1.0, -2.0, 3.0)
     kick(one, before, 1.0, *KICK)
     one.vy += 0.1 * is_touching
     one.dx, one.dy, one.turned = 0.01, -0.02, turned
@@ -85,7 +85,7 @@ def test_step_ends_with_the_pose_that_the_drifts_add_up_to(
 @pytest.mark.parametrize(("extra", "flies"), [(0.0, True), (1e-7, False), (-1e-7, False)])
 def test_body_is_in_flight_where_gravity_alone_has_changed_its_velocity(extra: float, flies: bool) -> None:
     for name in ("vx", "vy"):
-        one, before = line(1.0, -2.0, 3.0)
+        one, before = state(1.0, -2.0, 3.0)
         kick(one, before, 1.0, *KICK)
         one[name] += extra
         assert bool(is_in_flight(one, before, *KICK)) is flies

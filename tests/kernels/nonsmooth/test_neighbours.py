@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.nonsmooth.neighbours import look
+from blocksim.kernels.nonsmooth.neighbours import update_pairs
 from tests.kernels.nonsmooth.references import apart, corners
-from tests.kernels.nonsmooth.scenes import Block, listed, listed_rows, pairs_of, posed
+from tests.kernels.nonsmooth.scenes import Block, listed, listed_constraints, pairs_of, posed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -62,10 +62,10 @@ def fly(scene: Nonsmooth) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_list_has_all_pairs_whose_reaches_meet_each_once(seed: int) -> None:
     scene = listed(posed(cloud(seed, 0.15, 0.1), step=STEP))
-    rows = listed_rows(scene)
-    assert len(pairs_of(scene)) == rows.size
-    assert np.all(rows.a < rows.b)
-    reaches = scene.spots.reach
+    constraints = listed_constraints(scene)
+    assert len(pairs_of(scene)) == constraints.size
+    assert np.all(constraints.a < constraints.b)
+    reaches = scene.listed.reach
     assert len(set(reaches.tolist())) > BLOCKS // 3  # by speed
     expected = near(scene, reaches)
     assert pairs_of(scene) == expected
@@ -125,10 +125,10 @@ def test_body_that_only_turns_uses_up_its_reach() -> None:
 
 def test_list_that_does_not_fit_leaves_everything_as_it_was() -> None:
     scene = posed([Block(0.001 * i, 1.0) for i in range(8)], step=STEP)
-    assert scene.contacts.rows.size < 28
-    before = scene.contacts.rows.copy()
-    assert not look(scene)
-    assert np.array_equal(scene.contacts.rows, before)
+    assert scene.contacts.constraints.size < 28
+    before = scene.contacts.constraints.copy()
+    assert not update_pairs(scene)
+    assert np.array_equal(scene.contacts.constraints, before)
     assert len(pairs_of(listed(scene))) == 28
 
 

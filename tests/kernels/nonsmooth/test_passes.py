@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.arrays import INTERACTION, zeros
+from blocksim.kernels.common.arrays import INTERACTION, zeros
 from blocksim.kernels.nonsmooth.iterate import POSITION, WARM, sweep
 from blocksim.kernels.nonsmooth.motion import kick_all
 from blocksim.kernels.nonsmooth.passes import shear_limit
@@ -33,20 +33,20 @@ ROUND_OFF = 1e-8  # m/s: Gauss and Seidel approach slowly
 
 @pytest.fixture(scope="module")
 def size(pace: int) -> tuple[int, int]:
-    """Return how many columns and rows of blocks are solved."""
+    """Return how many columns and constraints of blocks are solved."""
     return (4, 3) if pace == 1 else (2, 2)
 
 
 def unpushed(scene: Nonsmooth) -> NDArray[np.float64]:
     """Return the velocities that a whole kick of gravity alone would leave."""
     found = velocities(scene.contacts.before)
-    found[scene.contacts.lines.inverse_mass > 0.0, 1] -= G * H
+    found[scene.contacts.states.inverse_mass > 0.0, 1] -= G * H
     return found.ravel()
 
 
 def slips(scene: Nonsmooth, all_of: Dense) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the velocities at the points along their normals, and those of rows along their tangents (m/s)."""
-    now = velocities(scene.contacts.lines).ravel()
+    """Return the velocities at the points along their normals, and those of constraints along their tangents (m/s)."""
+    now = velocities(scene.contacts.states).ravel()
     return all_of.normals @ now, all_of.tangents @ now
 
 
@@ -57,7 +57,7 @@ def test_impulses_without_friction_change_the_energy_least(seed: int, size: tupl
     all_of, free = dense(scene), unpushed(scene)
     least = all_of.targets[all_of.counts]
     expected = least_change(free, all_of.normals[all_of.counts], least, all_of.inverse_mass)
-    assert velocities(scene.contacts.lines).ravel() == pytest.approx(expected, abs=ROUND_OFF)
+    assert velocities(scene.contacts.states).ravel() == pytest.approx(expected, abs=ROUND_OFF)
     assert np.abs(expected - free).max() > 0.1
     assert np.all(all_of.shears == 0.0)
 
@@ -109,7 +109,7 @@ def test_one_contact_is_solved_exactly_at_once(seed: int) -> None:
     scene = after_substep(two_blocks(seed), **SMOOTH, **once)
     all_of, free = dense(scene), velocities(scene.contacts.before).ravel()
     expected = least_change(free, all_of.normals, all_of.targets, all_of.inverse_mass)
-    assert velocities(scene.contacts.lines).ravel() == pytest.approx(expected, abs=1e-10)
+    assert velocities(scene.contacts.states).ravel() == pytest.approx(expected, abs=1e-10)
     scene = after_substep(two_blocks(seed), friction=100.0, **once)
     all_of = dense(scene)
     _, slip = slips(scene, all_of)
@@ -136,13 +136,13 @@ def test_velocities_change_by_gravity_and_by_the_impulses_that_are_kept(
     """Whatever tolerance they are solved to: impulses and velocities belong together, spins and supports too."""
     blocks = pile(np.random.default_rng(seed), *size)
     scene = collided(posed(blocks, velocity_sweeps=2, substeps=4, step=4 * H))
-    before = velocities(scene.contacts.lines)
+    before = velocities(scene.contacts.states)
     for number in range(4):
         substep(scene, 0, number, is_first)
         expected = before.ravel() + dense(scene).pushed()
         share = 0.5 if is_first and number == 0 else 1.0
         expected[1:-3:3] -= share * G * H
-        before = velocities(scene.contacts.lines)
+        before = velocities(scene.contacts.states)
         assert before.ravel() == pytest.approx(expected, abs=1e-13)
     assert np.all(before[-1] == 0.0)
 
@@ -151,12 +151,12 @@ def test_second_substep_begins_with_the_impulses_of_the_first(size: tuple[int, i
     scene = collided(posed(pile(np.random.default_rng(3), *size), substeps=2, step=2 * H))
     substep(scene, 0, 0, False)
     pushed = dense(scene).pushed()
-    start = velocities(scene.contacts.lines)
-    kick_all(scene.contacts.lines, scene.contacts.before, 0, len(start) - 1, 1.0, 0.0, -G * H)
+    start = velocities(scene.contacts.states)
+    kick_all(scene.contacts.states, scene.contacts.before, 0, len(start) - 1, 1.0, 0.0, -G * H)
     sweep(scene.contacts, WARM, scene.world.team, 0)
     expected = start.ravel() + pushed
     expected[1:-3:3] -= G * H
-    warm = velocities(scene.contacts.lines).ravel()
+    warm = velocities(scene.contacts.states).ravel()
     assert warm == pytest.approx(expected, abs=1e-13)
     assert np.abs(pushed).max() > 0.1
 
@@ -179,7 +179,7 @@ def test_position_pass_holds_soft_contacts_and_lets_gaps_just_close(gap: float, 
     closed = all_of.gaps <= 0.0
     masses = np.diag(all_of.normals * all_of.inverse_mass @ all_of.normals.T)
     bias = np.where(closed, soft.bias, 1.0 / H)
-    rates = all_of.normals @ velocities(scene.contacts.lines).ravel()
+    rates = all_of.normals @ velocities(scene.contacts.states).ravel()
     rest = rates + bias * all_of.gaps + np.where(closed, soft.softness, 0.0) * masses * all_of.impulses
     assert all_of.impulses.min() >= 0.0
     assert rest.min() > -1e-12
@@ -192,16 +192,16 @@ def test_gap_that_stays_open_and_parts_that_leave_are_not_pulled() -> None:
     for gap, rate in ((3e-4, 0.0), (-1e-6, 1.0)):
         scene, all_of = soft_row(gap, rate)
         assert np.all(all_of.impulses == 0.0)
-        assert velocities(scene.contacts.lines)[0].tolist() == [0.0, rate, 0.0]
+        assert velocities(scene.contacts.states)[0].tolist() == [0.0, rate, 0.0]
 
 
 @given(static=st.floats(0.0, 1.0), less=st.floats(0.0, 1.0), normal=st.floats(1e-3, 2.0), needed=st.floats(0.0, 3.0))
 def test_static_friction_holds_what_it_can_and_else_friction_is_kinetic(
     static: float, less: float, normal: float, needed: float
 ) -> None:
-    touch = zeros(1, INTERACTION)[0]
-    touch.static_friction, touch.kinetic_friction, touch.transition_speed = static, less * static, 1e-3
-    limit = shear_limit(touch, normal, needed, 5.0)
+    material = zeros(1, INTERACTION)[0]
+    material.static_friction, material.kinetic_friction, material.transition_speed = static, less * static, 1e-3
+    limit = shear_limit(material, normal, needed, 5.0)
     assert less * static * normal <= limit <= static * normal
     if needed <= static * normal:
         assert limit >= needed
@@ -214,10 +214,10 @@ def test_block_that_slides_off_a_block_takes_from_it_what_it_gives(friction: flo
     """Equal and opposite: momentum and moment of momentum of two free blocks are kept by a contact with friction."""
     blocks = [Block(0.0, 1.0, 0.01, 0.3, 0.2, 4.0), Block(0.004, 1.0248, -0.02, -0.4, -0.6, -3.0)]
     scene = posed(blocks, friction=friction, gravity=0.0, **EXACT)
-    before = velocities(scene.contacts.lines)
+    before = velocities(scene.contacts.states)
     scene = collided(scene)
     substep(scene, 0, 0, False)
-    after = velocities(scene.contacts.lines)
+    after = velocities(scene.contacts.states)
     bodies: Any = scene.world.bodies[:2]
     gained = (after - before)[:2]
     assert np.abs(gained).min() > 1e-3
@@ -231,16 +231,16 @@ def test_books_have_what_impulses_take_from_blocks_that_meet_without_gravity(siz
     bodies: Any = scene.world.bodies[:-1]
 
     def kinetic() -> float:
-        vx, vy, spin = velocities(scene.contacts.lines)[:-1].T
+        vx, vy, spin = velocities(scene.contacts.states)[:-1].T
         return float(0.5 * (bodies.mass * (vx**2 + vy**2) + bodies.inertia * spin**2).sum())
 
     before = kinetic()
     substep(scene, 0, 0, False)
-    books = scene.contacts.books
-    taken = float(books.impacts.sum() + books.friction.sum())
+    tallies = scene.contacts.tallies
+    taken = float(tallies.impacts.sum() + tallies.friction.sum())
     assert before - kinetic() == pytest.approx(taken, rel=1e-12)
-    assert books.impacts.sum() > 0.1 * before
+    assert tallies.impacts.sum() > 0.1 * before
     all_of = dense(scene)
     _, slip = slips(scene, all_of)
     then = all_of.tangents @ velocities(scene.contacts.before).ravel()
-    assert float(books.friction.sum()) == pytest.approx(float(-0.5 * all_of.shears @ (slip + then)), rel=1e-9)
+    assert float(tallies.friction.sum()) == pytest.approx(float(-0.5 * all_of.shears @ (slip + then)), rel=1e-9)

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.arrays import TEAM_SIZE
-from blocksim.kernels.nonsmooth.advance import advance_nonsmooth_in_team
+from blocksim.kernels.common.arrays import TEAM_SIZE
+from blocksim.kernels.common.watch import Watched
 from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
-from blocksim.kernels.watch import Watched
+from blocksim.kernels.nonsmooth.step import advance_nonsmooth_in_team
 from blocksim.scenario.outlines import centred, regular, section_of
 from blocksim.verification.scene import Scene, Simulation
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth, with_more_threads
@@ -132,10 +132,10 @@ def test_random_pairs_push_one_another_alike_and_gain_no_energy(e: float) -> Non
     hit = 0
     for _ in range(POSES):
         place(run.scene, poses(random, outlines))
-        for line, body in zip(run.scene.contacts.lines[:-1], run.bodies, strict=True):
-            line.vx, line.vy, line.spin = body.vx, body.vy, body.spin
-        for row in run.scene.contacts.rows:
-            row.normal_one = row.normal_two = row.shear = 0.0
+        for state, body in zip(run.scene.contacts.states[:-1], run.bodies, strict=True):
+            state.vx, state.vy, state.spin = body.vx, body.vy, body.spin
+        for constraint in run.scene.contacts.constraints:
+            constraint.normal_one = constraint.normal_two = constraint.shear = 0.0
         run.world.clock[0].rebuilds = 0
         run.scene = listed(run.scene)
         bodies = run.bodies
@@ -253,8 +253,10 @@ def test_wedge_slides_in_between_jaws_with_the_force_of_limit_equilibrium(fricti
     assert run.bodies.vx[1] == pytest.approx(0.1 * sinks * math.tan(BETA), rel=0.01)
     assert run.bodies.vy[0] == pytest.approx(-0.1 * sinks, rel=0.01)
     weight = float(run.bodies.mass[0]) * G
-    rows = run.scene.contacts.rows[: run.scene.contacts.stepping[0].row_count]
-    normals = [(row.normal_one + row.normal_two) / 2.5e-4 for row in rows if row.a == 0]
+    constraints = run.scene.contacts.constraints[: run.scene.contacts.stepping[0].constraint_count]
+    normals = [
+        (constraint.normal_one + constraint.normal_two) / 2.5e-4 for constraint in constraints if constraint.a == 0
+    ]
     limit = weight / (2.0 * carry)
     assert normals == pytest.approx([limit * (1.0 - sinks / G)] * 2, rel=0.01)
 
@@ -269,7 +271,7 @@ def test_wedge_locks_where_friction_exceeds_the_tangent_of_its_half_angle(share:
     blocks, ratio = wedge(10.0, speed=0.1)
     sin, cos, friction = math.sin(BETA), math.cos(BETA), share * math.tan(BETA)
     scene = posed(blocks, restitution=0.0, friction=friction, ground_friction=0.0, gravity=0.0, velocity_tolerance=1e-9)
-    for record in (scene.world.bodies, scene.contacts.lines):
+    for record in (scene.world.bodies, scene.contacts.states):
         record.inverse_inertia[1:3] = 0.0
     run = Simulation(scene).to_step(1)
     lift = max(0.0, sin - friction * cos)

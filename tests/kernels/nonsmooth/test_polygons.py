@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.nonsmooth.advance import collide_rows
-from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, OPEN, ROW, TOUCHING
+from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, TOUCHING
+from blocksim.kernels.nonsmooth.step import find_manifolds
 from tests.kernels.nonsmooth import references
 from tests.kernels.nonsmooth.polygons import HEXAGON, depth_below, random_outline, rectangle, turned
-from tests.kernels.nonsmooth.scenes import Block, listed, listed_rows, place, posed
+from tests.kernels.nonsmooth.scenes import Block, listed, listed_constraints, place, posed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,15 +39,15 @@ class Outlined:
 
 
 def manifolds(scene: Nonsmooth, blocks: Sequence[Block]) -> Any:
-    """Return the rows of a scene whose blocks have been put elsewhere."""
+    """Return the constraints of a scene whose blocks have been put elsewhere."""
     place(scene, blocks)
     scene.world.clock[0].rebuilds = 0
     scene = listed(scene)
-    rows = listed_rows(scene)
+    constraints = listed_constraints(scene)
     for name in ("normal_one", "normal_two", "shear"):
-        rows[name] = 0.0
-    collide_rows(scene, 0, rows.size)
-    return rows
+        constraints[name] = 0.0
+    find_manifolds(scene, 0, constraints.size)
+    return constraints
 
 
 def near_one_another(random: Any, one: Block, other: Block) -> Block:
@@ -78,22 +78,22 @@ def test_manifold_is_what_two_clipped_polygons_have() -> None:
     for two in pairs(random), pairs(random), pairs(random):
         blocks = [block for pair in two for block in pair]
         scene = posed(blocks)
-        rows = {(int(row.a), int(row.b)): row for row in manifolds(scene, blocks)}
+        constraints = {(int(constraint.a), int(constraint.b)): constraint for constraint in manifolds(scene, blocks)}
         margin = float(scene.contacts.stepping[0].margin)
         for k in range(PAIRS):
             a, b = (Outlined(scene.world.bodies[2 * k + i], blocks[2 * k + i]) for i in (0, 1))
             expected: Any = references.meeting(a, b, margin)
-            row = rows.get((2 * k, 2 * k + 1))
+            constraint = constraints.get((2 * k, 2 * k + 1))
             is_near = references.apart(a, b) <= margin and expected.gaps.size > 0
-            assert (row is not None and bool(row.reach != AWAY)) is is_near
-            if row is None or not is_near:
+            assert (constraint is not None and bool(constraint.reach != AWAY)) is is_near
+            if constraint is None or not is_near:
                 continue
-            seen.append(int(row.reach))
-            assert (row.nx, row.ny) == pytest.approx(expected.normal, abs=1e-9)
-            gaps = np.array([row.gap_one, row.gap_two])
+            seen.append(int(constraint.reach))
+            assert (constraint.nx, constraint.ny) == pytest.approx(expected.normal, abs=1e-9)
+            gaps = np.array([constraint.gap_one, constraint.gap_two])
             assert gaps[gaps < FAR] == pytest.approx(expected.gaps, abs=1e-9)
             for body, of_a in ((a, True), (b, False)):
-                places = references.places_of(row, body, of_a=of_a)
+                places = references.places_of(constraint, body, of_a=of_a)
                 assert places[gaps < FAR] == pytest.approx(expected.places, abs=1e-9)
     assert min(seen.count(reach) for reach in (OPEN, TOUCHING)) > 10
 
@@ -111,15 +111,15 @@ def test_rectangles_given_as_outlines_have_the_same_manifolds(mixed: bool) -> No
     rectangles = [plain(block) for block in outlined]
     others = [rectangles[i] if mixed and i % 2 else block for i, block in enumerate(outlined)]
     one, other = (manifolds(posed(blocks), blocks) for blocks in (rectangles, others))
-    known = {(int(row.a), int(row.b)): row for row in one}
+    known = {(int(constraint.a), int(constraint.b)): constraint for constraint in one}
     near = 0
-    for row in other:
-        same = known[int(row.a), int(row.b)]
-        assert row.reach == same.reach
-        if row.reach != AWAY:
+    for constraint in other:
+        same = known[int(constraint.a), int(constraint.b)]
+        assert constraint.reach == same.reach
+        if constraint.reach != AWAY:
             near += 1
-            names = [name for name in ROW.names or () if not name.startswith("corner")]
-            assert [row[name] for name in names] == pytest.approx([same[name] for name in names], abs=1e-9)
+            names = [name for name in CONSTRAINT.names or () if not name.startswith("corner")]
+            assert [constraint[name] for name in names] == pytest.approx([same[name] for name in names], abs=1e-9)
     assert near > PAIRS // 2
 
 
@@ -131,22 +131,24 @@ def test_polygon_that_has_sunk_in_a_little_is_not_stopped_by_the_side_of_the_nex
     flush = [Block(0.0, 0.0), Block(0.032, 0.0)]
     slider = Block(0.016 - foot + 0.01 * sunk, 0.0125 + below - sunk, outline=HEXAGON)
     blocks = [*flush, slider]
-    rows = {(int(row.a), int(row.b)): row for row in manifolds(posed(blocks), blocks)}
+    constraints = {
+        (int(constraint.a), int(constraint.b)): constraint for constraint in manifolds(posed(blocks), blocks)
+    }
     for first in (0, 1):
-        row = rows[first, 2]
-        if row.reach != AWAY:
-            assert (row.nx, row.ny) == pytest.approx((0.0, -1.0), abs=1e-12)
-    assert rows[0, 2].reach == TOUCHING
+        constraint = constraints[first, 2]
+        if constraint.reach != AWAY:
+            assert (constraint.nx, constraint.ny) == pytest.approx((0.0, -1.0), abs=1e-12)
+    assert constraints[0, 2].reach == TOUCHING
 
 
 def test_honeycomb_cells_meet_at_whole_faces() -> None:
     """Their corners coincide with those of the next faces, which face one another as well."""
     below = depth_below(HEXAGON)
     blocks = [Block(0.0, 2.0, outline=HEXAGON), Block(0.0, 2.0 + 2.0 * below - 1e-6, outline=HEXAGON)]
-    (row,) = [row for row in manifolds(posed(blocks), blocks) if row.b == 1]
-    assert (row.nx, row.ny) == pytest.approx((0.0, -1.0), abs=1e-12)
-    assert row.width == pytest.approx(0.02, rel=1e-9)
-    assert (row.gap_one, row.gap_two) == pytest.approx((-1e-6, -1e-6), abs=1e-12)
+    (constraint,) = [constraint for constraint in manifolds(posed(blocks), blocks) if constraint.b == 1]
+    assert (constraint.nx, constraint.ny) == pytest.approx((0.0, -1.0), abs=1e-12)
+    assert constraint.width == pytest.approx(0.02, rel=1e-9)
+    assert (constraint.gap_one, constraint.gap_two) == pytest.approx((-1e-6, -1e-6), abs=1e-12)
 
 
 @pytest.mark.parametrize("ground", ["half-plane", "piece", "block"])
@@ -156,22 +158,22 @@ def test_impulses_go_with_the_corner_that_a_polygon_rolls_over(ground: str) -> N
     table = [Block(0.0, level - 0.1, width=1.0, height=0.2, fixed=True)] if level else []
     scene = posed([Block(outline=HEXAGON), *table], ground={"profile": [[-1, 0], [1, 0]]} if ground == "piece" else {})
     pivot: list[str] = []
-    row: Any = None
+    constraint: Any = None
     for degrees in (-29.0, -31.0):
         angle = math.radians(degrees)
         hexagon = Block(0.0, level + depth_below(HEXAGON, angle) - 1e-6, angle, outline=HEXAGON)
         place(scene, [hexagon, *table])
         scene.world.clock[0].rebuilds = 0
         scene = listed(scene)
-        rows = listed_rows(scene)
-        collide_rows(scene, 0, rows.size)
-        (row,) = [row for row in rows if row.reach != AWAY and row.a == 0]
+        constraints = listed_constraints(scene)
+        find_manifolds(scene, 0, constraints.size)
+        (constraint,) = [constraint for constraint in constraints if constraint.reach != AWAY and constraint.a == 0]
         if not pivot:
-            pressed = "one" if row.gap_one < row.gap_two else "two"
-            row[f"normal_{pressed}"] = 3.0
-            row.shear = 1.0
-        pivot.append("one" if row.gap_one < row.gap_two else "two")
+            pressed = "one" if constraint.gap_one < constraint.gap_two else "two"
+            constraint[f"normal_{pressed}"] = 3.0
+            constraint.shear = 1.0
+        pivot.append("one" if constraint.gap_one < constraint.gap_two else "two")
     assert pivot[0] != pivot[1]
-    assert row[f"normal_{pivot[1]}"] == 3.0
-    assert row[f"normal_{pivot[0]}"] == 0.0
-    assert row.shear == 1.0
+    assert constraint[f"normal_{pivot[1]}"] == 3.0
+    assert constraint[f"normal_{pivot[0]}"] == 0.0
+    assert constraint.shear == 1.0

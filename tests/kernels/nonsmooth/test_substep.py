@@ -28,7 +28,7 @@ BLOCKS = [
 
 def pushed(blocks: list[Block], **values: Any) -> NDArray[np.float64]:
     """Return the velocities of blocks after a substep of impacts."""
-    return velocities(after_substep(blocks, **{**EXACT, "restitution": 0.4, **values}).contacts.lines)[:-1]
+    return velocities(after_substep(blocks, **{**EXACT, "restitution": 0.4, **values}).contacts.states)[:-1]
 
 
 def test_blocks_do_the_same_anywhere_and_turned_any_way() -> None:
@@ -93,9 +93,11 @@ def test_velocity_pass_ends_at_its_tolerance_or_after_its_sweeps() -> None:
     for tolerance in (0.1, 1e-3, 1e-6):
         scene = after_substep(blocks, velocity_tolerance=tolerance)
         sweeps[tolerance] = int(scene.contacts.stepping[0].sweeps)
-        before = velocities(scene.contacts.lines)
+        before = velocities(scene.contacts.states)
         velocity_pass(scene.contacts, scene.world.team, 0, VELOCITY, 1e3)  # one more sweep
-        assert np.abs(velocities(scene.contacts.lines) - before)[:, :2].max() <= 4.0 * tolerance  # rows of a body
+        assert (
+            np.abs(velocities(scene.contacts.states) - before)[:, :2].max() <= 4.0 * tolerance
+        )  # constraints of a body
         assert scene.contacts.stepping[0].sweeps == sweeps[tolerance] + 1
     assert sweeps[0.1] < sweeps[1e-3] < sweeps[1e-6]
     assert after_substep(blocks, velocity_tolerance=1e-6, velocity_sweeps=3).contacts.stepping[0].sweeps == 3

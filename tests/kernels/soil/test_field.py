@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.arrays import TEAM_SIZE
+from blocksim.kernels.common.arrays import TEAM_SIZE
 from blocksim.kernels.soil.arrays import NEIGHBOURS, Soils
 from blocksim.kernels.soil.gradient import correction, raw_gradient
 from blocksim.kernels.soil.momentum import forces_on
@@ -83,7 +83,7 @@ def test_a_corrected_gradient_is_exact_for_linear_fields_at_surfaces_too(soils: 
 
 
 def test_forces_are_the_adjoint_of_the_gradient_and_give_no_momentum(soils: Soils) -> None:
-    for g in range(soils.books.size):
+    for g in range(soils.tallies.size):
         stress_group(soils, g, 0.0)  # no strain; what neighbours feel is made
     raw, by = gradients(soils)
     state = soils.states

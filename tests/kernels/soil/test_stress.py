@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from blocksim.kernels.arrays import zeros
+from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.soil.arrays import STATE
 from blocksim.kernels.soil.stress import invariants, strain
 from blocksim.scenario.models.soil import SoilTable

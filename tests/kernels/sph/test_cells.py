@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from blocksim.kernels.sph.cells import find_neighbours, lay_grid, make_cells
 
 if TYPE_CHECKING:
-    from blocksim.kernels.arrays import Floats
+    from blocksim.kernels.common.arrays import Floats
 
 RADIUS = 0.1
 # on the edges of cells, between them, and so far away that cells of the size of the radius would be too many

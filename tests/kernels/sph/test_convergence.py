@@ -26,7 +26,7 @@ from blocksim.kernels.sph.functions import KERNEL_CODES, kernel_slope, kernel_va
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.kernels.arrays import Floats
+    from blocksim.kernels.common.arrays import Floats
 
 EVERY_KERNEL = pytest.mark.parametrize("kernel", get_args(KernelName))
 PLACE = np.array([0.4, 0.3])

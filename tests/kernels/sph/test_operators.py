@@ -16,7 +16,7 @@ from blocksim.kernels.sph.operators import GRADIENT_CODES, INTERPOLATION_CODES, 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.kernels.arrays import Floats
+    from blocksim.kernels.common.arrays import Floats
     from tests.kernels.sph.conftest import Scatter
 
 EVERY_KERNEL = pytest.mark.parametrize("kernel", get_args(KernelName))

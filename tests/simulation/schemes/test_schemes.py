@@ -37,9 +37,12 @@ def wall() -> Scenario:
 
 def same_bits(one: Nonsmooth, other: Nonsmooth) -> bool:
     """Compare everything that moves, presses or is booked."""
-    rows, count = ("normal_one", "normal_two", "shear"), int(one.contacts.stepping[0].row_count)
+    rows, count = ("normal_one", "normal_two", "shear"), int(one.contacts.stepping[0].constraint_count)
     bodies = (np.array_equal(one.world.bodies[name], other.world.bodies[name]) for name in ("x", "y", "angle", "vx"))
-    impulses = (np.array_equal(one.contacts.rows[name][:count], other.contacts.rows[name][:count]) for name in rows)
+    impulses = (
+        np.array_equal(one.contacts.constraints[name][:count], other.contacts.constraints[name][:count])
+        for name in rows
+    )
     return all([*bodies, *impulses, np.array_equal(measured_row(one), measured_row(other))])
 
 
@@ -87,10 +90,10 @@ def test_more_room_for_pairs_keeps_impulses_and_books(
     monkeypatch.setattr(build, "PAIRS_PER_BODY", 1)
     monkeypatch.setattr(build, "GROWTH", 1.05)
     scene = build_nonsmooth(wall())
-    capacity = scene.contacts.rows.size
+    capacity = scene.contacts.constraints.size
     with Team(threads) as together:
         scene, _ = together.advance(scene, STEPS)
-    assert scene.contacts.rows.size > capacity
+    assert scene.contacts.constraints.size > capacity
     assert same_bits(scene, alone)
 
 

@@ -1,0 +1,37 @@
+"""Energies that need no contacts, the power of the weights, and the scale of lengths."""
+
+import math
+
+from blocksim.kernels.common.arrays import ALL, OUTLINE, Record, World
+from blocksim.kernels.common.jit import rare_kernel
+
+
+@rare_kernel
+def potential_energy(world: World) -> float:
+    """Return the energy (J) of all masses in the field of gravity, zero at the origin."""
+    total = 0.0
+    controls = world.controls[0]
+    for i in range(world.bodies.size - 1):
+        body = world.bodies[i]
+        total -= body.mass * (controls.gravity_x * body.x + controls.gravity_y * body.y)
+    return total
+
+
+@rare_kernel
+def weights_power(world: World) -> float:
+    """Return the power (W) of all weights, each counted positive: summed over time, the travel of the weights."""
+    total = 0.0
+    controls = world.controls[0]
+    for i in range(world.bodies.size - 1):
+        body = world.bodies[i]
+        total += body.mass * abs(controls.gravity_x * body.vx + controls.gravity_y * body.vy)
+    return total
+
+
+@rare_kernel
+def smallest_side(body: Record) -> float:
+    """Return the smaller side (m) of a body, of a polygon its least width; infinite for the ground and its pieces."""
+    if body.faces == OUTLINE:
+        return float(body.least_width)
+    half = min(body.half_x, body.half_y)
+    return 2.0 * half if half > 0.0 and body.faces == ALL else math.inf

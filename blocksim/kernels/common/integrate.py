@@ -1,0 +1,95 @@
+"""Velocity Verlet: half a kick, a drift, forces, half a kick. Symplectic; position and velocity at the same times."""
+
+import math
+
+from blocksim.kernels.common.arrays import Record, Records, World
+from blocksim.kernels.common.geometry import place_corners, turn
+from blocksim.kernels.common.jit import kernel, rare_kernel
+
+
+@kernel
+def start_step(body: Record, step: float) -> None:
+    """Advance the velocities of a body by half a step, then its position and rotation by a full one.
+
+    Uses the accelerations of the last force evaluation.
+    """
+    half = 0.5 * step
+    body.vx += half * body.ax
+    body.vy += half * body.ay
+    body.spin += half * body.spin_rate
+    turned = step * body.spin
+    body.x += step * body.vx
+    body.y += step * body.vy
+    body.angle += turned
+    body.cos, body.sin = turn(body.cos, body.sin, turned)
+    place_corners(body)
+
+
+@kernel
+def start_all(bodies: Records, first: int, last: int, step: float) -> None:
+    """Start a step of the bodies from `first` to before `last`; the ground, the last of all, never moves by itself."""
+    for i in range(first, min(last, bodies.size - 1)):
+        start_step(bodies[i], step)
+
+
+@rare_kernel
+def place_all_corners(bodies: Records) -> None:
+    """Update the vectors to the corners of all bodies after their rotations changed; the ground has none."""
+    for i in range(bodies.size - 1):
+        place_corners(bodies[i])
+
+
+@rare_kernel
+def renew_rotations(bodies: Records) -> None:
+    """Recompute cosines and sines from the angles, so that round-off does not add up."""
+    for i in range(bodies.size):
+        body = bodies[i]
+        body.cos = math.cos(body.angle)
+        body.sin = math.sin(body.angle)
+    place_all_corners(bodies)
+
+
+@kernel
+def finish_step(body: Record, controls: Record, step: float) -> None:
+    """Turn gravity and contact totals of a body into accelerations, advance its velocities by half a step with them.
+
+    Clears the totals. Fixed bodies and the ground have no acceleration; their totals are the support's affair.
+    """
+    half = 0.5 * step
+    if body.inverse_mass > 0.0:
+        body.ax = controls.gravity_x + body.inverse_mass * body.fx
+        body.ay = controls.gravity_y + body.inverse_mass * body.fy
+        body.spin_rate = body.inverse_inertia * body.torque
+        body.vx += half * body.ax
+        body.vy += half * body.ay
+        body.spin += half * body.spin_rate
+        body.pairs_changed = body.pairs_now != body.pairs_before
+        body.sums_changed = 0
+        body.pairs_before = body.pairs_now
+        body.pairs_now = 0
+        body.fx = 0.0
+        body.fy = 0.0
+        body.torque = 0.0
+
+
+@rare_kernel
+def kinetic_energy(world: World) -> float:
+    """Return the kinetic energy (J) of all bodies."""
+    total = 0.0
+    for i in range(world.bodies.size - 1):
+        body = world.bodies[i]
+        total += body.mass * (body.vx**2 + body.vy**2) + body.inertia * body.spin**2
+    return 0.5 * total
+
+
+@rare_kernel
+def fastest_point(bodies: Records) -> float:
+    """Return an upper bound (m/s) of the speed of any point of any body; infinite when a state is not finite."""
+    fastest = 0.0
+    for i in range(bodies.size - 1):
+        body = bodies[i]
+        speed = math.sqrt(body.vx**2 + body.vy**2) + body.radius * abs(body.spin)
+        if not math.isfinite(speed + body.x + body.y + body.angle):
+            return math.inf
+        fastest = max(fastest, speed)
+    return fastest

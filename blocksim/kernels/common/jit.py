@@ -1,0 +1,183 @@
+"""The one place that decides how kernels are compiled and where the machine code is kept.
+
+numba's disk cache looks only at the file of the cached function itself: after an edit of a law in another file the
+old physics would run silently. Here the cache folder is named by a hash of *all* kernel sources and of the numba,
+llvmlite and numpy versions, so any edit of any kernel file starts an empty cache.
+"""
+
+import contextlib
+import functools
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TypeVar
+
+import llvmlite
+import numba
+import numpy as np
+from numba import config as numba_config
+from numba import types as numba_types
+from numba.core.registry import CPUDispatcher
+
+from blocksim.kernels.common.cache import KernelCache
+from blocksim.kernels.common.compiler import InnerCompiler
+
+Function = TypeVar("Function", bound=Callable[..., object])
+
+# IEEE arithmetic as written (no fastmath: the same input gives the same bits) and division by zero as in IEEE (no
+# exception can leave a kernel). Nothing allocates, so reference counts of arrays, two atomic operations an array and
+# call, are switched off; together with inlining of the hot path that made a step five times faster than the defaults.
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+
+# Most kernels are called by kernels only. Without the code that unpacks their arguments from Python objects all of them
+# compile in two thirds of the time. Tests, and whoever looks for an error, set this variable and can call every one.
+OPEN = "BLOCKSIM_OPEN_KERNELS"
+IS_OPEN = bool(os.environ.get(OPEN))
+
+config: Any = numba_config  # its settings are attributes made at run time
+types: Any = numba_types
+njit: Any = numba.njit  # _nrt is an option that its types leave out
+
+KERNEL_FOLDER = Path(__file__).resolve().parents[1]
+
+
+def source_hash(folder: Path = KERNEL_FOLDER) -> str:
+    """Return a hash of every Python source below `folder`, with the versions of what compiles it."""
+    versions = f"numba {numba.__version__} llvmlite {llvmlite.__version__} numpy {np.__version__}"
+    digest = hashlib.sha256(versions.encode())
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(path.relative_to(folder).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_root() -> Path:
+    """Return the folder for compiled kernels: `BLOCKSIM_CACHE_DIR`, else the user's cache folder."""
+    chosen = os.environ.get("BLOCKSIM_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "blocksim"
+
+
+def _is_usable(folder: Path) -> bool:
+    """Return True if files can be kept there, and only by this user: cached code is executed."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with tempfile.TemporaryFile(dir=folder):
+            return not hasattr(os, "getuid") or folder.stat().st_uid == os.getuid()
+    except OSError:
+        return False
+
+
+def _cache_roots() -> Iterator[Path]:
+    with contextlib.suppress(RuntimeError):  # an unknown user without HOME has no folder
+        yield cache_root()
+    with contextlib.suppress(OSError):  # there may be no folder for temporary files either
+        yield Path(tempfile.gettempdir()) / f"blocksim-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
+
+
+@functools.cache
+def cache_folder() -> Path | None:
+    """Return the cache folder of this exact source, or None where nothing can be kept."""
+    name = source_hash() + ("-open" if IS_OPEN else "")
+    for root in _cache_roots():
+        if _is_usable(root) and _is_usable(root / name):
+            return root / name
+    return None
+
+
+def is_compiled() -> bool:
+    """Return True if a compiled time loop of this exact source lies in the cache (or nothing has to be compiled)."""
+    folder = cache_folder()
+    return bool(config.DISABLE_JIT) or (folder is not None and any(folder.rglob("step.advance_alone-*.nbc")))
+
+
+def is_marked(name: str) -> bool:
+    """Return True if `mark` has been called with this name for this exact source."""
+    folder = cache_folder()
+    return bool(config.DISABLE_JIT) or (folder is not None and (folder / name).is_file())
+
+
+def mark(name: str) -> None:
+    """Note beside the compiled kernels that something is among them; where nothing can be kept, do nothing."""
+    folder = cache_folder()
+    if folder is not None and not config.DISABLE_JIT:
+        with contextlib.suppress(OSError):
+            (folder / name).touch()
+
+
+def _compiled(function: Function, **options: object) -> Function:
+    compiled: Any = njit(**OPTIONS, **options)(function)
+    folder = cache_folder()
+    if folder is not None and not config.DISABLE_JIT:
+        with contextlib.suppress(OSError):  # a function without a source file
+            compiled._cache = KernelCache(function, folder, _stamp(function))  # noqa: SLF001 - as enable_caching does
+    wrapped: Function = compiled
+    return wrapped
+
+
+def _stamp(function: Callable[..., object]) -> object:
+    """Return what identifies the source of a function; of those here the folder's name does. Raises OSError."""
+    source = Path(function.__code__.co_filename)
+    if source.is_relative_to(KERNEL_FOLDER):
+        return None
+    state = source.stat()
+    return str(source), state.st_mtime_ns, state.st_size
+
+
+def plain_type(one: Any) -> Any:
+    """Return the type that a number is passed as: constants and short integers as integers of 8 bytes."""
+    one = types.unliteral(one)
+    is_short = isinstance(one, types.Integer) and one.bitwidth < types.int64.bitwidth
+    return types.int64 if is_short else one
+
+
+class _Shared(CPUDispatcher):
+    """A function compiled once for all that call it.
+
+    numba would compile it again for every constant, and every width of integer, that it is called with: nearly half of
+    all machine code.
+    """
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Look for the compiled version that serves a call, and have it compiled where there is none."""
+        named = {name: plain_type(one) for name, one in kws.items()}
+        return super().get_call_template(tuple(plain_type(one) for one in args), named)
+
+
+class _Inner(_Shared):
+    """A compiled function without the code that Python needs to call it."""
+
+    def __call__(self, *_: object, **__: object) -> None:
+        """Refuse: the process would die."""
+        message = f"{self.py_func.__name__} is compiled for other kernels only; {OPEN}=1 lets Python call it too"
+        raise TypeError(message)
+
+
+def _inner(function: Function, **options: object) -> Function:
+    """Compile a function that Python does not call, unless all are open."""
+    if config.DISABLE_JIT:
+        return function
+    if not IS_OPEN:
+        options = {**options, "no_cpython_wrapper": True, "pipeline_class": InnerCompiler}
+    compiled: Any = _compiled(function, **options)
+    compiled.__class__ = _Shared if IS_OPEN else _Inner
+    inner: Function = compiled
+    return inner
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function of the hot path: inlined where it is called, cached on disk by the hash of all sources."""
+    return _inner(function, forceinline=True)
+
+
+def rare_kernel(function: Function) -> Function:
+    """Compile a function that most steps do not call; kept out of the hot path, which it would only lengthen."""
+    return _inner(function, forceinline=False)  # said here, as numba would take it over from the first caller
+
+
+def entry_kernel(function: Function) -> Function:
+    """Compile a function that Python calls; other threads can run meanwhile."""
+    return _compiled(function, nogil=True)

@@ -1,0 +1,65 @@
+"""Stiffness of the corner contacts of one pair, as tributary.py has it: measured where dashpots are due."""
+
+from blocksim.kernels.common.arrays import Record, World
+from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.explicit.models.duplicate_corners import PARALLEL
+from blocksim.kernels.explicit.tributary import (
+    APART,
+    ENDS,
+    LEAST,
+    PLANE,
+    WHOLE,
+    Bearing,
+    are_blocks,
+    bearing_of_interval,
+    interval_of,
+    is_flat,
+    stiffness_between,
+)
+
+
+@rare_kernel
+def keep_bearing(pair: Record, bearing: Bearing, stiffness: float) -> None:
+    """Note what the contacts of a pair have of the stiffness of a corner contact."""
+    pair.stiffness = stiffness * bearing.share
+    pair.slide = stiffness * bearing.slide
+    pair.turn = stiffness * bearing.turn
+
+
+@rare_kernel
+def are_alike(one: Record, two: Record) -> bool:
+    """Return True if two contacts have nearly the same normal."""
+    return one.nx * two.nx + one.ny * two.ny > PARALLEL
+
+
+@rare_kernel
+def measure(world: World, p: int, count: int, stiffness: float) -> None:
+    """Measure the stiffness of the contacts of a pair where dashpots are due; `stiffness` is that of a corner alone."""
+    pair = world.pairs[p]
+    if pair.normal_left != 0:
+        return
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    if pair.b == world.bodies.size - 1 or not are_blocks(a, b):
+        pair.bearing = PLANE
+        keep_bearing(pair, WHOLE, stiffness)
+    else:
+        measure_faces(pair, a, b, world.points[0], world.points[count - 1], stiffness)
+
+
+@rare_kernel
+def measure_faces(pair: Record, a: Record, b: Record, one: Record, two: Record, stiffness: float) -> None:
+    """Measure the stiffness of the contacts of two blocks, `one` and `two` (or both the same).
+
+    Two on different faces, as where a corner lies in a corner, both have that of the deeper one.
+    """
+    deeper = one if one.depth >= two.depth else two
+    found = interval_of(a, b, deeper.nx, deeper.ny)
+    bearing = bearing_of_interval(found, a, b)
+    keep_bearing(pair, bearing, stiffness)
+    is_two = one.slot != two.slot
+    is_ends = not is_two or (are_alike(one, two) and is_flat(a, b) and bearing.share > LEAST)
+    pair.bearing = ENDS if is_ends else APART
+    if is_two and is_ends and bearing.slide != 0.0:
+        pair.slide = stiffness * found.slide * found.per_length
+        pair.stiffness = stiffness_between(pair, one.x - two.x, one.y - two.y, one.nx, one.ny)

@@ -1,0 +1,60 @@
+"""How far two bodies may overlap, and whether they overlap more: checked wherever forces are evaluated.
+
+A contact pushes a corner out through the nearest face that it can touch. Beyond the middle of a thin body, or deeper
+than the particles of a boundary reach, that would be the wrong way or none at all, and a block would come out on the
+other side. So a run ends at the first overlap beyond a limit, that of the thinner of the two. While a pair touches, the
+overlaps of its contacts are checked; where it does not, or particles may have lost one another, the overlap of the
+rectangles. No step takes a block far into another (world/step.py, verlet_list.py), so none is behind before it is
+found.
+"""
+
+from blocksim.kernels.common.arrays import ALL, Record, World
+from blocksim.kernels.common.energy import smallest_side
+from blocksim.kernels.common.geometry import ground_gap, separation
+from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.explicit.models import KERNEL, SURFACE
+
+OVERLAP_SHARE = 0.05  # of the smallest side of a pair, unless a limit is given
+MIDDLE = 0.5  # of it, beyond which no limit can be
+ROWS_APART = 0.75  # of a particle; at 0.35 two rows may rest in the gaps of one another, at 1 their centres meet
+
+
+@rare_kernel
+def overlap_limit(a: Record, b: Record, given: float) -> float:
+    """Return how far (m) two bodies may overlap; `given` (m) is zero where nothing was asked for."""
+    side = min(smallest_side(a), smallest_side(b))
+    return min(given, MIDDLE * side) if given > 0.0 else OVERLAP_SHARE * side
+
+
+@rare_kernel
+def penetration(world: World, pair: Record) -> float:
+    """Return how deep (m) the rectangles of a pair overlap; what lies behind a piece of ground does not overlap it."""
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    if pair.b == world.bodies.size - 1:
+        return b.y - ground_gap(a)
+    if b.faces != ALL and b.cos * (a.y - b.y) - b.sin * (a.x - b.x) < b.half_y:
+        return 0.0
+    return -separation(a, b)
+
+
+@rare_kernel
+def reach_of_contacts(world: World, pair: Record) -> float:
+    """Return at which overlap (m) of the rectangles contacts may be lost, or act the wrong way."""
+    controls = world.controls[0]
+    if controls.model == SURFACE:
+        return pair.limit
+    reach = controls.support if controls.model == KERNEL else ROWS_APART * controls.particle_size
+    return min(reach, MIDDLE * min(smallest_side(world.bodies[pair.a]), smallest_side(world.bodies[pair.b])))
+
+
+@rare_kernel
+def is_too_deep(world: World, p: int, count: int) -> bool:
+    """Return True if pair p, whose `count` points have been found, overlaps too far."""
+    pair = world.pairs[p]
+    for i in range(count):
+        if world.points[i].depth > pair.limit:
+            return True
+    if count > 0 and world.controls[0].model == SURFACE:
+        return False
+    return penetration(world, pair) > reach_of_contacts(world, pair)

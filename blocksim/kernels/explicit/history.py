@@ -1,0 +1,141 @@
+"""Contact history when contacts begin, end, or pass from one corner to another.
+
+A contact record keeps what a contact remembers from step to step. A contact ends when its corner leaves, or touches
+another face; what its springs hold is then lost and tallied. Where two corners pass one another (blocks that become
+exactly aligned), the contact itself continues under another corner, and its history goes with it.
+"""
+
+from blocksim.kernels.common.arrays import Record, Records, World
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.explicit.broad_phase import idle_candidates
+from blocksim.kernels.explicit.damping import renew_dashpots
+from blocksim.kernels.explicit.kinematics import has_just_begun, resolve_point, weigh_first_step
+from blocksim.kernels.explicit.memory import normal_loss, shear_loss, shear_stiffness_before, stiffness_before
+from blocksim.kernels.explicit.models import SURFACE, place_ended
+from blocksim.kernels.explicit.models.duplicate_corners import PARALLEL
+from blocksim.kernels.explicit.models.surface import slot_normal
+
+TAKEN = 0xFFFFFFFF  # slot of an old contact that has found its successor; no corner or particle has this number
+
+
+@rare_kernel
+def clear_contact(contact: Record) -> None:
+    """Forget all history of a contact."""
+    contact.spring = 0.0
+    contact.depth = 0.0
+    contact.normal_force = 0.0
+    contact.shear_force = 0.0
+
+
+@rare_kernel
+def carry_on(world: World, p: int, i: int, count: int) -> None:
+    """Give point i the history of the same corner on the same face, if there is one among `count`."""
+    point = world.points[i]
+    for j in range(count):
+        old = world.before[j]
+        if old.slot == point.slot and old.face == point.face:
+            world.contacts[p, i] = old
+            old.slot = TAKEN
+            return
+    contact = world.contacts[p, i]
+    clear_contact(contact)
+    contact.slot = point.slot
+    contact.face = point.face
+
+
+@rare_kernel
+def was_in_contact(slot: int, old: Records, count: int) -> bool:
+    """Return True if a corner had a contact, on whichever face."""
+    for j in range(count):
+        if old[j].slot == slot:
+            return True
+    return False
+
+
+@rare_kernel
+def take_over(world: World, p: int, i: int, count: int) -> None:
+    """Let the corner of point i, new and deeper than it closed, take the place of one of `count` that has ended.
+
+    Their normals must agree: then the contact continues under another corner.
+    """
+    pair = world.pairs[p]
+    point = world.points[i]
+    if has_just_begun(point) or was_in_contact(point.slot, world.before, count):
+        return
+    for j in range(count):
+        old = world.before[j]
+        if old.slot != TAKEN:
+            nx, ny = slot_normal(world, pair, old.slot, old.face)
+            if nx * point.nx + ny * point.ny > PARALLEL:
+                contact = world.contacts[p, i]
+                contact.spring = old.spring
+                contact.depth = old.depth
+                contact.normal_force = old.normal_force
+                contact.shear_force = old.shear_force
+                old.slot = TAKEN
+                return
+
+
+@rare_kernel
+def release(world: World, p: int, old: Record, step: float, tally: Record) -> None:
+    """End a contact: tally its last half step and what its springs still hold.
+
+    The last kick was half of a trapezoid whose other half is empty: its work over the last drift is half the force
+    times the relative displacement, along the normal and the tangent as they were.
+    """
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    values = world.interactions[a.contact_class, b.contact_class]
+    law = world.controls[0].law
+    point = world.points[world.points.size - 1]
+    place_ended(world, p, old, point)
+    resolve_point(point, a, b, step)
+    of_spring = stiffness_before(old, pair.stiffness, values, world.particles)
+    stiffness = shear_stiffness_before(old, of_spring, values, law)
+    lost = normal_loss(old, of_spring, law) * point.closing
+    tally.dashpot += 0.5 * (lost + shear_loss(old, stiffness) * point.slipping)
+    tally.broken += 0.5 * stiffness * old.spring * (old.spring + point.slipping)
+
+
+@rare_kernel
+def change_contacts(world: World, p: int, count: int, step: float, tally: Record) -> None:
+    """Adopt a changed set of contacts: pass on, release, weigh first steps, rebuild the operators."""
+    pair = world.pairs[p]
+    before = pair.active
+    for j in range(before):
+        world.before[j] = world.contacts[p, j]
+    for i in range(count):
+        carry_on(world, p, i, before)
+    for i in range(count):
+        contact = world.contacts[p, i]
+        if contact.depth == 0.0 and world.controls[0].model == SURFACE:
+            take_over(world, p, i, before)
+        if contact.depth == 0.0:  # it is new
+            weigh_first_step(world.points[i], world.controls[0].law)
+    for j in range(before):
+        if world.before[j].slot != TAKEN:
+            release(world, p, world.before[j], step, tally)
+    renew_dashpots(pair)
+    pair.active = count
+    pair.idle = idle_candidates(pair)
+
+
+@rare_kernel
+def keep_places(world: World, p: int, count: int) -> None:
+    """Note what only the models with particles keep: that a contact has ended shows when its particle is gone."""
+    keep_places_of(world, p, count, world.particles)
+
+
+@kernel
+def keep_places_of(world: World, p: int, count: int, particles: Records | None) -> None:
+    """As keep_places; corners (no particles) are found again."""
+    if particles is not None:
+        for i in range(count):
+            point = world.points[i]
+            contact = world.contacts[p, i]
+            contact.share = point.share
+            contact.x = point.x
+            contact.y = point.y
+            contact.nx = point.nx
+            contact.ny = point.ny

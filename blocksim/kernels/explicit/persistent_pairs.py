@@ -1,0 +1,292 @@
+"""Pairs whose contacts continue as they were: nearly all pairs at nearly all steps, so they decide the speed.
+
+The same forces as contact.py has, for the `surface` model with the linear law and one or two contacts. Nothing is
+searched, and nothing is written before it is certain that no contact begins, ends or changes. Where that is not so,
+`persistent_forces` leaves the pair as it was and contact.py deals with it.
+"""
+
+from typing import NamedTuple
+
+from blocksim.kernels.common.arrays import ALL, NORMAL, SHEAR, Record, Records, World
+from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.explicit.contact import has_new_neighbours
+from blocksim.kernels.explicit.damping import BOTH, are_dashpots_due, damp_one, damp_two, note_slip, renew_dashpots
+from blocksim.kernels.explicit.friction import clip_to_cone, draw_lasting_spring
+from blocksim.kernels.explicit.laws import has_constant_stiffness
+from blocksim.kernels.explicit.models import SURFACE
+from blocksim.kernels.explicit.models.duplicate_corners import is_oblique
+from blocksim.kernels.explicit.persistent_contacts import (
+    PersistentContact,
+    follow,
+    relative_motion,
+    renew_double,
+    renew_single,
+    renew_sliding,
+)
+from blocksim.kernels.explicit.separation import begins_contact, choose_axis, gap_along
+from blocksim.kernels.explicit.tributary import APART, PLANE, bearing_of_faces, is_flat, stiffness_between
+
+CHANGED, UNTOUCHED, TOUCHING = range(3)
+
+
+class Effect(NamedTuple):
+    """What a pair does in one step."""
+
+    fx: float  # N, on body a
+    fy: float
+    torque_a: float  # N m, on body a
+    torque_b: float  # against body b
+    dashpot: float  # J, lost to dashpots
+    friction: float  # J, lost to friction
+
+
+NOTHING = Effect(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def persistent_forces(world: World, p: int, step: float, particles: Records | None) -> tuple[int, Effect]:
+    """Return what pair p does if its contacts continue (TOUCHING) or there are none (UNTOUCHED).
+
+    Otherwise (CHANGED) nothing has been written. `step` is the length (s) of the drift that led here. Where `particles`
+    is not None no pair is handled here.
+    """
+    if particles is not None:
+        return CHANGED, NOTHING
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    dx = a.x - b.x
+    dy = a.y - b.y
+    if pair.active == 0 and gap_along(pair.axis, a, b, dx, dy) >= 0.0:
+        return UNTOUCHED, NOTHING
+    if is_unsettled(world, p, a, b, dx, dy):
+        return CHANGED, NOTHING
+    if pair.active == 1:
+        return single(world, p, a, b, dx, dy, step)
+    if pair.active == 2:
+        return double(world, p, a, b, dx, dy, step)
+    gap = choose_axis(pair, a, b, dx, dy, pair.b == world.bodies.size - 1)
+    return UNTOUCHED if gap >= -pair.limit else CHANGED, NOTHING
+
+
+@kernel
+def is_unsettled(world: World, p: int, a: Record, b: Record, dx: float, dy: float) -> bool:
+    """Return True if a new contact begins, or the contacts are of a kind that contact.py handles.
+
+    Has the dashpots rebuilt where the number of pairs on a body has changed.
+    """
+    pair = world.pairs[p]
+    if pair.duplicates != 0 and is_oblique(a, b):
+        return True
+    if pair.idle > 0 and begins_contact(world, p, a, b, dx, dy):
+        return True
+    if pair.active > 0 and has_new_neighbours(a, b, SURFACE):
+        renew_dashpots(pair)
+    return pair.active > 0 and (b.faces != ALL or not has_constant_stiffness(world.controls[0].law))
+
+
+@kernel
+def measure_one(pair: Record, a: Record, b: Record, found: PersistentContact, stiffness: float) -> None:
+    """Measure the stiffness of a single contact where dashpots are due; `stiffness` is that of a corner."""
+    if pair.normal_left == 0 and pair.bearing != PLANE:
+        bearing = bearing_of_faces(a, b, found.nx, found.ny)
+        pair.stiffness = stiffness * bearing.share
+        pair.slide = stiffness * bearing.slide
+        pair.turn = stiffness * bearing.turn
+
+
+@kernel
+def are_ends(pair: Record, a: Record, b: Record) -> bool:
+    """Return True if two contacts are on the ground or the two ends of one interval of parallel faces.
+
+    That changes by turning only, slowly, and is checked where dashpots are due.
+    """
+    return pair.bearing != APART and (pair.normal_left != 0 or pair.bearing == PLANE or is_flat(a, b))
+
+
+@kernel
+def measure_two(pair: Record, one: PersistentContact, two: PersistentContact) -> None:
+    """Measure the stiffness of two contacts where dashpots are due."""
+    if pair.normal_left == 0 and pair.bearing != PLANE:
+        pair.stiffness = stiffness_between(pair, one.x - two.x, one.y - two.y, one.nx, one.ny)
+
+
+@kernel
+def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float) -> tuple[int, Effect]:
+    """Return what a pair with one contact does, if it continues; see persistent_forces."""
+    contact = world.contacts[p, 0]
+    pair = world.pairs[p]
+    operator = world.operators[p, NORMAL]
+    values = world.interactions[a.contact_class, b.contact_class]
+    motion = relative_motion(a, b, dx, dy, 0.5 * step)
+    goes_on, found = follow(contact, a, b, dx, dy, motion, step, pair.normal_left == 0)
+    if not goes_on or found.depth > pair.limit:
+        return CHANGED, NOTHING
+    before = pair.stiffness
+    measure_one(pair, a, b, found, values.normal_stiffness)
+    k = pair.stiffness
+    spring = k * found.depth
+    force = spring
+    if values.normal_damping > 0.0:
+        if are_dashpots_due(pair, NORMAL):
+            if pair.slides != 0:
+                renew_sliding(operator, pair, a, b, found, values, step)
+            else:
+                renew_single(operator, pair, a, b, found, NORMAL, values.normal_damping, step, k)
+        force = damp_one(operator, spring, contact.normal_force, found.closing_rate)
+    normal = max(force, 0.0)
+    dashpot = 0.5 * (contact.normal_force - before * contact.depth + (normal - spring)) * found.closing
+    drawn, shear, lost, friction = shear_of_one(world, p, a, b, found, normal, step, before)
+    keep(contact, drawn, found.depth, normal, shear)
+    square = 0.5 * found.depth * found.depth
+    shear += square * pair.slide
+    fx = found.nx * normal + found.ny * shear
+    fy = found.ny * normal - found.nx * shear
+    torque = found.x * fy - found.y * fx - square * pair.turn
+    return TOUCHING, Effect(fx, fy, torque - (dx * fy - dy * fx), torque, dashpot + lost, friction)
+
+
+@kernel
+def shear_of_one(
+    world: World, p: int, a: Record, b: Record, found: PersistentContact, normal: float, step: float, before: float
+) -> tuple[float, float, float, float]:
+    """Return shear spring (m), shear force (N) and the losses (J) to dashpot and friction of a single contact.
+
+    `before` (N/m) is the stiffness along the normal in the step before.
+    """
+    contact = world.contacts[p, 0]
+    pair = world.pairs[p]
+    operator = world.operators[p, SHEAR]
+    values = world.interactions[a.contact_class, b.contact_class]
+    k = values.shear_ratio * pair.stiffness
+    old = values.shear_ratio * before
+    drawn, limit, slides, friction = draw_lasting_spring(
+        values, k, old, contact.spring, found.slip, normal, found.slip_rate
+    )
+    elastic = k * drawn
+    shear = elastic
+    if slides:
+        pair.shear_left = 0
+    elif values.shear_damping > 0.0:
+        if are_dashpots_due(pair, SHEAR):
+            renew_single(operator, pair, a, b, found, SHEAR, values.shear_damping, step, k)
+        free = damp_one(operator, elastic, contact.shear_force, found.slip_rate)
+        shear = clip_to_cone(values, free, limit, normal, found.slip_rate)
+        slides = shear != free
+    if normal > 0.0:
+        note_slip(pair, slides, shear)
+    dashpot = 0.5 * (contact.shear_force - old * contact.spring + (shear - elastic)) * found.slip
+    return drawn, shear, dashpot, friction
+
+
+@kernel
+def keep(contact: Record, spring: float, depth: float, normal_force: float, shear_force: float) -> None:
+    """Write what a contact remembers until the next step."""
+    contact.spring = spring
+    contact.depth = depth
+    contact.normal_force = normal_force
+    contact.shear_force = shear_force
+
+
+@kernel
+def double(world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float) -> tuple[int, Effect]:
+    """Return what a pair with two contacts does, if both continue; see persistent_forces."""
+    first = world.contacts[p, 0]
+    second = world.contacts[p, 1]
+    pair = world.pairs[p]
+    operator = world.operators[p, NORMAL]
+    values = world.interactions[a.contact_class, b.contact_class]
+    motion = relative_motion(a, b, dx, dy, 0.5 * step)
+    goes_1, one = follow(first, a, b, dx, dy, motion, step, pair.normal_left == 0)
+    goes_2, two = follow(second, a, b, dx, dy, motion, step, pair.normal_left == 0)
+    if not (goes_1 and goes_2 and are_ends(pair, a, b)) or max(one.depth, two.depth) > pair.limit:
+        return CHANGED, NOTHING
+    before = pair.stiffness
+    measure_two(pair, one, two)
+    k = pair.stiffness
+    spring_1, spring_2 = k * one.depth, k * two.depth
+    force_1, force_2 = spring_1, spring_2
+    if values.normal_damping > 0.0:
+        if are_dashpots_due(pair, NORMAL):
+            renew_double(operator, pair, a, b, one, two, NORMAL, BOTH, values.normal_damping, step, k)
+        force_1, force_2 = damp_two(
+            operator, spring_1, spring_2, first.normal_force, second.normal_force, one.closing_rate, two.closing_rate
+        )
+    normal_1, normal_2 = max(force_1, 0.0), max(force_2, 0.0)
+    lost_1 = (first.normal_force - before * first.depth + (normal_1 - spring_1)) * one.closing
+    lost_2 = (second.normal_force - before * second.depth + (normal_2 - spring_2)) * two.closing
+    drawn_1, drawn_2, shear_1, shear_2, lost, friction = shear_of_two(
+        world, p, a, b, one, two, normal_1, normal_2, step, before
+    )
+    keep(first, drawn_1, one.depth, normal_1, shear_1)
+    keep(second, drawn_2, two.depth, normal_2, shear_2)
+    half_slide = 0.5 * pair.slide
+    shear_1 += half_slide * one.depth * one.depth
+    shear_2 += half_slide * two.depth * two.depth
+    fx, fy, torque = sum_of_two(one, two, normal_1, normal_2, shear_1, shear_2)
+    dashpot = 0.5 * (lost_1 + lost_2) + lost
+    return TOUCHING, Effect(fx, fy, torque - (dx * fy - dy * fx), torque, dashpot, friction)
+
+
+@kernel
+def sum_of_two(
+    one: PersistentContact, two: PersistentContact, normal_1: float, normal_2: float, shear_1: float, shear_2: float
+) -> tuple[float, float, float]:
+    """Return the force (N) of two contacts on body a and its torque (N m) about the centre of b."""
+    fx_1 = one.nx * normal_1 + one.ny * shear_1
+    fy_1 = one.ny * normal_1 - one.nx * shear_1
+    fx_2 = two.nx * normal_2 + two.ny * shear_2
+    fy_2 = two.ny * normal_2 - two.nx * shear_2
+    torque = one.x * fy_1 - one.y * fx_1 + (two.x * fy_2 - two.y * fx_2)
+    return fx_1 + fx_2, fy_1 + fy_2, torque
+
+
+@kernel
+def shear_of_two(
+    world: World,
+    p: int,
+    a: Record,
+    b: Record,
+    one: PersistentContact,
+    two: PersistentContact,
+    normal_1: float,
+    normal_2: float,
+    step: float,
+    before: float,
+) -> tuple[float, float, float, float, float, float]:
+    """Return shear springs (m) and forces (N) of two contacts, and their losses (J) to dashpots and friction.
+
+    `before` (N/m) is their stiffness along the normal in the step before.
+    """
+    first = world.contacts[p, 0]
+    second = world.contacts[p, 1]
+    pair = world.pairs[p]
+    operator = world.operators[p, SHEAR]
+    values = world.interactions[a.contact_class, b.contact_class]
+    k = values.shear_ratio * pair.stiffness
+    old = values.shear_ratio * before
+    drawn_1, limit_1, slides_1, work_1 = draw_lasting_spring(
+        values, k, old, first.spring, one.slip, normal_1, one.slip_rate
+    )
+    drawn_2, limit_2, slides_2, work_2 = draw_lasting_spring(
+        values, k, old, second.spring, two.slip, normal_2, two.slip_rate
+    )
+    elastic_1 = k * drawn_1
+    elastic_2 = k * drawn_2
+    shear_1 = elastic_1
+    shear_2 = elastic_2
+    sticking = (0 if slides_1 else 1) + (0 if slides_2 else 2)
+    if sticking == 0:
+        pair.shear_left = 0
+    elif values.shear_damping > 0.0:
+        if pair.sticking != sticking or are_dashpots_due(pair, SHEAR):
+            renew_double(operator, pair, a, b, one, two, SHEAR, sticking, values.shear_damping, step, k)
+        shear_1, shear_2 = damp_two(
+            operator, elastic_1, elastic_2, first.shear_force, second.shear_force, one.slip_rate, two.slip_rate
+        )
+        # a point that slides has its spring at the limit and no dashpot
+        shear_1 = elastic_1 if slides_1 else clip_to_cone(values, shear_1, limit_1, normal_1, one.slip_rate)
+        shear_2 = elastic_2 if slides_2 else clip_to_cone(values, shear_2, limit_2, normal_2, two.slip_rate)
+    lost_1 = (first.shear_force - old * first.spring + (shear_1 - elastic_1)) * one.slip
+    lost_2 = (second.shear_force - old * second.spring + (shear_2 - elastic_2)) * two.slip
+    return drawn_1, drawn_2, shear_1, shear_2, 0.5 * (lost_1 + lost_2), work_1 + work_2

@@ -1,0 +1,72 @@
+"""Whether two bodies that do not touch, or touch elsewhere, come into contact: for all near pairs, every step.
+
+Vectors are taken from the centre of body b to that of body a, (dx, dy), in world axes.
+"""
+
+from blocksim.kernels.common.arrays import HALF, Record, World
+from blocksim.kernels.common.geometry import corner_offset
+from blocksim.kernels.common.jit import kernel, rare_kernel
+
+
+@kernel
+def extent(body: Record, nx: float, ny: float) -> float:
+    """Return how far (m) a body reaches from its centre along a unit vector."""
+    upper = abs(nx * body.upper_x + ny * body.upper_y)
+    lower = abs(nx * body.lower_x + ny * body.lower_y)
+    return max(upper, lower)
+
+
+@kernel
+def gap_along(axis: int, a: Record, b: Record, dx: float, dy: float) -> float:
+    """Return the gap (m) between two bodies along one of their four axes; from zero on they do not touch."""
+    body = b if axis < 2 else a
+    other = a if axis < 2 else b
+    is_x = axis == 0 or axis == 2
+    nx = body.cos if is_x else -body.sin
+    ny = body.sin if is_x else body.cos
+    half = body.half_x if is_x else body.half_y
+    return abs(nx * dx + ny * dy) - half - extent(other, nx, ny)
+
+
+@rare_kernel
+def choose_axis(pair: Record, a: Record, b: Record, dx: float, dy: float, is_ground: bool) -> float:
+    """Note along which axis two bodies that do not touch are farthest apart; the ground has but its vertical one.
+
+    Returns the gap (m) along it.
+    """
+    best = 1
+    for axis in range(0 if is_ground else 4):
+        if gap_along(axis, a, b, dx, dy) > gap_along(best, a, b, dx, dy):
+            best = axis
+    pair.axis = best
+    return gap_along(best, a, b, dx, dy)
+
+
+@kernel
+def begins_contact(world: World, p: int, a: Record, b: Record, dx: float, dy: float) -> bool:
+    """Return True if a candidate corner that was outside the other body is inside now."""
+    pair = world.pairs[p]
+    is_ground = pair.b == world.bodies.size - 1
+    known = 0
+    for m in range(pair.near):
+        slot = world.candidates[p, m]
+        if known < pair.active and world.contacts[p, known].slot == slot:
+            known += 1
+        elif (pair.duplicates >> slot) & 1 == 0:
+            if slot < HALF:
+                ox, oy = corner_offset(a, slot)
+                if is_inside(b, dx + ox, dy + oy) if not is_ground else dy + oy < 0.0:
+                    return True
+            else:
+                ox, oy = corner_offset(b, slot - HALF)
+                if is_inside(a, ox - dx, oy - dy):
+                    return True
+    return False
+
+
+@kernel
+def is_inside(body: Record, x: float, y: float) -> bool:
+    """Return True if a place (m, from its centre, world axes) lies inside a body."""
+    px = body.cos * x + body.sin * y
+    py = body.cos * y - body.sin * x
+    return abs(px) <= body.half_x and abs(py) <= body.half_y

@@ -1,0 +1,294 @@
+"""The time loop between two outputs, in one compiled call for every thread."""
+
+import math
+
+from blocksim.kernels.common.arrays import (
+    AT_REST,
+    NOT_FINITE,
+    OVERLAP_LIMIT,
+    PAIRS_FULL,
+    REACHED,
+    STATUS,
+    TEAM_SIZE,
+    TOO_FAST,
+    Integers,
+    Record,
+    Records,
+    World,
+)
+from blocksim.kernels.common.barrier import barrier
+from blocksim.kernels.common.driven import move_driven, tally_driven
+from blocksim.kernels.common.energy import weights_power
+from blocksim.kernels.common.integrate import (
+    fastest_point,
+    kinetic_energy,
+    place_all_corners,
+    renew_rotations,
+    start_all,
+)
+from blocksim.kernels.common.jit import entry_kernel, kernel, rare_kernel
+from blocksim.kernels.common.loads import are_loads_steady, push_bodies
+from blocksim.kernels.common.supports import has_motion, is_support_at_rest, move_support, tally_support
+from blocksim.kernels.common.systems import Coupled, Systems, step_systems, survey_systems
+from blocksim.kernels.explicit.forces import forces_between, forces_within
+from blocksim.kernels.explicit.inertia import note_contacts, share_out
+from blocksim.kernels.explicit.partition import add_from_before, partition
+from blocksim.kernels.explicit.verlet_list import outruns_lists, update_pairs
+
+NEIGHBOURS, CHECK, MOVE, TALLY, SHARE_OUT = range(5)  # what one thread does for all
+
+
+@rare_kernel
+def is_supported(bodies: Records, controls: Record) -> bool:
+    """Return True if every free body touches something, where there is gravity: at the top of its flight none rests."""
+    if controls.gravity_x == 0.0 and controls.gravity_y == 0.0 and controls.push == 0.0:
+        return True
+    for i in range(bodies.size - 1):
+        if bodies[i].inverse_mass > 0.0 and bodies[i].pairs_before == 0:
+            return False
+    return True
+
+
+@rare_kernel
+def check(world: World, systems: Systems | None) -> int:
+    """Check that the run may continue: finite, no pair overlaps too far, not at rest for the hold time."""
+    controls = world.controls[0]
+    clock = world.clock[0]
+    ledger = world.ledger[0]
+    renew_rotations(world.bodies)
+    fastest = fastest_point(world.bodies)
+    kinetic = kinetic_energy(world)
+    power = weights_power(world)
+    if systems is not None:
+        speed, energy, work = survey_systems(systems, world)
+        fastest = max(fastest, speed)
+        kinetic += energy
+        power += work
+    ledger.travel_work += controls.check_every * controls.step * power
+    ledger.largest_kinetic = max(ledger.largest_kinetic, kinetic)
+    if math.isinf(fastest):
+        return NOT_FINITE
+    if clock.ends_at > 0:
+        clock.ends_at = clock.steps
+        return OVERLAP_LIMIT
+    rests = fastest < controls.rest_speed and is_supported(world.bodies, controls) and is_support_at_rest(world)
+    rests = rests and are_loads_steady(world)
+    clock.checks_at_rest = clock.checks_at_rest + 1 if rests else 0
+    return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
+
+
+@rare_kernel
+def update_neighbours(world: World) -> int:
+    """Keep the pair list valid; return PAIRS_FULL where it does not fit, TOO_FAST where none would do, else REACHED."""
+    if outruns_lists(world):
+        return TOO_FAST
+    rebuilds = world.clock[0].rebuilds
+    if not update_pairs(world):
+        return PAIRS_FULL
+    if world.clock[0].rebuilds != rebuilds:
+        partition(world, world.team[TEAM_SIZE])
+    return REACHED
+
+
+@rare_kernel
+def supervise(world: World, k: int, task: int, step: float, systems: Systems | None) -> int:
+    """Let the first thread do a task for all while the others wait; return the status code that all follow."""
+    barrier(world.team)
+    if k == 0:
+        world.clock[0].steps = world.shares[0].steps
+        world.team[STATUS] = REACHED
+        if task == NEIGHBOURS:
+            world.team[STATUS] = update_neighbours(world)
+        elif task == CHECK:
+            world.team[STATUS] = check(world, systems)
+        elif task == MOVE:
+            move_support(world, step)
+            move_driven(world, step)
+        elif task == SHARE_OUT:
+            share_out(world)
+        else:
+            tally_support(world, step)
+            tally_driven(world, step)
+    barrier(world.team)
+    return world.team[STATUS]
+
+
+@rare_kernel
+def exchange_forces(world: World, k: int, step: float) -> None:
+    """Evaluate the pairs between shares, everyone some of them, and add what comes from shares before."""
+    forces_between(world, world.shares[k], step)
+    barrier(world.team)
+    add_from_before(world, world.shares[k])
+
+
+@rare_kernel
+def note_depth(clock: Record, share: Record) -> None:
+    """End the run with the next step if a pair of a share overlapped too far; at once where checks are due.
+
+    Bodies that were done early have started the next step by now. All threads that note it in the same step write the
+    same, and none later, as all have met in between.
+    """
+    if share.is_too_deep and clock.ends_at == 0:
+        clock.ends_at = share.steps + 1
+
+
+@kernel
+def has_ended(clock: Record, steps: int) -> bool:
+    """Return True if the last step of a run that failed is among so many steps."""
+    return 0 < clock.ends_at <= steps
+
+
+@rare_kernel
+def open_call(world: World, k: int, last_step: int) -> None:
+    """Get ready for the steps of one call."""
+    clock = world.clock[0]
+    if k == 0:
+        if clock.is_started == 0:
+            place_all_corners(world.bodies)
+        partition(world, world.team[TEAM_SIZE])
+    barrier(world.team)
+    every = world.controls[0].check_every
+    share = world.shares[k]
+    share.steps = clock.steps
+    share.is_started = clock.is_started
+    share.last_step = last_step
+    share.next_check = (clock.steps // every + 1) * every
+    share.until = 0
+    share.is_too_deep = 0
+    share.asks = 0
+    share.status = OVERLAP_LIMIT if has_ended(clock, clock.steps) else REACHED
+
+
+@rare_kernel
+def close_call(world: World, k: int) -> int:
+    """Note how far the run is and return its status code, once all threads are done."""
+    share = world.shares[k]
+    barrier(world.team)
+    if k == 0:
+        world.clock[0].steps = share.steps
+        world.clock[0].is_started = share.is_started
+    return share.status
+
+
+@rare_kernel
+def begin_steps(world: World, k: int, step: float) -> bool:
+    """Start a step of `step` (s), set up to which one nothing has to be checked, return whether the run continues."""
+    share = world.shares[k]
+    if share.steps >= world.clock[0].next_update:
+        share.status = supervise(world, k, NEIGHBOURS, step, None)
+        if share.status != REACHED:
+            return False
+    start_all(world.bodies, share.first_body, share.last_body, step)
+    if world.loads.size > 0:
+        push_bodies(world, share.first_body, share.last_body, share.steps * world.controls[0].step + step, step)
+    if has_motion(world.controls[0]):
+        supervise(world, k, MOVE, step, None)
+        return True
+    barrier(world.team)
+    if share.is_started != 0 and world.loads.size == 0:
+        share.until = min(share.last_step, share.next_check, world.clock[0].next_update)
+    return True
+
+
+@rare_kernel
+def end_steps(world: World, k: int, step: float, systems: Systems | None) -> bool:
+    """Do the checks that are due after some steps; return whether the run continues."""
+    share = world.shares[k]
+    if has_motion(world.controls[0]):
+        supervise(world, k, TALLY, step, None)
+    if share.steps >= world.clock[0].next_share:
+        supervise(world, k, SHARE_OUT, step, None)
+    if share.steps == share.next_check:
+        share.next_check += world.controls[0].check_every
+        share.status = supervise(world, k, CHECK, step, systems)
+    if has_ended(world.clock[0], share.steps) and share.status != NOT_FINITE:
+        share.status = OVERLAP_LIMIT
+    return share.status == REACHED
+
+
+@kernel
+def goes_further(clock: Record, share: Record) -> bool:
+    """Return True if a thread has another step to do; the last step of a run that failed may be one more than asked."""
+    if share.status != REACHED:
+        return False
+    return share.steps < share.last_step or share.is_started == 0 or share.steps + 1 == clock.ends_at
+
+
+@rare_kernel
+def advance_thread(world: World, last_step: int, k: int, team: Integers | None, systems: Systems | None) -> int:
+    """Be thread k of those that step a world until `last_step`, or until something ends the run.
+
+    Without a `team`, which is world.team, what threads exchange is not compiled: a first run is for one thread. With
+    further `systems` steps do not follow upon one another: each begins when all bodies have ended the one before.
+    """
+    open_call(world, k, last_step)
+    share = world.shares[k]
+    clock = world.clock[0]
+    while goes_further(clock, share):
+        step = world.controls[0].step if share.is_started else 0.0
+        if share.steps >= share.until and not begin_steps(world, k, step):
+            break
+        if share.steps + 1 == clock.ends_at:
+            share.until = clock.ends_at
+        share.until = min(share.until, clock.next_share)
+        share.steps += share.is_started
+        share.is_started = 1
+        if systems is not None:
+            share.until = share.steps
+            step_systems(systems, world, k, step)
+        goes_on = share.steps < share.until
+        if team is not None:
+            exchange_forces(world, k, step)
+        forces_within(world, share, step, goes_on)
+        note_depth(clock, share)
+        note_contacts(clock, share)
+        barrier(world.team)
+        if not goes_on and not end_steps(world, k, step, systems):
+            break
+    return close_call(world, k)
+
+
+@kernel
+def advance_single(world: World, last_step: int) -> int:
+    """Step a world with one thread; see advance."""
+    world.team[TEAM_SIZE] = 1
+    return advance_thread(world, last_step, 0, None, None)
+
+
+@entry_kernel
+def advance_alone(world: World, last_step: int) -> int:
+    """Step a world with one thread; see advance."""
+    return advance_single(world, last_step)
+
+
+@entry_kernel
+def advance_in_team(world: World, last_step: int, k: int) -> int:
+    """Be thread k of the world.team[TEAM_SIZE] that advance one world together; see advance. All get the same answer.
+
+    Every thread comes with work space of its own (points, matrices, before, action) and shares all other arrays.
+    """
+    return advance_thread(world, last_step, k, world.team, None)
+
+
+def advance(world: World, last_step: int) -> int:
+    """Step until `last_step` or until something ends the run; return one of the status codes of arrays.py.
+
+    The first call also evaluates the contacts at the start, as if after a step of no length; `advance(world, 0)` does
+    only that. Checks fall on fixed step numbers and all flags are part of the state, so the bits of a run do not
+    depend on where outputs interrupt it. PAIRS_FULL returns before anything has moved: give the lists more room and
+    call again.
+    """
+    return int(advance_alone(world, last_step))
+
+
+@entry_kernel
+def advance_coupled_alone(scene: Coupled, last_step: int) -> int:
+    """Step a world and further systems with one thread; see advance."""
+    scene.world.team[TEAM_SIZE] = 1
+    return advance_thread(scene.world, last_step, 0, None, scene.systems)
+
+
+@entry_kernel
+def advance_coupled_in_team(scene: Coupled, last_step: int, k: int) -> int:
+    """Be thread k of those that advance a world and further systems together; see advance_in_team."""
+    return advance_thread(scene.world, last_step, k, scene.world.team, scene.systems)

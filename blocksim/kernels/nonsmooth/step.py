@@ -1,0 +1,215 @@
+"""The time loop of the non-smooth scheme between two outputs, in one compiled call for every thread."""
+
+import math
+
+from blocksim.kernels.common.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL, REACHED, STATUS, TEAM_SIZE
+from blocksim.kernels.common.barrier import barrier
+from blocksim.kernels.common.energy import weights_power
+from blocksim.kernels.common.integrate import fastest_point, kinetic_energy, renew_rotations
+from blocksim.kernels.common.jit import entry_kernel, kernel
+from blocksim.kernels.common.loads import are_loads_steady
+from blocksim.kernels.common.simd import WIDTH
+from blocksim.kernels.common.supports import is_support_at_rest
+from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.kernels.nonsmooth.begin import is_start, load_states
+from blocksim.kernels.nonsmooth.energy import has_excessive_overlap
+from blocksim.kernels.nonsmooth.groups import gather, pack_groups, unpack_groups
+from blocksim.kernels.nonsmooth.loads import show_velocities
+from blocksim.kernels.nonsmooth.manifold import Place, are_four_of_blocks, collide, collide_four
+from blocksim.kernels.nonsmooth.motion import place_all
+from blocksim.kernels.nonsmooth.neighbours import update_pairs
+from blocksim.kernels.nonsmooth.parts import begin_next_part, begin_step, cut, is_cut
+from blocksim.kernels.nonsmooth.rounds import forget_struck
+from blocksim.kernels.nonsmooth.substep import bodies_of, kick_share, substep
+from blocksim.kernels.nonsmooth.supports import place_supports
+from blocksim.kernels.nonsmooth.sweeps import part_of
+
+NEIGHBOURS, GATHER, CHECK = range(3)  # what one thread does for all
+UNDER_WAY = -1  # beside the status codes: the step goes on
+
+
+@kernel
+def is_supported(scene: Nonsmooth) -> bool:
+    """Return True if every free body has a contact that presses, where there is gravity."""
+    world = scene.world
+    controls = world.controls[0]
+    if controls.gravity_x == 0.0 and controls.gravity_y == 0.0 and controls.push == 0.0:
+        return True
+    scene.used[:] = 0
+    contacts = scene.contacts
+    for r in range(contacts.stepping[0].constraint_count):
+        constraint = contacts.constraints[r]
+        if constraint.normal_one > 0.0 or constraint.normal_two > 0.0:
+            scene.used[constraint.a] = 1
+            scene.used[constraint.b] = 1
+    for i in range(world.bodies.size - 1):
+        if world.bodies[i].inverse_mass > 0.0 and scene.used[i] == 0:
+            return False
+    return True
+
+
+@kernel
+def check(scene: Nonsmooth) -> int:
+    """Check that the run may continue: finite, not at rest for the hold time."""
+    world = scene.world
+    controls = world.controls[0]
+    clock = world.clock[0]
+    renew_rotations(world.bodies)
+    ledger = world.ledger[0]
+    ledger.travel_work += controls.check_every * controls.step * weights_power(world)
+    ledger.largest_kinetic = max(ledger.largest_kinetic, kinetic_energy(world))
+    fastest = fastest_point(world.bodies)
+    if math.isinf(fastest):
+        return NOT_FINITE
+    if has_excessive_overlap(scene):
+        return OVERLAP_LIMIT
+    rests = fastest < controls.rest_speed and is_supported(scene) and is_support_at_rest(world)
+    rests = rests and are_loads_steady(world)
+    clock.checks_at_rest = clock.checks_at_rest + 1 if rests else 0
+    return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
+
+
+@kernel
+def end_part(scene: Nonsmooth) -> int:
+    """End a part of a step for all; return UNDER_WAY, or the status of a step that has come to its end."""
+    clock = scene.world.clock[0]
+    place_supports(scene)
+    if is_cut(scene):
+        begin_next_part(scene)
+        return UNDER_WAY
+    clock.steps += 1
+    return check(scene) if clock.steps % scene.world.controls[0].check_every == 0 else REACHED
+
+
+@kernel
+def supervise(scene: Nonsmooth, k: int, task: int) -> int:
+    """Let the first thread do a task for all while the others wait; return the status code that all follow."""
+    team = scene.world.team
+    barrier(team)
+    if k == 0:
+        team[STATUS] = REACHED
+        if task == NEIGHBOURS:
+            if update_pairs(scene):
+                begin_step(scene)
+            else:
+                team[STATUS] = PAIRS_FULL
+        elif task == GATHER:
+            if scene.contacts.stepping[0].is_divided and cut(scene):
+                team[STATUS] = UNDER_WAY
+            else:
+                gather(scene.contacts, scene.begins)
+        else:
+            team[STATUS] = end_part(scene)
+    barrier(team)
+    return team[STATUS]
+
+
+@kernel
+def find_manifolds(scene: Nonsmooth, begin: int, end: int) -> None:
+    """Find the manifolds of some constraints."""
+    contacts = scene.contacts
+    bodies = scene.world.bodies
+    constraints = contacts.constraints
+    ground = bodies.size - 1
+    h = contacts.stepping[0].substep
+    ahead = 0.5 * (contacts.stepping[0].length - h)
+    r = begin
+    while r < end:
+        if r + WIDTH <= end and are_four_of_blocks(constraints, r, bodies):
+            collide_four(contacts, bodies, r, ahead)
+            r += WIDTH
+        else:
+            constraint = constraints[r]
+            states = contacts.states
+            place = Place(contacts.stepping[0].margin, ahead, 0.5 * h, constraint.b == ground)
+            collide(
+                constraint,
+                bodies[constraint.a],
+                bodies[constraint.b],
+                states[constraint.a],
+                states[constraint.b],
+                place,
+                scene.world.corners,
+            )
+            r += 1
+
+
+@kernel
+def do_step(scene: Nonsmooth, k: int) -> int:
+    """Take one step as thread k, in as many parts as it takes; return the status code."""
+    contacts = scene.contacts
+    if contacts.stepping[0].is_guarded:
+        first, last = part_of(0, contacts.stepping[0].constraint_count, k, scene.world.team[TEAM_SIZE])
+        forget_struck(contacts, first, last)
+    status = supervise(scene, k, NEIGHBOURS)
+    if status != REACHED:
+        return status
+    status = UNDER_WAY
+    while status == UNDER_WAY:
+        status = do_part(scene, k)
+    return status
+
+
+@kernel
+def do_part(scene: Nonsmooth, k: int) -> int:
+    """Take one part of a step as thread k, or find that it has to be shorter; return UNDER_WAY or the status code."""
+    world = scene.world
+    contacts = scene.contacts
+    size = world.team[TEAM_SIZE]
+    first, last = part_of(0, contacts.stepping[0].constraint_count, k, size)
+    if contacts.stepping[0].parts > 0:
+        forget_struck(contacts, first, last)
+    find_manifolds(scene, first, last)
+    if supervise(scene, k, GATHER) == UNDER_WAY:
+        return UNDER_WAY
+    begin, end = part_of(0, contacts.stepping[0].group_count, k, size)
+    pack_groups(contacts, begin, end)
+    count = contacts.stepping[0].substeps
+    is_first = is_start(scene)
+    for number in range(count):
+        substep(scene, k, number, is_first)
+    unpack_groups(contacts, begin, end)
+    first, last = bodies_of(contacts, k, size)
+    gravity = (world.controls[0].gravity_x, world.controls[0].gravity_y)
+    share = kick_share(count - 1, is_first)
+    place_all(world.bodies, contacts, first, last, share, gravity)
+    if world.loads.size > 0:
+        show_velocities(scene, first, last, share)
+    return supervise(scene, k, CHECK)
+
+
+@kernel
+def advance_thread(scene: Nonsmooth, last_step: int, k: int) -> int:
+    """Be thread k of those that step a world until `last_step`, or until something ends the run."""
+    if k == 0 and scene.world.clock[0].is_started == 0:
+        load_states(scene)
+        renew_rotations(scene.world.bodies)
+        scene.world.clock[0].is_started = 1
+    barrier(scene.world.team)
+    status = REACHED
+    while status == REACHED and scene.world.clock[0].steps < last_step:
+        status = do_step(scene, k)
+    barrier(scene.world.team)
+    return status
+
+
+@kernel
+def advance_single(scene: Nonsmooth, last_step: int) -> int:
+    """Step a world with one thread; see advance."""
+    scene.world.team[TEAM_SIZE] = 1
+    return advance_thread(scene, last_step, 0)
+
+
+@entry_kernel
+def advance_nonsmooth_in_team(scene: Nonsmooth, last_step: int, k: int) -> int:
+    """Be thread k of the team[TEAM_SIZE] that advance one world together. All get the same answer."""
+    return advance_thread(scene, last_step, k)
+
+
+def advance_nonsmooth(scene: Nonsmooth, last_step: int) -> int:
+    """Step until `last_step` or until something ends the run; return one of the status codes of arrays.py.
+
+    PAIRS_FULL returns before anything of the step has moved: give the lists more room and call again.
+    """
+    scene.world.team[TEAM_SIZE] = 1
+    return int(advance_nonsmooth_in_team(scene, last_step, 0))

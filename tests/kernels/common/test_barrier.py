@@ -1,0 +1,223 @@
+"""Threads that advance one world together: the same bits as one alone, and nobody waits for ever."""
+
+from __future__ import annotations
+
+import copy
+from functools import cache
+from math import nan
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import pytest
+
+from blocksim.kernels.common.arrays import (
+    ARRIVED,
+    AT_REST,
+    MEETINGS,
+    NOT_FINITE,
+    OVERLAP_LIMIT,
+    PAIRS_FULL,
+    REACHED,
+    TEAM_SIZE,
+    TEAM_WORDS,
+    Integers,
+)
+from blocksim.kernels.common.barrier import barrier
+from blocksim.kernels.common.jit import entry_kernel
+from blocksim.verification.scene import HEIGHT
+from blocksim.world.build import empty_lists, with_more_room
+from tests.kernels.crews import (
+    SCENES,
+    advanced,
+    alone,
+    assert_same_bits,
+    bits,
+    contacts_between,
+    crew,
+    in_threads,
+    soft_world,
+    together,
+    wall,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from blocksim.kernels.common.arrays import World
+
+pytestmark = pytest.mark.usefixtures("compiler")  # what threads tell one another, no interpreter can
+MANY = 7  # more than there are groups of bodies, and than most machines have cores
+
+
+@entry_kernel
+def meet_often(team: Integers, places: Integers, k: int, rounds: int) -> int:
+    """Note after which meeting thread k is, and return how often another one was not where it must be."""
+    faults = 0
+    for n in range(1, rounds + 1):
+        places[8 * k] = n
+        barrier(team)
+        for other in range(team[TEAM_SIZE]):
+            faults += places[8 * other] != n
+        barrier(team)
+    return faults
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, MANY])
+def test_nobody_leaves_a_meeting_before_everybody_has_come(size: int) -> None:
+    team, places = np.zeros(TEAM_WORDS, dtype=np.int64), np.zeros(8 * MANY, dtype=np.int64)
+    team[TEAM_SIZE] = size
+    faults = in_threads(*(lambda k=k: meet_often(team, places, k, 500) for k in range(size)))
+    assert faults == [0] * size
+    assert team[ARRIVED] == 0
+    assert team[MEETINGS] == (1000 if size > 1 else 0)
+
+
+class ByOne(Protocol):
+    """Return a scene advanced by one thread; the signature of the fixture `by_one`."""
+
+    def __call__(self, scene: str, share: float = 1.0) -> World:
+        """`share` of its steps; all calls with the same arguments share the world."""
+
+
+@pytest.fixture(scope="module")
+def by_one() -> ByOne:
+    """Return every scene, advanced by one thread."""
+
+    @cache
+    def make(scene: str, share: float = 1.0) -> World:
+        start, steps = SCENES[scene]
+        world, status = advanced(start(), round(share * steps), 1)
+        assert status == REACHED
+        return world
+
+    return make
+
+
+@pytest.mark.parametrize(("size", "begin"), [(2, 0.0), (3, 0.5), (4, 0.8), (MANY, 0.9)])
+@pytest.mark.parametrize("scene", SCENES)
+def test_any_number_of_threads_gives_the_bits_of_one(by_one: ByOne, scene: str, size: int, begin: float) -> None:
+    steps = SCENES[scene][1]
+    world, status = advanced(by_one(scene, begin), steps, size)
+    assert status == REACHED
+    assert world.clock[0].rebuilds > 1
+    assert_same_bits(world, by_one(scene))
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_scenes_have_contacts_between_shares_that_begin_and_end(scene: str) -> None:
+    start, steps = SCENES[scene]
+    world = start()
+    begun: set[object] = set()
+    ended: set[object] = set()
+    before: set[tuple[int, int, int, int]] = set()
+    for last in range(0, steps + 1, steps // 50):
+        world, _ = advanced(world, last, 3)
+        now = contacts_between(world)
+        begun, ended, before = begun | (now - before), ended | (before - now), now
+    assert len(begun) > 20
+    assert len(ended) > 10
+    assert np.count_nonzero(world.ledger.dashpot) >= 3
+    assert np.count_nonzero(world.ledger.friction) >= 3
+
+
+@pytest.mark.parametrize("scene", ["wall", "among moving supports"])
+def test_team_interrupted_anywhere_gives_the_bits_of_one_call(by_one: ByOne, scene: str) -> None:
+    worlds = crew(SCENES[scene][0](), 3)
+    steps = round(0.2 * SCENES[scene][1])
+    for last in (0, 0, 1, 2, 3, 10, 11, 49, 50, 51, 100, 400, steps - 1, steps, steps):
+        assert together(worlds, last) == REACHED
+        assert worlds[0].clock[0].steps == last
+    assert_same_bits(worlds[0], by_one(scene, 0.2))
+
+
+def test_number_of_threads_may_change_from_call_to_call(by_one: ByOne) -> None:
+    worlds = crew(copy.deepcopy(by_one("wall", 0.5)), 4)
+    for size, share in ((2, 0.6), (4, 0.65), (1, 0.8), (3, 0.9), (2, 1.0)):
+        assert together(worlds[:size], round(share * SCENES["wall"][1])) == REACHED
+    assert_same_bits(worlds[0], by_one("wall"))
+
+
+@pytest.mark.parametrize("size", [2, 4])
+def test_one_thread_continues_alone_with_a_world_that_a_team_has_left(by_one: ByOne, size: int) -> None:
+    worlds, steps = crew(copy.deepcopy(by_one("wall", 0.8)), size), SCENES["wall"][1]
+    together(worlds, round(0.9 * steps))
+    assert worlds[0].pairs.is_between.any()
+    assert alone(worlds[0], steps) == REACHED
+    assert not worlds[0].pairs.is_between[: worlds[0].clock[0].pair_count].any()
+    assert_same_bits(worlds[0], by_one("wall"))
+
+
+def overlapping() -> World:
+    """Return a wall whose blocks soon overlap too much."""
+    return wall(max_overlap=1e-4)
+
+
+def burst() -> World:
+    """Return a wall one of whose last blocks is nowhere."""
+    world = wall()
+    world.bodies[60].vx = nan
+    return world
+
+
+def resting() -> World:
+    """Return blocks that lie on the ground, and some on them."""
+    below = [{"x": 0.033 * i, "y": 0.5 * HEIGHT} for i in range(30)]
+    above = [{"x": 0.033 * i + 0.016, "y": 1.5 * HEIGHT} for i in range(29)]
+    rest = {"stop_at_rest": True, "rest_speed": 2e-2, "rest_hold": 5e-3}
+    return soft_world([*below, *above], time=rest)
+
+
+ENDS: dict[int, Callable[[], World]] = {OVERLAP_LIMIT: overlapping, NOT_FINITE: burst, AT_REST: resting}
+
+
+@pytest.mark.parametrize("size", [2, 3, MANY])
+@pytest.mark.parametrize("status", ENDS)
+def test_what_ends_a_run_ends_it_for_all_threads_at_the_same_step(status: int, size: int) -> None:
+    one, ended = advanced(ENDS[status](), 10_000, 1)
+    assert ended == status
+    assert 0 < one.clock[0].steps < 10_000
+    worlds = crew(ENDS[status](), size)
+    assert together(worlds, 10_000) == status
+    assert_same_bits(worlds[0], one)
+
+
+def cramped() -> World:
+    """Return a wall with room for one pair."""
+    world = wall()
+    return world._replace(**empty_lists(1, world.candidates.shape[1], world.before))
+
+
+def test_full_list_sends_all_threads_back_before_anything_has_moved() -> None:
+    worlds, untouched = crew(cramped(), 3), cramped()
+    for _ in range(2):
+        assert together(worlds, 100) == PAIRS_FULL
+    assert worlds[0].clock[0].steps == worlds[0].clock[0].pair_count == worlds[0].clock[0].is_started == 0
+    for name in ("x", "y", "angle", "vx", "vy", "spin"):
+        assert worlds[0].bodies[name].tobytes() == untouched.bodies[name].tobytes(), name
+    assert bits(worlds[0].ledger) == bits(untouched.ledger)
+
+
+def test_list_that_runs_full_on_the_way_is_given_room_and_the_team_continues(by_one: ByOne) -> None:
+    steps, grown = round(0.2 * SCENES["wall"][1]), 0
+    worlds = crew(cramped(), 3)
+    while together(worlds, steps) == PAIRS_FULL:
+        worlds = crew(with_more_room(worlds[0]), 3)
+        grown += 1
+    assert grown > 3
+    assert_same_bits(worlds[0], by_one("wall", 0.2))
+
+
+@pytest.mark.parametrize("scene", ["wall with Hertz law", "on hills"])
+def test_losses_of_pairs_between_shares_are_in_the_books_of_their_first_bodies(by_one: ByOne, scene: str) -> None:
+    """The totals alone would not tell: book by book, time after time."""
+    steps = SCENES[scene][1]
+    one, team = copy.deepcopy(by_one(scene, 0.5)), crew(copy.deepcopy(by_one(scene, 0.5)), 3)
+    before = one.ledger.copy()
+    for last in range(steps // 2 + 1, steps, 13):
+        alone(one, last)
+        together(team, last)
+        for name in ("dashpot", "friction", "broken"):
+            assert team[0].ledger[name].tobytes() == one.ledger[name].tobytes(), (name, last)
+    for name, least in (("dashpot", 3), ("friction", 3), ("broken", 2)):
+        assert (one.ledger[name] != before[name]).sum() >= least, name
+    assert len(contacts_between(team[0])) > 3

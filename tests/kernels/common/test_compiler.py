@@ -1,0 +1,65 @@
+"""Inner kernels have no machine code of their own; their callers get theirs, from the compiler or from the disk."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from blocksim.kernels.common import jit
+from blocksim.kernels.common.compiler import INNER, InnerLibrary
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytestmark = pytest.mark.usefixtures("compiler")
+
+
+@pytest.fixture
+def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Compile as users do, into a folder of this test's own."""
+    monkeypatch.setattr(jit, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(jit, "IS_OPEN", False)
+    return tmp_path
+
+
+def chain() -> tuple[Any, Any, Any]:
+    """Return kernels as a new process has them: two and the one that calls them."""
+
+    @jit.kernel
+    def square(number: float) -> float:
+        return number * number
+
+    @jit.rare_kernel
+    def successor(number: float) -> float:
+        return number + 1.0
+
+    @jit.entry_kernel
+    def two(number: float) -> float:
+        return square(number) + square(successor(number))
+
+    return square, successor, two
+
+
+def loads(kernel: Any) -> int:
+    return sum(kernel.stats.cache_hits.values())
+
+
+def library_of(kernel: Any) -> Any:
+    (compiled,) = kernel.overloads.values()
+    return compiled.library
+
+
+def test_inner_kernels_are_kept_without_machine_code_and_serve_callers_of_later_processes(kept: Path) -> None:
+    square, successor, two = chain()
+    assert two(3.0) == 25.0
+    for kernel in (square, successor):
+        library = library_of(kernel)
+        assert isinstance(library, InnerLibrary)
+        assert library.serialize_using_object_code()[1] == INNER
+        assert not library.codegen._engine.is_symbol_defined(kernel.overloads.popitem()[1].fndesc.mangled_name)
+    for file in kept.rglob("*two*"):
+        file.unlink()
+    square, successor, two = chain()
+    assert two(3.0) == 25.0
+    assert (loads(square), loads(successor), loads(two)) == (1, 1, 0)

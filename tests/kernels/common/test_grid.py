@@ -1,0 +1,240 @@
+"""The grid of the broad phase finds what looking at every pair would, and history stays with its pair."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blocksim.kernels.common.arrays import HALF, NORMAL, SHEAR, Records, World
+from blocksim.kernels.common.grid import FARTHEST_CELL, bucket, cell_of, fill_grid
+from blocksim.kernels.common.integrate import renew_rotations
+from blocksim.kernels.explicit.broad_phase import carry_history, insert_sorted, neighbours_of
+from blocksim.verification.scene import scenario_of
+from blocksim.world.build import build_world, empty_lists
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Sides = Callable[[np.random.Generator, int], NDArray[np.float64]]
+
+SIGNS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+COUNT = 64
+HILL = {"ground": {"profile": [[-1.0, 0.2], [0.0, 0.0], [0.3, -0.1], [5.0, 0.4]]}}
+WALLS = {"walls": [{"from": [0.1, 0.5], "to": [0.1, 0.0]}]}
+
+
+def alike(_: np.random.Generator, count: int) -> NDArray[np.float64]:
+    return np.full((count, 2), (0.032, 0.025))
+
+
+def up_to(ratio: float) -> Sides:
+    """Return how to draw sides of which the largest is `ratio` times the smallest, all sizes equally often."""
+
+    def draw(random: np.random.Generator, count: int) -> NDArray[np.float64]:
+        return np.asarray(0.01 * ratio ** random.uniform(0.0, 1.0, (count, 2)))
+
+    return draw
+
+
+def planks(random: np.random.Generator, count: int) -> NDArray[np.float64]:
+    sides = up_to(2.0)(random, count)
+    sides[::12] = 1.5, 0.01
+    return sides
+
+
+def heap(seed: int, sides: Sides, area: float, **tables: Any) -> World:
+    """Return blocks all over a square, overlapping as no scenario would allow; every ninth one is fixed."""
+    random = np.random.default_rng(seed)
+    bodies = [
+        {"x": float(i), "y": 1.0, "fixed": i % 9 == 0, "width": width, "height": height}
+        for i, (width, height) in enumerate(sides(random, COUNT).tolist())
+    ]
+    world = build_world(scenario_of(bodies, **tables))
+    blocks: Any = world.bodies[:COUNT]
+    blocks.x, blocks.y = random.uniform(-area / 2, area / 2, (2, COUNT))
+    blocks.angle = random.uniform(-4.0, 4.0, COUNT)
+    renew_rotations(world.bodies)
+    return world
+
+
+def overlaps(bodies: Records) -> NDArray[np.float64]:
+    """Return the largest gap (m) of every two rectangles along their face normals; negative when they overlap."""
+    normals = np.array([(bodies.cos, bodies.sin), (-bodies.sin, bodies.cos)]).transpose(2, 0, 1)  # body, axis, xy
+    local = SIGNS * np.array([bodies.half_x, bodies.half_y]).T[:, None]
+    corners = np.einsum("ick,ikx->icx", local, normals)
+    centres = np.array([bodies.x, bodies.y]).T
+    apart = centres - centres[:, None]  # of the second body from the first
+    place = np.einsum("ijx,ikx->ijk", apart, normals)[..., None] + np.einsum("jcx,ikx->ijkc", corners, normals)
+    half = np.array([bodies.half_x, bodies.half_y]).T[:, None]
+    gaps = np.maximum(place.min(axis=-1) - half, -half - place.max(axis=-1)).max(axis=-1)
+    return np.asarray(np.maximum(gaps, gaps.T))
+
+
+def expected_neighbours(world: World) -> list[list[int]]:
+    """Return for every body those after it that are within the skin, unless both are fixed."""
+    bodies, reach = world.bodies[:-1].view(np.recarray), float(world.controls[0].skin)
+    way = np.hypot(bodies.x - bodies.x[:, None], bodies.y - bodies.y[:, None])
+    is_near = (way <= bodies.radius + bodies.radius[:, None] + reach) & (overlaps(bodies) <= reach)
+    is_free = bodies.inverse_mass > 0.0
+    is_near &= np.triu(is_free | is_free[:, None], 1)
+    return [np.flatnonzero(row).tolist() for row in is_near]
+
+
+def found_neighbours(world: World) -> list[list[int]]:
+    fill_grid(world)
+    return [world.neighbours[: neighbours_of(world, i)].tolist() for i in range(world.bodies.size - 1)]
+
+
+HEAPS = [
+    pytest.param(alike, 0.4, {}, 0, id="alike"),
+    pytest.param(up_to(3.0), 0.3, {}, 0, id="one to three"),
+    pytest.param(up_to(50.0), 2.0, {}, 5, id="one to fifty"),
+    pytest.param(planks, 0.8, {}, 6, id="planks"),
+    pytest.param(alike, 0.5, HILL | WALLS, 4, id="slabs"),
+    pytest.param(up_to(10.0), 0.5, HILL, 3, id="slabs and sizes"),
+]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("sides", "area", "tables", "large"), HEAPS)
+def test_grid_finds_the_pairs_that_looking_at_all_of_them_finds(
+    seed: int, sides: Sides, area: float, tables: dict[str, Any], large: int
+) -> None:
+    world = heap(seed, sides, area, **tables)
+    expected = expected_neighbours(world)
+    assert found_neighbours(world) == expected
+    assert sum(map(len, expected)) > 20
+    is_large = world.bodies.radius[:-1] > world.controls[0].cell_radius
+    assert world.large.tolist() == np.flatnonzero(is_large).tolist()
+    assert large <= is_large.sum() <= COUNT // 8
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_bodies_in_one_bucket_are_reported_apart_and_listed_once(seed: int) -> None:
+    world = heap(seed, up_to(3.0), 0.3)
+    world = world._replace(heads=np.zeros(1, dtype=np.uint32))  # nine examines everything
+    assert found_neighbours(world) == expected_neighbours(world)
+
+
+@pytest.mark.parametrize("place", [(1e3, -1e3), (-3e6, 2e6), (2e8, -3e8)])
+def test_bodies_that_have_flown_far_still_find_one_another(place: tuple[float, float]) -> None:
+    world = heap(4, alike, 0.4)
+    gone = np.arange(0, COUNT, 2)
+    world.bodies.x[gone] += place[0]
+    world.bodies.y[gone] += place[1]
+    expected = expected_neighbours(world)
+    assert found_neighbours(world) == expected
+    assert sum(map(len, expected[::2])) > 5
+
+
+@given(place=st.floats(-1e6, 1e6), width=st.floats(1e-3, 1.0))
+def test_cells_are_numbered_from_left_to_right_through_zero(place: float, width: float) -> None:
+    cell = cell_of(place, width)
+    assert cell * width <= place + 1e-9 * abs(place)
+    assert place <= (cell + 1) * width + 1e-9 * abs(place)
+
+
+def test_cell_number_has_a_bound() -> None:
+    assert cell_of(1e9, 1e-3) == FARTHEST_CELL
+    assert cell_of(-1e9, 1e-3) == -FARTHEST_CELL
+
+
+@given(column=st.integers(-(10**9), 10**9), row=st.integers(-(10**9), 10**9), bits=st.integers(0, 24))
+def test_bucket_is_one_of_the_table(column: int, row: int, bits: int) -> None:
+    assert 0 <= bucket(column, row, 1 << bits) < 1 << bits
+
+
+def test_cells_of_a_large_scene_spread_over_the_buckets() -> None:
+    used = {bucket(column, row, 4096) for column in range(-16, 16) for row in range(64)}  # 2048 cells
+    assert len(used) > 1400  # as many as of random numbers: 4096 (1 - exp(-1/2)) = 1612
+
+
+@given(numbers=st.lists(st.integers(0, 20), max_size=20))
+def test_row_stays_sorted_and_without_repetition(numbers: list[int]) -> None:
+    row: Any = np.zeros(21, dtype=np.uint32)
+    count = 0
+    for number in numbers:
+        count = insert_sorted(row, count, number)
+    assert row[:count].tolist() == sorted(set(numbers))
+
+
+BODIES = 12
+CAPACITY = BODIES * (BODIES - 1) // 2
+
+
+@pytest.fixture(scope="module")
+def worlds() -> dict[str, World]:
+    """Return a world with room for all pairs, with contacts of either kind."""
+    bodies = [{"x": 0.1 * i, "y": 1.0} for i in range(BODIES)]
+    contact = {"particle_spacing": 0.008}
+    made = {
+        model: build_world(scenario_of(bodies, contact={"model": model, **contact})) for model in ("surface", "kernel")
+    }
+    return {
+        model: world._replace(**empty_lists(CAPACITY, world.candidates.shape[1], world.before))
+        for model, world in made.items()
+    }
+
+
+def drawn_pairs(random: np.random.Generator, share: float) -> list[tuple[int, int]]:
+    every = [(a, b) for a in range(BODIES) for b in range(a + 1, BODIES)]
+    return [pair for pair in every if random.random() < share]
+
+
+def fill_list(world: World, pairs: list[tuple[int, int]], random: np.random.Generator) -> None:
+    """List pairs with made-up contacts, operators, duplicates and axes; every other pair or so touches."""
+    for p, (a, b) in enumerate(pairs):
+        pair = world.pairs[p]
+        pair.a, pair.b = a, b
+        pair.active = random.integers(0, 3)
+        pair.duplicates = random.integers(0, 256) if pair.active else 0
+        pair.axis = random.integers(0, 4)
+        pair.normal_left, pair.shear_left, pair.sticking = random.integers(0, 17, 3)
+        pair.slides = random.integers(0, 3)
+        for contact in world.contacts[p, : pair.active]:
+            for name in contact.dtype.names:
+                contact[name] = random.integers(1, 10**6)
+        for direction in (NORMAL, SHEAR):
+            world.operators[p, direction].e_one = random.random()
+    world.clock[0].pair_count = len(pairs)
+
+
+def remembered(world: World, pairs: Records, count: int) -> dict[tuple[int, int], tuple[object, ...]]:
+    """Return what every pair that touches remembers."""
+    return {
+        (int(pair.a), int(pair.b)): (
+            int(pair.axis),
+            int(pair.duplicates),
+            (int(pair.normal_left), int(pair.shear_left), int(pair.sticking), int(pair.slides)),
+            world.contacts[p, : pair.active].tobytes(),
+            world.operators[p].tobytes(),
+        )
+        for p, pair in enumerate(pairs[:count])
+        if pair.active
+    }
+
+
+@pytest.mark.parametrize("model", ["surface", "kernel"])
+@given(seed=st.integers(0, 10**6), shares=st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)))
+def test_every_pair_keeps_its_own_history_wherever_it_moves_in_the_list(
+    worlds: dict[str, World], model: str, seed: int, shares: tuple[float, float]
+) -> None:
+    world, random = worlds[model], np.random.default_rng(seed)
+    old, new = drawn_pairs(random, shares[0]), drawn_pairs(random, shares[1])
+    fill_list(world, old, random)
+    before = remembered(world, world.pairs, len(old))
+    axes = {(int(pair.a), int(pair.b)): int(pair.axis) for pair in world.pairs[: len(old)]}
+    for spare, (a, b) in zip(world.spare_pairs, new, strict=False):
+        spare.a, spare.b = a, b
+        spare.near, spare.active, spare.duplicates, spare.axis = HALF, 0, 0, 0
+        spare.normal_left = spare.shear_left = spare.slides = 0
+    carry_history(world, len(new))
+    after = remembered(world, world.spare_pairs, len(new))
+    assert after == {pair: history for pair, history in before.items() if pair in set(new)}
+    assert world.spare_pairs.axis[: len(new)].tolist() == [axes.get(pair, 0) for pair in new]

@@ -1,0 +1,189 @@
+"""Velocity Verlet: exact where it must be, of second order elsewhere; what it keeps up to date and what it flags."""
+
+from __future__ import annotations
+
+from math import cos, sin, sqrt
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from blocksim.kernels.common.arrays import BODY, CONTROLS, zeros
+from blocksim.kernels.common.geometry import place_corners
+from blocksim.kernels.common.integrate import (
+    finish_step,
+    kinetic_energy,
+    place_all_corners,
+    renew_rotations,
+    start_all,
+    start_step,
+)
+
+if TYPE_CHECKING:
+    from blocksim.kernels.common.arrays import Record, Records, World
+    from tests.conftest import PaperBlock, Start
+
+STEP = 1e-3
+
+
+def bodies_of(**values: float) -> Records:
+    """Return one free body of 2 kg and 0.5 kg m2, and the ground."""
+    bodies = zeros(2, BODY)
+    bodies.cos = 1.0
+    body = bodies[0]
+    body.mass, body.inertia, body.inverse_mass, body.inverse_inertia, body.radius = 2.0, 0.5, 0.5, 2.0, 0.1
+    for name, value in values.items():
+        body[name] = value
+    return bodies
+
+
+def controls_with_gravity() -> Record:
+    controls = zeros(1, CONTROLS)[0]
+    controls.step, controls.gravity_x, controls.gravity_y = STEP, 0.3, -9.81
+    return controls
+
+
+def finish_all(bodies: Records, step: float) -> None:
+    """Finish the step of all bodies; nobody does it for the ground."""
+    for body in bodies[:-1]:
+        finish_step(body, controls_with_gravity(), step)
+
+
+def free_steps(bodies: Records, count: int) -> None:
+    finish_all(bodies, 0.0)
+    for _ in range(count):
+        start_all(bodies, 0, bodies.size, STEP)
+        finish_all(bodies, STEP)
+
+
+def test_gravity_and_free_spin_are_exact() -> None:
+    bodies = bodies_of(vx=1.0, vy=2.0, spin=3.0)
+    free_steps(bodies, 500)
+    body, t = bodies[0], 0.5
+    assert [body.x, body.y] == pytest.approx([1.0 * t + 0.15 * t * t, 2.0 * t - 4.905 * t * t], abs=1e-13)
+    assert [body.vx, body.vy, body.spin] == pytest.approx([1.0 + 0.3 * t, 2.0 - 9.81 * t, 3.0], abs=1e-13)
+    assert body.angle == pytest.approx(1.5, abs=1e-13)
+    assert [body.cos, body.sin] == pytest.approx([cos(1.5), sin(1.5)], abs=1e-12)
+
+
+def test_forces_and_torques_accelerate_by_the_inverse_masses_and_are_used_up() -> None:
+    bodies = bodies_of(fx=4.0, fy=6.0, torque=1.5)
+    finish_all(bodies, STEP)
+    body = bodies[0]
+    assert [body.ax, body.ay, body.spin_rate] == pytest.approx([0.3 + 2.0, -9.81 + 3.0, 3.0])
+    assert [body.vx, body.vy, body.spin] == pytest.approx([2.3 * STEP / 2, -6.81 * STEP / 2, 3.0 * STEP / 2])
+    assert (body.fx, body.fy, body.torque) == (0.0, 0.0, 0.0)
+
+
+def test_fixed_bodies_and_the_ground_stay_and_leave_their_forces_to_the_support() -> None:
+    bodies = bodies_of(inverse_mass=0.0, inverse_inertia=0.0)
+    bodies.fx = bodies.fy = bodies.torque = 1e6
+    free_steps(bodies, 3)
+    for name in ("x", "y", "angle", "vx", "vy", "spin", "ax", "ay", "spin_rate"):
+        assert not bodies[name].any()
+    for name in ("fx", "fy", "torque"):
+        assert (bodies[name] == 1e6).all()
+
+
+def random_bodies(seed: int) -> Records:
+    """Return five free bodies, a fixed one and the ground, with random states, totals and numbers of pairs."""
+    random = np.random.default_rng(seed)
+    bodies = zeros(7, BODY)
+    for name in ("x", "y", "angle", "vx", "vy", "spin", "ax", "ay", "spin_rate"):
+        bodies[name][:5] = random.normal(size=5)
+    for name in ("fx", "fy", "torque"):
+        bodies[name] = random.normal(size=7)
+    for name in ("half_x", "half_y", "inverse_mass", "inverse_inertia"):
+        bodies[name][:5] = random.uniform(0.5, 2.0, 5)
+    bodies.half_x[-1] = np.inf  # a half-plane
+    bodies.cos, bodies.sin = np.cos(bodies.angle), np.sin(bodies.angle)
+    bodies.pairs_now, bodies.pairs_before = random.integers(0, 3, (2, 7))
+    return bodies
+
+
+@pytest.mark.parametrize(("first", "last", "started"), [(0, 7, 6), (0, 6, 6), (2, 4, 2), (4, 4, 0), (6, 7, 0)])
+def test_step_starts_for_those_bodies_that_are_asked_for_and_never_for_the_ground(
+    first: int, last: int, started: int
+) -> None:
+    bodies, expected = random_bodies(1), random_bodies(1)
+    start_all(bodies, first, last, STEP)
+    for body in expected[first : first + started]:
+        start_step(body, STEP)
+    assert bodies.tobytes() == expected.tobytes()
+    assert (bodies.tobytes() == random_bodies(1).tobytes()) == (started == 0)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.1, -1.3, 2.7])
+def test_step_changes_no_bit_of_a_body_that_stays(angle: float) -> None:
+    """Other threads look at fixed bodies while the thread of their share starts the next step."""
+    bodies = bodies_of(inverse_mass=0.0, inverse_inertia=0.0, x=0.1, y=0.7, angle=angle, half_x=0.3, half_y=0.2)
+    renew_rotations(bodies)
+    before = bodies.tobytes()
+    for _ in range(100):
+        start_step(bodies[0], STEP)
+        finish_step(bodies[0], controls_with_gravity(), STEP)
+    assert bodies.tobytes() == before
+
+
+def test_change_of_the_number_of_pairs_is_flagged_for_free_bodies_only() -> None:
+    bodies: Any = zeros(4, BODY)
+    bodies.inverse_mass = (1.0, 1.0, 0.0, 0.0)
+    bodies.pairs_now, bodies.pairs_before = (2, 3, 2, 5), (2, 2, 0, 0)
+    finish_all(bodies, STEP)
+    assert bodies.pairs_changed.tolist() == [0, 1, 0, 0]
+    assert bodies.pairs_before[:2].tolist() == [2, 3]
+    assert not bodies.pairs_now[:2].any()
+    finish_all(bodies, STEP)
+    assert bodies.pairs_before[:2].tolist() == [0, 0]
+    assert bodies.pairs_changed.tolist() == [1, 1, 0, 0]
+
+
+def corner_ways(bodies: Records) -> np.ndarray:
+    """Return the ways from the centres to the upper and to the lower right corners."""
+    return np.array([[body.upper_x, body.upper_y, body.lower_x, body.lower_y] for body in bodies])
+
+
+def test_ways_to_the_corners_follow_every_turn() -> None:
+    for advance in (lambda bodies: start_all(bodies, 0, bodies.size, STEP), place_all_corners, renew_rotations):
+        bodies = random_bodies(1)
+        advance(bodies)
+        expected = bodies.copy()
+        for body in expected[:-1]:
+            place_corners(body)
+        assert corner_ways(bodies)[:5].all()
+        assert corner_ways(bodies).tobytes() == corner_ways(expected).tobytes()  # the ground has none
+
+
+def test_renewed_rotations_are_those_of_the_angles() -> None:
+    bodies = bodies_of(angle=100.0)
+    renew_rotations(bodies)
+    assert [bodies[0].cos, bodies[0].sin] == [cos(100.0), sin(100.0)]
+
+
+def test_kinetic_energy_is_that_of_translation_and_spin(start: Start, paper_block: PaperBlock) -> None:
+    scene = start([{"y": 1.0, "velocity": [3.0, 4.0], "spin": 7.0}, {"x": 1.0, "y": 1.0}])
+    expected = 0.5 * paper_block.mass * 25.0 + 0.5 * paper_block.inertia * 49.0
+    assert kinetic_energy(scene.world) == pytest.approx(expected, rel=1e-12)
+
+
+def oscillation_error(start: Start, block: PaperBlock, safety: float) -> float:
+    """Return the largest error, in static overlaps, of a block that oscillates undamped without lifting off."""
+    frequency = sqrt(2.0 * block.point_stiffness / block.mass)
+    sag = 9.81 / frequency**2
+
+    def press(world: World) -> None:
+        world.bodies[0].y = block.height / 2 - 1.5 * sag
+
+    scene = start([{"y": block.height / 2}], restitution=1.0, time={"safety": safety}, change=press)
+    worst = 0.0
+    while scene.time * frequency < 20.0:
+        scene.to_step(scene.steps + 1)
+        expected = block.height / 2 - sag - 0.5 * sag * np.cos(frequency * scene.time)
+        worst = max(worst, abs(float(scene.bodies[0].y) - expected) / sag)
+    return worst
+
+
+def test_oscillation_on_contact_springs_converges_with_second_order(start: Start, paper_block: PaperBlock) -> None:
+    errors = [oscillation_error(start, paper_block, safety) for safety in (0.1, 0.05, 0.025)]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders == pytest.approx([2.0, 2.0], abs=0.1)

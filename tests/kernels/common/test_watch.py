@@ -1,0 +1,68 @@
+"""Members of ensembles stop at the frames of a run, and no later than at the first in which a block has moved."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blocksim.kernels.common.arrays import BODY, Records, zeros
+from blocksim.kernels.common.frame_times import next_frame
+from blocksim.kernels.common.watch import Watched, frame_to_watch, step_of_next, watch
+from blocksim.simulation.recorder import POSITION
+
+THRESHOLD, REACH = 1e-3, 0.03  # m
+
+
+@given(st.integers(0, 10**9), st.floats(1.0, 1e6))
+def test_frames_are_those_that_a_recorder_keeps(done: int, period: float) -> None:
+    assert step_of_next(done, period) == next_frame(done, period)
+
+
+def watched(threshold: float = THRESHOLD) -> Watched:
+    """Watch the second of two members, of two blocks each, the second of them fixed."""
+    thresholds = np.array([[math.inf, math.inf], [threshold, math.inf]])
+    places = np.zeros((2, 3, 2))
+    periods, steps = np.array([0.0, 3.0]), np.zeros(2, dtype=np.int64)
+    return Watched(periods, steps, places, np.zeros((2, 3, 2)), np.full((2, 2), REACH), thresholds)
+
+
+def bodies(**state: float) -> Records:
+    """Return two blocks and the ground; both blocks are where `state` says."""
+    all_bodies = zeros(3, BODY)
+    for name, value in state.items():
+        all_bodies[name][:2] = value
+    return all_bodies
+
+
+@pytest.mark.parametrize(
+    ("state", "moved"),
+    [
+        ({"x": 0.999e-3}, False),
+        ({"x": -1.001e-3}, True),
+        ({"x": 0.6e-3, "y": -0.801e-3}, True),
+        ({"angle": -0.999 * THRESHOLD / REACH}, False),
+        ({"angle": -1.001 * THRESHOLD / REACH}, True),
+        ({"y": math.nan}, True),
+    ],
+)
+def test_first_frame_in_which_a_free_block_has_moved_is_kept(state: dict[str, float], moved: bool) -> None:
+    seen = watched()
+    watch(bodies(**state), seen, 1, 6)
+    assert seen.steps.tolist() == [0, 6 if moved else 0]
+    if moved:
+        assert np.array_equal(seen.places[1], [[state.get(name, 0.0)] * 2 for name in POSITION], equal_nan=True)
+
+
+def test_fixed_blocks_do_not_count() -> None:
+    seen = watched(threshold=math.inf)
+    watch(bodies(x=1.0), seen, 1, 6)
+    assert seen.steps.tolist() == [0, 0]
+
+
+def test_frames_are_examined_until_something_has_moved() -> None:
+    seen = watched()
+    assert [frame_to_watch(seen, m, 4) for m in (0, 1)] == [0, 6]
+    seen.steps[1] = 6
+    assert frame_to_watch(seen, 1, 7) == 0

@@ -1,0 +1,81 @@
+"""Hertz's law: what an impact of a sphere does, in closed form, and restitution that does not know the speed."""
+
+from __future__ import annotations
+
+from math import gamma, pi, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR, dashpot_weight, hertz_mindlin
+
+if TYPE_CHECKING:
+    from tests.conftest import PaperBlock, Simulation, Start
+
+K = 2e9  # N/m^1.5
+SOFT = {"law": "hertz-mindlin", "stiffness_scale": 1e-2, "max_overlap": 5e-3}
+
+
+@given(depth=st.floats(1e-9, 1e-3), times=st.floats(1.1, 30.0))
+def test_force_grows_with_the_power_three_halves(depth: float, times: float) -> None:
+    force = hertz_mindlin.elastic_force(K, depth)
+    assert hertz_mindlin.elastic_force(K, times * depth) == pytest.approx(times**1.5 * force)
+    assert hertz_mindlin.elastic_force(times * K, depth) == pytest.approx(times * force)
+
+
+def test_sphere_on_a_plane_has_the_textbook_approach() -> None:
+    """K. L. Johnson (1985), eq. 4.23: d = (9 F^2/(16 R E*^2))^(1/3)."""
+    modulus, radius, force = 38e9, 1e-3, 10.0
+    approach = (9.0 * force**2 / (16.0 * radius * modulus**2)) ** (1.0 / 3.0)
+    assert hertz_mindlin.elastic_force(4.0 / 3.0 * modulus * sqrt(radius), approach) == pytest.approx(force)
+
+
+@given(begin=st.floats(0.0, 5.0), length=st.floats(0.1, 3.0), at=st.floats(0.1, 6.0))
+@pytest.mark.parametrize(("law", "power"), [(LINEAR, 0.0), (HERTZ_MINDLIN, 0.25)])
+def test_dashpot_weight_is_the_integral_of_its_coefficient(
+    law: int, power: float, begin: float, length: float, at: float
+) -> None:
+    integral, _ = quad(lambda t: t**power, begin, begin + length)
+    assert dashpot_weight(law, begin, begin + length, at) == pytest.approx(integral / at**power, rel=1e-6)
+
+
+def dropped(start: Start, block: PaperBlock, speed: float, restitution: float) -> Simulation:
+    """Throw a block down flat, without gravity, from just above the ground."""
+    lying = {"y": block.height / 2 + 1e-9, "velocity": [0.0, -speed]}
+    return start([lying], restitution=restitution, gravity=0.0, ground_friction=0.0, contact=SOFT)
+
+
+@pytest.mark.parametrize("speed", [0.05, 1.0, 5.0])
+def test_elastic_impact_lasts_and_reaches_as_hertz_says(start: Start, paper_block: PaperBlock, speed: float) -> None:
+    scene = dropped(start, paper_block, speed, 1.0)
+    stiffness = 2.0 * float(scene.world.interactions[1, 0].normal_stiffness)
+    deepest = (1.25 * paper_block.mass * speed**2 / stiffness) ** 0.4
+    duration = 2.0 * sqrt(pi) * gamma(1.4) / gamma(0.9) * deepest / speed  # 2.943 d/v
+    depths = []
+    while scene.contacts or scene.bodies[0].vy < 0.0:
+        scene.to_step(scene.steps + 1)
+        depths.append(float(scene.measured()[-1]))
+    assert max(depths) == pytest.approx(deepest, rel=1e-3)
+    assert scene.time == pytest.approx(duration, abs=3.0 * scene.step)
+    assert scene.bodies[0].vy == pytest.approx(speed, rel=1e-3)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.2, 0.5, 0.8])
+def test_restitution_is_the_one_asked_at_any_speed(start: Start, paper_block: PaperBlock, e: float) -> None:
+    for speed in (0.02, 0.5, 5.0):
+        scene = dropped(start, paper_block, speed, e)
+        while scene.contacts or scene.bodies[0].vy < 0.0:
+            scene.to_step(scene.steps + 1)
+        assert scene.bodies[0].vy == pytest.approx(e * speed, abs=0.01 * speed)
+        assert scene.residual() < 1e-3
+
+
+def test_static_overlap_carries_the_weight(start: Start, paper_block: PaperBlock) -> None:
+    rest = start([{"y": paper_block.height / 2}], restitution=0.0, contact=SOFT).to_time(0.05)
+    stiffness = float(rest.world.interactions[1, 0].normal_stiffness)
+    expected = (paper_block.mass * 9.81 / (2.0 * stiffness)) ** (2.0 / 3.0)
+    assert rest.touching.depth == pytest.approx(np.full(2, expected), rel=0.01)

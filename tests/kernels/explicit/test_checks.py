@@ -1,0 +1,85 @@
+"""What a check of the run finds in a world as it is; nothing is stepped, so that an interpreter sees it too."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from blocksim.kernels.common.arrays import AT_REST, OVERLAP_LIMIT, REACHED
+from blocksim.kernels.common.integrate import renew_rotations
+from blocksim.kernels.explicit.broad_phase import rebuild_pairs
+from blocksim.kernels.explicit.contact import pair_forces
+from blocksim.kernels.explicit.energy import contact_summary
+from blocksim.kernels.explicit.step import check
+from blocksim.verification.scene import HEIGHT
+
+if TYPE_CHECKING:
+    from blocksim.kernels.common.arrays import World
+    from tests.kernels.conftest import Pose
+
+ON_GROUND = (0.0, 0.5 * HEIGHT - 1e-7, 0.0)
+RESTS = {"stop_at_rest": True, "rest_speed": 1e-3, "rest_hold": 1e-3}
+
+
+def at_rest(pose: Pose, pairs: int) -> World:
+    """Return a block that does not move and has so many pairs that touch."""
+    world = pose(ON_GROUND, time=RESTS)
+    world.bodies[0].pairs_before = pairs
+    assert world.controls[0].rest_checks > 2
+    return world
+
+
+def test_rest_counts_only_where_it_has_lasted(pose: Pose) -> None:
+    world = at_rest(pose, pairs=1)
+    most = int(world.controls[0].rest_checks)
+    assert [check(world, None) for _ in range(most - 1)] == [REACHED] * (most - 1)
+    world.bodies[0].vx = 1.0  # pushed once more
+    assert check(world, None) == REACHED
+    world.bodies[0].vx = 0.0
+    assert [check(world, None) for _ in range(most)] == [REACHED] * (most - 1) + [AT_REST]
+
+
+def test_block_that_touches_nothing_never_rests(pose: Pose) -> None:
+    world = at_rest(pose, pairs=0)
+    assert {check(world, None) for _ in range(2 * int(world.controls[0].rest_checks))} == {REACHED}
+
+
+def touching(pose: Pose, *, depth: float, spring: float = 0.0) -> World:
+    """Return two blocks with one contact that has this overlap and shear spring (m)."""
+    world = pose((0.0, 1.0, 0.0), (0.0, 1.0 + HEIGHT, 0.0))
+    world.pairs[0].active = 1
+    world.pairs[0].stiffness = world.interactions[1, 1].normal_stiffness
+    contact = world.contacts[0, 0]
+    contact.depth, contact.spring = depth, spring
+    return world
+
+
+@pytest.mark.parametrize("small", [0, 1])
+def test_smaller_block_of_a_pair_limits_the_overlap(pose: Pose, small: int) -> None:
+    overlaps = {0.02: False, 0.03: True, 0.07: True}  # of a height; twentieths of the smallest side: 0.025
+    for share, is_too_deep in overlaps.items():
+        world = pose((0.0, 1.0, 0.0), (0.0, 1.0 + (0.75 - share) * HEIGHT, 0.0))
+        body = world.bodies[small]
+        body.half_x = body.half_y = 0.25 * HEIGHT
+        renew_rotations(world.bodies)
+        assert rebuild_pairs(world)
+        pair_forces(world, 0, 0.0)
+        assert world.pairs[0].active == 2
+        assert world.action[0].is_too_deep == is_too_deep
+
+
+def test_overlap_that_a_step_has_noted_ends_the_run_at_the_check(pose: Pose) -> None:
+    world = touching(pose, depth=0.04 * HEIGHT)
+    assert check(world, None) == REACHED
+    world.clock[0].ends_at = 1
+    assert check(world, None) == OVERLAP_LIMIT
+
+
+def test_springs_hold_half_of_force_times_way(pose: Pose) -> None:
+    world = touching(pose, depth=2e-6, spring=-3e-6)
+    pair = world.interactions[world.bodies[0].contact_class, world.bodies[1].contact_class]
+    normal, shear, count, deepest = contact_summary(world)
+    assert (count, deepest) == (1, 2e-6)
+    assert normal == pytest.approx(0.5 * pair.normal_stiffness * 2e-6**2, rel=1e-12)
+    assert shear == pytest.approx(0.5 * pair.shear_ratio * pair.normal_stiffness * 3e-6**2, rel=1e-12)

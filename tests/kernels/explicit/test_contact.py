@@ -1,0 +1,274 @@
+"""Springs with history, clipping, dashpots of a pair and what is booked, seen on one block or one pair."""
+
+from __future__ import annotations
+
+from math import cos, sin
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blocksim.kernels.common.arrays import NORMAL, SHEAR
+from blocksim.kernels.explicit.contact import (
+    damp,
+    draw_springs,
+    has_new_neighbours,
+    pair_forces,
+    shared_step,
+    spare_lost_faces,
+)
+from blocksim.kernels.explicit.damping import BOTH, OPERATOR_LIFE
+from blocksim.kernels.explicit.inertia import Piece
+from blocksim.kernels.explicit.kinematics import mutual_mass, resolve_point
+from blocksim.kernels.explicit.models import KERNEL, PARTICLES, SURFACE
+from tests.kernels.conftest import dashpots_by_definition
+
+if TYPE_CHECKING:
+    from blocksim.kernels.common.arrays import World
+    from tests.conftest import PaperBlock, Start
+    from tests.kernels.conftest import MakeBody, Pose
+
+SLOPE = 0.2
+SOFT = {"stiffness_scale": 1e-4}  # a hundredth of the steps
+
+
+@pytest.mark.parametrize(("of_a", "of_b", "times"), [(0, 0, 1.0), (2, 1, 1.0), (3, 2, 1.5), (1, 6, 3.0)])
+def test_own_force_counts_more_where_more_than_two_pairs_act_on_a_body(
+    make_body: MakeBody, of_a: int, of_b: int, times: float
+) -> None:
+    a, b = make_body(), make_body()
+    a.pairs_before, b.pairs_before = of_a, of_b
+    assert shared_step(a, b, 1e-6) == pytest.approx(times * 1e-6)
+
+
+def test_pairs_of_a_fixed_body_do_not_count(make_body: MakeBody) -> None:
+    a, ground = make_body(), make_body()
+    ground.inverse_mass, ground.pairs_before, a.pairs_before = 0.0, 100, 1
+    assert shared_step(a, ground, 1e-6) == shared_step(ground, a, 1e-6) == 1e-6
+
+
+def test_pairs_in_contact_are_counted_for_every_body(start: Start, paper_block: PaperBlock) -> None:
+    height = paper_block.height
+    brick = {"x": 0.5 * 0.033, "y": 1.5 * height}
+    wall = start([{"y": 0.5 * height}, {"x": 0.033, "y": 0.5 * height}, brick], contact=SOFT).to_time(1e-2)
+    assert wall.bodies.pairs_before.tolist() == [2, 2, 2]
+
+
+@pytest.mark.parametrize(
+    ("model", "flag", "other"),
+    [
+        (SURFACE, "sums_changed", "pairs_changed"),
+        (PARTICLES, "pairs_changed", "sums_changed"),
+        (KERNEL, "pairs_changed", "sums_changed"),
+    ],
+)
+def test_dashpots_are_void_where_others_bear_a_body_now_and_corners_know_how_stiffly(
+    make_body: MakeBody, model: int, flag: str, other: str
+) -> None:
+    a, b = make_body(), make_body()
+    for of_a, of_b in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        a[flag], b[flag] = of_a, of_b
+        a[other], b[other] = 1 - of_a, 1 - of_b
+        assert has_new_neighbours(a, b, model) == bool(of_a or of_b)
+
+
+def test_sticking_block_pulls_its_shear_springs_against_the_slope(start: Start, paper_block: PaperBlock) -> None:
+    rest = start([{"y": paper_block.height / 2}], tilt=-SLOPE, contact=SOFT).to_time(0.05)
+    touching = rest.touching
+    assert touching.slot.tolist() == [0, 1]
+    weight = paper_block.mass * 9.81
+    assert touching.normal_force.sum() == pytest.approx(weight * cos(SLOPE), rel=1e-3)
+    assert abs(touching.shear_force.sum()) == pytest.approx(weight * sin(SLOPE), rel=1e-3)
+    assert touching.normal_force[1] > touching.normal_force[0]  # it leans downhill, towards +x
+    lever = weight * sin(SLOPE) * paper_block.height / 2
+    assert np.diff(touching.normal_force)[0] * paper_block.width / 2 == pytest.approx(lever, rel=1e-3)
+
+
+def test_sliding_block_has_its_springs_at_the_cone(start: Start, paper_block: PaperBlock) -> None:
+    slide = start([{"y": paper_block.height / 2, "velocity": [-0.5, 0.0]}], contact=SOFT).to_time(0.02)
+    world, touching = slide.world, slide.touching
+    stiffness = float(world.interactions[1, 0].normal_stiffness * world.interactions[1, 0].shear_ratio)
+    assert touching.size == 2
+    assert abs(touching.shear_force) == pytest.approx(0.38 * touching.normal_force, rel=1e-12)
+    assert stiffness * touching.spring == pytest.approx(touching.shear_force, rel=1e-12)
+    assert world.ledger[0].friction == pytest.approx(
+        0.38 * paper_block.mass * 9.81 * abs(float(slide.bodies[0].x)), rel=1e-2
+    )
+
+
+def test_kinetic_friction_slows_a_sliding_block_and_static_friction_holds_it(
+    start: Start, paper_block: PaperBlock
+) -> None:
+    def give_kinetic_friction(world: object) -> None:
+        world.interactions.kinetic_friction[...] = 0.19  # type: ignore[attr-defined]
+
+    sliding = {"y": paper_block.height / 2, "velocity": [0.5, 0.0]}
+    slide = start([sliding], contact=SOFT, change=give_kinetic_friction).to_time(0.1)
+    assert slide.bodies[0].vx == pytest.approx(0.5 - 0.19 * 9.81 * slide.time, rel=1e-3)
+    lying = {"y": paper_block.height / 2}
+    rest = start([lying], tilt=-0.35, restitution=0.0, contact=SOFT, change=give_kinetic_friction).to_time(0.1)
+    assert abs(rest.bodies[0].vx) < 1e-6  # tan 0.35 = 0.365: between kinetic and static
+
+
+def test_contact_never_pulls_while_it_ends(start: Start, paper_block: PaperBlock) -> None:
+    impact = start([{"y": paper_block.height / 2 + 1e-7, "velocity": [0.0, -1.0]}], restitution=0.1, gravity=0.0)
+    forces = [impact.to_step(step).touching.normal_force.copy() for step in range(1, 300)]
+    assert min(force.min(initial=0.0) for force in forces) == 0.0
+    assert any(force.size and force.max() == 0.0 for force in forces)  # in contact, and clipped
+    assert max(force.max(initial=0.0) for force in forces) > 1e3
+    assert impact.contacts == 0
+    speed_change = np.sum(np.concatenate(forces)) * impact.step / paper_block.mass
+    assert speed_change == pytest.approx(float(impact.bodies[0].vy) + 1.0, rel=1e-9)
+
+
+STEP, K = 2e-7, 1e8
+
+
+def two_points(pose: Pose, seed: int, direction: int) -> World:
+    """Return a pair of moving blocks with two random points, resolved along normals or tangents."""
+    world, random = pose((0.1, 0.2, 0.3), (0.12, 0.18, -0.5)), np.random.default_rng(seed)
+    pair = world.pairs[0]
+    a, b = world.bodies[:2]
+    assert (pair.a, pair.b) == (0, 1)
+    for body in (a, b):
+        for name in ("vx", "vy", "spin", "ax", "ay", "spin_rate"):
+            body[name] = random.normal()
+    for point in world.points[:2]:
+        angle = random.uniform(-np.pi, np.pi)
+        point.x, point.y = 0.11 + 0.01 * random.normal(), 0.19 + 0.01 * random.normal()
+        point.nx, point.ny = np.cos(angle), np.sin(angle)
+        resolve_point(point, a, b, STEP)
+        point.rate = point.closing_rate if direction == NORMAL else point.slip_rate
+        point.stiffness, point.before, point.force = K, *random.uniform(0.0, 100.0, 2)
+    return world
+
+
+def lives(world: World) -> list[int]:
+    """Return for how many steps the dashpots of the first pair hold, along the normals and the tangents."""
+    return [int(world.pairs[0].normal_left), int(world.pairs[0].shear_left)]
+
+
+@pytest.mark.parametrize("direction", [NORMAL, SHEAR])
+@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.7, 0.7), (0.6, 1.2), (0.0, 1.0)])
+@pytest.mark.parametrize(("count", "pattern"), [(1, 1), (2, BOTH), (2, 1), (2, 2)])
+@given(seed=st.integers(0, 10_000))
+def test_dashpots_of_a_pair_follow_the_definition(
+    pose: Pose, direction: int, weights: tuple[float, float], count: int, pattern: int, seed: int
+) -> None:
+    world = two_points(pose, seed, direction)
+    a, b = world.bodies[:2]
+    points: Any = world.points[:count]
+    points.weight = weights[:count]
+    if count == 2 and pattern != BOTH:
+        points.stiffness[2 - pattern] = 0.0  # it slides
+    of_a, of_b = (Piece(body.inverse_mass, body.inverse_inertia, 0.0) for body in (a, b))
+    masses = np.array([[mutual_mass(one, two, of_a, of_b, direction) for two in points] for one in points])
+    expected = points.force + dashpots_by_definition(points, masses, 0.7, STEP)
+    damp(world, 0, count, direction, pattern, 0.7, STEP)
+    assert points.force == pytest.approx(expected, rel=1e-7, abs=1e-9 * np.abs(expected).max())
+    assert lives(world)[direction] == (OPERATOR_LIFE if weights[0] == weights[count - 1] == 1.0 else 0)
+    assert lives(world)[1 - direction] == 0
+    assert direction == NORMAL or world.pairs[0].sticking == pattern
+    assert world.operators[0, 1 - direction].tobytes() == bytes(world.operators.itemsize)
+
+
+def test_operator_is_kept_for_lasting_contacts_and_then_made_anew(pose: Pose) -> None:
+    world = two_points(pose, 1, NORMAL)
+    operator = world.operators[0, NORMAL]
+    damp(world, 0, 2, NORMAL, BOTH, 0.7, STEP)
+    first = float(operator.e_one)
+    world.points.stiffness = 4.0 * K
+    for left in range(OPERATOR_LIFE - 1, -1, -1):
+        damp(world, 0, 2, NORMAL, BOTH, 0.7, STEP)
+        assert (lives(world)[NORMAL], operator.e_one) == (left, first)
+    damp(world, 0, 2, NORMAL, BOTH, 0.7, STEP)
+    assert lives(world)[NORMAL] == OPERATOR_LIFE
+    assert operator.e_one > 1.1 * first
+
+
+def test_operator_of_a_step_without_length_is_not_kept(pose: Pose) -> None:
+    world = two_points(pose, 1, NORMAL)
+    damp(world, 0, 2, NORMAL, BOTH, 0.7, 0.0)
+    assert lives(world)[NORMAL] == 0
+    assert world.operators[0, NORMAL].e_one > 0.0
+
+
+def test_point_that_slides_has_no_dashpot_and_the_other_one_keeps_its_own(pose: Pose) -> None:
+    world = two_points(pose, 1, SHEAR)
+    values, action = world.interactions[1, 1], world.action[0]
+    one, two = world.points[:2]
+    one.force, two.force = 100.0, 0.0
+    one.slipping, two.slipping = 1e-9, 1e-9
+    stiffness = float(values.shear_ratio) * K
+    assert draw_springs(world, 0, 2, values, K, action) == 1
+    assert (one.stiffness, two.stiffness) == (pytest.approx(stiffness), 0.0)
+    assert (one.force, two.force) == (pytest.approx(stiffness * 1e-9), 0.0)
+    assert world.contacts[0].spring.tolist() == [1e-9, 0.0]
+    assert world.contacts[0].normal_force.tolist() == [100.0, 0.0]
+
+
+@pytest.mark.parametrize(("beside", "lost"), [(np.inf, False), (1.1e-6, False), (0.9e-6, True)])
+@pytest.mark.parametrize("closing", [1e-7, -1e-7])
+def test_corner_about_to_lose_its_face_has_no_dashpot_on_it(
+    pose: Pose, beside: float, lost: bool, closing: float
+) -> None:
+    world = two_points(pose, 1, NORMAL)
+    point = world.points[0]
+    world.pairs["normal_left"] = world.pairs["shear_left"] = 5
+    point.closing, point.beside = closing, beside
+    world.points.beside[1] = np.inf
+    spare_lost_faces(world, 0, 2)
+    assert world.points.weight[:2].tolist() == [0.0 if lost else 1.0, 1.0]
+    assert lives(world) == ([0, 0] if lost else [5, 5])
+
+
+def standing(pose: Pose) -> World:
+    """Return a block that stands on another one, 1 um deep, and slides; nothing has been evaluated."""
+    world = pose((0.003, 1.025 - 1e-6, 0.0), (0.0, 1.0, 0.0))
+    world.bodies[0].vx = 20.0
+    return world
+
+
+def test_pair_writes_what_it_does_and_adds_to_no_body_and_to_no_book(pose: Pose) -> None:
+    world = standing(pose)
+    bodies, ledger, action = world.bodies.tobytes(), world.ledger.tobytes(), world.action[0]
+    pair_forces(world, 0, STEP)
+    assert (world.bodies.tobytes(), world.ledger.tobytes()) == (bodies, ledger)
+    a, contacts = world.bodies[0], world.contacts[0]
+    pushes, pulls = float(contacts.normal_force.sum()), float(contacts.shear_force.sum())
+    assert (action.touches, action.is_changed) == (1, 1)
+    # besides, what the interval below the block lacks pushes along the face
+    stored = 0.5 * float(world.interactions[1, 1].normal_stiffness) * float((contacts.depth**2).sum())
+    assert (action.fy, action.fx) == pytest.approx((pushes, pulls + stored / 0.032))
+    assert action.fx < 0.0 < action.fy
+    assert action.friction > 0.0
+    # both torques are of the same forces, about centres that are apart
+    shift_x, shift_y = float(a.x - world.bodies[1].x), float(a.y - world.bodies[1].y)
+    assert action.torque_b - action.torque_a == pytest.approx(shift_x * action.fy - shift_y * action.fx)
+
+
+def test_nothing_is_left_of_what_another_pair_has_done(pose: Pose) -> None:
+    once, after = standing(pose), standing(pose)
+    for name in ("fx", "fy", "torque_a", "torque_b", "dashpot", "friction", "broken"):
+        after.action[name] = 7.0
+    for world in (once, after):
+        pair_forces(world, 0, STEP)
+    assert after.action.tobytes() == once.action.tobytes()
+
+
+def test_pair_whose_contacts_have_ended_does_nothing_but_lose_what_they_held(pose: Pose) -> None:
+    world = standing(pose)
+    pair_forces(world, 0, STEP)
+    world.contacts["spring"][0] = 1e-6
+    world.bodies[0].vx = 0.0
+    world.bodies[0].y += 1e-3
+    pair_forces(world, 0, STEP)
+    action = world.action[0]
+    assert (action.touches, action.is_changed) == (0, 1)
+    assert (action.fx, action.fy, action.torque_a, action.torque_b) == (0.0, 0.0, 0.0, 0.0)
+    assert action.broken > 0.0
+    assert world.pairs[0].active == 0
+    pair_forces(world, 0, STEP)
+    assert (action.dashpot, action.friction, action.broken) == (0.0, 0.0, 0.0)

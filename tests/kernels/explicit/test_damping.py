@@ -1,0 +1,203 @@
+"""Dashpots of one or two points: the same damping ratio for every mode, passive, as defined."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blocksim.kernels.common.arrays import NORMAL, OPERATOR, PAIR, POINT, SHEAR, zeros
+from blocksim.kernels.explicit.damping import (
+    BOTH,
+    are_dashpots_due,
+    damp_one,
+    damp_two,
+    fill_alike,
+    fill_different,
+    fill_single,
+    keep_dashpots,
+    keep_masses,
+    renew_dashpots,
+)
+from blocksim.verification.scene import HEIGHT, WIDTH
+from tests.kernels.conftest import dashpots_by_definition
+
+if TYPE_CHECKING:
+    from blocksim.kernels.common.arrays import Record, Records
+    from tests.conftest import Start
+
+STEP = 2e-7
+K = 1e9
+SEEDS = st.integers(0, 10_000)
+
+
+def inverse_masses(n: int, seed: int, *, parallel: bool = False) -> np.ndarray:
+    """Return what n points of a pair see (1/kg): of rank three at most, of rank one for tangents on one face."""
+    random = np.random.default_rng(seed)
+    jacobian = random.uniform(-1.0, 1.0, (n, 3)) + np.array([2.0, 0.0, 0.0])
+    if parallel:
+        jacobian[1:] = jacobian[0]
+    return np.asarray(10.0 * jacobian @ jacobian.T)
+
+
+def contact_points(n: int, seed: int, *, stiffness: tuple[float, ...] = (), weight: float = 1.0) -> Records:
+    random = np.random.default_rng(seed)
+    points = zeros(n, POINT)
+    points.weight = weight
+    points.stiffness = stiffness or K
+    points.rate = random.normal(size=n)
+    points.before = random.uniform(0.0, 100.0, n)
+    points.force = random.uniform(0.0, 100.0, n)
+    return points
+
+
+def operator_of(points: Records, masses: np.ndarray, ratio: float, pattern: int, step: float = STEP) -> Record:
+    """Return the operator of one or two points as the kernels make it."""
+    operator, half = zeros(1, OPERATOR)[0], 0.5 * step
+    one, two = points[0], points[-1]
+    a, b, d = masses[0, 0], masses[0, -1], masses[-1, -1]
+    keep_masses(operator, half, a, b, d)
+    if pattern != BOTH:
+        i = pattern - 1
+        fill_single(operator, i, ratio, half, masses[i, i], points[i].stiffness, points[i].weight)
+    elif one.weight == two.weight and one.stiffness == two.stiffness:
+        fill_alike(operator, one.weight * 2.0 * ratio * one.stiffness**0.5, half, a, b, d)
+    else:
+        fill_different(operator, ratio, half, a, b, d, one, two)
+    return operator
+
+
+def damped(points: Records, operator: Record) -> np.ndarray:
+    """Return spring and dashpot forces of all points."""
+    one, two = points[0], points[-1]
+    if points.size == 1:
+        return np.array([damp_one(operator, one.force, one.before, one.rate)])
+    return np.array(damp_two(operator, one.force, two.force, one.before, two.before, one.rate, two.rate))
+
+
+def damping_matrix(points: Records, masses: np.ndarray, ratio: float) -> np.ndarray:
+    """Return C, which is what a step of no length leaves of the dashpots: the force for each rate alone."""
+    n, columns = len(masses), []
+    points.before = points.force = 0.0
+    operator = operator_of(points, masses, ratio, (1 << n) - 1, 0.0)
+    for unit in np.eye(n):
+        points.rate = unit
+        columns.append(damped(points, operator))
+    return np.array(columns).T
+
+
+def added(points: Records, masses: np.ndarray, ratio: float, pattern: int) -> np.ndarray:
+    return np.asarray(damped(points, operator_of(points, masses, ratio, pattern)) - points.force)
+
+
+@pytest.mark.parametrize("ratio", [0.05, 0.3, 0.9])
+@pytest.mark.parametrize("stiffness", [(K,), (K, K), (K, 0.2 * K)])
+@given(seed=SEEDS)
+def test_every_mode_of_a_pair_has_the_asked_damping_ratio(
+    stiffness: tuple[float, ...], ratio: float, seed: int
+) -> None:
+    n = len(stiffness)
+    masses = inverse_masses(n, seed) + 5.0 * np.eye(n)
+    damping = damping_matrix(contact_points(n, seed, stiffness=stiffness), masses, ratio)
+    motion = np.block([[np.zeros((n, n)), np.eye(n)], [-masses * stiffness, -masses @ damping]])  # x, x'
+    modes = np.linalg.eigvals(motion)
+    assert -modes.real / np.abs(modes) == pytest.approx(np.full(2 * n, ratio), rel=1e-6)
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize("alike", [False, True])
+@given(seed=SEEDS)
+def test_dashpots_never_feed_energy(parallel: bool, alike: bool, seed: int) -> None:
+    points = contact_points(2, seed)
+    points.weight = np.random.default_rng(seed).uniform(0.5, 1.5, 1 if alike else 2)
+    damping = damping_matrix(points, inverse_masses(2, seed, parallel=parallel), 0.7)
+    assert damping == pytest.approx(damping.T, rel=1e-9, abs=1e-9 * np.abs(damping).max())
+    assert np.linalg.eigvalsh(damping).min() > -1e-9 * np.abs(damping).max()
+
+
+@pytest.mark.parametrize("weight", [0.6, 1.0, 1.4])
+@pytest.mark.parametrize("ratio", [0.1, 1.0, 5.0])
+@given(seed=SEEDS)
+def test_one_point_gets_the_dashpot_of_its_own_mass(ratio: float, weight: float, seed: int) -> None:
+    masses = inverse_masses(1, seed)
+    points = contact_points(1, seed, weight=weight)
+    expected = dashpots_by_definition(points, masses, ratio, STEP)
+    assert added(points, masses, ratio, 1) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize(
+    ("stiffness", "weights"),
+    [((K, K), (1.0, 1.0)), ((K, K), (0.7, 0.7)), ((K, K), (0.6, 1.3)), ((K, 0.1 * K), (1.0, 0.7))],
+)
+@given(seed=SEEDS, ratio=st.sampled_from([0.1, 1.0, 5.0]))
+def test_two_points_follow_the_definition(
+    parallel: bool, stiffness: tuple[float, ...], weights: tuple[float, ...], ratio: float, seed: int
+) -> None:
+    masses = inverse_masses(2, seed, parallel=parallel) + (0.0 if parallel else 2.0) * np.eye(2)
+    points = contact_points(2, seed, stiffness=stiffness)
+    points.weight = weights
+    expected = dashpots_by_definition(points, masses, ratio, STEP)
+    size = np.abs(expected).max()
+    assert added(points, masses, ratio, BOTH) == pytest.approx(expected, rel=1e-7, abs=1e-9 * size)
+
+
+@pytest.mark.parametrize("sticking", [1, 2])
+@given(seed=SEEDS)
+def test_sliding_point_beside_a_sticking_one_has_no_dashpot(sticking: int, seed: int) -> None:
+    masses = inverse_masses(2, seed) + 2.0 * np.eye(2)
+    points = contact_points(2, seed)
+    points.stiffness[2 - sticking] = 0.0
+    expected = dashpots_by_definition(points, masses, 0.7, STEP)
+    forces = added(points, masses, 0.7, sticking)
+    assert forces[2 - sticking] == 0.0
+    assert forces == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("half", [0.5 * STEP, 0.0])
+def test_operator_keeps_half_a_step_times_its_masses(half: float) -> None:
+    operator = zeros(1, OPERATOR)[0]
+    keep_masses(operator, half, 3.0, 1.0, 2.0)
+    assert [operator.h_one, operator.h_mixed, operator.h_two] == [3.0 * half, half, 2.0 * half]
+
+
+@pytest.mark.parametrize("direction", [NORMAL, SHEAR])
+def test_operator_of_one_direction_is_due_after_as_many_uses_as_it_was_kept_for(direction: int) -> None:
+    pair = zeros(1, PAIR)[0]
+    keep_dashpots(pair, NORMAL, BOTH, 9)
+    keep_dashpots(pair, SHEAR, 2, 9)
+    keep_dashpots(pair, direction, 1, 3)
+    assert [are_dashpots_due(pair, direction) for _ in range(5)] == [False] * 3 + [True] * 2
+    assert (pair.normal_left, pair.shear_left) == ((0, 9) if direction == NORMAL else (9, 0))
+    assert pair.sticking == (2 if direction == NORMAL else 1)  # normals have their dashpots always
+
+
+def test_renewed_dashpots_are_due_in_both_directions() -> None:
+    pair = zeros(1, PAIR)[0]
+    for direction in (NORMAL, SHEAR):
+        keep_dashpots(pair, direction, BOTH, 9)
+    renew_dashpots(pair)
+    assert are_dashpots_due(pair, NORMAL)
+    assert are_dashpots_due(pair, SHEAR)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("friction", [0.1, 0.5])
+@pytest.mark.parametrize("restitution", [0.2, 0.5, 0.8])
+def test_corner_that_slides_rebounds_as_asked(start: Start, restitution: float, friction: float, way: float) -> None:
+    """With the mass of a corner without friction it left at 0.45 to 0.57 of its speed where 0.5 was asked."""
+    turned, speed = pi / 6.0, 1.0
+    x = 0.5 * (HEIGHT * sin(turned) - WIDTH * cos(turned))
+    y = -0.5 * (WIDTH * sin(turned) + HEIGHT * cos(turned))
+    falling = {"y": 1e-7 - y, "angle": turned, "velocity": [3.0 * way, -speed]}
+    scene = start([falling], restitution=restitution, ground_friction=friction, gravity=0.0)
+    scene.to_step(20)
+    while scene.contacts > 0:
+        scene.to_step(scene.steps + 5)
+    block = scene.bodies[0]
+    assert way * (block.vx - block.spin * y) > 0.0  # it has slid all the time
+    assert block.vy + block.spin * x == pytest.approx(restitution * speed, abs=2e-3)

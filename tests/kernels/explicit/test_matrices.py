@@ -1,0 +1,103 @@
+"""Small matrix functions against numpy's eigenvalues and solver."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blocksim.kernels.explicit.matrices import (
+    RANK_TOLERANCE,
+    cholesky,
+    inverse_root,
+    inverse_root_2,
+    inverse_three_halves,
+    multiply,
+    multiply_transposed,
+    solve_in_place,
+)
+
+SEEDS = st.integers(0, 10_000)
+
+
+def positive(n: int, rank: int, seed: int) -> np.ndarray:
+    """Return a random symmetric positive n x n matrix with eigenvalues from 1 to 100, `rank` of them not zero."""
+    random = np.random.default_rng(seed)
+    basis, _ = np.linalg.qr(random.normal(size=(n, n)))
+    values = np.where(np.arange(n) < rank, random.uniform(1.0, 100.0, n), 0.0)
+    matrix = (basis * values) @ basis.T
+    return np.asarray(0.5 * (matrix + matrix.T))
+
+
+def power(matrix: np.ndarray, exponent: float) -> np.ndarray:
+    """Return a power of a symmetric matrix over its range."""
+    values, vectors = np.linalg.eigh(matrix)
+    kept = values > RANK_TOLERANCE * values.max()
+    return np.asarray((vectors[:, kept] * values[kept] ** exponent) @ vectors[:, kept].T)
+
+
+def by_jacobi(matrix: np.ndarray) -> np.ndarray:
+    out = np.zeros((3, 3))
+    inverse_three_halves(matrix.copy(), np.zeros((3, 3)), out)
+    return out
+
+
+def by_closed_form(matrix: np.ndarray) -> np.ndarray:
+    one, mixed, two = inverse_root_2(matrix[0, 0], matrix[0, 1], matrix[1, 1])
+    return np.array([[one, mixed], [mixed, two]])
+
+
+@given(seed=SEEDS, rank=st.integers(1, 3))
+def test_power_of_three_agrees_with_eigenvalues(seed: int, rank: int) -> None:
+    matrix = positive(3, rank, seed)
+    assert by_jacobi(matrix) == pytest.approx(power(matrix, -1.5), abs=1e-12)
+
+
+@given(seed=SEEDS)
+def test_lower_triangle_times_its_transpose_is_the_matrix(seed: int) -> None:
+    matrix, lower = positive(3, 3, seed), np.zeros((3, 3))
+    cholesky(matrix, lower)
+    assert lower @ lower.T == pytest.approx(matrix, rel=1e-12)
+    assert not np.triu(lower, 1).any()
+
+
+@given(seed=SEEDS)
+def test_products_agree_with_numpy(seed: int) -> None:
+    left, right = np.random.default_rng(seed).normal(size=(2, 3, 3))
+    out = np.zeros((3, 3))
+    multiply(left, right, out)
+    assert out == pytest.approx(left @ right, abs=1e-14)
+    multiply_transposed(left, right, out)
+    assert out == pytest.approx(left.T @ right, abs=1e-14)
+
+
+@given(seed=SEEDS, rank=st.integers(1, 2))
+def test_closed_form_of_two_agrees_with_eigenvalues(seed: int, rank: int) -> None:
+    matrix = positive(2, rank, seed)
+    assert by_closed_form(matrix) == pytest.approx(power(matrix, -0.5), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "matrix", [np.diag([4.0, 4.0]), np.diag([4.0, 0.0]), np.diag([0.0, 9.0]), np.full((2, 2), 3.0)]
+)
+def test_special_matrices_of_two_agree_with_eigenvalues(matrix: np.ndarray) -> None:
+    assert by_closed_form(matrix) == pytest.approx(power(matrix, -0.5), abs=1e-14)
+
+
+def test_zero_matrix_has_the_root_zero_not_infinity() -> None:
+    assert not by_closed_form(np.zeros((2, 2))).any()
+    assert not by_jacobi(np.zeros((3, 3))).any()
+
+
+def test_eigenvalues_below_the_rank_tolerance_count_as_zero() -> None:
+    assert inverse_root(0.9 * RANK_TOLERANCE, 1.0) == 0.0
+    assert inverse_root(1.1 * RANK_TOLERANCE, 1.0) == pytest.approx((1.1 * RANK_TOLERANCE) ** -0.5)
+
+
+@pytest.mark.parametrize("n", range(1, 9))
+@given(seed=SEEDS)
+def test_solve_agrees_with_numpy_for_identity_plus_product_of_positive_matrices(n: int, seed: int) -> None:
+    matrix = np.eye(n) + positive(n, max(1, n - 1), seed) @ positive(n, n, seed + 1)
+    right = np.random.default_rng(seed).normal(size=n)
+    solution = right.copy()
+    solve_in_place(matrix.copy(), solution, n)
+    assert solution == pytest.approx(np.linalg.solve(matrix, right), rel=1e-8, abs=1e-10)

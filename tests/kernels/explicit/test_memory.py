@@ -1,0 +1,53 @@
+"""What follows from the record of a contact: stiffness in the step before, and forces that were not of springs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from blocksim.kernels.common.arrays import CONTACT, INTERACTION, PARTICLE, PARTICLE_CONTACT, zeros
+from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR
+from blocksim.kernels.explicit.memory import normal_loss, shear_loss, shear_stiffness_before, stiffness_before
+
+if TYPE_CHECKING:
+    from blocksim.kernels.common.arrays import Record
+
+DEPTH, SHARE = 4e-6, 0.25
+
+
+def values() -> Record:
+    record = zeros(1, INTERACTION)[0]
+    record.normal_stiffness, record.shear_ratio = 1e6, 0.8
+    return record
+
+
+def corner() -> Record:
+    contact = zeros(1, CONTACT)[0]
+    contact.spring, contact.depth, contact.normal_force, contact.shear_force = 1e-6, DEPTH, 7.0, 1.0
+    return contact
+
+
+def particle() -> Record:
+    contact = zeros(1, PARTICLE_CONTACT)[0]
+    for name in ("spring", "depth", "normal_force", "shear_force"):
+        contact[name] = corner()[name]
+    contact.share = SHARE
+    return contact
+
+
+@pytest.mark.parametrize(("law", "stiffness", "force"), [(LINEAR, 8e5, 4.0), (HERTZ_MINDLIN, 2.4e3, 8e-3)])
+def test_losses_are_what_springs_did_not_hold(law: int, stiffness: float, force: float) -> None:
+    for contact, particles, share in ((corner(), None, 0.5), (particle(), zeros(1, PARTICLE), SHARE)):
+        of_spring = stiffness_before(contact, 0.5e6, values(), particles)
+        assert of_spring == share * 1e6
+        assert shear_stiffness_before(contact, of_spring, values(), law) == pytest.approx(share * stiffness)
+        assert normal_loss(contact, of_spring, law) == pytest.approx(7.0 - share * force)
+    assert shear_loss(corner(), stiffness) == pytest.approx(1.0 - 1e-6 * stiffness)
+
+
+@pytest.mark.parametrize("law", [LINEAR, HERTZ_MINDLIN])
+def test_contact_that_has_just_begun_has_lost_nothing(law: int) -> None:
+    contact = zeros(1, CONTACT)[0]
+    assert normal_loss(contact, 1e6, law) == 0.0
+    assert shear_loss(contact, shear_stiffness_before(contact, 1e6, values(), law)) == 0.0

@@ -1,0 +1,336 @@
+"""Persistent contacts: the same forces as in contact.py, taken by nearly all pairs and by none that changes."""
+
+from __future__ import annotations
+
+import copy
+from math import cos, pi, sin
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from blocksim.kernels.common.arrays import NORMAL, SHEAR
+from blocksim.kernels.common.integrate import start_all
+from blocksim.kernels.explicit.broad_phase import rebuild_pairs
+from blocksim.kernels.explicit.contact import IMPACT_STEPS, pair_forces
+from blocksim.kernels.explicit.damping import BOTH
+from blocksim.kernels.explicit.partition import add_kept, keep
+from blocksim.kernels.explicit.persistent_pairs import CHANGED, NOTHING, TOUCHING, UNTOUCHED, persistent_forces
+from blocksim.verification.scene import HEIGHT, WIDTH
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from blocksim.kernels.common.arrays import Record, World
+    from tests.conftest import Start
+    from tests.kernels.conftest import Pose
+
+STEP = 1e-6
+ROUND_OFF = 64 * np.finfo(float).eps  # of places, which are some ten sums and products
+
+
+class Tally(NamedTuple):
+    """How many pairs went either way, and which contacts those had that were steady."""
+
+    steady: int  # with contacts
+    general: int  # contacts before or after
+    kinds: frozenset[tuple[bool, ...]]  # for every contact whether its corner is one of b
+
+
+def take_generally(world: World, p: int, step: float) -> None:
+    """Evaluate a pair in the general way and add what it does."""
+    pair_forces(world, p, step)
+    add_kept(world, world.pairs[p], world.action[0], world.ledger[0])
+
+
+def take_steadily(world: World, p: int, step: float) -> bool:
+    """Evaluate a pair in the steady way and add what it does; return whether that goes."""
+    kind, effect = persistent_forces(world, p, step, world.particles)
+    if kind != CHANGED:
+        keep(world.action[0], effect, kind == TOUCHING)
+        dashpot, friction = add_kept(world, world.pairs[p], world.action[0], world.ledger[0])
+        world.ledger[0].dashpot += dashpot
+        world.ledger[0].friction += friction
+    return kind != CHANGED
+
+
+def evaluate(world: World) -> tuple[Tally, World, World]:
+    """Evaluate all pairs at the end of the next drift: in the steady way where it goes, and in a copy generally."""
+    step = float(world.controls[0].step)
+    quick, slow = copy.deepcopy(world), copy.deepcopy(world)
+    steady, general, kinds = 0, 0, set()
+    for copied in (quick, slow):
+        start_all(copied.bodies, 0, copied.bodies.size, step)
+        for name in ("dashpot", "friction", "broken"):
+            copied.ledger[name] = 0.0
+    for p, pair in enumerate(quick.pairs[: world.clock[0].pair_count]):
+        before = int(pair.active)
+        is_steady = take_steadily(quick, p, step)
+        if not is_steady:
+            take_generally(quick, p, step)
+        take_generally(slow, p, step)
+        if pair.active or before:
+            steady, general = steady + is_steady, general + (not is_steady)
+            if is_steady:
+                kinds.add(tuple((quick.contacts["slot"][p, : pair.active] > 3).tolist()))
+    return Tally(steady, general, frozenset(kinds)), quick, slow
+
+
+def assert_same(quick: World, slow: World) -> None:
+    """Compare totals, contacts, dashpots and losses of two worlds to what round-off in places can do to forces."""
+    stiffness = float(quick.interactions.normal_stiffness.max())
+    bodies: Any = quick.bodies[:-1]
+    reach = float(np.abs([bodies.x, bodies.y]).max()) + float(bodies.radius.max())
+    place = ROUND_OFF * reach
+    moved = float(quick.controls[0].step) * float(np.hypot(quick.bodies.vx, quick.bodies.vy).max())
+    force = stiffness * place + ROUND_OFF * float(slow.contacts.normal_force.max())
+    for name, size in (("fx", force), ("fy", force), ("torque", force * reach)):
+        assert quick.bodies[name] == pytest.approx(slow.bodies[name], abs=4.0 * size), name
+    assert quick.bodies.pairs_now.tolist() == slow.bodies.pairs_now.tolist()
+    count = int(quick.clock[0].pair_count)
+    for name in ("active", "near", "duplicates", "idle", "normal_left", "shear_left"):
+        assert quick.pairs[name][:count].tolist() == slow.pairs[name][:count].tolist(), name
+    for p in range(count):
+        one, other = (world.contacts[p, : world.pairs[p].active] for world in (quick, slow))
+        assert one["slot"].tolist() == other["slot"].tolist()
+        assert one["face"].tolist() == other["face"].tolist()
+        for name, size in (("spring", place), ("depth", place), ("normal_force", force), ("shear_force", force)):
+            assert one[name] == pytest.approx(other[name], abs=size), name
+        for direction, name in ((NORMAL, "normal_left"), (SHEAR, "shear_left")):
+            if quick.pairs[name][p] > 0:
+                assert_same_dashpots(quick.operators[p, direction], slow.operators[p, direction])
+        assert quick.pairs[p].shear_left == 0 or quick.pairs[p].sticking == slow.pairs[p].sticking
+    for name in ("dashpot", "friction", "broken"):
+        assert quick.ledger[name] == pytest.approx(slow.ledger[name], rel=1e-9, abs=8.0 * force * (moved + place)), name
+
+
+def assert_same_dashpots(one: Record, other: Record) -> None:
+    for names in (("e_one", "e_mixed", "e_two"), ("h_one", "h_mixed", "h_two")):
+        numbers = np.array([[operator[name] for name in names] for operator in (one, other)])
+        assert numbers[0] == pytest.approx(numbers[1], rel=1e-6, abs=1e-9 * np.abs(numbers).max())
+
+
+def tip(angle: float) -> float:
+    """Return the height (m) of the centre of a block that stands on its corner."""
+    return 0.5 * (abs(sin(angle)) * WIDTH + cos(angle) * HEIGHT)
+
+
+FIXED = {"y": 0.5 * HEIGHT, "fixed": True}
+ABOVE = 1.5 * HEIGHT
+RESTING = [{"y": 0.5 * HEIGHT}, {"x": 0.004, "y": ABOVE}, {"x": 0.06, "y": 0.5 * HEIGHT}]
+SITUATIONS: dict[str, tuple[Sequence[Mapping[str, object]], dict[str, Any]]] = {
+    "rest": (RESTING, {}),
+    "rest on a slope": (RESTING, {"tilt": -0.2}),
+    "sliding": ([{"y": 0.5 * HEIGHT, "velocity": [0.5, 0.0]}, {"x": 0.004, "y": ABOVE, "velocity": [-0.5, 0.0]}], {}),
+    "sliding on a slope": ([FIXED, {"x": -0.003, "y": ABOVE}], {"tilt": -0.5}),
+    "no friction": (RESTING, {"tilt": -0.2, "friction": 0.0, "ground_friction": 0.0}),
+    "no dashpots": (RESTING, {"restitution": 1.0, "tilt": -0.2}),
+    "impact on a corner": ([{"y": tip(0.3) + 1e-7, "angle": 0.3, "velocity": [0.2, -1.0]}], {}),
+    "flat impact": ([{"y": 0.5 * HEIGHT + 1e-7, "velocity": [0.1, -1.0]}], {}),
+    "impact of a's corner": ([{"y": HEIGHT + tip(0.3) + 1e-7, "angle": 0.3, "velocity": [0.2, -1.0]}, FIXED], {}),
+    "impact of b's corner": ([FIXED, {"y": HEIGHT + tip(-0.3) + 1e-7, "angle": -0.3, "velocity": [0.2, -1.0]}], {}),
+    "impact of two free blocks": (
+        [{"y": 0.1, "spin": 3.0}, {"x": 2e-3, "y": 0.1 + HEIGHT + 1e-7, "velocity": [0.1, -1.0], "spin": -2.0}],
+        {"gravity": 0.0},
+    ),
+    "narrow on wide": ([{"y": 0.5 * HEIGHT}, {"y": ABOVE, "width": 0.02}], {}),
+    "wide on narrow": ([{"y": 0.5 * HEIGHT, "width": 0.02}, {"y": ABOVE, "spin": 0.01}], {}),
+    "aligned": ([{"y": 0.5 * HEIGHT}, {"y": ABOVE, "velocity": [0.01, 0.0]}], {}),
+    "rocking": ([{"y": tip(0.002), "angle": 0.002, "spin": -0.3}, {"x": 0.1, "y": 0.5 * HEIGHT}], {}),
+    "wall of three": ([{"y": 0.5 * HEIGHT}, {"x": 0.033, "y": 0.5 * HEIGHT}, {"x": 0.0165, "y": ABOVE}], {}),
+    "soft": (RESTING, {"tilt": -0.2, "contact": {"stiffness_scale": 1e-4}}),
+}
+
+
+@pytest.mark.parametrize("situation", SITUATIONS)
+def test_steady_pairs_have_the_forces_and_losses_of_the_general_way(start: Start, situation: str, pace: int) -> None:
+    bodies, values = SITUATIONS[situation]
+    scene = start(bodies, **values)
+    seen = 0
+    for n in range(120 // pace):
+        tally, quick, slow = evaluate(scene.world)
+        assert_same(quick, slow)
+        seen += tally.steady
+        scene.to_step(scene.steps + 1 + n % 4)
+    assert seen > 20 // pace
+
+
+def test_situations_have_one_and_two_contacts_and_corners_of_either_body(start: Start, pace: int) -> None:
+    kinds: set[tuple[bool, ...]] = set()
+    for situation in ("impact of a's corner", "impact of b's corner", "rest", "narrow on wide", "wide on narrow"):
+        bodies, values = SITUATIONS[situation]
+        scene = start(bodies, **values).to_step(60 // pace)
+        kinds |= evaluate(scene.world)[0].kinds
+    assert kinds == {(False,), (True,), (False, False), (False, True), (True, True)}
+
+
+@pytest.mark.parametrize("situation", ["rest", "rest on a slope", "sliding", "sliding on a slope", "wall of three"])
+def test_nearly_all_pairs_of_a_lasting_scene_are_steady(start: Start, situation: str, pace: int) -> None:
+    bodies, values = SITUATIONS[situation]
+    scene = start(bodies, contact={"stiffness_scale": 1e-3}, **values).to_step(600 // pace)
+    steady = general = 0
+    for _ in range(100 // pace):
+        tally, _, _ = evaluate(scene.to_step(scene.steps + 1).world)
+        steady, general = steady + tally.steady, general + tally.general
+    assert steady >= 100 // pace
+    assert general <= 0.02 * steady
+
+
+def is_untouched(world: World, before: World) -> bool:
+    """Return True if nothing has changed that lasts, nor the work space of contact.py."""
+    return all(
+        np.array_equal(getattr(world, name), getattr(before, name))
+        for name in ("bodies", "pairs", "contacts", "candidates", "operators", "ledger", "points", "action")
+    )
+
+
+def on_ground(pose: Pose, **tables: object) -> World:
+    """Return a block that stands on the ground, 1 um deep, with its two contacts."""
+    world = pose((0.0, 0.5 * HEIGHT - 1e-6, 0.0), **tables)
+    pair_forces(world, 0, 0.0)
+    assert world.pairs[0].active == 2
+    return world
+
+
+def on_block(pose: Pose, shift: float, **tables: object) -> World:
+    """Return a block that stands on another one, 1 um deep, with its two contacts."""
+    world = pose((shift, 1.0 + HEIGHT - 1e-6, 0.0), (0.0, 1.0, 0.0), **tables)
+    pair_forces(world, 0, 0.0)
+    assert world.pairs[0].active == 2
+    return world
+
+
+def assert_changed(world: World) -> None:
+    """Assert that the pair is left to contact.py, as it was."""
+    before = copy.deepcopy(world)
+    assert persistent_forces(world, 0, STEP, world.particles) == (CHANGED, NOTHING)
+    assert is_untouched(world, before)
+
+
+def test_contacts_that_continue_are_steady(pose: Pose) -> None:
+    for world in (on_ground(pose), on_block(pose, 0.003)):
+        assert persistent_forces(world, 0, STEP, world.particles)[0] == TOUCHING
+
+
+@pytest.mark.parametrize("up", [1.1e-6, 1.0])
+def test_contact_that_ends_is_not_steady(pose: Pose, up: float) -> None:
+    for world in (on_ground(pose), on_block(pose, 0.003)):
+        world.bodies[0].y += up
+        assert_changed(world)
+
+
+@pytest.mark.parametrize("shift", [0.003 - WIDTH, WIDTH + 1e-4])
+def test_corner_beyond_the_end_of_its_face_is_not_steady(pose: Pose, shift: float) -> None:
+    world = on_block(pose, 0.003)
+    world.bodies[0].x = shift
+    assert_changed(world)
+
+
+@pytest.mark.parametrize(("down", "changes"), [(-0.9e-6, True), (0.0, False)])
+def test_corner_that_begins_is_not_steady(pose: Pose, down: float, changes: bool) -> None:
+    world = pose((0.0, tip(1e-4) - 1e-6, 1e-4))  # on its lower left corner, the other one 2 um above the ground
+    pair_forces(world, 0, 0.0)
+    assert (world.pairs[0].active, world.pairs[0].idle) == (1, 1)
+    world.bodies[0].y += down - 1.5e-6 if changes else 0.0
+    if changes:
+        assert_changed(world)
+    assert persistent_forces(world, 0, STEP, world.particles)[0] == (CHANGED if changes else TOUCHING)
+
+
+@pytest.mark.parametrize(("steps", "changes"), [(0.9 * IMPACT_STEPS, True), (1.2 * IMPACT_STEPS, False)])
+def test_corner_about_to_lose_a_face_while_another_one_is_near_is_not_steady(
+    pose: Pose, steps: float, changes: bool
+) -> None:
+    # tilted, so that its lower left corner may touch the upper face of the other block or its side
+    world = pose((0.0, 2.0, 0.1), (0.0, 1.0, 0.0))
+    a, b = world.bodies[:2]
+    beside, speed = 2e-5, 0.5
+    foot_x, foot_y = -cos(0.1) * a.half_x + sin(0.1) * a.half_y, -sin(0.1) * a.half_x - cos(0.1) * a.half_y
+    a.x, a.y = b.half_x - beside - foot_x, 1.0 + b.half_y - 1e-6 - foot_y
+    a.vy = -speed
+    assert rebuild_pairs(world)
+    pair_forces(world, 0, 0.0)
+    assert world.contacts[0, 0].slot == 0
+    assert world.contacts[0, 0].face == 1
+    kind, _ = persistent_forces(world, 0, beside / (steps * speed), world.particles)
+    assert kind == (CHANGED if changes else TOUCHING)
+
+
+def test_other_laws_models_and_straight_ground_are_never_steady(pose: Pose) -> None:
+    profile = {"ground": {"profile": [[-1.0, 0.0], [1.0, 0.0]]}}
+    for tables in ({"contact": {"law": "hertz-mindlin"}}, profile):
+        world = on_ground(pose, **tables)
+        assert_changed(world)
+    for model in ("kernel", "particles"):
+        world = pose((0.0, 0.5 * HEIGHT - 5e-4, 0.0), contact={"model": model})
+        pair_forces(world, 0, 0.0)
+        assert world.pairs[0].active > 2
+        assert_changed(world)
+
+
+def test_oblique_corners_that_meet_are_not_steady_and_aligned_ones_are(pose: Pose) -> None:
+    aligned = on_block(pose, 0.0)
+    assert aligned.pairs[0].duplicates != 0
+    assert persistent_forces(aligned, 0, STEP, aligned.particles)[0] == TOUCHING
+    oblique = pose((0.0, 0.0, pi / 4), (0.0, 1.0, 0.0))
+    a, b = oblique.bodies[:2]
+    a.x, a.y = b.half_x - 1e-7, 1.0 + b.half_y - 1e-6 + 0.5 * (WIDTH + HEIGHT) * sin(pi / 4)
+    a.x += 0.5 * (WIDTH - HEIGHT) * sin(pi / 4)
+    assert rebuild_pairs(oblique)
+    pair_forces(oblique, 0, 0.0)
+    assert oblique.pairs[0].active == 1
+    assert oblique.pairs[0].duplicates != 0
+    assert_changed(oblique)
+
+
+@pytest.mark.parametrize("sliding", [0, 1])
+def test_contact_that_slides_beside_one_that_sticks_has_no_dashpot(pose: Pose, sliding: int) -> None:
+    quick = on_block(pose, 0.003)
+    assert persistent_forces(quick, 0, STEP, quick.particles)[0] == TOUCHING
+    assert quick.pairs[0].sticking == BOTH
+    assert quick.pairs[0].shear_left > 0
+    quick.contacts[0, sliding].spring = 1e-3
+    quick.bodies[0].vx = 0.1
+    slow = copy.deepcopy(quick)
+    assert take_steadily(quick, 0, STEP)
+    take_generally(slow, 0, STEP)
+    assert quick.pairs[0].sticking == (2, 1)[sliding]
+    assert_same(quick, slow)
+
+
+def steps_left(world: World) -> list[int]:
+    return [int(world.pairs[0].normal_left), int(world.pairs[0].shear_left)]
+
+
+def test_dashpots_are_made_anew_where_the_number_of_neighbours_has_changed(pose: Pose) -> None:
+    world = on_block(pose, 0.003)
+    persistent_forces(world, 0, STEP, world.particles)
+    left = steps_left(world)
+    assert min(left) > 2
+    persistent_forces(world, 0, STEP, world.particles)
+    assert steps_left(world) == [n - 1 for n in left]
+    world.bodies[1].sums_changed = 1
+    persistent_forces(world, 0, STEP, world.particles)
+    assert steps_left(world) == left
+
+
+def test_steady_pair_adds_to_no_body_and_to_no_book_itself(pose: Pose) -> None:
+    for world in (on_ground(pose), on_block(pose, 0.003)):
+        world.bodies[0].vx = 20.0  # it slides
+        bodies, ledger = world.bodies.copy(), world.ledger.copy()
+        kind, effect = persistent_forces(world, 0, STEP, world.particles)
+        assert kind == TOUCHING
+        assert effect.fy > 0.0
+        assert effect.friction != 0.0
+        assert np.array_equal(world.bodies, bodies)
+        assert np.array_equal(world.ledger, ledger)
+
+
+@pytest.mark.parametrize("up", [1e-5, 1e-3, 3e-3])
+def test_pair_without_contacts_that_stays_apart_does_nothing(pose: Pose, up: float) -> None:
+    world = pose((0.003, 1.0 + HEIGHT + up, 0.0), (0.0, 1.0, 0.0))
+    before = copy.deepcopy(world)
+    for _ in range(2):  # along another axis than at first
+        assert persistent_forces(world, 0, STEP, world.particles) == (UNTOUCHED, NOTHING)
+    world.pairs.axis = before.pairs.axis  # along which they were found to be apart
+    assert is_untouched(world, before)

@@ -1,0 +1,86 @@
+"""Shares of corners in the stiffness of a face: where intervals lie, and that they change without jumps."""
+
+from __future__ import annotations
+
+from math import asin
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blocksim.kernels.common.arrays import SUPPORT
+from blocksim.kernels.explicit.contact import pair_forces
+from blocksim.kernels.explicit.models.duplicate_corners import CONE_TOLERANCE
+from blocksim.kernels.explicit.tributary import FLAT, LEAST, bearing_of_faces, interval_of
+from blocksim.verification.scene import HEIGHT, WIDTH
+
+if TYPE_CHECKING:
+    from blocksim.kernels.common.arrays import World
+    from tests.kernels.conftest import MakeBody, Pose
+
+UP = (0.0, 1.0)
+
+
+@pytest.mark.parametrize(("shift", "slide"), [(0.01, 1.0), (-0.01, -1.0), (0.0, 0.0)])
+def test_interval_is_what_of_two_faces_lies_opposite(make_body: MakeBody, shift: float, slide: float) -> None:
+    a, b = make_body(x=0.1 + shift, y=1.0 + HEIGHT), make_body(x=0.1, y=1.0)
+    found = interval_of(a, b, *UP)
+    assert found.right - found.left == pytest.approx(WIDTH - abs(shift))
+    assert found.per_length == pytest.approx(1.0 / WIDTH)
+    assert found.slide == slide  # a goes along the tangent, to the left
+    assert 0.5 * (found.left + found.right) == pytest.approx(-0.5 * shift)
+
+
+@pytest.mark.parametrize(("fixed", "length"), [("a", 0.032), ("b", 0.02), ("", 0.032)])
+def test_share_refers_to_the_face_of_the_free_body_and_of_two_to_the_longer(
+    make_body: MakeBody, fixed: str, length: float
+) -> None:
+    a, b = make_body(y=HEIGHT, width=0.02), make_body()
+    for name, body in (("a", a), ("b", b)):
+        if name == fixed:
+            body.is_moved = SUPPORT
+    assert interval_of(a, b, *UP).per_length == pytest.approx(1.0 / length)
+
+
+@given(sine=st.floats(-0.3, 0.3), shift=st.floats(-0.031, 0.031))
+def test_changes_of_a_share_are_its_derivatives(make_body: MakeBody, sine: float, shift: float) -> None:
+    def share(slip: float = 0.0, turned: float = 0.0) -> float:
+        a, b = make_body(x=shift - slip, y=HEIGHT, angle=asin(sine) + turned), make_body()
+        return float(bearing_of_faces(a, b, *UP).share)
+
+    a, b = make_body(x=shift, y=HEIGHT, angle=asin(sine)), make_body()
+    bearing = bearing_of_faces(a, b, *UP)
+    assert LEAST <= bearing.share <= 1.0
+    h = 1e-7
+    if abs(shift) > 1e-3:  # no end passes the other's within the difference
+        if abs(sine) <= FLAT:
+            assert (share(slip=h) - share(slip=-h)) / (2.0 * h) == pytest.approx(bearing.slide, abs=1e-4)
+        assert bearing.turn == 0.0 or abs(sine) > FLAT
+    assert abs(sine) < CONE_TOLERANCE or (bearing.share, bearing.slide, bearing.turn) == (1.0, 0.0, 0.0)
+
+
+def pushed(pose: Pose, x: float, angle: float) -> np.ndarray:
+    """Return the force (N) and torque (N m) on a block whose lower left corner lies 1 um deep in another one."""
+    c, s = np.cos(angle), np.sin(angle)
+    foot_x, foot_y = -0.5 * WIDTH * c + 0.5 * HEIGHT * s, -0.5 * WIDTH * s - 0.5 * HEIGHT * c
+    world: World = pose((x - foot_x, 1.0 + 0.5 * HEIGHT - 1e-6 - foot_y, angle), (0.0, 1.0, 0.0))
+    pair_forces(world, 0, 0.0)
+    action = world.action[0]
+    return np.array([action.fx, action.fy, action.torque_a])
+
+
+@pytest.mark.parametrize(
+    "angle", [1e-6 / 0.006, FLAT, CONE_TOLERANCE], ids=["other end lifts off", "tilts", "stands on its corner"]
+)
+def test_force_does_not_jump_while_a_block_tilts_onto_its_corner(pose: Pose, angle: float) -> None:
+    """The interval is 6 mm long: at 1 um over it the far end of the other block's face leaves the tilted one."""
+    before, after = (pushed(pose, 0.01, angle * (1.0 + sign * 1e-7)) for sign in (-1.0, 1.0))
+    assert before[1] > 0.0
+    assert after == pytest.approx(before, abs=1e-4 * before[1])
+
+
+def test_corner_that_slides_off_a_face_has_no_force_left(pose: Pose) -> None:
+    inside, edge = pushed(pose, 0.008, 0.0), pushed(pose, 0.016 - 1e-8, 0.0)
+    assert edge[1] < 1e-5 * inside[1]
