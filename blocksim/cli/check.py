@@ -73,12 +73,10 @@ def _data(description: Description) -> dict[str, object]:
 
 
 def _tables(scenario: Scenario, description: Description) -> list[list[str]]:
-    return [
-        _cost(scenario, description),
-        _bodies(description.bodies),
-        _pairs(scenario, description.pairs),
-        _rules(description.pairs),
-    ]
+    cost = _cost(scenario, description)
+    if not description.bodies:
+        return [cost]
+    return [cost, _bodies(description.bodies), _pairs(scenario, description.pairs), _rules(description.pairs)]
 
 
 def _bodies(bodies: Sequence[PlacedBody]) -> list[str]:
@@ -164,7 +162,7 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
         *_motion(description.motion),
         *lines_of(scenario),
         *_boundary(scenario, description),
-        *(f"{name:<10} {count}, beside the blocks" for name, count in description.systems.items()),
+        *(f"{name:<10} {count} particles or elements" for name, count in description.systems.items()),
         f"neighbours checked up to {MILLI * description.skin:.3g} mm apart",
     ]
 

@@ -125,7 +125,7 @@ def _answer_lines(result: Result) -> list[str]:
     count = len(blocks)
     shown = count if count <= MOST_ROWS else FIRST_ROWS
     rows = [(block, *map(number, row)) for block, *row in islice(zip(blocks, *values, strict=True), shown)]
-    lines = table_lines(("block", "x mm", "y mm", "rotation °"), rows)
+    lines = table_lines(("block", "x mm", "y mm", "rotation °"), rows) if rows else []
     more = [] if shown == count else [f"... and {count - shown} more blocks in final.csv"]
     return [*lines, *more, *_ending_lines(result)]
 

@@ -13,6 +13,7 @@ from blocksim.scenario.quantities import shown
 from blocksim.scenario.soil_places import unfit_soils
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.scenario.structures import Shaped
+from blocksim.scenario.systems import SYSTEMS
 
 BLOCKS_BY_NAME = ("structures", "bodies")
 SPRING_CHOICES = ("model", "law")
@@ -23,8 +24,9 @@ WITH_OUTLINES: frozenset[tuple[str, str]] = frozenset({("nonsmooth", "surface")}
 
 def wrong_names(data: Data) -> Iterator[Finding]:
     """Find names of blocks and materials that do not exist, and scenarios without a body."""
-    if all(data.get(group, ()) == () for group in BLOCKS_BY_NAME):
-        yield Finding((), "nothing to simulate: add a [[structures]] or a [[bodies]] table")
+    if all(data.get(group, ()) == () for group in (*BLOCKS_BY_NAME, *SYSTEMS)):
+        *tables, last = (f"[[{name}]]" for name in (*BLOCKS_BY_NAME, *SYSTEMS))
+        yield Finding((), f"nothing to simulate: add a {', '.join(tables)} or {last} table")
     blocks = data.get("blocks")
     for name in blocks if isinstance(blocks, Mapping) else ():
         yield from _unknown(data, ("blocks", name, "material"), "materials")

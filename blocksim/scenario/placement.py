@@ -2,7 +2,7 @@
 
 import math
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Protocol
 
 from blocksim.scenario.keys import KeyPath
@@ -71,6 +71,11 @@ class PlacedBody(NamedTuple):
         if self.outline:
             return max(math.hypot(x, y) for x, y in self.outline)
         return 0.5 * math.hypot(self.size_x, self.size_y)
+
+
+def smallest_width(bodies: Iterable[PlacedBody]) -> float:
+    """Return the least width (m) of all bodies; infinite where there are none."""
+    return min((body.least_width for body in bodies), default=math.inf)
 
 
 class _Placement(NamedTuple):

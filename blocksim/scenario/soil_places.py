@@ -11,10 +11,11 @@ from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.placement import PlacedBody, place_bodies
 from blocksim.scenario.quantities import shown
-from blocksim.scenario.segments import TOLERANCE, place_segments, surface_heights
+from blocksim.scenario.segments import TOLERANCE, PlacedSegment, place_segments, surface_heights
 
 UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 MOST_MEETINGS = 20
+PLACES_ON_A_WALL = 33
 
 
 def soil_tables(scenario: Scenario) -> list[SoilTable]:
@@ -25,12 +26,13 @@ def soil_tables(scenario: Scenario) -> list[SoilTable]:
 def meetings(soil: SoilTable, key: str, scenario: Scenario) -> Iterator[tuple[str, str]]:
     """Yield the key of an outline and what it meets: ground, walls, blocks, soils before it."""
     corners = soil.corners
-    found = [*_boundaries(corners, scenario), *_blocks(corners, scenario), *_soils(soil, scenario)]
+    found = [*_boundaries(soil, scenario), *_blocks(corners, scenario), *_soils(soil, scenario)]
     for what in found[:MOST_MEETINGS]:
         yield key, f"soil {soil.name} meets {what}"
 
 
-def _boundaries(corners: NDArray[np.float64], scenario: Scenario) -> Iterator[str]:
+def _boundaries(soil: SoilTable, scenario: Scenario) -> Iterator[str]:
+    corners = soil.corners
     middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
     for x, y in np.concatenate([corners, middles]):
         if y < float(surface_heights(scenario, np.array([x]))[0]) - TOLERANCE:
@@ -41,6 +43,16 @@ def _boundaries(corners: NDArray[np.float64], scenario: Scenario) -> Iterator[st
     for number, piece in enumerate(segments, start=1 - (len(segments) - walls)):
         if polygons.cuts(np.array([piece.x0, piece.y0]), np.array([piece.x1, piece.y1]), corners):
             yield f"wall {number}" if number > 0 else f"the ground near x = {piece.x1:.6g} m"
+        elif number > 0 and _is_behind(soil, piece):
+            yield f"the solid side of wall {number}, right of the way from its `from` to its `to`: exchange the two"
+
+
+def _is_behind(soil: SoilTable, piece: PlacedSegment) -> bool:
+    """Return True if soil lies against the back of a piece, where nothing would hold it."""
+    along = np.linspace(0.0, 1.0, PLACES_ON_A_WALL)[1:-1, None]
+    begin, end = np.array([piece.x0, piece.y0]), np.array([piece.x1, piece.y1])
+    back = np.array([piece.y1 - piece.y0, piece.x0 - piece.x1]) / piece.length
+    return bool(polygons.inside(begin + along * (end - begin) + 0.5 * soil.spacing * back, soil.corners).any())
 
 
 def _blocks(corners: NDArray[np.float64], scenario: Scenario) -> Iterator[str]:

@@ -16,7 +16,7 @@ from blocksim.scenario.models.drive import MOST_BODY_TABLES
 from blocksim.scenario.models.motion import PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.outlines import section_of
-from blocksim.scenario.placement import PlacedBody, origins_of, place_bodies
+from blocksim.scenario.placement import PlacedBody, origins_of, place_bodies, smallest_width
 from blocksim.scenario.probes import unfit_probes
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.resolved import body_table_contents
@@ -61,12 +61,12 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
         yield from endless
         return
     kinds = {(body.size_x, body.size_y, body.outline): body for body in bodies}
-    smallest = min(body.least_width for body in kinds.values())
+    smallest = smallest_width(kinds.values())
     yield from _coarse_particles(scenario, smallest)
     yield from _fine_particles(scenario)
     farthest = max(max(abs(one) for one in ends) for ends in (_ends(bodies, "x"), _ends(bodies, "y")))
     yield from _unfit_skin(scenario, smallest, farthest)
-    yield from _short_segments(scenario, SHORTEST_SHARE * smallest)
+    yield from _short_segments(scenario, SHORTEST_SHARE * smallest if bodies else 0.0)
     yield from _equal_names(origins, bodies)
     yield from _below_ground(scenario, origins, bodies)
     yield from _in_walls(scenario, origins, bodies)
@@ -81,7 +81,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
 def _ends(bodies: Sequence[PlacedBody], name: str) -> tuple[float, float]:
     """Return the smallest and the largest value of a number of all bodies."""
     values = list(map(attrgetter(name), bodies))
-    return min(values), max(values)
+    return min(values, default=0.0), max(values, default=0.0)
 
 
 def _unfit_systems(scenario: Scenario) -> Iterator[Finding]:

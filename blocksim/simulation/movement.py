@@ -243,13 +243,13 @@ class Watch:
         way, turn = np.hypot(dx, dy), np.abs(angle)
         self.way, self.turn = np.fmax(self.way, way), np.fmax(self.turn, turn)
         self.manner = _manner(self.shapes, way, -dy, turn)
-        if self.first is None:
+        if self.first is None and self.placed:
             shares = _shares(self.shapes, way, turn)
             most = int(np.argmax(shares))
             self.first = FirstMove(self.placed[most].name, time) if shares[most] > 1.0 else None
 
     def found(self, support: tuple[float, float] = (0.0, 0.0)) -> Movement:
-        """Return what was seen, given the velocity (m/s) of ground and walls at the end."""
+        """Return what was seen of the blocks, one at least, given the velocity (m/s) of ground and walls at the end."""
         assert self.last is not None  # noqa: S101 - the start is a frame
         motion, time = self.last
         (end,) = end_speeds([self.placed], motion[None], np.array([support]), [time])

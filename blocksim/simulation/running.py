@@ -12,6 +12,7 @@ from pathlib import Path
 
 from blocksim.scenario import PlacedBody, Scenario, scenario_hash
 from blocksim.scenario.models.stepping import Nonsmooth
+from blocksim.scenario.placement import smallest_width
 from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint import origin_of, restored
 from blocksim.simulation.checkpoint_policy import DEFAULTS, NO_PAST, CheckpointPolicy, CheckpointWriter, Past
@@ -284,7 +285,7 @@ def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds:
         energy_J=ended.ledger,
         threads=ended.threads,
         events=ended.events,
-        movement=recorder.watch.found(_velocity_of_support(ended.scene)),
+        movement=recorder.watch.found(_velocity_of_support(ended.scene)) if recorder.placed else None,
         warnings=tuple(_warnings(scenario, recorder.placed, ended)),
         environment=environment(),
     )
@@ -304,6 +305,6 @@ def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResul
     for number in ended.pending if ended.outcome.is_finished else ():
         yield f"events.{number} has not happened, as nothing came to rest: {in_words(scenario.events[number])}"
     if isinstance(scenario.time, Nonsmooth) and ended.outcome.is_finished:
-        sunk = overlap_warning(ended.overlap, min(body.least_width for body in placed))
+        sunk = overlap_warning(ended.overlap, smallest_width(placed))
         if sunk:
             yield sunk

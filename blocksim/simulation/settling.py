@@ -29,6 +29,7 @@ from blocksim.kernels.common.arrays import REACHED, World
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
+from blocksim.scenario.placement import smallest_width
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.settled import NOT_AT_REST, Settled
 from blocksim.simulation.team import Team
@@ -71,7 +72,7 @@ def begun(
     kept = [array.copy() for array in arrays_of(scene)]
     with suppress(SettleError):
         found, settled = settle(scene, scenario, placed, team)
-        if settled.largest_displacement_mm <= MILLI * UNASKED_SHARE * _smallest(placed):
+        if settled.largest_displacement_mm <= MILLI * UNASKED_SHARE * smallest_width(placed):
             return found, settled
     _restore(scene, kept)
     return scene, None
@@ -105,7 +106,7 @@ class _Settling:
         self.support = _support_acceleration(scene)
         self.carried = 0.0  # share of the inertial force of that
         self.scale = float(np.hypot(*self.gravity) + controls.push)
-        self.smallest = _smallest(placed)
+        self.smallest = smallest_width(placed)
         self.start = self._places()
         self.before = self.start
         self.energy, self.steps = 0.0, 0
@@ -284,11 +285,6 @@ class _Settling:
             f"{MILLI * float(speeds[fastest]):.3g} mm/s, block {self.placed[far].name} has come "
             f"{MILLI * float(ways[far]):.3g} mm, after {self.steps} steps"
         )
-
-
-def _smallest(placed: Sequence[PlacedBody]) -> float:
-    """Return the smallest side (m) of all blocks."""
-    return min(body.least_width for body in placed)
 
 
 def _restore(scene: AnyScene, kept: Sequence[NDArray[Any]]) -> None:

@@ -41,7 +41,7 @@ class Summary(BaseModel, frozen=True):
     energy_J: EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
     settled: Settled | None = None  # how it came to rest before time zero, where it did
     events: tuple[Happened, ...] = ()  # in the order in which they have happened
-    movement: Movement | None = None  # None in runs of earlier versions
+    movement: Movement | None = None  # None in runs of earlier versions and without blocks
     warnings: tuple[str, ...]
     environment: dict[str, str]
     sha256: dict[str, str] = {}

@@ -61,7 +61,9 @@ def final_values(motion: Floats, shapes: Floats, outlines: Floats | None = None)
     x, y, angle, vx, vy, spin = (motion[..., k, :] for k in range(6))
     size_x, size_y, start_angle = (shapes[..., k, :] for k in range(3))
     # of one state at a time: what is computed together may decide on the last digit
-    cos, sin = (np.reshape([turn(one) for one in angle.reshape(-1, x.shape[-1])], x.shape) for turn in (np.cos, np.sin))
+    cos, sin = (
+        np.reshape([turn(one) for one in angle.reshape(-1, max(x.shape[-1], 1))], x.shape) for turn in (np.cos, np.sin)
+    )
     if outlines is None:
         cos, sin = np.abs(cos), np.abs(sin)
         half_width = 0.5 * (cos * size_x + sin * size_y)

@@ -206,7 +206,7 @@ class Animation:
         from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
 
         past = self.drawable[self.drawable <= frame]
-        free = ~np.array(self.support.fixed or (False,) * len(self.frames.names))
+        free = ~np.array(self.support.fixed or (False,) * len(self.frames.names), dtype=bool)
         ways = MILLIMETRES * np.stack([self.frames.x[past], self.frames.y[past]], axis=-1)[:, free]
         lines = LineCollection(list(ways.swapaxes(0, 1)), colors=style.INK, **TRAIL, transform=self.canvas.scene)
         self.canvas.axes.add_collection(lines)

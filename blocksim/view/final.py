@@ -58,7 +58,7 @@ def draw_final(  # noqa: PLR0913 - one argument for each option of the command
     sheet = _sheet(frames, chosen, support, measured if frame == drawable[-1] else None, paper, paint.height, scale)
     with style.styled_figure(sheet.page.width, sheet.height, paper.dots) as figure:
         canvas = _draw_panel(figure, frames, frame, sheet.page, support, paint)
-        if sheet.is_labelled:
+        if sheet.is_labelled and sheet.labels:
             draw_centres(canvas, frames, frame)
             _draw_labels(figure, sheet)
         if scale is not None:

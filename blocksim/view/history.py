@@ -159,6 +159,9 @@ def _drawing(frames: HistoryLike, support: Support, choice: Choice, paint: Paint
     if not paint.is_lasting:
         message = "a history is coloured by block or material; speed and rotation are separate panels"
         raise InvalidInputError(message)
+    if not frames.names:
+        message = "no block to draw: a history is that of blocks, and a probe shows the thrust of soil"
+        raise InvalidInputError(message)
     chosen = _thinned(drawable_frames(frames))
     named = blocks_named(frames, choice.blocks)
     shown = named or farthest_blocks(frames, chosen, support, MOST_BLOCKS)

@@ -203,7 +203,7 @@ def blocks_named(frames: FramesLike, names: Sequence[str]) -> list[int]:
 def farthest_blocks(frames: FramesLike, chosen: Indices, support: Support, most: int) -> list[int]:
     """Return the blocks to colour, in their order: free ones; of many, those that end farthest from their start."""
     away = np.hypot(frames.x[chosen[-1]] - frames.x[0], frames.y[chosen[-1]] - frames.y[0])
-    free = ~np.array(support.fixed or (False,) * len(away))
+    free = ~np.array(support.fixed or (False,) * len(away), dtype=bool)
     ordered = [int(block) for block in np.argsort(-away, kind="stable") if free[block]]
     return sorted(ordered[:most])
 

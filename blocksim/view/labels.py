@@ -53,7 +53,7 @@ def labels_of(frames: FramesLike, frame: int, page: Page, measured: MeasuredTabl
 def arranged(labels: Sequence[Label], page: Page) -> list[Label]:
     """Return the labels below their blocks, or one after the other where too many blocks are above one another."""
     placed = placed_labels(labels)
-    if max(label.row for label in placed) < MOST_ROWS:
+    if all(label.row < MOST_ROWS for label in placed):
         return placed
     return listed_labels(labels, page.panel_width * style.POINTS_PER_INCH)
 
@@ -82,20 +82,24 @@ def listed_labels(labels: Sequence[Label], width: float) -> list[Label]:
     return listed
 
 
+def _rows(labels: Sequence[Label]) -> int:
+    return 1 + max((label.row for label in labels), default=-1)
+
+
 def lines_of(labels: Sequence[Label]) -> int:
     """Return how many lines of text all rows of labels take."""
-    rows = 1 + max(label.row for label in labels)
-    return rows * max(len(label.lines) + bool(label.measured) + bool(label.bar) for label in labels)
+    most = max((len(label.lines) + bool(label.measured) + bool(label.bar) for label in labels), default=0)
+    return _rows(labels) * most
 
 
 def depth(labels: Sequence[Label]) -> float:
     """Return how far the rows of labels reach down (points)."""
-    return (1 + max(label.row for label in labels)) * row_height(labels)
+    return _rows(labels) * row_height(labels)
 
 
 def row_height(labels: Sequence[Label]) -> float:
     """Return how far apart the rows of labels are (points)."""
-    lines = max(len(label.lines) + bool(label.measured) for label in labels)
+    lines = max((len(label.lines) + bool(label.measured) for label in labels), default=0)
     return lines * LINE + any(label.bar for label in labels) * BAR + SPACE[1]
 
 

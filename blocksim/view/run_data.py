@@ -98,10 +98,10 @@ def drawable_frames(frames: FramesLike) -> Indices:
     """Return the indices of the frames in which every number is finite (a failed run may end in others).
 
     Values beyond all reach, as in a damaged file, do not count: millimetres and areas would overflow.
-    Raises InvalidInputError when there is none, or no block.
+    Raises InvalidInputError when there is none, or nothing in it.
     """
-    if len(frames.names) == 0:
-        message = "no block to draw"
+    if len(frames.names) == 0 and not others_of(frames):
+        message = "nothing to draw"
         raise InvalidInputError(message)
     finite = np.isfinite(frames.time)
     for field in (frames.x, frames.y, frames.angle):
@@ -131,7 +131,7 @@ def path_travelled(frames: FramesLike, chosen: Indices, carried: Floats | None =
     way = (moved + turned).sum(axis=1)
     for track in others_of(frames):
         steps = np.hypot(*(np.diff(track[name][chosen], axis=0) for name in ("x", "y")))
-        way += len(frames.names) * steps.mean(axis=1)
+        way += max(1, len(frames.names)) * steps.mean(axis=1)
     return np.concatenate([[0.0], np.cumsum(way)])
 
 

@@ -48,7 +48,7 @@ def readable_scale(frames: FramesLike) -> float:
     wide, tall = (letter * style.SMALLEST_FONT / room for letter, room in zip(style.LETTER, NAME_ROOM, strict=True))
     sizes = MILLIMETRES * shortest_sides(frames)
     lengths = np.array([len(name) for name in frames.names])
-    return float((np.maximum(wide * lengths, tall) / sizes).max())
+    return float((np.maximum(wide * lengths, tall) / sizes).max(initial=0.0))
 
 
 def draw_scene(canvas: Canvas, frames: FramesLike, frame: int, support: Support, paint: Paint | None = None) -> None:
@@ -62,9 +62,9 @@ def draw_standing(canvas: Canvas, frames: FramesLike, frame: int, support: Suppo
     offset = MILLIMETRES * support.offset(frames.time[frame : frame + 1])[0]
     support = support.at(float(frames.time[frame]))
     draw_support(canvas, support, offset)
-    carried = _fixed(frames, support) & ~np.array(support.driven or (False,) * len(frames.names))
+    carried = _fixed(frames, support) & ~np.array(support.driven or (False,) * len(frames.names), dtype=bool)
     draw_start(canvas, support, offset, corners(frames, frame)[carried & are_there(frames, frame)])
-    draw_shift(canvas, support, offset, MILLIMETRES * float(frames.x[0].mean()))
+    draw_shift(canvas, support, offset, MILLIMETRES * (float(frames.x[0].mean()) if frames.names else 0.0))
 
 
 def draw_blocks(canvas: Canvas, frames: FramesLike, frame: int, support: Support, paint: Paint | None = None) -> None:
@@ -106,7 +106,7 @@ def are_there(frames: FramesLike, frame: int) -> Flags:
 
 def _fixed(frames: FramesLike, support: Support) -> Flags:
     """Return for every block whether it is fixed or driven, (b,)."""
-    return np.array(support.fixed or (False,) * len(frames.names))
+    return np.array(support.fixed or (False,) * len(frames.names), dtype=bool)
 
 
 def draw_centres(canvas: Canvas, frames: FramesLike, frame: int) -> None:
@@ -145,7 +145,7 @@ def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags,
     from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415 - see style
 
     outlines = corners(frames, frame)
-    smallest = MILLIMETRES * canvas.points_per_mm * float(shortest_sides(frames).min())
+    smallest = MILLIMETRES * canvas.points_per_mm * float(shortest_sides(frames).min(initial=np.inf))
     thin = min(style.LINE_WIDTH, 0.05 * smallest)
     line: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
     there = are_there(frames, frame)

@@ -124,7 +124,8 @@ def draw_strip(  # noqa: PLR0913 - one argument for each option of the command
         chosen = moments_at(frames, drawable, times)
         ranges = ranges if chosen[-1] == drawable[-1] else []  # they belong to the final state
     acts = outside(frames, chosen, support)
-    told = [_legend(ranges, support, scale), acts.explanation]
+    upper = ["Thick line inside a block: its own upper side."] if frames.names else []
+    told = [*upper, _legend(ranges, support, scale), acts.explanation]
     notes = wrap(" ".join(filter(None, told)), int(LETTERS_AN_INCH * paper.width(WIDTH, LEAST_WIDTH)))
     lines = Lines(_captions(support, acts), len(notes), rows_of(ranges), paint.height)
     layout = plan_on(paper, extent, columns, len(chosen), lines)
@@ -320,7 +321,7 @@ def _caption(frames: FramesLike, frame: int, support: Support) -> str:
 
 
 def _legend(ranges: Sequence[MeasuredRange], support: Support, scale: ForceScale | None) -> str:
-    texts = ["Thick line inside a block: its own upper side."]
+    texts = []
     if any(support.fixed):
         texts.append("Grey: fixed.")
     if support.motion is not None:

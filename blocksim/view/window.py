@@ -80,7 +80,7 @@ def extent_of(
     reached = np.concatenate([reached.reshape(-1, 2), *others])
     low, high = reached.min(axis=0), reached.max(axis=0)
     shifts = _extreme_offsets(frames, chosen, support)
-    diagonal = float(np.hypot(frames.size_x, frames.size_y).max())
+    diagonal = float(np.hypot(frames.size_x, frames.size_y).max(initial=0.0))
     reach = np.maximum(diagonal, NEAR * (high - low))
     points = np.concatenate([[low, high], _near(support, shifts, low - reach, high + reach)])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -98,10 +98,12 @@ def together(frames: FramesLike, chosen: Indices, support: Support | None = None
     with few blocks, of which each matters, of one and a half times that. At most a twentieth of the blocks are left
     out, or one, and never a fixed one.
     """
+    count = len(frames.names)
+    if count == 0:
+        return np.zeros(0, dtype=bool)
     support = support or Support()
     reached = _reached(frames, chosen, support)
     low, high = reached.min(axis=0), reached.max(axis=0)
-    count = len(low)
     most, share = max(1, int(FEW_LEFT_OUT * count)), GAP if count >= MANY else WIDE_GAP
     stays = np.ones(count, dtype=bool)
     for reach, other in ((high[:, 0], low[:, 0]), (-low[:, 0], -high[:, 0]), (high[:, 1], low[:, 1])):
@@ -111,7 +113,7 @@ def together(frames: FramesLike, chosen: Indices, support: Support | None = None
             if reach[far[0]] - reach[near].max() > share * float(reach[near].max() - other[near].min()):
                 stays[far] = False
                 break
-    return np.asarray(stays | np.array(support.fixed or (False,) * count))
+    return np.asarray(stays | np.array(support.fixed or (False,) * count, dtype=bool))
 
 
 def turned(points: Floats, angle: float) -> Floats:

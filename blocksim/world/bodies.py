@@ -26,6 +26,7 @@ from blocksim.kernels.common.arrays import (
 )
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments
 from blocksim.scenario.motion import motion_direction, motion_pieces
+from blocksim.scenario.placement import smallest_width
 from blocksim.world.applied import Applied, applied_loads
 from blocksim.world.drives import DriveRecords, drive_records, piece_records
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
@@ -130,7 +131,7 @@ def _fill_blocks(records: NDArray[np.record], outlines: Outlines) -> None:
     records["half_x"] = 0.5 * column(body.size_x for body in placed)
     records["half_y"] = 0.5 * column(body.size_y for body in placed)
     records["radius"] = 0.5 * column(math.hypot(body.size_x, body.size_y) for body in placed)
-    is_free = ~np.array([body.fixed for body in placed]).reshape(records.shape)
+    is_free = ~np.array([body.fixed for body in placed], bool).reshape(records.shape)
     for name in ("mass", "inertia"):
         records[name][is_free] = column(map(attrgetter(name), placed))[is_free]
         is_heavy = records["mass"] > 0.0
@@ -158,7 +159,9 @@ def _codes(outline: Outline) -> Iterator[int]:
 
 
 def _fill_slabs(records: Records, outline: Outline) -> None:
-    smallest = min(body.least_width for body in outline.placed)
+    smallest = smallest_width(outline.placed)
+    if not math.isfinite(smallest):  # nothing but particles touches the pieces, and these see faces only
+        smallest = min((segment.length for segment in outline.segments), default=0.0)
     thickness = max(SLAB_SHARE * smallest, 2.0 * (outline.scenario.contact.max_overlap or 0.0))
     for record, segment in zip(records, outline.segments, strict=True):
         _fill_slab(record, segment, thickness)

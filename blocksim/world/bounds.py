@@ -33,7 +33,7 @@ class Kind(NamedTuple):
 class Bounds(NamedTuple):
     """Of the blocks of one scene, without the ground and its pieces."""
 
-    smallest: float  # m, smallest side
+    smallest: float  # m, smallest side; infinite where there are no blocks
     top: float  # m, no corner is higher
     speed: float  # m/s, no point is faster
     mass: float  # kg, of all free ones
@@ -47,9 +47,11 @@ def bounds_of(bodies: NDArray[np.record], blocks: int) -> list[Bounds]:
     all_blocks = bodies[:, :blocks]
     columns = {name: np.ascontiguousarray(all_blocks[name]) for name in ("radius", "half_x", "half_y", "mass")}
     smallest = _smallest_sides(all_blocks, columns)
-    top = np.max(all_blocks["y"] + columns["radius"], axis=1)
+    top = np.max(all_blocks["y"] + columns["radius"], axis=1, initial=-math.inf)
     speed = np.max(
-        np.hypot(all_blocks["vx"], all_blocks["vy"]) + columns["radius"] * np.abs(all_blocks["spin"]), axis=1
+        np.hypot(all_blocks["vx"], all_blocks["vy"]) + columns["radius"] * np.abs(all_blocks["spin"]),
+        axis=1,
+        initial=0.0,
     )
     # one by one: the order of a sum must not depend on which other scenes there are
     masses = [float(np.sum(mass[mass > 0.0])) for mass in columns["mass"]]
@@ -67,7 +69,9 @@ def _smallest_sides(blocks: NDArray[np.record], columns: Mapping[str, NDArray[np
     """Return the smallest sides (m) of scenes, of polygons their least width."""
     is_polygon = blocks["faces"] == OUTLINE
     if not is_polygon.any():
-        smallest: NDArray[np.float64] = 2.0 * np.minimum(columns["half_x"].min(axis=1), columns["half_y"].min(axis=1))
+        smallest: NDArray[np.float64] = 2.0 * np.minimum(
+            columns["half_x"].min(axis=1, initial=math.inf), columns["half_y"].min(axis=1, initial=math.inf)
+        )
         return smallest
     sides = np.where(is_polygon, blocks["least_width"], 2.0 * np.minimum(columns["half_x"], columns["half_y"]))
     least: NDArray[np.float64] = sides.min(axis=1)
@@ -91,7 +95,7 @@ def given_speed(scenario: Scenario, bounds: Bounds) -> float:
     new = (event.velocity for event in scenario.events)
     sizes = [math.hypot(block.size_x, block.size_y) for block in scenario.blocks.values()]
     given = (
-        math.hypot(one.vx or 0.0, one.vy or 0.0) + 0.5 * max(sizes) * abs(one.spin or 0.0)
+        math.hypot(one.vx or 0.0, one.vy or 0.0) + 0.5 * max(sizes, default=0.0) * abs(one.spin or 0.0)
         for one in new
         if one is not None
     )

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from blocksim.scenario import PlacedBody
 from blocksim.scenario.outlines import box_of as corners_box
+from blocksim.scenario.placement import smallest_width
 
 TOUCHING = 1e-3  # of the smallest side: faces that near to each other touch
 
@@ -69,7 +70,7 @@ def _box_of_outline(body: PlacedBody) -> Box:
 def loads_at_rest(placed: Sequence[PlacedBody], gravity: float) -> Iterator[Load]:
     """Yield what the ends of all contacts below free blocks carry, from above downwards."""
     boxes = [box_of(body) for body in placed]
-    below = _Below(boxes, TOUCHING * min(body.least_width for body in placed))
+    below = _Below(boxes, TOUCHING * smallest_width(placed))
     carried = [_Carried(body.mass * gravity, body.x) for body in placed]
     for upper in sorted(range(len(placed)), key=lambda i: -boxes[i].bottom):
         if not placed[upper].fixed:

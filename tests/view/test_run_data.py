@@ -74,7 +74,7 @@ def test_a_failed_run_is_drawn_as_far_as_it_has_numbers() -> None:
 def test_a_run_without_a_number_or_a_block_is_refused() -> None:
     with pytest.raises(InvalidInputError, match="no frame to draw"):
         drawable_frames(moving([float("nan")]))
-    with pytest.raises(InvalidInputError, match="no block to draw"):
+    with pytest.raises(InvalidInputError, match="nothing to draw"):
         drawable_frames(replace(moving([0.0]), names=()))
 
 

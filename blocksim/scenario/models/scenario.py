@@ -45,7 +45,7 @@ class Scenario(Table):
     description: str = Field(default="", description="free text")
     gravity: q.NonNegativeAcceleration = Field(default=USUAL_GRAVITY, description="acceleration of gravity")
     materials: dict[str, Material] = Field(description="materials by name, as in [materials.aluminium]")
-    blocks: dict[str, Block] = Field(description="blocks by name, as in [blocks.brick]")
+    blocks: dict[str, Block] = Field(default={}, description="blocks by name, as in [blocks.brick]")
     structures: tuple[AnyStructure, ...] = Field(default=(), description="generators of bodies")
     bodies: tuple[BodySpec, ...] = Field(default=(), description="single bodies")
     ground: Ground = Field(default=Ground(), description="the ground")

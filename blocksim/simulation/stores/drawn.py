@@ -78,6 +78,9 @@ def _last_blocks(frames: Frames, scenario: Scenario) -> Iterator[_Block]:
     if not somewhere.any():
         message = "no frame to export"
         raise InvalidInputError(message)
+    if not frames.names:
+        message = "no block to export"
+        raise InvalidInputError(message)
     last = int(np.flatnonzero(somewhere)[-1])
     local = local_corners(frames.size_x, frames.size_y, frames.outlines)
     places = placed_points(local, frames.x[last], frames.y[last], frames.angle[last])

@@ -133,8 +133,9 @@ class FrameFile:
         self.file[layout.STEP].attrs["time_step"] = self.time_step  # s
 
     def _growing(self, name: str, kind: type, unit: str, *row: int) -> None:
-        chunks = (self.chunk_rows, *row)
-        data_set = self.file.create_dataset(name, (0, *row), dtype=kind, maxshape=(None, *row), chunks=chunks)
+        # a scene may have no blocks; a chunk of nothing cannot be
+        chunks, most = (self.chunk_rows, *(one or 1 for one in row)), (None, *(one or None for one in row))
+        data_set = self.file.create_dataset(name, (0, *row), dtype=kind, maxshape=most, chunks=chunks)
         data_set.attrs["unit"] = unit
 
     def _reserve(self, size: int) -> None:

@@ -53,7 +53,7 @@ def _finite(frames: Frames) -> Indices:
     for track in frames.tracks:
         finite &= np.isfinite(track.values).all(axis=(1, 2))
     chosen = np.flatnonzero(finite)
-    if len(chosen) == 0 or len(frames.names) == 0:
+    if len(chosen) == 0 or not any(track.values.size for track in frames.tracks):
         message = "no frame to export"
         raise InvalidInputError(message)
     return chosen
