@@ -6,6 +6,9 @@ SHELL := bash
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 MAKEFLAGS += --no-builtin-rules
+# Python keeps what it has read of the sources, also where container images tell it not to: tests start some hundred
+# processes, each of which would take half a second longer, and pytest would rewrite all tests in every one of its own.
+unexport PYTHONDONTWRITEBYTECODE
 
 PYTHON ?= python3
 # A PYTHON that somebody names is the only one tried; otherwise newer names are, where python3 is too old.

@@ -11,13 +11,13 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 JOBS = 2
-SPH = "sph"
-OPEN = ("with-particles", "outlines", "surface", "nonsmooth", SPH)  # those that take longest first
+SPH, SOIL = "sph", "soil"
+OPEN = ("outlines", "with-particles", "surface", SOIL, "nonsmooth", SPH)  # those that take longest first
 AS_USERS_HAVE_THEM = ("surface", "nonsmooth")  # for commands that tests run as processes
 
 
 def compile_set(name: str, is_open: bool) -> None:
-    """Compile one set of kernels, and what runs ensembles.
+    """Compile one set of kernels, and what runs ensembles and teams of threads.
 
     Imports come after the setting that lets Python call every kernel, which most tests need; users do not have it.
     """
@@ -25,22 +25,39 @@ def compile_set(name: str, is_open: bool) -> None:
         os.environ["BLOCKSIM_OPEN_KERNELS"] = "1"  # as tests/conftest.py has it
     if name == SPH:
         _use_particles()
+    elif name == SOIL:
+        _run_soil()
     else:
-        _run_smallest(name)
+        _run_smallest(name, is_open)
 
 
-def _run_smallest(name: str) -> None:
+def _run_smallest(name: str, in_team: bool) -> None:
     from blocksim.scenario import scenario_from_mapping  # noqa: PLC0415
     from blocksim.simulation import run_ensemble  # noqa: PLC0415
     from blocksim.simulation.compilation import CHANGES, SMALLEST_SCENE, compile_kernels  # noqa: PLC0415
+    from blocksim.simulation.schemes import build_scene  # noqa: PLC0415
     from blocksim.simulation.schemes.explicit import PARTICLES  # noqa: PLC0415
+    from blocksim.simulation.team import Team  # noqa: PLC0415
 
     compile_kernels(name)
-    if name == PARTICLES:
-        return  # ensembles of those take a minute more, and make test has none
     change: dict[str, Any] = CHANGES[name]
     scene = scenario_from_mapping({**SMALLEST_SCENE, **change, "time": {**change.get("time", {}), "end": 1e-4}})
-    run_ensemble([scene, scene])
+    if in_team:
+        with Team(2) as team:
+            team.advance(build_scene(scene), 1)
+    if name != PARTICLES:  # ensembles of those take a minute more, and make test has none
+        run_ensemble([scene, scene])
+
+
+def _run_soil() -> None:
+    from blocksim.simulation.schemes import build_scene, measured_row  # noqa: PLC0415
+    from blocksim.simulation.team import ALONE, Team  # noqa: PLC0415
+    from tests.soils import column, scene  # noqa: PLC0415
+
+    soil = scene(column(0.05, 0.05, 0.005), end=1e-4)
+    measured_row(ALONE.advance(build_scene(soil), 1)[0])
+    with Team(2) as team:
+        team.advance(build_scene(soil), 1)
 
 
 def _use_particles() -> None:
