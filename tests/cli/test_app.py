@@ -1,7 +1,6 @@
 """The command itself: help, version, mistyped commands, and that it starts quickly."""
 
 import inspect
-import os
 import subprocess
 import sys
 from importlib import import_module
@@ -10,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from blocksim import __version__
+from blocksim.cli.app import app
 from blocksim.cli.commands import COMMANDS, GROUPS
 from tests.cli.conftest import SOFT, Command
 from tests.golden import Golden
@@ -81,15 +81,14 @@ def test_short_help_is_the_long_one(blocksim: Command, arguments: list[str]) -> 
         ("plo", ["plot"]),
     ],
 )
-def test_shell_completes_kinds_and_keys(line: str, offered: list[str]) -> None:
-    words = {
-        "_BLOCKSIM_COMPLETE": "complete_bash",
-        "COMP_WORDS": f"blocksim {line}",
-        "COMP_CWORD": str(line.count(" ") + 1),
-    }
-    code = "from blocksim.cli.app import app; app(prog_name='blocksim')"
-    root = Path(__file__).parents[2]
-    done = subprocess.run(
-        [sys.executable, "-c", code], env={**os.environ, **words}, cwd=root, capture_output=True, text=True, check=False
-    )
-    assert (done.stdout.split(), done.stderr) == (offered, "")
+def test_shell_completes_kinds_and_keys(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], line: str, offered: list[str]
+) -> None:
+    monkeypatch.chdir(Path(__file__).parents[2])
+    monkeypatch.setenv("_BLOCKSIM_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", f"blocksim {line}")
+    monkeypatch.setenv("COMP_CWORD", str(line.count(" ") + 1))
+    with pytest.raises(SystemExit):
+        app(prog_name="blocksim")
+    said = capsys.readouterr()
+    assert (said.out.split(), said.err) == (offered, "")

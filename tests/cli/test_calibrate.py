@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import Document
-from tests.cli.conftest import SCENARIOS, SOFT, Answer, Command, Process
+from tests.cli.conftest import PATIENCE, SCENARIOS, SOFT, Answer, Command, Process
 
 FRICTION, SPEED = "friction.block_ground", "bodies.0.velocity.0"
 TABLE = "block,quantity,unit,replicate,value\nblock,x,mm,1,41\nblock,x,mm,2,43\n"
@@ -138,7 +138,7 @@ def test_stopped_killed_and_resumed_it_finds_the_same(slide: Slide, process: Pro
     journal = tmp_path / "cut.trials.jsonl"
     for number, lines in ((signal.SIGTERM, 5), (signal.SIGKILL, 20)):
         running = process("calibrate", *given)
-        until = time.monotonic() + 120
+        until = time.monotonic() + PATIENCE
         while not journal.exists() or journal.read_text().count("\n") < lines:
             assert time.monotonic() < until
             assert running.poll() is None

@@ -11,14 +11,18 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from blocksim.cli.app import app
 from blocksim.scenario import load_scenario
 from blocksim.simulation.stores.hdf5_reader import read_frames
-from tests.cli.conftest import PATIENCE, SOFT, Command, Process, wait_for
+from tests.cli.conftest import PATIENCE, SCENARIOS, SOFT, Command, Process, Running, wait_for
 from tests.sizes import in_all
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"
-LONG = ("run", NOMINAL, *SOFT, "--set", "time.end=10", "--set", "time.stop_at_rest=false", "--quiet")
+ENDLESS = ("run", NOMINAL, *SOFT, "--set", "time.stop_at_rest=false", "--quiet")
+LONG = (*ENDLESS, "--set", "time.end=10")  # seconds of a process that is killed somewhere
+SHORT = (*ENDLESS, "--set", "time.end=4")
 OFTEN = ("--checkpoint-every", "50 ms")
 OTHERS = [pytest.param(number, marks=pytest.mark.long) for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)]
 Wanted = dict[str, object]
@@ -29,18 +33,22 @@ def told(folder: Path) -> Wanted:
     return summary
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Give the folder of the run that is interrupted below, run in one go; not to be changed."""
-    from typer.testing import CliRunner  # noqa: PLC0415
-
-    from blocksim.cli.app import app  # noqa: PLC0415
-    from tests.cli.conftest import SCENARIOS  # noqa: PLC0415
-
-    folder = tmp_path_factory.mktemp("whole") / "run"
-    arguments = [str(SCENARIOS / Path(word).name) if word == NOMINAL else word for word in LONG]
+def in_one_go(run: tuple[str, ...], folder: Path) -> Path:
+    arguments = [str(SCENARIOS / Path(word).name) if word == NOMINAL else word for word in run]
     assert CliRunner().invoke(app, [*arguments, "--out", str(folder)]).exit_code == 0
     return folder
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Give the folder of the long run, run in one go; not to be changed."""
+    return in_one_go(LONG, tmp_path_factory.mktemp("whole") / "run")
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Give the folder of the short one."""
+    return in_one_go(SHORT, tmp_path_factory.mktemp("short") / "run")
 
 
 def assert_same(folder: Path, whole: Path) -> None:
@@ -76,6 +84,16 @@ def committed(path: Path) -> int:
             return int(file["n_committed"][()])
     except FileNotFoundError:
         return 0
+
+
+def wait_for_frames(path: Path, running: Running) -> None:
+    """Wait until a run has stored some."""
+    wait_for(path, running)
+    began = time.monotonic()
+    while committed(path) < 3:
+        assert running.poll() is None, running.communicate()
+        assert time.monotonic() - began < PATIENCE
+        time.sleep(0.005)
 
 
 def frames_in(folder: Path) -> int:
@@ -120,16 +138,13 @@ def test_hundred_kills_lose_nothing(process: Process, tmp_path: Path, whole: Pat
 
 @pytest.mark.parametrize("number", [signal.SIGINT, *OTHERS])
 def test_stopped_run_continues_to_the_same_bits(
-    process: Process, tmp_path: Path, whole: Path, number: signal.Signals
+    process: Process, tmp_path: Path, short: Path, number: signal.Signals
 ) -> None:
-    running = process(*LONG, "--out", "out")
-    wait_for(tmp_path / "out" / "run.h5", running)
-    time.sleep(0.2)
-    sent = time.monotonic()
+    running = process(*SHORT, "--out", "out")
+    wait_for_frames(tmp_path / "out" / "run.h5", running)
     running.send_signal(number)
     _, err = running.communicate(timeout=PATIENCE)
-    assert time.monotonic() - sent < 10.0
-    assert running.returncode == 75
+    assert running.returncode == 75, err
     assert (
         f"interrupted: stopped by {number.name}; partial results are in out\ncontinue with --resume (checkpoint" in err
     )
@@ -138,44 +153,44 @@ def test_stopped_run_continues_to_the_same_bits(
     assert frames_in(tmp_path / "out") > 1
     assert not (tmp_path / "out" / "done.json").exists()
     step = told(tmp_path / "out")["steps"]
-    running = process(*LONG, "--out", "out", "--resume")
+    running = process(*SHORT, "--out", "out", "--resume")
     running.communicate(timeout=PATIENCE)
     assert told(tmp_path / "out")["resumed_from"] == [step]
-    assert_same(tmp_path / "out", whole)
+    assert_same(tmp_path / "out", short)
 
 
 def test_second_signal_stops_while_a_checkpoint_is_being_written(process: Process, tmp_path: Path) -> None:
-    slow = "import blocksim.simulation.checkpoint_policy as w, time; w.write_checkpoint = lambda *_: time.sleep(600)"
+    slow = (
+        "import blocksim.simulation.checkpoint_policy as w, time\n"
+        "w.write_checkpoint = lambda *_: (open('writing', 'w').close(), time.sleep(600))"
+    )
     running = process(*LONG, "--out", "out", before=slow)
-    wait_for(tmp_path / "out" / "run.h5", running)
-    time.sleep(0.5)
+    wait_for_frames(tmp_path / "out" / "run.h5", running)
     running.send_signal(signal.SIGINT)
-    time.sleep(1.0)
-    assert running.poll() is None
-    sent = time.monotonic()
+    wait_for(tmp_path / "writing", running)
     running.send_signal(signal.SIGINT)
-    _, err = running.communicate(timeout=PATIENCE)
-    assert time.monotonic() - sent < 10.0
+    _, err = running.communicate(timeout=PATIENCE)  # sooner than the checkpoint is written
     assert (running.returncode, err) == (75, "stopped\n")
     assert committed(tmp_path / "out" / "run.h5") > 0
 
 
-def test_wall_time_stops_and_resume_tells_where_it_continues(blocksim: Command, tmp_path: Path, whole: Path) -> None:
-    stopped = blocksim(*LONG, "--out", "out", "--wall-time", "0.3 s")
+def test_wall_time_stops_and_resume_tells_where_it_continues(blocksim: Command, tmp_path: Path, short: Path) -> None:
+    stopped = blocksim(*SHORT, "--out", "out", "--wall-time", "0.1 s")
     assert stopped.code == 75
-    assert "interrupted: wall-time limit of 0.3 s reached" in stopped.err
+    assert "interrupted: wall-time limit of 0.1 s reached" in stopped.err
     step = told(tmp_path / "out")["steps"]
-    assert blocksim(*LONG, "--out", "out").code == 73
-    again = blocksim(*LONG[:-1], "--out", "out", "--resume")
+    assert blocksim(*SHORT, "--out", "out").code == 73
+    loud = tuple(word for word in SHORT if word != "--quiet")
+    again = blocksim(*loud, "--out", "out", "--resume")
     assert again.code == 0
     assert again.err.startswith(f"resuming at step {step} (")
-    assert_same(tmp_path / "out", whole)
-    shown = blocksim(*LONG[:-1], "--out", "out", "--resume")
+    assert_same(tmp_path / "out", short)
+    shown = blocksim(*loud, "--out", "out", "--resume")
     assert shown.err.startswith("already computed; rerun with --overwrite")
 
 
 def test_run_of_other_code_or_values_that_waits_is_reported(blocksim: Command) -> None:
-    stopped = blocksim(*LONG, "--wall-time", "0.2 s")
+    stopped = blocksim(*LONG, "--wall-time", "0.1 s")
     assert stopped.code == 75
     other = ("run", NOMINAL, *SOFT, "--set", "time.end=0.01")
     answer = blocksim(*other, "--resume")

@@ -77,10 +77,8 @@ def test_endless_case_is_given_up_at_once(process: Process, tmp_path: Path, numb
     running = process("sweep", "scenarios/three_blocks_nonsmooth.toml", *endless, "--out", "out")
     wait_for(tmp_path / "out" / "manifest.jsonl", running)
     time.sleep(0.5)
-    began = time.monotonic()
     running.send_signal(number)
-    _, err = running.communicate(timeout=PATIENCE)
-    assert time.monotonic() - began < 5.0  # most of it is waiting for a busy machine
+    _, err = running.communicate(timeout=PATIENCE)  # the case itself would take longer than that
     assert running.returncode == 75
     assert err == "stopped with 0 of 2 cases done; rerun the command to finish\n"
     assert (tmp_path / "out" / "sweep.csv").read_text().count("\n") == 1

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-PATIENCE = 30.0  # s of wall time, after which a command counts as hanging; machines of tests are busy
+PATIENCE = 120.0  # s of wall time, after which a command counts as hanging; machines of tests are busy
 MOST_SECONDS = 2.0  # of processor time
 MOST_BYTES = 10**9
 COLLECTED = 10  # commands between two collections of garbage

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
 
-PATIENCE = 120.0  # s, until threads that do not come back count as waiting for ever
+PATIENCE = 600.0  # s, until threads that do not come back count as waiting for ever
 WORK_SPACE = ("points", "matrices", "before", "action")  # of one thread each
 SOFT = {"stiffness_scale": 1e-4, "max_overlap": 5e-3}  # a hundredth of the steps
 
