@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import h5py
@@ -24,8 +25,6 @@ from tests.simulation.sliding import MODELS, assert_same, interrupted_at, slidin
 from tests.sizes import in_all
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from blocksim.scenario import Scenario
     from blocksim.simulation import Result
     from blocksim.simulation.schemes import AnyScene
@@ -137,22 +136,29 @@ def test_contacts_of_all_frames_are_kept_once(tmp_path: Path, name: str) -> None
 
 
 def test_checkpoints_threads_and_outputs_change_no_bit(tmp_path: Path) -> None:
-    scenario = sliding({}, end=0.02)
+    scenario = sliding({}, end=0.005)
     often = CheckpointPolicy(checkpoint_steps=7, checkpoint_time=1e-4, checkpoint_seconds=1e-3)
     one = simulate_into(scenario, tmp_path / "one")
     other = simulate_into(scenario, tmp_path / "other", precautions=often)
     assert_same(one, other)
     assert not [path for path in (tmp_path / "other").iterdir() if path.name.startswith(("checkpoint", "."))]
-    rare = simulate_into(sliding({}, end=0.02, every=0.0137), tmp_path / "rare", precautions=often)
+    rare = simulate_into(sliding({}, end=0.005, every=0.00137), tmp_path / "rare", precautions=often)
     assert rare.summary.final_state_sha256 == one.summary.final_state_sha256
 
 
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a run with two checkpoints that was interrupted; not to be changed."""
+    folder = tmp_path_factory.mktemp("interrupted") / "begun"
+    interrupted_at(sliding({}), folder, [500, 1000])
+    assert (folder / "checkpoint.1").is_file()
+    return folder
+
+
 @pytest.fixture
-def begun(tmp_path: Path) -> Path:
-    """Return the folder of a run with two checkpoints that was interrupted."""
-    interrupted_at(sliding({}), tmp_path / "begun", [500, 1000])
-    assert (tmp_path / "begun" / "checkpoint.1").is_file()
-    return tmp_path / "begun"
+def begun(interrupted: Path, tmp_path: Path) -> Path:
+    """Return a copy of the run that was interrupted."""
+    return Path(shutil.copytree(interrupted, tmp_path / "begun"))
 
 
 def newest(folder: Path) -> Path:

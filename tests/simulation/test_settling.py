@@ -50,8 +50,8 @@ def support_force(scene: Any, count: int) -> float:
 
 
 @pytest.mark.parametrize(
-    ("scheme", "scale", "tilt"),  # on springs so soft the wall falls at 30.8 degrees, and leans far before it does
-    [("explicit", 0.001, 28.0), ("explicit", 0.01, 30.0), ("nonsmooth", 1.0, 30.0)],
+    ("scheme", "scale", "tilt"),  # on springs so soft the wall falls soon after, and leans far before it does
+    [("explicit", 0.01, 30.0), ("nonsmooth", 1.0, 30.0)],
 )
 def test_the_tilted_wall_starts_at_rest_and_the_ground_carries_its_weight(
     scheme: str, scale: float, tilt: float

@@ -124,10 +124,9 @@ def test_bits_do_not_depend_on_the_number_of_threads_nor_on_interruptions(
         column(0.05, 0.1, SPACING), blocks=blocks, bodies=carried, walls=[LEFT], end=0.03, output={"every": 0.01}
     )
     whole = blocksim.run(scenario)
-    for threads in (2, 4):
-        again = blocksim.run(scenario, threads=threads)
-        assert again.summary.final_state_sha256 == whole.summary.final_state_sha256
-        assert again.summary.energy_J == whole.summary.energy_J
+    again = blocksim.run(scenario, threads=3)
+    assert again.summary.final_state_sha256 == whole.summary.final_state_sha256
+    assert again.summary.energy_J == whole.summary.energy_J
     cut = CheckpointPolicy(wall_time=1e-9)
     result = blocksim.run(scenario, out=tmp_path / "run", precautions=cut)
     assert result.status == "interrupted"

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from blocksim.scenario import PlacedBody, Scenario
 
 SENSITIVE = {"V18", "V19", "V21", "V22"}  # an impact in the next substep, or a sweep more, for a digit of round-off
-LONG = {"V4", "V10", "V15", "V18", "V23"}  # seconds
+LONG = {"V3", "V4", "V9", "V10", "V13", "V15", "V17", "V18", "V23"}  # seconds
 SETTING = Setting(scheme="nonsmooth")
 CASES = [
     pytest.param(case, id=case.id, marks=[pytest.mark.long] if case.id in LONG else [])

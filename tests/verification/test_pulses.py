@@ -29,12 +29,15 @@ def under_sine(scheme: str, share: float, **values: Any) -> Result:
     return simulate(load_scenario(SCENARIOS / "pulse.toml", overrides))
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize(
-    ("limit", "falls_above"),
-    [(0.7362, True), (1.7066, False), (1.8733, True)],
-    ids=["falls", "survives", "falls again"],
-)
+LIMITS = {"falls": (0.7362, True), "survives": (1.7066, False), "falls again": (1.8733, True)}
+OVERTURNING = [
+    pytest.param(scheme, *LIMITS[name], id=f"{name}-{scheme}", marks=pytest.mark.long if is_long else ())
+    for name in LIMITS
+    for scheme, is_long in (("explicit", name != "falls"), ("nonsmooth", False))
+]
+
+
+@pytest.mark.parametrize(("scheme", "limit", "falls_above"), OVERTURNING)
 def test_a_one_sine_pulse_overturns_from_the_published_amplitudes_on(
     scheme: str, limit: float, falls_above: bool
 ) -> None:

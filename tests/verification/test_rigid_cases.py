@@ -69,7 +69,8 @@ def peaks(width: float, height: float, restitution: float, **time: object) -> ND
 
 
 @pytest.mark.parametrize(
-    ("width", "height", "restitution"), [(0.01, 0.04, 0.5), (0.2, 0.8, 0.5), (0.032, 0.05, 0.5), (0.032, 0.05, 0.2)]
+    ("width", "height", "restitution"),
+    [(0.01, 0.04, 0.5), pytest.param(0.2, 0.8, 0.5, marks=pytest.mark.long), (0.032, 0.05, 0.5), (0.032, 0.05, 0.2)],
 )
 def test_rocking_peaks_are_within_a_percent_at_the_default_step(
     width: float, height: float, restitution: float
@@ -129,6 +130,7 @@ CASES_OF = {
 }
 
 
+@pytest.mark.long  # what a case can notice changes with the case alone
 @pytest.mark.parametrize(("name", "factor", "case_id"), [(*key, case) for key, ids in CASES_OF.items() for case in ids])
 def test_a_wrong_number_is_noticed(name: str, factor: float, case_id: str) -> None:
     assert rows_missed(Wrong(scheme="nonsmooth", name=name, factor=factor), case_id)

@@ -26,7 +26,7 @@ def test_shear_force_never_leaves_the_static_cone(start_shipped: Callable[..., S
     )
     last, shears = 0.35, 0
     while scene.time < last:
-        scene.to_step(scene.steps + 5)
+        scene.to_step(scene.steps + 20)
         pairs: Any = scene.world.pairs[: scene.world.clock[0].pair_count]
         ground = pairs.b == len(scene.bodies)
         static = np.where(ground, 0.38, 0.31).repeat(pairs.active)

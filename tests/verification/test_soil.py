@@ -18,6 +18,7 @@ def outside(case: Case, setting: Setting) -> list[str]:
     return [row.quantity for row in run_case(case, setting).rows if row.verdict != Verdict.INSIDE]
 
 
+@pytest.mark.long  # tests/simulation/test_soil.py has a wall that is drawn back
 def test_active_thrust_is_that_of_mohr_and_coulomb() -> None:
     (case,) = chosen_of_soil(["s2"])
     assert outside(case, Setting(quick=True)) == []

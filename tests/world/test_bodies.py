@@ -193,8 +193,10 @@ def edge_at(drop: float) -> dict[str, object]:
     return {"profile": [[-1.0, 0.0], [0.0, 0.0], [1.0, -drop]]}
 
 
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("drop", [0.0, 0.02, 0.5])
+@pytest.mark.parametrize(
+    ("model", "drop"),
+    [("surface", 0.0), ("surface", 0.02), ("surface", 0.5), ("kernel", 0.02), ("particles", 0.02)],
+)
 def test_block_sliding_over_an_edge_gets_no_kick(model: str, drop: float) -> None:
     scene = scene_of([{**LYING, "x": -0.03, "velocity": [1.0, 0.0]}], model=model, ground=edge_at(drop))
     while scene.bodies[0].x < -1e-4:
