@@ -4,23 +4,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from blocksim.view import style
-from blocksim.view.forces import ForceScale, WithContacts, draw_forces, force_scale
+from blocksim.view.forces import WithContacts, draw_forces, force_scale
 from blocksim.view.labels import LINE, SPACE, Label, arranged, depth, draw_label, labels_of, lines_of, row_height
 from blocksim.view.layout import OWN, Paper
+from blocksim.view.load_arrows import draw_marks, draw_outside
+from blocksim.view.loads import length_in, outside, with_room
 from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import Canvas, Page, depth_of, draw_ruler, finish_panel, page_for
-from blocksim.view.run_data import FramesLike, Indices, Support, drawable_frames, moments_at
+from blocksim.view.run_data import FramesLike, Support, drawable_frames, moments_at
 from blocksim.view.scene import draw_centres, draw_scene
 from blocksim.view.strip import MeasuredTable, widened
-from blocksim.view.window import extent_of
+from blocksim.view.window import Extent, extent_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH = 7.2  # inches
+MARKS = 0.2  # inches, for what acts on all blocks, above the panel
 SIDE, HEAD, AXIS, FOOT = 0.25, 0.32, 0.42, 0.24  # inches; AXIS: numbers below the panel, FOOT: the line below all
 TALLEST = 5.0  # inches, of the panel
 MOST_LINES = 36  # below the panel; more labels fit no page
@@ -55,12 +58,20 @@ def draw_final(  # noqa: PLR0913 - one argument for each option of the command
     chosen = drawable[-1:] if times is None else moments_at(frames, drawable, times)[-1:]
     frame = int(chosen[0])
     scale = force_scale(frames) if forces else None
-    sheet = _sheet(frames, chosen, support, measured if frame == drawable[-1] else None, paper, paint.height, scale)
+    acts = outside(frames, chosen, support)
+    told = "\n".join(filter(None, ("" if scale is None else scale.explanation, acts.explanation)))
+    around = _Around(HEAD + MARKS * any(acts.marks), paint.height, told)
+    extent = extent_of(frames, chosen, support)
+    length = length_in(extent)
+    extent = widened(with_room(extent, acts, length), [])
+    sheet = _sheet(frames, frame, extent, measured if frame == drawable[-1] else None, paper, around)
     with style.styled_figure(sheet.page.width, sheet.height, paper.dots) as figure:
-        canvas = _draw_panel(figure, frames, frame, sheet.page, support, paint)
+        canvas = _draw_panel(figure, frames, frame, sheet, support, paint)
         if sheet.is_labelled and sheet.labels:
             draw_centres(canvas, frames, frame)
             _draw_labels(figure, sheet)
+        draw_outside(canvas, acts, 0, length)
+        draw_marks(canvas, acts.marks[0])
         if scale is not None:
             draw_forces(canvas, frames, frame, scale)
         draw_key(figure, paint, SIDE, sheet.foot - paint.height)
@@ -68,14 +79,23 @@ def draw_final(  # noqa: PLR0913 - one argument for each option of the command
         style.save_figure(figure, path)
 
 
+class _Around(NamedTuple):
+    """What is above and below: heights (inches) of the head and of the key of colours, explanations."""
+
+    head: float
+    key: float
+    told: str
+
+
 @dataclass(frozen=True)
 class Sheet:
-    """The page: its panel, the labels below it, its height and the height of everything below the labels (inches)."""
+    """The page: its panel, the labels and lines below it; heights of all, of the head and of what is below (inches)."""
 
     page: Page
     labels: tuple[Label, ...]
     notes: tuple[str, ...]
     height: float
+    head: float
     foot: float
 
     @property
@@ -89,49 +109,42 @@ class Sheet:
         return depth(self.labels) / style.POINTS_PER_INCH if self.is_labelled else 0.0
 
 
-def _sheet(  # noqa: PLR0913, PLR0917 - all that decides the layout
+def _sheet(
     frames: FramesLike,
-    chosen: Indices,
-    support: Support,
+    frame: int,
+    extent: Extent,
     measured: MeasuredTable | None,
     paper: Paper,
-    key: float,
-    scale: ForceScale | None,
+    around: _Around,
 ) -> Sheet:
     """Return the page; if its size is given, the panel takes the room that the labels leave."""
-    extent = widened(extent_of(frames, chosen, support), [])
     width, tallest = paper.width(WIDTH, LEAST_WIDTH), TALLEST
-    sheet = _tried(frames, int(chosen[0]), page_for(extent, width, tallest, (SIDE, HEAD, AXIS)), measured, (key, scale))
+    margins = SIDE, around.head, AXIS
+    sheet = _tried(frames, frame, page_for(extent, width, tallest, margins), measured, around)
     for _ in range(FITTINGS if paper.size is not None else 0):
         tallest = min(paper.panel(0.0, 1, sheet.height - sheet.page.panel_height, LOWEST), tallest)
-        page = page_for(extent, width, tallest, (SIDE, HEAD, AXIS))
-        sheet = _tried(frames, int(chosen[0]), page, measured, (key, scale))
+        sheet = _tried(frames, frame, page_for(extent, width, tallest, margins), measured, around)
         tallest -= max(sheet.height - paper.height(0.0), 0.0)
     return replace(sheet, height=paper.height(sheet.height))
 
 
-def _tried(
-    frames: FramesLike,
-    frame: int,
-    page: Page,
-    measured: MeasuredTable | None,
-    below: tuple[float, ForceScale | None],
-) -> Sheet:
-    """Return the page for a panel; `below` are the height (inches) of the key of colours and the scale of forces."""
-    key, scale = below
+def _tried(frames: FramesLike, frame: int, page: Page, measured: MeasuredTable | None, around: _Around) -> Sheet:
+    """Return the page for a panel."""
     labels = tuple(arranged(labels_of(frames, frame, page, measured), page))
     text = _legend(labels, is_labelled=lines_of(labels) <= MOST_LINES)
-    text = text if scale is None else f"{text}\n{scale.explanation}"
+    text = "\n".join(filter(None, (text, around.told)))
     notes = tuple(line for part in text.split("\n") for line in wrap(part, int(LETTERS_AN_INCH * page.width)))
-    foot = FOOT + (len(notes) - 1) * LINE / style.POINTS_PER_INCH + key
-    sheet = Sheet(page, labels, notes, 0.0, foot)
+    foot = FOOT + (len(notes) - 1) * LINE / style.POINTS_PER_INCH + around.key
+    sheet = Sheet(page, labels, notes, 0.0, around.head, foot)
     return replace(sheet, height=page.height + sheet.room + foot)
 
 
-def _draw_panel(figure: "Figure", frames: FramesLike, frame: int, page: Page, support: Support, paint: Paint) -> Canvas:
+def _draw_panel(
+    figure: "Figure", frames: FramesLike, frame: int, sheet: Sheet, support: Support, paint: Paint
+) -> Canvas:
     """Draw the blocks at the top of the page."""
-    height = float(figure.get_figheight())
-    bottom = height - HEAD - page.panel_height
+    page, height = sheet.page, float(figure.get_figheight())
+    bottom = height - sheet.head - page.panel_height
     place = SIDE / page.width, bottom / height, page.panel_width / page.width, page.panel_height / height
     canvas = Canvas(figure.add_axes(place), page.extent, page.points_per_mm)
     draw_scene(canvas, frames, frame, support, paint)
@@ -173,6 +186,8 @@ def _caption(frames: FramesLike, frame: int) -> str:
 
 
 def _legend(labels: Sequence[Label], *, is_labelled: bool) -> str:
+    if not labels:
+        return ""
     if not is_labelled:
         return f"{len(labels)} blocks: too many to name x and rotation of each."
     texts = ["Below each block: x of its centre, rotation."]

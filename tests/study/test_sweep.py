@@ -69,7 +69,7 @@ def test_rows_distinguish_what_rocked_back_from_what_stands(tmp_path: Path) -> N
     assert table["first_mover"][1] == "1"
     assert table["first_moved_s"][1] == pytest.approx(0.01, abs=1e-5)  # the first frame
     kept = run_case(Document.from_mapping(ROCKING).with_values({"bodies.0.spin": 6.0}).build(), tmp_path / "case")
-    assert [kept[name] for name in MOVEMENT] == table.loc[1, list(MOVEMENT)].tolist()
+    assert [kept[name] for name in MOVEMENT] == [table[name][1] for name in MOVEMENT]
 
 
 def test_cases_are_drawn_as_the_command_draws_them(quick: Document, tmp_path: Path) -> None:

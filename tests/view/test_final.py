@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from blocksim.view.final import draw_final
 from tests.view.drawings import TABLE
 from tests.view.made_up import boxes_of, toppling
+from tests.view.test_loads import support
 
 
 def test_labels_and_measured_ranges_stand_below_what_they_are_about(caught: list[Figure]) -> None:
@@ -27,3 +28,16 @@ def test_rotation_counts_from_the_start_and_is_not_wrapped(caught: list[Figure])
     frames.angle[:, 0] = np.linspace(np.pi, 4.0 * np.pi, len(frames))
     draw_final(frames, "final.png")
     assert "540.00°" in [text for text, _ in boxes_of(caught[0])]
+
+
+def test_loads_are_drawn_and_explained_with_room_for_what_acts_on_all_blocks(caught: list[Figure]) -> None:
+    force: dict[str, object] = {"kind": "force", "body": "1", "magnitude": "20 N"}
+    loads = [force, {"kind": "horizontal", "magnitude": 0.1}]
+    draw_final(toppling(1), "final.png", support=support(loads))
+    draw_final(toppling(1), "final.png")
+    loaded, bare = (dict(boxes_of(figure)) for figure in caught)
+    assert any("Red arrows: loads, the longest 20 N." in text for text in loaded)
+    assert set(loaded) - set(bare) >= {"0.1 g"}
+    panel = caught[0].axes[0].get_window_extent()
+    assert loaded["0.1 g"][1] > panel.y1  # above the panel
+    assert loaded["0.1 g"][3] < caught[0].bbox.height - 72.0 * 0.1  # below the time
