@@ -21,16 +21,18 @@ from blocksim.kernels.common.geometry import place_corners
 from blocksim.kernels.common.integrate import renew_rotations
 from blocksim.kernels.common.jit import config
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
-from blocksim.verification.scene import Simulation, scenario_of
+from blocksim.simulation.team import Team
+from blocksim.verification.scene import scenario_of
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from blocksim.kernels.common.arrays import Record, Records, World
+    from blocksim.simulation.schemes import Scene
 
 IS_INTERPRETED = bool(config.DISABLE_JIT)
-BODY_STEPS = 1000  # a test, times bodies: a second or two of an interpreter
+BODY_STEPS, BODY_STEPS_RIGID = 400, 1000  # a test, times bodies: a second or two of an interpreter
 PARTICLES_COST = 15  # a step with boundary particles, in steps of the surface model
 
 if IS_INTERPRETED:
@@ -56,16 +58,17 @@ def patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the compiler, skip a test that asks for more steps than it is given."""
     if not IS_INTERPRETED:
         return
-    left, proceed = [BODY_STEPS], Simulation.to_step
+    spent, advance = [0], Team.advance
 
-    def to_step(scene: Simulation, last_step: int) -> Simulation:
-        cost = 1 if scene.world.particles is None else PARTICLES_COST
-        left[0] -= (last_step - scene.steps) * scene.bodies.size * cost
-        if left[0] < 0:
+    def advance_scene(team: Team, scene: Scene, last_step: int) -> tuple[Scene, int]:
+        world = scene.world
+        cost = 1 if world.particles is None else PARTICLES_COST
+        spent[0] += (last_step - int(world.clock[0].steps)) * (world.bodies.size - 1) * cost
+        if spent[0] > (BODY_STEPS if scene is world else BODY_STEPS_RIGID):
             pytest.skip("steps a scene too far for an interpreter")
-        return proceed(scene, last_step)
+        return advance(team, scene, last_step)
 
-    monkeypatch.setattr(Simulation, "to_step", to_step)
+    monkeypatch.setattr(Team, "advance", advance_scene)
 
 
 class MakeBody(Protocol):

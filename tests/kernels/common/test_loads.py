@@ -87,6 +87,7 @@ def test_a_moment_spins_a_block_about_its_centre(scheme: str) -> None:
     assert work_of_loads(result) == pytest.approx(-3000.0 * end["angle"], rel=EXACT)
 
 
+@pytest.mark.usefixtures("compiler")
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_force_at_a_point_is_the_force_at_the_centre_and_its_moment(scheme: str) -> None:
     at, size = [0.4, 0.2], 1500.0
@@ -119,6 +120,7 @@ HISTORIES: dict[str, tuple[dict[str, Any], float]] = {  # and the integral of th
 }
 
 
+@pytest.mark.usefixtures("compiler")
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("kind", HISTORIES)
 def test_a_force_that_goes_with_time_brings_the_integral_of_its_history(scheme: str, kind: str) -> None:
@@ -131,6 +133,7 @@ def test_a_force_that_goes_with_time_brings_the_integral_of_its_history(scheme: 
     assert work_of_loads(result) == pytest.approx(0.5 * MASS * end["vx"] ** 2, rel=SECOND_ORDER)
 
 
+@pytest.mark.usefixtures("compiler")
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_uniform_horizontal_load_is_gravity_that_is_tilted_in_its_limit(scheme: str) -> None:
     tilt, share = math.atan(0.2), math.hypot(1.0, 0.2)
@@ -211,6 +214,7 @@ def test_the_piece_of_a_history_is_found_among_those_of_several_loads() -> None:
     assert [value_at(world, world.loads[n], 0.55) for n in (0, 2)] == [1.0, 1.0]
 
 
+@pytest.mark.usefixtures("compiler")
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_run_whose_load_still_changes_does_not_end_at_rest(scheme: str) -> None:
     lying = [{"block": "b", "x": 0.0, "y": HEIGHT / 2}]

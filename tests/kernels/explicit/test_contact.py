@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from blocksim.kernels.common.arrays import NORMAL, SHEAR
@@ -22,6 +22,7 @@ from blocksim.kernels.explicit.contact import (
 from blocksim.kernels.explicit.damping import BOTH, OPERATOR_LIFE
 from blocksim.kernels.explicit.inertia import Piece
 from blocksim.kernels.explicit.kinematics import mutual_mass, resolve_point
+from blocksim.kernels.explicit.matrices import RANK_TOLERANCE
 from blocksim.kernels.explicit.models import KERNEL, PARTICLES, SURFACE
 from tests.kernels.conftest import dashpots_by_definition
 
@@ -154,6 +155,7 @@ def lives(world: World) -> list[int]:
 @pytest.mark.parametrize("weights", [(1.0, 1.0), (0.7, 0.7), (0.6, 1.2), (0.0, 1.0)])
 @pytest.mark.parametrize(("count", "pattern"), [(1, 1), (2, BOTH), (2, 1), (2, 2)])
 @given(seed=st.integers(0, 10_000))
+@example(seed=70)  # tangents that are nearly parallel
 def test_dashpots_of_a_pair_follow_the_definition(
     pose: Pose, direction: int, weights: tuple[float, float], count: int, pattern: int, seed: int
 ) -> None:
@@ -167,7 +169,10 @@ def test_dashpots_of_a_pair_follow_the_definition(
     masses = np.array([[mutual_mass(one, two, of_a, of_b, direction) for two in points] for one in points])
     expected = points.force + dashpots_by_definition(points, masses, 0.7, STEP)
     damp(world, 0, count, direction, pattern, 0.7, STEP)
-    assert points.force == pytest.approx(expected, rel=1e-7, abs=1e-9 * np.abs(expected).max())
+    # masses of rank one but for an eigenvalue that counts as zero: A tr(A)^(-3/2) is off by its share of the other
+    share = np.linalg.eigvalsh(masses)[0] / np.trace(masses)
+    rank_one = share < RANK_TOLERANCE and points.size == 2
+    assert points.force == pytest.approx(expected, rel=1e-7 + 2.0 * share * rank_one, abs=1e-9 * np.abs(expected).max())
     assert lives(world)[direction] == (OPERATOR_LIFE if weights[0] == weights[count - 1] == 1.0 else 0)
     assert lives(world)[1 - direction] == 0
     assert direction == NORMAL or world.pairs[0].sticking == pattern

@@ -93,6 +93,7 @@ def test_turning_about_an_edge_is_of_second_order(single: Callable[..., Any]) ->
     assert error(1e-3, 4)[:2].max() < 2e-6
 
 
+@pytest.mark.usefixtures("compiler")
 @pytest.mark.parametrize(("degrees", "slides"), [(-0.5, False), (0.5, True)])
 def test_slope_holds_below_the_friction_angle_only(single: Callable[..., Any], degrees: float, slides: bool) -> None:
     slope = math.atan(0.38) + math.radians(degrees)
@@ -144,6 +145,7 @@ def test_toppling_before_the_first_impact(begin: Callable[..., Any], step: float
     assert run.bodies.y[1:] == pytest.approx([32.025e-3, 48.972e-3], abs=within)
 
 
+@pytest.mark.usefixtures("compiler")
 @pytest.mark.parametrize("restitution", [0.0, 0.2, 0.9])
 @pytest.mark.parametrize("substeps", [1, 4])
 def test_energy_adds_up_to_round_off(begin: Callable[..., Any], restitution: float, substeps: int) -> None:

@@ -43,6 +43,7 @@ def test_flight_is_a_parabola_in_position_and_velocity(single: Callable[..., Sim
     assert run.residual() < 1e-13
 
 
+@pytest.mark.usefixtures("compiler")
 def test_correction_is_small_and_goes_with_the_step(single: Callable[..., Simulation]) -> None:
     def worst(step: float) -> float:
         blocks = [{"y": (i + 0.5) * HEIGHT + 0.01, "x": 0.002 * i} for i in range(4)]

@@ -174,6 +174,7 @@ def test_momentum_of_blocks_in_flight_is_kept(single: Callable[..., Simulation],
     assert abs(momenta() - before)[:2].max() < 1e-12
 
 
+@pytest.mark.usefixtures("compiler")
 @pytest.mark.parametrize("restitution", [0.6, 0.9, 1.0])
 def test_crowd_with_friction_never_gains_energy(
     single: Callable[..., Simulation], restitution: float, pace: int

@@ -31,6 +31,7 @@ def test_impact_happens_at_its_time_to_a_64th_of_a_step(single: Callable[..., Si
     assert run.bodies.y[0] == pytest.approx(ON_GROUND + 0.8 * (run.time - start), abs=run.step / 64.0)
 
 
+@pytest.mark.usefixtures("compiler")
 def test_blocks_that_stand_do_not_notice_that_steps_are_cut(single: Callable[..., Simulation]) -> None:
     standing = [{"y": ON_GROUND + k * HEIGHT} for k in range(4)]
     run = single([*standing, HOPPING], restitution=0.9).to_time(0.2)

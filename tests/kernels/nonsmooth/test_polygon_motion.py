@@ -75,6 +75,7 @@ def test_hexagon_that_rolls_onto_its_next_face_keeps_eleven_seventeenths_of_its_
     assert spins[fall + 3] / spins[fall - 1] == pytest.approx(11.0 / 17.0, rel=0.005)
 
 
+@pytest.mark.usefixtures("compiler")
 @pytest.mark.parametrize("ground", ["half-plane", "piece"])
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize(("degrees", "slides"), [(-0.5, False), (0.5, True)])
@@ -122,6 +123,7 @@ def poses(random: Any, outlines: list[Corners]) -> list[Block]:
     return blocks
 
 
+@pytest.mark.usefixtures("compiler")
 @pytest.mark.parametrize("e", [0.3, 1.0])
 def test_random_pairs_push_one_another_alike_and_gain_no_energy(e: float) -> None:
     """2000 of them: impulses and their moments are opposite and equal, at the places where bodies were."""

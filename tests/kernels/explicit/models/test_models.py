@@ -100,6 +100,7 @@ def test_flat_landing_rebounds_as_asked(start: Start, paper_block: PaperBlock, m
         assert scene.bodies[0].vy == pytest.approx(e * speed, abs=0.01 * speed)
 
 
+@pytest.mark.usefixtures("compiler")
 @pytest.mark.parametrize("spacing", [0.5e-3, 1e-3, 2e-3, 4e-3])
 @BOTH
 def test_rebound_does_not_depend_on_the_spacing_of_the_kernel_model(
