@@ -81,7 +81,7 @@ golden: $(DEV_STAMP) ## Write the texts that tests expect, tests/**/golden/*.txt
 .PHONY: faults
 faults: $(DEV_STAMP) ## Put deliberate faults into the code, one at a time: does make test notice every one of them?
 	@$(COMPILE)
-	$(VENV_PYTHON) -m tests.faults.run
+	$(VENV_PYTHON) -m tests.faults.run $(FAULTS)
 
 .PHONY: verify-table
 verify-table: $(DEV_STAMP) ## Measure all verification cases and write their table into blocksim/verification/README.md

@@ -81,7 +81,9 @@ def test_only_a_list_of_caught_faults_is_well(
         yield Workers(verdict, code)
 
     monkeypatch.setattr(run, "pool", pool)
-    assert run.main(["--only", "caret is one column off"]) == expected
+    only = ["--only", "caret is one column off"]
+    assert run.main(only) == expected
     said = capsys.readouterr().out
     assert ("1 faults: " in said) is (code == 0)
     assert ("fail without any fault" in said) is (code == 1)
+    assert run.main([*only, "--tests-passed"]) == (verdict is not Verdict.CAUGHT)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from blocksim.simulation.schemes import Scene
 
 IS_INTERPRETED = bool(config.DISABLE_JIT)
-BODY_STEPS, BODY_STEPS_RIGID = 400, 1000  # a test, times bodies: a second or two of an interpreter
+BODY_STEPS = 1000  # a test, times bodies: a second or two of an interpreter
 PARTICLES_COST = 15  # a step with boundary particles, in steps of the surface model
 
 if IS_INTERPRETED:
@@ -64,7 +64,7 @@ def patience(monkeypatch: pytest.MonkeyPatch) -> None:
         world = scene.world
         cost = 1 if world.particles is None else PARTICLES_COST
         spent[0] += (last_step - int(world.clock[0].steps)) * (world.bodies.size - 1) * cost
-        if spent[0] > (BODY_STEPS if scene is world else BODY_STEPS_RIGID):
+        if spent[0] > BODY_STEPS:
             pytest.skip("steps a scene too far for an interpreter")
         return advance(team, scene, last_step)
 
