@@ -147,10 +147,10 @@ def test_frames_name_particles_as_they_were_placed() -> None:
 
 
 def test_particles_too_near_to_one_another_end_the_run() -> None:
-    soil = Soil(scene(column(0.05, 0.05, SPACING)))
-    soil.soils.points["x"][:80] = np.linspace(0.02, 0.021, 80)
-    soil.soils.points["y"][:80] = 0.02
+    soil = Soil(scene(column(0.1, 0.05, SPACING)))
+    soil.soils.points["x"][:160] = np.linspace(0.02, 0.021, 160)
+    soil.soils.points["y"][:160] = 0.02
     soil.soils.controls.is_listed[0] = 0
-    soil.to_step(100_000)
+    soil.to_step(2000)
     assert soil.status != 0
     assert soil.steps < 1000

@@ -5,14 +5,17 @@ forces and energies are those of blocks. Stresses are positive in tension. Parti
 cells; `number` names them for whoever looks from outside.
 
 Losses are tallied by groups of particles, in their order, so that the bits of a sum depend on no number of threads.
+Four particles in a row, a cluster, share one list of neighbours; see neighbours.py.
 """
 
 from typing import NamedTuple
 
 from blocksim.kernels.common.arrays import Integers, Records, record_type
+from blocksim.kernels.common.simd import WIDTH
 
-GROUP = 64  # particles that share one tally
-NEIGHBOURS = 64  # room in the list of a particle; undisturbed soil has 28, and 36 with the skin
+GROUP = 64  # particles that share one tally, and room for their lists
+CLUSTER = WIDTH  # particles that share one list
+NEIGHBOURS = 24  # room in lists, a particle; undisturbed soil takes 13, a list of a cluster being of 50
 
 POINT = record_type(
     "x y vx vy "  # m, m/s
@@ -81,9 +84,9 @@ class Soils(NamedTuple):
     kinds: Records  # (k,) KIND, one for each table of the scenario
     interactions: Records  # (k, c) INTERACTION of kinds with contact classes of bodies
     order: Integers  # (n,) uint32, work space of the sorting
-    starts: Integers  # (3 n + 3,) uint32: where cells begin
-    lists: Integers  # (n, NEIGHBOURS) uint32
-    lengths: Integers  # (n,) uint32: of the lists
+    starts: Integers  # (3 n / 2 + 3,) uint32: where cells begin
+    lists: Integers  # (groups, GROUP * NEIGHBOURS) uint32: those of the clusters of a group, one after the other
+    lengths: Integers  # (n,) uint32: of the lists of all clusters; work space of touches, which are made before
     touches: Records  # (t,) TOUCH, what is near a body, sorted by particle and body
     kept: Records  # (t,) TOUCH, the same before the lists are made again
     by_body: Integers  # (t,) uint32: touches sorted by body

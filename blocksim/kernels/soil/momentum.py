@@ -9,9 +9,9 @@ the adjoint of the velocity gradient: sum F_i v_i = -sum V_i s_i : L_i, whatever
 that approach one another. Both are odd in the particles bit by bit: momentum changes by round-off of the sums alone.
 """
 
-import math
-
+from blocksim.kernels.common.arrays import Integers
 from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.simd import Lanes, fields_0, fields_4, four, lesser, root, spread
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.sph.wendland_c2 import fading, steepness
 
@@ -19,37 +19,41 @@ SOFTENING = 0.01  # h^2; keeps the viscosity finite where two particles meet
 
 
 @kernel
-def mean_impedance(soils: Soils, i: int, j: int) -> float:
-    """Return density times wave speed (kg/(m2 s)) between two particles."""
-    one, other = soils.kinds[soils.states[i].kind], soils.kinds[soils.states[j].kind]
-    return 0.5 * (one.impedance + other.impedance)
+def impedance_of(soils: Soils, i: int) -> float:
+    """Return density times wave speed (kg/(m2 s)) of a particle."""
+    impedance: float = soils.kinds[soils.states[i].kind].impedance
+    return impedance
 
 
 @kernel
-def forces_on(soils: Soils, i: int) -> tuple[float, float, float, float]:
-    """Return force of the stresses (N, x and y) and of the viscosity (N, x and y) on particle i."""
-    points, near = soils.points, soils.lists[i]
-    one = points[i]
-    controls = soils.controls[0]
-    kind = soils.kinds[soils.states[i].kind]
+def forces_on(soils: Soils, near: Integers, places: tuple[int, int, int, int]) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Return force of the stresses (x and y) and of the viscosity (x and y) on four particles, in N/m3.
+
+    That is, by volume; `near` are the neighbours of the four.
+    """
+    points, controls = soils.points, soils.controls[0]
     inverse, soft = 1.0 / controls.reach, SOFTENING * controls.smoothing * controls.smoothing
-    is_uniform, impedance = controls.is_uniform != 0, kind.impedance
-    x, y, vx, vy = one.x, one.y, one.vx, one.vy
-    pxx, pxy, pyx, pyy = one.pxx, one.pxy, one.pyx, one.pyy
-    fx, fy, drag_x, drag_y = 0.0, 0.0, 0.0, 0.0
-    for k in range(soils.lengths[i]):
-        j = near[k]
-        other = points[j]
+    is_uniform = controls.is_uniform != 0
+    i, j, k, m = places
+    impedance = four(
+        None, impedance_of(soils, i), impedance_of(soils, j), impedance_of(soils, k), impedance_of(soils, m)
+    )
+    x, y, vx, vy = fields_0(None, points, places)
+    pxx, pxy, pyx, pyy = fields_4(None, points, places)
+    fx, fy, drag_x, drag_y = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
+    for e in range(near.size):
+        other = points[near[e]]
         dx, dy = other.x - x, other.y - y
         r2 = dx * dx + dy * dy
-        f = fading(math.sqrt(r2), inverse)
+        f = fading(root(r2), inverse)
         gx, gy = f * dx, f * dy
-        fx += (pxx + other.pxx) * gx + (pxy + other.pxy) * gy
-        fy += (pyx + other.pyx) * gx + (pyy + other.pyy) * gy
-        closing = min((other.vx - vx) * dx + (other.vy - vy) * dy, 0.0)
-        q = (impedance if is_uniform else mean_impedance(soils, i, j)) * closing / (r2 + soft)
-        drag_x += q * gx
-        drag_y += q * gy
-    both = controls.area * kind.volume * steepness(controls.smoothing)
+        fx = fx + ((pxx + other.pxx) * gx + (pxy + other.pxy) * gy)
+        fy = fy + ((pyx + other.pyx) * gx + (pyy + other.pyy) * gy)
+        closing = lesser((other.vx - vx) * dx + (other.vy - vy) * dy, 0.0)
+        mean = impedance if is_uniform else 0.5 * (impedance + impedance_of(soils, near[e]))
+        q = mean * closing / (r2 + soft)
+        drag_x = drag_x + q * gx
+        drag_y = drag_y + q * gy
+    both = controls.area * steepness(controls.smoothing)
     stiff = both * controls.viscosity * controls.smoothing
     return both * fx, both * fy, stiff * drag_x, stiff * drag_y

@@ -5,18 +5,22 @@ Velocity Verlet as for bodies; at the start, while gravity grows or contacts fin
 
 import math
 
-from blocksim.kernels.common.arrays import Record, World
+from blocksim.kernels.common.arrays import Integers, Record, World
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.soil.arrays import GROUP, Soils
+from blocksim.kernels.common.simd import Lanes, fields_0, split, spread
+from blocksim.kernels.common.systems import part_of_thread
+from blocksim.kernels.soil.arrays import CLUSTER, GROUP, Soils
 from blocksim.kernels.soil.contact import particles_of_thread
 from blocksim.kernels.soil.gradient import correction, raw_gradient
 from blocksim.kernels.soil.momentum import forces_on
 from blocksim.kernels.soil.neighbours import (
     are_lists_due,
+    clusters_of_group,
     lay_cells,
     list_neighbours,
     move_particles,
+    places_of,
     sort_particles,
     travelled,
 )
@@ -102,43 +106,97 @@ def renew_lists(soils: Soils, world: World, k: int) -> None:
             preload(soils, world)
         soils.controls[0].is_listed = 1
     barrier(world.team)
-    first, last = particles_of_thread(soils, world, k)
+    first, last = part_of_thread(soils.tallies.size, world, k)
     list_neighbours(soils, first, last)
+
+
+@rare_kernel
+def stress_particle(
+    point: Record,
+    state: Record,
+    kind: Record,
+    gradient: tuple[float, float, float, float],
+    correction: tuple[float, float, float],
+    step: float,
+) -> float:
+    """Advance the stress of a particle, and what its neighbours feel of it; return the energy (J) lost to flow."""
+    ux, uy, wx, wy = gradient
+    bxx, bxy, byy = 1.0, 0.0, 1.0
+    if kind.is_corrected:
+        bxx, bxy, byy = correction
+        ux, uy = ux * bxx + uy * bxy, ux * bxy + uy * byy
+        wx, wy = wx * bxx + wy * bxy, wx * bxy + wy * byy
+    lost = strain(state, kind, ux, uy, wx, wy, step)
+    point.pxx = state.sxx * bxx + state.sxy * bxy
+    point.pxy = state.sxx * bxy + state.sxy * byy
+    point.pyx = state.sxy * bxx + state.syy * bxy
+    point.pyy = state.sxy * bxy + state.syy * byy
+    return lost
+
+
+@kernel
+def corrections_of(soils: Soils, c: int, near: Integers, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes, Lanes]:
+    """Return the corrections of the particles of a cluster at these places (m), if any of them is corrected."""
+    is_corrected = False
+    for i in range(CLUSTER * c, min(CLUSTER * (c + 1), soils.points.size)):
+        is_corrected = is_corrected or soils.kinds[soils.states[i].kind].is_corrected != 0
+    if is_corrected:
+        return correction(soils.controls[0], soils.points, near, x, y)
+    return spread(1.0), spread(0.0), spread(1.0)
+
+
+@kernel
+def stress_cluster(soils: Soils, c: int, near: Integers, step: float) -> float:
+    """Advance the stresses of the particles of a cluster; return the energy (J) lost to flow."""
+    x, y, vx, vy = fields_0(None, soils.points, places_of(soils, c))
+    lanes = raw_gradient(soils.controls[0], soils.points, near, x, y, vx, vy)
+    ux, uy, wx, wy = split(lanes[0]), split(lanes[1]), split(lanes[2]), split(lanes[3])
+    by = corrections_of(soils, c, near, x, y)
+    bxx, bxy, byy = split(by[0]), split(by[1]), split(by[2])
+    lost = 0.0
+    for m in range(min(CLUSTER, soils.points.size - CLUSTER * c)):
+        i = CLUSTER * c + m
+        state = soils.states[i]
+        gradient, tensor = (ux[m], uy[m], wx[m], wy[m]), (bxx[m], bxy[m], byy[m])
+        lost += stress_particle(soils.points[i], state, soils.kinds[state.kind], gradient, tensor, step)
+    return lost
 
 
 @rare_kernel
 def stress_group(soils: Soils, g: int, step: float) -> None:
     """Advance the stresses of the particles of a group; nothing that others read of them changes before."""
-    tally = soils.tallies[g]
-    for i in range(GROUP * g, min(GROUP * (g + 1), soils.points.size)):
-        point, state = soils.points[i], soils.states[i]
-        kind = soils.kinds[state.kind]
-        ux, uy, wx, wy = raw_gradient(soils, i)
-        bxx, bxy, byy = 1.0, 0.0, 1.0
-        if kind.is_corrected:
-            bxx, bxy, byy = correction(soils, i)
-            ux, uy = ux * bxx + uy * bxy, ux * bxy + uy * byy
-            wx, wy = wx * bxx + wy * bxy, wx * bxy + wy * byy
-        tally.plastic += strain(state, kind, ux, uy, wx, wy, step)
-        point.pxx = state.sxx * bxx + state.sxy * bxy
-        point.pxy = state.sxx * bxy + state.sxy * byy
-        point.pyx = state.sxy * bxx + state.syy * bxy
-        point.pyy = state.sxy * bxy + state.syy * byy
+    begin = 0
+    for c in clusters_of_group(soils, g):
+        end = begin + soils.lengths[c]
+        soils.tallies[g].plastic += stress_cluster(soils, c, soils.lists[g, begin:end], step)
+        begin = end
+
+
+@kernel
+def force_cluster(soils: Soils, c: int, near: Integers) -> float:
+    """Add the forces between particles to those of a cluster; return the power (W) of the viscosity."""
+    lanes = forces_on(soils, near, places_of(soils, c))
+    fx, fy, drag_x, drag_y = split(lanes[0]), split(lanes[1]), split(lanes[2]), split(lanes[3])
+    power = 0.0
+    for m in range(min(CLUSTER, soils.points.size - CLUSTER * c)):
+        point, state = soils.points[CLUSTER * c + m], soils.states[CLUSTER * c + m]
+        volume = soils.kinds[state.kind].volume
+        state.drag_x = volume * drag_x[m]
+        state.drag_y = volume * drag_y[m]
+        state.fx += volume * fx[m] + state.drag_x
+        state.fy += volume * fy[m] + state.drag_y
+        power += state.drag_x * point.vx + state.drag_y * point.vy
+    return power
 
 
 @rare_kernel
 def force_group(soils: Soils, g: int, step: float) -> None:
     """Add the forces between particles to those of a group."""
-    tally = soils.tallies[g]
-    half = 0.5 * step
-    for i in range(GROUP * g, min(GROUP * (g + 1), soils.points.size)):
-        point, state = soils.points[i], soils.states[i]
-        fx, fy, drag_x, drag_y = forces_on(soils, i)
-        state.fx += fx + drag_x
-        state.fy += fy + drag_y
-        state.drag_x = drag_x
-        state.drag_y = drag_y
-        tally.viscosity -= half * (drag_x * point.vx + drag_y * point.vy)
+    begin = 0
+    for c in clusters_of_group(soils, g):
+        end = begin + soils.lengths[c]
+        soils.tallies[g].viscosity -= 0.5 * step * force_cluster(soils, c, soils.lists[g, begin:end])
+        begin = end
 
 
 @rare_kernel

@@ -7,6 +7,7 @@ Its Fourier transform is positive, so that particles do not pair up however many
 import math
 
 from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.simd import Lanes, greater
 
 SUPPORT = 2.0  # smoothing lengths
 SCALE = 7.0 / (4.0 * math.pi)  # makes the integral over the plane one
@@ -39,7 +40,7 @@ def steepness(h: float) -> float:
 
 
 @kernel
-def fading(r: float, inverse: float) -> float:
+def fading(r: Lanes, inverse: float) -> Lanes:
     """Return -W'/r (-) as a share of that, zero from the support radius on, whose inverse (1/m) is given; no branch."""
-    s = max(1.0 - r * inverse, 0.0)
+    s = greater(1.0 - r * inverse, 0.0)
     return s * s * s

@@ -5,10 +5,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.common.arrays import TEAM_SIZE
-from blocksim.kernels.soil.arrays import NEIGHBOURS, Soils
+from blocksim.kernels.common.arrays import TEAM_SIZE, Floats, Integers
+from blocksim.kernels.common.jit import entry_kernel
+from blocksim.kernels.common.simd import fields_0, split
+from blocksim.kernels.soil.arrays import CLUSTER, GROUP, NEIGHBOURS, Soils
 from blocksim.kernels.soil.gradient import correction, raw_gradient
 from blocksim.kernels.soil.momentum import forces_on
+from blocksim.kernels.soil.neighbours import places_of
 from blocksim.kernels.soil.step import renew_lists, stress_group
 from blocksim.simulation.schemes import build_scene
 from tests.soils import column, scene
@@ -18,9 +21,9 @@ SPACING = 0.005
 
 @pytest.fixture
 def soils() -> Soils:
-    """Return two soils of 96 particles in disorder, with velocities and stresses at random, and their lists."""
-    clay = {**column(0.04, 0.03, SPACING, material="clay"), "name": "upper", "y": [0.03, 0.06]}
-    built: Any = build_scene(scene(column(0.04, 0.03, SPACING), clay))
+    """Return two soils of 54 and 63 particles in disorder, with velocities and stresses at random, and their lists."""
+    clay = {**column(0.045, 0.03, SPACING, material="clay"), "name": "upper", "y": [0.03, 0.065]}
+    built: Any = build_scene(scene(column(0.045, 0.03, SPACING), clay))
     found: Soils = built.systems[0]
     built.world.team[TEAM_SIZE] = 1
     random = np.random.default_rng(5)
@@ -39,20 +42,40 @@ def distances(soils: Soils) -> Any:
     return np.hypot(x[:, None] - x, y[:, None] - y)
 
 
-def test_lists_hold_all_neighbours_within_the_skin_and_each_once(soils: Soils) -> None:
-    reach = soils.controls.reach[0] + soils.controls.skin[0]
-    near = distances(soils) < reach
-    for i, row in enumerate(near):
-        listed = soils.lists[i, : soils.lengths[i]].tolist()
-        assert sorted(listed) == [j for j in np.flatnonzero(row).tolist() if j != i]
+def lists_of(soils: Soils) -> list[Any]:
+    """Return the list of every cluster."""
+    found = []
+    for c in range(-(-soils.points.size // CLUSTER)):
+        g = CLUSTER * c // GROUP
+        begin = int(soils.lengths[GROUP // CLUSTER * g : c].sum())
+        found.append(soils.lists[g, begin : begin + int(soils.lengths[c])])
+    return found
+
+
+def test_lists_hold_all_that_are_near_to_any_particle_of_a_cluster_and_each_once(soils: Soils) -> None:
+    assert soils.points.size % CLUSTER != 0  # the last cluster is not full
+    near = distances(soils) < soils.controls.reach[0] + soils.controls.skin[0]
+    for c, listed in enumerate(lists_of(soils)):
+        wanted = near[CLUSTER * c : CLUSTER * (c + 1)].any(axis=0)
+        assert sorted(listed.tolist()) == np.flatnonzero(wanted).tolist()
+
+
+def test_cells_stay_small_where_a_particle_has_flown_far_away(soils: Soils) -> None:
+    built: Any = build_scene(scene(column(0.04, 0.03, SPACING)))
+    built.world.team[TEAM_SIZE] = 1
+    soils.points["x"][3], soils.points["y"][-1] = 1e4, -1e6
+    soils.points["y"][5] = np.nan
+    renew_lists(soils, built.world, 0)
+    assert soils.controls.cell[0] < 4.0 * SPACING
+    test_lists_hold_all_that_are_near_to_any_particle_of_a_cluster_and_each_once(soils)
 
 
 def test_sorting_keeps_every_particle_whole(soils: Soils) -> None:
     assert sorted(soils.states["number"].tolist()) == list(range(soils.points.size))
     (alone,) = np.flatnonzero(soils.states["number"] == 7)
     assert soils.points.y[alone] > 0.5
-    assert soils.lengths[alone] == 0
-    assert set(soils.states["kind"][soils.states["number"] < 48].tolist()) == {0}
+    assert [c for c, listed in enumerate(lists_of(soils)) if alone in listed] == [alone // CLUSTER]
+    assert set(soils.states["kind"][soils.states["number"] < 54].tolist()) == {0}
 
 
 def test_a_list_without_room_is_noticed(soils: Soils) -> None:
@@ -60,24 +83,44 @@ def test_a_list_without_room_is_noticed(soils: Soils) -> None:
     built: Any = build_scene(scene(column(0.04, 0.03, SPACING)))
     built.world.team[TEAM_SIZE] = 1
     renew_lists(soils, built.world, 0)
-    assert soils.points.size > NEIGHBOURS
+    assert soils.points.size > CLUSTER * NEIGHBOURS
     assert soils.controls.is_full[0] == 1
 
 
-def gradients(soils: Soils) -> Any:
-    """Return the velocity gradients (n, 2, 2) and the corrections (n, 2, 2) of all particles."""
+@entry_kernel
+def write_gradients(soils: Soils, c: int, near: Integers, found: Floats) -> None:
+    """Write the gradients, the corrections and the forces of the particles of a cluster."""
+    places = places_of(soils, c)
+    x, y, vx, vy = fields_0(None, soils.points, places)
+    gradient = raw_gradient(soils.controls[0], soils.points, near, x, y, vx, vy)
+    by = correction(soils.controls[0], soils.points, near, x, y)
+    forces = forces_on(soils, near, places)
+    for lane in range(CLUSTER):
+        i = places[lane]
+        for k in range(4):
+            found[i, k] = split(gradient[k])[lane]
+            found[i, 7 + k] = split(forces[k])[lane]
+        for k in range(3):
+            found[i, 4 + k] = split(by[k])[lane]
+
+
+def fields(soils: Soils) -> Any:
+    """Return velocity gradients (n, 2, 2), corrections (n, 2, 2) and forces (n, 4) of all particles."""
     n = soils.points.size
-    raw = np.array([raw_gradient(soils, i) for i in range(n)]).reshape(n, 2, 2)
+    found = np.empty((n, 11))
+    for c, near in enumerate(lists_of(soils)):
+        write_gradients(soils, c, near, found)
     corrected = soils.kinds["is_corrected"][soils.states["kind"]] == 1
-    xx, xy, yy = np.array([correction(soils, i) if corrected[i] else (1.0, 0.0, 1.0) for i in range(n)]).T
-    return raw, np.stack([np.stack([xx, xy], 1), np.stack([xy, yy], 1)], 1)
+    xx, xy, yy = np.where(corrected[:, None], found[:, 4:7], [1.0, 0.0, 1.0]).T
+    by = np.stack([np.stack([xx, xy], 1), np.stack([xy, yy], 1)], 1)
+    return found[:, :4].reshape(n, 2, 2), by, soils.kinds["volume"][soils.states["kind"]][:, None] * found[:, 7:]
 
 
 def test_a_corrected_gradient_is_exact_for_linear_fields_at_surfaces_too(soils: Soils) -> None:
     soils.points["vx"] = 3.0 * soils.points["x"] - 2.0 * soils.points["y"]
     soils.points["vy"] = 0.5 * soils.points["x"] + 4.0 * soils.points["y"]
-    raw, by = gradients(soils)
-    upper = (soils.kinds["is_corrected"][soils.states["kind"]] == 1) & (soils.lengths > 0)
+    raw, by, _ = fields(soils)
+    upper = (soils.kinds["is_corrected"][soils.states["kind"]] == 1) & (soils.points["y"] < 0.5)
     found = (raw @ by)[upper]
     np.testing.assert_allclose(found, np.broadcast_to([[3.0, -2.0], [0.5, 4.0]], found.shape), rtol=1e-9)
 
@@ -85,10 +128,9 @@ def test_a_corrected_gradient_is_exact_for_linear_fields_at_surfaces_too(soils: 
 def test_forces_are_the_adjoint_of_the_gradient_and_give_no_momentum(soils: Soils) -> None:
     for g in range(soils.tallies.size):
         stress_group(soils, g, 0.0)  # no strain; what neighbours feel is made
-    raw, by = gradients(soils)
+    raw, by, found = fields(soils)
     state = soils.states
     stress = np.stack([np.stack([state["sxx"], state["sxy"]], 1), np.stack([state["sxy"], state["syy"]], 1)], 1)
-    found = np.array([forces_on(soils, i) for i in range(soils.points.size)])
     velocity = np.stack([soils.points["vx"], soils.points["vy"]], 1)
     volume = soils.kinds["volume"][state["kind"]]
     power = np.einsum("n,nab,nab->", volume, stress, raw @ by)

@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -97,3 +98,9 @@ def test_stored_runs_are_read_without_the_compiler() -> None:
     found = "any(name.startswith(('numba', 'blocksim.kernels')) for name in sys.modules)"
     code = f"import sys, blocksim.world.systems; sys.exit({found})"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_arrays_of_soil_take_as_many_bytes_as_check_estimates() -> None:
+    built: Any = build_scene(scene(column(0.25, 0.2, 0.005)))
+    taken = sum(array.nbytes for array in built.systems[0])
+    assert 0.95 * SOILS.cost.memory < taken / 2000 <= SOILS.cost.memory <= 400
