@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from blocksim.bench import ensemble, startup, threads, three_blocks, walls
+from blocksim.bench import ensemble, soils, startup, threads, three_blocks, walls
 from blocksim.bench.measurement import Measurement
 from blocksim.bench.peers import PEERS, require_all
 from blocksim.errors import BlocksimError, ExitCode
@@ -18,6 +18,7 @@ MEASUREMENTS = (
     three_blocks.NONSMOOTH,
     walls.NONSMOOTH,
     threads.NONSMOOTH,
+    soils.SOILS,
     startup.START_UP,
 )
 

@@ -40,6 +40,7 @@ class Case:
     blocks: int
     steps: int
     least_bodies: int  # a thread, of the scheme
+    element: str = "block"
 
     @property
     def threads(self) -> int:
@@ -70,8 +71,12 @@ def compared(case: Case, repeats: int) -> Iterable[Number]:
             times.append(_seconds(case.scene, team, case.steps))
             gains.append(alone / times[-1])
     share = 1e9 / (case.steps * case.blocks)
-    yield Number(f"{case.blocks} blocks, {THREADS} threads", "ns/block/step", tuple(share * one for one in times))
-    yield Number(f"{case.blocks} blocks, speed-up", "", tuple(gains))
+    yield Number(
+        f"{case.blocks} {case.element}s, {THREADS} threads",
+        f"ns/{case.element}/step",
+        tuple(share * one for one in times),
+    )
+    yield Number(f"{case.blocks} {case.element}s, speed-up", "", tuple(gains))
 
 
 def notes(cases: Sequence[Case]) -> tuple[str, ...]:

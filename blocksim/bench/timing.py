@@ -63,6 +63,10 @@ class Rerun:
         scene.world.bodies.x[:-1] += shift
         self.scene, _ = ALONE.advance(scene, 0)
         self._arrays = arrays_of(self.scene)
+        self.keep()
+
+    def keep(self) -> None:
+        """Start from the present state from now on."""
         self._saved = [array.copy() for array in self._arrays]
 
     @property

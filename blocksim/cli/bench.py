@@ -33,7 +33,7 @@ def bench_command(
         typer.Argument(
             metavar="[NAME]...",
             help="three-blocks, ensemble, walls, threads, nonsmooth-blocks, nonsmooth-walls, nonsmooth-threads, "
-            "start-up; with --peers three-blocks, three-blocks-e0, wall.",
+            "soils, start-up; with --peers three-blocks, three-blocks-e0, wall.",
         ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Run a reduced version; the last lines say how.")] = False,

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.bench import ensemble, startup, three_blocks, walls
+from blocksim.bench import ensemble, soils, startup, three_blocks, walls
 from blocksim.bench.measurement import Setting, single
 from blocksim.bench.measurements import chosen
 from blocksim.bench.startup import StartError
@@ -87,6 +87,15 @@ def test_rigid_walls_tell_times_growth_and_where_the_first_one_ends() -> None:
     assert 100.0 < x.median < 250.0  # mm; the wall is 272 mm long
     assert 0.0 < y.median < 62.5  # mm: lower than it stood
     assert all(float(str(row["sweeps_per_substep"])) >= 1.0 for row in found.details)
+
+
+def test_soils_tell_times_beside_a_wall_memory_and_what_two_threads_gain() -> None:
+    found = {one.quantity: one for one in soils.SOILS.measure(QUICK).numbers}
+    names = ("", ", over a block of a wall", ", memory")
+    wanted = [f"{count} particles{name}" for name in names for count in (256, 484)]
+    assert [*found] == [*wanted, "484 particles, 2 threads", "484 particles, speed-up"]
+    assert all(len(found[name].samples) == 2 and found[name].median > 0.0 for name in (*wanted[:4], *[*found][-2:]))
+    assert found["484 particles, memory"].median < found["256 particles, memory"].median < 600.0
 
 
 def test_growth_is_the_exponent_of_the_time_of_a_whole_step() -> None:
