@@ -226,7 +226,7 @@ def refinements_of(scenario: Scenario, studies: Iterable[str] | None = None) -> 
 
 def _possible(scenario: Scenario) -> list[Refinement]:
     if isinstance(scenario.time, Nonsmooth):
-        return [_rigid_step(scenario), _tolerance(scenario, scenario.time)]
+        return [_rigid_step(scenario), _tolerance(scenario)]
     spacing = [_spacing(scenario)] if has_particles(scenario) else []
     soil = [_soil_spacing(scenario)] if soil_tables(scenario) else []
     return [_step(scenario, scenario.time), _stiffness(scenario), *spacing, *soil]
@@ -267,9 +267,9 @@ def _halved(scenario: Scenario, key: str, own: float) -> Refinement:
     return replace(halved, coarser=coarser)
 
 
-def _tolerance(scenario: Scenario, time: Nonsmooth) -> Refinement:
+def _tolerance(scenario: Scenario) -> Refinement:
     """Tighten the tolerance of the velocity pass by half a decade, also from ten times the scenario's."""
-    own = velocity_tolerance(time, len(place_bodies(scenario)))
+    own = velocity_tolerance(scenario, len(place_bodies(scenario)))
     return Refinement(TOLERANCE, "velocity tolerance", "time.velocity_tolerance", own, sqrt(0.1), 2)
 
 

@@ -194,7 +194,7 @@ def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, ste
     return SagDescription(
         why=reason_of_step(outline, bounds).why,
         substeps=scenario.time.substeps,
-        tolerance=velocity_tolerance(scenario.time, len(placed)),
+        tolerance=velocity_tolerance(scenario, len(placed)),
         longest_step=longest_step(outline, bounds),
         sag=sag.sag,
         block=sag.block,

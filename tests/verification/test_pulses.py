@@ -60,25 +60,26 @@ def slab_under(scheme: str, slab: tuple[float, float, float, float], every: str,
     """Run a slab under a pulse, given by its width and height (m), its friction and the end of the run (s)."""
     width, height, friction, end = slab
     contact = {"stiffness_scale": motion.pop("stiffness_scale", 1.0)}
+    places = motion.pop("places", [(0.0, 0.5 * height)])
     data = {
         "schema": 1,
         "name": "slab",
         "materials": {"stone": STONE},
         "blocks": {"slab": {"width": width, "height": height, "length": 1.0, "material": "stone"}},
-        "bodies": [{"block": "slab", "x": 0.0, "y": 0.5 * height}],
+        "bodies": [{"block": "slab", "x": x, "y": y} for x, y in places],
         "motion": {"kind": "pulse", **motion},
-        "friction": {"block_ground": friction},
+        "friction": {"block_ground": friction, "block_block": 2.0},
         "contact": contact,
         "time": {"scheme": scheme, "end": end, "stop_at_rest": False},
         "output": {"every": every},
-        "probes": [{"kind": "point", "body": "1"}],
+        "probes": [{"kind": "point", "body": str(len(places))}],
     }
     return simulate(scenario_from_mapping(data))
 
 
 def sliding(scheme: str, slab: tuple[float, float, float, float], every: str, **motion: Any) -> tuple[Any, Any, Any]:
     """Return times (s), displacement (m) and velocity (m/s) along the ground relative to it of a slab."""
-    probe = slab_under(scheme, slab, every, **motion).probes["point1"]
+    (probe,) = slab_under(scheme, slab, every, **motion).probes.values()
     return probe.time, probe["relative_dx"], probe["relative_vx"]
 
 
@@ -110,6 +111,16 @@ def test_stick_and_slip_on_a_table_that_starts_at_its_largest_acceleration(
     time, slip, _ = sliding(scheme, (1.0, height, 0.8, 8.05), "50 ms", **COSINE, **softer)
     found = np.interp([2.0, 5.0, 8.0], time, slip)
     assert found == pytest.approx([SLIP, -2.0 * SLIP, SLIP], rel=within)
+
+
+@pytest.mark.parametrize(
+    "places",
+    [[(0.0, 0.05), (0.4, 0.05)], [(0.4 * k, 0.05) for k in range(5)], [(0.0, 0.05), (0.0, 0.15)]],
+    ids=["two", "five", "stack of two"],
+)
+def test_few_rigid_blocks_slip_on_that_table_as_one_does(places: list[tuple[float, float]]) -> None:
+    _, slip, _ = sliding("nonsmooth", (0.2, 0.1, 0.8, 5.05), "50 ms", places=places, **COSINE)
+    assert slip[[40, 100]] == pytest.approx([SLIP, -2.0 * SLIP], rel=1e-3)
 
 
 @pytest.mark.parametrize(("width", "height", "scale"), [(1.0, 0.25, 1.0), (0.5, 0.45, 1.0), (0.2, 0.1, 0.1)])
