@@ -10,7 +10,8 @@ import typer
 from blocksim.cli import options
 from blocksim.cli.output import note
 from blocksim.simulation.own_files import is_picture, refuse_foreign
-from blocksim.study.pictures import RunLook, draw
+from blocksim.study.pictures import draw
+from blocksim.study.run_pictures import RunLook
 
 
 def plot_command(

@@ -18,9 +18,10 @@ from blocksim.study.calibrate_plan import read_plan
 from blocksim.study.fragility import FragilityResult
 from blocksim.study.limit import LimitResult
 from blocksim.study.limit_curve import CurveResult
-from blocksim.study.pictures import RunLook, draw
+from blocksim.study.pictures import draw
 from blocksim.study.plan import Values, Variations
 from blocksim.study.reporting import report_on
+from blocksim.study.run_pictures import RunLook
 from blocksim.study.sensitivity_methods import METHODS
 from blocksim.study.stored_run import stored_run
 from blocksim.study.sweep_table import SweepResult
