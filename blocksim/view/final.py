@@ -12,11 +12,11 @@ from blocksim.view.labels import LINE, SPACE, Label, arranged, depth, draw_label
 from blocksim.view.layout import OWN, Paper
 from blocksim.view.load_arrows import draw_marks, draw_outside
 from blocksim.view.loads import length_in, outside, with_room
+from blocksim.view.measured import MeasuredTable, widened
 from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import Canvas, Page, depth_of, draw_ruler, finish_panel, page_for
 from blocksim.view.run_data import FramesLike, Support, drawable_frames, moments_at
 from blocksim.view.scene import draw_centres, draw_scene
-from blocksim.view.strip import MeasuredTable, widened
 from blocksim.view.window import Extent, extent_of
 
 if TYPE_CHECKING:

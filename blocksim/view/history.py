@@ -37,9 +37,9 @@ from blocksim.view.history_panels import (
     support_force,
 )
 from blocksim.view.layout import OWN, Paper, plain_numbers, write_heading
+from blocksim.view.measured import MeasuredTable
 from blocksim.view.paint import Paint, by_block
 from blocksim.view.run_data import Floats, Indices, Support, drawable_frames
-from blocksim.view.strip import MeasuredTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.view import style
+from blocksim.view.measured import MeasuredTable
 from blocksim.view.panel import Page
 from blocksim.view.run_data import Floats, FramesLike
-from blocksim.view.strip import MeasuredTable
 from blocksim.view.window import MILLIMETRES, turned
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.view import style
 from blocksim.view.forces import WithContacts
 from blocksim.view.layout import OWN, Paper
+from blocksim.view.measured import MeasuredTable
 from blocksim.view.paint import Paint, draw_key
 from blocksim.view.panel import Canvas, depth_of, draw_ruler, finish_panel, page_for
 from blocksim.view.run_data import (
@@ -21,7 +22,6 @@ from blocksim.view.run_data import (
     others_of,
 )
 from blocksim.view.scene import draw_blocks, draw_standing
-from blocksim.view.strip import MeasuredTable
 from blocksim.view.window import MILLIMETRES, extent_of
 
 WIDTH, LEAST_WIDTH, TALLEST = 7.2, 2.0, 6.0  # inches

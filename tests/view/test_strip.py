@@ -7,8 +7,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from blocksim.view import strip
-from blocksim.view.strip import arrangement, measured_ranges, plan, widened
+from blocksim.view import measured, strip
+from blocksim.view.measured import measured_ranges, widened
+from blocksim.view.strip_layout import arrangement, plan
 from blocksim.view.window import Extent
 
 
@@ -73,7 +74,7 @@ def test_a_scene_is_widened_to_hold_what_was_measured_and_a_tower_s_caption() ->
     assert wide.left < -50.0
     assert wide.right > 400.0
     tower = widened(Extent(0.0, 30.0, 0.0, 1000.0), [])
-    assert tower.width == pytest.approx(strip.NARROWEST * 1000.0)
+    assert tower.width == pytest.approx(measured.NARROWEST * 1000.0)
 
 
 def test_importing_the_room_does_not_load_matplotlib() -> None:
