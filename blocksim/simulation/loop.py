@@ -106,7 +106,7 @@ class Pace:
 
     def __init__(self, bodies: int) -> None:
         """Begin with few for so many bodies."""
-        self.steps = max(1, BODY_STEPS_AT_FIRST // bodies)
+        self.steps = max(1, BODY_STEPS_AT_FIRST // max(bodies, 1))
 
     def learn(self, steps: int, seconds: float) -> None:
         """Take account of a call of so many steps and seconds."""

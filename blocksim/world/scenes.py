@@ -214,6 +214,8 @@ def cell_radius(bodies: Records) -> Floats:
     In it are all but a few pieces of ground and planks.
     """
     radii = np.sort(bodies["radius"][..., :-1], axis=-1)
+    if radii.shape[-1] == 0:  # nothing but the half-plane: the grid holds nothing
+        return np.ones(radii.shape[:-1])
     few = min(MOST_LARGE, radii.shape[-1] // 8)
     count = np.count_nonzero(radii <= LARGE_RATIO * radii[..., :1], axis=-1)
     smaller = np.take_along_axis(radii, np.asarray(count)[..., np.newaxis] - 1, axis=-1)[..., 0]

@@ -33,6 +33,12 @@ def test_soil_alone_falls_as_beside_a_block_far_away(run: Result) -> None:
     assert np.ptp(again["y"][-1]) > 0.02
 
 
+def test_soil_needs_no_wall_either() -> None:
+    free = blocksim.run(scenario_from_mapping({**DATA, "walls": []}))
+    left, right = (free.endings["soils"][name][0] for name in ("left_mm", "right_mm"))
+    assert left + right == pytest.approx(40.0, abs=0.1)  # it spreads alike to both sides
+
+
 @pytest.mark.parametrize("kind", ["strip", "final", "profile"])
 def test_soil_alone_is_drawn(run: Result, tmp_path: Path, kind: str) -> None:
     assert blocksim.plot(run, tmp_path / "picture.png", kind=kind).stat().st_size > 5000
