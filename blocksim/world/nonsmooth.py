@@ -24,6 +24,7 @@ from blocksim.kernels.nonsmooth.arrays import (
     Contacts,
     Nonsmooth,
 )
+from blocksim.kernels.nonsmooth.groups import LONELY
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Nonsmooth as Stepping
 from blocksim.world.bodies import Outline
@@ -194,8 +195,8 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
 
 
 def groups_for(capacity: int) -> int:
-    """Return how many groups there is room for: full ones, and one in every colour that is not."""
-    return min(capacity, capacity // WIDTH + COLOURS)
+    """Return how many groups there is room for: full ones, and those in every colour that are not."""
+    return min(capacity, capacity // WIDTH + LONELY * COLOURS)
 
 
 def threads_of(scene: Nonsmooth) -> int:

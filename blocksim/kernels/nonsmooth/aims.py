@@ -2,7 +2,19 @@
 
 from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.jit import kernel
-from blocksim.kernels.common.simd import Lane, Lanes, fields_0, greater, is_all, lesser, load, root, select, store
+from blocksim.kernels.common.simd import (
+    Lane,
+    Lanes,
+    branch,
+    fields_0,
+    greater,
+    is_all,
+    lesser,
+    load,
+    root,
+    select,
+    store,
+)
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
 from blocksim.kernels.nonsmooth.groups import Bodies
 from blocksim.kernels.nonsmooth.slip import Constraints, Slip, slip_of
@@ -52,7 +64,7 @@ def target(impulse: Lanes, gap: Lanes, least: Lanes) -> Lanes:
     A gap that is still open must not slow an approach down: it would take a part of it in the substep before the
     impact, and restitution would vanish for small substeps.
     """
-    return select((impulse > 0.0) | (gap <= 0.0), least, -FAR)
+    return branch((impulse > 0.0) | (gap <= 0.0), least, -FAR)
 
 
 @kernel
@@ -72,8 +84,8 @@ def aim(
     vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
     vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
     u = slip_of(constraint, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
-    t_one = target(normal_one, gap_one, -greater(gap_one, 0.0) * stepping.open_bias)
-    t_two = target(normal_two, gap_two, -greater(gap_two, 0.0) * stepping.open_bias)
+    t_one = target(normal_one, gap_one, -branch(gap_one > 0.0, gap_one, 0.0) * stepping.open_bias)
+    t_two = target(normal_two, gap_two, -branch(gap_two > 0.0, gap_two, 0.0) * stepping.open_bias)
     if not is_all((lesser(u.one, u.two) >= -stepping.threshold) | (greater(t_one, t_two) <= -FAR)):
         t_one, t_two = with_rebounds(contacts, group, lane, constraint, a, b, u, t_one, t_two)
     store(lane, group.target_one, t_one)

@@ -42,10 +42,12 @@ LANE_FLOATS = (
     "target_one target_two"  # m/s: least approach that the velocity pass leaves; -FAR where a point does not count
 )
 LANE_INDICES = "a b constraint"  # bodies; number of the constraint
+SINGLE_FLOATS = "one mixed two along"  # 1/kg: A of a group of one: of both normals, and along the tangent
 GROUP = on_own_lines(
     np.dtype(
         [(name, np.float64, (WIDTH,)) for name in LANE_FLOATS.split()]
         + [(name, np.uint32, (WIDTH,)) for name in LANE_INDICES.split()]
+        + [(name, np.float64) for name in SINGLE_FLOATS.split()]
         + [
             ("count", np.uint8),  # of constraints, the others are copies
             ("are_simple", np.uint8),  # flag: static friction is the kinetic one

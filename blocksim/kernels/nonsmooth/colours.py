@@ -8,6 +8,7 @@ from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, Nonsmooth
+from blocksim.kernels.nonsmooth.groups import LONELY
 
 ONE = 1
 
@@ -102,11 +103,12 @@ def colour_pairs(scene: Nonsmooth, count: int) -> None:
 
 @rare_kernel
 def most_groups(scene: Nonsmooth) -> int:
-    """Return how many groups all constraints can make; those of the last colour are solved one by one."""
+    """Return how many groups the constraints can make, whichever are active; the last colour's are solved singly."""
     count = 0
     for colour in range(COLOURS):
         size = scene.begins[colour + 1] - scene.begins[colour]
-        count += size if colour == COLOURS - 1 else (size + WIDTH - 1) // WIDTH
+        most_left = min(size, LONELY if size % WIDTH >= LONELY else 1)  # groups of fewer than four; see gather
+        count += size if colour == COLOURS - 1 else size // WIDTH + most_left
     return count
 
 

@@ -131,6 +131,18 @@ def clip(edge: Edge, half: Lanes) -> Edge:
 
 
 @kernel
+def counted(left_gap: Lanes, right_gap: Lanes, width: Lanes, a: Block, b: Block, margin: float) -> tuple[Lanes, Lanes]:
+    """Return the gaps (m) of two points with a width (m) between them, FAR where one does not count."""
+    left_gap = select(left_gap <= margin, left_gap, FAR)
+    right_gap = select(right_gap <= margin, right_gap, FAR)
+    is_sliver = width < SLIVER * lesser(a.half_x + a.half_y, b.half_x + b.half_y)
+    is_left_less = left_gap <= right_gap
+    right_gap = select(is_sliver & is_left_less, FAR, right_gap)
+    left_gap = select(is_sliver & (is_left_less ^ is_sliver), FAR, left_gap)
+    return left_gap, right_gap
+
+
+@kernel
 def points_of(face: Face, edge: Edge, a: Block, b: Block, is_of_b: Mask, margin: float) -> Points:
     """Return normal, arms and gaps of a manifold.
 
@@ -139,13 +151,10 @@ def points_of(face: Face, edge: Edge, a: Block, b: Block, is_of_b: Mask, margin:
     sign = select(is_of_b, 1.0, -1.0)
     nx = sign * face.nx
     ny = sign * face.ny
-    left_gap = select(edge.is_left & (edge.left_gap <= margin), edge.left_gap, FAR)
-    right_gap = select(edge.is_right & (edge.right_gap <= margin), edge.right_gap, FAR)
     width = edge.right - edge.left
-    is_sliver = width < SLIVER * lesser(a.half_x + a.half_y, b.half_x + b.half_y)
-    is_left_less = left_gap <= right_gap
-    right_gap = select(is_sliver & is_left_less, FAR, right_gap)
-    left_gap = select(is_sliver & (is_left_less ^ is_sliver), FAR, left_gap)
+    left_gap = select(edge.is_left, edge.left_gap, FAR)
+    right_gap = select(edge.is_right, edge.right_gap, FAR)
+    left_gap, right_gap = counted(left_gap, right_gap, width, a, b, margin)
     one = select(is_of_b, edge.right, edge.left)
     # point one in world axes, on the face
     x = face.x + face.nx * face.distance + face.ny * one

@@ -44,7 +44,7 @@ from blocksim.kernels.nonsmooth.faces import (
     points_of,
 )
 from blocksim.kernels.nonsmooth.gap_curvature import bend_of
-from blocksim.kernels.nonsmooth.pieces import points_on_ground, points_on_piece
+from blocksim.kernels.nonsmooth.pieces import points_on_ground, points_on_level, points_on_piece
 from blocksim.kernels.nonsmooth.polygons import corners_on_ground, follow_corners, points_of_polygons
 from blocksim.kernels.nonsmooth.slip import Motion
 
@@ -257,7 +257,7 @@ def points_of_pair(
 def points_of_rectangles(a: Record, one: Block, b: Record, two: Block, place: Place) -> tuple[Points, bool]:
     """Return the contact manifold of a rectangle and another or the ground, and whether there is one."""
     if place.is_ground:
-        return points_on_ground(one, None, two, place.margin)
+        return points_on_level(one, two, place.margin)
     if a.faces != ALL:
         return points_on_piece(two, None, one, a.corners, False, place.margin)
     if b.faces != ALL:

@@ -1,8 +1,7 @@
 """What a substep does to the constraints, four at a time: warm start, position pass, velocity pass, tallies.
 
-Formulas: __init__.py. Velocities are read, changed by all impulses of a constraint and written back; effective masses
-are computed again each time, which is cheaper than to load them. Bodies that are fixed are never written to, so that
-constraints of one colour share nothing that changes.
+Formulas: __init__.py. Velocities are read, changed by all impulses of a constraint and written back. Bodies that are
+fixed are never written to, so that constraints of one colour share nothing that changes.
 """
 
 from blocksim.kernels.common.arrays import Record, Records
@@ -11,6 +10,7 @@ from blocksim.kernels.common.jit import kernel
 from blocksim.kernels.common.simd import (
     Lane,
     Lanes,
+    branch,
     fields_0,
     four,
     greater,
@@ -24,7 +24,14 @@ from blocksim.kernels.common.simd import (
 )
 from blocksim.kernels.nonsmooth.aims import aim, gaps
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
-from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, constraints_of, material_of
+from blocksim.kernels.nonsmooth.groups import (
+    Bodies,
+    bodies_at,
+    constraints_of,
+    material_of,
+    normal_masses,
+    tangent_mass,
+)
 from blocksim.kernels.nonsmooth.slip import Constraints, slip_of
 from blocksim.kernels.nonsmooth.solve import solve_two
 
@@ -85,17 +92,22 @@ def shove(
 
 
 @kernel
-def masses(constraint: Constraints, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes, Lanes]:
-    """Return A (1/kg) of the two normals: of one, mixed, of two."""
-    together = a.inverse_mass + b.inverse_mass
-    two_a = constraint.arm_a - constraint.width
-    two_b = constraint.arm_b - constraint.width
-    turned_a = a.inverse_inertia * constraint.arm_a
-    turned_b = b.inverse_inertia * constraint.arm_b
-    one = together + turned_a * constraint.arm_a + turned_b * constraint.arm_b
-    mixed = together + turned_a * two_a + turned_b * two_b
-    two = together + a.inverse_inertia * two_a * two_a + b.inverse_inertia * two_b * two_b
-    return one, mixed, two
+def masses(group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes, Lanes]:
+    """Return A (1/kg) of the two normals: of one, mixed, of two.
+
+    Of four constraints it is computed again each time, which is cheaper than to load it, of one it is kept.
+    """
+    if lane is None:
+        return normal_masses(constraint, a, b)
+    return group.one, group.mixed, group.two
+
+
+@kernel
+def shear_mass(group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies) -> Lanes:
+    """Return A (1/kg) along the tangent; kept as in masses."""
+    if lane is None:
+        return tangent_mass(constraint, a, b)
+    return group.along
 
 
 @kernel
@@ -120,7 +132,7 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     store(lane, group.start_one, gap_one)
     store(lane, group.start_two, gap_two)
     slip = slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
-    one, mixed, two = masses(constraint, a, b)
+    one, mixed, two = masses(group, lane, constraint, a, b)
     old_one = load(lane, group.normal_one)
     old_two = load(lane, group.normal_two)
     k_one = one + select(gap_one > 0.0, 0.0, stepping.softness) * one
@@ -206,7 +218,7 @@ def reach(
     if is_all((greater(t_one, t_two) <= -FAR) & (abs(load(lane, group.shear)) <= 0.0)):
         return 0.0 * t_one  # no normal impulse, so no friction either
     slip = slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
-    one, mixed, two = masses(constraint, a, b)
+    one, mixed, two = masses(group, lane, constraint, a, b)
     old_one = load(lane, group.normal_one)
     old_two = load(lane, group.normal_two)
     old_shear = load(lane, group.shear)
@@ -230,10 +242,11 @@ def reach(
         + coupled_a * (constraint.arm_a * normal - turn)
         + coupled_b * (constraint.arm_b * normal - turn)
     )
-    mass = a.inverse_mass + b.inverse_mass + coupled_a * constraint.shear_arm_a + coupled_b * constraint.shear_arm_b
+    mass = shear_mass(group, lane, constraint, a, b)
     needed = old_shear - rate * (1.0 / mass)
     limit = shear_limits(contacts, group, lane, new_one + new_two, abs(needed), mass)
-    shear = lesser(greater(needed, -limit), limit)
+    shear = branch(needed > -limit, needed, -limit)
+    shear = branch(shear < limit, shear, limit)
     d_shear = shear - old_shear
     store(lane, group.shear, shear)
     push_and_drag(contacts, group, lane, constraint, a, b, normal, d_two, d_shear)
@@ -283,8 +296,11 @@ def taken_by(
     vx_a, vy_a, spin_a, _ = fields_0(lane, then, group.a)
     vx_b, vy_b, spin_b, _ = fields_0(lane, then, group.b)
     free = select(a.inverse_mass > 0.0, 1.0, 0.0) - select(b.inverse_mass > 0.0, 1.0, 0.0)
-    vx = a.vx - b.vx + vx_a - vx_b + free * gx
-    vy = a.vy - b.vy + vy_a - vy_b + free * gy
+    vx = a.vx - b.vx + vx_a - vx_b
+    vy = a.vy - b.vy + vy_a - vy_b
+    if gx != 0.0 or gy != 0.0:  # only in the first substep of a run
+        vx = vx + free * gx
+        vy = vy + free * gy
     slip = slip_of(constraint, vx, vy, a.spin + spin_a, b.spin + spin_b)
     if contacts.stepping[0].is_shaken:
         given = free * given_to(constraint, a, b, normal_one, normal_two, shear)

@@ -9,7 +9,7 @@ from blocksim.kernels.common.integrate import fastest_point, kinetic_energy, ren
 from blocksim.kernels.common.jit import entry_kernel, kernel
 from blocksim.kernels.common.loads import are_loads_steady
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.common.supports import is_support_at_rest
+from blocksim.kernels.common.supports import has_motion, is_support_at_rest
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.begin import is_start, load_states
 from blocksim.kernels.nonsmooth.energy import has_excessive_overlap
@@ -73,7 +73,8 @@ def check(scene: Nonsmooth) -> int:
 def end_part(scene: Nonsmooth) -> int:
     """End a part of a step for all; return UNDER_WAY, or the status of a step that has come to its end."""
     clock = scene.world.clock[0]
-    place_supports(scene)
+    if has_motion(scene.world.controls[0]):
+        place_supports(scene)
     if is_cut(scene):
         begin_next_part(scene)
         return UNDER_WAY

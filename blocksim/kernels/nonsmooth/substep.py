@@ -3,6 +3,7 @@
 from blocksim.kernels.common.arrays import TEAM_SIZE
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.supports import has_motion
 from blocksim.kernels.nonsmooth.arrays import Contacts, Nonsmooth
 from blocksim.kernels.nonsmooth.gap_curvature import follow_curvature
 from blocksim.kernels.nonsmooth.impacts import follow_impacts
@@ -34,7 +35,9 @@ def prepare(scene: Nonsmooth, number: int, share: float) -> None:
     """Set what is the same for all bodies and constraints in substep `number`, with that share of a kick of gravity."""
     controls = scene.world.controls[0]
     stepping = scene.contacts.stepping[0]
-    drive(scene, number)
+    stepping.is_shaken = has_motion(controls)
+    if stepping.is_shaken:
+        drive(scene, number)
     follow_curvature(stepping, number)
     stepping.fall_x = stepping.substep * controls.gravity_x
     stepping.fall_y = stepping.substep * controls.gravity_y

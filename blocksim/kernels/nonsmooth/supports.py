@@ -3,7 +3,7 @@
 from blocksim.kernels.common.arrays import Record, World
 from blocksim.kernels.common.driven import follow_pieces, pose_at, put, way_over
 from blocksim.kernels.common.jit import rare_kernel
-from blocksim.kernels.common.supports import displacement, has_motion, is_driven, piece_at
+from blocksim.kernels.common.supports import displacement, is_driven, piece_at
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.parts import begin_of_part, end_of_part
 
@@ -20,9 +20,6 @@ def drive(scene: Nonsmooth, number: int) -> None:
     world = scene.world
     controls = world.controls[0]
     stepping = scene.contacts.stepping[0]
-    stepping.is_shaken = has_motion(controls)
-    if not stepping.is_shaken:
-        return
     h = stepping.substep
     begin = begin_of_part(scene) + number * h
     rate = (displacement_at(world, begin + h) - displacement_at(world, begin)) / h
@@ -56,8 +53,6 @@ def place_supports(scene: Nonsmooth) -> None:
     world = scene.world
     controls = world.controls[0]
     clock = world.clock[0]
-    if not has_motion(controls):
-        return
     now = end_of_part(scene)
     clock.motion_piece = piece_at(world.motion, clock.motion_piece, now)
     moved = displacement(world.motion[clock.motion_piece], now)

@@ -12,6 +12,7 @@ from numba.extending import lower_builtin
 
 from blocksim.kernels.common.simd.functions import (
     WIDTH,
+    branch,
     fields_0,
     fields_4,
     fields_8,
@@ -43,6 +44,8 @@ from blocksim.kernels.common.simd.types import (
     LanesType,
     MaskType,
 )
+
+LIKELY = (2000, 1)  # weights of a branch that is to stay one
 
 
 def _spread(builder: Any, value: Any) -> Any:
@@ -204,6 +207,19 @@ def _compared(comparison: str) -> Callable[..., Any]:
     return lambda builder, x, y: builder.fcmp_ordered(comparison, x, y)
 
 
+def _branched(builder: Any, flag: Any, yes: Any, no: Any) -> Any:
+    """Return one of two numbers by a branch, which optimization would turn into a selection if it were not likely."""
+    start, other, end = builder.block, builder.append_basic_block(), builder.append_basic_block()
+    builder.cbranch(flag, end, other).set_weights(LIKELY)
+    builder.position_at_end(other)
+    builder.branch(end)
+    builder.position_at_end(end)
+    chosen = builder.phi(DOUBLE)
+    chosen.add_incoming(yes, start)
+    chosen.add_incoming(no, other)
+    return chosen
+
+
 def _define_all() -> None:
     for function, name in (
         (operator.add, "fadd"),
@@ -237,8 +253,10 @@ def _define_select() -> None:
         return builder.select(mask, _spread(builder, yes), _spread(builder, no))
 
     one = types.float64
-    _define(select, LANES, choose, (MASK, LANES, LANES), (MASK, LANES, one), (MASK, one, LANES), (MASK, one, one))
+    for function in (select, branch):
+        _define(function, LANES, choose, (MASK, LANES, LANES), (MASK, LANES, one), (MASK, one, LANES), (MASK, one, one))
     _define(select, one, lambda builder, mask, yes, no: builder.select(mask, yes, no), (types.boolean, one, one))
+    _define(branch, one, _branched, (types.boolean, one, one))
 
 
 def _define_memory() -> None:

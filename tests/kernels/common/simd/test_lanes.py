@@ -13,6 +13,7 @@ from blocksim.kernels.common.simd import (
     WIDTH,
     Lane,
     Lanes,
+    branch,
     fields_0,
     fields_4,
     greater,
@@ -50,7 +51,8 @@ def test_records_have_their_fields_where_lanes_look_for_them(kind: np.dtype[Any]
 def mixed(x: Lanes, y: Lanes) -> Lanes:
     """Do a bit of everything."""
     sum_ = x + 2.0 * y - x / (y * y + 0.1)
-    return select((sum_ > 0.0) & (x <= y), greater(sum_, abs(y)), lesser(-x, y) * sum_)
+    either = select((sum_ > 0.0) & (x <= y), greater(sum_, abs(y)), lesser(-x, y) * sum_)
+    return branch(either > x, either, 0.5) + branch(x > 0.0, -0.5, y)
 
 
 @kernel
@@ -90,6 +92,7 @@ def test_lanes_have_the_bits_of_single_numbers() -> None:
     x, y = fours["nx"], fours["ny"]
     total = x + 2.0 * y - x / (y * y + 0.1)
     expected = np.where((total > 0.0) & (x <= y), np.maximum(total, np.abs(y)), np.minimum(-x, y) * total)
+    expected = np.where(expected > x, expected, 0.5) + np.where(x > 0.0, -0.5, y)
     assert fours["shear"] == pytest.approx(expected, rel=1e-15)
 
 
