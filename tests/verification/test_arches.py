@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from blocksim.scenario import load_scenario
 from blocksim.scenario.outlines import centred
+from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import Simulation
 from tests.kernels.nonsmooth.scenes import Block, posed
+from tests.simulation.conftest import SCENARIOS
 
 if TYPE_CHECKING:
     from blocksim.scenario.outlines import Corners
@@ -59,7 +62,24 @@ def fastest(run: Simulation) -> float:
     return float(np.hypot(run.bodies.vx, run.bodies.vy).max())
 
 
-@pytest.mark.parametrize(("friction", "least"), [(0.4, 0.10672), (0.375, 0.12597), (0.35, 0.15118), (0.325, 0.17821)])
+LEAST = [(0.4, 0.10672), (0.375, 0.12597), (0.35, 0.15118), (0.325, 0.17821)]  # of thickness over mean radius
+
+
+def at_its_own_step(friction: float, thickness: float) -> Simulation:
+    """Return the arch of `arch.toml` under way, of a thickness (m), with the automatic step."""
+    arch = {"kind": "arch", "block": "voussoir", "radius": RADIUS, "thickness": thickness, "count": 27}
+    frictions = {"block_block": friction, "block_ground": friction}
+    values: Any = {"time.step": "auto", "friction": frictions, "structures": [arch]}
+    return Simulation(build_scene(load_scenario(SCENARIOS / "arch.toml", values)))
+
+
+@pytest.mark.parametrize(("friction", "least"), LEAST)
+def test_automatic_step_is_short_enough_for_the_least_thickness(friction: float, least: float) -> None:
+    assert fastest(at_its_own_step(friction, 0.99 * least * RADIUS)) > FALLS
+    assert fastest(at_its_own_step(friction, 1.01 * least * RADIUS)) < STANDS
+
+
+@pytest.mark.parametrize(("friction", "least"), LEAST)
 def test_least_thickness_of_a_semicircular_arch_is_that_of_limit_analysis(friction: float, least: float) -> None:
     """27 voussoirs, thickness over mean radius; below a friction of 0.396 their joints slide."""
     for share, stands in ((0.99, False), (1.01, True)):
