@@ -33,11 +33,15 @@ def go_through(contacts: Contacts, task: int, begin: int, end: int) -> float:
 
 @kernel
 def sweep(contacts: Contacts, task: int, team: Integers, k: int) -> float:
-    """Do one task for all groups, colour after colour; return the largest change of velocity (m/s) of thread k."""
+    """Do one task for all groups, colour after colour; return the largest change of velocity (m/s) of thread k.
+
+    For one thread colours are one sequence of groups, the same.
+    """
     largest = 0.0
     size = team[TEAM_SIZE]
-    for colour in range(contacts.stepping[0].colours):
-        begin, end = contacts.ends[colour], contacts.ends[colour + 1]
+    for colour in range(1 if size == 1 else contacts.stepping[0].colours):
+        begin = 0 if size == 1 else contacts.ends[colour]
+        end = contacts.stepping[0].group_count if size == 1 else contacts.ends[colour + 1]
         if begin < end:
             first, last = part_of(begin, end, k, 1 if colour == COLOURS - 1 else size)
             if colour < COLOURS - 1 or k == 0:

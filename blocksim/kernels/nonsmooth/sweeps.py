@@ -69,6 +69,7 @@ def velocity_constraints(contacts: Contacts, begin: int, end: int) -> float:
 @kernel
 def tally_constraints(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None:
     """Tally the constraints of some groups; (gx, gy), m/s, is what velocities lack of gravity."""
+    is_shaken = contacts.stepping[0].is_shaken
     for m in range(begin, end):
         group = contacts.groups[m]
         tally = contacts.tallies[m // PART]
@@ -76,9 +77,11 @@ def tally_constraints(contacts: Contacts, begin: int, end: int, gx: float, gy: f
             normal, shear, given = taken_by(contacts, contacts.before, group, 0, gx, gy)
             tally.impacts -= 0.5 * normal
             tally.friction -= 0.5 * shear
-            tally.to_support += given
+            if is_shaken:
+                tally.to_support += given
         else:
             normals, shears, gifts = taken_by(contacts, contacts.before, group, None, gx, gy)
             tally.impacts -= 0.5 * total(normals, group.count)
             tally.friction -= 0.5 * total(shears, group.count)
-            tally.to_support += total(gifts, group.count)
+            if is_shaken:
+                tally.to_support += total(gifts, group.count)
