@@ -9,6 +9,7 @@ import pytest
 
 from tests.cli.conftest import Command, Process
 from tests.golden import Golden
+from tests.sizes import in_all
 
 AT_REST = ("--set", "time.scheme=nonsmooth", "--set", "time.end=0.5", "--set", "bodies.0.velocity=[0,0]")
 SLIDE = ("fragility", "scenarios/slide.toml", *AT_REST)
@@ -86,7 +87,7 @@ def test_a_study_killed_again_and_again_ends_as_one_that_was_not(
     wall = ("fragility", "scenarios/tilting_wall.toml", "--intensity", "ground.tilt=31deg:34deg:4", "--members", 40)
     study = (*wall, "--scatter", "friction.block_block=0.65+-0.03", "--set", "time.stop_at_rest=false", "--jobs", 1)
     assert blocksim(*study, "--out", "whole").code == 0
-    for _ in range(10):
+    for _ in range(in_all(10)):
         running = process(*study, "--out", "killed")
         time.sleep(2.5)
         running.send_signal(signal.SIGKILL)

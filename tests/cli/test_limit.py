@@ -12,12 +12,14 @@ import pytest
 from blocksim.scenario import scenario_from_mapping, scenario_to_toml
 from tests.cli.conftest import Command, Process
 from tests.golden import Golden
+from tests.sizes import in_all
 from tests.study.test_limit import SLENDER, block_on_a_slope
 
 WALL = ("limit", "scenarios/tilting_wall.toml")
 TILT = ("--vary", "ground.tilt=20deg:40deg")
 FELL = ("--stands", "outcome != fell")
 ROUGH = ("--to", "5%", "--no-runs", "--out", "out")
+ROUGHER = ("--to", "20%", *ROUGH[2:])
 
 
 def test_the_dry_wall_falls_where_limit_analysis_says_in_at_most_25_runs(blocksim: Command, golden: Golden) -> None:
@@ -35,7 +37,7 @@ def test_the_dry_wall_falls_where_limit_analysis_says_in_at_most_25_runs(blocksi
 
 def test_both_laws_are_compared(blocksim: Command, golden: Golden) -> None:
     soft = ("--set", "contact.stiffness_scale=0.001", "--set", "time.end=0.5 s", "--set", "start.settle=true")
-    answer = blocksim(*WALL, "--vary", "ground.tilt=0 deg:40 deg:3", *ROUGH, "--both-laws", *soft)
+    answer = blocksim(*WALL, "--vary", "ground.tilt=0 deg:40 deg:3", *ROUGHER, "--both-laws", *soft)
     assert answer.code == 0
     assert "rigid contacts against springs: " in answer.out
     assert max(map(len, answer.out.splitlines())) <= 80
@@ -172,7 +174,7 @@ def test_a_search_killed_again_and_again_ends_as_one_that_was_not(
     slow = (*WALL, *TILT, *FELL, "--set", "time.stop_at_rest=false", "--jobs", 1)
     assert blocksim(*slow, "--out", "whole").code == 0
     whole = json.loads((tmp_path / "whole" / "limit.json").read_text())
-    for _ in range(20):
+    for _ in range(in_all(20)):
         running = process(*slow, "--out", "killed")
         time.sleep(1.2)
         running.send_signal(signal.SIGKILL)

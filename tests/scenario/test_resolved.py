@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
@@ -121,6 +121,7 @@ SCENARIOS = st.fixed_dictionaries(
 )
 
 
+@settings(max_examples=40)
 @given(SCENARIOS)
 def test_any_scenario_is_written_and_loaded_bit_equal(data: dict[str, Any]) -> None:
     scenario = scenario_from_mapping(data)

@@ -18,6 +18,7 @@ from blocksim.study import executors as batches
 from blocksim.study.fragility import FragilityResult, fragility
 from blocksim.study.fragility_plan import read_fragility
 from blocksim.study.progress import Shard
+from tests.sizes import in_all
 
 MU = "friction.block_ground"
 SLIDES = "outcome = slid"
@@ -230,7 +231,7 @@ def test_without_scipy_it_says_what_to_install_before_anything_runs(
 
 @pytest.mark.long
 def test_intervals_cover_the_closed_form_through_the_whole_chain(tmp_path: Path) -> None:
-    studies, covered, fitted = 100, 0, 0
+    studies, covered, fitted = in_all(100), 0, 0
     truth = [float(norm.cdf((math.tan(math.radians(tilt)) - 0.38) / 0.06)) for tilt in (14, 17, 20, 23, 26)]
     for seed in range(studies):
         found = slides(tmp_path / str(seed), members=24, seed=seed)
@@ -238,6 +239,7 @@ def test_intervals_cover_the_closed_form_through_the_whole_chain(tmp_path: Path)
         assert isinstance(found.curve, Curve)
         low, high = found.curve.median_interval
         fitted += low <= math.degrees(math.atan(0.38)) <= high
+    # four standard deviations
     assert covered / (5 * studies) > 0.95 - 4.0 * math.sqrt(0.95 * 0.05 / (5 * studies))
     assert abs(fitted / studies - 0.95) < 4.0 * math.sqrt(0.95 * 0.05 / studies)
 

@@ -62,14 +62,14 @@ def meet_often(team: Integers, places: Integers, k: int, rounds: int) -> int:
     return faults
 
 
-@pytest.mark.parametrize("size", [1, 2, 3, MANY])
+@pytest.mark.parametrize("size", [1, 2, MANY])
 def test_nobody_leaves_a_meeting_before_everybody_has_come(size: int) -> None:
     team, places = np.zeros(TEAM_WORDS, dtype=np.int64), np.zeros(8 * MANY, dtype=np.int64)
     team[TEAM_SIZE] = size
-    faults = in_threads(*(lambda k=k: meet_often(team, places, k, 500) for k in range(size)))
+    faults = in_threads(*(lambda k=k: meet_often(team, places, k, 200) for k in range(size)))
     assert faults == [0] * size
     assert team[ARRIVED] == 0
-    assert team[MEETINGS] == (1000 if size > 1 else 0)
+    assert team[MEETINGS] == (400 if size > 1 else 0)
 
 
 class ByOne(Protocol):
@@ -93,7 +93,7 @@ def by_one() -> ByOne:
     return make
 
 
-@pytest.mark.parametrize(("size", "begin"), [(2, 0.0), (3, 0.5), (4, 0.8), (MANY, 0.9)])
+@pytest.mark.parametrize(("size", "begin"), [(2, 0.4), (3, 0.8), (MANY, 0.9)])
 @pytest.mark.parametrize("scene", SCENES)
 def test_any_number_of_threads_gives_the_bits_of_one(by_one: ByOne, scene: str, size: int, begin: float) -> None:
     steps = SCENES[scene][1]
@@ -170,7 +170,7 @@ def resting() -> World:
 ENDS: dict[int, Callable[[], World]] = {OVERLAP_LIMIT: overlapping, NOT_FINITE: burst, AT_REST: resting}
 
 
-@pytest.mark.parametrize("size", [2, 3, MANY])
+@pytest.mark.parametrize("size", [2, MANY])
 @pytest.mark.parametrize("status", ENDS)
 def test_what_ends_a_run_ends_it_for_all_threads_at_the_same_step(status: int, size: int) -> None:
     one, ended = advanced(ENDS[status](), 10_000, 1)
