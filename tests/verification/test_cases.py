@@ -14,8 +14,12 @@ from tests.verification.rows import allowed, missed, same_kind
 
 ROOT = Path(__file__).parents[2]
 LAWS = {"linear": "linear", "Hertz–Mindlin": "hertz-mindlin"}  # head of the column in the README: law
+SLOW = {"V10", "V12", "V23"}  # seconds each; V9, V11 and the ledgers of tests/simulation are there always
+LONG = pytest.mark.long
 HEADS = [
-    pytest.param(case, head, id=f"{case.id}-{law}", marks=pytest.mark.long if law == "hertz-mindlin" else ())
+    pytest.param(
+        case, head, id=f"{case.id}-{law}", marks=pytest.mark.long if law != "linear" or case.id in SLOW else ()
+    )
     for head, law in LAWS.items()
     for case in CASES
 ]  # make test has the linear law; tests of Hertz' law are in tests/kernels, its cases are for make test-long
