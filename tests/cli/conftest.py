@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+import h5py
 import pytest
 from typer.testing import CliRunner
 
@@ -62,6 +63,25 @@ def wait_for(path: Path, running: Running) -> None:
     """Wait until a process has made a file."""
     began = time.monotonic()
     while not path.exists():
+        assert running.poll() is None, running.communicate()
+        assert time.monotonic() - began < PATIENCE
+        time.sleep(0.005)
+
+
+def committed(path: Path) -> int:
+    """Return how many frames a file announces while it is written."""
+    try:
+        with h5py.File(path, "r", libver="latest", swmr=True) as file:
+            return int(file["n_committed"][()])
+    except FileNotFoundError:
+        return 0
+
+
+def wait_for_frames(path: Path, running: Running) -> None:
+    """Wait until a run has stored some."""
+    wait_for(path, running)
+    began = time.monotonic()
+    while committed(path) < 3:
         assert running.poll() is None, running.communicate()
         assert time.monotonic() - began < PATIENCE
         time.sleep(0.005)

@@ -8,7 +8,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -16,7 +15,7 @@ from typer.testing import CliRunner
 from blocksim.cli.app import app
 from blocksim.scenario import load_scenario
 from blocksim.simulation.stores.hdf5_reader import read_frames
-from tests.cli.conftest import PATIENCE, SCENARIOS, SOFT, Command, Process, Running, wait_for
+from tests.cli.conftest import PATIENCE, SCENARIOS, SOFT, Command, Process, committed, wait_for, wait_for_frames
 from tests.sizes import in_all
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"
@@ -75,25 +74,6 @@ def kill_again_and_again(process: Process, folder: Path, kills: int, most: float
         running.communicate()
         assert frames_in(folder) >= before
     return killed
-
-
-def committed(path: Path) -> int:
-    """Return how many frames a file announces while it is written."""
-    try:
-        with h5py.File(path, "r", libver="latest", swmr=True) as file:
-            return int(file["n_committed"][()])
-    except FileNotFoundError:
-        return 0
-
-
-def wait_for_frames(path: Path, running: Running) -> None:
-    """Wait until a run has stored some."""
-    wait_for(path, running)
-    began = time.monotonic()
-    while committed(path) < 3:
-        assert running.poll() is None, running.communicate()
-        assert time.monotonic() - began < PATIENCE
-        time.sleep(0.005)
 
 
 def frames_in(folder: Path) -> int:

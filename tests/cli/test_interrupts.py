@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.conftest import PATIENCE, SOFT, Process, wait_for
+from tests.cli.conftest import PATIENCE, SOFT, Process, wait_for, wait_for_frames
 
 LONG = ("run", "scenarios/three_blocks_nominal.toml", *SOFT, "--set", "time.end=500")
 LONGER = (*LONG, "--set", "time.stop_at_rest=false", "--out", "out")
@@ -46,11 +46,13 @@ def test_three_times_ctrl_c_prints_no_traceback(process: Process, tmp_path: Path
     slow = (
         "import blocksim.simulation.running as p, time\n"
         "close = p.FrameFile.__exit__\n"
-        "p.FrameFile.__exit__ = lambda *a: (time.sleep(600), close(*a))"  # as a slow disk
+        "p.FrameFile.__exit__ = lambda *a: (open('closing', 'w').close(), time.sleep(600), close(*a))"  # as a slow disk
     )
     running = process(*LONGER, "--quiet", before=slow)
-    wait_for(tmp_path / "out" / "run.h5", running)
-    for pause in (0.5, 0.5, 0.002):  # s
+    wait_for_frames(tmp_path / "out" / "run.h5", running)
+    running.send_signal(signal.SIGINT)
+    wait_for(tmp_path / "closing", running)
+    for pause in (0.0, 0.002):  # s
         time.sleep(pause)
         running.send_signal(signal.SIGINT)
     _, err = running.communicate(timeout=PATIENCE)
@@ -70,8 +72,7 @@ def test_lost_terminal_stops_a_run_with_a_checkpoint(process: Process, tmp_path:
         preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
     )
     os.close(follower)
-    wait_for(tmp_path / "out" / "run.h5", running)
-    time.sleep(0.5)
+    wait_for_frames(tmp_path / "out" / "run.h5", running)
     os.close(leader)
     running.wait(timeout=PATIENCE)
     assert running.returncode == 75
