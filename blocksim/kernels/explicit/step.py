@@ -133,6 +133,14 @@ def note_depth(clock: Record, share: Record) -> None:
 
 
 @kernel
+def note_step(clock: Record, share: Record) -> None:
+    """Note what all threads have to know of the step of a share; most steps have nothing, and call nothing."""
+    if share.is_too_deep or share.asks:
+        note_depth(clock, share)
+        note_contacts(clock, share)
+
+
+@kernel
 def has_ended(clock: Record, steps: int) -> bool:
     """Return True if the last step of a run that failed is among so many steps."""
     return 0 < clock.ends_at <= steps
@@ -240,8 +248,7 @@ def advance_thread(world: World, last_step: int, k: int, team: Integers | None, 
         if team is not None:
             exchange_forces(world, k, step)
         forces_within(world, share, step, goes_on)
-        note_depth(clock, share)
-        note_contacts(clock, share)
+        note_step(clock, share)
         barrier(world.team)
         if not goes_on and not end_steps(world, k, step, systems):
             break
