@@ -47,6 +47,7 @@ def test_the_energy_of_a_collapse_adds_up(gradient: str) -> None:
     assert abs(sum(change.values())) < 0.002 * before["soils_potential"]
     for loss in ("plastic", "viscosity", "dashpot", "friction"):
         assert change[f"soils_{loss}"] > 0.0
+    assert change["soils_viscosity"] < -0.06 * change["soils_potential"]  # else it stops thin fronts, not friction
 
 
 def test_a_column_between_smooth_walls_comes_to_rest_with_its_weight_on_the_ground() -> None:
@@ -59,6 +60,17 @@ def test_a_column_between_smooth_walls_comes_to_rest_with_its_weight_on_the_grou
     assert -base == pytest.approx(soil.weight, rel=0.005)
     assert np.hypot(soil.soils.points["vx"], soil.soils.points["vy"]).max() < 1e-3
     assert soil.soils.points["y"].max() == pytest.approx(0.05 - 0.5 * SPACING, abs=0.05 * SPACING)
+
+
+def test_a_particle_that_strikes_the_ground_keeps_a_fifth_of_its_speed_at_most() -> None:
+    soil = Soil(scene(column(0.04, 0.04, SPACING), gravity=0.0))
+    number = soil.soils.states["number"]
+    for name, value in (("x", 0.2), ("y", 0.01), ("vy", -0.5)):
+        soil.soils.points[name][number == 0] = value
+    soil.soils.controls.is_listed[0] = 0
+    soil.to_time(0.02)
+    flies = soil.soils.states["number"] == 0
+    assert 0.0 < float(soil.soils.points["vy"][flies][0]) < 1.01 * 0.5 * math.exp(-0.5 * math.pi)
 
 
 def test_soil_without_any_strength_presses_like_water() -> None:
