@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 COURANT = 0.4  # step in smoothing lengths that a wave passes
 # Factor of artificial viscosity. Sheared soil feels a c h/8 of it, a resistance that the material does not have; in the
 # thin front of a collapse 0.03 is several times the friction of its weight. It is there to damp waves: with 0.003 a
-# collapse loses 2 to 4 % of its energy to it, pressures at rest and thrusts stay as they are. Numerical, not calibrated.
+# collapse loses 2 to 4 % of its energy to it, pressures at rest and thrusts stay as they are. A numerical choice.
 VISCOSITY = 0.003
 SKIN = 0.4  # of lists, in spacings
 MILLI = 1e3
