@@ -18,7 +18,7 @@ from blocksim.scenario.systems import SYSTEMS
 BLOCKS_BY_NAME = ("structures", "bodies")
 SPRING_CHOICES = ("model", "law")
 """Keys of [contact] that rigid contacts do not have."""
-WITH_OUTLINES: frozenset[tuple[str, str]] = frozenset({("nonsmooth", "surface")})
+WITH_OUTLINES: frozenset[tuple[str, str]] = frozenset({("explicit", "surface"), ("nonsmooth", "surface")})
 """Schemes and contact models that know blocks with an outline; rigid contacts have the model "surface"."""
 
 

@@ -18,6 +18,9 @@ from blocksim.simulation.team import ALONE
 from blocksim.world.scenes import stack_of_one
 
 OUTLINED = "outlines"  # rigid contacts of blocks that are no rectangles
+SPRUNG_OUTLINES = "outlines-with-springs"  # the same with springs
+OF_OUTLINES = {RIGID: OUTLINED, SURFACE: SPRUNG_OUTLINES}
+POLYGON = {"any": {"sides": 4, "radius": 0.5, "depth": 1.0, "material": "any"}}
 
 CHANGES: dict[str, dict[str, object]] = {  # in the smallest scene, so that it needs them
     SURFACE: {},
@@ -25,8 +28,9 @@ CHANGES: dict[str, dict[str, object]] = {  # in the smallest scene, so that it n
     RIGID: {"time": {"scheme": "nonsmooth"}},
     OUTLINED: {
         "time": {"scheme": "nonsmooth"},
-        "blocks": {"any": {"sides": 4, "radius": 0.5, "depth": 1.0, "material": "any"}},
+        "blocks": POLYGON,
     },
+    SPRUNG_OUTLINES: {"blocks": POLYGON},
 }
 
 SMALLEST_SCENE = {
@@ -41,7 +45,7 @@ SMALLEST_SCENE = {
 def kernels_of(scenario: Scenario) -> str:
     """Return which set of kernels a scenario needs."""
     kernels = kernel_set(scenario.time.scheme, scenario.contact.model)
-    return OUTLINED if kernels == RIGID and has_outlines(scenario) else kernels
+    return OF_OUTLINES.get(kernels, kernels) if has_outlines(scenario) else kernels
 
 
 def kernel_set(scheme: str, model: str) -> str:

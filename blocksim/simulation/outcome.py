@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import ExitCode
 from blocksim.kernels.common import arrays
-from blocksim.kernels.common.arrays import ALL, NOT_FINITE, OVERLAP_LIMIT, World
+from blocksim.kernels.common.arrays import ALL, NOT_FINITE, OUTLINE, OVERLAP_LIMIT, World
 from blocksim.kernels.explicit.depth import MIDDLE, ROWS_APART
 from blocksim.kernels.explicit.models import KERNEL, SURFACE
 from blocksim.kernels.nonsmooth.arrays import TOUCHING
@@ -159,13 +159,28 @@ def _overlaps_of_springs(world: World) -> Pairs:
 
 
 def _penetrations(world: World, pairs: NDArray[Any]) -> NDArray[np.float64]:
-    """Return how deep (m) the rectangles of pairs overlap, or the block lies below the ground."""
+    """Return how deep (m) the bodies of pairs overlap, or the block lies below the ground."""
+    bodies = world.bodies
+    outlines = _outlines(world)
+    is_ground = pairs["b"] == bodies.size - 1
+    below = bodies[-1].y - outlines.bottom[pairs["a"]]
+    return np.where(is_ground, below, penetration(outlines.some(pairs["a"]), outlines.some(pairs["b"])))
+
+
+def _outlines(world: World) -> Outlines:
+    """Return the outlines of all bodies, those of polygons in boxes about their centroids."""
     bodies = world.bodies
     boxes = Rectangles(*(bodies[name] for name in ("x", "y", "half_x", "half_y", "cos", "sin")))
-    rectangles = Outlines.rectangles(boxes)
-    is_ground = pairs["b"] == bodies.size - 1
-    below = bodies[-1].y - rectangles.bottom[pairs["a"]]
-    return np.where(is_ground, below, penetration(rectangles.some(pairs["a"]), rectangles.some(pairs["b"])))
+    outlines = Outlines.rectangles(boxes)
+    polygons = np.flatnonzero(bodies["faces"] == OUTLINE)
+    if not polygons.size:
+        return outlines
+    shapes, shape_of = np.unique(bodies[["first_corner", "corner_count"]][polygons], return_inverse=True)
+    most = max(4, int(shapes["corner_count"].max()))
+    last = shapes["corner_count"][:, np.newaxis] - 1  # repeated up to a common number
+    rows = world.corners[shapes["first_corner"][:, np.newaxis] + np.minimum(np.arange(most), last)]
+    outlines.kinds[polygons] = shape_of
+    return outlines._replace(polygons=np.stack([rows["x"], rows["y"]], axis=-1))
 
 
 def _overlaps_of_constraints(scene: Any) -> Pairs:

@@ -5,19 +5,20 @@ Time steps and skins are chosen by these bounds, known before anything moves.
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.common.arrays import OUTLINE
+from blocksim.kernels.common.arrays import OUTLINE, Records
 from blocksim.scenario import Scenario
 from blocksim.scenario.drives import greatest_rate
 from blocksim.scenario.motion import motion_pieces
 from blocksim.world.applied import greatest_push, steepest_tilt
 from blocksim.world.drives import driven_speed, highest_rise
 from blocksim.world.interactions import Interactions
+from blocksim.world.shapes import Shapes
 
 
 class Kind(NamedTuple):
@@ -40,10 +41,11 @@ class Bounds(NamedTuple):
     free: int  # blocks that are not fixed
     kinds: frozenset[Kind]
     grounds: frozenset[int]  # contact classes of the half-plane and its pieces
+    standing: frozenset[Kind]  # blocks on each of their faces, as `standing_of` has them
 
 
-def bounds_of(bodies: NDArray[np.record], blocks: int) -> list[Bounds]:
-    """Return the bounds of scenes, given their bodies (m, n + 1) of which so many are blocks."""
+def bounds_of(bodies: NDArray[np.record], blocks: int, shapes: Sequence[Shapes | None]) -> list[Bounds]:
+    """Return the bounds of scenes, given their bodies (m, n + 1), of which so many are blocks, and shapes of blocks."""
     all_blocks = bodies[:, :blocks]
     columns = {name: np.ascontiguousarray(all_blocks[name]) for name in ("radius", "half_x", "half_y", "mass")}
     smallest = _smallest_sides(all_blocks, columns)
@@ -56,13 +58,43 @@ def bounds_of(bodies: NDArray[np.record], blocks: int) -> list[Bounds]:
     # one by one: the order of a sum must not depend on which other scenes there are
     masses = [float(np.sum(mass[mass > 0.0])) for mass in columns["mass"]]
     free = np.count_nonzero(columns["mass"] > 0.0, axis=1).tolist()
-    kinds = zip(*(all_blocks[name].tolist() for name in Kind._fields), strict=True)
-    grounds = bodies["contact_class"][:, blocks:].tolist()
-    rows = zip(smallest.tolist(), top.tolist(), speed.tolist(), masses, free, kinds, grounds, strict=True)
-    return [
-        Bounds(side, height, pace, mass, count, frozenset(map(Kind, *kind)), frozenset(ground))
-        for side, height, pace, mass, count, kind, ground in rows
+    columns_of_kinds = zip(*(all_blocks[name].tolist() for name in Kind._fields), strict=True)
+    kinds = [frozenset(map(Kind, *one)) for one in columns_of_kinds]
+    standing = [
+        one if shape is None else standing_of(bodies, shape)
+        for one, bodies, shape in zip(kinds, all_blocks, shapes, strict=True)
     ]
+    grounds = bodies["contact_class"][:, blocks:].tolist()
+    rows = zip(smallest.tolist(), top.tolist(), speed.tolist(), masses, free, kinds, grounds, standing, strict=True)
+    return [
+        Bounds(side, height, pace, mass, count, kind, frozenset(ground), faces)
+        for side, height, pace, mass, count, kind, ground, faces in rows
+    ]
+
+
+def standing_of(blocks: NDArray[np.record], shapes: Shapes) -> frozenset[Kind]:
+    """Return the blocks of a scene as they stand, a polygon on each of its faces.
+
+    In place of `half_x` is how far along the face a corner is from the foot of the centroid, at most, and in place of
+    `half_y` the distance of the face: what half sides are to a rectangle.
+    """
+    kinds: set[Kind] = set()
+    for block, first, size in zip(blocks, shapes.firsts, shapes.sizes, strict=True):
+        kind = Kind(*(block[name].item() for name in Kind._fields))
+        if block["faces"] == OUTLINE:
+            faces = _faces_of(shapes.table[first : first + size])
+            kinds.update(kind._replace(half_x=reach, half_y=distance) for reach, distance in faces)
+        else:
+            kinds.add(kind)
+    return frozenset(kinds)
+
+
+def _faces_of(corners: Records) -> Iterator[tuple[float, float]]:
+    """Yield how far (m) the corners of each face are from the foot of the centroid, and its distance (m)."""
+    tangents = np.stack([-corners["ny"], corners["nx"]])
+    places = np.stack([corners["x"], corners["y"]])
+    ends = np.abs(np.stack([(tangents * places).sum(axis=0), (tangents * np.roll(places, -1, axis=1)).sum(axis=0)]))
+    yield from zip(ends.max(axis=0).tolist(), corners["distance"].tolist(), strict=True)
 
 
 def _smallest_sides(blocks: NDArray[np.record], columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:

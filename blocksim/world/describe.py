@@ -180,7 +180,7 @@ def _limits(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World) ->
     if not isinstance(scenario.time, Explicit) or systems == math.inf:
         return None
     outline = outline_of(scenario)
-    (bounds,) = bounds_of(with_freed(stack_of_one(world.bodies), [outline]), len(placed))
+    (bounds,) = bounds_of(with_freed(stack_of_one(world.bodies), [outline]), len(placed), [outline.shapes])
     blocks = step_of_contacts(scenario, bounds, outline.interactions, scenario.time.safety)
     return StepLimits(blocks, systems, scenario.contact.stiffness_scale * (blocks / systems) ** 2)
 
@@ -189,7 +189,7 @@ def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, ste
     if not isinstance(scenario.time, Nonsmooth):
         return None
     outline = outline_of(scenario)
-    (bounds,) = bounds_of(with_freed(stack_of_one(world.bodies), [outline]), len(placed))
+    (bounds,) = bounds_of(with_freed(stack_of_one(world.bodies), [outline]), len(placed), [outline.shapes])
     sag = scene_sag(step / scenario.time.substeps, placed, scenario.gravity)
     return SagDescription(
         why=reason_of_step(outline, bounds).why,

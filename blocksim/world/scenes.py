@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
-from blocksim.kernels.common.arrays import SLOTS, Records, zeros
+from blocksim.kernels.common.arrays import HALF, SLOTS, Records, zeros
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.world.bodies import Outline, Outlines, body_records, outline_of, with_freed
 from blocksim.world.bounds import Bounds, bounds_of
@@ -108,7 +108,7 @@ def build_one(scenario: Scenario, construction: Construction) -> Built:
     outline = outline_of(scenario)
     with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused
         bodies = body_records([outline])
-        (bounds,) = bounds_of(with_freed(bodies, [outline]), len(outline.placed))
+        (bounds,) = bounds_of(with_freed(bodies, [outline]), len(outline.placed), [outline.shapes])
         stride = construction.choose(outline, bounds)
     ((_, parts),) = _divided([outline], bodies, construction.model(outline))
     refuse_if_too_large(construction.size(parts))
@@ -141,7 +141,7 @@ def _choose(outlines: Outlines, construction: Construction) -> tuple[Records, li
     chosen: list[Stride | BlocksimError] = []
     with np.errstate(all="ignore"):  # as in `build_one`
         bodies = body_records(outlines)
-        all_bounds = bounds_of(with_freed(bodies, outlines), len(outlines[0].placed))
+        all_bounds = bounds_of(with_freed(bodies, outlines), len(outlines[0].placed), [one.shapes for one in outlines])
         for outline, bounds in zip(outlines, all_bounds, strict=True):
             try:
                 chosen.append(construction.choose(outline, bounds))
@@ -201,11 +201,16 @@ def _divided(outlines: Outlines, bodies: Records, model: str) -> Iterator[tuple[
 def _boundaries(outlines: Outlines, bodies: Records, model: str) -> list[_Boundary]:
     """Return boundaries; fills the fields of the bodies that are about particles."""
     if model == SURFACE:
-        return [_Boundary(None, SLOTS)] * len(outlines)
+        return [_Boundary(None, _slots_of_corners(outline)) for outline in outlines]
     return [
         _Boundary(place_particles(one, model, outline.scenario.contact.particle_spacing), slots_of_a_pair(one, model))
         for one, outline in zip(bodies, outlines, strict=True)
     ]
+
+
+def _slots_of_corners(outline: Outline) -> int:
+    """Return how many corners the two bodies of a pair have, at most."""
+    return SLOTS if outline.shapes is None else 2 * max(HALF, *outline.shapes.sizes)
 
 
 def cell_radius(bodies: Records) -> Floats:

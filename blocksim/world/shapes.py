@@ -2,9 +2,11 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from blocksim.kernels.common.arrays import CORNER, Records, zeros
+from blocksim.kernels.explicit.outlines import WIDEST_CONE
 from blocksim.scenario import PlacedBody
 
 Corners = tuple[tuple[float, float], ...]  # m, counter-clockwise about the centroid
@@ -40,11 +42,24 @@ def shapes_of(placed: Sequence[PlacedBody]) -> Shapes | None:
 def corner_rows(corners: Corners) -> list[tuple[float, ...]]:
     """Return the fields of CORNER of the corners of one shape."""
     rows: list[tuple[float, ...]] = []
+    cone = cone_of(corners)
     for (x, y), (next_x, next_y) in zip(corners, (*corners[1:], corners[0]), strict=True):
         length = math.hypot(next_x - x, next_y - y)
         nx, ny = (next_y - y) / length, (x - next_x) / length
-        rows.append((x, y, nx, ny, nx * x + ny * y, 0.5 * length))
+        rows.append((x, y, nx, ny, nx * x + ny * y, 0.5 * length, cone))
     return rows
+
+
+def cone_of(corners: Corners) -> float:
+    """Return the sine of the angle up to which a face of a shape is parallel to one of another body.
+
+    At most half of the least angle by which the outline turns at a corner: a body that rolls over it from one face to
+    the next is on neither of them half way. And at most half of the sharpest corner: beyond that the sides of one
+    corner would be parallel.
+    """
+    edges = [math.atan2(y - last_y, x - last_x) for (last_x, last_y), (x, y) in pairwise((*corners, corners[0]))]
+    turns = [(after - before) % (2.0 * math.pi) for before, after in zip((edges[-1], *edges), edges, strict=False)]
+    return min(WIDEST_CONE, math.sin(0.5 * min(turns)), math.sin(0.5 * (math.pi - max(turns))))
 
 
 def half_sides(body: PlacedBody) -> tuple[float, float]:

@@ -81,7 +81,7 @@ class SkinTooSmallError(InvalidInputError):
 
 def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: str, load: Load) -> float:
     """Return the largest safe step (s) of blocks within these bounds with these contact parameters."""
-    kinds = [(_contact_body(kind), kind.contact_class) for kind in bounds.kinds]
+    kinds = [(_contact_body(kind), kind.contact_class) for kind in bounds.standing]
 
     def stiffness(i: int, j: int, inverse_mass: float) -> ContactStiffness:
         row = table[i][j]

@@ -127,7 +127,7 @@ def test_rest_is_looked_for_only_where_it_may_stop_the_run() -> None:
 def test_automatic_step_is_the_admissible_one_and_follows_safety_and_stiffness() -> None:
     world = build_world(scenario())
     step = float(world.controls[0].step)
-    (bounds,) = bounds_of(world.bodies[np.newaxis], 1)
+    (bounds,) = bounds_of(world.bodies[np.newaxis], 1, [None])
     table = interactions_of(scenario(), contact_classes(scenario(), place_bodies(scenario())))
     assert step == admissible_step(bounds, table, 0.05, "linear", Load(0.0, 0.0))
     assert build_world(scenario(time={"safety": 0.025})).controls[0].step == pytest.approx(step / 2)

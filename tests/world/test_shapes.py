@@ -74,7 +74,7 @@ def test_least_width_is_the_least_height_over_a_face() -> None:
 
 def test_steps_are_bounded_by_the_least_width_of_a_polygon() -> None:
     outline = outline_of(scenario(sliver={"outline": [[0.0, 0.0], [1.0, 1.0], [0.98, 1.02]], "depth": 0.1}))
-    (bounds,) = bounds_of(body_records([outline]), len(outline.placed))
+    (bounds,) = bounds_of(body_records([outline]), len(outline.placed), [outline.shapes])
     assert bounds.smallest == pytest.approx(0.028, rel=0.02)
 
 

@@ -32,7 +32,7 @@ def world_of(body: Mapping[str, object], *more: Mapping[str, object], **tables: 
 
 def load_of(*bodies: Mapping[str, object], **tables: Any) -> Load:
     scenario = scenario_of(bodies, **tables)
-    (bounds,) = bounds_of(build_world(scenario).bodies[np.newaxis], len(bodies))
+    (bounds,) = bounds_of(build_world(scenario).bodies[np.newaxis], len(bodies), [None])
     return expected_load(scenario, bounds)
 
 

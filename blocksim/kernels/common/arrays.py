@@ -119,7 +119,8 @@ PARTICLE = record_type(
 CORNER = record_type(
     "x y "  # m: place about the centroid, in the body frame; counter-clockwise
     "nx ny "  # -: outward normal of the face from this corner to the next, in the body frame
-    "distance half"  # m: of that face from the centroid, and half of its length
+    "distance half "  # m: of that face from the centroid, and half of its length
+    "cone"  # -: of the shape: sine of the angle up to which a face is parallel to one of another body
 )
 PAIR = record_type(
     "limit "  # m: a deeper overlap ends the run

@@ -1,7 +1,7 @@
 """Stiffness of the corner contacts of one pair, as tributary.py has it: measured where dashpots are due."""
 
-from blocksim.kernels.common.arrays import Record, World
-from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.common.arrays import Record, Records, World
+from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit.models.duplicate_corners import PARALLEL
 from blocksim.kernels.explicit.tributary import (
     APART,
@@ -10,8 +10,12 @@ from blocksim.kernels.explicit.tributary import (
     PLANE,
     WHOLE,
     Bearing,
+    Interval,
     are_blocks,
+    bearing_of_facing,
     bearing_of_interval,
+    facing_of,
+    flat_of,
     interval_of,
     is_flat,
     stiffness_between,
@@ -44,21 +48,34 @@ def measure(world: World, p: int, count: int, stiffness: float) -> None:
         pair.bearing = PLANE
         keep_bearing(pair, WHOLE, stiffness)
     else:
-        measure_faces(pair, a, b, world.points[0], world.points[count - 1], stiffness)
+        measure_faces(pair, a, b, world.points[0], world.points[count - 1], stiffness, world.corners)
+
+
+@kernel
+def bearing_along(
+    a: Record, b: Record, nx: float, ny: float, corners: Records | None
+) -> tuple[Interval, Bearing, bool]:
+    """Return the interval of two blocks along a normal, what its ends bear, and whether the faces are parallel."""
+    if corners is None:
+        found = interval_of(a, b, nx, ny)
+        return found, bearing_of_interval(found, a, b), is_flat(a, b)
+    facing = facing_of(a, b, nx, ny, corners)
+    return facing.interval, bearing_of_facing(facing), facing.sine <= flat_of(facing)
 
 
 @rare_kernel
-def measure_faces(pair: Record, a: Record, b: Record, one: Record, two: Record, stiffness: float) -> None:
+def measure_faces(
+    pair: Record, a: Record, b: Record, one: Record, two: Record, stiffness: float, corners: Records | None
+) -> None:
     """Measure the stiffness of the contacts of two blocks, `one` and `two` (or both the same).
 
     Two on different faces, as where a corner lies in a corner, both have that of the deeper one.
     """
     deeper = one if one.depth >= two.depth else two
-    found = interval_of(a, b, deeper.nx, deeper.ny)
-    bearing = bearing_of_interval(found, a, b)
+    found, bearing, flat = bearing_along(a, b, deeper.nx, deeper.ny, corners)
     keep_bearing(pair, bearing, stiffness)
     is_two = one.slot != two.slot
-    is_ends = not is_two or (are_alike(one, two) and is_flat(a, b) and bearing.share > LEAST)
+    is_ends = not is_two or (are_alike(one, two) and flat and bearing.share > LEAST)
     pair.bearing = ENDS if is_ends else APART
     if is_two and is_ends and bearing.slide != 0.0:
         pair.slide = stiffness * found.slide * found.per_length

@@ -4,15 +4,16 @@ A contact pushes a corner out through the nearest face that it can touch. Beyond
 than the particles of a boundary reach, that would be the wrong way or none at all, and a block would come out on the
 other side. So a run ends at the first overlap beyond a limit, that of the thinner of the two. While a pair touches, the
 overlaps of its contacts are checked; where it does not, or particles may have lost one another, the overlap of the
-rectangles. No step takes a block far into another (world/step.py, verlet_list.py), so none is behind before it is
+shapes. No step takes a block far into another (world/step.py, verlet_list.py), so none is behind before it is
 found.
 """
 
-from blocksim.kernels.common.arrays import ALL, Record, World
+from blocksim.kernels.common.arrays import ALL, Record, Records, World
 from blocksim.kernels.common.energy import smallest_side
 from blocksim.kernels.common.geometry import ground_gap, separation
-from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit.models import KERNEL, SURFACE
+from blocksim.kernels.explicit.outlines import deepest_overlap
 
 OVERLAP_SHARE = 0.05  # of the smallest side of a pair, unless a limit is given
 MIDDLE = 0.5  # of it, beyond which no limit can be
@@ -28,14 +29,21 @@ def overlap_limit(a: Record, b: Record, given: float) -> float:
 
 @rare_kernel
 def penetration(world: World, pair: Record) -> float:
-    """Return how deep (m) the rectangles of a pair overlap; what lies behind a piece of ground does not overlap it."""
+    """Return how deep (m) the bodies of a pair overlap; what lies behind a piece of ground does not overlap it."""
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
-    if pair.b == world.bodies.size - 1:
-        return b.y - ground_gap(a)
-    if b.faces != ALL and b.cos * (a.y - b.y) - b.sin * (a.x - b.x) < b.half_y:
+    is_ground = pair.b == world.bodies.size - 1
+    if not is_ground and b.faces < ALL and b.cos * (a.y - b.y) - b.sin * (a.x - b.x) < b.half_y:
         return 0.0
-    return -separation(a, b)
+    return overlap_of(a, b, is_ground, world.corners)
+
+
+@kernel
+def overlap_of(a: Record, b: Record, is_ground: bool, corners: Records | None) -> float:
+    """Return how deep (m) two bodies overlap; less than zero where they do not."""
+    if corners is not None:
+        return deepest_overlap(a, b, is_ground, corners)
+    return b.y - ground_gap(a) if is_ground else -separation(a, b)
 
 
 @rare_kernel

@@ -20,7 +20,7 @@ def forces_between(world: World, share: Record, step: float) -> None:
     """Evaluate a thread's part of the pairs between shares after a drift of `step` (s), and keep what they do."""
     for m in range(share.first_task, share.last_task):
         p = world.between[m].pair
-        kind, effect = persistent_forces(world, p, step, world.particles)
+        kind, effect = persistent_forces(world, p, step, world.particles, world.corners)
         if kind == CHANGED:
             pair_forces(world, p, step)
             note(share, world.action[0])
@@ -60,7 +60,7 @@ def forces_of_group(world: World, share: Record, end: int, step: float, tally: R
             friction += rubbed
             share.next_between += 1
         else:
-            kind, effect = persistent_forces(world, p, step, world.particles)
+            kind, effect = persistent_forces(world, p, step, world.particles, world.corners)
             if kind == TOUCHING:
                 add_to_first(world.bodies[pair.a], effect.fx, effect.fy, effect.torque_a)
                 add_to_second(world.bodies[pair.b], effect.fx, effect.fy, effect.torque_b)

@@ -11,9 +11,8 @@ from blocksim.kernels.explicit.broad_phase import idle_candidates
 from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.kinematics import has_just_begun, resolve_point, weigh_first_step
 from blocksim.kernels.explicit.memory import normal_loss, shear_loss, shear_stiffness_before, stiffness_before
-from blocksim.kernels.explicit.models import SURFACE, place_ended
+from blocksim.kernels.explicit.models import SURFACE, place_ended, slot_normal
 from blocksim.kernels.explicit.models.duplicate_corners import PARALLEL
-from blocksim.kernels.explicit.models.surface import slot_normal
 
 TAKEN = 0xFFFFFFFF  # slot of an old contact that has found its successor; no corner or particle has this number
 

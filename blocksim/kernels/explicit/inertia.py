@@ -30,10 +30,11 @@ from typing import NamedTuple
 from blocksim.kernels.common.arrays import ALL, HALF, SHEAR, Record, Records, World
 from blocksim.kernels.common.geometry import corner_offset, ground_gap
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.models import SURFACE
-from blocksim.kernels.explicit.models.surface import slot_normal
+from blocksim.kernels.explicit.bearing import bearing_along
+from blocksim.kernels.explicit.models import SURFACE, slot_normal, slot_place
+from blocksim.kernels.explicit.outlines import corner_vector, gap_on, lowest_corner, number_of_corners, way_over
 from blocksim.kernels.explicit.separation import gap_along
-from blocksim.kernels.explicit.tributary import bearing_of_faces, interval_of
+from blocksim.kernels.explicit.tributary import are_blocks
 
 LEAST_GYRATION = 0.1
 SHARE_PERIOD, MOST_PERIOD, SUM_PERIOD = 32, 128, 256  # steps
@@ -97,11 +98,29 @@ def way_apart(pair: Record, a: Record, b: Record, dx: float, dy: float) -> tuple
     return (nx, ny) if nx * dx + ny * dy >= 0.0 else (-nx, -ny)
 
 
+@kernel
+def way_of(pair: Record, a: Record, b: Record, is_ground: bool, corners: Records | None) -> tuple[float, float]:
+    """Return the same for bodies of any shape, `corners` being those of the scene."""
+    if corners is None:
+        return way_apart(pair, a, b, a.x - b.x, a.y - b.y)
+    return way_over(pair, a, b, is_ground, corners)
+
+
+@kernel
+def gap_of(pair: Record, a: Record, b: Record, is_ground: bool, corners: Records | None) -> float:
+    """Return the gap (m) of two bodies along the axis along which they were found apart."""
+    if corners is None:
+        return gap_along(pair.axis, a, b, a.x - b.x, a.y - b.y)
+    return gap_on(pair.axis, a, b, is_ground, corners)
+
+
 @rare_kernel
-def steps_apart(pair: Record, a: Record, b: Record, controls: Record) -> float:
+def steps_apart(
+    pair: Record, a: Record, b: Record, is_ground: bool, controls: Record, corners: Records | None
+) -> float:
     """Return after how many steps two bodies apart may touch at the earliest; infinity where they are not near."""
-    gap = gap_along(pair.axis, a, b, a.x - b.x, a.y - b.y)
-    nx, ny = way_apart(pair, a, b, a.x - b.x, a.y - b.y)
+    gap = gap_of(pair, a, b, is_ground, corners)
+    nx, ny = way_of(pair, a, b, is_ground, corners)
     closing = closing_bound(a, b, nx, ny)
     is_near = 0.0 <= gap < controls.approach
     return gap / (controls.step * closing) if is_near and closing > 0.0 else math.inf
@@ -121,16 +140,24 @@ def mean_velocity(bodies: Records) -> tuple[float, float]:
     return (vx / count, vy / count) if count > 0 else (0.0, 0.0)
 
 
+@kernel
+def height_of(body: Record, corners: Records | None) -> float:
+    """Return the height (m) of the lowest corner of a body over y = 0."""
+    if corners is None:
+        return ground_gap(body)
+    return lowest_corner(body, corners)
+
+
 @rare_kernel
-def steps_to_ground(body: Record, ground: Record, controls: Record) -> float:
+def steps_to_ground(body: Record, ground: Record, controls: Record, corners: Records | None) -> float:
     """Return after how many steps a body that is not near the half-plane may touch it at the earliest."""
-    gap = ground_gap(body) - ground.y
+    gap = height_of(body, corners) - ground.y
     closing = ground.vy - body.vy + body.radius * abs(body.spin)
     return gap / (controls.step * closing) if gap >= controls.approach and closing > 0.0 else math.inf
 
 
 @rare_kernel
-def steps_to_approach(bodies: Records, controls: Record) -> float:
+def steps_to_approach(bodies: Records, controls: Record, corners: Records | None) -> float:
     """Return after how many steps two bodies that are not near may touch at the earliest.
 
     Speeds are those against the mean of the free bodies: blocks that fly together have the same sums in any frame.
@@ -143,7 +170,7 @@ def steps_to_approach(bodies: Records, controls: Record) -> float:
         body = bodies[i]
         fastest = max(fastest, math.sqrt((body.vx - vx) ** 2 + (body.vy - vy) ** 2) + body.radius * abs(body.spin))
         if body.inverse_mass > 0.0:
-            soonest = min(soonest, steps_to_ground(body, ground, controls))
+            soonest = min(soonest, steps_to_ground(body, ground, controls, corners))
     return min(soonest, 0.5 * controls.approach / (controls.step * fastest)) if fastest > 0.0 else soonest
 
 
@@ -175,19 +202,41 @@ def add_touching(world: World, p: int) -> None:
     for k in range(pair.active):
         contact = world.contacts[p, k]
         nx, ny = slot_normal(world, pair, contact.slot, contact.face)
-        owner = a if contact.slot < HALF else b
-        x, y = corner_offset(owner, contact.slot % HALF)
-        add_spring(a, b, pair.stiffness, x + owner.x - b.x, y + owner.y - b.y, nx, ny)
+        x, y = slot_place(world, pair, contact.slot)
+        add_spring(a, b, pair.stiffness, x - b.x, y - b.y, nx, ny)
+
+
+@kernel
+def corners_of(block: Record, corners: Records | None) -> int:
+    """Return how many corners a block has."""
+    if corners is None:
+        return HALF
+    return number_of_corners(block)
+
+
+@kernel
+def corner_from(block: Record, number: int, corners: Records | None) -> tuple[float, float]:
+    """Return the vector (m) from the centre of a block to one of its corners, in world axes."""
+    if corners is None:
+        return corner_offset(block, number)
+    return corner_vector(block, corners, number)
 
 
 @rare_kernel
 def add_coming_corners(
-    block: Record, base: Record, is_ground: bool, nx: float, ny: float, reach: float, stiffness: float
+    block: Record,
+    base: Record,
+    is_ground: bool,
+    nx: float,
+    ny: float,
+    reach: float,
+    stiffness: float,
+    corners: Records | None,
 ) -> None:
     """Add the corners of a block within a reach (m) above the ground or a piece of it; (nx, ny) is its normal."""
     below = 0.0 if is_ground else base.half_y
-    for corner in range(HALF):
-        x, y = corner_offset(block, corner)
+    for corner in range(corners_of(block, corners)):
+        x, y = corner_from(block, corner, corners)
         x += block.x - base.x
         y += block.y - base.y
         is_over = is_ground or abs(nx * y - ny * x) <= base.half_x
@@ -201,16 +250,15 @@ def add_coming(world: World, p: int, stiffness: float, step: float) -> None:
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
-    nx, ny = way_apart(pair, a, b, a.x - b.x, a.y - b.y)
     is_ground = pair.b == world.bodies.size - 1
-    if is_ground or b.faces != ALL:
+    nx, ny = way_of(pair, a, b, is_ground, world.corners)
+    if is_ground or b.faces < ALL:
         reach = 2.0 * APPROACH_STEPS * step * closing_bound(a, b, nx, ny)
-        add_coming_corners(a, b, is_ground, nx, ny, reach, stiffness)
-    elif a.faces == ALL:
-        found = interval_of(a, b, nx, ny)
+        add_coming_corners(a, b, is_ground, nx, ny, reach, stiffness, world.corners)
+    elif are_blocks(a, b):
+        found, bearing, _ = bearing_along(a, b, nx, ny, world.corners)
         along = 0.5 * (found.left + found.right)
-        share = bearing_of_faces(a, b, nx, ny).share
-        add_spring(a, b, 2.0 * stiffness * share, -along * ny, along * nx, nx, ny)
+        add_spring(a, b, 2.0 * stiffness * bearing.share, -along * ny, along * nx, nx, ny)
 
 
 @rare_kernel
@@ -220,7 +268,7 @@ def find_coming(world: World) -> float:
     Only pairs that are listed whatever the skin count, so that the motion does not depend on it.
     """
     controls = world.controls[0]
-    soonest = steps_to_approach(world.bodies, controls)
+    soonest = steps_to_approach(world.bodies, controls, world.corners)
     for body in world.bodies:
         body.coming = 0
     for p in range(world.clock[0].pair_count):
@@ -229,7 +277,7 @@ def find_coming(world: World) -> float:
         if pair.active == 0:
             a = world.bodies[pair.a]
             b = world.bodies[pair.b]
-            left = steps_apart(pair, a, b, controls)
+            left = steps_apart(pair, a, b, pair.b == world.bodies.size - 1, controls, world.corners)
             if left < APPROACH_STEPS:
                 pair.is_coming = 1
                 a.coming += 1

@@ -5,7 +5,9 @@ searched, and nothing is written before it is certain that no contact begins, en
 `persistent_forces` leaves the pair as it was and contact.py deals with it.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from blocksim.kernels.common.arrays import ALL, NORMAL, SHEAR, Record, Records, World
 from blocksim.kernels.common.jit import kernel
@@ -15,6 +17,7 @@ from blocksim.kernels.explicit.friction import clip_to_cone, draw_lasting_spring
 from blocksim.kernels.explicit.laws import has_constant_stiffness
 from blocksim.kernels.explicit.models import SURFACE
 from blocksim.kernels.explicit.models.duplicate_corners import is_oblique
+from blocksim.kernels.explicit.outlines import gap_on, widest_gap
 from blocksim.kernels.explicit.persistent_contacts import (
     PersistentContact,
     follow,
@@ -44,14 +47,19 @@ NOTHING = Effect(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
-def persistent_forces(world: World, p: int, step: float, particles: Records | None) -> tuple[int, Effect]:
+def persistent_forces(
+    world: World, p: int, step: float, particles: Records | None, corners: Records | None
+) -> tuple[int, Effect]:
     """Return what pair p does if its contacts continue (TOUCHING) or there are none (UNTOUCHED).
 
     Otherwise (CHANGED) nothing has been written. `step` is the length (s) of the drift that led here. Where `particles`
-    is not None no pair is handled here.
+    is not None no pair is handled here, and where `corners` is not None, as there are polygons, those that do not
+    touch.
     """
     if particles is not None:
         return CHANGED, NOTHING
+    if corners is not None:
+        return apart_or_changed(world, p, corners), NOTHING
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
@@ -67,6 +75,21 @@ def persistent_forces(world: World, p: int, step: float, particles: Records | No
         return double(world, p, a, b, dx, dy, step)
     gap = choose_axis(pair, a, b, dx, dy, pair.b == world.bodies.size - 1)
     return UNTOUCHED if gap >= -pair.limit else CHANGED, NOTHING
+
+
+@kernel
+def apart_or_changed(world: World, p: int, table: Records) -> int:
+    """Return UNTOUCHED for a pair of a scene with polygons that did not touch and does not now, else CHANGED."""
+    pair = world.pairs[p]
+    if pair.active > 0:
+        return CHANGED
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    is_ground = pair.b == world.bodies.size - 1
+    axis: Any = np.int64(pair.axis)
+    if gap_on(axis, a, b, is_ground, table) >= 0.0 or widest_gap(pair, a, b, is_ground, table) >= 0.0:
+        return UNTOUCHED
+    return CHANGED
 
 
 @kernel

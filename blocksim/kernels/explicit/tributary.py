@@ -21,11 +21,13 @@ and ends tilted would gain or lose energy.
 
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import ALL, Record
+from blocksim.kernels.common.arrays import ALL, Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit.models.duplicate_corners import CONE_TOLERANCE
+from blocksim.kernels.explicit.outlines import Side, cone_of, into_world, side_along, side_of
 
 FLAT = 0.01  # sine of the angle between two faces up to which they are parallel
+FLAT_SHARE = FLAT / CONE_TOLERANCE  # the same of the cone, where that of polygons is narrower
 LEAST = 1e-6  # share of a corner that is about to pass the end of a face
 
 
@@ -54,7 +56,7 @@ PLANE, ENDS, APART = range(3)  # on the ground, a piece of it, or a wall; of fac
 @kernel
 def are_blocks(a: Record, b: Record) -> bool:
     """Return True if neither of two bodies is a piece of ground, so that intervals count; see also the ground."""
-    return a.faces == ALL and b.faces == ALL
+    return a.faces >= ALL and b.faces >= ALL
 
 
 @kernel
@@ -71,13 +73,19 @@ def tilt_of(a: Record, b: Record) -> tuple[float, float]:
 def bearing_of(part: float, slide: float, a: Record, b: Record) -> Bearing:
     """Return the share of a corner whose interval is `part` of a face and changes with the slip by `slide` (1/m)."""
     sine, rate = tilt_of(a, b)
-    if sine <= FLAT:
+    return bearing_at(sine, rate, part, slide, FLAT, CONE_TOLERANCE)
+
+
+@kernel
+def bearing_at(sine: float, rate: float, part: float, slide: float, flat: float, cone: float) -> Bearing:
+    """Return the same at a tilt and its change with the angle of a; `flat` and `cone` are where its effect begins, ends."""
+    if sine <= flat:
         return Bearing(part, slide, 0.0)
-    if sine >= CONE_TOLERANCE:
+    if sine >= cone:
         return WHOLE
-    q = (sine - FLAT) / (CONE_TOLERANCE - FLAT)
+    q = (sine - flat) / (cone - flat)
     up = q * q * (3.0 - 2.0 * q)
-    steepness = 6.0 * q * (1.0 - q) / (CONE_TOLERANCE - FLAT)
+    steepness = 6.0 * q * (1.0 - q) / (cone - flat)
     return Bearing(part + (1.0 - part) * up, slide * (1.0 - up), (1.0 - part) * steepness * rate)
 
 
@@ -122,13 +130,21 @@ def interval_of(a: Record, b: Record, nx: float, ny: float) -> Interval:
     middle_a, reach_a, half_a = face_across(a, nx, ny, -1.0)
     middle_b, reach_b, half_b = face_across(b, nx, ny, 1.0)
     middle_a += nx * (a.y - b.y) - ny * (a.x - b.x)
+    cosine = reach_a / half_a * (reach_b / half_b)
+    return overlap_of(middle_a, reach_a, middle_b, reach_b, face_per_length(a, b, half_a, half_b), cosine)
+
+
+@kernel
+def overlap_of(
+    middle_a: float, reach_a: float, middle_b: float, reach_b: float, per_length: float, cosine: float
+) -> Interval:
+    """Return the interval of two faces with these middles, from the centre of b, and half lengths along the tangent."""
     is_right_of_a = middle_a + reach_a < middle_b + reach_b
     is_left_of_a = middle_a - reach_a > middle_b - reach_b
     slide = (1.0 if is_right_of_a else 0.0) - (1.0 if is_left_of_a else 0.0)
     right = min(middle_a + reach_a, middle_b + reach_b)
     left = max(middle_a - reach_a, middle_b - reach_b)
-    cosine = reach_a / half_a * (reach_b / half_b)
-    return Interval(left, right, slide, face_per_length(a, b, half_a, half_b), cosine)
+    return Interval(left, right, slide, per_length, cosine)
 
 
 @rare_kernel
@@ -153,3 +169,54 @@ def stiffness_between(pair: Record, x: float, y: float, nx: float, ny: float) ->
     Where sliding does not change it, the interval is all of a face.
     """
     return abs(pair.slide * (y * nx - x * ny)) if pair.slide != 0.0 else pair.stiffness
+
+
+class Facing(NamedTuple):
+    """How the faces of two bodies look at each other along a normal, where there are polygons."""
+
+    interval: Interval
+    sine: float  # of the angle between them
+    rate: float  # its change with the angle of a
+    cone: float  # sine from which on they are not parallel
+
+
+@kernel
+def seen_along(body: Record, side: Side, nx: float, ny: float) -> tuple[float, float, float, float]:
+    """Return the normal of a face in world axes, its middle (m) along the tangent and its cosine to (nx, ny)."""
+    mx, my = into_world(body, side.nx, side.ny)
+    x, y = into_world(body, side.middle_x, side.middle_y)
+    return mx, my, nx * y - ny * x, abs(mx * nx + my * ny)
+
+
+@rare_kernel
+def facing_of(a: Record, b: Record, nx: float, ny: float, table: Records) -> Facing:
+    """Return how the faces of a and b look at each other along the normal (nx, ny), b to a."""
+    one = side_of(a, table, side_along(a, table, -nx, -ny))
+    two = side_of(b, table, side_along(b, table, nx, ny))
+    ax, ay, middle_a, cos_a = seen_along(a, one, nx, ny)
+    bx, by, middle_b, cos_b = seen_along(b, two, nx, ny)
+    middle_a += nx * (a.y - b.y) - ny * (a.x - b.x)
+    per_length = face_per_length(a, b, one.half, two.half)
+    interval = overlap_of(middle_a, one.half * cos_a, middle_b, two.half * cos_b, per_length, cos_a * cos_b)
+    sine = ax * by - ay * bx  # of the angle from the face of b to that of a
+    cosine = -ax * bx - ay * by
+    rate = cosine if sine > 0.0 else -cosine
+    return Facing(interval, abs(sine) if cosine > 0.0 else 1.0, rate, cone_of(a, b, table))
+
+
+@rare_kernel
+def bearing_of_facing(facing: Facing) -> Bearing:
+    """Return the share of a corner at an end of the interval of two faces, as bearing_of_interval."""
+    found = facing.interval
+    flat = flat_of(facing)
+    part = (found.right - found.left) * found.per_length / found.cosine
+    if part > 1.0 or part < LEAST:
+        return bearing_at(facing.sine, facing.rate, min(max(part, LEAST), 1.0), 0.0, flat, facing.cone)
+    slide = found.slide * found.per_length / found.cosine
+    return bearing_at(facing.sine, facing.rate, part, slide, flat, facing.cone)
+
+
+@kernel
+def flat_of(facing: Facing) -> float:
+    """Return the sine up to which two faces are parallel."""
+    return min(FLAT, FLAT_SHARE * facing.cone)

@@ -10,6 +10,7 @@ from blocksim.kernels.common.arrays import HALF, World
 from blocksim.kernels.explicit.energy import LEDGER_ROW, measure
 from blocksim.kernels.explicit.ensemble import advance_members
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR
+from blocksim.kernels.explicit.outlines import MOST_CORNERS, SIDES
 from blocksim.kernels.explicit.step import advance, advance_in_team
 from blocksim.simulation.contacts import SUPPORT, UNITS, Rows, empty_rows
 from blocksim.simulation.schemes.coupled import coupled_scheme
@@ -31,10 +32,7 @@ def explicit_contacts(world: World, blocks: int) -> Rows:
     a, b = pairs["a"][pair].astype(np.intp), pairs["b"][pair].astype(np.intp)
     rows = empty_rows(len(contacts))
     rows["body_a"], rows["body_b"] = a, np.where(b < blocks, b, SUPPORT)
-    places = (
-        _kept_places(contacts) if "nx" in (contacts.dtype.names or ()) else _places_of_corners(world, contacts, a, b)
-    )
-    for name, values in zip(list(UNITS)[:4], places, strict=True):
+    for name, values in zip(list(UNITS)[:4], _places(world, contacts, a, b), strict=True):
         rows[name] = values
     rows["overlap"] = contacts["depth"]
     rows["normal_force"] = contacts["normal_force"]
@@ -56,6 +54,15 @@ def _add_bearing(rows: Rows, world: World, pairs: Any) -> None:
     way = np.divide(pairs["turn"] * energy, normal, out=np.zeros_like(normal), where=normal > 0.0)
     rows["x"] -= way * rows["normal_y"]
     rows["y"] += way * rows["normal_x"]
+
+
+def _places(world: World, contacts: Any, a: Indices, b: Indices) -> list[Any]:
+    """Return place (m) and normal of contacts."""
+    if "nx" in (contacts.dtype.names or ()):
+        return _kept_places(contacts)
+    if world.corners is None:
+        return _places_of_corners(world, contacts, a, b)
+    return _places_on_outlines(world, contacts, a, b)
 
 
 def _kept_places(contacts: Any) -> list[Any]:
@@ -80,6 +87,36 @@ def _places_of_corners(world: World, contacts: Any, a: Indices, b: Indices) -> l
         outward * nx,
         outward * ny,
     ]
+
+
+def _places_on_outlines(world: World, contacts: Any, a: Indices, b: Indices) -> list[Any]:
+    """Return place (m) and normal of contacts of corners in a scene with polygons; see models/outlines.py."""
+    is_of_a = contacts["slot"] < MOST_CORNERS
+    owner = world.bodies[np.where(is_of_a, a, b)]
+    touched = world.bodies[np.where(is_of_a, b, a)]
+    outward = np.where(is_of_a, 1.0, -1.0)  # from b to a, whichever of the two is touched
+    x, y = _corners(world, owner, contacts["slot"] % MOST_CORNERS)
+    nx, ny = _normals(world, touched, contacts["face"])
+    cosine, sine = touched["cos"], touched["sin"]
+    return [x, y, outward * (cosine * nx - sine * ny), outward * (sine * nx + cosine * ny)]
+
+
+def _corners(world: World, owner: Any, number: Any) -> tuple[Any, Any]:
+    """Return where (m) corners of bodies are."""
+    rows = world.corners[np.minimum(owner["first_corner"] + number, world.corners.size - 1)]
+    piece = number % SIDES
+    is_piece = owner["corner_count"] == 0
+    px = np.where(is_piece, np.choose(piece, SIDES_X) * owner["half_x"], rows["x"])
+    py = np.where(is_piece, np.choose(piece, SIDES_Y) * owner["half_y"], rows["y"])
+    cosine, sine = owner["cos"], owner["sin"]
+    return owner["x"] + cosine * px - sine * py, owner["y"] + sine * px + cosine * py
+
+
+def _normals(world: World, touched: Any, face: Any) -> tuple[Any, Any]:
+    """Return the outward normals of faces in the frames of their bodies; of ground and walls the upper one."""
+    rows = world.corners[np.minimum(touched["first_corner"] + face, world.corners.size - 1)]
+    is_piece = touched["corner_count"] == 0
+    return np.where(is_piece, 0.0, rows["nx"]), np.where(is_piece, 1.0, rows["ny"])
 
 
 def _face_normal(face: Any, cosine: Any, sine: Any) -> tuple[Any, Any]:

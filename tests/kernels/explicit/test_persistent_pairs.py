@@ -45,7 +45,7 @@ def take_generally(world: World, p: int, step: float) -> None:
 
 def take_steadily(world: World, p: int, step: float) -> bool:
     """Evaluate a pair in the steady way and add what it does; return whether that goes."""
-    kind, effect = persistent_forces(world, p, step, world.particles)
+    kind, effect = persistent_forces(world, p, step, world.particles, world.corners)
     if kind != CHANGED:
         keep(world.action[0], effect, kind == TOUCHING)
         dashpot, friction = add_kept(world, world.pairs[p], world.action[0], world.ledger[0])

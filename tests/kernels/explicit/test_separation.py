@@ -55,7 +55,7 @@ def test_no_contact_begins_unseen(
     renew_rotations(world.bodies)
     pair = world.pairs[0]
     pair.axis = axis  # whichever was the best one last
-    result, _ = persistent_forces(world, 0, STEP, world.particles)
+    result, _ = persistent_forces(world, 0, STEP, world.particles, world.corners)
     assert result in {CHANGED, UNTOUCHED}
     if contact_points(world, 0) > 0:
         assert result == CHANGED
@@ -70,7 +70,7 @@ def test_no_contact_with_the_ground_begins_unseen(pose: Pose, axis: int, y: floa
     assume(world.clock[0].pair_count > 0)
     world.bodies[0].y += down * float(world.controls[0].skin)
     world.pairs[0].axis = axis
-    result, _ = persistent_forces(world, 0, STEP, world.particles)
+    result, _ = persistent_forces(world, 0, STEP, world.particles, world.corners)
     assert result == (CHANGED if contact_points(world, 0) > 0 else UNTOUCHED)
     assert world.pairs[0].axis == (1 if result == UNTOUCHED else axis)
 

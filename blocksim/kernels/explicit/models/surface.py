@@ -233,10 +233,8 @@ def slot_normal(world: World, pair: Record, slot: int, face: int) -> tuple[float
 
 
 @rare_kernel
-def place_ended(world: World, pair: Record, old: Record, point: Record) -> None:
-    """Set place and normal of a contact that ends, as they are now."""
-    owner = world.bodies[pair.a] if old.slot < HALF else world.bodies[pair.b]
-    ox, oy = corner_offset(owner, old.slot % HALF)
-    point.x = owner.x + ox
-    point.y = owner.y + oy
-    point.nx, point.ny = slot_normal(world, pair, old.slot, old.face)
+def slot_place(world: World, pair: Record, slot: int) -> tuple[float, float]:
+    """Return the place (m) of the corner of a slot."""
+    owner = world.bodies[pair.a] if slot < HALF else world.bodies[pair.b]
+    ox, oy = corner_offset(owner, slot % HALF)
+    return owner.x + ox, owner.y + oy

@@ -1,0 +1,308 @@
+"""Narrow phase of the `surface` model where there are polygons: corners of one body in another of any convex outline.
+
+The rules are those of rectangles (surface.py), stated for any angle:
+
+* A corner lies in a body where it is behind all its faces. It touches the face of least overlap among those on its side
+  of the centroid that it can touch.
+* It can touch a face where it is the corner of its own body that is lowest along the normal of that face: both faces
+  that meet in it rise from there. The sine of the angle by which one may fall is the cone (outlines.py): both ends of a
+  nearly parallel face count.
+* Of a corner of each that mark the same end of two nearly parallel faces one counts, and of two that meet where no
+  faces are parallel the shallower one: the nearest edge of the Minkowski difference.
+
+Slots from 0 are corners of body a, slots from MOST_CORNERS those of b; on the ground a contact has the face UPPER.
+"""
+
+import math
+from typing import NamedTuple
+
+from blocksim.kernels.common.arrays import CONTACTS, NO_FACE, Integers, Record, Records, World
+from blocksim.kernels.common.geometry import relative_pose, slab_depth, to_world
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.explicit.models.duplicate_corners import CLOSE, PARALLEL, drop_point, keeps_first
+from blocksim.kernels.explicit.outlines import (
+    MOST_CORNERS,
+    UPPER,
+    WIDEST_CONE,
+    cone_of,
+    corner_place,
+    corner_vector,
+    into_world,
+    number_of_corners,
+    side_along,
+    side_normal,
+    side_of,
+)
+
+BESIDE_SHARE = 0.1  # of the half diagonal; a face farther than that below a corner is not beside it
+
+
+class Corner(NamedTuple):
+    """A corner of a body, seen from the frame of another, and the directions of its faces away from it."""
+
+    x: float  # m
+    y: float
+    ahead_x: float
+    ahead_y: float
+    back_x: float
+    back_y: float
+
+
+@kernel
+def corner_seen(owner: Record, number: int, touched: Record, table: Records) -> Corner:
+    """Return a corner of a body as the frame of the touched one has it."""
+    x0, y0, c, s = relative_pose(owner, touched)
+    x, y = corner_place(owner, table, number)
+    ahead = side_of(owner, table, number)
+    back = side_of(owner, table, number - 1 if number > 0 else number_of_corners(owner) - 1)
+    return Corner(
+        x0 + c * x - s * y,
+        y0 + s * x + c * y,
+        -c * ahead.ny - s * ahead.nx,
+        -s * ahead.ny + c * ahead.nx,
+        c * back.ny + s * back.nx,
+        s * back.ny - c * back.nx,
+    )
+
+
+@kernel
+def can_touch(corner: Corner, nx: float, ny: float, cone: float) -> bool:
+    """Return True if a corner can touch a face of this outward normal; see the top."""
+    return nx * corner.ahead_x + ny * corner.ahead_y >= -cone and nx * corner.back_x + ny * corner.back_y >= -cone
+
+
+@kernel
+def side_below(corner: Corner, touched: Record, table: Records, cone: float) -> tuple[int, float, float]:
+    """Return the face (or NO_FACE) that a corner touches, its overlap (m), and the next least one (m).
+
+    The third value is infinite where there is no other face that it can touch, or that is far away.
+    """
+    face = NO_FACE
+    depth = math.inf
+    beside = math.inf
+    for k in range(number_of_corners(touched)):
+        side = side_of(touched, table, k)
+        over = side.distance - (side.nx * corner.x + side.ny * corner.y)
+        if over < 0.0:
+            return NO_FACE, 0.0, math.inf
+        if over <= side.distance and can_touch(corner, side.nx, side.ny, cone):
+            if over < depth:
+                beside = depth
+                depth = over
+                face = k
+            else:
+                beside = min(beside, over)
+    if beside >= BESIDE_SHARE * touched.radius:
+        beside = math.inf
+    return face, depth, beside
+
+
+@rare_kernel
+def add_corner(
+    owner: Record, number: int, touched: Record, table: Records, cone: float, points: Records, count: int
+) -> int:
+    """Append a corner of `owner` if it lies inside `touched`; return the new point count.
+
+    The normal points out of `touched`.
+    """
+    corner = corner_seen(owner, number, touched, table)
+    if touched.corner_count > 0:
+        face, depth, beside = side_below(corner, touched, table, cone)
+    else:
+        beside = math.inf
+        face = UPPER if can_touch(corner, 0.0, 1.0, cone) else NO_FACE
+        depth = slab_depth(corner.x, corner.y, touched)
+    if face == NO_FACE or depth <= 0.0:
+        return count
+    point = points[count]
+    point.slot = number
+    point.face = face
+    point.x, point.y = to_world(touched, corner.x, corner.y)
+    point.nx, point.ny = side_normal(touched, table, face)
+    point.depth = depth
+    point.beside = beside
+    return count + 1
+
+
+@rare_kernel
+def ground_points(owner: Record, near: int, candidates: Integers, level: float, points: Records, table: Records) -> int:
+    """Collect the candidate corners of `owner` below the ground, y < level (m). Return how many there are."""
+    count = 0
+    for m in range(near):
+        ox, oy = corner_vector(owner, table, candidates[m])
+        if owner.y + oy < level:
+            point = points[count]
+            point.slot = candidates[m]
+            point.face = UPPER
+            point.x = owner.x + ox
+            point.y = owner.y + oy
+            point.nx = 0.0
+            point.ny = 1.0
+            point.depth = level - point.y
+            point.beside = math.inf
+            count += 1
+    return count
+
+
+@kernel
+def from_middle(body: Record, number: int, table: Records, nx: float, ny: float) -> float:
+    """Return the place (m) of a corner along the tangent (-ny, nx), from the middle of the face that looks along n."""
+    side = side_of(body, table, side_along(body, table, nx, ny))
+    x, y = corner_place(body, table, number)
+    ox, oy = into_world(body, x - side.middle_x, y - side.middle_y)
+    return nx * oy - ny * ox
+
+
+@rare_kernel
+def is_same_end(of_a: Record, of_b: Record, a: Record, b: Record, table: Records) -> bool:
+    """Return True if a corner of a and a corner of b (both points) mark the same end of one face contact."""
+    nx = of_a.nx
+    ny = of_a.ny
+    if nx * of_b.nx + ny * of_b.ny < PARALLEL:
+        return False
+    end_a = -from_middle(a, of_a.slot, table, -nx, -ny)
+    return end_a * from_middle(b, of_b.slot - MOST_CORNERS, table, nx, ny) > 0.0
+
+
+@rare_kernel
+def are_oblique(a: Record, b: Record, nx: float, ny: float, table: Records, cone: float) -> bool:
+    """Return True if the faces of two bodies that look at each other along a normal, b to a, are not nearly parallel."""
+    ax, ay = side_normal(a, table, side_along(a, table, -nx, -ny))
+    bx, by = side_normal(b, table, side_along(b, table, nx, ny))
+    return abs(ax * by - ay * bx) > cone or ax * bx + ay * by > 0.0
+
+
+@rare_kernel
+def do_meet(one: Record, two: Record, cone: float) -> bool:
+    """Return True if two corners meet: they are as near to one another as two faces outside the cone can have them."""
+    dx = one.x - two.x
+    dy = one.y - two.y
+    reach = CLOSE * WIDEST_CONE / cone * max(one.depth, two.depth)
+    return dx * dx + dy * dy < reach * reach
+
+
+@rare_kernel
+def drop_duplicates(
+    a: Record, b: Record, pair: Record, contacts: Records, points: Records, count: int, table: Records, cone: float
+) -> int:
+    """Keep one of two corners that are one contact; return how many points are left."""
+    i = 0
+    while i < count and points[i].slot < MOST_CORNERS:
+        for j in range(i + 1, count):
+            one = points[i]
+            two = points[j]
+            if two.slot >= MOST_CORNERS:
+                near = one if one.depth <= two.depth else two
+                oblique = are_oblique(a, b, near.nx, near.ny, table, cone)
+                if do_meet(one, two, cone) if oblique else is_same_end(one, two, a, b, table):
+                    keep_i = keeps_first(one, two, pair, contacts, oblique)
+                    count = drop_point(points, j if keep_i else i, count)
+                    i -= 0 if keep_i else 1
+                    break
+        i += 1
+    return count
+
+
+@rare_kernel
+def block_points(
+    a: Record, b: Record, pair: Record, candidates: Integers, contacts: Records, points: Records, table: Records
+) -> int:
+    """Fill `points` with the contact points of two bodies and return how many there are."""
+    cone = cone_of(a, b, table)
+    count = 0
+    of_a = 0
+    for m in range(pair.near):
+        slot = candidates[m]
+        if slot < MOST_CORNERS:
+            count = add_corner(a, slot, b, table, cone, points, count)
+            of_a = count
+        else:
+            before = count
+            count = add_corner(b, slot - MOST_CORNERS, a, table, cone, points, count)
+            if count > before:
+                point = points[before]
+                point.slot = slot
+                point.nx = -point.nx
+                point.ny = -point.ny
+    if of_a > 0 and count > of_a:
+        count = drop_duplicates(a, b, pair, contacts, points, count, table, cone)
+    return count
+
+
+@rare_kernel
+def find_points(world: World, p: int, table: Records) -> int:
+    """Find the contact points of pair p and return how many there are; beyond CONTACTS the shallowest do not count."""
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    points = world.points
+    if pair.b == world.bodies.size - 1:
+        count = ground_points(a, pair.near, world.candidates[p], b.y, points, table)
+    else:
+        count = block_points(a, b, pair, world.candidates[p], world.contacts[p], points, table)
+    while count > CONTACTS:
+        least = 0
+        for i in range(1, count):
+            if points[i].depth < points[least].depth:
+                least = i
+        count = drop_point(points, least, count)
+    return count
+
+
+@rare_kernel
+def is_within(corner: Corner, touched: Record, reach: float, table: Records) -> bool:
+    """Return True if a corner lies inside a body grown by `reach` (m)."""
+    for k in range(number_of_corners(touched)):
+        side = side_of(touched, table, k)
+        if side.nx * corner.x + side.ny * corner.y > side.distance + reach:
+            return False
+    return True
+
+
+@rare_kernel
+def corners_near(
+    owner: Record, touched: Record, reach: float, first: int, out: Integers, count: int, table: Records
+) -> int:
+    """Append the corners of `owner` inside `touched` grown by `reach` (m), as slots from `first`; return the count."""
+    for number in range(number_of_corners(owner)):
+        is_there = owner.corner_count > 0 or (owner.corners >> number) & 1 == 1
+        if is_there and is_within(corner_seen(owner, number, touched, table), touched, reach, table):
+            out[count] = first + number
+            count += 1
+    return count
+
+
+@rare_kernel
+def near_slots(world: World, a: int, b: int, reach: float, out: Integers, table: Records) -> int:
+    """Write the slots of a pair whose corners are within `reach` (m) into `out` and return how many there are."""
+    one = world.bodies[a]
+    two = world.bodies[b]
+    count = 0
+    if b == world.bodies.size - 1:
+        for number in range(number_of_corners(one)):
+            if one.y + corner_vector(one, table, number)[1] <= two.y + reach:
+                out[count] = number
+                count += 1
+        return count
+    count = corners_near(one, two, reach, 0, out, 0, table)
+    return corners_near(two, one, reach, MOST_CORNERS, out, count, table)
+
+
+@rare_kernel
+def slot_normal(world: World, pair: Record, slot: int, face: int, table: Records) -> tuple[float, float]:
+    """Return the normal, from b to a, of the contact of a corner with a face of the other body."""
+    if pair.b == world.bodies.size - 1:
+        return 0.0, 1.0
+    if slot < MOST_CORNERS:
+        return side_normal(world.bodies[pair.b], table, face)
+    nx, ny = side_normal(world.bodies[pair.a], table, face)
+    return -nx, -ny
+
+
+@rare_kernel
+def slot_place(world: World, pair: Record, slot: int, table: Records) -> tuple[float, float]:
+    """Return the place (m) of the corner of a slot."""
+    is_own = slot < MOST_CORNERS
+    owner = world.bodies[pair.a] if is_own else world.bodies[pair.b]
+    ox, oy = corner_vector(owner, table, slot if is_own else slot - MOST_CORNERS)
+    return owner.x + ox, owner.y + oy
