@@ -115,20 +115,30 @@ def unfit_choices(scenario: Scenario) -> Iterator[Finding]:
 
 
 def _unmodelled_outlines(scenario: Scenario) -> Iterator[Finding]:
-    scheme, model = scenario.time.scheme, scenario.contact.model
-    if (scheme, model) in WITH_OUTLINES:
+    message = _why_without_outlines(scenario)
+    if not message:
         return
-    where = f"with time.scheme = {shown(scheme)} and contact.model = {shown(model)}"
-    modelled = " or ".join(f"{shown(one)} and {shown(other)}" for one, other in sorted(WITH_OUTLINES))
     for name, block in scenario.blocks.items():
         if block.polygon:
             key = "outline" if block.outline is not None else "sides"
-            message = f"outlines are not modelled {where}; use {modelled}"
             yield Finding(("blocks", name, key), message, at="key", relation=True)
     for number, structure in enumerate(scenario.structures):
         if isinstance(structure, Shaped):
-            message = f"outlines are not modelled {where}; use {modelled}"
             yield Finding(("structures", number, "kind"), message, relation=True)
+
+
+def _why_without_outlines(scenario: Scenario) -> str:
+    """Return why no block of a scenario can have an outline; nothing where blocks can."""
+    scheme, model = scenario.time.scheme, scenario.contact.model
+    if (scheme, model) not in WITH_OUTLINES:
+        boundary = "its boundary particles lie on rectangles only"
+        why = f": {boundary}" if scheme == "explicit" else ""
+        modelled = " or ".join(f"{shown(one)} and {shown(other)}" for one, other in sorted(WITH_OUTLINES))
+        where = f"with time.scheme = {shown(scheme)} and contact.model = {shown(model)}"
+        return f"outlines are not modelled {where}{why}; use {modelled}"
+    if scenario.systems:
+        return f"outlines are not modelled beside {', '.join(scenario.systems)}, whose particles meet rectangles only"
+    return ""
 
 
 def unknown_provenance(data: Data) -> Iterator[Finding]:

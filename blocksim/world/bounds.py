@@ -82,7 +82,7 @@ def standing_of(blocks: NDArray[np.record], shapes: Shapes) -> frozenset[Kind]:
     for block, first, size in zip(blocks, shapes.firsts, shapes.sizes, strict=True):
         kind = Kind(*(block[name].item() for name in Kind._fields))
         if block["faces"] == OUTLINE:
-            faces = _faces_of(shapes.table[first : first + size])
+            faces = _faces_of(shapes.table[first : first + size].view(np.recarray))
             kinds.update(kind._replace(half_x=reach, half_y=distance) for reach, distance in faces)
         else:
             kinds.add(kind)

@@ -10,7 +10,7 @@ contacts continue as they were, which is what nearly all pairs do at nearly all 
 
 from blocksim.kernels.common.arrays import NORMAL, SHEAR, Record, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.bearing import measure
+from blocksim.kernels.explicit.bearing import hold_down, measure
 from blocksim.kernels.explicit.coupled import MOBILITY, add_coupled_dashpots, fill_mobility
 from blocksim.kernels.explicit.damping import (
     BOTH,
@@ -174,8 +174,8 @@ def damp_many(world: World, p: int, count: int, direction: int, ratio: float, st
 
 
 @rare_kernel
-def resolve_points(world: World, p: int, count: int, step: float, tally: Record) -> None:
-    """Kinematics of all points; history where the set of contacts has changed."""
+def resolve_points(world: World, p: int, count: int, step: float, tally: Record) -> bool:
+    """Kinematics of all points; history where the set of contacts has changed. Return whether it has."""
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
@@ -191,10 +191,12 @@ def resolve_points(world: World, p: int, count: int, step: float, tally: Record)
             contact = world.contacts[p, i]
             continuing += 1 if contact.slot == point.slot and contact.face == point.face else 0
         loses_face = loses_face or point.beside < IMPACT_STEPS * abs(point.closing)
-    if continuing != count or count != pair.active:
+    is_changed = continuing != count or count != pair.active
+    if is_changed:
         change_contacts(world, p, count, step, tally)
     if loses_face:
         spare_lost_faces(world, p, count)
+    return is_changed
 
 
 @rare_kernel
@@ -329,10 +331,12 @@ def pair_forces(world: World, p: int, step: float) -> None:
     values = world.interactions[a.contact_class, b.contact_class]
     if has_new_neighbours(a, b, model) or not has_constant_stiffness(world.controls[0].law):
         renew_dashpots(pair)
-    resolve_points(world, p, count, step, action)
     before = pair.stiffness
+    had = pair.active
+    is_changed = resolve_points(world, p, count, step, action)
     if model == SURFACE:
         measure(world, p, count, values.normal_stiffness)
+        hold_down(world, p, count, had, is_changed, before, world.corners)
     shared = step if model == SURFACE else shared_step(a, b, step)
     normal_pass(world, p, count, values, shared)
     shear_pass(world, p, count, values, before, shared, action)

@@ -56,10 +56,16 @@ def persistent_forces(
     is not None no pair is handled here, and where `corners` is not None, as there are polygons, those that do not
     touch.
     """
-    if particles is not None:
-        return CHANGED, NOTHING
     if corners is not None:
         return apart_or_changed(world, p, corners), NOTHING
+    if particles is not None:
+        return CHANGED, NOTHING
+    return forces_of_rectangles(world, p, step)
+
+
+@kernel
+def forces_of_rectangles(world: World, p: int, step: float) -> tuple[int, Effect]:
+    """As persistent_forces, in a scene of rectangles without particles."""
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]

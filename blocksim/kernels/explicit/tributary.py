@@ -78,7 +78,7 @@ def bearing_of(part: float, slide: float, a: Record, b: Record) -> Bearing:
 
 @kernel
 def bearing_at(sine: float, rate: float, part: float, slide: float, flat: float, cone: float) -> Bearing:
-    """Return the same at a tilt and its change with the angle of a; `flat` and `cone` are where its effect begins, ends."""
+    """Return the same at a tilt and its change with the angle of a, whose effect lasts from `flat` to `cone`."""
     if sine <= flat:
         return Bearing(part, slide, 0.0)
     if sine >= cone:
@@ -209,7 +209,7 @@ def bearing_of_facing(facing: Facing) -> Bearing:
     """Return the share of a corner at an end of the interval of two faces, as bearing_of_interval."""
     found = facing.interval
     flat = flat_of(facing)
-    part = (found.right - found.left) * found.per_length / found.cosine
+    part = found.per_length * (found.right - found.left) / found.cosine
     if part > 1.0 or part < LEAST:
         return bearing_at(facing.sine, facing.rate, min(max(part, LEAST), 1.0), 0.0, flat, facing.cone)
     slide = found.slide * found.per_length / found.cosine

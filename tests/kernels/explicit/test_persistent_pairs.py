@@ -203,13 +203,13 @@ def on_block(pose: Pose, shift: float, **tables: object) -> World:
 def assert_changed(world: World) -> None:
     """Assert that the pair is left to contact.py, as it was."""
     before = copy.deepcopy(world)
-    assert persistent_forces(world, 0, STEP, world.particles) == (CHANGED, NOTHING)
+    assert persistent_forces(world, 0, STEP, world.particles, world.corners) == (CHANGED, NOTHING)
     assert is_untouched(world, before)
 
 
 def test_contacts_that_continue_are_steady(pose: Pose) -> None:
     for world in (on_ground(pose), on_block(pose, 0.003)):
-        assert persistent_forces(world, 0, STEP, world.particles)[0] == TOUCHING
+        assert persistent_forces(world, 0, STEP, world.particles, world.corners)[0] == TOUCHING
 
 
 @pytest.mark.parametrize("up", [1.1e-6, 1.0])
@@ -234,7 +234,7 @@ def test_corner_that_begins_is_not_steady(pose: Pose, down: float, changes: bool
     world.bodies[0].y += down - 1.5e-6 if changes else 0.0
     if changes:
         assert_changed(world)
-    assert persistent_forces(world, 0, STEP, world.particles)[0] == (CHANGED if changes else TOUCHING)
+    assert persistent_forces(world, 0, STEP, world.particles, world.corners)[0] == (CHANGED if changes else TOUCHING)
 
 
 @pytest.mark.parametrize(("steps", "changes"), [(0.9 * IMPACT_STEPS, True), (1.2 * IMPACT_STEPS, False)])
@@ -252,7 +252,7 @@ def test_corner_about_to_lose_a_face_while_another_one_is_near_is_not_steady(
     pair_forces(world, 0, 0.0)
     assert world.contacts[0, 0].slot == 0
     assert world.contacts[0, 0].face == 1
-    kind, _ = persistent_forces(world, 0, beside / (steps * speed), world.particles)
+    kind, _ = persistent_forces(world, 0, beside / (steps * speed), world.particles, world.corners)
     assert kind == (CHANGED if changes else TOUCHING)
 
 
@@ -271,7 +271,7 @@ def test_other_laws_models_and_straight_ground_are_never_steady(pose: Pose) -> N
 def test_oblique_corners_that_meet_are_not_steady_and_aligned_ones_are(pose: Pose) -> None:
     aligned = on_block(pose, 0.0)
     assert aligned.pairs[0].duplicates != 0
-    assert persistent_forces(aligned, 0, STEP, aligned.particles)[0] == TOUCHING
+    assert persistent_forces(aligned, 0, STEP, aligned.particles, aligned.corners)[0] == TOUCHING
     oblique = pose((0.0, 0.0, pi / 4), (0.0, 1.0, 0.0))
     a, b = oblique.bodies[:2]
     a.x, a.y = b.half_x - 1e-7, 1.0 + b.half_y - 1e-6 + 0.5 * (WIDTH + HEIGHT) * sin(pi / 4)
@@ -286,7 +286,7 @@ def test_oblique_corners_that_meet_are_not_steady_and_aligned_ones_are(pose: Pos
 @pytest.mark.parametrize("sliding", [0, 1])
 def test_contact_that_slides_beside_one_that_sticks_has_no_dashpot(pose: Pose, sliding: int) -> None:
     quick = on_block(pose, 0.003)
-    assert persistent_forces(quick, 0, STEP, quick.particles)[0] == TOUCHING
+    assert persistent_forces(quick, 0, STEP, quick.particles, quick.corners)[0] == TOUCHING
     assert quick.pairs[0].sticking == BOTH
     assert quick.pairs[0].shear_left > 0
     quick.contacts[0, sliding].spring = 1e-3
@@ -304,13 +304,13 @@ def steps_left(world: World) -> list[int]:
 
 def test_dashpots_are_made_anew_where_the_number_of_neighbours_has_changed(pose: Pose) -> None:
     world = on_block(pose, 0.003)
-    persistent_forces(world, 0, STEP, world.particles)
+    persistent_forces(world, 0, STEP, world.particles, world.corners)
     left = steps_left(world)
     assert min(left) > 2
-    persistent_forces(world, 0, STEP, world.particles)
+    persistent_forces(world, 0, STEP, world.particles, world.corners)
     assert steps_left(world) == [n - 1 for n in left]
     world.bodies[1].sums_changed = 1
-    persistent_forces(world, 0, STEP, world.particles)
+    persistent_forces(world, 0, STEP, world.particles, world.corners)
     assert steps_left(world) == left
 
 
@@ -318,7 +318,7 @@ def test_steady_pair_adds_to_no_body_and_to_no_book_itself(pose: Pose) -> None:
     for world in (on_ground(pose), on_block(pose, 0.003)):
         world.bodies[0].vx = 20.0  # it slides
         bodies, ledger = world.bodies.copy(), world.ledger.copy()
-        kind, effect = persistent_forces(world, 0, STEP, world.particles)
+        kind, effect = persistent_forces(world, 0, STEP, world.particles, world.corners)
         assert kind == TOUCHING
         assert effect.fy > 0.0
         assert effect.friction != 0.0
@@ -331,6 +331,6 @@ def test_pair_without_contacts_that_stays_apart_does_nothing(pose: Pose, up: flo
     world = pose((0.003, 1.0 + HEIGHT + up, 0.0), (0.0, 1.0, 0.0))
     before = copy.deepcopy(world)
     for _ in range(2):  # along another axis than at first
-        assert persistent_forces(world, 0, STEP, world.particles) == (UNTOUCHED, NOTHING)
+        assert persistent_forces(world, 0, STEP, world.particles, world.corners) == (UNTOUCHED, NOTHING)
     world.pairs.axis = before.pairs.axis  # along which they were found to be apart
     assert is_untouched(world, before)

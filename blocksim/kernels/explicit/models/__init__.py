@@ -6,15 +6,15 @@ A model is one file with
     near_slots(world, a, b, reach, out)   write the slots of a pair that may come into contact, return how many
 
 one code here and one branch in each dispatcher below. The `surface` model has two: with polygons in a scene, all its
-corners lie in a table (`corners` below), which outlines.py reads. How many slots a pair needs is said in world/particles.py. Where
-an ended contact was is derived again for corners and kept in the slot for particles (`place_ended`). All models share
-laws, friction, dashpots, history and the energy ledger.
+corners lie in a table (`corners` below), which outlines.py reads. How many slots a pair needs is said in
+world/particles.py. Where an ended contact was is derived again for corners and kept in the slot for particles
+(`place_ended`). All models share laws, friction, dashpots, history and the energy ledger.
 """
 
 from blocksim.kernels.common.arrays import Integers, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.models import particles as discs
 from blocksim.kernels.explicit.models import outlines, smoothed, surface
+from blocksim.kernels.explicit.models import particles as discs
 
 SURFACE, PARTICLES, KERNEL = range(3)
 MODEL_CODES = {"surface": SURFACE, "particles": PARTICLES, "kernel": KERNEL}
@@ -65,9 +65,7 @@ def slot_normal(world: World, pair: Record, slot: int, face: int) -> tuple[float
 
 
 @kernel
-def normal_of_slot(
-    world: World, pair: Record, slot: int, face: int, corners: Records | None
-) -> tuple[float, float]:
+def normal_of_slot(world: World, pair: Record, slot: int, face: int, corners: Records | None) -> tuple[float, float]:
     """As slot_normal; see points_of."""
     if corners is None:
         return surface.slot_normal(world, pair, slot, face)

@@ -166,7 +166,7 @@ def is_same_end(of_a: Record, of_b: Record, a: Record, b: Record, table: Records
 
 @rare_kernel
 def are_oblique(a: Record, b: Record, nx: float, ny: float, table: Records, cone: float) -> bool:
-    """Return True if the faces of two bodies that look at each other along a normal, b to a, are not nearly parallel."""
+    """Return True if the faces of two bodies that look at each other along a normal are not nearly parallel."""
     ax, ay = side_normal(a, table, side_along(a, table, -nx, -ny))
     bx, by = side_normal(b, table, side_along(b, table, nx, ny))
     return abs(ax * by - ay * bx) > cone or ax * bx + ay * by > 0.0
