@@ -23,6 +23,8 @@ from blocksim.kernels.explicit.tributary import (
 )
 
 MOST_RISE = 1.05  # of the energy of a pair, where its contacts change: more is no round-off and no motion of one step
+NEGLIGIBLE = 1e-4  # of the limit of overlap: energies up to that of such an overlap are no matter, and may be round-off
+LEAST_HELD = 0.01  # of its stiffness that a pair keeps in any case, so that nothing passes through
 
 
 @rare_kernel
@@ -89,9 +91,9 @@ def hold_pair_down(world: World, p: int, count: int, had: int, is_changed: bool,
         for i in range(count):
             point = world.points[i]
             now += stored_energy(law, pair.stiffness, max(point.depth - point.closing, 0.0))
-        if now > MOST_RISE * held:
+        if now > MOST_RISE * held + stored_energy(law, pair.stiffness, NEGLIGIBLE * pair.limit):
             pair.duplicates = 1
-            keep_bearing(pair, Bearing(pair.stiffness * max(held / now, LEAST), 0.0, 0.0), 1.0)
+            keep_bearing(pair, Bearing(pair.stiffness * max(held / now, LEAST_HELD), 0.0, 0.0), 1.0)
 
 
 @kernel
