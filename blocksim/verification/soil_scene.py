@@ -24,8 +24,10 @@ WIDTH, HEIGHT = 0.032, 0.025  # m, of blocks
 TALL = 0.3  # m, of walls
 EVERY = 20  # steps between two samples of a force
 SOFT = {"young_modulus": YOUNG_MODULUS, "poisson_ratio": POISSON_RATIO}
+RODS = {**SOFT, "unit_weight": UNIT_WEIGHT, "friction_angle": f"{math.degrees(ANGLE)!r} deg"}
 MATERIALS: dict[str, dict[str, Any]] = {
-    "rods": {**SOFT, "unit_weight": UNIT_WEIGHT, "friction_angle": f"{math.degrees(ANGLE)!r} deg"},
+    "rods": RODS,
+    "rods of SPHinXsys": {**RODS, "yield_surface": "plane-strain-associated"},  # the only one that it has
     "wall": {**SOFT, "density": DENSITY},
     "block": {**SOFT, "density": DENSITY},
 }
@@ -61,7 +63,7 @@ class SoilScene(Simulation):
             "bodies": list(bodies),
             "soils": [{**table, "x": [x, x + size[0]], "y": [0.0, size[1]]}],
             "walls": [_wall(place, is_left=place == 0.0) for place in walls],
-            "pairs": {"rods": pairs},
+            "pairs": {str(table["material"]): pairs},
             "friction": {"block_block": 1.0, "block_ground": friction},
             "time": {"end": 10.0, "stop_at_rest": False},
         }

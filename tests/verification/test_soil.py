@@ -19,8 +19,9 @@ def outside(case: Case, setting: Setting) -> list[str]:
 
 
 @pytest.mark.long  # tests/simulation/test_soil.py has a wall that is drawn back
-def test_active_thrust_is_that_of_mohr_and_coulomb() -> None:
-    (case,) = chosen_of_soil(["s2"])
+@pytest.mark.parametrize("name", ["s2", "s4"])
+def test_active_thrust_and_shear_band_are_those_of_a_yielding_wall(name: str) -> None:
+    (case,) = chosen_of_soil([name])
     assert outside(case, Setting(quick=True)) == []
 
 
@@ -44,5 +45,5 @@ def test_the_table_of_the_page_is_what_is_kept() -> None:
 
 
 def test_an_unknown_case_is_told_with_those_there_are() -> None:
-    with pytest.raises(UnknownCaseError, match="S4: no such case of soil; choose S1, S2"):
-        chosen_of_soil(["S4"])
+    with pytest.raises(UnknownCaseError, match="S8: no such case of soil; choose S1, S2"):
+        chosen_of_soil(["S8"])
