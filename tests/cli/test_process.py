@@ -12,7 +12,7 @@ import pytest
 
 from blocksim.scenario import load_scenario
 from blocksim.simulation.stores.hdf5_reader import read_frames
-from tests.cli.conftest import PATIENCE, SOFT, Process, wait_for
+from tests.cli.conftest import PATIENCE, SOFT, Process, wait_for, wait_for_frames
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"
 SLOW = ("run", NOMINAL, *SOFT, "--set", "time.end=500", "--set", "time.stop_at_rest=false")
@@ -25,7 +25,7 @@ DELAYS = [0.1, *(pytest.param(delay, marks=pytest.mark.long) for delay in (0.0, 
 @pytest.mark.parametrize("delay", DELAYS)
 def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path, delay: float) -> None:
     running = process(*SLOW, "--set", "output.every=1e-5", "--out", "out", "--quiet")
-    wait_for(tmp_path / "out" / "run.h5", running)
+    (wait_for if delay < 0.1 else wait_for_frames)(tmp_path / "out" / "run.h5", running)
     time.sleep(delay)
     running.kill()
     running.communicate()
