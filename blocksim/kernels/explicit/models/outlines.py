@@ -7,6 +7,8 @@ The rules are those of rectangles (surface.py), stated for any angle:
 * It can touch a face where it is the corner of its own body that is lowest along the normal of that face: both faces
   that meet in it rise from there. The sine of the angle by which one may fall is the cone (outlines.py): both ends of a
   nearly parallel face count.
+* Under the sharp end of a face it still lies where it is out of the body there, if a face of its own leads from it along
+  that face into the body: between two sharp corners, as at the back of an arch, no end of an interval is lost.
 * Of a corner of each that mark the same end of two nearly parallel faces one counts, and of two that meet where no
   faces are parallel the shallower one: the nearest edge of the Minkowski difference.
 
@@ -24,6 +26,7 @@ from blocksim.kernels.explicit.outlines import (
     MOST_CORNERS,
     UPPER,
     WIDEST_CONE,
+    Side,
     cone_of,
     corner_place,
     corner_vector,
@@ -34,6 +37,7 @@ from blocksim.kernels.explicit.outlines import (
     side_of,
 )
 
+DEEPEST = 0.01  # of the half diagonal, under the sharp end of a face
 BESIDE_SHARE = 0.1  # of the half diagonal; a face farther than that below a corner is not beside it
 
 
@@ -46,6 +50,8 @@ class Corner(NamedTuple):
     ahead_y: float
     back_x: float
     back_y: float
+    ahead: float  # m, lengths of these faces
+    back: float
 
 
 @kernel
@@ -62,6 +68,8 @@ def corner_seen(owner: Record, number: int, touched: Record, table: Records) -> 
         -s * ahead.ny + c * ahead.nx,
         c * back.ny + s * back.nx,
         s * back.ny - c * back.nx,
+        2.0 * ahead.half,
+        2.0 * back.half,
     )
 
 
@@ -84,7 +92,7 @@ def side_below(corner: Corner, touched: Record, table: Records, cone: float) -> 
         side = side_of(touched, table, k)
         over = side.distance - (side.nx * corner.x + side.ny * corner.y)
         if over < 0.0:
-            return NO_FACE, 0.0, math.inf
+            return side_over_end(corner, k, over, touched, table, cone)
         if over <= side.distance and can_touch(corner, side.nx, side.ny, cone):
             if over < depth:
                 beside = depth
@@ -95,6 +103,55 @@ def side_below(corner: Corner, touched: Record, table: Records, cone: float) -> 
     if beside >= BESIDE_SHARE * touched.radius:
         beside = math.inf
     return face, depth, beside
+
+
+@kernel
+def leads_in(corner: Corner, level: Side, passed: Side, beyond: float, depth: float, cone: float) -> bool:
+    """Return True if a face of a corner leads nearly along `level`, and farther behind `passed` than it is deep.
+
+    `beyond` (m, negative) is the overlap of the corner with the face `passed`, `depth` (m) that with `level`.
+    """
+    ahead = beyond - corner.ahead * (passed.nx * corner.ahead_x + passed.ny * corner.ahead_y)
+    back = beyond - corner.back * (passed.nx * corner.back_x + passed.ny * corner.back_y)
+    is_ahead = level.nx * corner.ahead_x + level.ny * corner.ahead_y <= cone
+    is_back = level.nx * corner.back_x + level.ny * corner.back_y <= cone
+    return (is_ahead and ahead > depth) or (is_back and back > depth)
+
+
+@rare_kernel
+def side_over_end(
+    corner: Corner, passed: int, beyond: float, touched: Record, table: Records, cone: float
+) -> tuple[int, float, float]:
+    """Return as side_below the face under whose sharp end a corner lies that is in front of the face `passed`.
+
+    `beyond` (m, negative) is the overlap with that face. Deep under the end of another it is no end of an interval.
+    """
+    count = number_of_corners(touched)
+    side = side_of(touched, table, passed)
+    for step in (1, count - 1):
+        k = (passed + step) % count
+        level = side_of(touched, table, k)
+        over = level.distance - (level.nx * corner.x + level.ny * corner.y)
+        cosine = level.nx * side.nx + level.ny * side.ny
+        is_under = 0.0 < over < DEEPEST * touched.radius and beyond >= over * cosine
+        if (
+            is_under
+            and can_touch(corner, level.nx, level.ny, cone)
+            and leads_in(corner, level, side, beyond, over, cone)
+            and is_behind_others(corner, k, passed, touched, table)
+        ):
+            return k, over, math.inf
+    return NO_FACE, 0.0, math.inf
+
+
+@rare_kernel
+def is_behind_others(corner: Corner, one: int, two: int, touched: Record, table: Records) -> bool:
+    """Return True if a corner is behind all faces of a body but two, whichever side of those it is on."""
+    for k in range(number_of_corners(touched)):
+        side = side_of(touched, table, k)
+        if k != one and k != two and side.nx * corner.x + side.ny * corner.y > side.distance:
+            return False
+    return True
 
 
 @rare_kernel
