@@ -22,9 +22,11 @@ def test_full_disk_of_the_kernel_cache_is_named(monkeypatch: pytest.MonkeyPatch)
         compilation.compile_kernels()
 
 
-def test_blocks_with_outlines_have_a_set_of_kernels_of_their_own() -> None:
-    changes = compilation.CHANGES[compilation.OUTLINED]
-    outlined = scenario_from_mapping({**compilation.SMALLEST_SCENE, **changes})
-    rectangular = scenario_from_mapping({**compilation.SMALLEST_SCENE, "time": {"scheme": "nonsmooth"}})
-    assert compilation.kernels_of(outlined) == compilation.OUTLINED
-    assert compilation.kernels_of(rectangular) == "nonsmooth"
+def test_blocks_with_outlines_have_sets_of_kernels_of_their_own() -> None:
+    for name, plain in ((compilation.OUTLINED, "nonsmooth"), (compilation.SPRUNG_OUTLINES, "surface")):
+        changes = compilation.CHANGES[name]
+        without = {key: value for key, value in changes.items() if key != "blocks"}
+        outlined = scenario_from_mapping({**compilation.SMALLEST_SCENE, **changes})
+        rectangular = scenario_from_mapping({**compilation.SMALLEST_SCENE, **without})
+        assert compilation.kernels_of(outlined) == name
+        assert compilation.kernels_of(rectangular) == plain

@@ -7,8 +7,8 @@ The rules are those of rectangles (surface.py), stated for any angle:
 * It can touch a face where it is the corner of its own body that is lowest along the normal of that face: both faces
   that meet in it rise from there. The sine of the angle by which one may fall is the cone (outlines.py): both ends of a
   nearly parallel face count.
-* Under the sharp end of a face it still lies where it is out of the body there, if a face of its own leads from it along
-  that face into the body: between two sharp corners, as at the back of an arch, no end of an interval is lost.
+* Under the sharp end of a face it still lies where it is out of the body there, if a face of its own leads from it
+  along that face into the body: between two sharp corners, as at the back of an arch, no end of an interval is lost.
 * Of a corner of each that mark the same end of two nearly parallel faces one counts, and of two that meet where no
   faces are parallel the shallower one: the nearest edge of the Minkowski difference.
 
