@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import ALL, OUTLINE
+from blocksim.kernels.explicit.outlines import WIDEST_CONE
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.outlines import least_width, regular
 from blocksim.world.bodies import body_records, outline_of
 from blocksim.world.bounds import bounds_of
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth
 from blocksim.world.scenes import Stack, build_stacks, member
+from blocksim.world.shapes import cone_of
 
 TRIANGLE = [[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]]
 
@@ -95,3 +97,12 @@ def test_scenes_of_rectangles_have_no_table() -> None:
     world = build_nonsmooth(scenario(brick={"width": 0.2, "height": 0.1, "length": 0.1})).world
     assert world.corners is None
     assert not world.bodies.corner_count.any()
+
+
+def test_faces_of_blunt_and_sharp_shapes_are_parallel_within_less_than_those_of_rectangles() -> None:
+    def even(sides: int) -> tuple[tuple[float, float], ...]:
+        return tuple((math.cos(2.0 * math.pi * k / sides), math.sin(2.0 * math.pi * k / sides)) for k in range(sides))
+
+    assert cone_of(even(4)) == cone_of(even(6)) == WIDEST_CONE
+    assert cone_of(even(16)) == pytest.approx(math.sin(math.pi / 16))
+    assert cone_of(((0.0, 0.0), (1.0, -0.05), (1.0, 0.05))) == pytest.approx(math.sin(math.atan(0.05)))
