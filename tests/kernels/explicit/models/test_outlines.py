@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import cos, hypot, pi, sin
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -102,7 +102,7 @@ def test_force_does_not_jump_where_a_corner_passes_from_one_face_to_the_next() -
     for x in np.linspace(-2e-6, 2e-6, 41).tolist():
         run.bodies[0].x, run.bodies[0].y, run.bodies[0].angle = x, 0.1 - 2e-4 - 2e-6, 0.0
         run.bodies[0].vx = run.bodies[0].vy = run.bodies[0].spin = 0.0
-        run.to_step(int(run.scene.clock[0].steps) + 1)
+        run.to_step(int(run.scene.world.clock[0].steps) + 1)
         forces.append(hypot(run.bodies[0].ax, run.bodies[0].ay))
     assert min(forces) > 0.0
     assert np.abs(np.diff(forces)).max() < 0.1 * max(forces)
@@ -112,9 +112,13 @@ def test_force_does_not_jump_where_a_corner_passes_from_one_face_to_the_next() -
 def test_rectangles_given_as_outlines_have_the_same_motion(angle: float) -> None:
     sides = [[-0.02, -0.03], [0.02, -0.03], [0.02, 0.03], [-0.02, 0.03]]
     high = 0.02 * sin(angle) + 0.03 * cos(angle)
-    poses = [{"y": 0.03}, {"x": 0.007, "y": 0.06 + high + ABOVE, "angle": angle, "velocity": [0.2, -0.5]}]
+    poses: list[dict[str, object]] = [
+        {"y": 0.03},
+        {"x": 0.007, "y": 0.06 + high + ABOVE, "angle": angle, "velocity": [0.2, -0.5]},
+    ]
     states = []
-    for shape in ({"width": 0.04, "height": 0.06}, {"outline": sides}):
+    shapes: tuple[dict[str, object], ...] = ({"width": 0.04, "height": 0.06}, {"outline": sides})
+    for shape in shapes:
         run = Scene([{**pose, **shape} for pose in poses], friction=0.3).start()
         run.to_step(2 * STEPS)
         states.append(run.state())
@@ -127,7 +131,7 @@ def test_only_corners_near_the_other_body_are_candidates() -> None:
         {"y": 0.1, "outline": regular(3), "angle": 0.5 * pi},
         {"y": 0.1 - 0.011 - RADIUS, "outline": regular(6), "angle": 0.5 * pi},
     ]
-    world = Scene(bodies, gravity=0.0).start().scene
+    world: Any = Scene(bodies, gravity=0.0).start().scene
     found = np.zeros(2 * MOST_CORNERS, dtype=np.int64)
     count = near_slots(world, 0, 1, 1.1e-3, found, world.corners)
     assert found[:count].tolist() == [MOST_CORNERS]
