@@ -25,7 +25,7 @@ MATERIALS: dict[str, dict[str, Any]] = {
     "smooth": {"density": 2700.0, "young_modulus": 5.84e6, "poisson_ratio": 0.3},
 }
 BLOCKS: dict[str, dict[str, Any]] = {"far": {"width": 0.04, "height": 0.04, "length": DEPTH, "material": "soft"}}
-FAR = {"block": "far", "x": -1.0, "y": 0.02}  # a scene needs a block; out of the way
+FAR = {"block": "far", "x": -1.0, "y": 0.02}  # out of the way
 LEFT = {"from": [0.0, 0.3], "to": [0.0, 0.0], "material": "smooth"}
 SMOOTH_WALLS = {"rods": {"smooth": {"friction": 0.0}}}
 

@@ -31,7 +31,7 @@ MATERIALS: dict[str, dict[str, Any]] = {
     "wall": {**SOFT, "density": DENSITY},
     "block": {**SOFT, "density": DENSITY},
 }
-FAR = {"block": "far", "x": -1.0, "y": 0.02}  # a scene needs a block; out of the way
+FAR = {"block": "far", "x": -1.0, "y": 0.02}  # out of the way
 
 
 class SoilScene(Simulation):
