@@ -19,6 +19,8 @@ from blocksim.simulation.movement import MOVED_SHARE
 from blocksim.view import style
 from blocksim.view.forces import WithContacts, contacts_of
 from blocksim.view.layout import EDGE, LINE, OWN, Paper, add_axes, wrapped, write_heading, write_text
+from blocksim.view.load_arrows import draw_outside
+from blocksim.view.loads import SPEED, Outside, length_in, outside, with_room
 from blocksim.view.paint import Paint, by_displacement, displacements, draw_key
 from blocksim.view.panel import Canvas, Page, finish_panel, page_for
 from blocksim.view.run_data import Floats, Support, drawable_frames, shortest_sides
@@ -33,6 +35,8 @@ SIDE, GAP, HEAD, ROW_GAP, AXIS = 0.12, 0.16, 0.36, 0.12, 0.30  # inches
 VISIBLE = 0.3  # of a block's shortest side: displacement from which on a mechanism is seen
 SLIDES, ROCKS = "#CC79A7", "#FFFFFF"
 FIRST: dict[str, Any] = {"color": "#000000", "linewidth": 1.8, "zorder": 3.2, "solid_joinstyle": "miter"}
+ARROWS_OF_LOADS = "Red arrows: loads, on a scale of its own on each side."
+ARROWS_OF_SPEED = "Black arrows: velocity of driven bodies."
 LEGEND = "Outlined: block that moved first. Line: joint that slides; circle: point about which one rocks open."
 
 
@@ -133,7 +137,7 @@ def draw_mechanisms(
     width = paper.width(WIDTH, LEAST_WIDTH)
     across = 0.5 * (width - GAP)
     key = by_displacement(brackets[0][0].frames, brackets[0][0].support, 1.0).height
-    notes = wrapped([LEGEND], width - 2.0 * SIDE)
+    notes = wrapped([LEGEND, *_told_of_loads(brackets)], width - 2.0 * SIDE)
     foot = AXIS + key + LINE * len(notes)
     rows = len(brackets)
     tallest = paper.panel(TALLEST, rows, HEAD + foot + rows * (HEAD + ROW_GAP), LOWEST)
@@ -161,7 +165,7 @@ def _most(side: Side) -> float:
 
 def _extent(pair: tuple[Side, Side]) -> Extent:
     """Return what both panels of a row show: on one scale, all blocks of either."""
-    one, other = (extent_of(side.frames, np.array([side.frame]), side.support) for side in pair)
+    one, other = (_extent_of_side(side) for side in pair)
     return Extent(
         left=min(one.left, other.left),
         right=max(one.right, other.right),
@@ -172,6 +176,23 @@ def _extent(pair: tuple[Side, Side]) -> Extent:
     )
 
 
+def _acts(side: Side) -> Outside:
+    """Return what acts on the blocks in the frame that is drawn."""
+    return outside(side.frames, np.array([side.frame]), side.support)
+
+
+def _extent_of_side(side: Side) -> Extent:
+    extent = extent_of(side.frames, np.array([side.frame]), side.support)
+    return with_room(extent, _acts(side), length_in(extent))
+
+
+def _told_of_loads(brackets: Sequence[tuple[Side, Side]]) -> list[str]:
+    """Return what arrows mean where there are any."""
+    all_acts = [_acts(side) for pair in brackets for side in pair]
+    texts = [ARROWS_OF_LOADS] if any(acts.sizes for acts in all_acts) else []
+    return [*texts, *([ARROWS_OF_SPEED] if any(acts.largest.get(SPEED, 0.0) > 0.0 for acts in all_acts) else [])]
+
+
 def _draw_side(figure: "Figure", side: Side, page: Page, corner: tuple[float, float], most: float) -> None:
     """Draw a panel with its upper left corner at a place in inches; ground is tilted as it is on that side."""
     left, top = corner
@@ -180,6 +201,7 @@ def _draw_side(figure: "Figure", side: Side, page: Page, corner: tuple[float, fl
     canvas = Canvas(axes, extent, page.points_per_mm)
     paint: Paint = by_displacement(side.frames, side.support, most)
     draw_scene(canvas, side.frames, side.frame, side.support, paint)
+    draw_outside(canvas, _acts(side), 0, length_in(extent))
     _mark_first(canvas, side)
     _mark_joints(canvas, joints(side.frames, side.frame, side.support))
     finish_panel(canvas, (page.panel_width, page.panel_height), labelled=False)

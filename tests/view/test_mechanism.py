@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
@@ -13,10 +14,11 @@ from blocksim.view.layout import Paper
 from blocksim.view.mechanism import Side, draw_mechanisms, joints
 from blocksim.view.run_data import support_of
 from tests.study.test_limit import SLENDER, SQUAT, block_on_a_slope
+from tests.view.made_up import boxes_of
 
 
-def side(size: tuple[float, float], tilt: str, *, contacts: bool = True) -> Side:
-    data: dict[str, Any] = block_on_a_slope(size) | {"ground": {"tilt": tilt}}
+def side(size: tuple[float, float], tilt: str, *, contacts: bool = True, **tables: Any) -> Side:
+    data: dict[str, Any] = block_on_a_slope(size) | {"ground": {"tilt": tilt}} | tables
     scenario = load_scenario(data | {"output": {"every": 0.02, "contacts": contacts}})
     result = run(scenario)
     assert result.summary.movement is not None
@@ -71,3 +73,12 @@ def test_the_picture_is_the_same_every_time_and_says_what_each_side_is(
     bare = side(SQUAT, "25 deg", contacts=False)
     with pytest.raises(InvalidInputError, match=r"output\.contacts=true"):
         draw_mechanisms([(bare, toppling)], tmp_path / "bare.png")
+
+
+def test_loads_are_drawn_on_the_side_that_has_them_and_told(sliding: Side, caught: list[Figure]) -> None:
+    pushed = side(SQUAT, "5 deg", loads=[{"kind": "force", "body": "1", "magnitude": "1 N"}])
+    draw_mechanisms([(pushed, sliding)], "loads.png")
+    draw_mechanisms([(sliding, sliding)], "none.png")
+    loaded, bare = ("".join(text for text, _ in boxes_of(figure)) for figure in caught)
+    assert "arrows: loads" in loaded
+    assert "arrows" not in bare
