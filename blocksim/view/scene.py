@@ -24,6 +24,7 @@ LETTERS = 100  # of a name; longer ones have no room anywhere
 FIXED_HATCH = "////"
 HALO = 2.0  # points around a name, so that paths of centres do not strike through it
 LEAST_HATCHED = 12.0  # points; on smaller blocks hatching is a few stray lines
+SMALL, CLOSED = 6.0, 0.42  # points, of discs drawn without gaps; share of a size that closes those of a square lattice
 
 
 @dataclass(frozen=True)
@@ -89,10 +90,11 @@ def _draw_system(canvas: Canvas, track: Track, frame: int, colours: str | Sequen
     from matplotlib.collections import PolyCollection  # noqa: PLC0415 - see style
 
     (outlines,) = MILLIMETRES * outlines_of(track, np.array([frame]))
-    thin = min(
-        style.LINE_WIDTH, 0.05 * canvas.points_per_mm * float(np.ptp(outlines[:, :, 0], axis=1).min(initial=1.0))
-    )
+    size = canvas.points_per_mm * float(np.ptp(outlines[:, :, 0], axis=1).min(initial=1.0))
+    thin = min(style.LINE_WIDTH, 0.05 * size)
     edges = style.INK if isinstance(colours, str) else "face"
+    if edges == "face" and size < SMALL:  # gaps between small discs make a pattern that is none of the soil
+        thin = CLOSED * size
     drawn = PolyCollection(list(outlines), facecolors=colours, edgecolors=edges, linewidths=thin)
     drawn.set_transform(canvas.scene)
     canvas.axes.add_collection(drawn)
