@@ -11,6 +11,7 @@ from blocksim.scenario.models.stepping import Explicit, Nonsmooth
 from blocksim.scenario.motion import motion_pieces
 from blocksim.scenario.motion_peaks import motion_peaks
 from blocksim.scenario.outlines import edges_of
+from blocksim.scenario.placement import has_outlines
 from blocksim.world.bodies import outline_of, with_freed
 from blocksim.world.bounds import bounds_of
 from blocksim.world.build import build_world
@@ -38,6 +39,7 @@ from blocksim.world.systems.system import Present
 SECONDS_PER_BODY_AND_STEP = 75e-9
 SECONDS_IN_A_CROWD = 250e-9  # where bodies have neighbours on all sides
 CROWD = 50  # bodies
+OUTLINES_COST = 6.0  # times as much, where blocks with outlines are on springs
 # with particles: a block, and each particle around it; in a crowd as many times that, as all its faces touch others
 SECONDS_WITH_PARTICLES = {"kernel": (1.5e-6, 10e-9, 5.0), "particles": (0.7e-6, 6e-9, 2.0)}
 SECONDS_IN_A_SUBSTEP = 400e-9  # a block, where contacts are rigid
@@ -167,7 +169,8 @@ def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
     if scenario.contact.model in SECONDS_WITH_PARTICLES:
         block, particle, more = SECONDS_WITH_PARTICLES[scenario.contact.model]
         return (more if is_crowd else 1.0) * (blocks * block + particles * particle)
-    return blocks * (SECONDS_IN_A_CROWD if is_crowd else SECONDS_PER_BODY_AND_STEP)
+    rectangles = blocks * (SECONDS_IN_A_CROWD if is_crowd else SECONDS_PER_BODY_AND_STEP)
+    return OUTLINES_COST * rectangles if has_outlines(scenario) else rectangles
 
 
 def _seconds_of(others: Sequence[Present]) -> float:

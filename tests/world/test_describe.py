@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.scenario import load_scenario
+from blocksim.scenario import load_scenario, scenario_from_mapping
 from blocksim.world import build_world
 from blocksim.world.describe import describe
 
@@ -103,6 +103,23 @@ def test_frames_that_go_into_a_folder_take_no_memory() -> None:
     coarse, fine = (describe(load_scenario(shipped, [f"output.every={every}"])) for every in (0.01, 1e-5))
     assert fine.memory == coarse.memory
     assert 200e6 < coarse.memory < 220e6  # measured: 207 MB
+
+
+def test_outlines_on_springs_cost_what_was_measured() -> None:
+    brick = {"width": 0.1, "height": 0.1, "length": 0.1, "material": "oak"}
+    square = {"outline": [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]], "depth": 0.1, "material": "oak"}
+    seconds = []
+    for block in (brick, square):
+        scene = {
+            "schema": 1,
+            "name": "a",
+            "materials": {"oak": {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}},
+            "blocks": {"one": block},
+            "bodies": [{"block": "one", "x": 0.0, "y": 0.05}],
+        }
+        found = describe(scenario_from_mapping(scene))
+        seconds.append(found.seconds / found.steps)
+    assert 4.0 < seconds[1] / seconds[0] < 8.0
 
 
 def test_kernels_of_a_crowd_cost_more_than_of_a_few() -> None:
