@@ -9,6 +9,7 @@ each other by that over this side, a hundredth.
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -50,7 +51,12 @@ class Side:
     caption: str
     is_mechanism: bool
 
-    @property
+    @cached_property
+    def acts(self) -> Outside:
+        """What acts on the blocks in the frame that is drawn."""
+        return outside(self.frames, np.array([self.frame]), self.support)
+
+    @cached_property
     def frame(self) -> int:
         """The last frame; of a mechanism the first in which it is seen."""
         drawable = drawable_frames(self.frames)
@@ -176,19 +182,14 @@ def _extent(pair: tuple[Side, Side]) -> Extent:
     )
 
 
-def _acts(side: Side) -> Outside:
-    """Return what acts on the blocks in the frame that is drawn."""
-    return outside(side.frames, np.array([side.frame]), side.support)
-
-
 def _extent_of_side(side: Side) -> Extent:
     extent = extent_of(side.frames, np.array([side.frame]), side.support)
-    return with_room(extent, _acts(side), length_in(extent))
+    return with_room(extent, side.acts, length_in(extent))
 
 
 def _told_of_loads(brackets: Sequence[tuple[Side, Side]]) -> list[str]:
     """Return what arrows mean where there are any."""
-    all_acts = [_acts(side) for pair in brackets for side in pair]
+    all_acts = [side.acts for pair in brackets for side in pair]
     texts = [ARROWS_OF_LOADS] if any(acts.sizes for acts in all_acts) else []
     return [*texts, *([ARROWS_OF_SPEED] if any(acts.largest.get(SPEED, 0.0) > 0.0 for acts in all_acts) else [])]
 
@@ -201,7 +202,7 @@ def _draw_side(figure: "Figure", side: Side, page: Page, corner: tuple[float, fl
     canvas = Canvas(axes, extent, page.points_per_mm)
     paint: Paint = by_displacement(side.frames, side.support, most)
     draw_scene(canvas, side.frames, side.frame, side.support, paint)
-    draw_outside(canvas, _acts(side), 0, length_in(extent))
+    draw_outside(canvas, side.acts, 0, length_in(extent))
     _mark_first(canvas, side)
     _mark_joints(canvas, joints(side.frames, side.frame, side.support))
     finish_panel(canvas, (page.panel_width, page.panel_height), labelled=False)
