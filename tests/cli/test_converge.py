@@ -91,7 +91,7 @@ def test_failing_scenario_is_76_and_draws_nothing(blocksim: Command) -> None:
 
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_ctrl_c_ends_all_runs_with_75(process: Process, tmp_path: Path, jobs: int) -> None:
-    endless = ("--set", "time.end=1e4", "--set", "time.stop_at_rest=false")
+    endless = ("--set", "time.end=1e4", "--set", "time.stop_at_rest=false", "--set", "output.every=10")
     running = process("converge", "scenarios/three_blocks_nominal.toml", *SOFT, *endless, "--jobs", jobs, "-q")
     began = time.monotonic()
     while not list(tmp_path.glob("results/three_blocks_nominal/converge/*/run.h5")):
