@@ -3,7 +3,7 @@
 >>> from blocksim import compare, load, run
 >>> result = run(load("scenarios/three_blocks.toml", {"contact.stiffness_scale": 0.01}))
 >>> result.final.round(1)[["block", "x_mm", "rotation_deg"]].to_string(index=False).splitlines()[-1].split()
-['3', '131.2', '-90.0']
+['3', '130.7', '-90.0']
 >>> compare(result).inside
 True
 

@@ -32,7 +32,7 @@ def test_values_are_replaced_and_everything_else_stays(tmp_path: Path) -> None:
     assert len(changed) == 5  # two values, two notes of provenance, the path of the table
     comment = "calibrated within the prior 0.17 to 0.31"
     assert changed[0] == (
-        f"kinetic = 0.1974                    # {comment}",
+        f"kinetic = 0.191                     # {comment}",
         f"kinetic = 0.2                       # calibrated, see [provenance]; before: {comment}",
     )
     assert changed[1][1].startswith("restitution = 0.25 ")
