@@ -23,15 +23,16 @@ from blocksim.simulation.events import NEVER, Timeline
 from blocksim.simulation.ledger import (
     adds_up,
     energy_ledger,
+    ledger_of,
     next_energy_check,
     start_energy,
 )
 from blocksim.simulation.loop import last_step_of
-from blocksim.simulation.member_end import Closing, Ended, MemberEnd, MemberFailure
+from blocksim.simulation.member_end import Closing, Ended, MemberEnd, MemberFailure, in_play_of
 from blocksim.simulation.movement import FirstMoves
 from blocksim.simulation.moving_support import MovingSupport
 from blocksim.simulation.recorder import POSITION, steps_per_frame
-from blocksim.simulation.schemes import AnyScene, build_stacks, measured_row, scheme_of
+from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, measured_row, scheme_of
 from blocksim.simulation.settling import begun
 from blocksim.simulation.team import ALONE
 from blocksim.world.scenes import Refusal, Stack, member, stack_of_one
@@ -130,7 +131,7 @@ class Ensemble:
         """Take a stack of scenes that have not moved yet, and the scenarios that its numbers count."""
         self.placed = stack.placed
         self.scenes: AnyScene = stack.scenes
-        self.scheme = scheme_of(self.scenes)
+        self.scheme, self.names = scheme_of(self.scenes), ledger_names(self.scenes)
         self.bodies = int(self.scenes.world.bodies.shape[1]) - 1
         self.time_steps: list[float] = self.scenes.world.controls["step"][:, 0].tolist()
         own = zip([scenarios[number] for number in stack.numbers], self.placed, self.time_steps, strict=True)
@@ -177,7 +178,7 @@ class Ensemble:
                 self._advance_watching(m, int(stops[m]), rows)
             rows = np.zeros_like(self.starts)  # what is measured at the start of a later call
             members = members[(self.codes[members] == REACHED) & (self.last_steps[members] > done)]
-            members = members[[self._adds_up(m) for m in members.tolist()]]
+            members = members[self._add_up(members)]
 
     def _advance_watching(self, m: int, stop: int, rows: NDArray[np.float64]) -> None:
         """Advance a member on a moving support to a step, from frame to frame until something has moved there."""
@@ -227,8 +228,12 @@ class Ensemble:
         bodies = scenes.world.bodies.view(np.ndarray)  # a record array takes five times as long for a field
         return np.stack([bodies[name][which, : len(self.placed[0])] for name in POSITION], axis=1)
 
-    def _adds_up(self, m: int) -> bool:
-        return adds_up(energy_ledger(member(self.scenes, m), self._start(m)))
+    def _add_up(self, members: Steps) -> list[bool]:
+        """Return for each of some members if its energy adds up."""
+        rows, which = self._measured(members), members.tolist()
+        in_play = in_play_of(self.scenes, which)
+        ledgers = (ledger_of(self.names, rows[m], self._start(m), own) for m, own in zip(which, in_play, strict=True))
+        return [*map(adds_up, ledgers)]
 
     def _start(self, m: int) -> float:
         """Return the energy (J) of a member at the start."""
@@ -237,7 +242,7 @@ class Ensemble:
     def ends(self) -> list[Ended]:
         """Return where the members ended, in order."""
         self._see_ends()
-        closing = Closing(self.scenes, self.placed, self._measured())
+        closing = Closing(self.scenes, self.placed, self._measured(np.arange(len(self.codes))))
         return [
             self._from_rest(
                 m,
@@ -253,10 +258,10 @@ class Ensemble:
         is_settled = self.settle[m] and isinstance(end, MemberEnd)
         return replace(end, start=self.moves.start[m]) if is_settled else end
 
-    def _measured(self) -> NDArray[np.float64]:
+    def _measured(self, members: Steps) -> NDArray[np.float64]:
         """Return rows as `measured` of the scheme names them: a call that goes to no further step only measures."""
         rows, nowhere = np.zeros_like(self.starts), np.zeros_like(self.codes)
-        self._advance_members(np.arange(len(rows)), nowhere, rows, nowhere.copy())
+        self._advance_members(members, nowhere, rows, nowhere.copy())
         return rows
 
     def _run_alone(self, m: int, start: float) -> Ended:

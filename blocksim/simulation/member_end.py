@@ -1,5 +1,6 @@
 """Where members of ensembles ended, and how: tables, ledgers and outcomes of a stack of scenes at their last states."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -67,6 +68,16 @@ class MemberFailure:
 Ended = MemberEnd | MemberFailure
 
 
+def in_play_of(scenes: AnyScene, members: Sequence[int]) -> list[InPlay]:
+    """Return what decides the energy in play, of some members of a stack."""
+    further = mass_of_systems(member(scenes, 0))  # in a stack of one, or zero
+    mass = scenes.world.bodies.view(np.ndarray)["mass"]
+    masses = [float(np.sum(mass[m])) + further for m in members]  # one by one: the order matters
+    book = scenes.world.ledger[:, 0]
+    moved = book["largest_kinetic"] + book["travel_work"]
+    return [*map(InPlay, masses, moved[list(members)].tolist())]
+
+
 class Closing:
     """The last states of a stack of scenes."""
 
@@ -79,11 +90,7 @@ class Closing:
         self.motion = motion_of(world.bodies[:, :blocks])  # (m, 6, b)
         self.steps: NDArray[np.int64] = world.clock["steps"].copy()  # (m, 1)
         self.time_steps: list[float] = world.controls["step"][:, 0].tolist()
-        book = world.ledger[:, 0]
-        moved = (book["largest_kinetic"] + book["travel_work"]).tolist()
-        further = mass_of_systems(member(scenes, 0))  # in a stack of one, or zero
-        masses = [float(np.sum(mass)) + further for mass in world.bodies["mass"]]  # one by one: the order matters
-        self.in_play = [*map(InPlay, masses, moved)]
+        self.in_play = in_play_of(scenes, range(len(placed)))
         self.columns = final_values(self.motion, _shapes(placed), _outlines(placed)).tolist()
         support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
         self.end_speeds = end_speeds(placed, self.motion, support, [self._seconds(m) for m in range(len(placed))])
