@@ -144,6 +144,10 @@ pictures: $(RUN_STAMP) ## Draw the pictures of the findings in results/
 	$(BLOCKSIM) plot $(PICTURES)/ensemble --kind histogram --out results/ensemble.png
 	$(BLOCKSIM) sensitivity scenarios/ensemble_three_blocks.toml --samples 24 --out $(PICTURES)/morris.csv --overwrite --quiet
 	$(BLOCKSIM) plot $(PICTURES)/morris.csv --out results/sensitivity.png
+	$(BLOCKSIM) limit scenarios/arch.toml --vary structures.0.thickness=1m:2.1m --stands "outcome == stands" --to 1% \
+	    --over friction.block_block=0.3125,0.325,0.3375,0.35,0.3625,0.375,0.3875,0.4,0.45,0.5 \
+	    --out $(PICTURES)/arch --overwrite --quiet
+	$(BLOCKSIM) plot $(PICTURES)/arch --experiment scenarios/published/arch_thickness.csv --out results/arch_thickness.png
 
 .PHONY: paper
 paper: $(RUN_STAMP) ## The paper's figures, tables and equations from the shipped scenarios, into results/paper

@@ -83,7 +83,8 @@ def plot_command(
     A sweep over one key, or a second one with few values, is drawn as lines of final x; over two keys as a map of
     run-outs and outcomes; a sampled one as a matrix of its inputs. The measured range is marked in all of them. A
     fragility study is drawn as its counts, with limits, and the curve with its band; a limit as the mechanism beside
-    its last stable neighbour.
+    its last stable neighbour; limits over another key as a curve, beside those of a table that --experiment names
+    (columns over, limit and series, with units as in limits.csv).
 
     An older picture of blocksim is replaced; any other file only with --overwrite.
 

@@ -131,7 +131,7 @@ def draw(  # noqa: PLR0913 - what a picture is made of
     study = study_in(place)
     if study is not None:
         refuse(asked.of_runs(), f"{place} is {study.what}")
-        return draw_study(place, study, out, kind, paper, ready), ""
+        return draw_study(place, study, out, kind, paper, ready, published=experiment), ""
     if is_sweep(place):
         refuse(asked.of_runs(), f"{place} is a sweep")
         return draw_sweep(place, out, experiment, kind, paper, ready=ready), ""

@@ -14,6 +14,7 @@ from blocksim.scenario import load_stored
 from blocksim.scenario.bounded_read import MEGABYTE, read_limited
 from blocksim.study.criterion import Verdict
 from blocksim.study.fragility_counts import Point
+from blocksim.study.published import read_published
 from blocksim.study.stored_run import stored_run
 from blocksim.study.sweep_folder import FRAGILITY, LIMIT, LIMIT_CURVE, FolderKind, case_folder
 from blocksim.view.fragility import Band, Fragility, draw_fragility, places
@@ -102,23 +103,38 @@ def study_in(place: Path | str) -> FolderKind | None:
     return next((kind for kind in DRAWN if (Path(place) / kind.origin).is_file()), None)
 
 
-def draw_study(
-    folder: Path, kind: FolderKind, path: Path | None, picture: str | None, paper: Paper, ready: Callable[[Path], None]
+def draw_study(  # noqa: PLR0913 - what a picture is made of
+    folder: Path,
+    kind: FolderKind,
+    path: Path | None,
+    picture: str | None,
+    paper: Paper,
+    ready: Callable[[Path], None],
+    *,
+    published: Path | None = None,
 ) -> Path:
     """Draw a study; return the picture's path (default: NAME_KIND.png).
 
-    `ready` is asked about the path first. Raises InvalidInputError for another kind of picture, an unknown format and
-    what cannot be read, InputMissingError, OutputError.
+    `ready` is asked about the path first; `published` is a table of limits to draw beside a curve of them. Raises
+    InvalidInputError for another kind of picture, an unknown format, a table for another study and what cannot be
+    read, InputMissingError, OutputError.
     """
     name, draw = DRAWN[kind]
     if picture not in {None, name}:
         message = f"{folder}: {kind.what} is drawn as {name!r}, not as {picture!r}"
         raise InvalidInputError(message)
+    if published is not None and kind != LIMIT_CURVE:
+        message = f"{published}: a table is drawn beside {LIMIT_CURVE.what} only, and {folder} is {kind.what}"
+        raise InvalidInputError(message)
     scenario = load_stored(folder / kind.plan)
     path = path or Path(f"{scenario.name}_{name}.png")
     picture_suffix(path)
     ready(path)
-    draw(folder, path, scenario.description or scenario.name, paper)
+    title = scenario.description or scenario.name
+    if kind == LIMIT_CURVE:
+        draw_curve_of(folder, path, title, paper, published)
+    else:
+        draw(folder, path, title, paper)
     return path
 
 
@@ -178,8 +194,8 @@ def read_curve_answer(folder: Path) -> StoredCurve:
     return _read(folder / LIMIT_CURVE.origin, StoredCurve, LIMIT_CURVE)
 
 
-def draw_curve_of(folder: Path, path: Path, title: str, paper: Paper) -> None:
-    """Draw limits over the other key."""
+def draw_curve_of(folder: Path, path: Path, title: str, paper: Paper, published: Path | None = None) -> None:
+    """Draw limits over the other key, with a table of others beside them."""
     stored = read_curve_answer(folder)
     points = [
         (one.over, [Bracket(c.low, c.high, c.below.verdict, c.above.verdict) for c in one.changes])
@@ -191,7 +207,8 @@ def draw_curve_of(folder: Path, path: Path, title: str, paper: Paper) -> None:
         raise InvalidInputError(message)
     notes = [f"Stands means: {stored.stands}.", *([f"Nothing changes at {', '.join(none)}."] if none else [])]
     axes = with_unit(stored.over, stored.over_unit), with_unit(stored.key, stored.unit)
-    draw_limit_curve(LimitCurve(*axes, points, tuple(notes)), path, title, paper)
+    beside = () if published is None else read_published(published, stored.over_unit, stored.unit)
+    draw_limit_curve(LimitCurve(*axes, points, tuple(notes), beside), path, title, paper)
 
 
 def with_unit(key: str, unit: str) -> str:

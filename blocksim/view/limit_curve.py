@@ -17,6 +17,9 @@ MARGIN = 0.06  # of an axis
 MOST_NUMBERS = 6
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")  # by the kind of the change
 LINE_COLOUR = "#777777"
+OTHERS = ("#D55E00", "#000000", "#56B4E9", "#777777")  # of what others found
+MARKS = "DsX^"
+MOST_MARKS = 12  # series with more points are lines
 
 
 class Bracket(NamedTuple):
@@ -28,14 +31,22 @@ class Bracket(NamedTuple):
     above: str
 
 
+class Series(NamedTuple):
+    """What others found: a name, and limits as pairs of the other key's value and the limit."""
+
+    name: str
+    points: tuple[tuple[float, float], ...]
+
+
 @dataclass(frozen=True)
 class LimitCurve:
-    """The brackets at every value of the other key, the names of both axes, and the range that was searched."""
+    """The brackets at every value of the other key, the names of both axes, and what others found."""
 
     across: str
     up: str
     points: Sequence[tuple[float, Sequence[Bracket]]]
     notes: tuple[str, ...] = ()
+    beside: tuple[Series, ...] = ()
 
 
 def joined(curve: LimitCurve) -> list[tuple[tuple[float, float], tuple[float, float]]]:
@@ -56,6 +67,7 @@ def draw_limit_curve(curve: LimitCurve, path: Path | str, title: str | None = No
     with sheet(path, title, curve.notes, paper, LEFT) as axes:
         for start, end in joined(curve):
             axes.plot(*zip(start, end, strict=True), color=LINE_COLOUR, linewidth=1.0, zorder=2)
+        _draw_others(axes, curve.beside)
         _draw_brackets(axes, [(x, one) for x, found in curve.points for one in found])
         axes.margins(MARGIN)
         for axis in (axes.xaxis, axes.yaxis):
@@ -75,3 +87,14 @@ def _draw_brackets(axes: "Axes", brackets: Sequence[tuple[float, Bracket]]) -> N
         look: dict[str, Any] = {"color": COLOURS[number % len(COLOURS)], "markersize": 4.5, "linewidth": 0.0}
         label = f"{kind[0]} below, {kind[1]} above"
         axes.errorbar(places, middles, yerr=reach, fmt="o", elinewidth=1.0, capsize=2.5, label=label, **look)
+
+
+def _draw_others(axes: "Axes", beside: Sequence[Series]) -> None:
+    """Draw long series as lines and short ones as marks, which no line between few points would do justice."""
+    for number, one in enumerate(beside):
+        colour = OTHERS[number % len(OTHERS)]
+        look: dict[str, Any] = {"color": colour, "linewidth": 1.4, "zorder": 1.5}
+        if len(one.points) <= MOST_MARKS:
+            mark = MARKS[number % len(MARKS)]
+            look |= {"linestyle": "none", "marker": mark, "markersize": 6.0, "markerfacecolor": "none", "zorder": 3.0}
+        axes.plot(*zip(*one.points, strict=True), label=one.name, **look)

@@ -10,7 +10,7 @@ import pytest
 from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.study.api import plot, report
 from blocksim.study.limit_curve import CurveResult, limit_curve
-from blocksim.view.limit_curve import Bracket, LimitCurve, joined
+from blocksim.view.limit_curve import Bracket, LimitCurve, Series, joined
 from tests.study.test_limit import TILT, block_on_a_slope
 
 SIZE = (0.05, 0.1)  # m: topples at atan 0.5
@@ -52,6 +52,41 @@ def test_the_folder_holds_table_and_answer_and_is_drawn(found: CurveResult, tmp_
     assert [point["over"] for point in data["points"]] == [0.3, 0.7]
     assert plot(found, out=tmp_path / "limits.png").stat().st_size > 0
     assert "friction.block_ground" in report(found, out=tmp_path / "limits.html").read_text()
+
+
+def test_a_table_of_others_is_drawn_beside_it(
+    found: CurveResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[LimitCurve] = []
+    monkeypatch.setattr("blocksim.study.study_pictures.draw_limit_curve", lambda curve, *_: drawn.append(curve))
+    table = tmp_path / "published.csv"
+    table.write_text('# from a book\nover,limit [deg],series\n0.3,16.7,"a, b"\n0.5,26.6,c\n0.4,21.8,"a, b"\n')
+    plot(found, experiment=table)
+    assert drawn[0].beside == (Series("a, b", ((0.3, 16.7), (0.4, 21.8))), Series("c", ((0.5, 26.6),)))
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("over,limit,series\n", r"bad\.csv:1: .*'limit \[deg\]'"),
+        ("over,limit [deg],series\n1,2,a\n1,x,a\n", r"bad\.csv:3: .*'x' is not a number"),
+        ("over,limit [deg],series\n1,2\n", r"bad\.csv:2: "),
+        ("over,limit [deg],series\n", r"bad\.csv: .*no rows"),
+    ],
+)
+def test_a_bad_table_beside_a_curve_is_refused_with_its_line(
+    found: CurveResult, tmp_path: Path, text: str, why: str
+) -> None:
+    (tmp_path / "bad.csv").write_text(text)
+    with pytest.raises(InvalidInputError, match=why):
+        plot(found, out=tmp_path / "limits.png", experiment=tmp_path / "bad.csv")
+    assert not (tmp_path / "limits.png").exists()
+
+
+def test_a_table_beside_a_single_limit_is_refused(found: CurveResult, tmp_path: Path) -> None:
+    single = next(iter(found.searches.values())).folder
+    with pytest.raises(InvalidInputError, match=r"a table is drawn beside a curve of limits only, and .* is a limit"):
+        plot(single, out=tmp_path / "limit.png", experiment=tmp_path / "any.csv")
 
 
 @pytest.mark.parametrize(

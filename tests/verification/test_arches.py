@@ -1,7 +1,8 @@
-"""Arches of voussoirs with rigid contacts: least thickness and tilt, bracketed within a percent."""
+"""Arches of voussoirs with rigid contacts: least thickness and tilt, bracketed within a percent; limit analysis."""
 
 from __future__ import annotations
 
+import csv
 import math
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -12,11 +13,15 @@ import pytest
 from blocksim.scenario import load_scenario
 from blocksim.scenario.outlines import centred
 from blocksim.simulation.schemes import build_scene
+from blocksim.study.limit_curve import limit_curve
+from blocksim.verification.arches import COCCHETTI_RIZZI, HEAD, VOUSSOIRS, least_thickness
 from blocksim.verification.scene import Simulation
 from tests.kernels.nonsmooth.scenes import Block, posed
 from tests.simulation.conftest import SCENARIOS
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from blocksim.scenario.outlines import Corners
 
 RADIUS = 10.0  # m, mean
@@ -98,3 +103,60 @@ def test_arch_on_a_tilting_table_falls_at_20_49_degrees(share: float, stands: bo
         spins = run.to_time(1.5).bodies.spin[:7]
         parts = 1 + np.count_nonzero(np.abs(np.diff(spins)) > 0.1 * np.abs(spins).max())
         assert parts == 3
+
+
+@pytest.mark.parametrize(("friction", "least"), LEAST)
+def test_limit_analysis_of_voussoirs_gives_the_thicknesses_that_others_found(friction: float, least: float) -> None:
+    assert least_thickness(friction) == pytest.approx(least, abs=6e-6)
+
+
+def test_limit_analysis_of_a_ring_is_that_of_cocchetti_and_rizzi() -> None:
+    for friction, least in COCCHETTI_RIZZI:
+        assert least_thickness(friction, None) == pytest.approx(least, abs=2e-5)
+    (weakest, _), (kink, plateau), _ = COCCHETTI_RIZZI
+    assert least_thickness(weakest - 5e-5, None) is None
+    slides = least_thickness(kink - 1e-3, None)
+    assert slides is not None
+    assert slides > plateau + 5e-4
+
+
+def test_the_table_beside_the_picture_is_what_limit_analysis_gives() -> None:
+    text = (SCENARIOS / "published" / "arch_thickness.csv").read_text(encoding="utf-8")
+    assert text.startswith(HEAD)
+    rows = list(csv.reader(text[len(HEAD) :].splitlines()))
+    for name, count in (("limit analysis of that ring", None), (f"the same of {VOUSSOIRS} voussoirs", VOUSSOIRS)):
+        curve = [row for row in rows if row[2] == name]
+        assert len(curve) > 20
+        for over, limit, _ in curve[2::9]:
+            least = least_thickness(float(over), count)
+            assert least is not None
+            assert float(limit) == pytest.approx(RADIUS * least, abs=1e-4)
+
+
+def limits_over(frictions: list[float], out: Path) -> None:
+    """Assert that `limit` finds the thicknesses of limit analysis, all brackets within a percent of it."""
+    found = limit_curve(
+        SCENARIOS / "arch.toml",
+        {"structures.0.thickness": {"from": "1 m", "to": "2.1 m"}},
+        {"friction.block_block": frictions},
+        stands="outcome == stands",
+        tolerance=0.01,
+        jobs=1,
+        out=out,
+    )
+    assert list(found.searches) == frictions
+    for friction, search in found.searches.items():
+        (change,) = search.limits
+        least = least_thickness(friction)
+        assert least is not None
+        assert change.above.value == "stands"
+        assert 0.99 * RADIUS * least < change.low < change.high < 1.01 * RADIUS * least
+
+
+def test_limit_finds_the_least_thickness_where_joints_slide(tmp_path: Path) -> None:
+    limits_over([0.35], tmp_path / "curve")
+
+
+@pytest.mark.long
+def test_every_point_of_the_picture_is_within_a_percent_of_limit_analysis(tmp_path: Path) -> None:
+    limits_over([0.3125, 0.325, 0.3375, 0.35, 0.3625, 0.375, 0.3875, 0.4, 0.45, 0.5], tmp_path / "curve")
