@@ -156,3 +156,51 @@ def test_pushed_wall_leans_more_the_higher_a_course_is() -> None:
     assert (np.diff(left) > 0.0).all()
     assert abs(left[0]) < 1e-4
     assert 0.02 < left[-1] < 0.05  # 1 m/s, less friction
+
+
+def turned_under(amplitude: float, end: float = 8.0) -> Result:
+    """Run the column of drums under another amplitude (m/s2)."""
+    return run_shipped("drum_column", **{"motion.amplitude": amplitude, "time.end": end, "output.every": 2e-3})
+
+
+def test_drums_begin_to_rock_at_the_foot_as_one_block() -> None:
+    """Half the width of the foot over the height of the centre: h/3 (w0 + 2 w1)/(w0 + w1)."""
+    height = 10.33 / 3.0 * (1.63 + 2.0 * 1.31) / (1.63 + 1.31)
+    onset = 0.5 * 1.63 / height * 9.81
+    assert onset / 9.81 == pytest.approx(0.1637, abs=5e-5)  # as the file says
+    for share, least in ((0.97, 26), (1.03, 25)):  # two contacts for each drum
+        frames = turned_under(share * onset, 1.0).frames
+        assert frames.contact_count[frames.time > 0.01].min() == least
+
+
+@pytest.mark.parametrize(("amplitude", "falls"), [(0.245, False), (0.275, True)])
+def test_drums_come_down_from_0_26_g_on(amplitude: float, falls: bool) -> None:
+    movement = turned_under(amplitude * STANDARD_GRAVITY).summary.movement
+    assert movement is not None
+    assert (movement.outcome == "fell") == falls
+
+
+def test_at_half_of_gravity_the_upper_eight_drums_fall() -> None:
+    final = run_shipped("drum_column").final
+    assert (final["rotation_deg"].abs() > 60.0).tolist() == [False] * 5 + [True] * 8
+
+
+def slope_of_cells(friction: str, end: float) -> Result:
+    return run_shipped("voronoi_slope", **{"friction.block_block": friction, "time.end": end})
+
+
+def test_slope_of_cells_begins_to_slide_below_the_friction_that_holds_it() -> None:
+    falls, stands = (slope_of_cells(angle, 0.6).summary.movement for angle in ("15 deg", "20 deg"))
+    assert falls is not None
+    assert stands is not None
+    assert falls.largest_displacement_mm > 50.0
+    assert stands.largest_displacement_mm < 5.0
+
+
+@pytest.mark.long
+def test_slope_of_cells_falls_at_15_degrees_and_rests_at_20() -> None:
+    assert slope_of_cells("20 deg", 5.0).reason == "at rest"
+    result = slope_of_cells("15 deg", 5.0)
+    moved = np.abs(result.frames.x[-1] - result.frames.x[0])
+    assert np.mean(moved > 1.0) == pytest.approx(0.125, abs=0.04)
+    assert float(result.final["x_mm"].min()) < -5000.0
