@@ -17,6 +17,7 @@ FRICTION = {"block_block": 0.31, "block_ground": 0.38}
 OVERLAP = 0.01  # m
 RESTITUTION = 0.2
 WALL_RESTITUTION = 0.1
+HEXAGONS, HEXAGONS_GAP = (0.02, 0.04), 0.002  # m, smallest and largest of a heap, and the least distance at the start
 PUSH = 1.0  # m/s, of the upper edge of a wall
 LOW_COURSES = "height"  # `upright` of the wall that non-smooth engines are compared on: bricks of 32 x 25 mm
 SUBSTEPS = 4
@@ -67,12 +68,26 @@ def pushed_wall(
     return _scenario("pushed_wall", upright, wall, {**more, "friction": FRICTION})
 
 
+def hexagon_heap(columns: int, rows: int, contact: Table | None = None, time: Table | None = None) -> Scenario:
+    """Return random hexagons of 20 to 40 mm in rows, apart from one another, that fall to a heap."""
+    sizes = {"smallest": HEXAGONS[0], "largest": HEXAGONS[1], "fewest_sides": 6, "most_sides": 6}
+    heap = {"kind": "rubble", "block": "stone", "columns": columns, "count": columns * rows, "gap": HEXAGONS_GAP}
+    more = {"contact": {"restitution": WALL_RESTITUTION, **(contact or {})}, "friction": FRICTION}
+    more["time"] = {"end": 1.0, "stop_at_rest": False, **(time or {})}
+    stone = {"depth": SIDES["length"], "material": "aluminium"}
+    return _placed("hexagon_heap", {"stone": stone}, {**heap, **sizes}, more)
+
+
 def _scenario(name: str, upright: str, structure: Table, more: Table) -> Scenario:
+    return _placed(name, {"brick": {**SIDES, "upright": upright, "material": "aluminium"}}, structure, more)
+
+
+def _placed(name: str, blocks: Table, structure: Table, more: Table) -> Scenario:
     data: dict[str, Any] = {
         "schema": 1,
         "name": name,
         "materials": {"aluminium": MATERIAL},
-        "blocks": {"brick": {**SIDES, "upright": upright, "material": "aluminium"}},
+        "blocks": blocks,
         "structures": [structure],
         "ground": {"material": "aluminium"},
         **more,

@@ -13,6 +13,8 @@ from blocksim.bench.measurements import chosen
 from blocksim.bench.peers.blocksim_engine import Explicit, Nonsmooth
 from blocksim.bench.peers.box2d_engine import Box2D
 from blocksim.bench.peers.engine import Final, Scene, Series, Solver, Stepper
+from blocksim.bench.peers.heap import SMALL as SMALL_HEAP
+from blocksim.bench.peers.heap import Heap
 from blocksim.bench.peers.pymunk_engine import Pymunk
 from blocksim.bench.peers.series import three_blocks_series, wall_racers, wall_series
 from blocksim.bench.peers.three_blocks import starts
@@ -20,6 +22,7 @@ from blocksim.bench.peers.wall import SMALL, Computed, distances, raced, wassers
 from blocksim.bench.scenes import Stepping, three_blocks
 from blocksim.errors import ExitCode, UnavailableError
 from blocksim.scenario import Scenario
+from blocksim.scenario.outlines import edges_of
 
 ENGINES = pytest.mark.parametrize(
     ("module", "solver"),
@@ -82,6 +85,46 @@ def test_a_sliding_wall_is_stopped_by_the_friction_of_the_ground(module: str, so
     final = solved(module, solver, scene)
     assert final.x[0] - 0.016 == pytest.approx(0.5**2 / (2.0 * 0.38 * 9.81), rel=0.02)
     assert final.y[0] == pytest.approx(0.0125, abs=3e-5)
+
+
+@ENGINES
+@pytest.mark.filterwarnings("ignore:builtin type .* has no __module__ attribute:DeprecationWarning")
+def test_a_hexagon_comes_to_rest_on_one_of_its_sides(module: str, solver: Solver) -> None:
+    scene = Heap(1, 1, 0.6).scene()
+    (block,) = scene.placed()
+    heights = [ax * nx + ay * ny for (ax, ay), _, (nx, ny) in edges_of(block.corners)]
+    assert len(heights) == 6
+    final = solved(module, solver, scene)
+    assert min(abs(float(final.y[0]) - height) for height in heights) < 5e-5
+
+
+@pytest.mark.parametrize("engine", [Pymunk(1e-3, 10), Box2D(1e-3, 10)], ids=["pymunk", "Box2D"])
+@pytest.mark.filterwarnings("ignore:builtin type .* has no __module__ attribute:DeprecationWarning")
+def test_hexagons_have_their_own_mass_and_inertia_in_every_engine(engine: Stepper) -> None:
+    pytest.importorskip(type(engine).__name__ if isinstance(engine, Box2D) else "pymunk", exc_type=ImportError)
+    scene = SMALL_HEAP.scene()
+    placed = scene.placed()
+    _, bodies = engine.made(scene)
+    for block, body in zip(placed, bodies, strict=True):
+        inertia = body.inertia / engine.units**2 if isinstance(engine, Box2D) else body.moment
+        assert body.mass / bodies[0].mass == pytest.approx(block.mass / placed[0].mass, rel=1e-5)
+        assert inertia / body.mass == pytest.approx(block.inertia / block.mass, rel=1e-5)
+    assert len({round(block.mass, 9) for block in placed}) == len(placed)
+
+
+@pytest.mark.filterwarnings("ignore:builtin type .* has no __module__ attribute:DeprecationWarning")
+def test_a_heap_of_hexagons_is_timed_and_compared() -> None:
+    for module in ("pymunk", "Box2D"):
+        pytest.importorskip(module, exc_type=ImportError)
+    found = peers.HEAP.measure(Setting(quick=True, repeats=2))
+    own, *others = found.numbers
+    assert own.quantity == "non-smooth, step 1 ms / 4"
+    assert [one.quantity for one in others] == [f"{name}, 10 iterations: times that" for name in ("Box2D", "pymunk")]
+    assert all(len(one.samples) == 2 and one.smallest > 0.0 for one in found.numbers)
+    meaning, mine, *_ = found.notes
+    assert meaning.startswith("20 random hexagons")
+    assert mine.startswith("non-smooth: mean height of the centres ")
+    assert mine.endswith("mm, 0.0 and 0.0 mm off in x and y")
 
 
 def test_starts_differ_by_a_micrometre_and_are_the_same_every_time() -> None:
@@ -213,7 +256,7 @@ def test_a_run_of_blocksim_that_breaks_off_has_no_answer() -> None:
 def test_a_missing_package_names_the_extra(monkeypatch: pytest.MonkeyPatch, module: str, package: str) -> None:
     for name in ("pymunk", "Box2D"):
         monkeypatch.setitem(sys.modules, name, sys)  # there, whatever it is
-    assert chosen(["wall"], peers=True) == peers.PEERS[2:]
+    assert chosen(["wall"], peers=True) == peers.PEERS[2:3]
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(UnavailableError, match=rf"package {package} .*blocksim\[bench\]") as caught:
         chosen([], peers=True)

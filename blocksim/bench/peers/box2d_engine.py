@@ -13,15 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 from blocksim.bench.peers.engine import Stepper, loaded
 from blocksim.bench.scenes import FRICTION
+from blocksim.scenario.outlines import edges_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from blocksim.bench.peers.engine import Scene
+    from blocksim.scenario import PlacedBody
 
 UNITS = 200.0  # a metre
 GRAVITY = 9.81  # m/s2
-MASS = 1.0  # among equal blocks it has no influence
 GROUND_LENGTH, GROUND_DEPTH = 150.0, 1.0  # m
 
 
@@ -46,15 +47,14 @@ class Box2D(Stepper):
         slab = box2d.b2PolygonShape(box=(0.5 * UNITS * GROUND_LENGTH, depth, (0.0, -depth - skin), 0.0))
         world.CreateStaticBody().CreateFixture(box2d.b2FixtureDef(shape=slab, **ground))
         bodies = []
-        for block in scene.placed():
-            half_x, half_y = 0.5 * UNITS * block.size_x, 0.5 * UNITS * block.size_y
+        placed = scene.placed()
+        for block in placed:
             body = world.CreateDynamicBody(
                 position=(UNITS * block.x, UNITS * block.y), linearVelocity=(UNITS * block.vx, UNITS * block.vy)
             )
-            # The skin is part of the block: what is inside of it is smaller by as much.
-            shape = box2d.b2PolygonShape(box=(half_x - skin, half_y - skin))
+            shape = box2d.b2PolygonShape(vertices=_inside_of_skin(block, skin))
             body.CreateFixture(box2d.b2FixtureDef(shape=shape, density=1.0, **blocks))
-            body.massData = _mass_data(box2d, half_x, half_y)
+            body.massData = _mass_data(box2d, block, placed[0].mass)
             bodies.append(body)
         return world, bodies
 
@@ -70,10 +70,20 @@ def empty_world() -> Any:
     return world
 
 
-def _mass_data(box2d: Any, half_x: float, half_y: float) -> Any:
-    """Return mass and inertia of the whole block, skin included."""
+def _inside_of_skin(block: PlacedBody, skin: float) -> list[tuple[float, float]]:
+    """Return corners in the engine's units: the skin is part of the block, what is inside of it smaller by as much."""
+    edges = list(edges_of(block.corners))
+    found = []
+    for (_, _, (ax, ay)), ((x, y), _, (bx, by)) in zip([edges[-1], *edges[:-1]], edges, strict=True):
+        reach = skin / (1.0 + ax * bx + ay * by)
+        found.append((UNITS * x - reach * (ax + bx), UNITS * y - reach * (ay + by)))
+    return found
+
+
+def _mass_data(box2d: Any, block: PlacedBody, unit: float) -> Any:
+    """Return mass, in units of that of a block, and inertia of the whole block, skin included."""
     data = box2d.b2MassData()
-    data.mass = MASS
+    data.mass = block.mass / unit
     data.center = (0.0, 0.0)
-    data.I = MASS * (half_x**2 + half_y**2) / 3.0
+    data.I = UNITS**2 * block.inertia / unit
     return data

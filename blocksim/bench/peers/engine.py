@@ -43,7 +43,7 @@ class Make(Protocol):
 
 @dataclass(frozen=True)
 class Scene:
-    """Equal blocks on level ground, let go at time zero."""
+    """Blocks on level ground, let go at time zero; they are not turned."""
 
     make: Make
     shift: Floats  # (b,) m, along x, of every block at the start

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 # Overlap that is left alone so that contacts last. The default of 0.1 is a tenth of a pixel; here it would be 0.1 m.
 SLOP = 1e-6  # m
 GROUND = ((-50.0, -1.0), (100.0, -1.0), (100.0, 0.0), (-50.0, 0.0))  # m
-MASS = 1.0  # kg; among equal blocks it has no influence
 
 
 class Pymunk(Stepper):
@@ -43,11 +42,12 @@ class Pymunk(Stepper):
         ground.elasticity = bounce
         space.add(ground)
         bodies = []
-        for block in scene.placed():
-            body = pymunk.Body(MASS, MASS * (block.size_x**2 + block.size_y**2) / 12.0)
+        placed = scene.placed()
+        for block in placed:
+            body = pymunk.Body(block.mass / placed[0].mass, block.inertia / placed[0].mass)
             body.position = (block.x, block.y)
             body.velocity = (block.vx, block.vy)
-            shape = pymunk.Poly.create_box(body, (block.size_x, block.size_y))  # its corners are sharp: radius 0
+            shape = pymunk.Poly(body, block.corners)  # its corners are sharp: radius 0
             shape.friction, shape.elasticity = friction, bounce
             space.add(body, shape)
             bodies.append(body)

@@ -70,6 +70,15 @@ def wall_racers() -> dict[str, Solver]:
     }
 
 
+def heap_racers() -> dict[str, Solver]:
+    """Return those that are timed in turns on the heap, the non-smooth scheme first."""
+    return {
+        NONSMOOTH: Nonsmooth(Stepping(RACE_STEP)),
+        f"{BOX2D}, 10 iterations": Box2D(RACE_STEP, 10),
+        f"{PYMUNK}, 10 iterations": Pymunk(RACE_STEP, 10),
+    }
+
+
 def _stepped(engine: type[Pymunk | Box2D], steps: tuple[float, ...], iterations: int) -> tuple[Solver, ...]:
     return tuple(engine(step, iterations) for step in steps)
 
