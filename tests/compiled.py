@@ -5,7 +5,6 @@ a time; where all are in the cache already this takes some seconds.
 """
 
 import multiprocessing
-import os
 import time
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
@@ -13,26 +12,20 @@ from typing import Any
 JOBS = 2
 SPH, SOIL = "sph", "soil"
 # those that take longest first
-OPEN = ("outlines", "outlines-with-springs", "with-particles", "surface", SOIL, "nonsmooth", SPH)
-AS_USERS_HAVE_THEM = ("surface", "nonsmooth")  # for commands that tests run as processes
+SETS = ("outlines-with-springs", "outlines", "nonsmooth", "with-particles", "surface", SOIL, SPH)
 
 
-def compile_set(name: str, is_open: bool) -> None:
-    """Compile one set of kernels, and what runs ensembles and teams of threads.
-
-    Imports come after the setting that lets Python call every kernel, which most tests need; users do not have it.
-    """
-    if is_open:
-        os.environ["BLOCKSIM_OPEN_KERNELS"] = "1"  # as tests/conftest.py has it
+def compile_set(name: str) -> None:
+    """Compile one set of kernels, and what runs ensembles and teams of threads."""
     if name == SPH:
         _use_particles()
     elif name == SOIL:
         _run_soil()
     else:
-        _run_smallest(name, is_open)
+        _run_smallest(name)
 
 
-def _run_smallest(name: str, in_team: bool) -> None:
+def _run_smallest(name: str) -> None:
     from blocksim.scenario import scenario_from_mapping  # noqa: PLC0415
     from blocksim.simulation import run_ensemble  # noqa: PLC0415
     from blocksim.simulation.compilation import (  # noqa: PLC0415
@@ -50,9 +43,8 @@ def _run_smallest(name: str, in_team: bool) -> None:
         return
     change: dict[str, Any] = CHANGES[name]
     scene = scenario_from_mapping({**SMALLEST_SCENE, **change, "time": {**change.get("time", {}), "end": 1e-4}})
-    if in_team:
-        with Team(2) as team:
-            team.advance(build_scene(scene), 1)
+    with Team(2) as team:
+        team.advance(build_scene(scene), 1)
     run_ensemble([scene, scene])
 
 
@@ -78,10 +70,8 @@ def _use_particles() -> None:
 def main() -> None:
     """Compile all sets."""
     began = time.perf_counter()
-    wanted = [*((name, True) for name in OPEN), *((name, False) for name in AS_USERS_HAVE_THEM)]
-    os.environ.pop("BLOCKSIM_OPEN_KERNELS", None)
     with ProcessPoolExecutor(JOBS, mp_context=multiprocessing.get_context("spawn"), max_tasks_per_child=1) as pool:
-        list(pool.map(compile_set, *zip(*wanted, strict=True)))
+        list(pool.map(compile_set, SETS))
     print(f"kernels are in the cache after {time.perf_counter() - began:.0f} s")  # noqa: T201 - for people who wait
 
 

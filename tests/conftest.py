@@ -5,14 +5,11 @@ Blocks are the paper's: 32 x 25 x 50 mm, the height upright, unless a test says 
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import pytest
 from hypothesis.internal.conjecture import providers
-
-os.environ["BLOCKSIM_OPEN_KERNELS"] = "1"  # before kernels are imported; here and in all processes that tests start
 
 from blocksim.scenario import load_scenario
 from blocksim.verification.scene import PaperBlock, Scene, Simulation

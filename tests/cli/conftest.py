@@ -89,9 +89,8 @@ def wait_for_frames(path: Path, running: Running) -> None:
 
 @pytest.fixture
 def process(tmp_path: Path) -> Process:
-    """Start blocksim as a process, with the kernels that users have."""
+    """Start blocksim as a process."""
     environment = {**os.environ, "COLUMNS": "80"}
-    environment.pop("BLOCKSIM_OPEN_KERNELS", None)
     scenarios = tmp_path / "scenarios"
     if not scenarios.exists():
         scenarios.symlink_to(SCENARIOS)

@@ -31,11 +31,6 @@ Function = TypeVar("Function", bound=Callable[..., object])
 # call, are switched off; together with inlining of the hot path that made a step five times faster than the defaults.
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 
-# Most kernels are called by kernels only. Without the code that unpacks their arguments from Python objects all of them
-# compile in two thirds of the time. Tests, and whoever looks for an error, set this variable and can call every one.
-OPEN = "BLOCKSIM_OPEN_KERNELS"
-IS_OPEN = bool(os.environ.get(OPEN))
-
 config: Any = numba_config  # its settings are attributes made at run time
 types: Any = numba_types
 njit: Any = numba.njit  # _nrt is an option that its types leave out
@@ -81,7 +76,7 @@ def _cache_roots() -> Iterator[Path]:
 @functools.cache
 def cache_folder() -> Path | None:
     """Return the cache folder of this exact source, or None where nothing can be kept."""
-    name = source_hash() + ("-open" if IS_OPEN else "")
+    name = source_hash()
     for root in _cache_roots():
         if _is_usable(root) and _is_usable(root / name):
             return root / name
@@ -108,12 +103,14 @@ def mark(name: str) -> None:
             (folder / name).touch()
 
 
-def _compiled(function: Function, **options: object) -> Function:
+def _compiled(function: Function, kind: str, **options: object) -> Function:
+    """Compile a function; `kind` tells apart on the disk what is compiled from it in several ways."""
     compiled: Any = njit(**OPTIONS, **options)(function)
     folder = cache_folder()
     if folder is not None and not config.DISABLE_JIT:
         with contextlib.suppress(OSError):  # a function without a source file
-            compiled._cache = KernelCache(function, folder, _stamp(function))  # noqa: SLF001 - as enable_caching does
+            stamp = (kind, _stamp(function))
+            compiled._cache = KernelCache(function, folder, stamp)  # noqa: SLF001 - as enable_caching does
     wrapped: Function = compiled
     return wrapped
 
@@ -134,36 +131,37 @@ def plain_type(one: Any) -> Any:
     return types.int64 if is_short else one
 
 
-class _Shared(CPUDispatcher):
-    """A function compiled once for all that call it.
+class _Inner(CPUDispatcher):
+    """A function compiled once for all kernels that call it; their machine code has it, and it has none of its own.
 
     numba would compile it again for every constant, and every width of integer, that it is called with: nearly half of
-    all machine code.
+    all code. Where Python calls one as well, as tests do, it is compiled for that then.
     """
+
+    choices: dict[str, Any]  # the options that the compiler was given
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Look for the compiled version that serves a call, and have it compiled where there is none."""
         named = {name: plain_type(one) for name, one in kws.items()}
         return super().get_call_template(tuple(plain_type(one) for one in args), named)
 
+    @functools.cached_property
+    def for_python(self) -> Any:
+        """Return the function as Python calls it, with machine code."""
+        return _compiled(self.py_func, "entry", **self.choices)
 
-class _Inner(_Shared):
-    """A compiled function without the code that Python needs to call it."""
-
-    def __call__(self, *_: object, **__: object) -> None:
-        """Refuse: the process would die."""
-        message = f"{self.py_func.__name__} is compiled for other kernels only; {OPEN}=1 lets Python call it too"
-        raise TypeError(message)
+    def __call__(self, *args: Any, **kws: Any) -> Any:
+        """Call the function from Python."""
+        return self.for_python(*args, **kws)
 
 
 def _inner(function: Function, **options: object) -> Function:
-    """Compile a function that Python does not call, unless all are open."""
+    """Compile a function that kernels call."""
     if config.DISABLE_JIT:
         return function
-    if not IS_OPEN:
-        options = {**options, "no_cpython_wrapper": True, "pipeline_class": InnerCompiler}
-    compiled: Any = _compiled(function, **options)
-    compiled.__class__ = _Shared if IS_OPEN else _Inner
+    compiled: Any = _compiled(function, "inner", **options, no_cpython_wrapper=True, pipeline_class=InnerCompiler)
+    compiled.__class__ = _Inner
+    compiled.choices = options
     inner: Function = compiled
     return inner
 
@@ -180,4 +178,4 @@ def rare_kernel(function: Function) -> Function:
 
 def entry_kernel(function: Function) -> Function:
     """Compile a function that Python calls; other threads can run meanwhile."""
-    return _compiled(function, nogil=True)
+    return _compiled(function, "entry", nogil=True)

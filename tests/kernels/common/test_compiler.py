@@ -17,9 +17,8 @@ pytestmark = pytest.mark.usefixtures("compiler")
 
 @pytest.fixture
 def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Compile as users do, into a folder of this test's own."""
+    """Keep what is compiled in a folder of this test's own."""
     monkeypatch.setattr(jit, "cache_folder", lambda: tmp_path)
-    monkeypatch.setattr(jit, "IS_OPEN", False)
     return tmp_path
 
 
@@ -63,3 +62,15 @@ def test_inner_kernels_are_kept_without_machine_code_and_serve_callers_of_later_
     square, successor, two = chain()
     assert two(3.0) == 25.0
     assert (loads(square), loads(successor), loads(two)) == (1, 1, 0)
+
+
+@pytest.mark.usefixtures("kept")
+def test_inner_kernel_that_python_calls_is_compiled_and_kept_for_that_beside_what_its_callers_need() -> None:
+    square, _, two = chain()
+    assert (square(3.0), two(3.0), square(number=4.0)) == (9.0, 25.0, 16.0)
+    assert isinstance(library_of(square), InnerLibrary)
+    assert not isinstance(library_of(square.for_python), InnerLibrary)
+    square, _, _ = chain()
+    assert square(3.0) == 9.0
+    assert loads(square.for_python) == 1
+    assert not square.overloads, "its callers' version has been loaded for nothing"

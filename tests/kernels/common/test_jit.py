@@ -34,7 +34,8 @@ from blocksim.kernels.explicit.contact import push_spring
 point = zeros(1, POINT)[0]
 point.depth, point.share = 2e-6, 1.0
 push_spring(point, zeros(1, CONTACT)[0], 0, 1e9)
-hits, misses = (sum(counts.values()) for counts in (push_spring.stats.cache_hits, push_spring.stats.cache_misses))
+stats = push_spring.for_python.stats
+hits, misses = (sum(counts.values()) for counts in (stats.cache_hits, stats.cache_misses))
 print(point.force, hits, misses, jit.cache_folder())
 """
 
@@ -124,7 +125,7 @@ def test_cache_folder_falls_back_to_the_temporary_one(
     folder = jit.cache_folder()
     assert folder is not None
     assert folder.is_relative_to(tmp_path / "temporary")
-    assert folder.name == f"{jit.source_hash()}-open"
+    assert folder.name == jit.source_hash()
 
 
 @pytest.mark.usefixtures("fresh_folder_choice", "compiler")
@@ -189,7 +190,7 @@ def test_marks_and_compiled_kernels_are_found_for_this_source_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(tmp_path))
-    below = tmp_path / f"{jit.source_hash()}-open" / "kernels"
+    below = tmp_path / jit.source_hash() / "kernels"
     assert not jit.is_marked("seen")
     assert not jit.is_compiled()
     jit.mark("seen")
@@ -202,37 +203,6 @@ def test_marks_and_compiled_kernels_are_found_for_this_source_only(
     jit.cache_folder.cache_clear()
     assert not jit.is_marked("seen")
     assert not jit.is_compiled()
-
-
-CLOSED = """
-import os
-del os.environ["BLOCKSIM_OPEN_KERNELS"]
-from blocksim.kernels.common.geometry import turn
-from blocksim.kernels.sph.functions import support_radius
-
-try:
-    turn(1.0, 0.0, 0.1)
-except TypeError as error:
-    print(error)
-print(support_radius(0, 0.5))
-"""
-
-
-@pytest.mark.usefixtures("compiler")
-def test_kernels_that_python_cannot_call_say_so_instead_of_killing_the_process(tmp_path: Path) -> None:
-    words = python(CLOSED, folder=PACKAGE.parent, BLOCKSIM_CACHE_DIR=str(tmp_path))
-    message = "turn is compiled for other kernels only; BLOCKSIM_OPEN_KERNELS=1 lets Python call it too"
-    assert " ".join(words[:-1]) == message
-    assert float(words[-1]) == 1.0
-
-
-def test_open_and_closed_kernels_do_not_share_a_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(tmp_path))
-    folders = set()
-    for is_open in (True, False):
-        monkeypatch.setattr(jit, "IS_OPEN", is_open)
-        folders.add(jit.cache_folder.__wrapped__())
-    assert len(folders) == 2
 
 
 @pytest.mark.usefixtures("compiler")
