@@ -85,7 +85,7 @@ def touching(world: World) -> Any:
 
 
 def assert_same_bits(one: World, other: World) -> None:
-    """Compare all that lasts, the ledger book by book; only which pairs are between shares may differ."""
+    """Compare all that lasts, the ledger tally by tally; only which pairs are between shares may differ."""
     count = int(one.clock[0].pair_count)
     assert count == other.clock[0].pair_count
     for name in ("bodies", "clock", "ledger", "moved"):

@@ -85,7 +85,7 @@ def test_body_is_held_in_its_flight_and_falls_again_from_rest(scheme: str) -> No
 
 
 @both
-def test_new_velocity_is_had_at_once_and_its_energy_is_booked(scheme: str) -> None:
+def test_new_velocity_is_had_at_once_and_its_energy_is_tallied(scheme: str) -> None:
     event = {"at": 0.01, "velocity": {"body": "block", "vx": 2.0, "spin": "0 rad/s"}}
     run = simulate(with_events(scheme, [event], bodies=[block(y=1.0, spin=3.0), plate()]))
     since = run.summary.simulated_time_s - run.summary.events[0].time_s

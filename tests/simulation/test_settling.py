@@ -1,4 +1,4 @@
-"""A scene that comes to rest before time zero: forces, clock, books, held bodies, failure, resuming, ensembles."""
+"""A scene that comes to rest before time zero: forces, clock, tallies, held bodies, failure, resuming, ensembles."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def test_a_driven_body_begins_its_way_at_time_zero(scheme: str) -> None:
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_velocities_are_those_of_the_release_and_books_begin_at_time_zero(scheme: str) -> None:
+def test_velocities_are_those_of_the_release_and_tallies_begin_at_time_zero(scheme: str) -> None:
     bodies = [{"block": "b", "x": 0.0, "y": 0.1}, {"block": "b", "x": 1.0, "y": 0.1, "velocity": [0.5, 0.0]}]
     result = simulate(stack(scheme, bodies=bodies))
     assert result.frames.vx[0] == pytest.approx([0.0, 0.5])

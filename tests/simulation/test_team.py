@@ -30,7 +30,7 @@ def wall(columns: int = COLUMNS, rows: int = ROWS, end: float = 1.0) -> Scenario
 
 
 def same_bits(one: World, other: World) -> bool:
-    """Compare everything that moves or is booked."""
+    """Compare everything that moves or is tallied."""
     pairs = [(one.bodies[:-1], other.bodies[:-1]), (one.ledger, other.ledger)]
     return all(np.array_equal(a[name], b[name]) for a, b in pairs for name in a.dtype.names or ())
 

@@ -1,4 +1,4 @@
-"""The energy ledger gets better with a smaller step, and books losses only (V15 and V23 are cases)."""
+"""The energy ledger gets better with a smaller step, and tallies losses only (V15 and V23 are cases)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_ledger_of_an_impact_balances_better_with_half_the_step(start: Start) ->
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
-def test_losses_are_booked_never_gained(start: Start, restitution: float) -> None:
+def test_losses_are_tallied_never_gained(start: Start, restitution: float) -> None:
     run = start([{"y": 0.03, "angle": 0.6, "velocity": [0.3, -1.0]}], restitution=restitution, ground_friction=0.2)
     before = run.world.ledger[0].copy()
     for _ in range(50):

@@ -153,7 +153,7 @@ def test_a_stack_on_leaning_ground_is_noticed() -> None:
     assert rows_missed(Leaning(scheme="nonsmooth"), "V13")
 
 
-def test_energy_that_friction_took_and_nobody_booked_is_noticed() -> None:
+def test_energy_that_friction_took_and_nobody_tallied_is_noticed() -> None:
     slide = SETTING.start([{"y": HEIGHT / 2, "velocity": [0.5, 0.0]}]).to_time(0.1)
     assert slide.residual() < energy.RIGID_LEDGER_TOLERANCE
     slide.scene.contacts.tallies.friction[:] *= 0.999

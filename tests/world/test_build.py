@@ -193,7 +193,7 @@ def test_more_room_keeps_what_there_is(model: str) -> None:
 
 
 @pytest.mark.parametrize("more", [0, GROUP - 2, GROUP - 1, GROUP, 3 * GROUP])
-def test_every_group_of_bodies_has_a_book_of_its_own_whatever_the_room_for_pairs(more: int) -> None:
+def test_every_group_of_bodies_has_a_tally_of_its_own_whatever_the_room_for_pairs(more: int) -> None:
     world = build_world(scenario(more=tuple({**BODY, "x": 0.1 * i} for i in range(2, 2 + more))))
     last = (world.bodies.size - 1) // GROUP
     assert world.ledger.size > last

@@ -208,8 +208,8 @@ def test_list_that_runs_full_on_the_way_is_given_room_and_the_team_continues(by_
 
 
 @pytest.mark.parametrize("scene", ["wall with Hertz law", "on hills"])
-def test_losses_of_pairs_between_shares_are_in_the_books_of_their_first_bodies(by_one: ByOne, scene: str) -> None:
-    """The totals alone would not tell: book by book, time after time."""
+def test_losses_of_pairs_between_shares_are_in_the_tallies_of_their_first_bodies(by_one: ByOne, scene: str) -> None:
+    """The totals alone would not tell: tally by tally, time after time."""
     steps = SCENES[scene][1]
     one, team = copy.deepcopy(by_one(scene, 0.5)), crew(copy.deepcopy(by_one(scene, 0.5)), 3)
     before = one.ledger.copy()

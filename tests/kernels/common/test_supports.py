@@ -1,4 +1,4 @@
-"""Supports that move: the ground carries, drops and throws blocks as closed forms say, and its work is booked."""
+"""Supports that move: the ground carries, drops and throws blocks as closed forms say, and its work is tallied."""
 
 from __future__ import annotations
 
@@ -275,7 +275,7 @@ def test_bodies_on_the_support_return_to_where_they_were_to_the_last_bit() -> No
     assert scene.world.bodies[0].is_moved == 0
 
 
-def test_work_on_the_support_is_booked_by_the_trapezoid_rule_and_its_totals_are_used_up() -> None:
+def test_work_on_the_support_is_tallied_by_the_trapezoid_rule_and_its_totals_are_used_up() -> None:
     world = on_support([LYING, {"y": 0.1, "x": 0.2, "fixed": True}], pieces_of((0.0, 0.0, 0.3))).world
     wall, ground, step = world.bodies[1], world.bodies[2], 1e-3
     assert world.moved.body.tolist() == [1, 2]

@@ -86,7 +86,7 @@ def test_list_misses_no_corner_within_reach_and_has_none_beyond(start: Start, se
     assert {pair: allowed.get(pair) for pair in found} == found
 
 
-def test_candidates_that_wait_are_those_that_are_neither_in_contact_nor_a_twin(start: Start) -> None:
+def test_candidates_that_wait_are_those_that_are_neither_in_contact_nor_a_duplicate(start: Start) -> None:
     # two blocks of the same width exactly on top of one another, a third one beside them, just out of touch
     bodies = [{"y": 0.0125}, {"y": 0.0375}, {"x": 0.0321, "y": 0.0125}]
     world = start(bodies, contact={"stiffness_scale": 1e-4}).to_time(5e-3).world

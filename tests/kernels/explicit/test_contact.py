@@ -1,4 +1,4 @@
-"""Springs with history, clipping, dashpots of a pair and what is booked, seen on one block or one pair."""
+"""Springs with history, clipping, dashpots of a pair and what is tallied, seen on one block or one pair."""
 
 from __future__ import annotations
 
@@ -236,7 +236,7 @@ def standing(pose: Pose) -> World:
     return world
 
 
-def test_pair_writes_what_it_does_and_adds_to_no_body_and_to_no_book(pose: Pose) -> None:
+def test_pair_writes_what_it_does_and_adds_to_no_body_and_to_no_tally(pose: Pose) -> None:
     world = standing(pose)
     bodies, ledger, action = world.bodies.tobytes(), world.ledger.tobytes(), world.action[0]
     pair_forces(world, 0, STEP)

@@ -60,7 +60,7 @@ def test_row_of_the_ledger_has_the_documented_order(start: Start) -> None:
     assert named["friction"] > 0.0
 
 
-def test_losses_are_those_of_all_books() -> None:
+def test_losses_are_those_of_all_tallies() -> None:
     tallies = zeros(5, LEDGER)
     amounts = np.random.default_rng(0).uniform(0.0, 1.0, (3, 5))
     tallies.dashpot, tallies.friction, tallies.broken = amounts

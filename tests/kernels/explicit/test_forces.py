@@ -1,4 +1,4 @@
-"""Pairs of several shares, evaluated apart: every pair once, sums in the order of the list, losses in their books."""
+"""Pairs of several shares, evaluated apart: every pair once, sums in the order of the list, losses in their tallies."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from blocksim.kernels.common.arrays import World
 
-BOOKED = ("dashpot", "friction", "broken")
+TALLIED = ("dashpot", "friction", "broken")
 MOST = 5  # threads
 
 
@@ -82,7 +82,7 @@ def test_forces_of_several_shares_have_the_bits_of_one(
     assert_same_bits(one, several)
 
 
-def test_pairs_between_shares_touch_no_body_and_no_book_until_they_are_added(moving: Callable[[str], World]) -> None:
+def test_pairs_between_shares_touch_no_body_and_no_tally_until_they_are_added(moving: Callable[[str], World]) -> None:
     world = moving("wall")
     partition(world, 3)
     bodies, ledger = bits(world.bodies), bits(world.ledger)
@@ -103,7 +103,7 @@ def test_pairs_between_shares_touch_no_body_and_no_book_until_they_are_added(mov
         assert found | {"pair": b""} == expected | {"pair": b""}
 
 
-def test_every_group_of_bodies_has_the_losses_of_its_pairs_in_its_own_book(moving: Callable[[str], World]) -> None:
+def test_every_group_of_bodies_has_the_losses_of_its_pairs_in_its_own_tally(moving: Callable[[str], World]) -> None:
     world, apart = moving("wall"), moving("wall")
     before, step = world.ledger.copy(), step_of(world)
     evaluate_in_shares(world, 1)
@@ -119,7 +119,7 @@ def test_every_group_of_bodies_has_the_losses_of_its_pairs_in_its_own_book(movin
     assert np.count_nonzero(tallies.dashpot) > GROUP
     groups = world.pairs.a[:count] // GROUP
     assert groups.max() == 3
-    for name in BOOKED:
+    for name in TALLIED:
         gained = world.ledger[name] - before[name]
         expected = np.bincount(groups, tallies[name], world.ledger.size)
         scale = 1e-12 * max(float(np.abs(before[name]).max()), float(np.abs(expected).max()))

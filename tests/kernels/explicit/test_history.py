@@ -143,7 +143,7 @@ def test_only_a_contact_that_begins_has_the_weight_of_a_first_step(pose: Pose, c
     assert two.drawn == pytest.approx(1.0 if closing == 0.0 else 1.0 / closing)
 
 
-def test_ended_contact_books_half_the_work_of_its_last_step(pose: Pose) -> None:
+def test_ended_contact_tallies_half_the_work_of_its_last_step(pose: Pose) -> None:
     world = stacked(pose, ONE)
     world.bodies[0].vx = 0.3
     lost = find(world, closing=2.0)
@@ -163,7 +163,7 @@ def test_corner_was_in_contact_on_whichever_face(pose: Pose) -> None:
     assert not was_in_contact(0, old, 2)
 
 
-def test_broken_contact_books_its_shear_springs_and_forgets_everything(start: Start, paper_block: PaperBlock) -> None:
+def test_broken_contact_tallies_its_shear_springs_and_forgets_everything(start: Start, paper_block: PaperBlock) -> None:
     soft = {"stiffness_scale": 1e-4}
     scene = start([{"y": paper_block.height / 2}], tilt=-0.2, contact=soft).to_time(0.05)
     springs = scene.touching.spring.copy()

@@ -195,7 +195,7 @@ def test_what_is_kept_of_a_steady_pair_goes_to_its_bodies_and_its_losses_to_the_
     assert (tally.dashpot, tally.friction, tally.broken) == (0.0, 0.0, 0.0)
 
 
-def test_losses_of_changed_contacts_go_into_the_book_at_once_even_where_nothing_touches_any_more() -> None:
+def test_losses_of_changed_contacts_are_tallied_at_once_even_where_nothing_touches_any_more() -> None:
     world, tally, action = two_blocks(), zeros(1, LEDGER)[0], zeros(1, ACTION)[0]
     action.fx, action.dashpot, action.friction, action.broken, action.is_changed = 1.0, 5.0, 6.0, 7.0, 1
     tally.dashpot, tally.friction, tally.broken = 10.0, 20.0, 30.0

@@ -314,7 +314,7 @@ def test_dashpots_are_made_anew_where_the_number_of_neighbours_has_changed(pose:
     assert steps_left(world) == left
 
 
-def test_steady_pair_adds_to_no_body_and_to_no_book_itself(pose: Pose) -> None:
+def test_steady_pair_adds_to_no_body_and_to_no_tally_itself(pose: Pose) -> None:
     for world in (on_ground(pose), on_block(pose, 0.003)):
         world.bodies[0].vx = 20.0  # it slides
         bodies, ledger = world.bodies.copy(), world.ledger.copy()

@@ -76,7 +76,7 @@ def test_no_contact_with_the_ground_begins_unseen(pose: Pose, axis: int, y: floa
 
 
 @given(x=st.floats(-0.03, 0.03), depth=st.floats(1e-7, 1e-5), known=st.integers(0, 15), duplicates=st.integers(0, 15))
-def test_contact_begins_where_a_corner_that_is_neither_known_nor_a_twin_is_inside(
+def test_contact_begins_where_a_corner_that_is_neither_known_nor_a_duplicate_is_inside(
     pose: Pose, x: float, depth: float, known: int, duplicates: int
 ) -> None:
     world = pose((x, 1.0 + HEIGHT - depth, 0.0), (0.0, 1.0, 0.0))

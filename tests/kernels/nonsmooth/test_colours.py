@@ -84,7 +84,7 @@ def test_pairs_beyond_the_last_colour_are_solved_one_by_one() -> None:
     assert last <= most_groups(scene) <= scene.contacts.groups.size
 
 
-def test_rows_know_how_the_materials_of_their_bodies_touch() -> None:
+def test_constraints_know_how_the_materials_of_their_bodies_touch() -> None:
     scene = listed(posed(crowd(0), friction=0.25, ground_friction=0.75))
     for constraint in listed_constraints(scene):
         expected = 0.75 if constraint.b == scene.world.bodies.size - 1 else 0.25

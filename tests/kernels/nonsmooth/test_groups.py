@@ -36,7 +36,7 @@ def members(scene: Nonsmooth) -> list[list[int]]:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_every_row_within_the_margin_is_in_one_group_of_its_colour(seed: int) -> None:
+def test_every_constraint_within_the_margin_is_in_one_group_of_its_colour(seed: int) -> None:
     random = np.random.default_rng(seed)
     scene = listed(posed([Block(*random.uniform(0.0, (0.15, 0.15, 6.0))) for _ in range(25)]))
     constraints: Any = listed_constraints(scene)
@@ -58,7 +58,7 @@ def test_every_row_within_the_margin_is_in_one_group_of_its_colour(seed: int) ->
         assert group.constraint.tolist() == inside + [inside[-1]] * (WIDTH - len(inside))
 
 
-def test_rows_are_packed_as_they_are_and_get_their_impulses_back() -> None:
+def test_constraints_are_packed_as_they_are_and_get_their_impulses_back() -> None:
     random = np.random.default_rng(4)
     scene = collided(posed(pile(random, 4, 3)))
     constraints: Any = listed_constraints(scene)
@@ -80,7 +80,7 @@ def test_rows_are_packed_as_they_are_and_get_their_impulses_back() -> None:
         assert np.all(constraints[name][~near] == -1.0)
 
 
-def test_rows_of_one_group_have_the_restitution_and_friction_of_their_own_materials() -> None:
+def test_constraints_of_one_group_have_the_restitution_and_friction_of_their_own_materials() -> None:
     """Blocks that land and slide on the ground, and on fixed blocks, of other materials."""
     landing: dict[str, Any] = {"vy": -1.0, "vx": 3.0}
     blocks = [Block(0.0, 0.0125 + 1e-5, **landing), Block(0.1, 0.0125 + 1e-5, **landing)]

@@ -73,7 +73,7 @@ def test_uniform_motion_is_added_to_all_that_happens() -> None:
 
 @pytest.mark.parametrize("size", [1, 2, 3, 5])
 @pytest.mark.parametrize("count", [0, 1, 3, 4, 7, 23, 64])
-def test_threads_divide_groups_in_whole_books_and_leave_none_out(size: int, count: int) -> None:
+def test_threads_divide_groups_in_whole_tallies_and_leave_none_out(size: int, count: int) -> None:
     begin, end = 8, 8 + count
     parts = [part_of(begin, end, k, size) for k in range(size)]
     assert [m for first, last in parts for m in range(first, last)] == list(range(begin, end))

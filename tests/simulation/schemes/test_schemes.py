@@ -36,7 +36,7 @@ def wall() -> Scenario:
 
 
 def same_bits(one: Nonsmooth, other: Nonsmooth) -> bool:
-    """Compare everything that moves, presses or is booked."""
+    """Compare everything that moves, presses or is tallied."""
     rows, count = ("normal_one", "normal_two", "shear"), int(one.contacts.stepping[0].constraint_count)
     bodies = (np.array_equal(one.world.bodies[name], other.world.bodies[name]) for name in ("x", "y", "angle", "vx"))
     impulses = (
@@ -84,7 +84,7 @@ def test_one_thread_takes_over_from_a_team_and_a_team_from_one(alone: Nonsmooth)
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_more_room_for_pairs_keeps_impulses_and_books(
+def test_more_room_for_pairs_keeps_impulses_and_tallies(
     alone: Nonsmooth, monkeypatch: pytest.MonkeyPatch, threads: int
 ) -> None:
     monkeypatch.setattr(build, "PAIRS_PER_BODY", 1)

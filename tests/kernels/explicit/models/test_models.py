@@ -51,7 +51,7 @@ def momenta(scene: Simulation) -> np.ndarray:
 @ALL_MODELS
 @BOTH
 @pytest.mark.parametrize("e", [0.1, 1.0])
-def test_free_collision_keeps_momenta_and_books_all_energy(start: Start, model: str, law: str, e: float) -> None:
+def test_free_collision_keeps_momenta_and_tallies_all_energy(start: Start, model: str, law: str, e: float) -> None:
     scene = start(COLLIDING, restitution=e, gravity=0.0, contact=contact_of(model, law))
     before, energy = momenta(scene), scene.kinetic
     scene.to_step(STEPS)

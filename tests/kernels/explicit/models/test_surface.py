@@ -135,7 +135,7 @@ def test_aligned_blocks_keep_the_corner_that_was_in_contact(make_body: MakeBody)
         assert found == duplicates
 
 
-def test_corners_that_meet_no_other_have_no_twins(make_body: MakeBody) -> None:
+def test_corners_that_meet_no_other_have_no_duplicates(make_body: MakeBody) -> None:
     points, duplicates = points_and_duplicates(make_body(0.003, H - 1e-6), make_body())
     assert [point.slot for point in points] == [0, 6]
     assert duplicates == []
