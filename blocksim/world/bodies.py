@@ -30,7 +30,7 @@ from blocksim.scenario.placement import smallest_width
 from blocksim.world.applied import Applied, applied_loads
 from blocksim.world.drives import DriveRecords, drive_records, piece_records
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
-from blocksim.world.shapes import Shapes, half_sides, shapes_of
+from blocksim.world.shapes import HalfSides, Shapes, half_sides, shapes_of
 
 # A piece of ground is a slab of which only the upper face counts; its thickness is a share of the smallest side of all
 # blocks: more than any overlap, less than a ledge that is worth modelling.
@@ -78,7 +78,8 @@ def outline_of(scenario: Scenario) -> Outline:
         both[: drives.paths.size], both[drives.paths.size :] = drives.paths, motion
         motion = both
     applied = applied_loads(scenario, placed)
-    segments, shapes = place_segments(scenario), shapes_of(placed)
+    segments = place_segments(scenario)
+    shapes = shapes_of(placed, _slab_half_sides(scenario, placed, segments))
     return Outline(scenario, placed, segments, classes, interactions, motion, drives, applied, shapes)
 
 
@@ -94,6 +95,7 @@ def body_records(outlines: Outlines) -> Records:
     _fill_blocks(bodies[:, :blocks], outlines)
     for records, outline in zip(bodies, outlines, strict=True):
         if outline.shapes is not None:
+            records["first_corner"], records["corner_count"] = outline.shapes.firsts, outline.shapes.sizes
             _fill_polygons(records[:blocks], outline.placed, outline.shapes)
     if pieces:
         for records, outline in zip(bodies, outlines, strict=True):
@@ -140,9 +142,7 @@ def _fill_blocks(records: NDArray[np.record], outlines: Outlines) -> None:
 
 
 def _fill_polygons(records: NDArray[np.record], placed: Sequence[PlacedBody], shapes: Shapes) -> None:
-    """Tell where the corners of blocks are, and which blocks are polygons."""
-    records["first_corner"] = shapes.firsts
-    records["corner_count"] = shapes.sizes
+    """Tell which blocks are polygons, and how large."""
     records["inner_radius"] = [shapes.inner[body.corners] for body in placed]
     for record, body in zip(records, placed, strict=True):
         if body.outline:
@@ -158,11 +158,32 @@ def _codes(outline: Outline) -> Iterator[int]:
     return (codes[body.material, body.depth] for body in outline.placed)
 
 
-def _fill_slabs(records: Records, outline: Outline) -> None:
-    smallest = smallest_width(outline.placed)
+def _slab_thickness(scenario: Scenario, placed: Sequence[PlacedBody], segments: Sequence[PlacedSegment]) -> float:
+    """Return the thickness (m) of the pieces of ground."""
+    smallest = smallest_width(placed)
     if not math.isfinite(smallest):  # nothing but particles touches the pieces, and these see faces only
-        smallest = min((segment.length for segment in outline.segments), default=0.0)
-    thickness = max(SLAB_SHARE * smallest, 2.0 * (outline.scenario.contact.max_overlap or 0.0))
+        smallest = min((segment.length for segment in segments), default=0.0)
+    return max(SLAB_SHARE * smallest, 2.0 * (scenario.contact.max_overlap or 0.0))
+
+
+def _slab_ends(segment: PlacedSegment, thickness: float) -> tuple[float, float]:
+    """Return where (m, along a piece from its start) its slab begins and ends: longer where it must leave no crack."""
+    begin = -thickness if segment.extends_start else 0.0
+    return begin, segment.length + (thickness if segment.extends_end else 0.0)
+
+
+def _slab_half_sides(
+    scenario: Scenario, placed: Sequence[PlacedBody], segments: Sequence[PlacedSegment]
+) -> Iterator[HalfSides]:
+    """Yield half the length and thickness (m) of every slab."""
+    thickness = _slab_thickness(scenario, placed, segments)
+    for segment in segments:
+        begin, end = _slab_ends(segment, thickness)
+        yield 0.5 * (end - begin), 0.5 * thickness
+
+
+def _fill_slabs(records: Records, outline: Outline) -> None:
+    thickness = _slab_thickness(outline.scenario, outline.placed, outline.segments)
     for record, segment in zip(records, outline.segments, strict=True):
         _fill_slab(record, segment, thickness)
         wall = ContactClass(segment.material, math.inf, is_wall=True)
@@ -170,10 +191,9 @@ def _fill_slabs(records: Records, outline: Outline) -> None:
 
 
 def _fill_slab(record: Record, segment: PlacedSegment, thickness: float) -> None:
-    """Turn a piece into a slab below its line, lengthened by its thickness where it must leave no crack."""
+    """Turn a piece into a slab below its line."""
     along = ((segment.x1 - segment.x0) / segment.length, (segment.y1 - segment.y0) / segment.length)
-    begin = -thickness if segment.extends_start else 0.0
-    end = segment.length + (thickness if segment.extends_end else 0.0)
+    begin, end = _slab_ends(segment, thickness)
     middle = 0.5 * (begin + end)
     record.cos, record.sin = along
     record.angle = math.atan2(along[1], along[0])

@@ -79,7 +79,7 @@ def standing_of(blocks: NDArray[np.record], shapes: Shapes) -> frozenset[Kind]:
     `half_y` the distance of the face: what half sides are to a rectangle.
     """
     kinds: set[Kind] = set()
-    for block, first, size in zip(blocks, shapes.firsts, shapes.sizes, strict=True):
+    for block, first, size in zip(blocks, shapes.firsts, shapes.sizes, strict=False):
         kind = Kind(*(block[name].item() for name in Kind._fields))
         if block["faces"] == OUTLINE:
             faces = _faces_of(shapes.table[first : first + size].view(np.recarray))

@@ -1,7 +1,13 @@
-"""The corners of all blocks of a scene, each shape once, where any block is a polygon and no rectangle."""
+"""The corners of all bodies of a scene, each shape once, where any block is a polygon and no rectangle.
+
+Contact of a corner with a face lasts as long as no other face is nearer. At the distance e from the end of a face and
+so deep behind it, all others of a convex body are at least `clear` e minus the depth away: along the face the least
+distance to the others is a concave function, zero at both ends, and `clear` is its value in the middle over half of the
+length.
+"""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -10,33 +16,44 @@ from blocksim.kernels.explicit.outlines import WIDEST_CONE
 from blocksim.scenario import PlacedBody
 
 Corners = tuple[tuple[float, float], ...]  # m, counter-clockwise about the centroid
+HalfSides = tuple[float, float]  # m
 
 
 class Shapes(NamedTuple):
-    """The shapes of a scene, and where each of its blocks has its corners."""
+    """The shapes of a scene, and where each of its bodies has its corners."""
 
     table: Records  # (q,) CORNER
-    firsts: tuple[int, ...]  # (b,)
-    sizes: tuple[int, ...]  # (b,) numbers of corners
-    inner: Mapping[Corners, float]  # m: from the centroid to the nearest face
+    firsts: tuple[int, ...]  # (n + 1,) of blocks, pieces of ground and the half-plane
+    sizes: tuple[int, ...]  # (n + 1,) numbers of corners
+    inner: Mapping[Corners, float]  # m: from the centroid of a block to the nearest face
 
 
-def shapes_of(placed: Sequence[PlacedBody]) -> Shapes | None:
-    """Return the corners of all blocks, of rectangles too; None where there are only these."""
+def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[HalfSides]) -> Shapes | None:
+    """Return the corners of all bodies, of rectangles too; None where all blocks are rectangles.
+
+    `slabs` (m) are the half sides of the pieces of ground. The half-plane, the last of all bodies, is a rectangle that
+    is infinitely wide and has its upper face in its centre.
+    """
     if not any(body.outline for body in placed):
         return None
     places: dict[Corners, int] = {}
     rows: list[tuple[float, ...]] = []
-    for body in placed:
-        if body.corners not in places:
-            places[body.corners] = len(rows)
-            rows += corner_rows(body.corners)
+    blocks = [body.corners for body in placed]
+    ground = [_rectangle(*half_sides) for half_sides in (*slabs, (math.inf, 0.0))]
+    for corners in blocks:
+        if corners not in places:
+            places[corners] = len(rows)
+            rows += corner_rows(corners)
+    firsts = [places[corners] for corners in blocks]
+    for corners in ground:
+        firsts.append(len(rows))
+        rows += _ground_rows(corners)
     table = zeros(len(rows), CORNER)
     for name, column in zip(CORNER.names or (), zip(*rows, strict=True), strict=True):
         table[name] = column
-    firsts, sizes = ([of(body.corners) for body in placed] for of in (places.__getitem__, len))
+    sizes = tuple(len(corners) for corners in (*blocks, *ground))
     inner = {corners: float(table["distance"][place : place + len(corners)].min()) for corners, place in places.items()}
-    return Shapes(table, tuple(firsts), tuple(sizes), inner)
+    return Shapes(table, tuple(firsts), sizes, inner)
 
 
 def corner_rows(corners: Corners) -> list[tuple[float, ...]]:
@@ -46,8 +63,37 @@ def corner_rows(corners: Corners) -> list[tuple[float, ...]]:
     for (x, y), (next_x, next_y) in zip(corners, (*corners[1:], corners[0]), strict=True):
         length = math.hypot(next_x - x, next_y - y)
         nx, ny = (next_y - y) / length, (x - next_x) / length
-        rows.append((x, y, nx, ny, nx * x + ny * y, 0.5 * length, cone))
-    return rows
+        half = 0.5 * length
+        rows.append((x, y, nx, ny, nx * x + ny * y, half, half - (ny * x - nx * y), cone))
+    return [
+        (*row[:-1], _clearance(number, rows), _is_sharp(row, rows[number - 1], rows[(number + 1) % len(rows)]), cone)
+        for number, row in enumerate(rows)
+    ]
+
+
+def _is_sharp(face: Sequence[float], *beside: Sequence[float]) -> bool:
+    """Return True if a face beside one meets it at less than a right angle."""
+    return any(face[2] * other[2] + face[3] * other[3] < 0.0 for other in beside)
+
+
+def _clearance(number: int, rows: Sequence[tuple[float, ...]]) -> float:
+    """Return how far all other faces are from the middle of one, over half of its length."""
+    x, y, nx, ny, _, half, *_ = rows[number]
+    x, y = x - half * ny, y + half * nx
+    return min(row[4] - row[2] * x - row[3] * y for k, row in enumerate(rows) if k != number) / half
+
+
+def _rectangle(half_x: float, half_y: float) -> Corners:
+    """Return the corners of a rectangle from the lower left one."""
+    return ((-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y))
+
+
+def _ground_rows(corners: Corners) -> list[tuple[float, ...]]:
+    """Return the fields of CORNER of a piece of ground or the half-plane, of which no face is beside another."""
+    half_x, half_y = corners[2]
+    faces = ((0.0, -1.0, half_y, half_x), (1.0, 0.0, half_x, half_y), (0.0, 1.0, half_y, half_x))
+    sides = (*faces, (-1.0, 0.0, half_x, half_y))
+    return [(*corner, *side, 0.0, 1.0, 0.0, WIDEST_CONE) for corner, side in zip(corners, sides, strict=True)]
 
 
 def cone_of(corners: Corners) -> float:

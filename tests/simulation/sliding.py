@@ -24,6 +24,13 @@ MODELS: dict[str, dict[str, dict[str, object]]] = {
     "particles-hertz": {"contact": {"model": "particles", "law": "hertz-mindlin", "particle_spacing": 0.004}},
     "kernel-linear": {"contact": {"model": "kernel", "law": "linear", "particle_spacing": 0.004}},
     "kernel-hertz": {"contact": {"model": "kernel", "law": "hertz-mindlin", "particle_spacing": 0.004}},
+    "outlines": {
+        "block": {
+            "outline": [[-0.025, -0.008], [0.025, -0.008], [0.027, 0], [0.025, 0.008], [-0.025, 0.008], [-0.027, 0]],
+            "depth": 0.025,
+            "material": "aluminium",
+        }
+    },
     "nonsmooth": {"time": {"scheme": "nonsmooth", "step": 1e-4}},
 }
 FLAT = {"width": 0.05, "height": 0.016, "length": 0.025, "material": "aluminium"}
@@ -38,7 +45,7 @@ def sliding(parts: Mapping[str, Mapping[str, object]], end: float = 0.05, every:
             "schema": 1,
             "name": "sliding",
             "materials": {"aluminium": {"unit_weight": 26700.0, "young_modulus": 69e9, "poisson_ratio": 0.3}},
-            "blocks": {"flat": FLAT},
+            "blocks": {"flat": parts.get("block", FLAT)},
             "bodies": [
                 {"block": "flat", "name": "below", "x": 0.0, "y": 0.008, "velocity": [0.3, 0.0]},
                 {"block": "flat", "name": "above", "x": 0.0, "y": 0.024, "velocity": [1.0, 0.0]},

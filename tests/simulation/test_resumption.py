@@ -62,7 +62,7 @@ def test_resumed_run_has_the_bits_of_a_continuous_one(tmp_path: Path, name: str)
 
 
 @pytest.mark.usefixtures("two_threads")
-@pytest.mark.parametrize("name", ["surface-linear", "nonsmooth"])
+@pytest.mark.parametrize("name", ["surface-linear", "outlines", "nonsmooth"])
 def test_run_continues_with_another_number_of_threads(tmp_path: Path, name: str) -> None:
     scenario = sliding(MODELS[name], end=0.01)
     whole = simulate_into(scenario, tmp_path / "whole")

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import ALL, OUTLINE
-from blocksim.kernels.explicit.outlines import WIDEST_CONE
+from blocksim.kernels.explicit.outlines import MOST_CORNERS, UPPER, WIDEST_CONE
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.scenario.outlines import least_width, regular
+from blocksim.scenario.outlines import MOST, centred, least_width, regular
 from blocksim.world.bodies import body_records, outline_of
 from blocksim.world.bounds import bounds_of
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth
 from blocksim.world.scenes import Stack, build_stacks, member
-from blocksim.world.shapes import cone_of
+from blocksim.world.shapes import cone_of, corner_rows
 
 TRIANGLE = [[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]]
 
 
-def scenario(**blocks: dict[str, object]) -> Scenario:
-    """Return blocks high up and apart; a triangle, two bricks and a hexagon unless told."""
+def scenario(*, ground: dict[str, object] | None = None, **blocks: dict[str, object]) -> Scenario:
+    """Return blocks high up and apart; a triangle, a brick and a hexagon, two of each, unless told."""
     tables = blocks or {
         "triangle": {"outline": TRIANGLE, "depth": 0.1},
         "brick": {"width": 0.2, "height": 0.1, "length": 0.1},
@@ -35,15 +36,16 @@ def scenario(**blocks: dict[str, object]) -> Scenario:
             "blocks": {name: {**table, "material": "stone"} for name, table in tables.items()},
             "bodies": [{"block": name, "x": float(i), "y": 2.0} for i, name in enumerate([*tables, *tables])],
             "time": {"scheme": "nonsmooth", "end": 1.0},
+            **({} if ground is None else {"ground": ground}),
         }
     )
 
 
 def test_every_shape_is_in_the_table_once_with_outward_normals() -> None:
     world = build_nonsmooth(scenario()).world
-    assert world.corners.size == 3 + 4 + 6
-    assert world.bodies.first_corner[:6].tolist() == [0, 3, 7] * 2
-    assert world.bodies.corner_count.tolist() == [3, 4, 6] * 2 + [0]
+    assert world.corners.size == 3 + 4 + 6 + 4
+    assert world.bodies.first_corner.tolist() == [0, 3, 7] * 2 + [13]
+    assert world.bodies.corner_count.tolist() == [3, 4, 6] * 2 + [4]
     assert world.bodies.faces[:6].tolist() == [OUTLINE, ALL, OUTLINE] * 2
     for body in world.bodies[:6]:
         own = world.corners[body.first_corner : body.first_corner + body.corner_count]
@@ -52,6 +54,36 @@ def test_every_shape_is_in_the_table_once_with_outward_normals() -> None:
         assert body.inner_radius == own.distance.min()
         assert np.hypot(own.nx, own.ny) == pytest.approx(1.0, abs=1e-15)
         assert 2.0 * own.half == pytest.approx(np.hypot(own.x - np.roll(own.x, -1), own.y - np.roll(own.y, -1)))
+
+
+def test_ground_has_corners_from_the_lower_left_one_on() -> None:
+    """The upper face of a piece, and of the half-plane, has the same number in both schemes."""
+    profile: dict[str, object] = {"profile": [[-1.0, 0.5], [0.0, 0.0], [3.0, 0.0]]}
+    world = build_nonsmooth(scenario(ground=profile)).world
+    for body in world.bodies[6:]:
+        own = world.corners[body.first_corner : body.first_corner + body.corner_count]
+        assert own.x.tolist() == [-body.half_x, body.half_x, body.half_x, -body.half_x]
+        assert own.y.tolist() == [-body.half_y, -body.half_y, body.half_y, body.half_y]
+        upper = own[UPPER]
+        assert (upper.nx, upper.ny, upper.distance, upper.half) == (0.0, 1.0, body.half_y, body.half_x)
+
+
+def test_slots_have_room_for_the_corners_of_any_block() -> None:
+    assert MOST == MOST_CORNERS
+
+
+@pytest.mark.parametrize("outline", [TRIANGLE, regular(16, 0.1), [[0, 0], [1, 0], [1.01, 0.02], [0.5, 0.3], [0, 0.1]]])
+def test_other_faces_are_as_far_as_is_told_along_a_face(outline: list[list[float]]) -> None:
+    rows = np.array(corner_rows(centred([(x, y) for x, y in outline])))
+    for k, (x, y, nx, ny, distance, half, middle, clear, *_) in enumerate(rows):
+        assert nx * y - ny * x == pytest.approx(middle - half)
+        others = np.delete(rows, k, axis=0)
+        for end, depth in itertools.product(np.linspace(0.0, 1.0, 9) * half, (0.0, 0.01 * half)):
+            for along in (middle - half + end, middle + half - end):
+                place = (distance - depth) * np.array([nx, ny]) + along * np.array([-ny, nx])
+                least = (others[:, 4] - others[:, 2:4] @ place).min()
+                assert least >= clear * end - depth - 1e-12
+        assert clear > 0.0
 
 
 def test_mass_and_inertia_of_a_polygon_are_about_its_centroid() -> None:

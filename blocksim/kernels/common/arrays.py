@@ -101,7 +101,7 @@ BODY = on_own_lines(
             "least_width "  # m: of a polygon, between two parallel lines; zero for rectangles
             "inner_radius",  # m: from the centroid to the nearest face; with corners in the table
             indices="first_particle particle_count "  # its part of the particles
-            "first_corner",  # its part of the corners, also of rectangles beside polygons; zero where there are none
+            "first_corner",  # its part of the corners, also of rectangles and ground beside polygons; else zero
             small="row_x row_y "  # intervals between particles on the faces along x and along y
             "seats coming "  # pairs in those sums; pairs about to touch
             "corner_count "
@@ -120,19 +120,22 @@ CORNER = record_type(
     "x y "  # m: place about the centroid, in the body frame; counter-clockwise
     "nx ny "  # -: outward normal of the face from this corner to the next, in the body frame
     "distance half "  # m: of that face from the centroid, and half of its length
+    "middle "  # m: of that face along (-ny, nx), from the foot of the centroid
+    "clear "  # -: other faces are at least so many times as far as its nearer end; see world/shapes.py
+    "sharp "  # -: one where a face beside this one meets it at less than a right angle, else zero
     "cone"  # -: of the shape: sine of the angle up to which a face is parallel to one of another body
 )
 PAIR = record_type(
     "limit "  # m: a deeper overlap ends the run
     "stiffness "  # of each of its corner contacts, in units of normal_stiffness; see tributary.py
     "slide turn",  # how that changes with the slip of a ahead of b, per m, and by turning a, per rad
-    indices="a b",  # bodies, sorted
+    indices="a b "  # bodies, sorted
+    "duplicates",  # bits of the slots whose corner is in touch, but marks the same end of a face contact as another
     small="near active "  # number of candidate slots; of contacts
     "idle",  # candidates that are neither in contact nor a duplicate
     flags="bearing "  # PLANE, ENDS or APART: what its contacts are; see tributary.py
     "is_coming "  # flag: about to touch
-    "duplicates "  # bits of the slots whose corner is in touch, but marks the same end of a face contact as another;
-    # with polygons a flag: the stiffness is held down, see bearing.py
+    "is_held "  # flag: the stiffness is held down; see bearing.py
     "axis "  # along which the two were apart when last looked at; 0, 1: x, y of body b, 2, 3: of body a
     "is_between "  # flag: its bodies are of two shares
     "normal_left shear_left "  # steps until the dashpots along normals and tangents are made again

@@ -2,7 +2,6 @@
 
 from blocksim.kernels.common.arrays import Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.laws import stored_energy
 from blocksim.kernels.explicit.models.duplicate_corners import PARALLEL
 from blocksim.kernels.explicit.tributary import (
     APART,
@@ -21,10 +20,6 @@ from blocksim.kernels.explicit.tributary import (
     is_flat,
     stiffness_between,
 )
-
-MOST_RISE = 1.05  # of the energy of a pair, where its contacts change: more is no round-off and no motion of one step
-NEGLIGIBLE = 1e-4  # of the limit of overlap: energies up to that of such an overlap are no matter, and may be round-off
-LEAST_HELD = 0.01  # of its stiffness that a pair keeps in any case, so that nothing passes through
 
 
 @rare_kernel
@@ -54,46 +49,6 @@ def measure(world: World, p: int, count: int, stiffness: float) -> None:
         keep_bearing(pair, WHOLE, stiffness)
     else:
         measure_faces(pair, a, b, world.points[0], world.points[count - 1], stiffness, world.corners)
-
-
-@kernel
-def hold_down(
-    world: World, p: int, count: int, had: int, is_changed: bool, before: float, corners: Records | None
-) -> None:
-    """Keep polygons from gaining energy where the corners and faces of their contact change; see hold_pair_down."""
-    if corners is not None and world.pairs[p].bearing != PLANE:
-        hold_pair_down(world, p, count, had, is_changed, before)
-
-
-@rare_kernel
-def hold_pair_down(world: World, p: int, count: int, had: int, is_changed: bool, before: float) -> None:
-    """Bound the stiffness of a pair of polygons whose contacts have changed by the energy that the old ones held.
-
-    Two sharp or blunt corners that overlap by a sliver have next to no stiffness on the faces that are parallel, and
-    all of it on the faces beside these; a rectangle has no such neighbours. So where a contact passes from one to the
-    other the stiffness stays as it was, without which energy would come from nowhere. It is free again when the pair
-    has parted, or its stiffness would be less anyway. `had` contacts were there with the stiffness `before`.
-    """
-    pair = world.pairs[p]
-    if had == 0:
-        pair.duplicates = 0
-    if pair.duplicates != 0:
-        if pair.stiffness >= before:
-            keep_bearing(pair, Bearing(before, 0.0, 0.0), 1.0)
-        else:
-            pair.duplicates = 0
-    elif is_changed and had > 0:
-        law = world.controls[0].law
-        held = 0.0
-        for j in range(had):
-            held += stored_energy(law, before, world.before[j].depth)
-        now = 0.0
-        for i in range(count):
-            point = world.points[i]
-            now += stored_energy(law, pair.stiffness, max(point.depth - point.closing, 0.0))
-        if now > MOST_RISE * held + stored_energy(law, pair.stiffness, NEGLIGIBLE * pair.limit):
-            pair.duplicates = 1
-            keep_bearing(pair, Bearing(pair.stiffness * max(held / now, LEAST_HELD), 0.0, 0.0), 1.0)
 
 
 @kernel

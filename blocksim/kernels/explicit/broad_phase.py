@@ -13,6 +13,7 @@ from blocksim.kernels.common.supports import has_motion
 from blocksim.kernels.explicit.depth import overlap_limit
 from blocksim.kernels.explicit.models import near_slots
 
+MOST_SLOTS = 32  # of corners of a pair
 TRAVELLED = 0.8  # of the skin, by which two bodies may have come nearer since the list was made
 
 
@@ -52,6 +53,7 @@ def add_pair(world: World, count: int, a: int, b: int) -> int:
         pair.is_coming = 0
         pair.active = 0
         pair.duplicates = 0
+        pair.is_held = 0
         pair.axis = 0
         pair.normal_left = 0
         pair.shear_left = 0
@@ -170,6 +172,7 @@ def carry_history(world: World, count: int) -> None:
                 new.slide = world.pairs[q].slide
                 new.turn = world.pairs[q].turn
                 new.duplicates = world.pairs[q].duplicates
+                new.is_held = world.pairs[q].is_held
                 new.normal_left = world.pairs[q].normal_left
                 new.shear_left = world.pairs[q].shear_left
                 new.sticking = world.pairs[q].sticking
@@ -189,7 +192,7 @@ def idle_candidates(pair: Record) -> int:
     Discs can have two contacts each, so that there may be more of those than candidates.
     """
     duplicates = 0
-    for k in range(16):
+    for k in range(MOST_SLOTS):
         duplicates += int(pair.duplicates >> k) & 1
     return max(0, int(pair.near) - int(pair.active) - duplicates)
 

@@ -10,7 +10,7 @@ contacts continue as they were, which is what nearly all pairs do at nearly all 
 
 from blocksim.kernels.common.arrays import NORMAL, SHEAR, Record, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.bearing import hold_down, measure
+from blocksim.kernels.explicit.bearing import measure
 from blocksim.kernels.explicit.coupled import MOBILITY, add_coupled_dashpots, fill_mobility
 from blocksim.kernels.explicit.damping import (
     BOTH,
@@ -30,6 +30,7 @@ from blocksim.kernels.explicit.damping import (
 from blocksim.kernels.explicit.depth import is_too_deep
 from blocksim.kernels.explicit.friction import clip_to_cone, draw_spring
 from blocksim.kernels.explicit.history import change_contacts, keep_places
+from blocksim.kernels.explicit.holding import hold_down
 from blocksim.kernels.explicit.inertia import Piece, piece_of
 from blocksim.kernels.explicit.kinematics import coupling, mutual_mass, resolve_point, weigh_onset
 from blocksim.kernels.explicit.laws import elastic_force, has_constant_stiffness, stored_energy, tangent_stiffness
@@ -324,7 +325,9 @@ def pair_forces(world: World, p: int, step: float) -> None:
     action.asks = count != pair.active and model == SURFACE
     if count == 0:
         if pair.active > 0:
+            had = pair.active
             change_contacts(world, p, 0, step, action)
+            hold_down(world, p, 0, had, True, pair.stiffness, step, action, world.corners)
         return
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
@@ -336,7 +339,7 @@ def pair_forces(world: World, p: int, step: float) -> None:
     is_changed = resolve_points(world, p, count, step, action)
     if model == SURFACE:
         measure(world, p, count, values.normal_stiffness)
-        hold_down(world, p, count, had, is_changed, before, world.corners)
+        hold_down(world, p, count, had, is_changed, before, step, action, world.corners)
     shared = step if model == SURFACE else shared_step(a, b, step)
     normal_pass(world, p, count, values, shared)
     shear_pass(world, p, count, values, before, shared, action)

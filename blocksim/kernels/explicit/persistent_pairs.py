@@ -19,12 +19,20 @@ from blocksim.kernels.explicit.models import SURFACE
 from blocksim.kernels.explicit.models.duplicate_corners import is_oblique
 from blocksim.kernels.explicit.outlines import gap_on, widest_gap
 from blocksim.kernels.explicit.persistent_contacts import (
+    Motion,
     PersistentContact,
     follow,
     relative_motion,
     renew_double,
     renew_single,
     renew_sliding,
+)
+from blocksim.kernels.explicit.persistent_outlines import (
+    are_parallel,
+    begins_on_outlines,
+    follow_on_outlines,
+    has_crossed,
+    measure_on_outlines,
 )
 from blocksim.kernels.explicit.separation import begins_contact, choose_axis, gap_along
 from blocksim.kernels.explicit.tributary import APART, PLANE, bearing_of_faces, is_flat, stiffness_between
@@ -53,11 +61,10 @@ def persistent_forces(
     """Return what pair p does if its contacts continue (TOUCHING) or there are none (UNTOUCHED).
 
     Otherwise (CHANGED) nothing has been written. `step` is the length (s) of the drift that led here. Where `particles`
-    is not None no pair is handled here, and where `corners` is not None, as there are polygons, those that do not
-    touch.
+    is not None no pair is handled here.
     """
     if corners is not None:
-        return apart_or_changed(world, p, corners), NOTHING
+        return forces_of_outlines(world, p, step, corners)
     if particles is not None:
         return CHANGED, NOTHING
     return forces_of_rectangles(world, p, step)
@@ -84,18 +91,47 @@ def forces_of_rectangles(world: World, p: int, step: float) -> tuple[int, Effect
 
 
 @kernel
-def apart_or_changed(world: World, p: int, table: Records) -> int:
-    """Return UNTOUCHED for a pair of a scene with polygons that did not touch and does not now, else CHANGED."""
+def forces_of_outlines(world: World, p: int, step: float, table: Records) -> tuple[int, Effect]:
+    """As persistent_forces, in a scene with polygons."""
     pair = world.pairs[p]
-    if pair.active > 0:
-        return CHANGED
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
+    dx = a.x - b.x
+    dy = a.y - b.y
+    if pair.active == 0:
+        return apart_or_changed(world, p, a, b, table), NOTHING
+    if has_changed(world, p, a, b, table):
+        return CHANGED, NOTHING
+    if pair.active == 1:
+        return single(world, p, a, b, dx, dy, step)
+    return double(world, p, a, b, dx, dy, step)
+
+
+@kernel
+def apart_or_changed(world: World, p: int, a: Record, b: Record, table: Records) -> int:
+    """Return UNTOUCHED for a pair of a scene with polygons that did not touch and does not now, else CHANGED."""
+    pair = world.pairs[p]
     is_ground = pair.b == world.bodies.size - 1
     axis: Any = np.int64(pair.axis)
-    if gap_on(axis, a, b, is_ground, table) >= 0.0 or widest_gap(pair, a, b, is_ground, table) >= 0.0:
+    if gap_on(axis, a, b, is_ground, table) >= 0.0:
         return UNTOUCHED
-    return CHANGED
+    gap = widest_gap(pair, a, b, is_ground, table)
+    if gap < 0.0 and (gap < -pair.limit or begins_on_outlines(world, p, a, b, table)):
+        return CHANGED
+    return UNTOUCHED
+
+
+@kernel
+def has_changed(world: World, p: int, a: Record, b: Record, table: Records) -> bool:
+    """As is_unsettled, for two bodies that touch in a scene with polygons."""
+    pair = world.pairs[p]
+    if pair.duplicates != 0 and has_crossed(world, p, a, b, table):
+        return True
+    if pair.idle > 0 and begins_on_outlines(world, p, a, b, table):
+        return True
+    if has_new_neighbours(a, b, SURFACE):
+        renew_dashpots(pair)
+    return (pair.is_held != 0 and pair.normal_left == 0) or not has_constant_stiffness(world.controls[0].law)
 
 
 @kernel
@@ -115,22 +151,63 @@ def is_unsettled(world: World, p: int, a: Record, b: Record, dx: float, dy: floa
 
 
 @kernel
-def measure_one(pair: Record, a: Record, b: Record, found: PersistentContact, stiffness: float) -> None:
+def follow_corner(
+    contact: Record,
+    a: Record,
+    b: Record,
+    dx: float,
+    dy: float,
+    motion: Motion,
+    step: float,
+    turns: bool,
+    corners: Records | None,
+) -> tuple[bool, PersistentContact]:
+    """Check that a contact continues, and where and how; see persistent_contacts.py."""
+    if corners is None:
+        return follow(contact, a, b, dx, dy, motion, step, turns)
+    return follow_on_outlines(contact, a, b, dx, dy, motion, step, turns, corners)
+
+
+@kernel
+def measure_one(
+    pair: Record, a: Record, b: Record, found: PersistentContact, stiffness: float, corners: Records | None
+) -> None:
     """Measure the stiffness of a single contact where dashpots are due; `stiffness` is that of a corner."""
     if pair.normal_left == 0 and pair.bearing != PLANE:
+        measure_corner(pair, a, b, found, stiffness, corners)
+
+
+@kernel
+def measure_corner(
+    pair: Record, a: Record, b: Record, found: PersistentContact, stiffness: float, corners: Records | None
+) -> None:
+    """Measure the stiffness of a single contact of two blocks; `stiffness` is that of a corner alone."""
+    if corners is None:
         bearing = bearing_of_faces(a, b, found.nx, found.ny)
         pair.stiffness = stiffness * bearing.share
         pair.slide = stiffness * bearing.slide
         pair.turn = stiffness * bearing.turn
+    else:
+        measure_on_outlines(pair, a, b, found.nx, found.ny, stiffness, corners)
 
 
 @kernel
-def are_ends(pair: Record, a: Record, b: Record) -> bool:
+def are_flat(a: Record, b: Record, found: PersistentContact, corners: Records | None) -> bool:
+    """Return True if the faces of two blocks that meet along the normal of a contact are parallel."""
+    if corners is None:
+        return is_flat(a, b)
+    return are_parallel(a, b, found.nx, found.ny, corners)
+
+
+@kernel
+def are_ends(pair: Record, a: Record, b: Record, found: PersistentContact, corners: Records | None) -> bool:
     """Return True if two contacts are on the ground or the two ends of one interval of parallel faces.
 
     That changes by turning only, slowly, and is checked where dashpots are due.
     """
-    return pair.bearing != APART and (pair.normal_left != 0 or pair.bearing == PLANE or is_flat(a, b))
+    if pair.bearing == APART:
+        return False
+    return pair.normal_left != 0 or pair.bearing == PLANE or are_flat(a, b, found, corners)
 
 
 @kernel
@@ -148,11 +225,11 @@ def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
     operator = world.operators[p, NORMAL]
     values = world.interactions[a.contact_class, b.contact_class]
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
-    goes_on, found = follow(contact, a, b, dx, dy, motion, step, pair.normal_left == 0)
+    goes_on, found = follow_corner(contact, a, b, dx, dy, motion, step, pair.normal_left == 0, world.corners)
     if not goes_on or found.depth > pair.limit:
         return CHANGED, NOTHING
     before = pair.stiffness
-    measure_one(pair, a, b, found, values.normal_stiffness)
+    measure_one(pair, a, b, found, values.normal_stiffness, world.corners)
     k = pair.stiffness
     spring = k * found.depth
     force = spring
@@ -226,9 +303,9 @@ def double(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
     operator = world.operators[p, NORMAL]
     values = world.interactions[a.contact_class, b.contact_class]
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
-    goes_1, one = follow(first, a, b, dx, dy, motion, step, pair.normal_left == 0)
-    goes_2, two = follow(second, a, b, dx, dy, motion, step, pair.normal_left == 0)
-    if not (goes_1 and goes_2 and are_ends(pair, a, b)) or max(one.depth, two.depth) > pair.limit:
+    goes_1, one = follow_corner(first, a, b, dx, dy, motion, step, pair.normal_left == 0, world.corners)
+    goes_2, two = follow_corner(second, a, b, dx, dy, motion, step, pair.normal_left == 0, world.corners)
+    if not (goes_1 and goes_2 and are_ends(pair, a, b, one, world.corners)) or max(one.depth, two.depth) > pair.limit:
         return CHANGED, NOTHING
     before = pair.stiffness
     measure_two(pair, one, two)

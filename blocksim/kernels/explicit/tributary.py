@@ -24,7 +24,7 @@ from typing import NamedTuple
 from blocksim.kernels.common.arrays import ALL, Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit.models.duplicate_corners import CONE_TOLERANCE
-from blocksim.kernels.explicit.outlines import Side, cone_of, into_world, side_along, side_of
+from blocksim.kernels.explicit.outlines import cone_of, corner_of, into_world, side_along
 
 FLAT = 0.01  # sine of the angle between two faces up to which they are parallel
 FLAT_SHARE = FLAT / CONE_TOLERANCE  # the same of the cone, where that of polygons is narrower
@@ -181,18 +181,18 @@ class Facing(NamedTuple):
 
 
 @kernel
-def seen_along(body: Record, side: Side, nx: float, ny: float) -> tuple[float, float, float, float]:
+def seen_along(body: Record, side: Record, nx: float, ny: float) -> tuple[float, float, float, float]:
     """Return the normal of a face in world axes, its middle (m) along the tangent and its cosine to (nx, ny)."""
     mx, my = into_world(body, side.nx, side.ny)
-    x, y = into_world(body, side.middle_x, side.middle_y)
+    x, y = into_world(body, side.x - side.half * side.ny, side.y + side.half * side.nx)
     return mx, my, nx * y - ny * x, abs(mx * nx + my * ny)
 
 
 @rare_kernel
 def facing_of(a: Record, b: Record, nx: float, ny: float, table: Records) -> Facing:
     """Return how the faces of a and b look at each other along the normal (nx, ny), b to a."""
-    one = side_of(a, table, side_along(a, table, -nx, -ny))
-    two = side_of(b, table, side_along(b, table, nx, ny))
+    one = corner_of(a, table, side_along(a, table, -nx, -ny))
+    two = corner_of(b, table, side_along(b, table, nx, ny))
     ax, ay, middle_a, cos_a = seen_along(a, one, nx, ny)
     bx, by, middle_b, cos_b = seen_along(b, two, nx, ny)
     middle_a += nx * (a.y - b.y) - ny * (a.x - b.x)

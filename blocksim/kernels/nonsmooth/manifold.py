@@ -272,12 +272,12 @@ def points_with_polygon(
     """Return the contact manifold of a polygon and another, a rectangle or the ground, and whether there is one."""
     hull_a = hull_of(a, corners)
     hull_b = hull_of(b, corners)
-    if hull_a.size > 0 and hull_b.size > 0:
+    is_first = a.faces >= ALL
+    if is_first and b.faces >= ALL and not place.is_ground:
         found = points_of_polygons(one, hull_a, two, hull_b, place.margin)
         if found.is_near:
             follow_corners(constraint, found.one, found.two)
         return found.points, found.is_near
-    is_first = hull_a.size > 0
     if place.is_ground:
         points, is_near = points_on_ground(one, hull_a, two, place.margin)
     elif is_first:

@@ -10,7 +10,7 @@ from blocksim.kernels.common.arrays import HALF, World
 from blocksim.kernels.explicit.energy import LEDGER_ROW, measure
 from blocksim.kernels.explicit.ensemble import advance_members
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR
-from blocksim.kernels.explicit.outlines import MOST_CORNERS, SIDES
+from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.kernels.explicit.step import advance, advance_in_team
 from blocksim.simulation.contacts import SUPPORT, UNITS, Rows, empty_rows
 from blocksim.simulation.schemes.coupled import coupled_scheme
@@ -103,20 +103,15 @@ def _places_on_outlines(world: World, contacts: Any, a: Indices, b: Indices) -> 
 
 def _corners(world: World, owner: Any, number: Any) -> tuple[Any, Any]:
     """Return where (m) corners of bodies are."""
-    rows = world.corners[np.minimum(owner["first_corner"] + number, world.corners.size - 1)]
-    piece = number % SIDES
-    is_piece = owner["corner_count"] == 0
-    px = np.where(is_piece, np.choose(piece, SIDES_X) * owner["half_x"], rows["x"])
-    py = np.where(is_piece, np.choose(piece, SIDES_Y) * owner["half_y"], rows["y"])
+    rows = world.corners[owner["first_corner"] + number]
     cosine, sine = owner["cos"], owner["sin"]
-    return owner["x"] + cosine * px - sine * py, owner["y"] + sine * px + cosine * py
+    return owner["x"] + cosine * rows["x"] - sine * rows["y"], owner["y"] + sine * rows["x"] + cosine * rows["y"]
 
 
 def _normals(world: World, touched: Any, face: Any) -> tuple[Any, Any]:
-    """Return the outward normals of faces in the frames of their bodies; of ground and walls the upper one."""
-    rows = world.corners[np.minimum(touched["first_corner"] + face, world.corners.size - 1)]
-    is_piece = touched["corner_count"] == 0
-    return np.where(is_piece, 0.0, rows["nx"]), np.where(is_piece, 1.0, rows["ny"])
+    """Return the outward normals of faces in the frames of their bodies."""
+    rows = world.corners[touched["first_corner"] + face]
+    return rows["nx"], rows["ny"]
 
 
 def _face_normal(face: Any, cosine: Any, sine: Any) -> tuple[Any, Any]:

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pytest
 
-from blocksim.kernels.common.arrays import NORMAL, SHEAR
+from blocksim.kernels.common.arrays import HALF, NORMAL, SHEAR
 from blocksim.kernels.common.integrate import start_all
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.contact import IMPACT_STEPS, pair_forces
 from blocksim.kernels.explicit.damping import BOTH
+from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.kernels.explicit.partition import add_kept, keep
 from blocksim.kernels.explicit.persistent_pairs import CHANGED, NOTHING, TOUCHING, UNTOUCHED, persistent_forces
 from blocksim.verification.scene import HEIGHT, WIDTH
@@ -72,7 +73,8 @@ def evaluate(world: World) -> tuple[Tally, World, World]:
         if pair.active or before:
             steady, general = steady + is_steady, general + (not is_steady)
             if is_steady:
-                kinds.add(tuple((quick.contacts["slot"][p, : pair.active] > 3).tolist()))
+                of_b = HALF if world.corners is None else MOST_CORNERS
+                kinds.add(tuple((quick.contacts["slot"][p, : pair.active] >= of_b).tolist()))
     return Tally(steady, general, frozenset(kinds)), quick, slow
 
 
@@ -139,6 +141,57 @@ SITUATIONS: dict[str, tuple[Sequence[Mapping[str, object]], dict[str, Any]]] = {
     "rocking": ([{"y": tip(0.002), "angle": 0.002, "spin": -0.3}, {"x": 0.1, "y": 0.5 * HEIGHT}], {}),
     "wall of three": ([{"y": 0.5 * HEIGHT}, {"x": 0.033, "y": 0.5 * HEIGHT}, {"x": 0.0165, "y": ABOVE}], {}),
     "soft": (RESTING, {"tilt": -0.2, "contact": {"stiffness_scale": 1e-4}}),
+}
+
+
+def outlined(body: Mapping[str, object]) -> dict[str, object]:
+    """Return a block with its corners as an outline."""
+    x, y = 0.5 * float(str(body.get("width", WIDTH))), 0.5 * HEIGHT
+    return {**body, "outline": [[-x, -y], [x, -y], [x, y], [-x, y]]}
+
+
+RADIUS, APOTHEM = 0.02, 0.01 * 3.0**0.5
+HEXAGON = {"outline": [[RADIUS * cos(k * pi / 3), RADIUS * sin(k * pi / 3)] for k in range(6)]}
+WEDGE = {"outline": [[-0.03, -0.01], [0.03, -0.01], [0.0, 0.02]]}  # centroid in its origin, sharp ends
+NEAR_ROUND = {"outline": [[RADIUS * cos(k * pi / 8), RADIUS * sin(k * pi / 8)] for k in range(16)]}
+SITUATIONS |= {
+    f"{name}, as outlines": ([outlined(body) for body in bodies], values)
+    for name, (bodies, values) in SITUATIONS.items()
+}
+SITUATIONS |= {
+    "column of hexagons": (
+        [{"y": APOTHEM, **HEXAGON}, {"y": 3.0 * APOTHEM, **HEXAGON}, {"x": 2e-3, "y": 5.0 * APOTHEM, **HEXAGON}],
+        {"contact": {"stiffness_scale": 1e-2}},
+    ),
+    "comb of hexagons": (
+        [
+            {"y": APOTHEM, **HEXAGON},
+            {"x": 3.0 * RADIUS, "y": APOTHEM, **HEXAGON},
+            {"x": 1.5 * RADIUS, "y": 2.0 * APOTHEM + 1e-7, **HEXAGON},
+        ],
+        {"contact": {"stiffness_scale": 1e-3}},
+    ),
+    "wedge on wedge": (
+        [
+            {"y": 0.01, **WEDGE},
+            {"x": 0.03, "y": 0.02, **WEDGE, "angle": pi},
+            {"x": -0.03, "y": 0.02, **WEDGE, "angle": pi},
+        ],
+        {"contact": {"stiffness_scale": 1e-3}},
+    ),
+    "wedge on a tip": ([{"y": 0.01, **WEDGE}, {"x": 0.004, "y": 0.04 + 1e-7, **WEDGE}], {"tilt": 0.1}),
+    "hexagon that rolls": ([{"y": APOTHEM, **HEXAGON, "velocity": [0.4, 0.0], "spin": -20.0}], {}),
+    "nearly round ones": (
+        [{"y": RADIUS, **NEAR_ROUND}, {"x": 0.01, "y": 2.91 * RADIUS, **NEAR_ROUND, "spin": 5.0}],
+        {"contact": {"stiffness_scale": 1e-3}},
+    ),
+    "hexagon strikes a corner": (
+        [
+            {"y": APOTHEM, **HEXAGON, "fixed": True},
+            {"x": 0.004, "y": 3.0 * APOTHEM + 1e-7, **HEXAGON, "velocity": [0.3, -1.0]},
+        ],
+        {},
+    ),
 }
 
 

@@ -26,15 +26,14 @@ from blocksim.kernels.explicit.outlines import (
     MOST_CORNERS,
     UPPER,
     WIDEST_CONE,
-    Side,
     cone_of,
-    corner_place,
+    corner_of,
     corner_vector,
-    into_world,
+    into_frame,
+    is_piece,
     number_of_corners,
     side_along,
     side_normal,
-    side_of,
 )
 
 DEEPEST = 0.01  # of the half diagonal, under the sharp end of a face
@@ -58,12 +57,11 @@ class Corner(NamedTuple):
 def corner_seen(owner: Record, number: int, touched: Record, table: Records) -> Corner:
     """Return a corner of a body as the frame of the touched one has it."""
     x0, y0, c, s = relative_pose(owner, touched)
-    x, y = corner_place(owner, table, number)
-    ahead = side_of(owner, table, number)
-    back = side_of(owner, table, number - 1 if number > 0 else number_of_corners(owner) - 1)
+    ahead = corner_of(owner, table, number)
+    back = corner_of(owner, table, number - 1 if number > 0 else number_of_corners(owner) - 1)
     return Corner(
-        x0 + c * x - s * y,
-        y0 + s * x + c * y,
+        x0 + c * ahead.x - s * ahead.y,
+        y0 + s * ahead.x + c * ahead.y,
         -c * ahead.ny - s * ahead.nx,
         -s * ahead.ny + c * ahead.nx,
         c * back.ny + s * back.nx,
@@ -89,7 +87,7 @@ def side_below(corner: Corner, touched: Record, table: Records, cone: float) -> 
     depth = math.inf
     beside = math.inf
     for k in range(number_of_corners(touched)):
-        side = side_of(touched, table, k)
+        side = corner_of(touched, table, k)
         over = side.distance - (side.nx * corner.x + side.ny * corner.y)
         if over < 0.0:
             return side_over_end(corner, k, over, touched, table, cone)
@@ -106,7 +104,7 @@ def side_below(corner: Corner, touched: Record, table: Records, cone: float) -> 
 
 
 @kernel
-def leads_in(corner: Corner, level: Side, passed: Side, beyond: float, depth: float, cone: float) -> bool:
+def leads_in(corner: Corner, level: Record, passed: Record, beyond: float, depth: float, cone: float) -> bool:
     """Return True if a face of a corner leads nearly along `level`, and farther behind `passed` than it is deep.
 
     `beyond` (m, negative) is the overlap of the corner with the face `passed`, `depth` (m) that with `level`.
@@ -127,10 +125,10 @@ def side_over_end(
     `beyond` (m, negative) is the overlap with that face. Deep under the end of another it is no end of an interval.
     """
     count = number_of_corners(touched)
-    side = side_of(touched, table, passed)
+    side = corner_of(touched, table, passed)
     for step in (1, count - 1):
         k = (passed + step) % count
-        level = side_of(touched, table, k)
+        level = corner_of(touched, table, k)
         over = level.distance - (level.nx * corner.x + level.ny * corner.y)
         cosine = level.nx * side.nx + level.ny * side.ny
         is_under = 0.0 < over < DEEPEST * touched.radius and beyond >= over * cosine
@@ -148,10 +146,19 @@ def side_over_end(
 def is_behind_others(corner: Corner, one: int, two: int, touched: Record, table: Records) -> bool:
     """Return True if a corner is behind all faces of a body but two, whichever side of those it is on."""
     for k in range(number_of_corners(touched)):
-        side = side_of(touched, table, k)
+        side = corner_of(touched, table, k)
         if k != one and k != two and side.nx * corner.x + side.ny * corner.y > side.distance:
             return False
     return True
+
+
+@kernel
+def face_met(corner: Corner, touched: Record, table: Records, cone: float) -> tuple[int, float, float]:
+    """Return as side_below the face that a corner touches, of a piece of ground the upper one."""
+    if not is_piece(touched):
+        return side_below(corner, touched, table, cone)
+    face = UPPER if can_touch(corner, 0.0, 1.0, cone) else NO_FACE
+    return face, slab_depth(corner.x, corner.y, touched), math.inf
 
 
 @rare_kernel
@@ -163,12 +170,7 @@ def add_corner(
     The normal points out of `touched`.
     """
     corner = corner_seen(owner, number, touched, table)
-    if touched.corner_count > 0:
-        face, depth, beside = side_below(corner, touched, table, cone)
-    else:
-        beside = math.inf
-        face = UPPER if can_touch(corner, 0.0, 1.0, cone) else NO_FACE
-        depth = slab_depth(corner.x, corner.y, touched)
+    face, depth, beside = face_met(corner, touched, table, cone)
     if face == NO_FACE or depth <= 0.0:
         return count
     point = points[count]
@@ -204,10 +206,12 @@ def ground_points(owner: Record, near: int, candidates: Integers, level: float, 
 @kernel
 def from_middle(body: Record, number: int, table: Records, nx: float, ny: float) -> float:
     """Return the place (m) of a corner along the tangent (-ny, nx), from the middle of the face that looks along n."""
-    side = side_of(body, table, side_along(body, table, nx, ny))
-    x, y = corner_place(body, table, number)
-    ox, oy = into_world(body, x - side.middle_x, y - side.middle_y)
-    return nx * oy - ny * ox
+    side = corner_of(body, table, side_along(body, table, nx, ny))
+    corner = corner_of(body, table, number)
+    tx, ty = into_frame(body, -ny, nx)
+    x = corner.x - side.x + side.half * side.ny
+    y = corner.y - side.y - side.half * side.nx
+    return tx * x + ty * y
 
 
 @rare_kernel
@@ -242,7 +246,7 @@ def do_meet(one: Record, two: Record, cone: float) -> bool:
 def drop_duplicates(
     a: Record, b: Record, pair: Record, contacts: Records, points: Records, count: int, table: Records, cone: float
 ) -> int:
-    """Keep one of two corners that are one contact; return how many points are left."""
+    """Keep one of two corners that are one contact, mark the other in `pair`; return how many points are left."""
     i = 0
     while i < count and points[i].slot < MOST_CORNERS:
         for j in range(i + 1, count):
@@ -253,7 +257,9 @@ def drop_duplicates(
                 oblique = are_oblique(a, b, near.nx, near.ny, table, cone)
                 if do_meet(one, two, cone) if oblique else is_same_end(one, two, a, b, table):
                     keep_i = keeps_first(one, two, pair, contacts, oblique)
-                    count = drop_point(points, j if keep_i else i, count)
+                    gone = j if keep_i else i
+                    pair.duplicates |= 1 << points[gone].slot
+                    count = drop_point(points, gone, count)
                     i -= 0 if keep_i else 1
                     break
         i += 1
@@ -281,6 +287,7 @@ def block_points(
                 point.slot = slot
                 point.nx = -point.nx
                 point.ny = -point.ny
+    pair.duplicates = 0
     if of_a > 0 and count > of_a:
         count = drop_duplicates(a, b, pair, contacts, points, count, table, cone)
     return count
@@ -310,7 +317,7 @@ def find_points(world: World, p: int, table: Records) -> int:
 def is_within(corner: Corner, touched: Record, reach: float, table: Records) -> bool:
     """Return True if a corner lies inside a body grown by `reach` (m)."""
     for k in range(number_of_corners(touched)):
-        side = side_of(touched, table, k)
+        side = corner_of(touched, table, k)
         if side.nx * corner.x + side.ny * corner.y > side.distance + reach:
             return False
     return True
@@ -322,7 +329,7 @@ def corners_near(
 ) -> int:
     """Append the corners of `owner` inside `touched` grown by `reach` (m), as slots from `first`; return the count."""
     for number in range(number_of_corners(owner)):
-        is_there = owner.corner_count > 0 or (owner.corners >> number) & 1 == 1
+        is_there = not is_piece(owner) or (owner.corners >> number) & 1 == 1
         if is_there and is_within(corner_seen(owner, number, touched, table), touched, reach, table):
             out[count] = first + number
             count += 1

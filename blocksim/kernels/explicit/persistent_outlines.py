@@ -1,0 +1,168 @@
+"""Contacts that continue in a scene with polygons: the same as persistent_contacts.py and separation.py have.
+
+A contact continues where the search of models/outlines.py would find it again: its corner lies behind the face, no
+other face is nearer that it can touch, and no other corner begins. Far from the ends of its face no other can be nearer
+(`clear`, world/shapes.py). Near an end that rule itself is asked, for this one corner. The same holds for a corner
+without a contact: in front of a face that has no sharp end it is outside, elsewhere the rule decides.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from blocksim.kernels.common.arrays import NO_FACE, Record, Records, World
+from blocksim.kernels.common.geometry import END_RATIO
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.explicit.contact import IMPACT_STEPS
+from blocksim.kernels.explicit.models.outlines import DEEPEST, can_touch, corner_seen, face_met
+from blocksim.kernels.explicit.outlines import (
+    MOST_CORNERS,
+    cone_of,
+    corner_of,
+    corner_vector,
+    into_frame,
+    into_world,
+    is_piece,
+    number_of_corners,
+)
+from blocksim.kernels.explicit.persistent_contacts import Motion, PersistentContact, contact_at
+from blocksim.kernels.explicit.tributary import bearing_of_facing, facing_of, flat_of
+
+
+@rare_kernel
+def stays_on(face: int, owner: Record, number: int, touched: Record, way: float, table: Records) -> bool:
+    """Return True if a corner of `owner` touches this face, and would still do `way` (m) nearer to the next one."""
+    cone = cone_of(owner, touched, table)
+    found, depth, beside = face_met(corner_seen(owner, number, touched, table), touched, table, cone)
+    return found == face and depth > 0.0 and beside >= way
+
+
+@rare_kernel
+def is_admitted(face: int, owner: Record, number: int, touched: Record, table: Records) -> bool:
+    """Return True if a corner of `owner` can touch a face, wherever it is."""
+    side = corner_of(touched, table, face)
+    return can_touch(corner_seen(owner, number, touched, table), side.nx, side.ny, cone_of(owner, touched, table))
+
+
+@kernel
+def follow_on_outlines(
+    contact: Record,
+    a: Record,
+    b: Record,
+    dx: float,
+    dy: float,
+    motion: Motion,
+    step: float,
+    turns: bool,
+    table: Records,
+) -> tuple[bool, PersistentContact]:
+    """As follow in persistent_contacts.py, with corners and faces of the table."""
+    slot: Any = np.int64(contact.slot)
+    face: Any = np.int64(contact.face)
+    is_own = slot < MOST_CORNERS
+    owner = a if is_own else b
+    touched = b if is_own else a
+    sign = 1.0 if is_own else -1.0
+    number = slot if is_own else slot - MOST_CORNERS
+    corner = corner_of(owner, table, number)
+    side = corner_of(touched, table, face)
+    ox, oy = into_world(owner, corner.x, corner.y)
+    nx, ny = into_world(touched, side.nx, side.ny)
+    x = ox + sign * dx
+    y = oy + sign * dy
+    depth = side.distance - (x * nx + y * ny)
+    end = side.half - abs(y * nx - x * ny - side.middle)
+    found = contact_at(x if is_own else ox, y if is_own else oy, sign * nx, sign * ny, depth, motion, step)
+    goes_on = depth > 0.0
+    if is_piece(touched):
+        goes_on = goes_on and depth <= END_RATIO * end
+    elif end < math.inf:  # else the half-plane
+        way = IMPACT_STEPS * abs(found.closing)
+        if side.clear * end - depth <= max(depth, way) or depth > side.distance:
+            goes_on = goes_on and stays_on(face, owner, number, touched, way, table)
+    if turns:
+        goes_on = goes_on and is_admitted(face, owner, number, touched, table)
+    return goes_on, found
+
+
+@kernel
+def is_in_front(owner: Record, number: int, touched: Record, table: Records) -> bool:
+    """Return True if a corner of `owner` is in front of a face of `touched`, and under no sharp end of another."""
+    corner = corner_of(owner, table, number)
+    ox, oy = into_world(owner, corner.x, corner.y)
+    x, y = into_frame(touched, owner.x - touched.x + ox, owner.y - touched.y + oy)
+    if is_piece(touched):
+        return bool(y > touched.half_y)
+    room = DEEPEST * touched.radius
+    for k in range(number_of_corners(touched)):
+        side = corner_of(touched, table, k)
+        if side.nx * x + side.ny * y - side.distance > side.sharp * room:
+            return True
+    return False
+
+
+@rare_kernel
+def has_face(owner: Record, number: int, touched: Record, table: Records) -> bool:
+    """Return True if a corner of `owner` touches a face."""
+    cone = cone_of(owner, touched, table)
+    face, depth, _ = face_met(corner_seen(owner, number, touched, table), touched, table, cone)
+    return face != NO_FACE and depth > 0.0
+
+
+@kernel
+def touches(owner: Record, number: int, touched: Record, is_ground: bool, table: Records) -> bool:
+    """Return True if a corner of `owner` touches another body, or the half-plane."""
+    if is_ground:
+        return owner.y + corner_vector(owner, table, number)[1] < touched.y
+    return not is_in_front(owner, number, touched, table) and has_face(owner, number, touched, table)
+
+
+@kernel
+def begins_on_outlines(world: World, p: int, a: Record, b: Record, table: Records) -> bool:
+    """Return True if a candidate corner of a pair that was outside the other body touches it now."""
+    pair = world.pairs[p]
+    is_ground = pair.b == world.bodies.size - 1
+    known = 0
+    for m in range(pair.near):
+        slot: Any = np.int64(world.candidates[p, m])
+        if known < pair.active and world.contacts[p, known].slot == slot:
+            known += 1
+        elif (pair.duplicates >> slot) & 1 == 0:
+            if slot < MOST_CORNERS:
+                if touches(a, slot, b, is_ground, table):
+                    return True
+            elif touches(b, slot - MOST_CORNERS, a, False, table):
+                return True
+    return False
+
+
+@rare_kernel
+def has_crossed(world: World, p: int, a: Record, b: Record, table: Records) -> bool:
+    """Return True if the faces of a pair that has duplicates are not nearly parallel: others may then be dropped."""
+    contact = world.contacts[p, 0]
+    slot: Any = np.int64(contact.slot)
+    is_own = slot < MOST_CORNERS
+    owner, touched = (a, b) if is_own else (b, a)
+    corner = corner_seen(owner, slot if is_own else slot - MOST_CORNERS, touched, table)
+    face: Any = np.int64(contact.face)
+    side = corner_of(touched, table, face)
+    ahead = abs(side.nx * corner.ahead_x + side.ny * corner.ahead_y)
+    back = abs(side.nx * corner.back_x + side.ny * corner.back_y)
+    return min(ahead, back) > cone_of(a, b, table)
+
+
+@rare_kernel
+def measure_on_outlines(pair: Record, a: Record, b: Record, nx: float, ny: float, k: float, table: Records) -> None:
+    """Measure the stiffness of a single contact of the normal (nx, ny); `k` is that of a corner alone."""
+    bearing = bearing_of_facing(facing_of(a, b, nx, ny, table))
+    pair.stiffness = k * bearing.share
+    pair.slide = k * bearing.slide
+    pair.turn = k * bearing.turn
+
+
+@rare_kernel
+def are_parallel(a: Record, b: Record, nx: float, ny: float, table: Records) -> bool:
+    """Return True if the faces of two blocks that look at each other along a normal are parallel."""
+    facing = facing_of(a, b, nx, ny, table)
+    return facing.sine <= flat_of(facing)
