@@ -17,8 +17,8 @@ SWEEPS = [kind for kind in SCENARIOS if kind.startswith("sweep-")]
 
 
 def test_all_promised_kinds_are_there() -> None:
-    promised = "arch column-collapse dominoes experiment pyramid retaining-wall slope stack sweep-grid sweep-normal"
-    assert list(templates()) == [*promised.split(), "sweep-sobol", "three-blocks", "voronoi", "wall"]
+    promised = "arch column-collapse dominoes experiment pyramid retaining-wall slope soil-slope stack sweep-grid"
+    assert list(templates()) == [*promised.split(), "sweep-normal", "sweep-sobol", "three-blocks", "voronoi", "wall"]
 
 
 @pytest.mark.parametrize("kind", SCENARIOS)
@@ -38,6 +38,7 @@ def test_a_new_scenario_passes_the_check(blocksim: Command, kind: str) -> None:
         ("voronoi", "smallest"),
         ("retaining-wall", "cohesion"),
         ("retaining-wall", "start"),
+        ("soil-slope", "cohesion"),
         ("sweep-grid", '"contact.stiffness_scale"'),
         ("sweep-sobol", '"contact.stiffness_scale"'),
     ],

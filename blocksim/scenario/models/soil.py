@@ -1,5 +1,6 @@
 """[[soils]]: bodies of soil, filled with particles of one spacing."""
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Literal, Self, get_args
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     from blocksim.scenario.models.scenario import Scenario
 
-Kind = Literal["outline", "rectangle"]
+Kind = Literal["outline", "rectangle", "slope"]
 Start = Literal["geostatic", "ramp"]
 Gradient = Literal["raw", "corrected"]
 MOST_PARTICLES = 1_000_000
@@ -26,22 +27,28 @@ LEAST_ACROSS = 4
 SPACINGS_A_SIDE = 8
 """Least number of spacings along the smallest side of all blocks."""
 MILLI = 1e3
+SHAPES: dict[str, tuple[str, ...]] = {"outline": ("outline",), "rectangle": ("x", "y"), "slope": ("x", "y", "angle")}
+"""Keys that give the shape, by kind."""
 
 
 class SoilTable(SystemTable):
-    """A body of soil: an outline, or a rectangle, filled with particles."""
+    """A body of soil: an outline, a rectangle or a slope, filled with particles."""
 
     declared_in = "blocksim.world.systems.soils:SOILS"
     name: Identifier = Field(description="name of the soil in tables")
     material: str = Field(description="the name of its material, which has a friction_angle")
     kind: Annotated[Kind, OneOf(get_args(Kind))] = Field(
-        default="outline", description="what is given of its shape: an outline, or the x and y of a rectangle"
+        default="outline",
+        description="what is given of its shape: an outline, x and y of a rectangle, or these and the angle of a slope",
     )
     outline: tuple[Point, ...] | None = Field(
         default=None, description="corners [x, y] in order; where an edge is inclined, discs of a spacing stay inside"
     )
-    x: Point | None = Field(default=None, description="where the rectangle begins and ends along the ground")
-    y: Point | None = Field(default=None, description="where the rectangle begins and ends above the ground")
+    x: Point | None = Field(default=None, description="where a rectangle, or the base of a slope, begins and ends")
+    y: Point | None = Field(default=None, description="where it begins and ends above the ground")
+    angle: q.SlopeAngle | None = Field(
+        default=None, description="rise of the face of a slope, from its foot at the left; above 90 deg from the right"
+    )
     spacing: q.PositiveLength = Field(description="distance of the particles at the start, the same for all soils")
     start: Annotated[Start, OneOf(get_args(Start))] = Field(
         default="geostatic",
@@ -53,8 +60,8 @@ class SoilTable(SystemTable):
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
-        wanted = ("outline",) if self.kind == "outline" else ("x", "y")
-        for key in ("outline", "x", "y"):
+        wanted = SHAPES[self.kind]
+        for key in ("outline", "x", "y", "angle"):
             is_given = getattr(self, key) is not None
             if is_given and key not in wanted:
                 raise q.invalid(f"this key does not belong to kind {q.shown(self.kind)}", key, at="key")
@@ -64,6 +71,8 @@ class SoilTable(SystemTable):
             ends = getattr(self, key)
             if ends is not None and ends[1] <= ends[0]:
                 raise q.invalid("the end must be beyond the begin", key)
+        if self.angle is not None and self.x is not None and max(self._heads) >= self.x[1] - self.x[0]:
+            raise q.invalid("the face reaches the other end below the crest", "angle")
         return self
 
     @model_validator(mode="after")
@@ -86,7 +95,15 @@ class SoilTable(SystemTable):
         if self.outline is not None:
             return polygons.corners_of(self.outline)
         (x0, x1), (y0, y1) = self.x or (0.0, 0.0), self.y or (0.0, 0.0)
-        return polygons.corners_of([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+        left, right = self._heads
+        return polygons.corners_of([(x0, y0), (x1, y0), (x1 - right, y1), (x0 + left, y1)])
+
+    @property
+    def _heads(self) -> tuple[float, float]:
+        """Return how far (m) the crest begins after the left end and ends before the right one."""
+        (_, _), (y0, y1) = self.x or (0.0, 0.0), self.y or (0.0, 0.0)
+        back = 0.0 if self.angle is None else (y1 - y0) / math.tan(self.angle)
+        return max(back, 0.0), max(-back, 0.0)
 
     def impossible(self, scenario: "Scenario") -> Iterator[tuple[str, str]]:
         """Find a material that is no soil, a spacing that does not suit, and what the outline meets."""

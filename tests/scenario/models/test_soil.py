@@ -1,8 +1,10 @@
 """Tables of soils and materials that are soils: what is refused, and where it is told."""
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from blocksim.errors import ScenarioError
@@ -56,6 +58,45 @@ def test_an_outline_that_does_not_fit_is_told(corners: list[list[float]], told: 
     data = data_of(column(0.05, 0.05, 0.005), {**OUTLINE, "outline": corners}, walls=[wall])
     (problem,) = problems(data)
     assert told in problem
+
+
+SLOPE = {**column(0.3, 0.1, 0.005), "kind": "slope", "angle": "45 deg"}
+
+
+@pytest.mark.parametrize(
+    ("angle", "corners"),
+    [
+        ("45 deg", [(0.0, 0.0), (0.3, 0.0), (0.3, 0.1), (0.1, 0.1)]),
+        ("135 deg", [(0.0, 0.0), (0.3, 0.0), (0.2, 0.1), (0.0, 0.1)]),
+        ("90 deg", [(0.0, 0.0), (0.3, 0.0), (0.3, 0.1), (0.0, 0.1)]),
+    ],
+)
+def test_a_slope_rises_from_its_foot_to_its_crest(angle: str, corners: list[tuple[float, float]]) -> None:
+    (table,) = scene({**SLOPE, "angle": angle}).systems["soils"]
+    assert isinstance(table, SoilTable)
+    np.testing.assert_allclose(table.corners, corners, atol=1e-15)
+    again = scenario_from_mapping(tomllib.loads(scenario_to_toml(scene({**SLOPE, "angle": angle}))))
+    assert again.systems == scene({**SLOPE, "angle": angle}).systems
+
+
+@pytest.mark.parametrize(
+    ("soil", "told"),
+    [
+        ({"angle": "18 deg"}, ("soils", "angle", "the face reaches the other end below the crest")),
+        ({"angle": "0 deg"}, ("soils", "angle", "above 0")),
+        ({"angle": 45}, ("soils", "angle", "deg")),
+        ({"kind": "rectangle"}, ("soils", "angle", "does not belong to kind")),
+        ({"outline": CORNERS}, ("soils", "outline", "does not belong to kind")),
+    ],
+)
+def test_a_slope_that_cannot_be_is_told_with_its_key(soil: dict[str, Any], told: tuple[str, ...]) -> None:
+    (problem,) = problems(data_of({**SLOPE, **soil}))
+    assert all(part in problem for part in told), problem
+
+
+def test_a_slope_without_an_angle_is_told() -> None:
+    (problem,) = problems(data_of({key: value for key, value in SLOPE.items() if key != "angle"}))
+    assert 'kind "slope" needs the key angle' in problem
 
 
 def test_soils_may_touch_what_they_stand_beside() -> None:
