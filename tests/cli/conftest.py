@@ -20,6 +20,7 @@ from tests.view.report.folders import write_run
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SOFT = ("--set", "contact.stiffness_scale=0.001")
 START = "from blocksim.cli.app import main; main()"
+SMALL_DISK = "import shutil, types; shutil.disk_usage = lambda _: types.SimpleNamespace(free=10**9)"  # on every machine
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def process(tmp_path: Path) -> Process:
         scenarios.symlink_to(SCENARIOS)
 
     def start(*arguments: object, before: str = "", **options: object) -> Running:
-        command = [sys.executable, "-c", f"{before}\n{START}", *map(str, arguments)]
+        command = [sys.executable, "-c", f"{SMALL_DISK}\n{before}\n{START}", *map(str, arguments)]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
         return subprocess.Popen(command, cwd=tmp_path, env=environment, text=True, **pipes)  # type: ignore[call-overload,no-any-return]
 

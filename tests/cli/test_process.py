@@ -15,8 +15,8 @@ from blocksim.simulation.stores.hdf5_reader import read_frames
 from tests.cli.conftest import PATIENCE, SOFT, Process, wait_for, wait_for_frames
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"
-SLOW = ("run", NOMINAL, *SOFT, "--set", "time.end=30", "--set", "time.stop_at_rest=false")
-FINE = ("--set", "output.every=1e-5")  # some million frames: they would fit on a small disk, or the run is refused
+SLOW = ("run", NOMINAL, *SOFT, "--set", "time.end=500", "--set", "time.stop_at_rest=false")
+DENSE = (*SLOW, "--set", "output.every=1e-5", "--set", "time.end=20")
 LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))"
 
 
@@ -25,7 +25,7 @@ DELAYS = [0.1, *(pytest.param(delay, marks=pytest.mark.long) for delay in (0.0, 
 
 @pytest.mark.parametrize("delay", DELAYS)
 def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path, delay: float) -> None:
-    running = process(*SLOW, *FINE, "--out", "out", "--quiet")
+    running = process(*DENSE, "--out", "out", "--quiet")
     (wait_for if delay < 0.1 else wait_for_frames)(tmp_path / "out" / "run.h5", running)
     time.sleep(delay)
     running.kill()
@@ -49,7 +49,7 @@ def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path, del
     ],
 )
 def test_full_disk_is_74_with_one_line(process: Process, tmp_path: Path, limit: int, file: str) -> None:
-    running = process(*SLOW, *FINE, "--out", "out", "-q", before=LIMIT.format(limit))
+    running = process(*DENSE, "--out", "out", "-q", before=LIMIT.format(limit))
     out, err = running.communicate(timeout=PATIENCE)
     assert (running.returncode, out) == (74, "")
     assert err == f"out/{file}: cannot be written: File too large\n"

@@ -198,7 +198,7 @@ def test_too_small_a_disk_is_reported_with_both_sizes(tmp_path: Path, monkeypatc
         asked.append(place)
         return SimpleNamespace(free=1_000_000)
 
-    monkeypatch.setattr("shutil.disk_usage", usage)
+    monkeypatch.setattr("blocksim.simulation.disk_room.shutil.disk_usage", usage)
     scenario = sliding({}, end=0.05, every=1e-7)
     with pytest.raises(OutputError, match=r"the results may take 1\.96 MB, but only 1 MB are free there"):
         simulate_into(scenario, tmp_path / "not" / "yet")
