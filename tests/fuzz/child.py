@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import json
+import os
 import resource
 import select
 import subprocess
@@ -61,7 +62,8 @@ class Child:
     def _started(self) -> subprocess.Popen[str]:
         pipe = subprocess.PIPE
         command = [sys.executable, "-c", START]
-        self.process = subprocess.Popen(command, cwd=self.root, text=True, bufsize=1, stdin=pipe, stdout=pipe)
+        few = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each maps addresses: with 64 there are not enough
+        self.process = subprocess.Popen(command, cwd=self.root, text=True, bufsize=1, stdin=pipe, stdout=pipe, env=few)
         return self.process
 
     def close(self) -> None:
@@ -82,8 +84,6 @@ class Child:
 
 def serve() -> None:
     """Run the commands that come in, a line each, until there are no more."""
-    import os  # noqa: PLC0415 - all of these belong to the process that is started
-
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     answers = os.fdopen(os.dup(1), "w")
@@ -96,8 +96,7 @@ def serve() -> None:
 
 
 def _left(folder: str, arguments: list[str]) -> dict[str, Any]:
-    import os  # noqa: PLC0415
-    import traceback  # noqa: PLC0415
+    import traceback  # noqa: PLC0415 - all of these belong to the process that is started
 
     from typer.testing import CliRunner  # noqa: PLC0415
 

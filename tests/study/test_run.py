@@ -1,6 +1,7 @@
 """One run and its comparison, from Python."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -58,9 +59,9 @@ def test_finished_run_is_not_run_again(kept: Result, scenario: Scenario, monkeyp
 
 
 def test_overwrite_runs_again(copy: Path, scenario: Scenario) -> None:
-    before = (copy / "run.json").stat().st_mtime_ns
+    os.utime(copy / "run.json", (0.0, 0.0))
     run(scenario, out=copy, overwrite=True)
-    assert (copy / "run.json").stat().st_mtime_ns > before
+    assert (copy / "run.json").stat().st_mtime_ns > 0
 
 
 def test_table_that_does_not_fit_the_blocks_is_reported_before_the_run(scenario: Scenario, tmp_path: Path) -> None:
