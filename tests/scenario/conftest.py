@@ -59,13 +59,6 @@ def valid_text() -> str:
     return VALID
 
 
-@pytest.fixture(params=sorted(SCENARIOS.glob("*.toml")), ids=lambda path: path.stem)
-def shipped(request: pytest.FixtureRequest) -> Path:
-    """Every scenario file that ships."""
-    path: Path = request.param
-    return path
-
-
 @pytest.fixture
 def refusal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Refusal:
     """Load a scenario that must be refused: exit code and message. Nothing may be written meanwhile."""

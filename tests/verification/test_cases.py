@@ -14,7 +14,7 @@ from tests.verification.rows import allowed, missed, same_kind
 
 ROOT = Path(__file__).parents[2]
 LAWS = {"linear": "linear", "Hertz–Mindlin": "hertz-mindlin"}  # head of the column in the README: law
-SLOW = {"V10", "V12", "V23"}  # seconds each; V9, V11 and the ledgers of tests/simulation are there always
+SLOW = {"V10", "V12", "V15", "V18", "V23"}  # seconds; V9, V11 and the ledgers of tests/simulation are there always
 LONG = pytest.mark.long
 HEADS = [
     pytest.param(

@@ -39,7 +39,7 @@ def test_rectangles_given_as_outlines_have_the_same_answers(case: Case, monkeypa
         assert now.measured == pytest.approx(was.measured, rel=1e-9, abs=room), was.quantity
 
 
-@pytest.mark.parametrize("name", ["V3", "V5", "V6", "V7", "V8"])
+@pytest.mark.parametrize("name", [pytest.param("V3", marks=pytest.mark.long), "V5", "V6", "V7", "V8"])
 def test_rectangles_given_as_outlines_have_the_same_answers_with_springs(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

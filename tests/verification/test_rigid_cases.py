@@ -29,10 +29,11 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[2]
 SETTING = Setting(scheme="nonsmooth")
 APPLY = chosen([], SETTING.scheme)
+SLOW = {"V18", "V23"}  # seconds; ledgers of tests/kernels/nonsmooth and tests/simulation are there always
 
 
 @pytest.mark.parametrize(
-    "case", [pytest.param(case, id=case.id, marks=pytest.mark.long if case.id == "V18" else ()) for case in APPLY]
+    "case", [pytest.param(case, id=case.id, marks=pytest.mark.long if case.id in SLOW else ()) for case in APPLY]
 )
 def test_case_is_inside_its_tolerances_and_what_the_readme_says_with_rigid_contacts(case: Case) -> None:
     found = run_case(case, SETTING)

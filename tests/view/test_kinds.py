@@ -28,8 +28,12 @@ SWEEPS = {
     "one member": (made_up(MEMBER, "sobol"), "lines"),
     "two keys of one member": (made_up(tuple(Input(str(i), "", np.ones(1)) for i in range(2)), "grid"), "lines"),
 }
+ODD = ("a word alone", "grid, some failed", "grid without measurements", "drawn", "one member")  # in all their kinds
 DRAWN = [
-    (name, kind) for name, (sweep, _) in SWEEPS.items() for kind in SWEEP_KINDS if not SWEEP_KINDS[kind].refusal(sweep)
+    (name, kind)
+    for name, (sweep, own) in SWEEPS.items()
+    for kind in SWEEP_KINDS
+    if (kind == own or name in ODD) and not SWEEP_KINDS[kind].refusal(sweep)
 ]
 
 

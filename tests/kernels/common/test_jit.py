@@ -57,7 +57,7 @@ for n, (model, law, steps) in enumerate(word.split(",") for word in sys.argv[3:]
     advance(world, int(steps))
     np.savez(sys.argv[2] + f"{n}.npz", **{key: part for key, part in world._asdict().items() if part is not None})
 """
-RUNS = ["surface,linear,400", "surface,hertz-mindlin,100", "kernel,linear,60", "particles,linear,60"]
+RUNS = ["surface,linear,200", "surface,hertz-mindlin,60", "kernel,linear,40", "particles,linear,40"]
 
 
 def python(program: str, *arguments: str | Path, folder: Path, **environment: str) -> list[str]:

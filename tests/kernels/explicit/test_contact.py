@@ -152,12 +152,12 @@ def lives(world: World) -> list[int]:
 
 
 @pytest.mark.parametrize("direction", [NORMAL, SHEAR])
-@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.7, 0.7), (0.6, 1.2), (0.0, 1.0)])
 @pytest.mark.parametrize(("count", "pattern"), [(1, 1), (2, BOTH), (2, 1), (2, 2)])
-@given(seed=st.integers(0, 10_000))
-@example(seed=70)  # tangents that are nearly parallel
+@given(seed=st.integers(0, 10_000), weights=st.sampled_from([(1.0, 1.0), (0.7, 0.7), (0.6, 1.2), (0.0, 1.0)]))
+@example(seed=70, weights=(1.0, 1.0))  # tangents that are nearly parallel
+@example(seed=70, weights=(0.6, 1.2))
 def test_dashpots_of_a_pair_follow_the_definition(
-    pose: Pose, direction: int, weights: tuple[float, float], count: int, pattern: int, seed: int
+    *, pose: Pose, direction: int, weights: tuple[float, float], count: int, pattern: int, seed: int
 ) -> None:
     world = two_points(pose, seed, direction)
     a, b = world.bodies[:2]

@@ -94,9 +94,8 @@ def added(points: Records, masses: np.ndarray, ratio: float, pattern: int) -> np
     return np.asarray(damped(points, operator_of(points, masses, ratio, pattern)) - points.force)
 
 
-@pytest.mark.parametrize("ratio", [0.05, 0.3, 0.9])
 @pytest.mark.parametrize("stiffness", [(K,), (K, K), (K, 0.2 * K)])
-@given(seed=SEEDS)
+@given(seed=SEEDS, ratio=st.sampled_from([0.05, 0.3, 0.9]))
 def test_every_mode_of_a_pair_has_the_asked_damping_ratio(
     stiffness: tuple[float, ...], ratio: float, seed: int
 ) -> None:
@@ -119,9 +118,7 @@ def test_dashpots_never_feed_energy(parallel: bool, alike: bool, seed: int) -> N
     assert np.linalg.eigvalsh(damping).min() > -1e-9 * np.abs(damping).max()
 
 
-@pytest.mark.parametrize("weight", [0.6, 1.0, 1.4])
-@pytest.mark.parametrize("ratio", [0.1, 1.0, 5.0])
-@given(seed=SEEDS)
+@given(seed=SEEDS, ratio=st.sampled_from([0.1, 1.0, 5.0]), weight=st.sampled_from([0.6, 1.0, 1.4]))
 def test_one_point_gets_the_dashpot_of_its_own_mass(ratio: float, weight: float, seed: int) -> None:
     masses = inverse_masses(1, seed)
     points = contact_points(1, seed, weight=weight)

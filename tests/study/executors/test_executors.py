@@ -40,7 +40,12 @@ def without_experiment(document: Document) -> Document:
 
 
 @pytest.mark.parametrize(
-    "options", [{"jobs": 3}, {"executor": "processes", "jobs": 2}, {"keep_cases": True, "jobs": 2}]
+    "options",
+    [
+        {"jobs": 3},
+        {"executor": "processes", "jobs": 2},
+        pytest.param({"keep_cases": True, "jobs": 2}, marks=pytest.mark.long),  # the same processes, with folders
+    ],
 )
 def test_table_is_the_same_from_every_executor(
     quick: Document, whole: bytes, tmp_path: Path, options: dict[str, object]
