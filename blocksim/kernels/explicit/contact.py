@@ -323,23 +323,23 @@ def pair_forces(world: World, p: int, step: float) -> None:
     action.is_too_deep = is_too_deep(world, p, count)
     model = world.controls[0].model
     action.asks = count != pair.active and model == SURFACE
+    had = pair.active
+    left = pair.normal_left
+    before = pair.stiffness
     if count == 0:
-        if pair.active > 0:
-            had = pair.active
+        if had > 0:
             change_contacts(world, p, 0, step, action)
-            hold_down(world, p, 0, had, True, pair.stiffness, step, action, world.corners)
+            hold_down(world, p, 0, had, True, before, left, step, action, world.corners)
         return
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
     values = world.interactions[a.contact_class, b.contact_class]
     if has_new_neighbours(a, b, model) or not has_constant_stiffness(world.controls[0].law):
         renew_dashpots(pair)
-    before = pair.stiffness
-    had = pair.active
     is_changed = resolve_points(world, p, count, step, action)
     if model == SURFACE:
         measure(world, p, count, values.normal_stiffness)
-        hold_down(world, p, count, had, is_changed, before, step, action, world.corners)
+        hold_down(world, p, count, had, is_changed, before, left, step, action, world.corners)
     shared = step if model == SURFACE else shared_step(a, b, step)
     normal_pass(world, p, count, values, shared)
     shear_pass(world, p, count, values, before, shared, action)

@@ -9,7 +9,8 @@ The springs of a pair hold U before and U' after such a change, and the kicks on
 F c/2 + F' c'/2 over the drift, c and c' being how far the contacts closed in it. For linear springs the energy that is
 left over, U - U' less that work, is the difference of U(k, g) before and after, with g the root of the overlaps at both
 ends of the drift on the same face: k d (d + c)/2 each. For springs of another power it is that to first order in the
-step. A change of stiffness by sliding and tilting is no loss, since it does work (tributary.py).
+step. A change of stiffness by sliding and tilting is no loss, since it does work (tributary.py): what the old contacts
+have is measured again on the faces that they had. Of the last drift that work is half done.
 """
 
 import math
@@ -17,11 +18,12 @@ import math
 from blocksim.kernels.common.arrays import Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit.bearing import keep_bearing
+from blocksim.kernels.explicit.damping import OPERATOR_LIFE
 from blocksim.kernels.explicit.history import TAKEN
 from blocksim.kernels.explicit.kinematics import resolve_point
 from blocksim.kernels.explicit.laws import stored_energy
-from blocksim.kernels.explicit.models import place_ended
-from blocksim.kernels.explicit.tributary import PLANE, Bearing
+from blocksim.kernels.explicit.models import place_ended, slot_normal
+from blocksim.kernels.explicit.tributary import PLANE, Bearing, bearing_of_facing, facing_of
 
 MOST_RISE = 1.05  # of the energy of a pair, where its contacts change: more is no round-off and no motion of one step
 NEGLIGIBLE = 1e-4  # of the limit of overlap: energies up to that of such an overlap are no matter, and may be round-off
@@ -36,20 +38,25 @@ def hold_down(
     had: int,
     is_changed: bool,
     before: float,
+    left: int,
     step: float,
     tally: Record,
     corners: Records | None,
 ) -> None:
     """Hold down the stiffness of a pair of polygons where its contacts change, and book what energy goes; see the top.
 
-    `had` contacts were there with the stiffness `before` (of the corner stiffness), `count` are there now.
+    `had` contacts were there with the stiffness `before` (N/m), to be measured again in `left` steps, `count` are there
+    now.
     """
     if corners is not None and world.pairs[p].bearing != PLANE and had > 0:
         was_held = world.pairs[p].is_held != 0
-        measured = before if was_held else world.pairs[p].stiffness
         hold_pair_down(world, p, count, had, is_changed, before)
+        if is_changed and not was_held:
+            now = stiffness_on_old_faces(world, p, count, had, before, corners)
+            since = OPERATOR_LIFE - left + 1 if left > 0 else 1  # steps
+            before += (1.0 - 0.5 / since) * (now - before)
         if is_changed or (was_held and world.pairs[p].is_held == 0):
-            tally.broken += energy_gone(world, p, count, had if is_changed else 0, before, measured, step)
+            tally.broken += energy_gone(world, p, count, had if is_changed else 0, before, step)
     elif corners is not None:
         world.pairs[p].is_held = 0
 
@@ -84,19 +91,45 @@ def between(law: int, stiffness: float, depth: float, closing: float) -> float:
 
 
 @rare_kernel
-def energy_gone(world: World, p: int, count: int, had: int, before: float, measured: float, step: float) -> float:
-    """Return the energy (J) that a pair has lost as its contacts, `had` before, changed; see the top.
+def stiffness_on_old_faces(world: World, p: int, count: int, had: int, before: float, table: Records) -> float:
+    """Return what the stiffness of a pair was `before`, of which `had` contacts are left, as it would be by now."""
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    deepest = 0.0
+    nx = 0.0
+    ny = 0.0
+    for i in range(count):
+        point = world.points[i]
+        if world.contacts[p, i].depth > deepest:
+            deepest = world.contacts[p, i].depth
+            nx = point.nx
+            ny = point.ny
+    for j in range(had):
+        old = world.before[j]
+        if old.slot != TAKEN and old.depth > deepest:
+            deepest = old.depth
+            nx, ny = slot_normal(world, pair, old.slot, old.face)
+    if deepest == 0.0:
+        return before
+    whole = world.interactions[a.contact_class, b.contact_class].normal_stiffness
+    share: float = bearing_of_facing(facing_of(a, b, nx, ny, table)).share
+    return whole * share
 
-    A contact that goes on had the stiffness `measured`, one that has ended had `before`.
-    """
+
+@rare_kernel
+def energy_gone(world: World, p: int, count: int, had: int, before: float, step: float) -> float:
+    """Return the energy (J) that a pair has lost as its contacts, `had` with the stiffness `before`, changed."""
     pair = world.pairs[p]
     law = world.controls[0].law
+    turned = step * (world.bodies[pair.a].spin - world.bodies[pair.b].spin)
     gone = 0.0
     for i in range(count):
         point = world.points[i]
         contact = world.contacts[p, i]
-        gone += between(law, measured, contact.depth, point.closing)
-        gone -= between(law, pair.stiffness, point.depth, -point.closing)
+        now = max(pair.stiffness - 0.5 * (pair.slide * point.slipping + pair.turn * turned), 0.0)
+        gone += between(law, before, contact.depth, point.closing)
+        gone -= between(law, now, point.depth, -point.closing)
     last = world.points[world.points.size - 1]
     for j in range(had):
         old = world.before[j]
