@@ -14,6 +14,7 @@ from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.verification.scene import Scene
 
 if TYPE_CHECKING:
+    from blocksim.kernels.common.arrays import World
     from blocksim.verification.scene import Simulation
 
 Outline = list[list[float]]
@@ -135,3 +136,24 @@ def test_only_corners_near_the_other_body_are_candidates() -> None:
     found = np.zeros(2 * MOST_CORNERS, dtype=np.int64)
     count = near_slots(world, 0, 1, 1.1e-3, found, world.corners)
     assert found[:count].tolist() == [MOST_CORNERS]
+
+
+def test_no_end_of_a_face_is_lost_between_two_sharp_corners() -> None:
+    """As at the back of an arch: where sharp ends lie on one another, neither corner need be inside the other body."""
+    depth = 1e-6
+    below = [[-0.02, -0.02], [0.02, -0.02], [0.03, 0.02], [-0.03, 0.02]]
+    above = [[-0.03, -0.02], [0.03, -0.02], [0.02, 0.02], [-0.02, 0.02]]
+    apart = 0.08 * 7.0 / 15.0  # m, of the centroids
+    for beside in (0.0, 0.1 * depth, -0.2 * depth):  # within a quarter of the depth: that is how far sides recede there
+        bodies = [{"y": 0.1, "outline": below}, {"x": beside, "y": 0.1 + apart, "outline": above}]
+
+        def press(world: World) -> None:
+            world.bodies[1].y -= depth
+
+        run = Scene(bodies, gravity=0.0, restitution=1.0).start(press)
+        contacts = run.touching
+        assert contacts.depth == pytest.approx([depth, depth], rel=1e-6)
+        assert run.bodies[1].ay * run.bodies[1].mass == pytest.approx(contacts.normal_force.sum(), rel=1e-9)
+        assert abs(run.bodies[1].spin_rate) * 0.03 < 1e-3 * run.bodies[1].ay
+        run.to_step(3)
+        assert run.contacts == 2
