@@ -2,6 +2,7 @@
 
 from blocksim.kernels.common.arrays import Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.explicit.damping import OPERATOR_LIFE, renew_dashpots
 from blocksim.kernels.explicit.models.duplicate_corners import PARALLEL
 from blocksim.kernels.explicit.tributary import (
     APART,
@@ -21,6 +22,8 @@ from blocksim.kernels.explicit.tributary import (
     stiffness_between,
 )
 
+MOST_CHANGE = 0.01  # of its stiffness, that a pair of polygons may miss until it is measured again
+
 
 @rare_kernel
 def keep_bearing(pair: Record, bearing: Bearing, stiffness: float) -> None:
@@ -28,6 +31,18 @@ def keep_bearing(pair: Record, bearing: Bearing, stiffness: float) -> None:
     pair.stiffness = stiffness * bearing.share
     pair.slide = stiffness * bearing.slide
     pair.turn = stiffness * bearing.turn
+
+
+@kernel
+def measure_soon(pair: Record, slip: float, turned: float, corners: Records | None) -> None:
+    """Have the stiffness of a pair of polygons measured in the next step where it changes fast, as on slivers.
+
+    `slip` (m) and `turned` (rad) are how far a has moved ahead of b, and turned, in the last drift.
+    """
+    if corners is not None:
+        change = abs(pair.slide * slip + pair.turn * turned)
+        if OPERATOR_LIFE * change > MOST_CHANGE * pair.stiffness:
+            renew_dashpots(pair)
 
 
 @rare_kernel

@@ -10,7 +10,7 @@ contacts continue as they were, which is what nearly all pairs do at nearly all 
 
 from blocksim.kernels.common.arrays import NORMAL, SHEAR, Record, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.bearing import measure
+from blocksim.kernels.explicit.bearing import measure, measure_soon
 from blocksim.kernels.explicit.coupled import MOBILITY, add_coupled_dashpots, fill_mobility
 from blocksim.kernels.explicit.damping import (
     BOTH,
@@ -344,4 +344,5 @@ def pair_forces(world: World, p: int, step: float) -> None:
     normal_pass(world, p, count, values, shared)
     shear_pass(world, p, count, values, before, shared, action)
     force_pass(world, p, count, action)
+    measure_soon(pair, world.points[0].slipping, step * (a.spin - b.spin), world.corners)
     keep_places(world, p, count)

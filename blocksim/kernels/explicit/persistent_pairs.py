@@ -11,6 +11,7 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import ALL, NORMAL, SHEAR, Record, Records, World
 from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.explicit.bearing import measure_soon
 from blocksim.kernels.explicit.contact import has_new_neighbours
 from blocksim.kernels.explicit.damping import BOTH, are_dashpots_due, damp_one, damp_two, note_slip, renew_dashpots
 from blocksim.kernels.explicit.friction import clip_to_cone, draw_lasting_spring
@@ -244,6 +245,7 @@ def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
     dashpot = 0.5 * (contact.normal_force - before * contact.depth + (normal - spring)) * found.closing
     drawn, shear, lost, friction = shear_of_one(world, p, a, b, found, normal, step, before)
     keep(contact, drawn, found.depth, normal, shear)
+    measure_soon(pair, found.slip, step * (a.spin - b.spin), world.corners)
     square = 0.5 * found.depth * found.depth
     shear += square * pair.slide
     fx = found.nx * normal + found.ny * shear
@@ -326,12 +328,12 @@ def double(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
     )
     keep(first, drawn_1, one.depth, normal_1, shear_1)
     keep(second, drawn_2, two.depth, normal_2, shear_2)
+    measure_soon(pair, one.slip, step * (a.spin - b.spin), world.corners)
     half_slide = 0.5 * pair.slide
     shear_1 += half_slide * one.depth * one.depth
     shear_2 += half_slide * two.depth * two.depth
     fx, fy, torque = sum_of_two(one, two, normal_1, normal_2, shear_1, shear_2)
-    dashpot = 0.5 * (lost_1 + lost_2) + lost
-    return TOUCHING, Effect(fx, fy, torque - (dx * fy - dy * fx), torque, dashpot, friction)
+    return TOUCHING, Effect(fx, fy, torque - (dx * fy - dy * fx), torque, 0.5 * (lost_1 + lost_2) + lost, friction)
 
 
 @kernel

@@ -54,11 +54,12 @@ def test_elastic_impact_on_a_sliver_gains_next_to_nothing_and_the_ledger_has_it(
     run, before = struck(name, restitution=1.0, friction=0.0)
     assert run.world.ledger.broken.sum() != 0.0
     assert run.mechanical <= (1.0 + SLIVERS[name][-1]) * before
-    assert run.residual() < 1e-3
+    assert run.residual() < 1e-4
 
 
 @pytest.mark.parametrize("name", SLIVERS)
-def test_ledger_closes_where_impacts_on_slivers_rub(name: str) -> None:
-    run, _ = struck(name, restitution=1.0, friction=0.3)
-    assert run.world.ledger.friction.sum() > 0.0
-    assert run.residual() < 1e-3
+def test_ledger_closes_where_impacts_on_slivers_are_damped_and_rub(name: str) -> None:
+    """The stiffness of a sliver changes by a tenth in a few steps: it is measured in each of them."""
+    run, _ = struck(name, restitution=0.5, friction=0.3)
+    assert run.world.ledger.dashpot.sum() > 0.0
+    assert run.residual() < 1e-4
