@@ -279,6 +279,21 @@ def test_corner_beyond_the_end_of_its_face_is_not_steady(pose: Pose, shift: floa
     assert_changed(world)
 
 
+@pytest.mark.parametrize(("shift", "changes"), [(0.0, False), (0.016, False), (0.0171, True)])
+def test_corner_of_a_polygon_beyond_the_end_of_its_face_is_not_steady(
+    start: Start, shift: float, changes: bool
+) -> None:
+    def press(world: World) -> None:
+        world.bodies[1].y -= 1e-6
+
+    below, above = {"y": APOTHEM, **HEXAGON, "fixed": True}, {"x": 0.003, "y": 3.0 * APOTHEM, **HEXAGON}
+    world = start([below, above], change=press).world  # their faces are 20 mm long
+    assert world.pairs[0].active == 2
+    world.bodies[1].x += shift
+    kind, _ = persistent_forces(world, 0, 0.0, world.particles, world.corners)
+    assert kind == (CHANGED if changes else TOUCHING)
+
+
 @pytest.mark.parametrize(("down", "changes"), [(-0.9e-6, True), (0.0, False)])
 def test_corner_that_begins_is_not_steady(pose: Pose, down: float, changes: bool) -> None:
     world = pose((0.0, tip(1e-4) - 1e-6, 1e-4))  # on its lower left corner, the other one 2 um above the ground
