@@ -73,6 +73,25 @@ def test_a_particle_that_strikes_the_ground_keeps_a_fifth_of_its_speed_at_most()
     assert 0.0 < float(soil.soils.points["vy"][flies][0]) < 1.01 * 0.5 * math.exp(-0.5 * math.pi)
 
 
+def test_particles_that_have_parted_do_not_bounce_off_one_another() -> None:
+    soil = Soil(scene(column(0.04, 0.04, SPACING), gravity=0.0))
+    points, number = soil.soils.points, soil.soils.states["number"]
+
+    def pair() -> tuple[int, int]:
+        return int(np.flatnonzero(number == 0)[0]), int(np.flatnonzero(number == 1)[0])
+
+    for i, x, speed in zip(pair(), (0.2, 0.2 + SPACING), (-0.5, 0.5), strict=True):
+        points["x"][i], points["y"][i], points["vx"][i] = x, 0.2, speed
+    soil.soils.controls.is_listed[0] = 0
+    soil.to_time(0.015)
+    one, other = pair()
+    assert points["x"][other] - points["x"][one] > 3.0 * SPACING  # nothing holds them
+    points["vx"][[one, other]] = 0.5, -0.5
+    soil.to_time(0.06)
+    one, other = pair()
+    assert abs(points["vx"][other] - points["vx"][one]) < 0.25
+
+
 def test_soil_without_any_strength_presses_like_water() -> None:
     table = column(0.05, 0.05, SPACING, start="ramp", material="water")
     soil = Soil(scene(table, walls=[LEFT, right(0.05)]))

@@ -24,6 +24,7 @@ POINT = record_type(
 STATE = record_type(
     "sxx syy szz sxy "  # Pa, tension positive
     "plastic "  # -: accumulated plastic shear strain, the integral of (2 e:e)^(1/2) of the plastic rate e
+    "opening "  # -: volume strain of the gaps, which carry no stress
     "fx fy "  # N: all forces but gravity in the current evaluation
     "drag_x drag_y",  # N: what artificial viscosity contributes to them
     indices="number "  # as in the scenario
@@ -35,6 +36,7 @@ KIND = record_type(
     "density mass volume "  # kg/m3, kg, m3 of a particle
     "lame shear bulk "  # Pa: Lame's first parameter, shear modulus, bulk modulus
     "slope cohesion "  # -, Pa: (J2)^(1/2) = cohesion - slope I1 is the yield surface
+
     "impedance "  # kg/(m2 s): density times wave speed
     "settling settled",  # 1/s, s: rate of damping at the start, and when it ends
     flags="is_corrected",

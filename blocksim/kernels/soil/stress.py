@@ -8,6 +8,11 @@ adds what the strain of the step gives, with the strain out of the plane zero, a
 returns to it at the same pressure: the deviator is scaled by Y/(J2)^(1/2), Y = k - a I1, which is exact as the plastic
 flow has no volume change. Where Y < 0 there is nothing but the apex, I1 = k/a.
 
+Soil that is stretched beyond the apex opens: the volume strain that finds no stress is kept as that of gaps (the volume
+correction of A. P. Tampubolon et al., ACM Trans. Graph. 36 (2017) 105). When it closes again, gaps take all but a share
+of the compression. Without them, soil that has opened would be as stiff as ever from the first touch on: grains that fly
+would bounce off one another like balls of rubber, and what has once opened would never be dense again.
+
 In plane strain such a flow ends where s_zz is zero, as its rate is proportional to the deviator and has no component
 out of the plane. So the failing stress lies midway, s_zz = (s_1 + s_2)/2, (J2)^(1/2) = |s_1 - s_2|/2 and
 I1 = 3 (s_1 + s_2)/2: with a = sin(phi)/3 and k = c cos(phi) the surface is Mohr and Coulomb's.
@@ -17,6 +22,9 @@ import math
 
 from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.jit import kernel
+
+# Share of the work of closing gaps that soil gives back: as much as a contact with a body, exp(-pi/2) of the speed.
+RESILIENCE = math.exp(-math.pi)
 
 
 @kernel
@@ -71,11 +79,26 @@ def return_to_surface(state: Record, kind: Record) -> float:
         factor = most / deviator
     elif kind.slope > 0.0:
         mean = kind.cohesion / (3.0 * kind.slope)
+    state.opening += (total / 3.0 - mean) / kind.bulk
     state.sxx = mean + factor * (state.sxx - total / 3.0)
     state.syy = mean + factor * (state.syy - total / 3.0)
     state.szz = mean + factor * (state.szz - total / 3.0)
     state.sxy *= factor
     return deviator * (1.0 - factor)
+
+
+@kernel
+def close_gaps(state: Record, kind: Record, volume: float) -> float:
+    """Close gaps of a particle whose stress has followed a volume strain (-) of the step; return by how much (-)."""
+    if state.opening == 0.0 or volume >= 0.0:
+        return 0.0
+    pressed = -(state.sxx + state.syy + state.szz) / (3.0 * kind.bulk)
+    closed: float = min(state.opening, (1.0 - RESILIENCE) * max(min(pressed, -volume), 0.0))
+    state.opening -= closed
+    state.sxx += kind.bulk * closed
+    state.syy += kind.bulk * closed
+    state.szz += kind.bulk * closed
+    return closed
 
 
 @kernel
@@ -92,8 +115,9 @@ def strain(state: Record, kind: Record, ux: float, uy: float, wx: float, wy: flo
     state.syy = syy + volume + 2.0 * kind.shear * dyy
     state.szz = before + volume
     state.sxy = sxy + 2.0 * kind.shear * dxy
+    closed = close_gaps(state, kind, dxx + dyy)
     lost = return_to_surface(state, kind)
-    if lost == 0.0:
+    if lost == 0.0 and closed == 0.0:
         total, _ = invariants(state.sxx, state.syy, state.szz, state.sxy)
         if strength(kind, total) >= 0.0:
             return 0.0

@@ -91,6 +91,24 @@ def test_soil_without_cohesion_takes_no_tension_and_clay_only_up_to_the_apex() -
         assert deviator == pytest.approx(0.0, abs=1e-9)
 
 
+def test_opened_soil_closes_with_little_pressure_and_is_as_dense_as_before() -> None:
+    kind, state = kind_of(), state_under(0.0)
+    for rate in (1.0, -1.0):
+        for _ in range(200):
+            lost = strain(state, kind, rate, 0.0, 0.0, rate, STEP)
+            assert lost >= 0.0
+    closed, _ = deviator_of(state)
+    assert 0.0 < -closed / 3.0 < 0.05 * kind.bulk * 0.004  # a strain of 0.004 away and back
+    assert state.opening < 0.05 * 0.004
+    for _ in range(50):
+        strain(state, kind, -1.0, 0.0, 0.0, -1.0, STEP)
+    assert state.opening == 0.0
+    before, _ = deviator_of(state)
+    strain(state, kind, -1.0, 0.0, 0.0, -1.0, STEP)
+    after, _ = deviator_of(state)
+    assert (before - after) / 3.0 == pytest.approx(kind.bulk * 2.0 * STEP, rel=1e-6)  # stiff again
+
+
 def test_an_elastic_step_loses_nothing_and_stores_its_work() -> None:
     kind, state = kind_of("clay"), state_under(PRESSURE)
     assert strain(state, kind, -1.0, 0.3, 0.1, -0.5, STEP) == 0.0
