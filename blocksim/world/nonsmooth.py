@@ -41,6 +41,7 @@ WEAK_RESTITUTION = 0.5  # up to which the impacts of a substep happen all at onc
 ALONE = 2  # blocks: so few have impacts in rounds at any restitution
 FINEST, FINE, COARSE = 1e-6, 1e-3, 0.1  # m/s: tolerances of the velocity pass; see velocity_tolerance
 CROWD = 100  # blocks
+TOUCH = 1e-12  # of the smallest side: points with no larger gap touch
 LINE_WORDS = CACHE_LINE // 8  # so that no two threads write to one cache line
 
 
@@ -147,6 +148,7 @@ def _stepping(outline: Outline, stride: Stride) -> dict[str, float]:
         "substep": substep,
         "length": stride.step,
         "rest_gap": time.restitution_threshold * substep,
+        "touch_gap": TOUCH * min((min(body.size_x, body.size_y) for body in outline.placed), default=0.0),
         "frequency": soft.frequency,
         "damping": DAMPING,
         "closed_bias": soft.bias,

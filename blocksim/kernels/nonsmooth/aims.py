@@ -17,7 +17,7 @@ from blocksim.kernels.common.simd import (
 )
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
 from blocksim.kernels.nonsmooth.groups import Bodies
-from blocksim.kernels.nonsmooth.slip import Constraints, Slip, slip_of
+from blocksim.kernels.nonsmooth.slip import Constraints, Slip, presses, slip_of
 
 
 @kernel
@@ -58,13 +58,13 @@ def rebound(approach: Lanes, start: Lanes, pull: Lanes, restitution: Lanes, step
 
 
 @kernel
-def target(impulse: Lanes, gap: Lanes, least: Lanes) -> Lanes:
+def target(impulse: Lanes, inverse_mass: Lanes, gap: Lanes, least: Lanes, stepping: Record) -> Lanes:
     """Return what J v of a point has to be at least (m/s) after the velocity pass; -FAR where it does not count.
 
     A gap that is still open must not slow an approach down: it would take a part of it in the substep before the
     impact, and restitution would vanish for small substeps.
     """
-    return branch((impulse > 0.0) | (gap <= 0.0), least, -FAR)
+    return branch(presses(impulse, inverse_mass, stepping) | (gap <= stepping.touch_gap), least, -FAR)
 
 
 @kernel
@@ -76,7 +76,7 @@ def aim(
     gap_one, gap_two = gaps(group, lane, constraint, a, b, stepping.next_bend_time)
     normal_one = load(lane, group.normal_one)
     normal_two = load(lane, group.normal_two)
-    if is_all((lesser(gap_one, gap_two) > 0.0) & (greater(normal_one, normal_two) <= 0.0)):
+    if is_all((lesser(gap_one, gap_two) > stepping.touch_gap) & (greater(normal_one, normal_two) <= 0.0)):
         none = 0.0 * gap_one - FAR
         store(lane, group.target_one, none)
         store(lane, group.target_two, none)
@@ -84,8 +84,11 @@ def aim(
     vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
     vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
     u = slip_of(constraint, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
-    t_one = target(normal_one, gap_one, -branch(gap_one > 0.0, gap_one, 0.0) * stepping.open_bias)
-    t_two = target(normal_two, gap_two, -branch(gap_two > 0.0, gap_two, 0.0) * stepping.open_bias)
+    inverse_mass = a.inverse_mass + b.inverse_mass
+    least_one = -branch(gap_one > 0.0, gap_one, 0.0) * stepping.open_bias
+    least_two = -branch(gap_two > 0.0, gap_two, 0.0) * stepping.open_bias
+    t_one = target(normal_one, inverse_mass, gap_one, least_one, stepping)
+    t_two = target(normal_two, inverse_mass, gap_two, least_two, stepping)
     if not is_all((lesser(u.one, u.two) >= -stepping.threshold) | (greater(t_one, t_two) <= -FAR)):
         t_one, t_two = with_rebounds(contacts, group, lane, constraint, a, b, u, t_one, t_two)
     store(lane, group.target_one, t_one)

@@ -112,6 +112,7 @@ STEPPING = record_type(
     "bend_share "  # -: of the bend of a constraint, what velocities gain up to the middle of the current substep
     "bend_time next_bend_time "  # s: times the bend, by how much gaps at its start and end are off
     "rest_gap "  # m: points with no larger one touch others at an impact
+    "touch_gap "  # m: points with no larger one touch: round-off is smaller, and must not decide
     "frequency damping "  # 1/s, -: w and zeta of points in contact
     "length gone",  # s: of the current part of a step, and of the step before it; parts.py
     "substeps "

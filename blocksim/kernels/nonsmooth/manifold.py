@@ -23,6 +23,7 @@ from blocksim.kernels.common.simd import (
     fields_8,
     fields_16,
     greater,
+    is_all,
     lesser,
     select,
     split,
@@ -30,7 +31,7 @@ from blocksim.kernels.common.simd import (
     write_fields_4,
     write_fields_8,
 )
-from blocksim.kernels.nonsmooth.arrays import AWAY, OPEN, TOUCHING, Contacts
+from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, OPEN, TOUCHING, Contacts
 from blocksim.kernels.nonsmooth.faces import (
     Block,
     Points,
@@ -46,7 +47,7 @@ from blocksim.kernels.nonsmooth.faces import (
 from blocksim.kernels.nonsmooth.gap_curvature import bend_of
 from blocksim.kernels.nonsmooth.pieces import points_on_ground, points_on_level, points_on_piece
 from blocksim.kernels.nonsmooth.polygons import corners_on_ground, follow_corners, points_of_polygons
-from blocksim.kernels.nonsmooth.slip import Motion
+from blocksim.kernels.nonsmooth.slip import Constraints, Motion, presses
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller half side: two faces that face each other over less are passed by
@@ -61,6 +62,7 @@ class Place(NamedTuple):
     ahead: float  # s: those that press
     half: float  # s: half a substep
     is_ground: bool
+    stepping: Record
 
 
 @kernel
@@ -108,10 +110,16 @@ def chosen(is_one: Mask, one: Block, two: Block) -> Block:
 
 
 @kernel
+def nothing(zero: Lanes, is_of_b: Mask) -> Points:
+    """Return a manifold without points."""
+    return Points(Constraints(zero, zero, zero, zero, zero, zero, zero), zero + FAR, zero + FAR, is_of_b)
+
+
+@kernel
 def points_of_blocks(a: Block, b: Block, margin: float) -> tuple[Points, Mask]:
     """Return the contact manifold of two blocks within the margin (m), and whether there is one.
 
-    No processor can predict which faces meet, so the code has no branches.
+    No processor can predict which faces meet, so the code has no branches but one, for pairs that are not near.
     """
     dx = a.x - b.x
     dy = a.y - b.y
@@ -127,7 +135,10 @@ def points_of_blocks(a: Block, b: Block, margin: float) -> tuple[Points, Mask]:
     gap_ay = abs(ay) - a.half_y - s_abs * b.half_x - c_abs * b.half_y
     best_b = greater(gap_bx, gap_by)
     best_a = greater(gap_ax, gap_ay)
+    farthest = greater(best_a, best_b)
     is_of_b = best_b + TIE >= best_a
+    if is_all(farthest > margin):
+        return nothing(0.0 * farthest, is_of_b), farthest <= margin
     of_x = select(is_of_b, gap_bx, gap_ax)
     of_y = select(is_of_b, gap_by, gap_ay)
     is_level = lesser(c_abs, s_abs) < LEVEL
@@ -135,17 +146,27 @@ def points_of_blocks(a: Block, b: Block, margin: float) -> tuple[Points, Mask]:
     face = face_towards(chosen(is_of_b, b, a), select(is_of_b, bx, -ax), select(is_of_b, by, -ay), along_x)
     edge = clip(opposite_edge(face, chosen(is_of_b, a, b)), face.half)
     points = points_of(face, edge, a, b, is_of_b, margin)
-    is_near = (greater(best_a, best_b) <= margin) & (edge.right > edge.left)
+    is_near = (farthest <= margin) & (edge.right > edge.left)
     return points, is_near & has_point(points)
 
 
 @kernel
-def reach_of(constraint: Record) -> int:
-    """Return True if a constraint within the margin has a point that touches or pressed in the last substep."""
-    is_touching = (
-        min(constraint.gap_one, constraint.gap_two) <= 0.0 or constraint.normal_one > 0.0 or constraint.normal_two > 0.0
-    )
-    return TOUCHING if is_touching else OPEN
+def reach_of(constraint: Record, inverse_mass: float, stepping: Record) -> int:
+    """Return TOUCHING if a constraint within the margin has a point that touches or pressed in the last substep.
+
+    `inverse_mass` (1/kg) is that of both bodies together.
+    """
+    gap = min(constraint.gap_one, constraint.gap_two)
+    is_pressed = presses(constraint.normal_one + constraint.normal_two, inverse_mass, stepping)
+    return TOUCHING if gap <= stepping.touch_gap or is_pressed else OPEN
+
+
+@kernel
+def inverse_masses_at(states: Records, a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> Lanes:
+    """Return the inverse masses (1/kg) of the bodies of four pairs, both together."""
+    _, _, _, of_a = fields_0(None, states, a)
+    _, _, _, of_b = fields_0(None, states, b)
+    return of_a + of_b
 
 
 @kernel
@@ -164,24 +185,35 @@ def blocks_at(
 def collide_four(contacts: Contacts, bodies: Records, first: int, ahead: float) -> None:
     """Find the manifolds of four pairs of blocks from constraint `first` on; those that press a time `ahead` (s)."""
     constraints = contacts.constraints
+    stepping = contacts.stepping[0]
     places = (first, first + 1, first + 2, first + 3)
     one, two, three, four = constraints[first], constraints[first + 1], constraints[first + 2], constraints[first + 3]
+    places_a = (one.a, two.a, three.a, four.a)
+    places_b = (one.b, two.b, three.b, four.b)
+    inverse_mass = inverse_masses_at(contacts.states, places_a, places_b)
     _, normal_one, normal_two, _ = fields_8(None, constraints, places)
-    are_pressed = normal_one + normal_two > 0.0
+    are_pressed = presses(normal_one + normal_two, inverse_mass, stepping)
     times = select(are_pressed, ahead, 0.0)
-    half = select(are_pressed, 0.5 * contacts.stepping[0].substep, 0.0)
-    a, vx_a, vy_a, spin_a = blocks_at(bodies, contacts.states, (one.a, two.a, three.a, four.a), times)
-    b, vx_b, vy_b, spin_b = blocks_at(bodies, contacts.states, (one.b, two.b, three.b, four.b), times)
-    points, is_near = points_of_blocks(a, b, contacts.stepping[0].margin)
+    half = select(are_pressed, 0.5 * stepping.substep, 0.0)
+    a, vx_a, vy_a, spin_a = blocks_at(bodies, contacts.states, places_a, times)
+    b, vx_b, vy_b, spin_b = blocks_at(bodies, contacts.states, places_b, times)
+    points, is_near = points_of_blocks(a, b, stepping.margin)
     motion = Motion(vx_a - vx_b, vy_a - vy_b, spin_a, spin_b, times, half)
-    write_four(constraints, places, at_start(points, motion), motion, is_near)
+    write_four(contacts, places, at_start(points, motion), motion, is_near, inverse_mass)
 
 
 @kernel
 def write_four(
-    constraints: Records, places: tuple[int, int, int, int], points: Points, motion: Motion, is_near: Mask
+    contacts: Contacts,
+    places: tuple[int, int, int, int],
+    points: Points,
+    motion: Motion,
+    is_near: Mask,
+    inverse_mass: Lanes,
 ) -> None:
     """Write the manifolds of four constraints; without one the impulses are forgotten."""
+    constraints = contacts.constraints
+    stepping = contacts.stepping[0]
     found = points.constraint
     nx, ny, _, _ = fields_0(None, constraints, places)
     _, normal_one, normal_two, shear = fields_8(None, constraints, places)
@@ -195,7 +227,8 @@ def write_four(
     write_fields_4(None, constraints, places, are_all, columns)
     write_fields_8(None, constraints, places, are_all, (points.gap_two, normal_one, normal_two, shear))
     bend = bend_of(found, motion, points.is_of_b, normal_two > normal_one)
-    is_touching = (lesser(points.gap_one, points.gap_two) <= 0.0) | (greater(normal_one, normal_two) > 0.0)
+    is_pressed = presses(normal_one + normal_two, inverse_mass, stepping)
+    is_touching = (lesser(points.gap_one, points.gap_two) <= stepping.touch_gap) | is_pressed
     reach = select(is_near, select(is_touching, 1.0 * TOUCHING, 1.0 * OPEN), 1.0 * AWAY)
     one, two, three, four = (
         constraints[places[0]],
@@ -226,7 +259,8 @@ def collide(
 
     `corners` are those of all polygons; where there are none, the compiler leaves them out altogether.
     """
-    is_pressed = constraint.normal_one + constraint.normal_two > 0.0
+    inverse_mass = line_a.inverse_mass + line_b.inverse_mass
+    is_pressed = presses(constraint.normal_one + constraint.normal_two, inverse_mass, place.stepping)
     ahead = place.ahead if is_pressed else 0.0
     one = block_ahead(block_of(a), line_a.vx, line_a.vy, line_a.spin, ahead)
     two = block_ahead(block_of(b), line_b.vx, line_b.vy, line_b.spin, ahead)
@@ -235,7 +269,7 @@ def collide(
         half = place.half if is_pressed else 0.0
         motion = Motion(line_a.vx - line_b.vx, line_a.vy - line_b.vy, line_a.spin, line_b.spin, ahead, half)
         write_points(constraint, at_start(points, motion), motion)
-        constraint.reach = reach_of(constraint)
+        constraint.reach = reach_of(constraint, inverse_mass, place.stepping)
     else:
         constraint.normal_one = constraint.normal_two = constraint.shear = 0.0
         constraint.reach = AWAY

@@ -1,7 +1,7 @@
 """What happens to bodies one by one: kick and warm start, drift, poses."""
 
 from blocksim.kernels.common.arrays import Record, Records
-from blocksim.kernels.common.geometry import place_corners, turn
+from blocksim.kernels.common.geometry import turn
 from blocksim.kernels.common.jit import kernel
 from blocksim.kernels.nonsmooth.arrays import Contacts
 
@@ -30,8 +30,8 @@ def kick_warm(state: Record, before: Record, last: float, hx: float, hy: float) 
     vy = state.vy
     spin = state.spin
     before.lifted -= vx * hx + vy * hy
-    state.vx += vx - before.vx + (1.0 - last) * hx
-    state.vy += vy - before.vy + (1.0 - last) * hy
+    state.vx += vx - (before.vx - (1.0 - last) * hx)
+    state.vy += vy - (before.vy - (1.0 - last) * hy)
     state.spin += spin - before.spin
     before.vx = vx
     before.vy = vy
@@ -92,7 +92,6 @@ def place(body: Record, state: Record, before: Record, share: float, h: float, g
     body.y += state.dy
     body.angle += state.turned
     body.cos, body.sin = turn(body.cos, body.sin, state.turned)
-    place_corners(body)
     before.lifted += state.dx * gravity[0] + state.dy * gravity[1]
     state.dx = 0.0
     state.dy = 0.0

@@ -20,6 +20,7 @@ from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, Nonsmooth
 from blocksim.kernels.nonsmooth.begin import is_start
+from blocksim.kernels.nonsmooth.slip import presses
 
 FINE = 1.0 / 64.0  # of a step: the part in which an impact falls
 MOST_PARTS = 32  # of a step; what is left then is one more
@@ -92,9 +93,13 @@ def set_length(scene: Nonsmooth, length: float) -> None:
 def mark_pressed(scene: Nonsmooth) -> None:
     """Mark the bodies with a contact that presses, not only in an impact."""
     scene.used[:] = 0
-    for r in range(scene.contacts.stepping[0].constraint_count):
+    states = scene.contacts.states
+    stepping = scene.contacts.stepping[0]
+    for r in range(stepping.constraint_count):
         constraint = scene.contacts.constraints[r]
-        if constraint.normal_one + constraint.normal_two > 0.0 and not constraint.is_struck:
+        inverse_mass = states[constraint.a].inverse_mass + states[constraint.b].inverse_mass
+        impulse = constraint.normal_one + constraint.normal_two
+        if presses(impulse, inverse_mass, stepping) and not constraint.is_struck:
             scene.used[constraint.a] = 1
             scene.used[constraint.b] = 1
 

@@ -2,6 +2,9 @@
 
 Formulas: __init__.py. Velocities are read, changed by all impulses of a constraint and written back. Bodies that are
 fixed are never written to, so that constraints of one colour share nothing that changes.
+
+Few blocks wait for one constraint after the other, so sums are put together such that what needs no velocity is there
+when the velocities of the constraint before come.
 """
 
 from blocksim.kernels.common.arrays import Record, Records
@@ -135,13 +138,15 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     one, mixed, two = masses(group, lane, constraint, a, b)
     old_one = load(lane, group.normal_one)
     old_two = load(lane, group.normal_two)
-    k_one = one + select(gap_one > 0.0, 0.0, stepping.softness) * one
-    k_two = two + select(gap_two > 0.0, 0.0, stepping.softness) * two
+    is_open_one = gap_one > stepping.touch_gap
+    is_open_two = gap_two > stepping.touch_gap
+    k_one = one + branch(is_open_one, 0.0, stepping.softness) * one
+    k_two = two + branch(is_open_two, 0.0, stepping.softness) * two
     bend = stepping.bend_share * load(lane, group.bend)
-    free_one = slip.one + bend + select(gap_one > 0.0, stepping.open_bias, stepping.closed_bias) * gap_one
-    free_two = slip.two + bend + select(gap_two > 0.0, stepping.open_bias, stepping.closed_bias) * gap_two
-    q_one = free_one - (one * old_one + mixed * old_two)
-    q_two = free_two - (mixed * old_one + two * old_two)
+    rate_one = bend + branch(is_open_one, stepping.open_bias, stepping.closed_bias) * gap_one
+    rate_two = bend + branch(is_open_two, stepping.open_bias, stepping.closed_bias) * gap_two
+    q_one = slip.one + (rate_one - (one * old_one + mixed * old_two))
+    q_two = slip.two + (rate_two - (mixed * old_one + two * old_two))
     if is_all((lesser(q_one, q_two) >= 0.0) & (greater(old_one, old_two) <= 0.0)):
         return  # gaps that stay open
     new_one, new_two = solve_two(lane, k_one, mixed, k_two, q_one, q_two)
@@ -224,8 +229,8 @@ def reach(
     old_shear = load(lane, group.shear)
     share = contacts.stepping[0].bend_share
     bend = share * load(lane, group.bend)
-    q_one = slip.one + bend - t_one - one * old_one - mixed * old_two
-    q_two = slip.two + bend - t_two - mixed * old_one - two * old_two
+    q_one = slip.one + (bend - t_one - (one * old_one + mixed * old_two))
+    q_two = slip.two + (bend - t_two - (mixed * old_one + two * old_two))
     new_one, new_two = solve_two(lane, one, mixed, two, q_one, q_two)
     store(lane, group.normal_one, new_one)
     store(lane, group.normal_two, new_two)
@@ -235,13 +240,9 @@ def reach(
     # slip along the tangent after the normal impulses
     coupled_a = a.inverse_inertia * constraint.shear_arm_a
     coupled_b = b.inverse_inertia * constraint.shear_arm_b
-    turn = constraint.width * d_two
-    rate = (
-        slip.shear
-        + share * load(lane, group.shear_bend)
-        + coupled_a * (constraint.arm_a * normal - turn)
-        + coupled_b * (constraint.arm_b * normal - turn)
-    )
+    by_normal = coupled_a * constraint.arm_a + coupled_b * constraint.arm_b
+    by_width = (coupled_a + coupled_b) * constraint.width
+    rate = (slip.shear + share * load(lane, group.shear_bend)) + (by_normal * normal - by_width * d_two)
     mass = shear_mass(group, lane, constraint, a, b)
     needed = old_shear - rate * (1.0 / mass)
     limit = shear_limits(contacts, group, lane, new_one + new_two, abs(needed), mass)

@@ -2,8 +2,9 @@
 
 from typing import NamedTuple
 
+from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.jit import kernel
-from blocksim.kernels.common.simd import Lanes
+from blocksim.kernels.common.simd import Lanes, Mask
 
 
 class Constraints(NamedTuple):
@@ -42,8 +43,19 @@ class Motion(NamedTuple):
 
 
 @kernel
+def presses(impulse: Lanes, inverse_mass: Lanes, stepping: Record) -> Mask:
+    """Return True if an impulse (N s) is more than round-off: if it moves bodies by more than `touch_gap` in a substep.
+
+    `inverse_mass` (1/kg) is that of both bodies together.
+    """
+    return inverse_mass * impulse > stepping.touch_gap * stepping.open_bias
+
+
+@kernel
 def slip_of(constraint: Constraints, vx: Lanes, vy: Lanes, spin_a: Lanes, spin_b: Lanes) -> Slip:
     """Return the velocities at the points, given that of centre a against centre b and both spins."""
-    one = constraint.nx * vx + constraint.ny * vy + constraint.arm_a * spin_a - constraint.arm_b * spin_b
-    shear = constraint.nx * vy - constraint.ny * vx + constraint.shear_arm_a * spin_a - constraint.shear_arm_b * spin_b
+    along = constraint.nx * vx + constraint.ny * vy
+    across = constraint.nx * vy - constraint.ny * vx
+    one = along + (constraint.arm_a * spin_a - constraint.arm_b * spin_b)
+    shear = across + (constraint.shear_arm_a * spin_a - constraint.shear_arm_b * spin_b)
     return Slip(one, one - constraint.width * (spin_a - spin_b), shear)

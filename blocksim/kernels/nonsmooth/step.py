@@ -112,8 +112,9 @@ def find_manifolds(scene: Nonsmooth, begin: int, end: int) -> None:
     bodies = scene.world.bodies
     constraints = contacts.constraints
     ground = bodies.size - 1
-    h = contacts.stepping[0].substep
-    ahead = 0.5 * (contacts.stepping[0].length - h)
+    stepping = contacts.stepping[0]
+    h = stepping.substep
+    ahead = 0.5 * (stepping.length - h)
     r = begin
     while r < end:
         if r + WIDTH <= end and are_four_of_blocks(constraints, r, bodies):
@@ -122,7 +123,7 @@ def find_manifolds(scene: Nonsmooth, begin: int, end: int) -> None:
         else:
             constraint = constraints[r]
             states = contacts.states
-            place = Place(contacts.stepping[0].margin, ahead, 0.5 * h, constraint.b == ground)
+            place = Place(stepping.margin, ahead, 0.5 * h, constraint.b == ground, stepping)
             collide(
                 constraint,
                 bodies[constraint.a],

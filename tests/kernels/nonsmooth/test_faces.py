@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.kernels.common.arrays import zeros
-from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, STATE
+from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, STATE, STEPPING
 from blocksim.kernels.nonsmooth.faces import Block, Edge, Face, block_ahead, block_of, clip, face_towards, in_frame
 from blocksim.kernels.nonsmooth.manifold import Place, collide
 from tests.kernels.nonsmooth.references import corners, places_of
@@ -72,7 +72,7 @@ def test_block_ahead_turns_to_third_order_in_the_angle() -> None:
 
 def on_ground(body: Record, ground: Record, margin: float) -> Record:
     constraint, states = zeros(1, CONSTRAINT)[0], zeros(2, STATE)
-    collide(constraint, body, ground, states[0], states[1], Place(margin, 0.0, 0.0, True), None)
+    collide(constraint, body, ground, states[0], states[1], Place(margin, 0.0, 0.0, True, zeros(1, STEPPING)[0]), None)
     return constraint
 
 

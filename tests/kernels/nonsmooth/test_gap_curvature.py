@@ -65,7 +65,7 @@ def examples(make_body: MakeBody) -> list[Moving]:
         a = brought_near(make_body, b, np.array([0.02, 0.03]), angle, way, gap)
         known = meeting(a, b, MARGIN)
         constraint, states = zeros(1, CONSTRAINT)[0], zeros(2, STATE)
-        collide(constraint, a, b, states[0], states[1], Place(MARGIN, 0.0, 0.0, False), None)
+        collide(constraint, a, b, states[0], states[1], Place(MARGIN, 0.0, 0.0, False, zeros(1, STEPPING)[0]), None)
         if known.is_of_b == (len(found) % 2 == 0) and max(constraint.gap_one, constraint.gap_two) >= FAR:
             other, of, sign = (a, b, 1.0) if known.is_of_b else (b, a, -1.0)
             ways = np.abs(corners(other) - known.places[0]).sum(axis=1)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import zeros
-from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, STATE, TOUCHING
+from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, STATE, STEPPING, TOUCHING
 from blocksim.kernels.nonsmooth.manifold import Place, collide
 from blocksim.kernels.nonsmooth.step import find_manifolds
 from tests.kernels.nonsmooth.references import apart, brought_near, meeting, places_of
@@ -42,7 +42,7 @@ def pairs(make_body: MakeBody, pace: int) -> list[tuple[Record, Record]]:
 def row_of(a: Record, b: Record, margin: float = MARGIN) -> Record:
     """Return the constraint of two bodies at rest that have not touched before."""
     constraint, states = zeros(1, CONSTRAINT)[0], zeros(2, STATE)
-    collide(constraint, a, b, states[0], states[1], Place(margin, 0.0, 0.0, False), None)
+    collide(constraint, a, b, states[0], states[1], Place(margin, 0.0, 0.0, False, zeros(1, STEPPING)[0]), None)
     return constraint
 
 
@@ -174,7 +174,7 @@ def test_impulses_are_kept_until_the_normal_has_turned_by_25_degrees(
     constraint, states = zeros(1, CONSTRAINT)[0], zeros(2, STATE)
     constraint.normal_one, constraint.normal_two, constraint.shear = 3.0, 2.0, 1.0
     constraint.nx, constraint.ny = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
-    collide(constraint, a, b, states[0], states[1], Place(MARGIN, 0.0, 0.0, False), None)
+    collide(constraint, a, b, states[0], states[1], Place(MARGIN, 0.0, 0.0, False, zeros(1, STEPPING)[0]), None)
     expected = (3.0, 2.0, 1.0) if is_kept else (0.0, 0.0, 0.0)
     assert (constraint.normal_one, constraint.normal_two, constraint.shear) == expected
 
@@ -194,7 +194,7 @@ def test_impulses_are_forgotten_where_blocks_have_parted(make_body: MakeBody) ->
         make_body(),
         states[0],
         states[1],
-        Place(MARGIN, 0.0, 0.0, False),
+        Place(MARGIN, 0.0, 0.0, False, zeros(1, STEPPING)[0]),
         None,
     )
     assert (constraint.normal_one, constraint.normal_two, constraint.shear, constraint.reach) == (0.0, 0.0, 0.0, AWAY)
@@ -204,13 +204,20 @@ def test_impulses_are_forgotten_where_blocks_have_parted(make_body: MakeBody) ->
 def test_contact_that_presses_has_the_normal_and_arms_of_the_middle_of_the_step(
     make_body: MakeBody, pressed: bool
 ) -> None:
-    """One to come is taken as it is. Gaps are those of now, along that normal and those arms."""
+    """One to come is taken as it is, one with an impulse of round-off too. Gaps are those of now, along that normal."""
     ahead = 1e-3
     a, b = make_body(0.004, 0.0262, 0.06), make_body(0.0, 0.0, 0.02)
     states, constraint = zeros(2, STATE), zeros(1, CONSTRAINT)[0]
     states.vx, states.vy, states.spin = (0.4, -0.1), (-0.3, 0.2), (8.0, -9.0)
-    constraint.normal_one, constraint.nx, constraint.ny = float(pressed), 0.0, 1.0
-    collide(constraint, a, b, states[0], states[1], Place(MARGIN, ahead, 0.5e-3, False), None)
+    states.inverse_mass = 9.0
+    stepping = zeros(1, STEPPING)[0]
+    stepping.touch_gap, stepping.open_bias = 1e-14, 1e4
+    constraint.normal_one, constraint.nx, constraint.ny = (
+        (1e-8 if pressed else 1e-13),
+        0.0,
+        1.0,
+    )  # 18/kg makes 1e-10 m/s
+    collide(constraint, a, b, states[0], states[1], Place(MARGIN, ahead, 0.5e-3, False, stepping), None)
     time = ahead if pressed else 0.0
     late_a, late_b = (
         make_body(body.x + time * state.vx, body.y + time * state.vy, body.angle + time * state.spin)

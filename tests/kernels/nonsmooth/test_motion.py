@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.nonsmooth.arrays import BEFORE, STATE
 from blocksim.kernels.nonsmooth.motion import drift_all, is_in_flight, kick, kick_warm, place
-from tests.kernels.nonsmooth.references import corners
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record
@@ -76,7 +75,6 @@ def test_step_ends_with_the_pose_that_the_drifts_add_up_to(
     place(body, one, before, 1.0, H, GRAVITY)
     assert (body.x, body.y, body.angle) == pytest.approx((0.21, 0.08, 0.6 + turned), abs=1e-15)
     assert (body.cos, body.sin) == pytest.approx((math.cos(body.angle), math.sin(body.angle)), abs=1e-14)
-    assert (body.x + body.upper_x, body.y + body.upper_y) == pytest.approx(corners(body)[2].tolist(), abs=1e-14)
     brought = np.array([0.0, 0.0, 0.0]) if is_touching else np.array([*KICK, 0.0]) / 2
     assert [body.vx, body.vy, body.spin] == pytest.approx(velocity + brought, abs=1e-15)
     assert (one.dx, one.dy, one.turned) == (0.0, 0.0, 0.0)

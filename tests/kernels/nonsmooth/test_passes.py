@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.kernels.common.arrays import INTERACTION, zeros
-from blocksim.kernels.nonsmooth.iterate import POSITION, WARM, sweep
+from blocksim.kernels.nonsmooth.iterate import FIRST_VELOCITY, POSITION, WARM, sweep
 from blocksim.kernels.nonsmooth.motion import kick_all
 from blocksim.kernels.nonsmooth.passes import shear_limit
 from blocksim.kernels.nonsmooth.substep import substep
@@ -186,6 +186,16 @@ def test_position_pass_holds_soft_contacts_and_lets_gaps_just_close(gap: float, 
     assert np.abs(rest * all_of.impulses).max() < 1e-12 * (1.0 + all_of.impulses.max())
     assert np.any(all_of.impulses > 0.0) or rate > 0.0 or rate * H > -abs(gap)
     assert np.all(all_of.shears == 0.0)  # friction is no affair of the position pass
+
+
+def test_round_off_of_a_gap_does_not_choose_between_the_rules() -> None:
+    """What a pass has just closed is open by 1e-20 m or deep by it, as sums happen to be rounded."""
+    scenes = [soft_row(gap, -0.05, 0.0)[0] for gap in (-1e-16, 1e-16)]
+    deep, open_ = (velocities(scene.contacts.states)[0] for scene in scenes)
+    assert deep == pytest.approx(open_, abs=1e-11)
+    for scene in scenes:
+        sweep(scene.contacts, FIRST_VELOCITY, scene.world.team, 0)
+    assert [dense(scene).impulses.min() > 0.0 for scene in scenes] == [True, True]
 
 
 def test_gap_that_stays_open_and_parts_that_leave_are_not_pulled() -> None:
