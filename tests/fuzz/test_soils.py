@@ -34,7 +34,7 @@ ODD: st.SearchStrategy[Any] = st.sampled_from(
 
 def mostly(values: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
     """Draw a sound value, and once in forty times an odd one."""
-    return st.integers(0, 39).flatmap(lambda kind: values if kind else ODD)
+    return st.integers(0, 39).flatmap(lambda kind: ODD if kind == 17 else values)
 
 
 def between(low: float, high: float) -> st.SearchStrategy[Any]:
@@ -57,8 +57,8 @@ SHAPE = st.one_of(
     st.fixed_dictionaries(
         {
             "kind": st.just("slope"),
-            "x": st.tuples(st.just(0.0), between(0.05, 0.2)).map(list),
-            "angle": mostly(st.integers(20, 160).map(lambda angle: f"{angle} deg")),
+            "x": st.tuples(st.just(0.0), between(0.11, 0.2)).map(list),
+            "angle": mostly(st.integers(40, 140).map(lambda angle: f"{angle} deg")),
         }
     ),
 )
@@ -75,9 +75,9 @@ SOIL = st.fixed_dictionaries(
 def scenes(draw: st.DrawFn) -> dict[str, Any]:
     """Draw a block beside a body of soil of any material, which may rest on a second one."""
     soils = [{"name": "one", "material": "earth", "y": [0.0, draw(LENGTH)], **draw(SHAPE), **draw(SOIL)}]
-    if draw(st.integers(0, 3)) == 0:
-        high = [0.2, draw(between(0.21, 0.3))]
-        soils.append({**soils[0], "name": draw(st.sampled_from(["two", "two", "one"])), "y": high})
+    if draw(st.integers(0, 3)) == 2:
+        high = [0.2, draw(between(0.23, 0.3))]
+        soils.append({**soils[0], "name": draw(st.sampled_from(["two", "two", "two", "one"])), "y": high})
     body = {"block": "stone", "x": draw(between(-0.1, -0.021)), "y": draw(between(0.02, 0.05))}
     walls = [{"from": [0.21, 0.0], "to": [0.21, 0.3], "material": "granite"}] if draw(st.booleans()) else []
     return {
