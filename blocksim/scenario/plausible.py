@@ -1,21 +1,43 @@
-"""Warnings of values that are allowed but hardly meant: as a rule a number without the unit that was in mind."""
+"""Warnings of values that are allowed but hardly meant: as a rule a number without the unit that was in mind.
+
+And of soil whose particles leave a part of its shape empty.
+"""
 
 from collections.abc import Iterator
+from math import ceil
 
 from blocksim.scenario import keys
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.variation import Normal, Uniform
+from blocksim.scenario.polygons import count_across
+from blocksim.scenario.soil_places import soil_tables
 
 STEEPEST = 5.0
 """Friction coefficient (79 degrees) above which a friction angle without its unit is more likely."""
 LIGHTEST, HEAVIEST = 25.0, 25_000.0  # kg/m3: foams and osmium
 SOFTEST = 1e4  # Pa: gels
 LONGEST = 50.0  # m
+MOST_EMPTY = 0.01  # of the width or height of a soil: its thrust goes with the square of the height
 
 
 def implausible_values(scenario: Scenario) -> list[str]:
     """Return a warning for each value that looks like one in another unit; of frictions swept ones too."""
-    return [*_bare_numbers(scenario), *_friction_angles(scenario)]
+    return [*_bare_numbers(scenario), *_friction_angles(scenario), *_unfilled_soils(scenario)]
+
+
+def _unfilled_soils(scenario: Scenario) -> Iterator[str]:
+    """Find soils of whose width or height no whole number of particles takes all, and a finer spacing that does."""
+    for soil in soil_tables(scenario):
+        extents = soil.corners.max(axis=0) - soil.corners.min(axis=0)
+        for way, extent, count in zip(
+            ("width", "height"), extents, count_across(soil.corners, soil.spacing), strict=True
+        ):
+            if extent - count * soil.spacing > MOST_EMPTY * extent:
+                fits = 1e3 * extent / ceil(extent / soil.spacing)
+                yield (
+                    f"{keys.format_key(('soils', soil.name, 'spacing'))} = {1e3 * soil.spacing:.4g} mm fills "
+                    f"{1e3 * count * soil.spacing:.4g} of {1e3 * extent:.4g} mm of the {way}; {fits:.4g} mm fills all"
+                )
 
 
 def _bare_numbers(scenario: Scenario) -> Iterator[str]:

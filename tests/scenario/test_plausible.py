@@ -7,6 +7,7 @@ import pytest
 
 from blocksim.scenario import Document
 from blocksim.scenario.plausible import implausible_values
+from tests.soils import column, scene
 
 THREE_BLOCKS = Path(__file__).parents[2] / "scenarios" / "three_blocks.toml"
 APART = THREE_BLOCKS.with_name("bounce.toml")  # one block, of any size
@@ -45,3 +46,17 @@ def test_numbers_that_look_like_another_unit_are_warned_of(settings: dict[str, A
     given = {key: {**base, **value} if isinstance(value, dict) else value for key, value in settings.items()}
     found = implausible_values(Document.read(APART).with_values(given).build())
     assert [text.removesuffix("; write the unit that is meant") for text in found] == expected
+
+
+@pytest.mark.parametrize(
+    ("settings", "expected"),
+    [
+        ({}, []),
+        ({"spacing": 0.004}, ["soils.column.spacing = 4 mm fills 48 of 50 mm of the height; 3.846 mm fills all"]),
+        ({"x": [0.0, 0.1004]}, []),  # less than a hundredth
+        ({"x": [0.0, 0.104]}, ["soils.column.spacing = 5 mm fills 100 of 104 mm of the width; 4.952 mm fills all"]),
+    ],
+)
+def test_soil_that_leaves_a_part_of_its_shape_empty_is_warned_of(settings: dict[str, Any], expected: list[str]) -> None:
+    found = implausible_values(scene({**column(0.1, 0.05, 0.005), **settings}))
+    assert found == expected
