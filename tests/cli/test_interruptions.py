@@ -59,12 +59,12 @@ def assert_same(folder: Path, whole: Path) -> None:
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
-def kill_again_and_again(process: Process, folder: Path, kills: int, most: float) -> int:
+def kill_again_and_again(process: Process, folder: Path, kills: int, most: float, run: tuple[str, ...] = LONG) -> int:
     """Kill a run that continues and on; look at its folder each time; return how many times it was killed."""
     moments = np.random.default_rng(kills)
     killed = 0
     while killed < kills and not (folder / "done.json").exists():
-        running = process(*LONG, *OFTEN, "--out", folder, "--resume")
+        running = process(*run, *OFTEN, "--out", folder, "--resume")
         wait_for(folder / "scenario.toml", running)
         time.sleep(moments.uniform(0.0, most))
         before = committed(folder / "run.h5")
@@ -96,6 +96,19 @@ def test_killed_run_continues_to_the_same_bits(process: Process, tmp_path: Path,
     _, err = running.communicate(timeout=PATIENCE)
     assert running.returncode == 0, err
     assert_same(folder, whole)
+
+
+@pytest.mark.long
+def test_killed_run_with_soil_continues_to_the_same_bits(process: Process, tmp_path: Path) -> None:
+    run = ("run", str(SCENARIOS / "soil" / "seawall.toml"), "--set", "time.end=0.2", "--quiet")
+    whole = in_one_go(run, tmp_path / "whole")
+    folder = tmp_path / "out"
+    assert kill_again_and_again(process, folder, in_all(5), 1.5, run) >= 1
+    running = process(*run, "--out", folder, "--resume")
+    _, err = running.communicate(timeout=PATIENCE)
+    assert running.returncode == 0, err
+    assert_same(folder, whole)
+    assert (folder / "soils.csv").read_bytes() == (whole / "soils.csv").read_bytes()
 
 
 @pytest.mark.long
