@@ -36,7 +36,7 @@ def test_the_dry_wall_falls_where_limit_analysis_says_in_at_most_25_runs(blocksi
 
 
 def test_both_laws_are_compared(blocksim: Command, golden: Golden) -> None:
-    soft = ("--set", "contact.stiffness_scale=0.001", "--set", "time.end=0.5 s", "--set", "start.settle=true")
+    soft = ("--set", "contact.stiffness_scale=0.001", "--set", "time.end=0.25 s", "--set", "start.settle=true")
     answer = blocksim(*WALL, "--vary", "ground.tilt=0 deg:40 deg:3", *ROUGHER, "--both-laws", *soft)
     assert answer.code == 0
     assert "rigid contacts against springs: " in answer.out

@@ -111,7 +111,7 @@ def test_stopped_sweep_is_75_and_ends_its_workers(process: Process, tmp_path: Pa
 
 def test_terminal_shows_progress_on_one_line_and_clears_it(process: Process) -> None:
     leader, follower = pty.openpty()
-    running = process(*SLOW, "--set", "time.end=4", "--out", "out", stderr=follower)
+    running = process(*SLOW, "--set", "time.end=2", "--out", "out", stderr=follower)
     os.close(follower)
     shown = b""
     while select.select([leader], [], [], PATIENCE)[0]:
@@ -123,6 +123,6 @@ def test_terminal_shows_progress_on_one_line_and_clears_it(process: Process) -> 
     os.close(leader)
     text = shown.decode()
     assert running.returncode == 0
-    assert "of 4 s " in text
+    assert "of 2 s " in text
     assert "steps/s, relative energy error " in text
     assert "…" not in text

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 from multiprocessing import active_children
 from pathlib import Path
@@ -99,15 +100,22 @@ def test_folder_holds_plan_table_and_manifest_and_the_plan_repeats_the_sweep(qui
     assert len(lines(tmp_path)) == 2
 
 
-def test_kept_cases_are_runs_in_a_folder_for_each_different_one(quick: Document, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def with_cases(quick: Document, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
+    """Sweep with the cases kept, two of which are one; return the folder, not to be changed, and their names."""
+    folder = tmp_path_factory.mktemp("swept") / "with_cases"
     vary: dict[str, Values] = {END: [0.01, "10 ms", 0.005]}
-    result = sweep(quick, vary, out=tmp_path, jobs=1, keep_cases=True)
-    assert result.table["status"].tolist() == ["finished"] * 3
-    cases = result.table["case"].tolist()
-    assert sorted({*cases}) == sorted(path.name for path in (tmp_path / "cases").iterdir())
+    table = sweep(quick, vary, out=folder, jobs=1, keep_cases=True).table
+    assert table["status"].tolist() == ["finished"] * 3
+    return folder, table["case"].tolist()
+
+
+def test_kept_cases_are_runs_in_a_folder_for_each_different_one(with_cases: tuple[Path, list[str]]) -> None:
+    folder, cases = with_cases
+    assert sorted({*cases}) == sorted(path.name for path in (folder / "cases").iterdir())
     assert cases[0] == cases[1] != cases[2]
-    assert (tmp_path / "cases" / cases[2] / "run.h5").is_file()
-    scenario = load_scenario(tmp_path / "cases" / cases[2] / "scenario.toml")
+    assert (folder / "cases" / cases[2] / "run.h5").is_file()
+    scenario = load_scenario(folder / "cases" / cases[2] / "scenario.toml")
     assert (scenario.time.end, scenario.sweep) == (0.005, None)
 
 
@@ -227,19 +235,21 @@ MINE = {
 }
 
 
-def test_overwriting_a_sweep_leaves_all_that_it_did_not_write(quick: Document, tmp_path: Path) -> None:
-    short = quick.with_values({END: 0.01})
-    first = sweep(short, TWO, out=tmp_path, keep_cases=True, jobs=1).table["case"]
-    (tmp_path / "cases" / first[0] / "remarks.txt").write_text("this one looks odd")
-    kept = content(tmp_path / "cases" / first[0])
+def test_overwriting_a_sweep_leaves_all_that_it_did_not_write(
+    quick: Document, with_cases: tuple[Path, list[str]], tmp_path: Path
+) -> None:
+    folder, (first, _, other) = with_cases
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    (tmp_path / "cases" / first / "remarks.txt").write_text("this one looks odd")
+    kept = content(tmp_path / "cases" / first)
     (tmp_path / "cases" / "mine").mkdir()
     for name, text in MINE.items():
         (tmp_path / name).write_text(text)
-    again = sweep(short, {KINETIC: [0.1]}, out=tmp_path, overwrite=True)
+    again = sweep(quick, {KINETIC: [0.1]}, out=tmp_path, overwrite=True)
     assert again.table[KINETIC].tolist() == [0.1]
     assert {name: (tmp_path / name).read_text() for name in MINE} == MINE
-    assert content(tmp_path / "cases" / first[0]) == kept
-    assert not (tmp_path / "cases" / first[1]).exists()
+    assert content(tmp_path / "cases" / first) == kept
+    assert not (tmp_path / "cases" / other).exists()
 
 
 @pytest.mark.parametrize("overwrite", [False, True])
@@ -333,6 +343,7 @@ def test_rubbish_for_a_sweep_table_and_a_missing_one_are_refused(tmp_path: Path,
         read_sweep(tmp_path)
 
 
+@pytest.mark.long
 def test_interrupt_between_two_rows_ends_the_workers_at_once(tmp_path: Path) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
