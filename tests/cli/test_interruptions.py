@@ -191,7 +191,7 @@ def test_run_of_other_code_or_values_that_waits_is_reported(blocksim: Command) -
     assert "an unfinished run of another scenario or code version is in results/three_blocks_nominal/" in answer.err
 
 
-@pytest.mark.parametrize("executor", ["ensemble", "processes"])
+@pytest.mark.parametrize("executor", ["ensemble", pytest.param("processes", marks=pytest.mark.long)])
 def test_sweep_around_a_case_that_blows_up_continues(blocksim: Command, tmp_path: Path, executor: str) -> None:
     forced = ("--set", "time.force_step=true", "--set", "contact.max_overlap=1", "--vary", "time.step=1e-6,5e-4,2e-6")
     shorter = ("--set", "time.end=0.01", "--jobs", "1", "--executor", executor)

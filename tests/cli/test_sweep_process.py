@@ -76,7 +76,7 @@ def test_endless_case_is_given_up_at_once(process: Process, tmp_path: Path, numb
     endless = ("--vary", "time.end=1e4,2e4", "--set", "time.stop_at_rest=false")
     running = process("sweep", "scenarios/three_blocks_nonsmooth.toml", *endless, "--out", "out")
     wait_for(tmp_path / "out" / "manifest.jsonl", running)
-    time.sleep(0.5)
+    time.sleep(0.2)
     running.send_signal(number)
     _, err = running.communicate(timeout=PATIENCE)  # the case itself would take longer than that
     assert running.returncode == 75

@@ -21,7 +21,7 @@ def test_ctrl_c_ends_the_workers_at_once(nominal: Document, tmp_path: Path) -> N
     batches = run_tasks(tasks, Setting(2, folder=tmp_path))
     assert next(batches).tasks[0].name == "quick"
     before = signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGINT))
-    signal.setitimer(signal.ITIMER_REAL, 0.5)
+    signal.setitimer(signal.ITIMER_REAL, 0.2)
     try:
         with pytest.raises(KeyboardInterrupt):
             next(batches)
