@@ -10,6 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 from blocksim.kernels.common import jit
+from blocksim.kernels.common.compiler import compiling
 
 JOBS = 2
 DONE = "sets-of-tests"  # the mark of a cache that has all sets
@@ -20,12 +21,13 @@ SETS = ("outlines-with-springs", "outlines", "nonsmooth", "with-particles", "sur
 
 def compile_set(name: str) -> None:
     """Compile one set of kernels, and what runs ensembles and teams of threads."""
-    if name == SPH:
-        _use_particles()
-    elif name == SOIL:
-        _run_soil()
-    else:
-        _run_smallest(name)
+    with compiling():
+        if name == SPH:
+            _use_particles()
+        elif name == SOIL:
+            _run_soil()
+        else:
+            _run_smallest(name)
 
 
 def _run_smallest(name: str) -> None:
