@@ -1,4 +1,4 @@
-"""Arches of voussoirs with rigid contacts: least thickness and tilt, bracketed within a percent; limit analysis."""
+"""Arches of voussoirs: least thickness and tilt, bracketed within a percent, rigid and on springs; limit analysis."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ import pytest
 
 from blocksim.scenario import load_scenario
 from blocksim.scenario.outlines import centred
+from blocksim.simulation import simulate
 from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.settling import SettleError
 from blocksim.study.limit_curve import limit_curve
 from blocksim.verification.arches import COCCHETTI_RIZZI, HEAD, VOUSSOIRS, least_thickness
 from blocksim.verification.scene import Simulation
@@ -22,6 +24,7 @@ from tests.simulation.conftest import SCENARIOS
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from blocksim.scenario import Scenario
     from blocksim.scenario.outlines import Corners
 
 RADIUS = 10.0  # m, mean
@@ -82,6 +85,24 @@ def at_its_own_step(friction: float, thickness: float) -> Simulation:
 def test_automatic_step_is_short_enough_for_the_least_thickness(friction: float, least: float) -> None:
     assert fastest(at_its_own_step(friction, 0.99 * least * RADIUS)) > FALLS
     assert fastest(at_its_own_step(friction, 1.01 * least * RADIUS)) < STANDS
+
+
+def on_springs(friction: float, thickness: float) -> Scenario:
+    """Return the arch of `arch.toml`, of a thickness (m), settled on springs of full stiffness."""
+    arch = {"kind": "arch", "block": "voussoir", "radius": RADIUS, "thickness": thickness, "count": 27}
+    frictions = {"block_block": friction, "block_ground": friction}
+    time = {"end": 1.0, "stop_at_rest": False}
+    values: Any = {"time": time, "start": {"settle": True}, "friction": frictions, "structures": [arch]}
+    return load_scenario(SCENARIOS / "arch.toml", values)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("friction", "least"), LEAST)
+def test_least_thickness_of_an_arch_settled_on_springs_is_that_of_limit_analysis(friction: float, least: float) -> None:
+    with pytest.raises(SettleError, match="does not come to rest"):
+        simulate(on_springs(friction, 0.99 * least * RADIUS))
+    stands = simulate(on_springs(friction, 1.01 * least * RADIUS))
+    assert np.hypot(stands.frames.vx, stands.frames.vy).max() < STANDS
 
 
 @pytest.mark.parametrize(("friction", "least"), LEAST)

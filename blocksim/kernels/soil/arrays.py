@@ -36,7 +36,6 @@ KIND = record_type(
     "density mass volume "  # kg/m3, kg, m3 of a particle
     "lame shear bulk "  # Pa: Lame's first parameter, shear modulus, bulk modulus
     "slope cohesion "  # -, Pa: (J2)^(1/2) = cohesion - slope I1 is the yield surface
-
     "impedance "  # kg/(m2 s): density times wave speed
     "settling settled",  # 1/s, s: rate of damping at the start, and when it ends
     flags="is_corrected",
