@@ -39,7 +39,7 @@ from blocksim.world.systems.system import Present
 SECONDS_PER_BODY_AND_STEP = 75e-9
 SECONDS_IN_A_CROWD = 250e-9  # where bodies have neighbours on all sides
 CROWD = 50  # bodies
-OUTLINES_COST = 6.0  # times as much, where blocks with outlines are on springs
+OUTLINES_COST = 1.5  # times as much, where blocks with outlines are on springs: 1.0 to 1.7 measured
 # with particles: a block, and each particle around it; in a crowd as many times that, as all its faces touch others
 SECONDS_WITH_PARTICLES = {"kernel": (1.5e-6, 10e-9, 5.0), "particles": (0.7e-6, 6e-9, 2.0)}
 SECONDS_IN_A_SUBSTEP = 400e-9  # a block, where contacts are rigid
