@@ -50,6 +50,18 @@ def test_the_energy_of_a_collapse_adds_up(gradient: str) -> None:
     assert change["soils_viscosity"] < -0.06 * change["soils_potential"]  # else it stops thin fronts, not friction
 
 
+@pytest.mark.parametrize("gradient", ["raw", "corrected"])
+def test_the_energy_of_soil_that_strikes_the_ground_at_four_metres_a_second_adds_up(gradient: str) -> None:
+    soil = Soil(scene(column(0.05, 0.05, SPACING, gradient=gradient), walls=[LEFT], gravity=0.0))
+    soil.soils.points["vx"], soil.soils.points["vy"] = -2.0, -4.0
+    soil.soils.controls.is_listed[0] = 0
+    before = sum(soil.entries().values())
+    soil.to_time(0.008)
+    after = soil.entries()
+    assert after["soils_kinetic"] < 0.6 * before  # it has struck, and rebounds
+    assert sum(after.values()) == pytest.approx(before, rel=0.001)
+
+
 def test_a_column_between_smooth_walls_comes_to_rest_with_its_weight_on_the_ground() -> None:
     table = column(0.05, 0.05, SPACING, start="ramp")
     pairs = {"rods": {"smooth": {"friction": 0.0}, "ground": {"friction": 0.0}}}

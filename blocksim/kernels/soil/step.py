@@ -8,7 +8,7 @@ import math
 from blocksim.kernels.common.arrays import Integers, Record, World
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.simd import Lanes, fields_0, split, spread
+from blocksim.kernels.common.simd import fields_0, split, spread
 from blocksim.kernels.common.systems import part_of_thread
 from blocksim.kernels.soil.arrays import CLUSTER, GROUP, Soils
 from blocksim.kernels.soil.contact import particles_of_thread
@@ -116,16 +116,21 @@ def stress_particle(
     state: Record,
     kind: Record,
     gradient: tuple[float, float, float, float],
-    correction: tuple[float, float, float],
+    halfway: tuple[float, float, float],
+    now: tuple[float, float, float],
     step: float,
 ) -> float:
-    """Advance the stress of a particle, and what its neighbours feel of it; return the energy (J) lost to flow."""
+    """Advance the stress of a particle, and what its neighbours feel of it; return the energy (J) lost to flow.
+
+    Its gradient is corrected as half way through the step, forces as at the end of it.
+    """
     ux, uy, wx, wy = gradient
     bxx, bxy, byy = 1.0, 0.0, 1.0
     if kind.is_corrected:
-        bxx, bxy, byy = correction
+        bxx, bxy, byy = halfway
         ux, uy = ux * bxx + uy * bxy, ux * bxy + uy * byy
         wx, wy = wx * bxx + wy * bxy, wx * bxy + wy * byy
+        bxx, bxy, byy = now
     lost = strain(state, kind, ux, uy, wx, wy, step)
     point.pxx = state.sxx * bxx + state.sxy * bxy
     point.pxy = state.sxx * bxy + state.sxy * byy
@@ -135,30 +140,34 @@ def stress_particle(
 
 
 @kernel
-def corrections_of(soils: Soils, c: int, near: Integers, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-    """Return the corrections of the particles of a cluster at these places (m), if any of them is corrected."""
+def is_any_corrected(soils: Soils, c: int) -> bool:
+    """Return True if the gradient of any particle of a cluster is corrected."""
     is_corrected = False
     for i in range(CLUSTER * c, min(CLUSTER * (c + 1), soils.points.size)):
         is_corrected = is_corrected or soils.kinds[soils.states[i].kind].is_corrected != 0
-    if is_corrected:
-        return correction(soils.controls[0], soils.points, near, x, y)
-    return spread(1.0), spread(0.0), spread(1.0)
+    return is_corrected
 
 
 @kernel
 def stress_cluster(soils: Soils, c: int, near: Integers, step: float) -> float:
     """Advance the stresses of the particles of a cluster; return the energy (J) lost to flow."""
-    x, y, vx, vy = fields_0(None, soils.points, places_of(soils, c))
-    lanes = raw_gradient(soils.controls[0], soils.points, near, x, y, vx, vy)
+    controls, points, lag = soils.controls[0], soils.points, 0.5 * step
+    x, y, vx, vy = fields_0(None, points, places_of(soils, c))
+    lanes = raw_gradient(controls, points, near, x, y, vx, vy, lag)
     ux, uy, wx, wy = split(lanes[0]), split(lanes[1]), split(lanes[2]), split(lanes[3])
-    by = corrections_of(soils, c, near, x, y)
-    bxx, bxy, byy = split(by[0]), split(by[1]), split(by[2])
+    halfway = now = spread(1.0), spread(0.0), spread(1.0)
+    if is_any_corrected(soils, c):
+        halfway = correction(controls, points, near, x, y, vx, vy, lag)
+        now = correction(controls, points, near, x, y, vx, vy, 0.0)
+    hxx, hxy, hyy = split(halfway[0]), split(halfway[1]), split(halfway[2])
+    bxx, bxy, byy = split(now[0]), split(now[1]), split(now[2])
     lost = 0.0
-    for m in range(min(CLUSTER, soils.points.size - CLUSTER * c)):
+    for m in range(min(CLUSTER, points.size - CLUSTER * c)):
         i = CLUSTER * c + m
         state = soils.states[i]
-        gradient, tensor = (ux[m], uy[m], wx[m], wy[m]), (bxx[m], bxy[m], byy[m])
-        lost += stress_particle(soils.points[i], state, soils.kinds[state.kind], gradient, tensor, step)
+        gradient = ux[m], uy[m], wx[m], wy[m]
+        tensors = (hxx[m], hxy[m], hyy[m]), (bxx[m], bxy[m], byy[m])
+        lost += stress_particle(points[i], state, soils.kinds[state.kind], gradient, tensors[0], tensors[1], step)
     return lost
 
 

@@ -9,9 +9,9 @@ returns to it at the same pressure: the deviator is scaled by Y/(J2)^(1/2), Y = 
 flow has no volume change. Where Y < 0 there is nothing but the apex, I1 = k/a.
 
 Soil that is stretched beyond the apex opens: the volume strain that finds no stress is kept as that of gaps (the volume
-correction of A. P. Tampubolon et al., ACM Trans. Graph. 36 (2017) 105). When it closes again, gaps take all but a share
-of the compression. Without them, soil that has opened would be as stiff as ever from the first touch on: grains that fly
-would bounce off one another like balls of rubber, and what has once opened would never be dense again.
+correction of A. P. Tampubolon et al., ACM Trans. Graph. 36 (2017) 105). When it closes again, gaps take all but a
+share of the compression. Without them, soil that has opened would be as stiff as ever from the first touch on: grains
+that fly would bounce off one another like balls of rubber, and what has once opened would never be dense again.
 
 In plane strain such a flow ends where s_zz is zero, as its rate is proportional to the deviator and has no component
 out of the plane. So the failing stress lies midway, s_zz = (s_1 + s_2)/2, (J2)^(1/2) = |s_1 - s_2|/2 and
@@ -102,18 +102,16 @@ def close_gaps(state: Record, kind: Record, volume: float) -> float:
 
 
 @kernel
-def strain(state: Record, kind: Record, ux: float, uy: float, wx: float, wy: float, step: float) -> float:
-    """Advance the stress of a particle by a step (s) of a velocity gradient (1/s); return the energy (J) lost to flow.
+def stretch(state: Record, kind: Record, dxx: float, dyy: float, dxy: float) -> float:
+    """Advance the stress of a particle by a strain (-); return the energy (J) lost to flow and gaps.
 
-    dvx/dx, dvx/dy, dvy/dx, dvy/dy. The loss is the work of the mean stress less what elasticity has gained.
+    The loss is the work of the mean stress less what elasticity has gained.
     """
-    dxx, dyy, dxy = step * ux, step * wy, 0.5 * step * (uy + wx)
-    sxx, syy, sxy = turned(state.sxx, state.syy, state.sxy, 0.5 * step * (wx - uy))
-    before = state.szz
+    sxx, syy, szz, sxy = state.sxx, state.syy, state.szz, state.sxy
     volume = kind.lame * (dxx + dyy)
     state.sxx = sxx + volume + 2.0 * kind.shear * dxx
     state.syy = syy + volume + 2.0 * kind.shear * dyy
-    state.szz = before + volume
+    state.szz = szz + volume
     state.sxy = sxy + 2.0 * kind.shear * dxy
     closed = close_gaps(state, kind, dxx + dyy)
     lost = return_to_surface(state, kind)
@@ -122,8 +120,22 @@ def strain(state: Record, kind: Record, ux: float, uy: float, wx: float, wy: flo
         if strength(kind, total) >= 0.0:
             return 0.0
     state.plastic += lost / kind.shear
-    total, deviator = invariants(sxx, syy, before, sxy)
+    total, deviator = invariants(sxx, syy, szz, sxy)
     held = strain_energy(kind, total, deviator)
     total, deviator = invariants(state.sxx, state.syy, state.szz, state.sxy)
     work = kind.volume * work_of(state, sxx, syy, sxy, dxx, dyy, dxy)
     return work - (strain_energy(kind, total, deviator) - held)
+
+
+@kernel
+def strain(state: Record, kind: Record, ux: float, uy: float, wx: float, wy: float, step: float) -> float:
+    """Advance the stress of a particle by a step (s) of a velocity gradient (1/s); return the energy (J) lost to flow.
+
+    dvx/dx, dvx/dy, dvy/dx, dvy/dy. Half of the rotation comes before the strain and half after it: the stress of the
+    strain is then the mean of those at both ends of the step, whose forces do the work, to second order.
+    """
+    angle = 0.25 * step * (wx - uy)
+    state.sxx, state.syy, state.sxy = turned(state.sxx, state.syy, state.sxy, angle)
+    lost = stretch(state, kind, step * ux, step * wy, 0.5 * step * (uy + wx))
+    state.sxx, state.syy, state.sxy = turned(state.sxx, state.syy, state.sxy, angle)
+    return lost

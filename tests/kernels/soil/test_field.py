@@ -92,8 +92,8 @@ def write_gradients(soils: Soils, c: int, near: Integers, found: Floats) -> None
     """Write the gradients, the corrections and the forces of the particles of a cluster."""
     places = places_of(soils, c)
     x, y, vx, vy = fields_0(None, soils.points, places)
-    gradient = raw_gradient(soils.controls[0], soils.points, near, x, y, vx, vy)
-    by = correction(soils.controls[0], soils.points, near, x, y)
+    gradient = raw_gradient(soils.controls[0], soils.points, near, x, y, vx, vy, 0.0)
+    by = correction(soils.controls[0], soils.points, near, x, y, vx, vy, 0.0)
     forces = forces_on(soils, near, places)
     for lane in range(CLUSTER):
         i = places[lane]
