@@ -16,7 +16,8 @@ from tests.verification.rows import allowed
 if TYPE_CHECKING:
     from blocksim.scenario import PlacedBody, Scenario
 
-SENSITIVE = {"V18", "V19", "V21", "V22"}  # an impact in the next substep, or a sweep more, for a digit of round-off
+# with friction of 5 a domino jams, sweeps do not converge within 1000, and grow round-off to any size
+SENSITIVE = {"V18"}
 LONG = {"V3", "V4", "V9", "V10", "V13", "V15", "V17", "V18", "V23"}  # seconds
 SETTING = Setting(scheme="nonsmooth")
 CASES = [

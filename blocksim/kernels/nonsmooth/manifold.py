@@ -52,6 +52,7 @@ from blocksim.kernels.nonsmooth.slip import Constraints, Motion, presses
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller half side: two faces that face each other over less are passed by
 LEVEL = 0.1  # sine of the angle between two blocks up to which that is so
+NOT_THERE = 0.5 * FAR  # m: what is FAR changes a little as bodies move
 TURNED = 0.906307787036650  # cosine of 25 degrees
 
 
@@ -67,10 +68,19 @@ class Place(NamedTuple):
 
 @kernel
 def write_points(constraint: Record, points: Points, motion: Motion) -> None:
-    """Write a manifold into a constraint. Impulses along another normal are forgotten."""
+    """Write a manifold into a constraint. Impulses along another normal are forgotten.
+
+    One of a point that is not there any more goes to the other: where a block rolls over a corner, what was the right
+    end of its one face is the left end of the next.
+    """
     found = points.constraint
     if found.nx * constraint.nx + found.ny * constraint.ny < TURNED:
         constraint.normal_one = constraint.normal_two = constraint.shear = 0.0
+    normal = constraint.normal_one + constraint.normal_two
+    if points.gap_one > NOT_THERE:
+        constraint.normal_one, constraint.normal_two = 0.0, normal
+    elif points.gap_two > NOT_THERE:
+        constraint.normal_one, constraint.normal_two = normal, 0.0
     constraint.nx = found.nx
     constraint.ny = found.ny
     constraint.arm_a = found.arm_a
@@ -218,8 +228,13 @@ def write_four(
     nx, ny, _, _ = fields_0(None, constraints, places)
     _, normal_one, normal_two, shear = fields_8(None, constraints, places)
     are_kept = is_near & (found.nx * nx + found.ny * ny >= TURNED)
+    normal = select(are_kept, normal_one + normal_two, 0.0)
     normal_one = select(are_kept, normal_one, 0.0)
     normal_two = select(are_kept, normal_two, 0.0)
+    is_only_one = points.gap_two > NOT_THERE
+    is_only_two = points.gap_one > NOT_THERE
+    normal_one = select(is_only_one, normal, select(is_only_two, 0.0, normal_one))
+    normal_two = select(is_only_two, normal, select(is_only_one, 0.0, normal_two))
     shear = select(are_kept, shear, 0.0)
     are_all = abs(found.width) >= 0.0
     write_fields_0(None, constraints, places, are_all, (found.nx, found.ny, found.arm_a, found.arm_b))

@@ -168,6 +168,26 @@ def best_of_all(body: Block, hull: Hull, other: Block, other_hull: Hull) -> Best
 
 
 @kernel
+def can_reach_less(least: float, body: Block, hull: Hull, other: Block, inner: float) -> bool:
+    """Return True if any face of a body may have a gap above `least` (m) to another, `inner` (m) its inner radius."""
+    dx = other.x - body.x
+    dy = other.y - body.y
+    px = body.cos * dx + body.sin * dy
+    py = body.cos * dy - body.sin * dx
+    most = -math.inf
+    for k in range(hull.first, hull.first + hull.size):
+        one = hull.table[k]
+        most = max(most, one.nx * px + one.ny * py - one.distance)
+    return most - inner > least
+
+
+@rare_kernel
+def best_face_after_all(body: Block, hull: Hull, other: Block, other_hull: Hull, thin: float) -> Best:
+    """Return the best face of a body where that of the other one, though no worse, has no point."""
+    return best_face(body, hull, other, other_hull, thin)
+
+
+@kernel
 def clipped_on(body: Block, hull: Hull, number: int, other: Block, other_hull: Hull) -> Clipped:
     """Return what of another body lies over a face; its corners count from 1, those of the body from OF_B + 1."""
     face = outline_face(body, hull, number)
@@ -228,11 +248,16 @@ def points_of_polygons(a: Block, hull_a: Hull, b: Block, hull_b: Hull, margin: f
     best_b = best_face(b, hull_b, a, hull_a, thin)
     if best_b.gap > margin:
         return nothing()
-    best_a = best_face(a, hull_a, b, hull_b, thin)
+    best_a = Best(-math.inf, -1, -math.inf, -1)
+    is_asked = can_reach_less(best_b.gap + TIE, a, hull_a, b, hull_b.inner)
+    if is_asked:
+        best_a = best_face(a, hull_a, b, hull_b, thin)
     if best_a.gap > margin:
         return nothing()
     if best_b.gap + TIE >= best_a.gap:
         found = found_on(met_on(best_b, b, hull_b, a, hull_a, thin), a, b, True, margin)
+        if not (found.is_near or is_asked):
+            best_a = best_face_after_all(a, hull_a, b, hull_b, thin)
         if found.is_near or best_b.gap > best_a.gap:
             return found
     return found_on(met_on(best_a, a, hull_a, b, hull_b, thin), a, b, False, margin)

@@ -10,6 +10,7 @@ import pytest
 
 from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, TOUCHING
 from blocksim.kernels.nonsmooth.step import find_manifolds
+from blocksim.verification.scene import HEIGHT, WIDTH
 from tests.kernels.nonsmooth import references
 from tests.kernels.nonsmooth.polygons import HEXAGON, depth_below, random_outline, rectangle, turned
 from tests.kernels.nonsmooth.scenes import Block, listed, listed_constraints, place, posed
@@ -18,8 +19,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+    from blocksim.scenario.outlines import Corners
 
 PAIRS = 25
+BRICK = rectangle(WIDTH, HEIGHT)
 
 
 @pytest.fixture(autouse=True)
@@ -152,17 +155,20 @@ def test_honeycomb_cells_meet_at_whole_faces() -> None:
 
 
 @pytest.mark.parametrize("ground", ["half-plane", "piece", "block"])
-def test_impulses_go_with_the_corner_that_a_polygon_rolls_over(ground: str) -> None:
+@pytest.mark.parametrize(("outline", "halfway"), [(HEXAGON, -30.0), (BRICK, -45.0), ((), -45.0)])
+def test_impulses_go_with_the_corner_that_a_block_rolls_over(outline: Corners, halfway: float, ground: str) -> None:
     """What carried one face at the right carries the next face at the left; the new corner has none."""
     level = 1.0 if ground == "block" else 0.0
     table = [Block(0.0, level - 0.1, width=1.0, height=0.2, fixed=True)] if level else []
-    scene = posed([Block(outline=HEXAGON), *table], ground={"profile": [[-1, 0], [1, 0]]} if ground == "piece" else {})
+    profile = {"profile": [[-1, 0], [1, 0]]} if ground == "piece" else {}
+    scene = posed([Block(outline=outline), *table], ground=profile)
     pivot: list[str] = []
+    corners: list[int] = []
     constraint: Any = None
-    for degrees in (-29.0, -31.0):
+    for degrees in (halfway + 1.0, halfway - 1.0):
         angle = math.radians(degrees)
-        hexagon = Block(0.0, level + depth_below(HEXAGON, angle) - 1e-6, angle, outline=HEXAGON)
-        place(scene, [hexagon, *table])
+        block = Block(0.0, level + depth_below(outline or BRICK, angle) - 1e-6, angle, outline=outline)
+        place(scene, [block, *table])
         scene.world.clock[0].rebuilds = 0
         scene = listed(scene)
         constraints = listed_constraints(scene)
@@ -173,7 +179,9 @@ def test_impulses_go_with_the_corner_that_a_polygon_rolls_over(ground: str) -> N
             constraint[f"normal_{pressed}"] = 3.0
             constraint.shear = 1.0
         pivot.append("one" if constraint.gap_one < constraint.gap_two else "two")
+        corners.append(int(constraint[f"corner_{pivot[-1]}"]))
     assert pivot[0] != pivot[1]
+    assert corners[0] == corners[1]
     assert constraint[f"normal_{pivot[1]}"] == 3.0
     assert constraint[f"normal_{pivot[0]}"] == 0.0
     assert constraint.shear == 1.0
