@@ -158,9 +158,9 @@ def test_pushed_wall_leans_more_the_higher_a_course_is() -> None:
     assert 0.02 < left[-1] < 0.05  # 1 m/s, less friction
 
 
-def turned_under(amplitude: float, end: float = 8.0) -> Result:
+def drums_under(amplitude: float, **values: object) -> Result:
     """Run the column of drums under another amplitude (m/s2)."""
-    return run_shipped("drum_column", **{"motion.amplitude": amplitude, "time.end": end, "output.every": 2e-3})
+    return run_shipped("drum_column", **{"motion.amplitude": amplitude, **values})
 
 
 def test_drums_begin_to_rock_at_the_foot_as_one_block() -> None:
@@ -169,13 +169,13 @@ def test_drums_begin_to_rock_at_the_foot_as_one_block() -> None:
     onset = 0.5 * 1.63 / height * 9.81
     assert onset / 9.81 == pytest.approx(0.1637, abs=5e-5)  # as the file says
     for share, least in ((0.97, 26), (1.03, 25)):  # two contacts for each drum
-        frames = turned_under(share * onset, 1.0).frames
+        frames = drums_under(share * onset, **{"time.end": 1.0, "output.every": 5e-3}).frames
         assert frames.contact_count[frames.time > 0.01].min() == least
 
 
 @pytest.mark.parametrize(("amplitude", "falls"), [(0.245, False), (0.275, True)])
 def test_drums_come_down_from_0_26_g_on(amplitude: float, falls: bool) -> None:
-    movement = turned_under(amplitude * STANDARD_GRAVITY).summary.movement
+    movement = drums_under(amplitude * STANDARD_GRAVITY).summary.movement
     assert movement is not None
     assert (movement.outcome == "fell") == falls
 
@@ -190,10 +190,10 @@ def slope_of_cells(friction: str, end: float) -> Result:
 
 
 def test_slope_of_cells_begins_to_slide_below_the_friction_that_holds_it() -> None:
-    falls, stands = (slope_of_cells(angle, 0.6).summary.movement for angle in ("15 deg", "20 deg"))
+    falls, stands = (slope_of_cells(angle, 0.4).summary.movement for angle in ("15 deg", "20 deg"))
     assert falls is not None
     assert stands is not None
-    assert falls.largest_displacement_mm > 50.0
+    assert falls.largest_displacement_mm > 20.0
     assert stands.largest_displacement_mm < 5.0
 
 
