@@ -83,7 +83,7 @@ def _compile(kernels: str) -> None:
     change = CHANGES.get(kernels, {"time": {"scheme": kernels}})  # a scheme beside the usual ones has its own set
     scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **change})), 0)
     measured_row(scene)
-    if kernels in {RIGID, OUTLINED}:
+    if kernels in {RIGID, OUTLINED} and not jit.is_marked(kernels):  # a single run has no use for it otherwise
         _compile_ensemble(stack_of_one(scene))
     if kernels != SURFACE:
         jit.mark(kernels)
