@@ -200,7 +200,7 @@ def test_steady_pairs_have_the_forces_and_losses_of_the_general_way(start: Start
     bodies, values = SITUATIONS[situation]
     scene = start(bodies, **values)
     seen = 0
-    for n in range(120 // pace):
+    for n in range(80 // pace):
         tally, quick, slow = evaluate(scene.world)
         assert_same(quick, slow)
         seen += tally.steady
