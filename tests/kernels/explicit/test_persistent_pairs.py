@@ -17,7 +17,9 @@ from blocksim.kernels.explicit.damping import BOTH
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.kernels.explicit.partition import add_kept, keep
 from blocksim.kernels.explicit.persistent_pairs import CHANGED, NOTHING, TOUCHING, UNTOUCHED, persistent_forces
-from blocksim.verification.scene import HEIGHT, WIDTH
+from blocksim.scenario import scenario_from_mapping
+from blocksim.simulation.schemes import build_scene
+from blocksim.verification.scene import HEIGHT, WIDTH, Simulation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -205,6 +207,33 @@ def test_steady_pairs_have_the_forces_and_losses_of_the_general_way(start: Start
         assert_same(quick, slow)
         seen += tally.steady
         scene.to_step(scene.steps + 1 + n % 4)
+    assert seen > 20 // pace
+
+
+def test_steady_polygons_on_pieces_of_ground_have_the_forces_of_the_general_way(pace: int) -> None:
+    """On a slope, at the joint to the flat beside it, and against a wall."""
+    outline = HEXAGON["outline"]
+    tables = {
+        "schema": 1,
+        "name": "pieces",
+        "materials": {"stone": {"density": 2500.0, "young_modulus": 1e10, "poisson_ratio": 0.2}},
+        "blocks": {"hexagon": {"outline": outline, "depth": 0.05, "material": "stone"}},
+        "ground": {"profile": [[-0.5, 0.1], [0.0, 0.0], [0.5, 0.0]]},
+        "walls": [{"from": [0.1, 0.0], "to": [0.1, 0.3]}],
+        "bodies": [
+            {"block": "hexagon", "x": -0.2, "y": 0.04 + 1.0198039 * APOTHEM + 1e-6, "angle": "-0.19739556 rad"},
+            {"block": "hexagon", "x": 0.0005, "y": RADIUS + 1e-4, "angle": "90 deg", "velocity": [-0.1, -0.1]},
+            {"block": "hexagon", "x": 0.1 - RADIUS - 1e-6, "y": APOTHEM + 1e-6, "velocity": [0.2, 0.0]},
+        ],
+        "contact": {"stiffness_scale": 1e-2},
+    }
+    scene = Simulation(build_scene(scenario_from_mapping(tables)))
+    seen = 0
+    for n in range(120 // pace):
+        tally, quick, slow = evaluate(scene.world)
+        assert_same(quick, slow)
+        seen += tally.steady
+        scene.to_step(scene.steps + 1 + 4 * (n % 4))
     assert seen > 20 // pace
 
 
