@@ -18,6 +18,9 @@ Position pass (soft, J. Baumgarte's feedback with a spring and a dashpot, after 
 
 At rest (J v = 0) that is a spring: s = -gamma lambda / b = -F A / w^2 with the force F = lambda / h.
 
+The pass leaves gaps that it has closed at zero to round-off. So s <= 0 means up to `touch_gap`, 1e-12 of the smallest
+side, and an impulse is one if it moves the bodies by more than that in a substep (slip.presses).
+
 Velocity pass: points with an impulse after the position pass, or s <= 0, have 0 <= lambda  complementary to
 J v - t >= 0, with the target t = -e u where the approach u before the substep was faster than a threshold (and what
 gravity does meanwhile: aims.rebound), and -max(s, 0) / h elsewhere. What the position pass adds to velocities moves
