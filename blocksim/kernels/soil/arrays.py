@@ -46,6 +46,10 @@ TOUCH = record_type(
     "fx fy",  # N: on the particle
     indices="particle body",
 )
+HISTORY = record_type(
+    "spring depth normal_force shear_force",  # as in TOUCH
+    indices="body",
+)
 TALLY = record_type(
     "plastic viscosity dashpot friction settling ramp "  # J, lost so far; ramp: what the missing weight would have done
     "fastest",  # m/s: highest speed in the current drift
@@ -89,7 +93,7 @@ class Soils(NamedTuple):
     lists: Integers  # (groups, GROUP * NEIGHBOURS) uint32: those of the clusters of a group, one after the other
     lengths: Integers  # (n,) uint32: of the lists of all clusters; work space of touches, which are made before
     touches: Records  # (t,) TOUCH, what is near a body, sorted by particle and body
-    kept: Records  # (t,) TOUCH, the same before the lists are made again
+    kept: Records  # (t,) HISTORY, what the touches before the lists are made again leave to the new ones
     by_body: Integers  # (t,) uint32: touches sorted by body
     begins: Integers  # (bodies + 1,) uint32: where those of a body begin
     tallies: Records  # (n / GROUP, rounded up) TALLY

@@ -6,7 +6,7 @@ Made when the lists of neighbours are, by one thread, as few particles are near 
 import math
 
 from blocksim.kernels.common.arrays import Record, World
-from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.soil.neighbours import grid_of
 from blocksim.kernels.soil.shapes import from_body, is_near
@@ -83,17 +83,23 @@ def count_touches(soils: Soils, count: int) -> None:
         total += soils.lengths[i]
 
 
+@kernel
+def keep(new: Record, old: Record) -> None:
+    """Give a touch or history what another one has of a contact with the same body."""
+    new.body = old.body
+    new.spring = old.spring
+    new.depth = old.depth
+    new.normal_force = old.normal_force
+    new.shear_force = old.shear_force
+
+
 @rare_kernel
 def carry_over(soils: Soils, state: Record, touch: Record) -> None:
     """Give a touch the history that its particle had with this body, if any."""
     touch.spring = touch.depth = touch.normal_force = touch.shear_force = touch.fx = touch.fy = 0.0
     for e in range(state.first, state.first + state.count):
-        old = soils.kept[e]
-        if old.body == touch.body:
-            touch.spring = old.spring
-            touch.depth = old.depth
-            touch.normal_force = old.normal_force
-            touch.shear_force = old.shear_force
+        if soils.kept[e].body == touch.body:
+            keep(touch, soils.kept[e])
 
 
 @rare_kernel
@@ -101,7 +107,7 @@ def make_touches(soils: Soils, world: World) -> None:
     """List all touches anew, particles being in their new order; those of a particle are in the order of bodies."""
     controls = soils.controls[0]
     for e in range(controls.touch_count):
-        soils.kept[e] = soils.touches[e]
+        keep(soils.kept[e], soils.touches[e])
     count = find_all(soils, world)
     count_touches(soils, count)
     for b in range(world.bodies.size):

@@ -63,7 +63,7 @@ ENERGIES = (
     "settling",
     "ramp",
 )
-FEW_TOUCHES = 256
+FEW_TOUCHES = 128
 COST = Cost(seconds=220e-9, memory=400)  # measured
 QUANTITIES = (
     Quantity("x", "m"),
@@ -114,7 +114,16 @@ def _words(count: int | tuple[int, int]) -> Any:
 
 def _build(scenario: Scenario) -> "Soils":
     from blocksim.kernels.common.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
-    from blocksim.kernels.soil.arrays import GROUP, NEIGHBOURS, POINT, STATE, TALLY, TOUCH, Soils  # noqa: PLC0415
+    from blocksim.kernels.soil.arrays import (  # noqa: PLC0415
+        GROUP,
+        HISTORY,
+        NEIGHBOURS,
+        POINT,
+        STATE,
+        TALLY,
+        TOUCH,
+        Soils,
+    )
 
     tables, places = soil_tables(scenario), _places(scenario)
     start = _elements(scenario).start
@@ -138,7 +147,7 @@ def _build(scenario: Scenario) -> "Soils":
         lists=_words((groups, GROUP * NEIGHBOURS)),
         lengths=_words(n),
         touches=zeros(room, TOUCH),
-        kept=zeros(room, TOUCH),
+        kept=zeros(room, HISTORY),
         by_body=_words(room),
         begins=_words(bodies + 1),
         tallies=zeros(groups, TALLY),

@@ -104,3 +104,10 @@ def test_arrays_of_soil_take_as_many_bytes_as_check_estimates() -> None:
     built: Any = build_scene(scene(column(0.25, 0.2, 0.005)))
     taken = sum(array.nbytes for array in built.systems[0])
     assert 0.95 * SOILS.cost.memory < taken / 2000 <= SOILS.cost.memory <= 400
+
+
+def test_a_thousand_particles_take_no_more_than_400_bytes_each() -> None:
+    built: Any = build_scene(scene(column(0.25, 0.1, 0.005)))
+    soils = built.systems[0]
+    assert soils.points.size == 1000
+    assert sum(array.nbytes for array in soils) <= 400 * soils.points.size
