@@ -251,9 +251,8 @@ ROUGH_BASE = (
 )
 SHOCK = "soil on its yield surface keeps part of the sideways stress of the shock at the start"
 SHORT = (
-    "fronts of few particles stop early and break up, so the connected front is shorter than the last particle; at "
-    "1.25 mm, measured once with contacts of damping ratio 0.3, the 100 mm column runs 3.25 and 2.91 and keeps 0.72; "
-    "with raw gradients and 5 mm a single upright row of particles stays beside the wall, 20 mm above the next one"
+    "fronts of few particles stop early: the finer the particles, the farther they run; what flies ahead of a front "
+    "loses its speed where it lands; raw gradients leave more of the height beside the wall than corrected ones"
 )
 SOIL_CASES = (
     Case(
