@@ -13,7 +13,8 @@ def test_a_table_outside_is_refused_unless_asked_for(blocksim: Command, tmp_path
     scenario.write_text(text.replace("experiments/three_blocks.csv", str(table)), encoding="utf-8")
     refused = blocksim("check", scenario, "--quiet")
     assert refused.code == 65
-    assert "case.toml:63: experiment.table" in refused.err
+    line = 1 + text[: text.index("experiments/three_blocks.csv")].count("\n")
+    assert f"case.toml:{line}: experiment.table" in refused.err
     assert "--allow-outside" in refused.err
     assert blocksim("check", scenario, "--quiet", "--allow-outside").code == 0
     assert blocksim("check", scenario, "--quiet").code == 65, "asked for once, allowed ever after"

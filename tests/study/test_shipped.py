@@ -168,9 +168,10 @@ def test_drums_begin_to_rock_at_the_foot_as_one_block() -> None:
     height = 10.33 / 3.0 * (1.63 + 2.0 * 1.31) / (1.63 + 1.31)
     onset = 0.5 * 1.63 / height * 9.81
     assert onset / 9.81 == pytest.approx(0.1637, abs=5e-5)  # as the file says
-    for share, least in ((0.97, 26), (1.03, 25)):  # two contacts for each drum
-        frames = drums_under(share * onset, **{"time.end": 1.0, "output.every": 5e-3}).frames
-        assert frames.contact_count[frames.time > 0.01].min() == least
+    for share, opens in ((0.99, False), (1.01, True)):
+        frames = drums_under(share * onset, **{"time.end": 0.5, "output.every": 5e-3}).frames
+        least = frames.contact_count[frames.time > 0.25].min()  # the start has died away, the peak is at 0.375 s
+        assert (least < 26) == opens  # two contacts for each drum
 
 
 @pytest.mark.parametrize(("amplitude", "falls"), [(0.245, False), (0.275, True)])
