@@ -178,7 +178,8 @@ class Ensemble:
                 self._advance_watching(m, int(stops[m]), rows)
             rows = np.zeros_like(self.starts)  # what is measured at the start of a later call
             members = members[(self.codes[members] == REACHED) & (self.last_steps[members] > done)]
-            members = members[self._add_up(members)]
+            if members.size:
+                members = members[self._add_up(members)]
 
     def _advance_watching(self, m: int, stop: int, rows: NDArray[np.float64]) -> None:
         """Advance a member on a moving support to a step, from frame to frame until something has moved there."""

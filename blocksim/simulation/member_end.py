@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
+from blocksim.kernels.common.systems import Coupled
 from blocksim.scenario import PlacedBody
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.ledger import EnergyLedger, InPlay, ledger_of
@@ -68,9 +69,9 @@ class MemberFailure:
 Ended = MemberEnd | MemberFailure
 
 
-def in_play_of(scenes: AnyScene, members: Sequence[int]) -> list[InPlay]:
+def in_play_of(scenes: AnyScene | Coupled, members: Sequence[int]) -> list[InPlay]:
     """Return what decides the energy in play, of some members of a stack."""
-    further = mass_of_systems(member(scenes, 0))  # in a stack of one, or zero
+    further = mass_of_systems(member(scenes, 0)) if isinstance(scenes, Coupled) else 0.0  # in a stack of one
     mass = scenes.world.bodies.view(np.ndarray)["mass"]
     masses = [float(np.sum(mass[m])) + further for m in members]  # one by one: the order matters
     book = scenes.world.ledger[:, 0]
