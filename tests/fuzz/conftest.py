@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +20,8 @@ ROOT = Path(__file__).parents[2]
 settings.register_profile("long", settings.get_profile("ci"), max_examples=5000)
 QUICK = 25  # a taste: even a tenth of LONG is as much again, and more
 LONG = settings.get_profile("long")
+PLACED = re.compile(r"^bad\.toml:\d+: ", re.MULTILINE)
+WHOLE = ("not a text file", "the file is empty", "nested too deeply", "larger than", "not valid TOML: ")
 
 
 def assert_harmless(left: Left, codes: set[int], usual: float = 0.0) -> None:
@@ -33,6 +36,15 @@ def assert_harmless(left: Left, codes: set[int], usual: float = 0.0) -> None:
     assert bool(left.err) or left.code in {0, 1}, told
     assert left.seconds < MOST_SECONDS + usual, f"{left.seconds} s: {told}"
     assert left.memory < MOST_BYTES, f"{left.memory} bytes: {told}"
+
+
+def check_damaged(child: Child, folder: Path, content: bytes) -> None:
+    """Let a scenario be checked: it is accepted, or refused with the place, or as a whole."""
+    (folder / "bad.toml").write_bytes(content)
+    left = child.call(folder, "check", "bad.toml")
+    assert_harmless(left, {0, 65, 66})
+    if left.code == 65 and "bad.toml" in left.err:
+        assert PLACED.search(left.err) or any(told in left.err for told in WHOLE), left.err
 
 
 @pytest.fixture(scope="session")

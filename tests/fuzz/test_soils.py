@@ -13,9 +13,8 @@ import tomli_w
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fuzz.conftest import LONG, QUICK, ROOT, assert_harmless
+from tests.fuzz.conftest import LONG, QUICK, ROOT, assert_harmless, check_damaged
 from tests.fuzz.mutations import SCENARIO, damaged
-from tests.fuzz.test_scenarios import PLACED, WHOLE
 from tests.sizes import in_all
 
 if TYPE_CHECKING:
@@ -98,14 +97,6 @@ def scenes(draw: st.DrawFn) -> dict[str, Any]:
     }
 
 
-def _check(child: Child, folder: Path, content: bytes) -> None:
-    (folder / "bad.toml").write_bytes(content)
-    left = child.call(folder, "check", "bad.toml")
-    assert_harmless(left, {0, 65, 66})
-    if left.code == 65 and "bad.toml" in left.err:
-        assert PLACED.search(left.err) or any(told in left.err for told in WHOLE), left.err
-
-
 def _run(child: Child, folder: Path, data: dict[str, Any]) -> None:
     (folder / "bad.toml").write_text(tomli_w.dumps(data), encoding="utf-8")
     shutil.rmtree(folder / "out", ignore_errors=True)
@@ -128,14 +119,14 @@ def _run(child: Child, folder: Path, data: dict[str, Any]) -> None:
 def test_damaged_scenarios_with_soil_are_refused_with_their_place(
     child: Child, folder: Path, data: st.DataObject
 ) -> None:
-    _check(child, folder, data.draw(damaged(data.draw(st.sampled_from(TEXTS)), SCENARIO)))
+    check_damaged(child, folder, data.draw(damaged(data.draw(st.sampled_from(TEXTS)), SCENARIO)))
 
 
 @pytest.mark.long
 @settings(LONG, max_examples=in_all(1000))
 @given(data=st.data())
 def test_a_thousand_damaged_scenarios_with_soil(child: Child, folder: Path, data: st.DataObject) -> None:
-    _check(child, folder, data.draw(damaged(data.draw(st.sampled_from(TEXTS)), SCENARIO)))
+    check_damaged(child, folder, data.draw(damaged(data.draw(st.sampled_from(TEXTS)), SCENARIO)))
 
 
 @pytest.mark.long
