@@ -16,7 +16,7 @@ from blocksim.scenario.models.probe import PROBES
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES, scheme_of
 from blocksim.scenario.quantities import shown
-from blocksim.scenario.spelling import did_you_mean, nearest, similar_word
+from blocksim.scenario.spelling import did_you_mean, meant_word, nearest
 from blocksim.scenario.structures import KINDS
 from blocksim.scenario.systems import HELD, SYSTEMS
 
@@ -131,10 +131,12 @@ def _unknown_key(path: KeyPath, data: object) -> Finding:
         )
     table = SCHEMES[scheme_of(follow(data, path[:-1]))] if path[0] == "time" else table_at(path[:-1], data)
     known = keys_of(table) if table is not None else ()
-    meant = similar_word(str(path[-1]), known)
+    meant = meant_word(str(path[-1]), known)
     is_typing_error = nearest(str(path[-1]), known, most=1) is not None
     if (not meant or (len(path) == 1 and not is_typing_error)) and (other := _table_with(str(path[-1]))):
         return Finding(path, f"unknown key, did you mean {f'{other}.{path[-1]}'!r}?", at="key")
+    if len(path) > 1 and not is_typing_error and path[-1] in keys_of(Scenario):
+        return Finding(path, f"unknown key, {path[-1]} belongs at the top of the file", at="key")
     hint = f"did you mean {meant!r}?" if meant else f"allowed are: {', '.join(known)}"
     return Finding(path, f"unknown key, {hint}", at="key", meant=(*path[:-1], meant) if meant else ())
 

@@ -1,14 +1,50 @@
 """Words in messages: lists that are cut short, and known words that a misspelt one may mean."""
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 
 MIN_BEGINNING = 3
-"""Letters that a word needs before a longer word is suggested."""
+"""Letters that a word needs before a similar word is suggested."""
 MAX_COMPARED = 1000
 """Known words that a misspelt one is compared with; a file of a million mistakes must not take minutes."""
 MAX_LISTED = 10
+USUAL: Mapping[str, tuple[str, ...]] = {
+    "vx": ("velocity",),
+    "vy": ("velocity",),
+    "v": ("velocity", "speed"),
+    "omega": ("spin",),
+    "angular_velocity": ("spin",),
+    "rotation": ("angle", "tilt"),
+    "theta": ("angle", "tilt"),
+    "inclination": ("tilt", "angle"),
+    "slope": ("tilt", "angle"),
+    "e": ("young_modulus", "restitution"),
+    "nu": ("poisson_ratio",),
+    "rho": ("density",),
+    "gamma": ("unit_weight",),
+    "phi": ("friction_angle",),
+    "c": ("cohesion",),
+    "psi": ("dilation",),
+    "mu": ("block_block", "friction", "static"),
+    "w": ("width",),
+    "h": ("height",),
+    "l": ("length",),
+    "nx": ("columns",),
+    "ny": ("rows",),
+    "n": ("count",),
+    "number": ("count",),
+    "kn": ("normal_stiffness",),
+    "ks": ("shear_stiffness_ratio",),
+    "f": ("frequency",),
+    "a": ("amplitude",),
+    "dt": ("step", "every"),
+    "timestep": ("step",),
+    "interval": ("every",),
+    "duration": ("end",),
+    "tmax": ("end",),
+}
+"""Symbols and words of papers and other programs with the keys that mean the same; a table takes the first it has."""
 
 
 def listed(names: Sequence[object], most: int) -> str:
@@ -54,11 +90,20 @@ def did_you_mean_or_list(word: str, known: Iterable[object]) -> str:
     return did_you_mean(word, names) or (f"known: {listed}" if names else "none is defined")
 
 
+def meant_word(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word for a symbol or a word of other programs, or the one that is similar."""
+    known = tuple(islice(known, MAX_COMPARED))
+    usual = (key for key in USUAL.get(word.lower(), ()) if key in known)
+    return next(usual, None) or similar_word(word, known)
+
+
 def similar_word(word: str, known: Iterable[str]) -> str | None:
     """Return the known word that has the fewest typing errors, begins like the given one, or shares most of it."""
     known = tuple(islice(known, MAX_COMPARED))
+    if len(word) < MIN_BEGINNING:  # of so few letters one that is wrong is half of the word
+        return nearest(word, known, most=0)
     similar = nearest(word, known, most=max(1, len(word) // 3))
-    if similar is not None or len(word) < MIN_BEGINNING:
+    if similar is not None:
         return similar
     alike = [other for other in known if other.startswith(word) or word.startswith(other)]
     if alike:
