@@ -73,19 +73,19 @@ def peaks(width: float, height: float, restitution: float, **time: object) -> ND
 
 @pytest.mark.parametrize(
     ("width", "height", "restitution"),
-    [(0.01, 0.04, 0.5), pytest.param(0.2, 0.8, 0.5, marks=pytest.mark.long), (0.032, 0.05, 0.5), (0.032, 0.05, 0.2)],
+    [(0.01, 0.04, 0.5), pytest.param(0.2, 0.8, 0.5, marks=pytest.mark.long), (0.032, 0.05, 0.0), (0.05, 0.1, 0.2)],
 )
-def test_rocking_peaks_are_within_a_percent_at_the_default_step(
+def test_rocking_peaks_are_within_two_permille_at_the_default_step(
     width: float, height: float, restitution: float
 ) -> None:
-    assert peaks(width, height, restitution) == pytest.approx(rocking_peaks(width, height, restitution), rel=0.01)
+    assert peaks(width, height, restitution) == pytest.approx(rocking_peaks(width, height, restitution), rel=2e-3)
 
 
 @pytest.mark.parametrize(("width", "restitution"), [(0.032, 0.6), (0.032, 0.8), (0.0125, 0.8)])
 def test_rocking_peaks_of_blocks_that_hop_are_those_of_exact_impact_times(width: float, restitution: float) -> None:
     """At 0.8 a restitution of 0.80008 would move the fourth peak of the squat block by 0.9 %."""
     exact = rocking_peaks(width, 0.05, restitution)
-    assert peaks(width, 0.05, restitution) == pytest.approx(exact, rel=0.01)
+    assert peaks(width, 0.05, restitution) == pytest.approx(exact, rel=5e-3)
 
 
 def test_what_is_about_springs_is_left_out_and_says_why() -> None:

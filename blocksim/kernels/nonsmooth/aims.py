@@ -114,9 +114,9 @@ def with_rebounds(
     pull = pulls(constraint, a, b, stepping)
     after_one = rebound(u.one, load(lane, group.start_one), pull, restitution, stepping)
     after_two = rebound(u.two, load(lane, group.start_two), pull, restitution, stepping)
-    is_elastic = restitution > 0.0
-    t_one = select(is_elastic & (u.one < -stepping.threshold) & (t_one > -FAR), after_one, t_one)
-    t_two = select(is_elastic & (u.two < -stepping.threshold) & (t_two > -FAR), after_two, t_two)
+    rebounds = restitution > (-1.0 if stepping.is_divided else 0.0)  # then it is an impact without any rebound too
+    t_one = select(rebounds & (u.one < -stepping.threshold) & (t_one > -FAR), after_one, t_one)
+    t_two = select(rebounds & (u.two < -stepping.threshold) & (t_two > -FAR), after_two, t_two)
     if stepping.is_guarded and not is_all(greater(t_one, t_two) <= 0.0):
         stepping.has_rebounds = 1
     return t_one, t_two

@@ -114,7 +114,8 @@ STEPPING = record_type(
     "rest_gap "  # m: points with no larger one touch others at an impact
     "touch_gap "  # m: points with no larger one touch: round-off is smaller, and must not decide
     "frequency damping "  # 1/s, -: w and zeta of points in contact
-    "length gone",  # s: of the current part of a step, and of the step before it; parts.py
+    "length gone "  # s: of the current part of a step, and of the step before it; parts.py
+    "last_substep",  # s: with which bodies have moved last, in the part before
     "substeps "
     "velocity_sweeps "  # at most
     "colours constraint_count active_count group_count "  # now

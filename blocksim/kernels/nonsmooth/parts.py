@@ -10,8 +10,8 @@ something is predicted from gap s, approach u and the pull p of gravity,
 
 a part ends just before it, one of FINE of a step follows, then it is predicted again. Substeps of parts are as many as
 those of a step. The springs of the position pass keep their stiffness in seconds, so that what is at rest does not
-move when the length changes, and impulses that a substep begins with go with it. Velocities live half a substep behind:
-in flight they are shifted by half of what the substep changes by; what something holds has its velocity at any time.
+move when the length changes, and impulses that a substep begins with go with it. Velocities live half a substep behind
+and are shifted with its length: by gravity in flight, by their own change where something holds a body.
 """
 
 import math
@@ -24,6 +24,7 @@ from blocksim.kernels.nonsmooth.slip import presses
 
 FINE = 1.0 / 64.0  # of a step: the part in which an impact falls
 MOST_PARTS = 32  # of a step; what is left then is one more
+MOST_CHANGE = 1.5  # of the square of gravity: that of an acceleration with which something is held that turns
 
 
 @kernel
@@ -54,6 +55,7 @@ def begin_step(scene: Nonsmooth) -> None:
     if stepping.is_divided:
         stepping.parts = 0
         stepping.gone = 0.0
+        stepping.last_substep = stepping.substep
         set_length(scene, scene.world.controls[0].step)
 
 
@@ -63,6 +65,7 @@ def begin_next_part(scene: Nonsmooth) -> None:
     stepping = scene.contacts.stepping[0]
     stepping.parts += 1
     stepping.gone += stepping.length
+    stepping.last_substep = stepping.substep
     set_length(scene, scene.world.controls[0].step - stepping.gone)
 
 
@@ -106,8 +109,9 @@ def mark_pressed(scene: Nonsmooth) -> None:
 
 @rare_kernel
 def shift_velocities(scene: Nonsmooth, h: float) -> None:
-    """Bring velocities from half of the last substep behind to half of the next, h (s), but of what something holds.
+    """Bring velocities from half of the last substep behind to half of the next, h (s), by what the last one changed.
 
+    In flight that is gravity, of what something holds it is what the last substep has left of it (`held_change`).
     The ledger (energy.py) counts with velocities half a substep on, and with the displacements that velocities alone
     would give.
     """
@@ -119,16 +123,45 @@ def shift_velocities(scene: Nonsmooth, h: float) -> None:
     for i in range(scene.world.bodies.size - 1):
         state = scene.contacts.states[i]
         if state.inverse_mass > 0.0:
-            share = 0.0 if scene.used[i] else behind
-            vx = state.vx + share * (old - h) * controls.gravity_x
-            vy = state.vy + share * (old - h) * controls.gravity_y
+            before = scene.contacts.before[i]
+            share = behind * (old - h)
+            ax, ay, turn = controls.gravity_x, controls.gravity_y, 0.0
+            if scene.used[i]:
+                ax, ay, turn = held_change(state, before, stepping.last_substep, controls)
+            vx = state.vx + share * ax
+            vy = state.vy + share * ay
+            spin = state.spin + share * turn
             lifted = h * (controls.gravity_x * vx + controls.gravity_y * vy)
             lifted -= old * (controls.gravity_x * state.vx + controls.gravity_y * state.vy)
             lifted -= kinetic_ahead(vx, vy, behind * h, controls)
             lifted += kinetic_ahead(state.vx, state.vy, behind * old, controls)
-            scene.contacts.before[i].lifted += lifted
+            lifted += 0.5 * (state.spin * state.spin - spin * spin) * state.inverse_mass / state.inverse_inertia
+            before.lifted += lifted
+            before.vx += share * ax  # so that the change is still known where a length is given twice
+            before.vy += share * ay
+            before.spin += share * turn
             state.vx = vx
             state.vy = vy
+            state.spin = spin
+
+
+@rare_kernel
+def held_change(state: Record, before: Record, h: float, controls: Record) -> tuple[float, float, float]:
+    """Return the accelerations (m/s2, m/s2, rad/s2) of a body that something holds, from its last substep h (s).
+
+    One that rolls about a corner speeds up until the other meets the ground, and strikes it too slowly with the
+    velocity of half a substep ago. Contacts that do no work take a part of the acceleration of gravity away, so that
+    the rest, measured by its kinetic energy, is no more than gravity; where it is, the change was none of motion alone
+    but, say, a contact that closed, and nothing is known of the acceleration.
+    """
+    ax = (state.vx - before.vx) / h
+    ay = (state.vy - before.vy) / h
+    turn = (state.spin - before.spin) / h
+    size = ax * ax + ay * ay + turn * turn * state.inverse_mass / state.inverse_inertia
+    gravity = controls.gravity_x * controls.gravity_x + controls.gravity_y * controls.gravity_y
+    if size > MOST_CHANGE * gravity:
+        return 0.0, 0.0, 0.0
+    return ax, ay, turn
 
 
 @rare_kernel
@@ -163,7 +196,7 @@ def time_to_impact(scene: Nonsmooth) -> float:
     least = math.inf
     for r in range(contacts.stepping[0].constraint_count):
         constraint = contacts.constraints[r]
-        if constraint.reach != AWAY and contacts.materials[constraint.material].restitution > 0.0:
+        if constraint.reach != AWAY:
             a, b = bodies[constraint.a], bodies[constraint.b]
             free = (1.0 if a.inverse_mass > 0.0 else 0.0) - (1.0 if b.inverse_mass > 0.0 else 0.0)
             pull = free * (constraint.nx * controls.gravity_x + constraint.ny * controls.gravity_y)
