@@ -40,12 +40,18 @@ def place_all_corners(bodies: Records) -> None:
 
 
 @rare_kernel
-def renew_rotations(bodies: Records) -> None:
+def renew_angles(bodies: Records) -> None:
     """Recompute cosines and sines from the angles, so that round-off does not add up."""
     for i in range(bodies.size):
         body = bodies[i]
         body.cos = math.cos(body.angle)
         body.sin = math.sin(body.angle)
+
+
+@rare_kernel
+def renew_rotations(bodies: Records) -> None:
+    """Do the same, and update the vectors to the corners."""
+    renew_angles(bodies)
     place_all_corners(bodies)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.common.arrays import Floats, Integers, Records, World, on_own_lines, record_type
+from blocksim.kernels.common.arrays import CACHE_LINE, Floats, Integers, Records, World, on_own_lines, record_type
 from blocksim.kernels.common.simd import WIDTH
 
 STATE = record_type(
@@ -33,27 +33,33 @@ CONSTRAINT = record_type(
     flags="reach is_struck "
     "corner_one corner_two",  # of a polygon's pair: the corners that the points are, see polygons.py; else zero
 )
-# four active constraints of one colour, field by field; see groups.py
-LANE_FLOATS = (
-    "nx ny arm_a arm_b width shear_arm_a shear_arm_b gap_one gap_two normal_one normal_two shear "  # as in CONSTRAINT
-    "bend shear_bend "  # as in CONSTRAINT
-    "friction restitution "  # -: coefficients of kinetic friction and of restitution
-    "start_one start_two "  # m: gaps when the substep began
-    "target_one target_two"  # m/s: least approach that the velocity pass leaves; -FAR where a point does not count
-)
+# Four active constraints of one colour, field by field; see groups.py. Two fields share a cache line, and those that a
+# sweep needs lie side by side: crowds fill the cache, and wait for memory more than for anything else.
 LANE_INDICES = "a b constraint"  # bodies; number of the constraint
-SINGLE_FLOATS = "one mixed two along"  # 1/kg: A of a group of one: of both normals, and along the tangent
-GROUP = on_own_lines(
-    np.dtype(
-        [(name, np.float64, (WIDTH,)) for name in LANE_FLOATS.split()]
-        + [(name, np.uint32, (WIDTH,)) for name in LANE_INDICES.split()]
-        + [(name, np.float64) for name in SINGLE_FLOATS.split()]
-        + [
-            ("count", np.uint8),  # of constraints, the others are copies
-            ("are_simple", np.uint8),  # flag: static friction is the kinetic one
-        ],
-        align=True,
-    )
+LANE_FLOATS = (
+    "nx ny arm_a arm_b width bend normal_one normal_two "  # as in CONSTRAINT
+    "gap_one start_one gap_two start_two "  # m: as in CONSTRAINT; when the substep began
+    "shear_arm_a shear_arm_b shear shear_bend "  # as in CONSTRAINT
+    "target_one target_two "  # m/s: least approach that the velocity pass leaves; -FAR where a point does not count
+    "friction restitution"  # -: coefficients of kinetic friction and of restitution
+)
+LANES_AT = {name: CACHE_LINE + 8 * WIDTH * k for k, name in enumerate(LANE_FLOATS.split())}  # bytes
+SINGLE_FLOATS = {  # 1/kg: A of a group of one, of both normals and along the tangent; in lanes that it does not use
+    "one": LANES_AT["restitution"] + 8,
+    "mixed": LANES_AT["restitution"] + 16,
+    "two": LANES_AT["restitution"] + 24,
+    "along": LANES_AT["friction"] + 8,
+}
+GROUP = np.dtype(
+    {
+        "names": [*LANE_INDICES.split(), "count", "are_simple", *LANES_AT, *SINGLE_FLOATS],
+        "formats": [(np.uint32, (WIDTH,))] * 3
+        + [np.uint8] * 2  # number of constraints, the others are copies; flag: static friction is the kinetic one
+        + [(np.float64, (WIDTH,))] * len(LANES_AT)
+        + [np.float64] * len(SINGLE_FLOATS),
+        "offsets": [0, 16, 32, 48, 49, *LANES_AT.values(), *SINGLE_FLOATS.values()],
+        "itemsize": CACHE_LINE + 8 * WIDTH * len(LANES_AT),
+    },
 )
 # of a body in a round of impacts; see impacts.py
 IMPACT = on_own_lines(

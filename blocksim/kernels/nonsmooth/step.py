@@ -5,7 +5,7 @@ import math
 from blocksim.kernels.common.arrays import AT_REST, NOT_FINITE, OVERLAP_LIMIT, PAIRS_FULL, REACHED, STATUS, TEAM_SIZE
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.energy import weights_power
-from blocksim.kernels.common.integrate import fastest_point, kinetic_energy, renew_rotations
+from blocksim.kernels.common.integrate import fastest_point, kinetic_energy, renew_angles
 from blocksim.kernels.common.jit import entry_kernel, kernel
 from blocksim.kernels.common.loads import are_loads_steady
 from blocksim.kernels.common.simd import WIDTH
@@ -54,7 +54,7 @@ def check(scene: Nonsmooth) -> int:
     world = scene.world
     controls = world.controls[0]
     clock = world.clock[0]
-    renew_rotations(world.bodies)
+    renew_angles(world.bodies)
     ledger = world.ledger[0]
     ledger.travel_work += controls.check_every * controls.step * weights_power(world)
     ledger.largest_kinetic = max(ledger.largest_kinetic, kinetic_energy(world))
@@ -185,7 +185,7 @@ def advance_thread(scene: Nonsmooth, last_step: int, k: int) -> int:
     """Be thread k of those that step a world until `last_step`, or until something ends the run."""
     if k == 0 and scene.world.clock[0].is_started == 0:
         load_states(scene)
-        renew_rotations(scene.world.bodies)
+        renew_angles(scene.world.bodies)
         scene.world.clock[0].is_started = 1
     barrier(scene.world.team)
     status = REACHED
