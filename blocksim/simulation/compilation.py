@@ -3,19 +3,15 @@
 import functools
 import time
 
-import numpy as np
-
 from blocksim.errors import OutputError
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.compiler import compiling
-from blocksim.kernels.common.watch import Watched
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.placement import has_outlines
-from blocksim.simulation.schemes import SCHEMES, AnyScene, build_scene, measured_row, scheme_of
+from blocksim.simulation.schemes import SCHEMES, build_scene, measured_row
 from blocksim.simulation.schemes.explicit import PARTICLES, SURFACE
 from blocksim.simulation.schemes.nonsmooth import RIGID
 from blocksim.simulation.team import ALONE
-from blocksim.world.scenes import stack_of_one
 
 OUTLINED = "outlines"  # rigid contacts of blocks that are no rectangles
 SPRUNG_OUTLINES = "outlines-with-springs"  # the same with springs
@@ -83,19 +79,8 @@ def _compile(kernels: str) -> None:
     change = CHANGES.get(kernels, {"time": {"scheme": kernels}})  # a scheme beside the usual ones has its own set
     scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **change})), 0)
     measured_row(scene)
-    if kernels in {RIGID, OUTLINED} and not jit.is_marked(kernels):  # a single run has no use for it otherwise
-        _compile_ensemble(stack_of_one(scene))
     if kernels != SURFACE:
         jit.mark(kernels)
-
-
-def _compile_ensemble(scenes: AnyScene) -> None:
-    """Compile the advance of members too: it shares all kernels but the outermost, so that it costs little now."""
-    scheme, nothing = scheme_of(scenes), np.zeros(0, dtype=np.int64)
-    places, lengths = np.zeros((1, 3, 1)), np.zeros((1, 1))
-    watched = Watched(np.zeros(1), np.zeros(1, dtype=np.int64), places, places, lengths, lengths)
-    assert scheme.advance_members is not None  # noqa: S101 - of a scheme that has them
-    scheme.advance_members(scenes, nothing, nothing, np.zeros((1, len(scheme.measured))), nothing, watched)
 
 
 def is_compiled(kernels: str = SURFACE) -> bool:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
 from blocksim.kernels.common.arrays import PAIRS_FULL, REACHED
+from blocksim.kernels.common.compiler import compiling
 from blocksim.kernels.common.frame_times import next_frame
 from blocksim.kernels.common.watch import Watched
 from blocksim.scenario import Scenario
@@ -154,8 +155,9 @@ class Ensemble:
 
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
-        nobody = np.zeros(0, dtype=np.int64)  # compiles, before there are threads
-        self._advance_members(nobody, self.last_steps, self.starts, self.codes)
+        nobody = np.zeros(0, dtype=np.int64)
+        with compiling():  # what a single run has no use for, before there are threads
+            self._advance_members(nobody, self.last_steps, self.starts, self.codes)
         count = len(self.codes)
         if any(self.timelines):  # each is advanced alone, from where it begins
             self._advance_members(np.arange(count), np.zeros_like(self.codes), self.starts, self.codes)

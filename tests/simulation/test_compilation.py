@@ -30,14 +30,3 @@ def test_blocks_with_outlines_have_sets_of_kernels_of_their_own() -> None:
         rectangular = scenario_from_mapping({**compilation.SMALLEST_SCENE, **without})
         assert compilation.kernels_of(outlined) == name
         assert compilation.kernels_of(rectangular) == plain
-
-
-@pytest.mark.parametrize("has_set", [False, True])
-def test_a_single_run_loads_no_kernels_of_ensembles_once_they_are_compiled(
-    monkeypatch: pytest.MonkeyPatch, has_set: bool
-) -> None:
-    compiled: list[object] = []
-    monkeypatch.setattr("blocksim.simulation.compilation.jit.is_marked", lambda _: has_set)
-    monkeypatch.setattr(compilation, "_compile_ensemble", compiled.append)
-    compilation.compile_kernels.__wrapped__("nonsmooth")
-    assert len(compiled) == (not has_set)

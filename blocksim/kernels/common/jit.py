@@ -22,7 +22,7 @@ from numba import types as numba_types
 from numba.core.registry import CPUDispatcher
 
 from blocksim.kernels.common.cache import KernelCache
-from blocksim.kernels.common.compiler import InnerCompiler
+from blocksim.kernels.common.compiler import InnerCompiler, LeanCompiler
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -159,7 +159,8 @@ def _inner(function: Function, **options: object) -> Function:
     """Compile a function that kernels call."""
     if config.DISABLE_JIT:
         return function
-    compiled: Any = _compiled(function, "inner", **options, no_cpython_wrapper=True, pipeline_class=InnerCompiler)
+    compiler = LeanCompiler if Path(function.__code__.co_filename).is_relative_to(KERNEL_FOLDER) else InnerCompiler
+    compiled: Any = _compiled(function, "inner", **options, no_cpython_wrapper=True, pipeline_class=compiler)
     compiled.__class__ = _Inner
     compiled.choices = options
     inner: Function = compiled
