@@ -10,7 +10,7 @@ import typer
 
 from blocksim.cli import completion, options
 from blocksim.cli.limit_curve import show_curve
-from blocksim.cli.limit_give import extrapolated, warn_of_give
+from blocksim.cli.limit_give import level_lines, told_stiffness, warn_of_give
 from blocksim.cli.output import answer, note, number, print_json, table_lines, width_of_screen
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.sweep_output import leaving_unfinished_cases
@@ -21,12 +21,13 @@ from blocksim.scenario.plausible import implausible_values
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study.criterion import DEFAULT, Verdict
 from blocksim.study.executors import Execution
-from blocksim.study.limit import LimitResult, OnRun, find_limit
+from blocksim.study.limit import OnRun, find_limit
 from blocksim.study.limit_curve import OPTION as OVER
 from blocksim.study.limit_curve import read_curve
-from blocksim.study.limit_give import stiff_limits
-from blocksim.study.limit_plan import OPTION, TOLERANCE, LimitPlan, read_limit, variants
+from blocksim.study.limit_plan import NAMES, OPTION, SPRINGS, TOLERANCE, LimitPlan, read_limit, variants
+from blocksim.study.limit_result import LimitResult
 from blocksim.study.limit_search import Change, Number
+from blocksim.study.limit_stiff import refuse_without_springs
 from blocksim.study.rows import MOVEMENT, Row
 
 SHARE = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(%?)")
@@ -83,8 +84,13 @@ def limit_command(
         bool, typer.Option("--both-laws", help="Search with springs and with rigid contacts, and compare.")
     ] = False,
     stiffer: Annotated[
-        bool, typer.Option("--stiffer", help="Search once more with springs ten times as stiff, and compare.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--stiffer/--as-given",
+            help="Search once more with springs ten times as stiff and extrapolate to stiff contacts, always or never "
+            "(default: where springs shift a limit by more than 0.25 %).",
+        ),
+    ] = None,
     settings: options.Settings = None,
     executor: options.ExecutorName = None,
     jobs: options.Jobs = None,
@@ -102,8 +108,8 @@ def limit_command(
     """Find the value of a key at which the structure falls.
 
     Scans the range, as there may be more than one change, and then narrows every change between neighbours to a
-    bracket. Failed runs are reported. The same command again, also after a kill, repeats no run. Exit code 1: nothing
-    changes within the range.
+    bracket. Failed runs are reported. The same command again, also after a kill, repeats no run. Limits of springs that
+    give way are extrapolated to stiff contacts. Exit code 1: nothing changes within the range.
 
     Example: blocksim limit scenarios/tilting_wall.toml --vary ground.tilt=20deg:40deg
     """
@@ -111,9 +117,9 @@ def limit_command(
     document = Document.read(scenario).with_settings(settings or [])
     given = read_variations(vary, OPTION, RANGE)
     if over is not None:
-        if both_laws or stiffer:
+        if both_laws:
             raise typer.BadParameter(
-                "a curve of limits is searched with one law; leave the other option out", param_hint=OVER
+                "a curve of limits is searched with one law; leave --both-laws out", param_hint=OVER
             )
         curve = read_curve(document, given, read_variations([over], OVER), stands=stands, tolerance=to)
         _warn(curve.one, silent=silent)
@@ -122,13 +128,16 @@ def limit_command(
             Execution(None if executor is None else executor.value, jobs, scheduler),
             out,
             overwrite=overwrite,
+            stiffer=stiffer,
             as_json=as_json,
             quiet=quiet,
         )
     plans = {
         name: read_limit(one, given, stands=stands, tolerance=to)
-        for name, one in variants(document, both_laws=both_laws, stiffer=stiffer).items()
+        for name, one in variants(document, both_laws=both_laws).items()
     }
+    if stiffer:
+        refuse_without_springs(*plans.values())
     _warn(next(iter(plans.values())), silent=silent)
     found = {}
     for name, plan in plans.items():
@@ -141,9 +150,11 @@ def limit_command(
                 out=None if out is None else out / _folder(name) if len(plans) > 1 else out,
                 overwrite=overwrite,
                 keep_runs=not no_runs,
+                stiffer=stiffer if name == NAMES[SPRINGS] else False,
+                on_stiffer=told_stiffness(silent=silent),
                 on_run=(lambda *_: None) if silent else _telling(plan.shown),
             )
-    _show(found, as_json=as_json, quiet=quiet)
+    _show(found, as_given=stiffer is False, as_json=as_json, quiet=quiet)
     raise typer.Exit(ExitCode.SUCCESS if all(one.changes for one in found.values()) else ExitCode.OUTSIDE)
 
 
@@ -157,22 +168,20 @@ def _warn(plan: LimitPlan, *, silent: bool) -> None:
         note(f"warning: {text}")
 
 
-def _show(found: Mapping[str, LimitResult], *, as_json: bool, quiet: bool) -> None:
+def _show(found: Mapping[str, LimitResult], *, as_given: bool, as_json: bool, quiet: bool) -> None:
     """Print every search, how far they lie apart, and where the runs are."""
     if as_json:
         print_json([{"contacts": name, "folder": str(one.folder), **one.to_dict()} for name, one in found.items()])
     else:
         answer("\n\n".join("\n".join(_lines(name, one)) for name, one in found.items()))
         _compare(found)
-        for line in extrapolated(found):
-            answer(f"\n{line}")
     if quiet or as_json:
         return
     if any(Verdict.UNDECIDED in one.verdicts.values() for one in found.values()):
         note("undecided: the run ends while blocks move on; a larger time.end may decide")
-    warn_of_give(found.values(), hint="" if stiff_limits(found) else "; see --stiffer")
+    warn_of_give(found.values(), as_given=as_given)
     for one in found.values():
-        note(f"{len(one.rows)} runs, {one.run} of them now: {one.folder / 'limit.csv'}")
+        note(f"{one.runs} runs, {one.run} of them now: {one.folder / 'limit.csv'}")
         if one.pictured:
             note(f"picture of the mechanism: blocksim plot {one.folder}")
         elif one.kept:
@@ -195,9 +204,10 @@ def _lines(name: str, found: LimitResult) -> list[str]:
     """Return both sides of every change, and what that comes to."""
     plan = found.plan
     title = textwrap.wrap(f'{plan.key}, {name}: stands means "{plan.criterion.text}"', width_of_screen())
-    if found.changes:
-        sides = [side for one in found.changes for side in ((one.low, one.below), (one.high, one.above))]
-        told = [_told(found, one) for one in found.changes]
+    changes = found.changes_as_given
+    if changes:
+        sides = [side for one in changes for side in ((one.low, one.below), (one.high, one.above))]
+        told = [line for one in changes for line in _told(found, one)]
     else:
         ends = list(found.verdicts.items())
         sides = [ends[0], ends[-1]]
@@ -226,11 +236,15 @@ def _cells(value: Number, verdict: Verdict, row: Row) -> list[str]:
     ]
 
 
-def _told(found: LimitResult, change: Change[Verdict]) -> str:
-    shown = found.plan.shown
-    width = (change.high - change.low) / max(abs(change.low), abs(change.high))
-    below = f"{change.below.value} up to {shown(change.low)}"
-    return f"{below}, {change.above.value} from {shown(change.high)} (bracket {width:.2%})"
+def _told(found: LimitResult, change: Change[Verdict]) -> list[str]:
+    """Return the answer, after what it is extrapolated from."""
+    shown, answered, levels = found.plan.shown, found.answer(change), found.levels.get(change)
+    width = (answered.high - answered.low) / max(abs(answered.low), abs(answered.high))
+    below = f"{answered.below.value} up to {shown(answered.low)}"
+    line = f"{below}, {answered.above.value} from {shown(answered.high)} (bracket {width:.2%})"
+    if levels is None or levels.stiff is None:
+        return [line]
+    return [*level_lines(found, levels), "stiff contacts, extrapolated with 1/stiffness:", line]
 
 
 def _compare(found: Mapping[str, LimitResult]) -> None:

@@ -11,27 +11,34 @@ from blocksim.cli.output import answer, note, print_json, table_lines, width_of_
 from blocksim.cli.sweep_output import leaving_unfinished_cases
 from blocksim.errors import ExitCode
 from blocksim.study.executors import Execution
-from blocksim.study.limit import LimitResult
 from blocksim.study.limit_curve import CurvePlan, CurveResult, find_curve
+from blocksim.study.limit_result import LimitResult
 
 
 def show_curve(
-    plan: CurvePlan, execution: Execution, out: Path | None, *, overwrite: bool, as_json: bool, quiet: bool
+    plan: CurvePlan,
+    execution: Execution,
+    out: Path | None,
+    *,
+    overwrite: bool,
+    stiffer: bool | None,
+    as_json: bool,
+    quiet: bool,
 ) -> NoReturn:
     """Search, print the limits and leave with the exit code: 1 where some value has no change."""
 
     def tell(value: float, search: LimitResult) -> None:
         if not (quiet or as_json):
-            note(f"{plan.head.key} = {plan.shown(value)}: {len(search.rows)} runs, {search.run} of them now")
+            note(f"{plan.head.key} = {plan.shown(value)}: {search.runs} runs, {search.run} of them now")
 
     with leaving_unfinished_cases():
-        found = find_curve(plan, execution, out=out, overwrite=overwrite, on_limit=tell)
+        found = find_curve(plan, execution, out=out, overwrite=overwrite, stiffer=stiffer, on_limit=tell)
     if as_json:
         print_json({"folder": str(found.folder), **found.to_dict()})
     else:
         answer("\n".join(_lines(found)))
     if not (quiet or as_json):
-        warn_of_give(found.searches.values(), hint="")
+        warn_of_give(found.searches.values(), as_given=stiffer is False)
         note(f"limits: {found.folder / 'limits.csv'}; picture: blocksim plot {found.folder}")
     raise typer.Exit(ExitCode.SUCCESS if all(one.changes for one in found.searches.values()) else ExitCode.OUTSIDE)
 

@@ -16,8 +16,8 @@ from blocksim.study import calibrate as calibration
 from blocksim.study import sensitivity as analysis
 from blocksim.study.calibrate_plan import read_plan
 from blocksim.study.fragility import FragilityResult
-from blocksim.study.limit import LimitResult
 from blocksim.study.limit_curve import CurveResult
+from blocksim.study.limit_result import LimitResult
 from blocksim.study.pictures import draw
 from blocksim.study.plan import Values, Variations
 from blocksim.study.reporting import report_on

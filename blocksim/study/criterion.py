@@ -11,7 +11,7 @@ that does not come to rest before time zero (`start.settle`) falls.
 import math
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -26,8 +26,9 @@ STANDS = "--stands"
 DEFAULT = "outcome = stands | rocked back"
 FORM = re.compile(r"\s*([a-z]+)\s*(<=|>=|!=|==?|<|>)\s*(.*?)\s*")
 OUTCOME, _, _, DISPLACEMENT, TURN, _, MOVES_ON = MOVEMENT
+MOVED = "moved"
 NUMBERS: dict[str, tuple[str, q.Kind, float]] = {  # word: column of a row, kind, units of the column in one of SI
-    "moved": (DISPLACEMENT, q.LENGTH, 1e3),
+    MOVED: (DISPLACEMENT, q.LENGTH, 1e3),
     "turned": (TURN, q.ANGLE, math.degrees(1.0)),
 }
 BELOW: dict[str, Callable[[float, float], bool]] = {"<": operator.lt, "<=": operator.le}
@@ -50,6 +51,7 @@ class Criterion:
 
     text: str
     conditions: tuple[Callable[[Mapping[str, object]], bool], ...]
+    least_moved: float | None = None  # m, the least displacement that any of them names
 
     def holds(self, row: Mapping[str, object]) -> bool:
         """Return True if a row of a finished run meets all conditions."""
@@ -73,11 +75,19 @@ def falls_before_zero(row: Mapping[str, object]) -> bool:
 
 def read_criterion(text: str, option: str = STANDS) -> Criterion:
     """Read conditions given to an option. Raises InvalidInputError for anything else, with what may be written."""
+    parts = text.split(",")
     try:
-        return Criterion(text, tuple(_condition(part) for part in text.split(",")))
+        return Criterion(text, tuple(_condition(part) for part in parts), _least_moved(parts))
     except InvalidInputError as error:
         message = f"{option} {error}"
         raise InvalidInputError(message) from None
+
+
+def _least_moved(parts: Iterable[str]) -> float | None:
+    """Return the least displacement (m) that conditions name which have been read."""
+    found = (FORM.fullmatch(part) for part in parts)
+    ways = (q.parse_quantity(one[3], q.LENGTH)[0] for one in found if one is not None and one[1] == MOVED)
+    return min(ways, default=None)
 
 
 def _condition(text: str) -> Callable[[Mapping[str, object]], bool]:

@@ -20,8 +20,10 @@ from blocksim.simulation.atomic import write_text
 from blocksim.simulation.provenance import HASH_DIGITS
 from blocksim.study import criterion
 from blocksim.study.executors import Execution
-from blocksim.study.limit import LimitResult, OnRun, find_limit
+from blocksim.study.limit import OnRun, find_limit
 from blocksim.study.limit_plan import TOLERANCE, LimitPlan, read_limit
+from blocksim.study.limit_result import LimitResult
+from blocksim.study.limit_stiff import refuse_without_springs
 from blocksim.study.plan import Values, Variations
 from blocksim.study.rows import Head
 from blocksim.study.sweep_folder import LIMIT_CURVE, OVER, prepare, read_origin
@@ -106,13 +108,14 @@ def limit_curve(  # noqa: PLR0913 - one argument for each option of the command
     scheduler: str | None = None,
     out: Path | str | None = None,
     overwrite: bool = False,
+    stiffer: bool | None = None,
 ) -> CurveResult:
     """Find the limits of a key at each value of another one: `limit` with `over`, {"friction.block_block": [0.3, 0.5]}.
 
     Searches are kept in `out` (default: results/NAME/limits-HASH). Raises as `limit`.
     """
     plan = read_curve(document_of(scenario), vary, over, stands=stands, tolerance=tolerance)
-    return find_curve(plan, Execution(executor, jobs, scheduler), out=out, overwrite=overwrite)
+    return find_curve(plan, Execution(executor, jobs, scheduler), out=out, overwrite=overwrite, stiffer=stiffer)
 
 
 def read_curve(
@@ -142,24 +145,29 @@ def read_curve(
     )
 
 
-def find_curve(
+def find_curve(  # noqa: PLR0913 - as `limit_curve`
     plan: CurvePlan,
     execution: Execution,
     *,
     out: Path | str | None = None,
     overwrite: bool = False,
+    stiffer: bool | None = None,
     on_run: OnRun = lambda *_: None,
     on_limit: OnLimit = lambda *_: None,
 ) -> CurveResult:
     """Search as planned, one value after the other; see `limit_curve`."""
     execution.ready()
+    if stiffer:
+        refuse_without_springs(*plan.searches.values())
     base = plan.one.scenario_at(plan.one.span.low)
     folder = Path(out) if out is not None else files.RESULTS / base.name / f"limits-{plan.name}"
     prepare(folder, base, plan.name, overwrite=overwrite, kind=LIMIT_CURVE)
     found: dict[float, LimitResult] = {}
     for number, search in plan.searches.items():
         place = folder / _named(plan.shown(number))
-        found[number] = find_limit(search, execution, out=place, overwrite=overwrite, keep_runs=False, on_run=on_run)
+        found[number] = find_limit(
+            search, execution, out=place, overwrite=overwrite, keep_runs=False, stiffer=stiffer, on_run=on_run
+        )
         on_limit(number, found[number])
     result = CurveResult(plan, folder, found)
     _write(result)

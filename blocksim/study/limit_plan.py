@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from blocksim.errors import BlocksimError, InvalidInputError
@@ -22,11 +22,8 @@ MOST_SCANNED = 1000
 TOLERANCE = 1e-3
 LEAST_TOLERANCE = 1e-9
 OPTION = "--vary"
-RATIO = 10.0  # of stiffness between a search and its repetition
 SPRINGS = "explicit"
 NAMES = {SPRINGS: "springs", "nonsmooth": "rigid contacts"}
-STIFFNESS = "contact.stiffness_scale"
-STIFFER = f"{NAMES[SPRINGS]}, stiffness scale"
 
 
 @dataclass(frozen=True)
@@ -39,6 +36,7 @@ class LimitPlan:
     span: Span
     criterion: Criterion
     tolerance: float  # of a bracket, relative to its ends
+    apart: Mapping[str, object] = field(default_factory=dict)  # settings in which its runs differ from the document
 
     def value(self, number: Number) -> object:
         """Return a value of the range as a scenario takes it."""
@@ -52,7 +50,11 @@ class LimitPlan:
 
     def scenario_at(self, number: Number) -> Scenario:
         """Return the scenario at a value. Raises ScenarioError where the value does not go with the others."""
-        return self.document.with_values({self.key: self.value(number)}).build()
+        return self.document.with_values(self.settings(number)).build()
+
+    def settings(self, number: Number) -> dict[str, object]:
+        """Return what distinguishes the run of a value from the document."""
+        return {self.key: self.value(number), **self.apart}
 
     @property
     def name(self) -> str:
@@ -133,22 +135,11 @@ def _refuse_wrong_ends(plan: LimitPlan) -> None:
             raise InvalidInputError(message) from error
 
 
-def variants(document: Document, *, both_laws: bool = False, stiffer: bool = False) -> dict[str, Document]:
-    """Return the scenarios whose limits are compared, by what distinguishes them.
-
-    With `both_laws` springs and rigid contacts; with `stiffer` springs once more, ten times as stiff. Raises
-    InvalidInputError where there are no springs to make stiffer.
-    """
-    present = document.build()
-    laws = {NAMES[name]: with_scheme(document, name) for name in SCHEMES} if both_laws else {}
-    chosen = laws or {NAMES[present.time.scheme]: document}
-    if not stiffer:
-        return chosen
-    springs = chosen.get(NAMES[SPRINGS])
-    if springs is None:
-        raise InvalidInputError("rigid contacts have no stiffness: --stiffer is for springs (time.scheme explicit)")
-    scale = RATIO * present.contact.stiffness_scale
-    return {**chosen, f"{STIFFER} {scale:g}": springs.with_values({STIFFNESS: scale})}
+def variants(document: Document, *, both_laws: bool = False) -> dict[str, Document]:
+    """Return the scenarios whose limits are compared, by what distinguishes them: both laws, or the present one."""
+    if both_laws:
+        return {NAMES[name]: with_scheme(document, name) for name in SCHEMES}
+    return {NAMES[document.build().time.scheme]: document}
 
 
 def with_scheme(document: Document, scheme: str) -> Document:

@@ -14,6 +14,7 @@ from typing import Generic, TypeVar
 Answer = TypeVar("Answer")
 DIGITS = 12  # of a value that is tried: what people read is what was run
 PARTS = 3
+OUTWARD = 2.0  # widths of what is known, by which a search near a value goes on beyond it
 FLOOR = 1e-6  # of the range: brackets about zero get no narrower
 Number = float  # in the unit of the range
 
@@ -45,6 +46,10 @@ class Span:
         else:
             value = self.low + (self.high - self.low) * share
         return float(round(value)) if self.is_whole else float(f"{value:.{DIGITS}g}")
+
+    def fitted(self, value: float) -> Number:
+        """Return a value as it is tried, the nearest within the range."""
+        return float(f"{min(max(value, self.low), self.high):.{DIGITS}g}")
 
     def is_narrow(self, low: Number, high: Number, tolerance: float) -> bool:
         """Return True if a bracket is as narrow as wanted, relative to its ends; of whole numbers: neighbours."""
@@ -78,3 +83,29 @@ def next_values(span: Span, known: Mapping[Number, Answer], tolerance: float) ->
         return scan
     wide = (one for one in changes_in(known) if not span.is_narrow(one.low, one.high, tolerance))
     return [value for one in wide for value in span.between(one.low, one.high)]
+
+
+def next_near(span: Span, known: Mapping[Number, Answer], near: Change[Answer], tolerance: float) -> list[Number]:
+    """Return the values to try next where a change is expected near a bracket, that of `near`, and nothing is scanned.
+
+    First its ends, then on in the direction in which the change must be until it is passed, by more every time, and
+    then as `next_values`. None when the change is as narrow as wanted, and where there is no such change in the range.
+    """
+    if not known:
+        return list(dict.fromkeys(span.fitted(value) for value in (near.low, near.high)))
+    changes = changes_in(known)
+    if not changes:
+        return [value for value in _beyond(span, known, near, tolerance) if value not in known]
+    (first, *others) = changes
+    if others or (first.below, first.above) != (near.below, near.above):
+        return []
+    return [] if span.is_narrow(first.low, first.high, tolerance) else span.between(first.low, first.high)
+
+
+def _beyond(span: Span, known: Mapping[Number, Answer], near: Change[Answer], tolerance: float) -> list[Number]:
+    """Return the next value outwards of values with the same answer, on the side where the other one must be."""
+    low, high = min(known), max(known)
+    width = OUTWARD * ((high - low) or tolerance * abs(high))
+    if known[low] == near.below:
+        return [span.fitted(high + width)]
+    return [span.fitted(low - width)] if known[low] == near.above else []

@@ -56,7 +56,7 @@ def _fragility(folder: Path) -> Parts:
 
 def _limit(folder: Path) -> Parts:
     stored = read_limit_answer(folder)
-    ends = [(value, end) for one in stored.changes for value, end in ((one.low, one.below), (one.high, one.above))]
+    ends = [end for one in stored.changes for end in one.ends]
     rows = [
         [
             f"{value:.8g}",
@@ -68,6 +68,8 @@ def _limit(folder: Path) -> Parts:
         for value, end in dict.fromkeys(ends)
     ]
     found = [f"{one.low:.7g} ({one.below.verdict}) to {one.high:.7g} ({one.above.verdict})" for one in stored.changes]
+    stiff = [one for one in stored.changes if one.extrapolated]
+    levels = [level for one in stiff for level in one.levels]
     unit = f" {stored.unit}" if stored.unit else ""
     summary = [
         ("key", stored.key),
@@ -75,6 +77,10 @@ def _limit(folder: Path) -> Parts:
         ("contacts", NAMES.get(stored.scheme, stored.scheme)),
         ("runs", str(stored.runs)),
         *(("limit", f"{text}{unit}") for text in found or ["nothing changes within the range"]),
+        *(
+            (f"at stiffness scale {one.stiffness_scale:g}", f"{one.low:.7g} to {one.high:.7g}{unit}, extrapolated from")
+            for one in levels
+        ),
     ]
     return summary, "Both sides of every bracket", (f"value{unit}", *SIDE_HEADS), rows
 

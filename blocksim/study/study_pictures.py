@@ -49,9 +49,10 @@ class StoredFragility(BaseModel, frozen=True):
 
 
 class StoredSide(BaseModel, frozen=True):
-    """One side of a bracket of limit.json; `case` is the folder of its run in `cases`."""
+    """One side of a bracket of limit.json; `case` is the folder of its run in `cases`, `value` that of the run."""
 
     verdict: str
+    value: float | None = None  # in answers of earlier versions that of the bracket
     outcome: str | None = None
     first_mover: str | int | None = None
     first_moved_s: float | None = None
@@ -60,13 +61,30 @@ class StoredSide(BaseModel, frozen=True):
     case: str | None = None
 
 
+class StoredLevel(BaseModel, frozen=True):
+    """The bracket of a limit at one stiffness scale."""
+
+    stiffness_scale: float
+    low: float
+    high: float
+
+
 class StoredChange(BaseModel, frozen=True):
-    """A bracket of limit.json."""
+    """A bracket of limit.json; `levels` are those of springs that it is extrapolated from."""
 
     low: float
     high: float
     below: StoredSide
     above: StoredSide
+    extrapolated: bool = False
+    levels: tuple[StoredLevel, ...] = ()
+
+    @property
+    def ends(self) -> tuple[tuple[float, StoredSide], tuple[float, StoredSide]]:
+        """The values that were run on either side, and what they came to."""
+        given = ((self.low, self.below), (self.high, self.above))
+        (low, below), (high, above) = ((value if side.value is None else side.value, side) for value, side in given)
+        return (low, below), (high, above)
 
 
 class StoredLimit(BaseModel, frozen=True):
@@ -218,7 +236,7 @@ def with_unit(key: str, unit: str) -> str:
 
 def _sides(folder: Path, stored: StoredLimit, change: StoredChange) -> tuple[Side, Side] | None:
     """Return what is drawn of a bracket: what stands on the left."""
-    ends = [(change.low, change.below), (change.high, change.above)]
+    ends = list(change.ends)
     ends.sort(key=lambda end: end[1].verdict != STANDS)
     found = [side for value, end in ends if (side := _side(folder, stored, value, end)) is not None]
     return (found[0], found[1]) if len(found) == len(ends) else None

@@ -58,7 +58,7 @@ def on_soft_springs() -> dict[str, object]:
         "friction": {"block_ground": 2.0},
         "contact": {"restitution": 0.0, "normal_stiffness": weight / (0.03 * width)},
         "start": {"settle": True},
-        "time": {"end": 0.5},
+        "time": {"end": 0.5, "safety": 0.1},
     }
 
 
@@ -71,20 +71,32 @@ def test_springs_that_give_way_are_warned_of_over_another_key_too(blocksim: Comm
     assert (float(told[0]), float(told[1])) == pytest.approx((1.498, 6.24), abs=0.06)
 
 
-@pytest.mark.long
-def test_springs_that_give_way_are_warned_of_by_what_they_shift_and_extrapolated(
+def test_springs_that_give_way_are_extrapolated_to_stiff_contacts_unless_wanted_as_given(
     blocksim: Command, tmp_path: Path
 ) -> None:
     (tmp_path / "soft.toml").write_text(scenario_to_toml(scenario_from_mapping(on_soft_springs())))
-    limit = ("limit", "soft.toml", "--vary", "ground.tilt=24.8deg:26.6deg:3", "--no-runs")
+    limit = ("limit", "soft.toml", "--vary", "ground.tilt=24.8deg:26.6deg:2", "--to", "2%", "--no-runs", "--out", "out")
     stiff = math.degrees(math.atan(0.5))
-    both = blocksim(*limit, "--to", "0.5%", "--stiffer", "--out", "both")
-    soft, stiffer = (float(one) for one in re.findall(r"stands up to (\S+) deg", both.out))
-    assert stiff - soft == pytest.approx(1.55, abs=0.1)  # 0.03 rad cos(tilt), on one corner
-    assert stiff - stiffer == pytest.approx(0.155, abs=0.1)
-    first, second = re.findall(r"the limit is off by some (\S+)%", both.err)
-    assert (float(first), float(second)) == pytest.approx((6.0, 0.6), rel=0.15)
-    assert float(both.out.split("stiff contacts: ")[1].split()[0]) == pytest.approx(stiff, rel=4e-3)
+    given = blocksim(*limit, "--as-given")
+    (soft,) = re.findall(r"^stands up to (\S+) deg", given.out, re.MULTILINE)
+    assert stiff - float(soft) == pytest.approx(1.55, abs=0.3)  # 0.03 rad cos(tilt), on one corner
+    (told,) = re.findall(r"the limit is off by some (\S+)%; leave --as-given out", given.err)
+    assert float(told) == pytest.approx(6.0, rel=0.15)
+    answer = blocksim(*limit)  # the same folder: what was run is not run again
+    assert "warning" not in answer.err
+    runs, now = map(int, re.findall(r"(\d+) runs, (\d+) of them now", answer.err)[0])
+    assert runs - now == int(re.findall(r"(\d+) runs", given.err)[0])
+    scales = re.findall(r"^stiffness scale (\S+): .* \((\S+)%\)$", answer.out, re.MULTILINE)
+    assert [one for one, _ in scales] == ["1", "10"]
+    assert [float(off) for _, off in scales] == pytest.approx([-6.0, -0.6], abs=0.7)
+    low, high = re.findall(r"^stands up to (\S+) deg, falls from (\S+) deg", answer.out, re.MULTILINE)[-1]
+    assert float(low) < stiff < float(high)
+    assert float(high) - float(low) < 0.025 * stiff
+    (change,) = json.loads((tmp_path / "out" / "limit.json").read_text())["changes"]
+    assert change["low"] == pytest.approx(float(low), rel=1e-6)
+    assert change["below"]["value"] == pytest.approx(float(soft), rel=1e-6)
+    assert blocksim("report", "out").code == 0
+    assert "extrapolated from" in Path("report.html").read_text()
 
 
 def test_a_picture_is_named_only_where_both_sides_have_a_run_to_draw(blocksim: Command, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.study.limit_search import Change, Span, changes_in, next_values
+from blocksim.study.limit_search import Change, Span, changes_in, next_near, next_values
 
 
 def searched(span: Span, answer: Callable[[float], str], tolerance: float) -> dict[float, str]:
@@ -69,3 +69,26 @@ def test_an_undecided_range_has_a_bracket_at_either_side() -> None:
 def test_nothing_is_narrowed_where_nothing_changes(answers: list[str]) -> None:
     span = Span(0.0, 1.0, 9)
     assert next_values(span, dict(zip(span.scanned(), answers, strict=True)), 1e-3) == []
+
+
+@given(st.floats(20.01, 39.99), st.floats(20.0, 40.0), st.floats(0.01, 1.0))
+def test_a_change_near_a_value_is_found_wherever_it_is_in_the_range(limit: float, about: float, width: float) -> None:
+    span, near = Span(20.0, 40.0, 9), Change(about - width, about + width, "stands", "falls")
+    known: dict[float, str] = {}
+    while values := next_near(span, known, near, 1e-3):
+        assert not set(values) & known.keys(), "no value is tried twice"
+        known |= {value: "stands" if value < limit else "falls" for value in values}
+    (change,) = changes_in(known)
+    assert change.low < limit <= change.high
+    assert change.high - change.low <= 1e-3 * change.high
+    assert len(known) < 30
+
+
+@pytest.mark.parametrize("answer", ["stands", "falls", "undecided"])
+def test_a_change_that_is_not_in_the_range_is_not_looked_for_without_end(answer: str) -> None:
+    span, near = Span(20.0, 40.0, 9), Change(30.0, 31.0, "stands", "falls")
+    known: dict[float, str] = {}
+    while values := next_near(span, known, near, 1e-3):
+        known |= dict.fromkeys(values, answer)
+    assert changes_in(known) == []
+    assert len(known) < 12

@@ -1,0 +1,166 @@
+"""What a search for a limit has found, and its files: limit.csv with all runs, limit.json with the answer."""
+
+import csv
+import io
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from blocksim.simulation.atomic import write_text
+from blocksim.study.criterion import Verdict
+from blocksim.study.limit_plan import SPRINGS, LimitPlan
+from blocksim.study.limit_search import Change, Number, changes_in
+from blocksim.study.limit_stiff import Levels
+from blocksim.study.rows import MOVEMENT, Row, as_cell
+from blocksim.study.sweep_folder import LIMIT, read_origin
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TABLE = "limit.csv"
+VALUE, VERDICT, SCALE = "value", "verdict", "stiffness_scale"
+COLUMNS = (VERDICT, *MOVEMENT, "status", "reason", "seconds", SCALE)
+BOTH = {Verdict.STANDS, Verdict.FALLS}
+
+
+@dataclass(frozen=True)
+class LimitResult:
+    """All runs of a search by value, and where the answer changes.
+
+    `rows` are those of the scenario as given; `stiffer` those with stiffer springs, by stiffness scale.
+    """
+
+    plan: LimitPlan = field(repr=False)
+    folder: Path
+    rows: Mapping[Number, Row] = field(repr=False)
+    run: int  # runs of this call; the others were known
+    kept: Mapping[Number, str] = field(default_factory=dict, repr=False)  # folders in `cases`, with frames, by value
+    stiffer: Mapping[float, Mapping[Number, Row]] = field(default_factory=dict, repr=False)
+    levels: Mapping[Change[Verdict], Levels] = field(default_factory=dict, repr=False)  # of limits as given
+
+    @property
+    def runs(self) -> int:
+        """Number of all runs."""
+        return len(self.rows) + sum(map(len, self.stiffer.values()))
+
+    @property
+    def verdicts(self) -> dict[Number, Verdict]:
+        """What each value came to in the scenario as given, from the smallest up."""
+        return {value: self.plan.criterion.verdict(self.rows[value]) for value in sorted(self.rows)}
+
+    @property
+    def changes_as_given(self) -> list[Change[Verdict]]:
+        """Brackets between neighbours that differ, from the smallest value up; empty where nothing changes."""
+        return changes_in(self.verdicts)
+
+    @property
+    def limits_as_given(self) -> list[Change[Verdict]]:
+        """Those brackets between standing and falling."""
+        return [change for change in self.changes_as_given if {change.below, change.above} == BOTH]
+
+    @property
+    def changes(self) -> list[Change[Verdict]]:
+        """The answer: brackets of the scenario as given, of stiff contacts where springs of several were searched."""
+        return [self.answer(change) for change in self.changes_as_given]
+
+    @property
+    def limits(self) -> list[Change[Verdict]]:
+        """Those between standing and falling."""
+        return [self.answer(change) for change in self.limits_as_given]
+
+    def answer(self, change: Change[Verdict]) -> Change[Verdict]:
+        """Return a bracket as it is with stiff contacts, where that is known."""
+        levels = self.levels.get(change)
+        stiff = None if levels is None else levels.stiff
+        return change if stiff is None else replace(change, low=stiff[0], high=stiff[1])
+
+    @property
+    def is_extrapolated(self) -> bool:
+        """True where any limit is that of stiff contacts."""
+        return any(levels.stiff is not None for levels in self.levels.values())
+
+    @property
+    def pictured(self) -> list[Change[Verdict]]:
+        """The limits of which both sides are kept as runs: a side that does not settle has none."""
+        return [one for one in self.limits_as_given if {one.low, one.high} <= self.kept.keys()]
+
+    @property
+    def scale(self) -> float | None:
+        """The stiffness scale as given; None for rigid contacts."""
+        scenario = self.plan.document.build()
+        return scenario.contact.stiffness_scale if scenario.time.scheme == SPRINGS else None
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """All runs as limit.csv has them."""
+        import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+
+        return pd.DataFrame(list(_records(self)), columns=[_head(self.plan), *COLUMNS])
+
+    def to_dict(self) -> dict[str, object]:
+        """Return plain values for JSON."""
+        plan = self.plan
+        return {
+            "key": plan.key,
+            "unit": plan.unit,
+            "from": plan.span.low,
+            "to": plan.span.high,
+            "stands": plan.criterion.text,
+            "tolerance": plan.tolerance,
+            "scheme": plan.document.build().time.scheme,
+            SCALE: self.scale,
+            "runs": self.runs,
+            "changes": [self._change(change) for change in self.changes_as_given],
+        }
+
+    def _change(self, change: Change[Verdict]) -> dict[str, object]:
+        answer, levels = self.answer(change), self.levels.get(change)
+        told: dict[str, object] = {
+            "low": answer.low,
+            "high": answer.high,
+            "below": self._side(change.low, change.below),
+            "above": self._side(change.high, change.above),
+        }
+        if levels is not None:
+            told["extrapolated"] = levels.stiff is not None
+            told["levels"] = [{SCALE: one.scale, "low": one.low, "high": one.high} for one in levels.found]
+            told["problem"] = levels.problem
+        return told
+
+    def _side(self, value: Number, verdict: Verdict) -> dict[str, object]:
+        row = self.rows[value]
+        told = {name: row.get(name) for name in (*MOVEMENT, "status", "reason")}
+        return {VALUE: value, VERDICT: verdict.value, **told, "case": self.kept.get(value)}
+
+    def __repr__(self) -> str:
+        """Return a line: key, brackets, runs, folder."""
+        shown = self.plan.shown
+        found = ", ".join(f"{shown(one.low)} {one.below} / {shown(one.high)} {one.above}" for one in self.changes)
+        return f"<LimitResult {self.plan.key}: {found or 'no change'}; {self.runs} runs, {self.folder}>"
+
+
+def write_result(result: LimitResult) -> None:
+    """Write limit.csv, and the answer into limit.json."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([_head(result.plan), *COLUMNS])
+    writer.writerows(_records(result))
+    write_text(result.folder / TABLE, text.getvalue())
+    origin = read_origin(result.folder, LIMIT)
+    begun = {} if origin is None else origin.model_dump(exclude_none=True)
+    write_text(result.folder / LIMIT.origin, json.dumps({**begun, **result.to_dict()}, indent=2) + "\n")
+
+
+def _head(plan: LimitPlan) -> str:
+    return f"{VALUE} [{plan.unit}]" if plan.unit else VALUE
+
+
+def _records(result: LimitResult) -> Iterator[list[object]]:
+    """Yield the rows of limit.csv: those of the scenario as given, then those of stiffer springs."""
+    for scale, rows in ((result.scale, result.rows), *result.stiffer.items()):
+        for value in sorted(rows):
+            row = rows[value]
+            cells = (as_cell(row.get(name)) for name in COLUMNS[1:-1])
+            yield [value, result.plan.criterion.verdict(row).value, *cells, scale]

@@ -1,0 +1,172 @@
+"""Limits of springs, extrapolated to stiff contacts: by a formula in place of runs (a real block: tests/cli)."""
+
+import json
+import math
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from blocksim.errors import InvalidInputError, StoppedEarlyError
+from blocksim.scenario import Scenario, document_of
+from blocksim.study.executors import Batch, Execution, Run, Setting, Task
+from blocksim.study.limit import find_limit
+from blocksim.study.limit_plan import read_limit
+from blocksim.study.limit_result import LimitResult
+from blocksim.study.limit_stiff import Level, Levels, ratio_of
+from blocksim.study.progress import MANIFEST
+from tests.study.test_limit import block_on_a_slope
+
+STIFF = 26.5  # deg: limit of stiff contacts
+SLENDER = (0.1, 0.2)
+Law = Callable[[float], float]
+
+
+def linear(share: float) -> Law:
+    """Return the limit over the stiffness scale of springs that take away so much at a scale of one."""
+    return lambda scale: STIFF * (1.0 - share / scale)
+
+
+class Formula(Execution):
+    """Says at once that a block stands below the limit of its stiffness, and by how much it has turned."""
+
+    law: Law = staticmethod(linear(0.0))
+    is_known = True  # the turn
+
+    def ready(self) -> tuple[Run, Setting]:
+        def run(tasks: Iterator[Task], _: Setting) -> Generator[Batch, None, None]:
+            for task in tasks:
+                yield Batch((task,), (self.row(task.scenario),), 0.0, "")
+
+        return run, Setting(1)
+
+    def row(self, scenario: Scenario) -> dict[str, object]:
+        tilt, scale = math.degrees(scenario.ground.tilt), scenario.contact.stiffness_scale
+        stands = tilt < self.law(scale)
+        outcome = ("stands" if self.is_known else "rocked back") if stands else "fell"
+        turn = STIFF - self.law(scale)
+        return {"status": "finished", "reason": "", "seconds": 1.0, "outcome": outcome, "b.rotation_deg": turn}
+
+
+def formula(law: Law, *, is_known: bool = True) -> Formula:
+    found = Formula()
+    object.__setattr__(found, "law", law)
+    object.__setattr__(found, "is_known", is_known)
+    return found
+
+
+def on_springs(**tables: Any) -> dict[str, Any]:
+    time = {"scheme": "explicit", "end": 1.0}
+    contact = {"restitution": 0, "normal_stiffness": 1e5}
+    data = block_on_a_slope(SLENDER) | {"time": time, "contact": contact, "start": {"settle": True}}
+    return data | tables
+
+
+def found_with(execution: Execution, out: Path, data: Mapping[str, Any] | None = None, **wanted: Any) -> LimitResult:
+    vary = {"ground.tilt": {"from": "5 deg", "to": "40 deg"}}
+    plan = read_limit(document_of(data or on_springs()), vary, stands="outcome != fell", tolerance=1e-3)
+    return find_limit(plan, execution, out=out, keep_runs=False, **wanted)
+
+
+@pytest.mark.parametrize(("share", "scales"), [(0.06, 2), (0.006, 2), (0.2, 3)])
+def test_a_limit_of_springs_becomes_that_of_stiff_contacts(tmp_path: Path, share: float, scales: int) -> None:
+    found = found_with(formula(linear(share)), tmp_path)
+    (answer,) = found.limits
+    assert answer.low < STIFF < answer.high
+    assert answer.high - answer.low < 5e-3 * STIFF
+    (levels,) = found.levels.values()
+    assert [one.scale for one in levels.found] == [10.0**n for n in range(scales)]
+    assert all(one.low < linear(share)(one.scale) < one.high for one in levels.found)
+    assert found.runs - len(found.rows) <= 8 * (scales - 1)
+    assert found_with(formula(linear(share)), tmp_path, stiffer=False).limits == found.limits_as_given
+
+
+@pytest.mark.parametrize("share", [0.03, -0.03])
+def test_a_shift_that_nothing_foretells_is_found_by_two_runs_beyond_the_bracket(tmp_path: Path, share: float) -> None:
+    (answer,) = found_with(formula(linear(share), is_known=False), tmp_path).limits
+    assert answer.low < STIFF < answer.high
+
+
+def test_where_springs_do_not_shift_a_limit_two_runs_say_so_and_none_where_they_cannot(tmp_path: Path) -> None:
+    found = found_with(formula(linear(1e-4), is_known=False), tmp_path / "may")
+    assert found.runs == len(found.rows) + 2
+    assert found.limits == found.limits_as_given
+    stiff = on_springs(contact={"restitution": 0})  # the stone's own stiffness
+    assert found_with(formula(linear(1e-4), is_known=False), tmp_path / "cannot", stiff).runs == len(found.rows)
+
+
+def test_without_a_start_at_rest_the_bracket_holds_what_goes_with_the_root_of_the_stiffness_too(tmp_path: Path) -> None:
+    data = on_springs(start={"settle": False})
+    for law in (linear(0.03), lambda scale: STIFF * (1.0 - 0.03 / math.sqrt(scale))):
+        (answer,) = found_with(formula(law), tmp_path / f"{law(4.0)}", data).limits
+        assert answer.low < STIFF < answer.high
+
+
+def test_a_limit_that_stiffer_springs_do_not_have_is_told_and_left_as_given(tmp_path: Path) -> None:
+    found = found_with(formula(lambda scale: 24.0 if scale == 1.0 else 50.0), tmp_path)
+    (levels,) = found.levels.values()
+    assert levels.problem == "with springs 10 times as stiff there is no such limit in the range"
+    assert found.limits == found.limits_as_given
+    (change,) = json.loads((tmp_path / "limit.json").read_text())["changes"]
+    assert (change["extrapolated"], change["problem"]) == (False, levels.problem)
+
+
+def test_a_search_stopped_after_any_run_goes_on_with_the_same_values_and_repeats_none(tmp_path: Path) -> None:
+    execution = formula(linear(0.2))
+    whole = found_with(execution, tmp_path / "whole")
+    seen: list[object] = []
+
+    def stop(*run: object) -> None:
+        seen.append(run)
+        raise KeyboardInterrupt
+
+    for _ in range(whole.runs):
+        with suppress(StoppedEarlyError):
+            found_with(execution, tmp_path / "stopped", on_run=stop)
+    again = found_with(execution, tmp_path / "stopped")
+    assert again.run == 0
+    assert len(seen) == whole.runs == len((tmp_path / "stopped" / MANIFEST).read_text().splitlines())
+    tables = [(tmp_path / name / "limit.csv").read_bytes() for name in ("whole", "stopped")]
+    assert tables[0] == tables[1]
+    assert again.limits == whole.limits
+
+
+def test_limits_of_stiffness_itself_are_left_as_given_and_rigid_contacts_cannot_be_stiffer(tmp_path: Path) -> None:
+    plan = read_limit(
+        document_of(on_springs()), {"contact.stiffness_scale": {"from": 0.5, "to": 2.0}}, stands="moved < 5 mm"
+    )
+    with pytest.raises(InvalidInputError, match=r"not made stiffer for a limit of contact\.stiffness_scale"):
+        find_limit(plan, Execution(), out=tmp_path / "limit", stiffer=True)
+    rigid = on_springs(time={"scheme": "nonsmooth", "end": 1.0})
+    with pytest.raises(InvalidInputError, match="rigid contacts have no stiffness"):
+        found_with(Execution(), tmp_path / "limit", rigid, stiffer=True)
+    assert not (tmp_path / "limit").exists()
+
+
+def test_springs_of_hertz_give_way_by_another_power_and_a_step_by_hand_is_shortened_with_them(tmp_path: Path) -> None:
+    assert ratio_of(document_of(on_springs()).build()) == 10.0
+    hertz = on_springs(contact={"restitution": 0, "law": "hertz-mindlin", "contact_radius": 0.01})
+    assert ratio_of(document_of(hertz).build()) == pytest.approx(10.0 ** (2.0 / 3.0))
+    steps: set[float] = set()
+
+    class Noting(Formula):
+        def row(self, scenario: Scenario) -> dict[str, object]:
+            steps.add(float(scenario.time.step) * math.sqrt(scenario.contact.stiffness_scale))
+            return super().row(scenario)
+
+    noting = Noting()
+    object.__setattr__(noting, "law", linear(0.06))
+    found_with(noting, tmp_path, on_springs(time={"scheme": "explicit", "end": 1.0, "step": 1e-6}))
+    assert min(steps) == pytest.approx(1e-6)
+    assert max(steps) == pytest.approx(1e-6)
+
+
+def test_what_is_left_out_of_second_order_is_within_the_bracket() -> None:
+    def law(s: float) -> float:
+        return 1.0 - s - s * s
+
+    (low, high) = Levels((Level(1.0, law(0.08), law(0.08)), Level(10.0, law(0.008), law(0.008))), 10.0).stiff or (0, 0)
+    assert low < 1.0 < high
+    assert high - low < 2e-3
