@@ -249,7 +249,6 @@ ROUGH_BASE = (
     "the formula is that of a smooth base; a rough one carries part of the thrust, 4.2 % at 2.5 mm by S3, "
     "and less the finer the particles"
 )
-SHOCK = "soil on its yield surface keeps part of the sideways stress of the shock at the start"
 SHORT = (
     "fronts of few particles stop early: the finer the particles, the farther they run; what flies ahead of a front "
     "loses its speed where it lands; raw gradients leave more of the height beside the wall than corrected ones"
@@ -261,7 +260,6 @@ SOIL_CASES = (
         "pressure at rest",
         at_rest,
         quick="5 mm instead of 2.5 mm",
-        remarks={"surface": SHOCK},
     ),
     Case("S2", "smooth wall drawn back, smooth base", "active pressure, Mohr and Coulomb", active),
     Case("S3", "smooth wall drawn back, rough base", "below S2", active_on_rough_base, quick="5 mm only"),

@@ -74,6 +74,16 @@ def test_a_column_between_smooth_walls_comes_to_rest_with_its_weight_on_the_grou
     assert soil.soils.points["y"].max() == pytest.approx(0.05 - 0.5 * SPACING, abs=0.05 * SPACING)
 
 
+def test_soil_that_starts_geostatic_presses_sideways_as_at_rest() -> None:
+    pairs = {"rods": {"smooth": {"friction": 0.0}, "ground": {"friction": 0.0}}}
+    soil = Soil(scene(column(0.06, 0.1, SPACING), walls=[LEFT, right(0.06)], pairs=pairs))
+    soil.to_time(0.03)
+    thrust, _ = soil.mean_force_on(1, 0.05)
+    sine = math.sin(ANGLE) / math.sqrt(3.0)
+    found = -2.0 * thrust / (UNIT_WEIGHT * 0.1**2 * DEPTH)
+    assert found == pytest.approx((1.0 - sine) / (1.0 + 2.0 * sine), rel=0.01)
+
+
 def test_a_particle_that_strikes_the_ground_keeps_a_fifth_of_its_speed_at_most() -> None:
     soil = Soil(scene(column(0.04, 0.04, SPACING), gravity=0.0))
     number = soil.soils.states["number"]

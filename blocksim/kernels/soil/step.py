@@ -24,6 +24,7 @@ from blocksim.kernels.soil.neighbours import (
     sort_particles,
     travelled,
 )
+from blocksim.kernels.soil.rows import balance_rows
 from blocksim.kernels.soil.stress import strain
 from blocksim.kernels.soil.touches import make_touches, preload
 
@@ -104,6 +105,7 @@ def renew_lists(soils: Soils, world: World, k: int) -> None:
         make_touches(soils, world)
         if soils.controls[0].is_listed == 0:
             preload(soils, world)
+            balance_rows(soils, world)
         soils.controls[0].is_listed = 1
     barrier(world.team)
     first, last = part_of_thread(soils.tallies.size, world, k)
