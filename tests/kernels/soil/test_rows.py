@@ -1,5 +1,6 @@
 """Rows of particles along faces at a geostatic start: what their stresses are, and that they are in equilibrium."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,11 @@ SPACING = 0.005
 
 def weight_of_row(k: int) -> float:
     """Return half of sum V f d (x) d across a face, of the particles of a row k spacings away."""
-    away = np.hypot(k, np.arange(-4, 5))
-    return sum(-float(slope(r, SMOOTHING)) / r * k * k for r in away)
+    total = 0.0
+    for along in range(-4, 5):
+        away = math.hypot(k, along)
+        total -= slope(away, SMOOTHING) / away * k * k
+    return total
 
 
 def test_the_decay_from_row_to_row_is_that_of_the_kernel_on_its_lattice() -> None:
