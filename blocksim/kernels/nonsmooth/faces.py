@@ -131,6 +131,14 @@ def clip(edge: Edge, half: Lanes) -> Edge:
 
 
 @kernel
+def clip_one(edge: Edge, half: float) -> Edge:
+    """Return the same for a single edge, bit by bit, without the division where nothing is cut."""
+    if edge.left >= -half and edge.right <= half:
+        return edge
+    return clip(edge, half)
+
+
+@kernel
 def counted(left_gap: Lanes, right_gap: Lanes, width: Lanes, a: Block, b: Block, margin: float) -> tuple[Lanes, Lanes]:
     """Return the gaps (m) of two points with a width (m) between them, FAR where one does not count."""
     left_gap = select(left_gap <= margin, left_gap, FAR)

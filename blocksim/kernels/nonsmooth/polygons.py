@@ -18,7 +18,7 @@ from blocksim.kernels.nonsmooth.faces import (
     Edge,
     Face,
     Points,
-    clip,
+    clip_one,
     face_of,
     has_point,
     in_frame,
@@ -30,17 +30,16 @@ from blocksim.kernels.nonsmooth.slip import Constraints
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller inner radius: two faces that face each other over less are passed by
 LEVEL = -0.99498743710662  # cosine: two faces within 0.1 rad of each other can meet as faces
+ROUND_OFF = 0.5 * TIE
 OF_B = 32  # added to the number of a corner of body b, which counts from 1
 RECTANGLE = 4
 
 
 class Best(NamedTuple):
-    """The face of a body beyond which another reaches least, the gap (m) there, and the next best of its faces."""
+    """The face of a body beyond which another reaches least, -1 for none, and the gap (m) there."""
 
     gap: float
     face: int
-    second_gap: float
-    second_face: int
 
 
 class Clipped(NamedTuple):
@@ -125,10 +124,11 @@ def outline_edge(face: Face, body: Block, hull: Hull, number: int) -> Edge:
 
 
 @kernel
-def best_above(least: float, body: Block, hull: Hull, other: Block, other_hull: Hull) -> Best:
+def best_above(least: float, body: Block, hull: Hull, other: Block, other_hull: Hull, but: int) -> Best:
     """Return the face of a body beyond which another one reaches least, of those with a gap above `least` (m).
 
-    The other body reaches beyond a face at least by its inner radius, from its centroid: most faces are out with that.
+    The face number `but` is left out. The other body reaches beyond a face at least by its inner radius, from its
+    centroid: most faces are out with that.
     """
     dx = other.x - body.x
     dy = other.y - body.y
@@ -137,25 +137,22 @@ def best_above(least: float, body: Block, hull: Hull, other: Block, other_hull: 
     # a direction in the frame of the body, in that of the other
     c = body.cos * other.cos + body.sin * other.sin
     s = body.sin * other.cos - body.cos * other.sin
-    best = second = least
-    number = next_number = -1
+    best = least
+    number = -1
     for k in range(hull.size):
         one = hull.table[hull.first + k]
         away = one.nx * px + one.ny * py - one.distance
-        if away - other_hull.inner > second:
+        if away - other_hull.inner > best and k != but:
             gap = away + least_along(other_hull, c * one.nx - s * one.ny, s * one.nx + c * one.ny)
             if gap > best:
-                second, next_number = best, number
                 best, number = gap, k
-            elif gap > second:
-                second, next_number = gap, k
-    return Best(best, number, second, next_number)
+    return Best(best, number)
 
 
 @kernel
 def best_face(body: Block, hull: Hull, other: Block, other_hull: Hull, thin: float) -> Best:
-    """Return the face of a body beyond which another one reaches least; the next best only where `met_on` may ask."""
-    best = best_above(-EDGE * thin, body, hull, other, other_hull)
+    """Return the face of a body beyond which another one reaches least."""
+    best = best_above(-EDGE * thin, body, hull, other, other_hull, -1)
     if best.face < 0:
         return best_of_all(body, hull, other, other_hull)
     return best
@@ -164,21 +161,21 @@ def best_face(body: Block, hull: Hull, other: Block, other_hull: Hull, thin: flo
 @rare_kernel
 def best_of_all(body: Block, hull: Hull, other: Block, other_hull: Hull) -> Best:
     """Return the same where bodies lie deep in one another."""
-    return best_above(-math.inf, body, hull, other, other_hull)
+    return best_above(-math.inf, body, hull, other, other_hull, -1)
 
 
 @kernel
-def can_reach_less(least: float, body: Block, hull: Hull, other: Block, inner: float) -> bool:
-    """Return True if any face of a body may have a gap above `least` (m) to another, `inner` (m) its inner radius."""
+def best_if_above(least: float, body: Block, hull: Hull, other: Block, other_hull: Hull) -> Best:
+    """Return the face of a body beyond which another one reaches least, if the gap there is above `least` (m).
+
+    Near centroids exclude that: regular polygons that meet face to face are done then.
+    """
     dx = other.x - body.x
     dy = other.y - body.y
-    px = body.cos * dx + body.sin * dy
-    py = body.cos * dy - body.sin * dx
-    most = -math.inf
-    for k in range(hull.first, hull.first + hull.size):
-        one = hull.table[k]
-        most = max(most, one.nx * px + one.ny * py - one.distance)
-    return most - inner > least
+    near = least - ROUND_OFF + hull.inner + other_hull.inner
+    if near > 0.0 and dx * dx + dy * dy <= near * near:
+        return Best(least, -1)
+    return best_above(least, body, hull, other, other_hull, -1)
 
 
 @rare_kernel
@@ -195,7 +192,7 @@ def clipped_on(body: Block, hull: Hull, number: int, other: Block, other_hull: H
     whole = outline_edge(face, other, other_hull, against)
     left = 1 + against if whole.left >= -face.half else OF_B + 1 + next_corner(hull, number)
     right = 1 + next_corner(other_hull, against) if whole.right <= face.half else OF_B + 1 + number
-    return Clipped(face, clip(whole, face.half), left, right)
+    return Clipped(face, clip_one(whole, face.half), left, right)
 
 
 @kernel
@@ -219,16 +216,22 @@ def met_on(best: Best, body: Block, hull: Hull, other: Block, other_hull: Hull, 
     by a little. `thin` is the smaller inner radius of both (m).
     """
     found = clipped_on(body, hull, best.face, other, other_hull)
-    if found.edge.right - found.edge.left < EDGE * thin and best.second_gap > -EDGE * thin:
-        return met_beside(found, best.second_face, body, hull, other, other_hull)
+    if found.edge.right - found.edge.left < EDGE * thin:
+        return met_beside(found, best.face, body, hull, other, other_hull, thin)
     return found
 
 
 @rare_kernel
-def met_beside(found: Clipped, number: int, body: Block, hull: Hull, other: Block, other_hull: Hull) -> Clipped:
-    """Return how another body lies over the next best face, if it has one that is nearly parallel; else `found`."""
-    if can_meet(body, hull, number, other, other_hull):
-        return clipped_on(body, hull, number, other, other_hull)
+def met_beside(
+    found: Clipped, number: int, body: Block, hull: Hull, other: Block, other_hull: Hull, thin: float
+) -> Clipped:
+    """Return how another body lies over the next best face after one, if it has one that is nearly parallel.
+
+    Else return `found`, what lies over the one.
+    """
+    next_best = best_above(-EDGE * thin, body, hull, other, other_hull, number)
+    if next_best.face >= 0 and can_meet(body, hull, next_best.face, other, other_hull):
+        return clipped_on(body, hull, next_best.face, other, other_hull)
     return found
 
 
@@ -248,17 +251,15 @@ def points_of_polygons(a: Block, hull_a: Hull, b: Block, hull_b: Hull, margin: f
     best_b = best_face(b, hull_b, a, hull_a, thin)
     if best_b.gap > margin:
         return nothing()
-    best_a = Best(-math.inf, -1, -math.inf, -1)
-    is_asked = can_reach_less(best_b.gap + TIE, a, hull_a, b, hull_b.inner)
-    if is_asked:
-        best_a = best_face(a, hull_a, b, hull_b, thin)
+    best_a = best_if_above(min(best_b.gap + TIE, margin), a, hull_a, b, hull_b)
     if best_a.gap > margin:
         return nothing()
-    if best_b.gap + TIE >= best_a.gap:
+    if best_a.face < 0:
         found = found_on(met_on(best_b, b, hull_b, a, hull_a, thin), a, b, True, margin)
-        if not (found.is_near or is_asked):
-            best_a = best_face_after_all(a, hull_a, b, hull_b, thin)
-        if found.is_near or best_b.gap > best_a.gap:
+        if found.is_near:
+            return found
+        best_a = best_face_after_all(a, hull_a, b, hull_b, thin)
+        if best_b.gap > best_a.gap:
             return found
     return found_on(met_on(best_a, a, hull_a, b, hull_b, thin), a, b, False, margin)
 

@@ -12,7 +12,17 @@ from hypothesis import strategies as st
 
 from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, STATE, STEPPING
-from blocksim.kernels.nonsmooth.faces import Block, Edge, Face, block_ahead, block_of, clip, face_towards, in_frame
+from blocksim.kernels.nonsmooth.faces import (
+    Block,
+    Edge,
+    Face,
+    block_ahead,
+    block_of,
+    clip,
+    clip_one,
+    face_towards,
+    in_frame,
+)
 from blocksim.kernels.nonsmooth.manifold import Place, collide
 from tests.kernels.nonsmooth.references import corners, places_of
 
@@ -49,7 +59,9 @@ def test_frame_of_a_face_counts_to_the_right_and_from_the_face_on(angle: float, 
 def test_clipped_edge_stays_on_its_line_and_over_the_face(
     left: float, width: float, gap: float, rise: float, half: float
 ) -> None:
-    cut = clip(Edge(left, gap, left + width, gap + rise, False, False), half)
+    whole = Edge(left, gap, left + width, gap + rise, False, False)
+    cut = clip(whole, half)
+    assert clip_one(whole, half) == cut
     if left >= half or left + width <= -half:
         assert cut.left >= cut.right or math.isclose(cut.left, cut.right)
         return
