@@ -12,6 +12,8 @@ from blocksim.scenario.outlines import Corners, box_of, least_width, middle_of, 
 from blocksim.scenario.structures import Pose, Shaped, Structure
 from blocksim.scenario.structures.shaped import Cell
 
+LENGTH_WITHOUT_BLOCKS = 0.1  # m: can be seen beside soil
+
 
 class PlacedBody(NamedTuple):
     """One block at the start: centroid x, y, turned by angle, all in SI (m, kg/m³, rad, m/s, rad/s).
@@ -76,6 +78,15 @@ class PlacedBody(NamedTuple):
 def smallest_width(bodies: Iterable[PlacedBody]) -> float:
     """Return the least width (m) of all bodies; infinite where there are none."""
     return min((body.least_width for body in bodies), default=math.inf)
+
+
+def length_beside(of_blocks: float) -> float:
+    """Return a length (m) that blocks give, where there are none LENGTH_WITHOUT_BLOCKS.
+
+    What goes by it moves nothing then, as soil has lengths of its own: lists of pairs that stay empty, how thick ground
+    is behind the faces that soil touches, and how far it is drawn.
+    """
+    return of_blocks if math.isfinite(of_blocks) else LENGTH_WITHOUT_BLOCKS
 
 
 class _Placement(NamedTuple):

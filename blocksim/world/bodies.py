@@ -26,7 +26,7 @@ from blocksim.kernels.common.arrays import (
 )
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments
 from blocksim.scenario.motion import motion_direction, motion_pieces
-from blocksim.scenario.placement import smallest_width
+from blocksim.scenario.placement import length_beside, smallest_width
 from blocksim.world.applied import Applied, applied_loads
 from blocksim.world.drives import DriveRecords, drive_records, piece_records
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
@@ -160,9 +160,7 @@ def _codes(outline: Outline) -> Iterator[int]:
 
 def _slab_thickness(scenario: Scenario, placed: Sequence[PlacedBody], segments: Sequence[PlacedSegment]) -> float:
     """Return the thickness (m) of the pieces of ground."""
-    smallest = smallest_width(placed)
-    if not math.isfinite(smallest):  # nothing but particles touches the pieces, and these see faces only
-        smallest = min((segment.length for segment in segments), default=0.0)
+    smallest = length_beside(smallest_width(placed))
     return max(SLAB_SHARE * smallest, 2.0 * (scenario.contact.max_overlap or 0.0))
 
 

@@ -25,6 +25,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.kernels.explicit.inertia import APPROACH_STEPS
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Explicit, Nonsmooth
+from blocksim.scenario.placement import length_beside
 from blocksim.world.applied import greatest_push, steepest_tilt
 from blocksim.world.bounds import Bounds, Kind, fastest_fall, given_speed, greatest_speed, support_speed
 from blocksim.world.interactions import Interactions
@@ -158,7 +159,7 @@ def choose_skin(scenario: Scenario, bounds: Bounds, table: Interactions, step: f
     given = scenario.contact.skin
     if given is None:
         share = SKIN_SHARE_OF_PARTICLES if _has_particles(scenario) else SKIN_SHARE
-        return _size_of_lists(bounds) * share
+        return length_beside(bounds.smallest) * share
     speed = greatest_speed(scenario, bounds, table) + support_speed(scenario)
     reserve = 1.0 if isinstance(scenario.time, Nonsmooth) else RESERVE
     # a list holds for one step at least, even where it is updated at every one
@@ -176,14 +177,9 @@ def choose_approach(scenario: Scenario, bounds: Bounds, table: Interactions, ste
     """
     if _has_particles(scenario):
         return 0.0
-    default = _size_of_lists(bounds) * SKIN_SHARE
+    default = length_beside(bounds.smallest) * SKIN_SHARE
     way = APPROACH_STEPS * step * greatest_speed(scenario, bounds, table)
     return min(max(way, LEAST_APPROACH * default), MOST_APPROACH * default)
-
-
-def _size_of_lists(bounds: Bounds) -> float:
-    """Return the length (m) that distances of listed bodies go by; any will do where there are no blocks."""
-    return bounds.smallest if math.isfinite(bounds.smallest) else 1.0
 
 
 def _has_particles(scenario: Scenario) -> bool:

@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_from_mapping
 from blocksim.scenario.overrides import frozen
-from blocksim.scenario.placement import PlacedBody
+from blocksim.scenario.placement import LENGTH_WITHOUT_BLOCKS, PlacedBody, length_beside, smallest_width
 from tests.scenario.conftest import MATERIAL, data_of
 
 BRICK = {"width": "32 mm", "height": "25 mm", "length": "50 mm", "material": "aluminium"}
@@ -115,3 +115,8 @@ def test_structures_line_up_the_bounding_boxes_of_outlines() -> None:
     body = placed_outline([[0, 0], [6, 0], [0, 3]], structures=[push], bodies=[])
     # pivots about the lower right corner at (6, 0)
     assert (body.vx, body.vy) == pytest.approx((-body.spin * body.y, body.spin * (body.x - 6)))
+
+
+def test_lengths_where_there_are_no_blocks_are_finite_and_those_of_blocks_as_they_are() -> None:
+    assert length_beside(smallest_width([])) == length_beside(-math.inf) == LENGTH_WITHOUT_BLOCKS
+    assert length_beside(0.025) == 0.025

@@ -9,12 +9,12 @@ import numpy as np
 
 from blocksim.scenario import Scenario
 from blocksim.scenario.motion import displacement_and_velocity, motion_direction, motion_pieces
+from blocksim.scenario.placement import length_beside
 from blocksim.scenario.segments import wall_segments
 from blocksim.world.systems.system import Elements, Floats, Indices, Present, Quantity, System, Track
 
 BEYOND = 2.0  # diagonals of the largest block; so far the ground reaches beyond all blocks
 THICKNESS = 0.25  # of the smallest side of all blocks
-LENGTH_WITHOUT_BLOCKS = 0.1  # m
 CORNERS = tuple(Quantity(f"{axis}{corner}", "m") for corner in range(4) for axis in "xy")  # at rest
 QUANTITIES = (Quantity("dx", "m"), Quantity("dy", "m"), Quantity("vx", "m/s"), Quantity("vy", "m/s"))
 
@@ -66,7 +66,7 @@ def support_quads(scenario: Scenario, blocks: Track) -> Floats:
 
     Every straight piece of the ground is filled down to a common depth; a wall has a thickness behind its face.
     """
-    thick = THICKNESS * _length(np.minimum(blocks["size_x"], blocks["size_y"]).min(initial=np.inf))
+    thick = THICKNESS * length_beside(np.minimum(blocks["size_x"], blocks["size_y"]).min(initial=np.inf))
     line = _ground(scenario, blocks)
     floor = float(line[:, 1].min()) - thick
     pieces = [(line[i], line[i + 1]) for i in range(len(line) - 1) if line[i + 1, 0] > line[i, 0]]
@@ -86,7 +86,7 @@ def support_motion(scenario: Scenario, times: Floats) -> tuple[Floats, Floats]:
 def _ground(scenario: Scenario, blocks: Track) -> Floats:
     """Return the line of the ground (m, (k, 2)) from left to right, beyond all blocks."""
     profile = np.array(scenario.ground.profile or ()).reshape(-1, 2)
-    beyond = BEYOND * _length(np.hypot(blocks["size_x"], blocks["size_y"]).max(initial=-np.inf))
+    beyond = BEYOND * length_beside(np.hypot(blocks["size_x"], blocks["size_y"]).max(initial=-np.inf))
     x = np.concatenate([profile[:, 0], _places(scenario, blocks)])
     first, last = (profile[0, 1], profile[-1, 1]) if len(profile) else (0.0, 0.0)
     return np.concatenate([[[float(x.min()) - beyond, first]], profile, [[float(x.max()) + beyond, last]]])
@@ -98,11 +98,6 @@ def _places(scenario: Scenario, blocks: Track) -> Floats:
     if found.size:
         return found
     return np.array([x for wall in wall_segments(scenario) for x in (wall.x0, wall.x1)] or [0.0])
-
-
-def _length(of_blocks: float) -> float:
-    """Return a length (m) that blocks give; where there are none, one that can be seen beside soil."""
-    return float(of_blocks) if np.isfinite(of_blocks) else LENGTH_WITHOUT_BLOCKS
 
 
 def _walls(scenario: Scenario, thick: float) -> list[Floats]:
