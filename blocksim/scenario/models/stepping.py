@@ -82,7 +82,7 @@ class Nonsmooth(Time):
     velocity_tolerance: Annotated[float, _TOLERANCE] | None = Field(
         default=None,
         description="largest change of velocity by one impulse at which a substep counts as solved (default: 1 mm/s, "
-        "for a single block, and for up to 12 on supports that move, 0.001 mm/s, from 100 on 100 mm/s)",
+        "for a single block, and for up to 99 on supports that move, 0.001 mm/s, from 100 on 100 mm/s)",
     )
     velocity_sweeps: Annotated[int, Whole(1, MOST_SWEEPS)] = Field(
         default=1000, description="maximum number of iterations over all contacts per substep"
