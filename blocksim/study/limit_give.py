@@ -8,7 +8,8 @@ of a bracket is the shift: on the dry wall of Ferris & Tin-Loi 1.74 and 0.22 deg
 two of them extrapolate (limit_stiff.py).
 
 A structure that has moved, or rocked back, has turned otherwise too. Of that only a bound is known, if everything rests
-on one corner of the softest contact.
+on one corner of the softest contact; and none under a pulse that begins at its peak while springs carry none of it,
+which shifts a limit with the root of 1/stiffness (simulation/onset.py).
 """
 
 import math
@@ -16,6 +17,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from blocksim.scenario import Scenario, place_bodies
+from blocksim.scenario.models.pulse import Pulse
+from blocksim.scenario.motion import settles
 from blocksim.simulation.movement import Manner
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit_plan import SPRINGS
@@ -67,6 +70,8 @@ def most_shift(found: LimitResult, change: Change[Verdict]) -> float:
     """Return a bound of the share of a limit that springs take away, by their load and how slender blocks are."""
     scenario = found.plan.scenario_at(change.low if change.below is Verdict.STANDS else change.high)
     slender = slenderness(scenario)
+    if isinstance(scenario.motion, Pulse) and scenario.motion.is_abrupt and not settles(scenario):
+        return math.inf
     known = give_at(found, change)
     if known is not None:
         return max(known.share, 2.0 * math.radians(known.turn) / slender)

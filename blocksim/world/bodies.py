@@ -158,7 +158,7 @@ def _codes(outline: Outline) -> Iterator[int]:
     return (codes[body.material, body.depth] for body in outline.placed)
 
 
-def _slab_thickness(scenario: Scenario, placed: Sequence[PlacedBody], segments: Sequence[PlacedSegment]) -> float:
+def _slab_thickness(scenario: Scenario, placed: Sequence[PlacedBody]) -> float:
     """Return the thickness (m) of the pieces of ground."""
     smallest = length_beside(smallest_width(placed))
     return max(SLAB_SHARE * smallest, 2.0 * (scenario.contact.max_overlap or 0.0))
@@ -174,14 +174,14 @@ def _slab_half_sides(
     scenario: Scenario, placed: Sequence[PlacedBody], segments: Sequence[PlacedSegment]
 ) -> Iterator[HalfSides]:
     """Yield half the length and thickness (m) of every slab."""
-    thickness = _slab_thickness(scenario, placed, segments)
+    thickness = _slab_thickness(scenario, placed)
     for segment in segments:
         begin, end = _slab_ends(segment, thickness)
         yield 0.5 * (end - begin), 0.5 * thickness
 
 
 def _fill_slabs(records: Records, outline: Outline) -> None:
-    thickness = _slab_thickness(outline.scenario, outline.placed, outline.segments)
+    thickness = _slab_thickness(outline.scenario, outline.placed)
     for record, segment in zip(records, outline.segments, strict=True):
         _fill_slab(record, segment, thickness)
         wall = ContactClass(segment.material, math.inf, is_wall=True)

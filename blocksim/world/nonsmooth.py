@@ -60,7 +60,7 @@ def velocity_tolerance(scenario: Scenario, blocks: int) -> float:
     one sweep, and shear is found over many substeps: on a table that starts with 8 m/s2 on friction 0.8 five blocks of
     0.2 x 0.1 m slip by 2.8 % too far, a stack of two by 4.7 %, as they tilt until shear and normal forces agree. A
     single block has every substep solved, and so have fewer than CROWD on supports that move: what is wrong of a slip
-    goes as the tolerance over what gravity does in a substep. Fifteen of those blocks slip by 2.8 % too far with 1 mm/s,
+    goes as the tolerance over what gravity does in a substep. With 1 mm/s fifteen such blocks slip by 2.8 % too far,
     eight stacks of two by 10 %, with 0.1 mm/s by 0.25 and 1 %; the foot of a column of 13 drums opens 5 % too early. It
     costs nothing where blocks stand side by side, as impulses change little from one substep to the next, and a column
     of 13 drums five times as much. Blocks that collapse under gravity alone would take half as long again.
