@@ -21,11 +21,12 @@ def told_stiffness(*, silent: bool) -> Callable[[LimitPlan], None]:
 def warn_of_give(searches: Iterable[LimitResult], *, as_given: bool) -> None:
     """Warn of limits that springs shift by more than GIVE, where they are not those of stiff contacts."""
     for one in searches:
-        for change in one.limits_as_given:
-            levels, give = one.levels.get(change), give_at(one, change)
-            if levels is not None and levels.problem:
+        for levels in one.levels.values():
+            if levels.problem:
                 note(f"warning: {_named(one, levels)}: {levels.problem}")
-            if give is not None and give.share > GIVE and (levels is None or levels.stiff is None):
+        for change in one.limits_as_given:
+            given, give = one.levels.get(change), give_at(one, change)
+            if give is not None and give.share > GIVE and (given is None or given.stiff is None):
                 turned = f"blocks have turned by {give.turn:.2g}° at {one.plan.shown(give.value)}"
                 hint = "leave --as-given out" if as_given else "see --stiffer"
                 note(f"warning: {turned}, as springs give way; the limit is off by some {give.share:.1%}; {hint}")

@@ -192,7 +192,7 @@ class _Stiffening:
     def complete(self) -> LimitResult:
         """Return the result with limits of stiff contacts."""
         found = self.found
-        levels = {one: self._levels(one) for one in found.limits_as_given if self._is_worth_it(one)}
+        levels = {one: self._levels(one) for one in found.falls_as_given if self._is_worth_it(one)}
         return replace(found, stiffer=self.rows, levels=levels)
 
     def _is_worth_it(self, change: Change[Verdict]) -> bool:
@@ -207,7 +207,7 @@ class _Stiffening:
             scale = RATIO * levels.found[-1].scale
             near, is_foretold = self._near(change, levels)
             rows = self._searched(change, scale, near, is_foretold=is_foretold)
-            changes = changes_in({value: self.plan.criterion.verdict(row) for value, row in rows.items()})
+            changes = changes_in(fallen({value: self.plan.criterion.verdict(row) for value, row in rows.items()}))
             (first, *others) = changes or [near]
             if others or not changes or {first.below, first.above} != BOTH:
                 return replace(levels, problem=NOT_FOUND.format(ratio=scale / levels.found[0].scale))
@@ -223,12 +223,12 @@ class _Stiffening:
         if len(levels.found) == 1 and share <= self.least:
             beyond = self.least * max(abs(change.low), abs(change.high))
             return self._between(change, change.low - beyond, change.high + beyond), False
-        aim = levels.aim(share if change.below is Verdict.STANDS else -share, self.plan.tolerance)
+        aim = levels.aim(-share if change.below is Verdict.FALLS else share, self.plan.tolerance)
         return self._between(change, *aim), True
 
     def _between(self, change: Change[Verdict], low: float, high: float) -> Change[Verdict]:
-        span = self.plan.span
-        return replace(change, low=span.fitted(low), high=span.fitted(high))
+        span, sides = self.plan.span, fallen({0: change.below, 1: change.above})
+        return Change(span.fitted(low), span.fitted(high), sides[0], sides[1])
 
     def _searched(
         self, change: Change[Verdict], scale: float, near: Change[Verdict], *, is_foretold: bool
@@ -238,9 +238,14 @@ class _Stiffening:
             self.on_stiffer(plan)
 
         def choose(known: Mapping[Number, Verdict]) -> list[Number]:
-            is_as_it_was = changes_in(known) == [near] and not (is_foretold or self.is_asked)
-            return [] if is_as_it_was else next_near(plan.span, known, near, plan.tolerance)
+            is_as_it_was = changes_in(fallen(known)) == [near] and not (is_foretold or self.is_asked)
+            return [] if is_as_it_was else next_near(plan.span, fallen(known), near, plan.tolerance)
 
         rows = self.runs.searched(plan, choose)
         self.rows.setdefault(scale, {}).update(rows)
         return rows
+
+
+def fallen(verdicts: Mapping[Number, Verdict]) -> dict[Number, Verdict]:
+    """Return what runs came to, those that move on at the end without having fallen among those that stand."""
+    return {value: Verdict.STANDS if verdict is Verdict.UNDECIDED else verdict for value, verdict in verdicts.items()}

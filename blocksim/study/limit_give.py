@@ -8,8 +8,9 @@ of a bracket is the shift: on the dry wall of Ferris & Tin-Loi 1.74 and 0.22 deg
 two of them extrapolate (limit_stiff.py).
 
 A structure that has moved, or rocked back, has turned otherwise too. Of that only a bound is known, if everything rests
-on one corner of the softest contact; and none under a pulse that begins at its peak while springs carry none of it,
-which shifts a limit with the root of 1/stiffness (simulation/onset.py).
+on one corner of the softest contact; and none where supports move: what impacts of a rocking block leave depends on the
+springs too, and a pulse that begins at its peak while springs carry none of it makes it slip too far, with the root of
+1/stiffness (simulation/onset.py). With springs of the materials' own stiffness both are small.
 """
 
 import math
@@ -48,7 +49,7 @@ def give_at(found: LimitResult, change: Change[Verdict]) -> Give | None:
     """Return how far springs have given way at a limit; None where it is not known from what stands there."""
     if found.plan.document.build().time.scheme != SPRINGS:
         return None
-    value = change.low if change.below is Verdict.STANDS else change.high
+    value = standing_side(change)
     row = found.rows[value]
     if row.get("outcome") != Manner.STANDS.value:  # it has turned otherwise, too
         return None
@@ -66,15 +67,21 @@ def _slope(found: LimitResult, value: float) -> float:
     return float(found.plan.scenario_at(value).ground.tilt) or math.inf
 
 
+def standing_side(change: Change[Verdict]) -> float:
+    """Return the end of a bracket at which nothing has fallen."""
+    return change.high if change.below is Verdict.FALLS else change.low
+
+
 def most_shift(found: LimitResult, change: Change[Verdict]) -> float:
     """Return a bound of the share of a limit that springs take away, by their load and how slender blocks are."""
-    scenario = found.plan.scenario_at(change.low if change.below is Verdict.STANDS else change.high)
+    scenario = found.plan.scenario_at(standing_side(change))
     slender = slenderness(scenario)
-    if isinstance(scenario.motion, Pulse) and scenario.motion.is_abrupt and not settles(scenario):
-        return math.inf
+    is_late = isinstance(scenario.motion, Pulse) and scenario.motion.is_abrupt and not settles(scenario)
     known = give_at(found, change)
-    if known is not None:
+    if known is not None and not is_late:
         return max(known.share, 2.0 * math.radians(known.turn) / slender)
+    if is_late or (scenario.motion is not None and scenario.contact.stiffness_scale < 1.0):
+        return math.inf
     sink = most_sink(scenario)
     width = min(min(body.size_x, body.size_y) for body in place_bodies(scenario))
     moved = found.plan.criterion.least_moved

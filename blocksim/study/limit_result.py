@@ -23,6 +23,7 @@ TABLE = "limit.csv"
 VALUE, VERDICT, SCALE = "value", "verdict", "stiffness_scale"
 COLUMNS = (VERDICT, *MOVEMENT, "status", "reason", "seconds", SCALE)
 BOTH = {Verdict.STANDS, Verdict.FALLS}
+BOTH_OR_MOVING = BOTH | {Verdict.UNDECIDED}
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,11 @@ class LimitResult:
     def limits_as_given(self) -> list[Change[Verdict]]:
         """Those brackets between standing and falling."""
         return [change for change in self.changes_as_given if {change.below, change.above} == BOTH]
+
+    @property
+    def falls_as_given(self) -> list[Change[Verdict]]:
+        """Those on one side of which the structure falls; on the other it stands, or moves on at the end."""
+        return [one for one in self.changes_as_given if BOTH_OR_MOVING >= {one.below, one.above} > {Verdict.FALLS}]
 
     @property
     def changes(self) -> list[Change[Verdict]]:

@@ -89,6 +89,18 @@ def test_a_shift_that_nothing_foretells_is_found_by_two_runs_beyond_the_bracket(
     assert answer.low < STIFF < answer.high
 
 
+def test_what_moves_on_at_the_end_is_extrapolated_as_what_stands(tmp_path: Path) -> None:
+    class Rocking(Formula):
+        def row(self, scenario: Scenario) -> dict[str, object]:
+            return super().row(scenario) | {"moves_on": True}
+
+    rocking = Rocking()
+    object.__setattr__(rocking, "law", linear(0.03))
+    (answer,) = found_with(rocking, tmp_path).changes
+    assert (answer.below, answer.above) == ("undecided", "falls")
+    assert answer.low < STIFF < answer.high
+
+
 def test_where_springs_do_not_shift_a_limit_two_runs_say_so_and_none_where_they_cannot(tmp_path: Path) -> None:
     found = found_with(formula(linear(1e-4), is_known=False), tmp_path / "may")
     assert found.runs == len(found.rows) + 2
