@@ -25,6 +25,12 @@ def test_active_thrust_and_shear_band_are_those_of_a_yielding_wall(name: str) ->
     assert outside(case, Setting(quick=True)) == []
 
 
+@pytest.mark.long
+def test_the_shortened_walls_stand_and_topple_within_the_shortened_time() -> None:
+    (case,) = chosen_of_soil(["S6"])
+    assert outside(case, Setting(quick=True)) == []
+
+
 def test_the_ledger_of_a_collapse_closes_with_both_gradients() -> None:
     (case,) = chosen_of_soil(["S7"])
     assert outside(case, Setting(quick=True)) == []
