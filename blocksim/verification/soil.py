@@ -250,8 +250,9 @@ ROUGH_BASE = (
     "and less the finer the particles"
 )
 SHORT = (
-    "fronts of few particles stop early: the finer the particles, the farther they run; what flies ahead of a front "
-    "loses its speed where it lands; raw gradients leave more of the height beside the wall than corrected ones"
+    "an error of first order in the spacing: with 1.25 mm and raw gradients the column of 100 mm is 1.1 % too "
+    "high, its last particle comes 4.0 % and its connected front 9.8 % too short. A last bit more or less of speed "
+    "moves ends by 1 to 4 %, and heights with 5 mm know whole particles only, of 7 %"
 )
 SOIL_CASES = (
     Case(
