@@ -148,6 +148,8 @@ pictures: $(RUN_STAMP) ## Draw the pictures of the findings in results/
 	    --over friction.block_block=0.3125,0.325,0.3375,0.35,0.3625,0.375,0.3875,0.4,0.45,0.5 \
 	    --out $(PICTURES)/arch --overwrite --quiet
 	$(BLOCKSIM) plot $(PICTURES)/arch --experiment scenarios/published/arch_thickness.csv --out results/arch_thickness.png
+	$(BLOCKSIM) run scenarios/soil/retaining_wall_falls.toml --quiet
+	$(BLOCKSIM) plot scenarios/soil/retaining_wall_falls.toml --out results/retaining_wall.png
 
 .PHONY: paper
 paper: $(RUN_STAMP) ## The paper's figures, tables and equations from the shipped scenarios, into results/paper
