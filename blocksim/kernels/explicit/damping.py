@@ -162,6 +162,12 @@ def are_dashpots_due(pair: Record, direction: int) -> bool:
 
 
 @kernel
+def count_down(pair: Record) -> None:
+    """Note that the operator along the normals of a pair, which is not due, is used in one more step."""
+    pair.normal_left -= 1
+
+
+@kernel
 def keep_dashpots(pair: Record, direction: int, pattern: int, left: int) -> None:
     """Note for how many steps an operator of a pair holds, and the bits of the points that have a dashpot in it."""
     if direction == NORMAL:

@@ -60,10 +60,12 @@ def forces_of_group(world: World, share: Record, end: int, step: float, tally: R
             friction += rubbed
             share.next_between += 1
         else:
+            a = world.bodies[pair.a]
+            b = world.bodies[pair.b]
             kind, effect = persistent_forces(world, p, step, world.particles, world.corners)
             if kind == TOUCHING:
-                add_to_first(world.bodies[pair.a], effect.fx, effect.fy, effect.torque_a)
-                add_to_second(world.bodies[pair.b], effect.fx, effect.fy, effect.torque_b)
+                add_to_first(a, effect.fx, effect.fy, effect.torque_a)
+                add_to_second(b, effect.fx, effect.fy, effect.torque_b)
                 dashpot += effect.dashpot
                 friction += effect.friction
             elif kind == CHANGED:

@@ -16,6 +16,12 @@ def coulomb_limit(values: Record, normal_force: float, speed: float, needed: flo
     kinetic = values.kinetic_friction * normal_force
     if needed <= kinetic:
         return kinetic
+    return limit_between(values, normal_force, speed)
+
+
+@kernel
+def limit_between(values: Record, normal_force: float, speed: float) -> float:
+    """Return the largest shear force (N) at a slip speed (m/s), between those of rest and of fast slip."""
     static = values.static_friction
     return normal_force * friction_coefficient(static, values.kinetic_friction, values.transition_speed, speed)
 
@@ -60,7 +66,10 @@ def draw_same_spring(
     """As draw_spring, for a stiffness that does not change: a spring that sticks then loses nothing."""
     spring = old + slip
     needed = stiffness * abs(spring)
-    limit = coulomb_limit(values, normal_force, rate, needed)
+    kinetic = values.kinetic_friction * normal_force
+    if needed <= kinetic:
+        return spring, kinetic, False, 0.0
+    limit = limit_between(values, normal_force, rate)
     if needed <= limit:
         return spring, limit, False, 0.0
     spring = math.copysign(limit / stiffness, spring)
@@ -77,10 +86,17 @@ def draw_changed_spring(
 
 @kernel
 def draw_lasting_spring(
-    values: Record, stiffness: float, old_stiffness: float, old: float, slip: float, normal_force: float, rate: float
+    values: Record,
+    stiffness: float,
+    old_stiffness: float,
+    old: float,
+    slip: float,
+    normal_force: float,
+    rate: float,
+    may_change: bool,
 ) -> tuple[float, float, bool, float]:
-    """As draw_spring, over the whole drift, quick where the stiffness has not changed."""
-    if stiffness == old_stiffness:
+    """As draw_spring, over the whole drift, quick where the stiffness has not changed, or cannot have."""
+    if not may_change or stiffness == old_stiffness:
         return draw_same_spring(values, stiffness, old, slip, normal_force, rate)
     return draw_changed_spring(values, stiffness, old_stiffness, old, slip, normal_force, rate)
 

@@ -10,10 +10,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from blocksim.kernels.common.arrays import ALL, NORMAL, SHEAR, Record, Records, World
-from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit.bearing import measure_soon
 from blocksim.kernels.explicit.contact import has_new_neighbours
-from blocksim.kernels.explicit.damping import BOTH, are_dashpots_due, damp_one, damp_two, note_slip, renew_dashpots
+from blocksim.kernels.explicit.damping import (
+    BOTH,
+    are_dashpots_due,
+    count_down,
+    damp_one,
+    damp_two,
+    note_slip,
+    renew_dashpots,
+)
 from blocksim.kernels.explicit.friction import clip_to_cone, draw_lasting_spring
 from blocksim.kernels.explicit.laws import has_constant_stiffness
 from blocksim.kernels.explicit.models import SURFACE
@@ -83,10 +91,8 @@ def forces_of_rectangles(world: World, p: int, step: float) -> tuple[int, Effect
         return UNTOUCHED, NOTHING
     if is_unsettled(world, p, a, b, dx, dy):
         return CHANGED, NOTHING
-    if pair.active == 1:
-        return single(world, p, a, b, dx, dy, step)
-    if pair.active == 2:
-        return double(world, p, a, b, dx, dy, step)
+    if pair.active > 0:
+        return forces_of_contacts(world, p, a, b, dx, dy, step)
     gap = choose_axis(pair, a, b, dx, dy, pair.b == world.bodies.size - 1)
     return UNTOUCHED if gap >= -pair.limit else CHANGED, NOTHING
 
@@ -103,9 +109,35 @@ def forces_of_outlines(world: World, p: int, step: float, table: Records) -> tup
         return apart_or_changed(world, p, a, b, table), NOTHING
     if has_changed(world, p, a, b, table):
         return CHANGED, NOTHING
+    return forces_of_contacts(world, p, a, b, dx, dy, step)
+
+
+@kernel
+def forces_of_contacts(
+    world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float
+) -> tuple[int, Effect]:
+    """Return what a pair with contacts does, if they continue.
+
+    What is checked and measured once in OPERATOR_LIFE steps, where dashpots are due, is compiled apart, so that all
+    other steps have neither the tests for it nor what they would keep for it.
+    """
+    pair = world.pairs[p]
+    if pair.normal_left == 0:
+        return forces_when_due(world, p, step)
     if pair.active == 1:
-        return single(world, p, a, b, dx, dy, step)
-    return double(world, p, a, b, dx, dy, step)
+        return single(world, p, a, b, dx, dy, step, False)
+    return double(world, p, a, b, dx, dy, step, False)
+
+
+@rare_kernel
+def forces_when_due(world: World, p: int, step: float) -> tuple[int, Effect]:
+    """As forces_of_contacts, where the dashpots along the normals are due, and with them the stiffness."""
+    pair = world.pairs[p]
+    a = world.bodies[pair.a]
+    b = world.bodies[pair.b]
+    if pair.active == 1:
+        return single(world, p, a, b, a.x - b.x, a.y - b.y, step, True)
+    return double(world, p, a, b, a.x - b.x, a.y - b.y, step, True)
 
 
 @kernel
@@ -170,15 +202,6 @@ def follow_corner(
 
 
 @kernel
-def measure_one(
-    pair: Record, a: Record, b: Record, found: PersistentContact, stiffness: float, corners: Records | None
-) -> None:
-    """Measure the stiffness of a single contact where dashpots are due; `stiffness` is that of a corner."""
-    if pair.normal_left == 0 and pair.bearing != PLANE:
-        measure_corner(pair, a, b, found, stiffness, corners)
-
-
-@kernel
 def measure_corner(
     pair: Record, a: Record, b: Record, found: PersistentContact, stiffness: float, corners: Records | None
 ) -> None:
@@ -201,49 +224,65 @@ def are_flat(a: Record, b: Record, found: PersistentContact, corners: Records | 
 
 
 @kernel
-def are_ends(pair: Record, a: Record, b: Record, found: PersistentContact, corners: Records | None) -> bool:
+def are_ends(
+    pair: Record, a: Record, b: Record, found: PersistentContact, is_due: bool, corners: Records | None
+) -> bool:
     """Return True if two contacts are on the ground or the two ends of one interval of parallel faces.
 
     That changes by turning only, slowly, and is checked where dashpots are due.
     """
     if pair.bearing == APART:
         return False
-    return pair.normal_left != 0 or pair.bearing == PLANE or are_flat(a, b, found, corners)
+    return not is_due or pair.bearing == PLANE or are_flat(a, b, found, corners)
 
 
 @kernel
-def measure_two(pair: Record, one: PersistentContact, two: PersistentContact) -> None:
-    """Measure the stiffness of two contacts where dashpots are due."""
-    if pair.normal_left == 0 and pair.bearing != PLANE:
-        pair.stiffness = stiffness_between(pair, one.x - two.x, one.y - two.y, one.nx, one.ny)
+def use_operator_of_one(
+    operator: Record,
+    pair: Record,
+    a: Record,
+    b: Record,
+    found: PersistentContact,
+    values: Record,
+    step: float,
+    is_due: bool,
+) -> None:
+    """Rebuild the operator along the normal of a single contact where it is due, else count down."""
+    if not is_due:
+        count_down(pair)
+    elif pair.slides != 0:
+        renew_sliding(operator, pair, a, b, found, values, step)
+    else:
+        renew_single(operator, pair, a, b, found, NORMAL, values.normal_damping, step, pair.stiffness)
 
 
 @kernel
-def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float) -> tuple[int, Effect]:
-    """Return what a pair with one contact does, if it continues; see persistent_forces."""
+def single(
+    world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float, is_due: bool
+) -> tuple[int, Effect]:
+    """Return what a pair with one contact does, if it continues; see persistent_forces.
+
+    `is_due` says whether dashpots along the normal are, where there are any.
+    """
     contact = world.contacts[p, 0]
     pair = world.pairs[p]
-    operator = world.operators[p, NORMAL]
     values = world.interactions[a.contact_class, b.contact_class]
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
-    goes_on, found = follow_corner(contact, a, b, dx, dy, motion, step, pair.normal_left == 0, world.corners)
+    goes_on, found = follow_corner(contact, a, b, dx, dy, motion, step, is_due, world.corners)
     if not goes_on or found.depth > pair.limit:
         return CHANGED, NOTHING
     before = pair.stiffness
-    measure_one(pair, a, b, found, values.normal_stiffness, world.corners)
-    k = pair.stiffness
-    spring = k * found.depth
+    if is_due and pair.bearing != PLANE:
+        measure_corner(pair, a, b, found, values.normal_stiffness, world.corners)
+    spring = pair.stiffness * found.depth
     force = spring
-    if values.normal_damping > 0.0:
-        if are_dashpots_due(pair, NORMAL):
-            if pair.slides != 0:
-                renew_sliding(operator, pair, a, b, found, values, step)
-            else:
-                renew_single(operator, pair, a, b, found, NORMAL, values.normal_damping, step, k)
+    if not is_due or values.normal_damping > 0.0:
+        operator = world.operators[p, NORMAL]
+        use_operator_of_one(operator, pair, a, b, found, values, step, is_due)
         force = damp_one(operator, spring, contact.normal_force, found.closing_rate)
     normal = max(force, 0.0)
     dashpot = 0.5 * (contact.normal_force - before * contact.depth + (normal - spring)) * found.closing
-    drawn, shear, lost, friction = shear_of_one(world, p, a, b, found, normal, step, before)
+    drawn, shear, lost, friction = shear_of_one(world, p, a, b, values, found, normal, step, before, is_due)
     keep(contact, drawn, found.depth, normal, shear)
     measure_soon(pair, found.slip, step * (a.spin - b.spin), world.corners)
     square = 0.5 * found.depth * found.depth
@@ -256,20 +295,28 @@ def single(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
 
 @kernel
 def shear_of_one(
-    world: World, p: int, a: Record, b: Record, found: PersistentContact, normal: float, step: float, before: float
+    world: World,
+    p: int,
+    a: Record,
+    b: Record,
+    values: Record,
+    found: PersistentContact,
+    normal: float,
+    step: float,
+    before: float,
+    is_due: bool,
 ) -> tuple[float, float, float, float]:
     """Return shear spring (m), shear force (N) and the losses (J) to dashpot and friction of a single contact.
 
-    `before` (N/m) is the stiffness along the normal in the step before.
+    `before` (N/m) is the stiffness along the normal in the step before; it is another now only where `is_due` says so.
     """
     contact = world.contacts[p, 0]
     pair = world.pairs[p]
     operator = world.operators[p, SHEAR]
-    values = world.interactions[a.contact_class, b.contact_class]
     k = values.shear_ratio * pair.stiffness
     old = values.shear_ratio * before
     drawn, limit, slides, friction = draw_lasting_spring(
-        values, k, old, contact.spring, found.slip, normal, found.slip_rate
+        values, k, old, contact.spring, found.slip, normal, found.slip_rate, is_due
     )
     elastic = k * drawn
     shear = elastic
@@ -297,26 +344,47 @@ def keep(contact: Record, spring: float, depth: float, normal_force: float, shea
 
 
 @kernel
-def double(world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float) -> tuple[int, Effect]:
-    """Return what a pair with two contacts does, if both continue; see persistent_forces."""
+def use_operator_of_two(
+    operator: Record,
+    pair: Record,
+    a: Record,
+    b: Record,
+    one: PersistentContact,
+    two: PersistentContact,
+    values: Record,
+    step: float,
+    is_due: bool,
+) -> None:
+    """Rebuild the operator along the normals of two contacts where it is due, else count down."""
+    if is_due:
+        renew_double(operator, pair, a, b, one, two, NORMAL, BOTH, values.normal_damping, step, pair.stiffness)
+    else:
+        count_down(pair)
+
+
+@kernel
+def double(
+    world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float, is_due: bool
+) -> tuple[int, Effect]:
+    """Return what a pair with two contacts does, if both continue; see single."""
     first = world.contacts[p, 0]
     second = world.contacts[p, 1]
     pair = world.pairs[p]
     operator = world.operators[p, NORMAL]
     values = world.interactions[a.contact_class, b.contact_class]
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
-    goes_1, one = follow_corner(first, a, b, dx, dy, motion, step, pair.normal_left == 0, world.corners)
-    goes_2, two = follow_corner(second, a, b, dx, dy, motion, step, pair.normal_left == 0, world.corners)
-    if not (goes_1 and goes_2 and are_ends(pair, a, b, one, world.corners)) or max(one.depth, two.depth) > pair.limit:
+    goes_1, one = follow_corner(first, a, b, dx, dy, motion, step, is_due, world.corners)
+    goes_2, two = follow_corner(second, a, b, dx, dy, motion, step, is_due, world.corners)
+    goes_on = goes_1 and goes_2 and are_ends(pair, a, b, one, is_due, world.corners)
+    if not goes_on or max(one.depth, two.depth) > pair.limit:
         return CHANGED, NOTHING
     before = pair.stiffness
-    measure_two(pair, one, two)
+    if is_due and pair.bearing != PLANE:
+        pair.stiffness = stiffness_between(pair, one.x - two.x, one.y - two.y, one.nx, one.ny)
     k = pair.stiffness
-    spring_1, spring_2 = k * one.depth, k * two.depth
-    force_1, force_2 = spring_1, spring_2
-    if values.normal_damping > 0.0:
-        if are_dashpots_due(pair, NORMAL):
-            renew_double(operator, pair, a, b, one, two, NORMAL, BOTH, values.normal_damping, step, k)
+    spring_1, spring_2 = force_1, force_2 = k * one.depth, k * two.depth
+    if not is_due or values.normal_damping > 0.0:
+        use_operator_of_two(operator, pair, a, b, one, two, values, step, is_due)
         force_1, force_2 = damp_two(
             operator, spring_1, spring_2, first.normal_force, second.normal_force, one.closing_rate, two.closing_rate
         )
@@ -324,7 +392,7 @@ def double(world: World, p: int, a: Record, b: Record, dx: float, dy: float, ste
     lost_1 = (first.normal_force - before * first.depth + (normal_1 - spring_1)) * one.closing
     lost_2 = (second.normal_force - before * second.depth + (normal_2 - spring_2)) * two.closing
     drawn_1, drawn_2, shear_1, shear_2, lost, friction = shear_of_two(
-        world, p, a, b, one, two, normal_1, normal_2, step, before
+        world, p, a, b, values, one, two, normal_1, normal_2, step, before, is_due
     )
     keep(first, drawn_1, one.depth, normal_1, shear_1)
     keep(second, drawn_2, two.depth, normal_2, shear_2)
@@ -355,29 +423,30 @@ def shear_of_two(
     p: int,
     a: Record,
     b: Record,
+    values: Record,
     one: PersistentContact,
     two: PersistentContact,
     normal_1: float,
     normal_2: float,
     step: float,
     before: float,
+    is_due: bool,
 ) -> tuple[float, float, float, float, float, float]:
     """Return shear springs (m) and forces (N) of two contacts, and their losses (J) to dashpots and friction.
 
-    `before` (N/m) is their stiffness along the normal in the step before.
+    `before` and `is_due` as in shear_of_one.
     """
     first = world.contacts[p, 0]
     second = world.contacts[p, 1]
     pair = world.pairs[p]
     operator = world.operators[p, SHEAR]
-    values = world.interactions[a.contact_class, b.contact_class]
     k = values.shear_ratio * pair.stiffness
     old = values.shear_ratio * before
     drawn_1, limit_1, slides_1, work_1 = draw_lasting_spring(
-        values, k, old, first.spring, one.slip, normal_1, one.slip_rate
+        values, k, old, first.spring, one.slip, normal_1, one.slip_rate, is_due
     )
     drawn_2, limit_2, slides_2, work_2 = draw_lasting_spring(
-        values, k, old, second.spring, two.slip, normal_2, two.slip_rate
+        values, k, old, second.spring, two.slip, normal_2, two.slip_rate, is_due
     )
     elastic_1 = k * drawn_1
     elastic_2 = k * drawn_2

@@ -3,6 +3,10 @@
 Vectors are taken from the centre of body b to that of body a, (dx, dy), in world axes.
 """
 
+from typing import Any
+
+import numpy as np
+
 from blocksim.kernels.common.arrays import HALF, Record, World
 from blocksim.kernels.common.geometry import corner_offset
 from blocksim.kernels.common.jit import kernel, rare_kernel
@@ -47,20 +51,19 @@ def begins_contact(world: World, p: int, a: Record, b: Record, dx: float, dy: fl
     """Return True if a candidate corner that was outside the other body is inside now."""
     pair = world.pairs[p]
     is_ground = pair.b == world.bodies.size - 1
-    known = 0
+    known: Any = np.int64(pair.duplicates)
+    for k in range(pair.active):
+        known |= 1 << np.int64(world.contacts[p, k].slot)
     for m in range(pair.near):
-        slot = world.candidates[p, m]
-        if known < pair.active and world.contacts[p, known].slot == slot:
-            known += 1
-        elif (pair.duplicates >> slot) & 1 == 0:
-            if slot < HALF:
-                ox, oy = corner_offset(a, slot)
-                if is_inside(b, dx + ox, dy + oy) if not is_ground else dy + oy < 0.0:
-                    return True
-            else:
-                ox, oy = corner_offset(b, slot - HALF)
-                if is_inside(a, ox - dx, oy - dy):
-                    return True
+        slot: Any = np.int64(world.candidates[p, m])
+        if (known >> slot) & 1 == 0:
+            is_own = slot < HALF
+            owner, touched, side = (a, b, 1.0) if is_own else (b, a, -1.0)
+            ox, oy = corner_offset(owner, slot % HALF)
+            x = ox + side * dx
+            y = oy + side * dy
+            if y < 0.0 if is_ground else is_inside(touched, x, y):
+                return True
     return False
 
 
@@ -69,4 +72,4 @@ def is_inside(body: Record, x: float, y: float) -> bool:
     """Return True if a place (m, from its centre, world axes) lies inside a body."""
     px = body.cos * x + body.sin * y
     py = body.cos * y - body.sin * x
-    return abs(px) <= body.half_x and abs(py) <= body.half_y
+    return (abs(px) <= body.half_x) & (abs(py) <= body.half_y)  # no branch, as none is foreseen well
