@@ -109,6 +109,14 @@ def test_where_springs_do_not_shift_a_limit_two_runs_say_so_and_none_where_they_
     assert found_with(formula(linear(1e-4), is_known=False), tmp_path / "cannot", stiff).runs == len(found.rows)
 
 
+def test_under_a_late_abrupt_pulse_stiffer_springs_are_asked_whatever_their_stiffness(tmp_path: Path) -> None:
+    pulse = {"kind": "pulse", "shape": "cosine", "amplitude": 1.0, "duration": 0.1}
+    for start, asked in ((0.0, 0), (0.5, 2)):
+        stiff = on_springs(contact={"restitution": 0}, motion=pulse | {"start": start}, start={"settle": False})
+        found = found_with(formula(linear(1e-4)), tmp_path / f"{start}", stiff)
+        assert found.runs == len(found.rows) + asked
+
+
 def test_without_a_start_at_rest_the_bracket_holds_what_goes_with_the_root_of_the_stiffness_too(tmp_path: Path) -> None:
     data = on_springs(start={"settle": False})
     for law in (linear(0.03), lambda scale: STIFF * (1.0 - 0.03 / math.sqrt(scale))):
