@@ -16,7 +16,17 @@ JOBS = 2
 DONE = "sets-of-tests"  # the mark of a cache that has all sets
 SPH, SOIL = "sph", "soil"
 # those that take longest first, and no two at a time that have much in common
-SETS = ("outlines", "surface", "nonsmooth", SOIL, "outlines-with-springs", "with-particles", SPH)
+SETS = (
+    "outlines-in-rounds",
+    "surface",
+    "nonsmooth-in-rounds",
+    SOIL,
+    "outlines",
+    "outlines-with-springs",
+    "nonsmooth",
+    "with-particles",
+    SPH,
+)
 
 
 def compile_set(name: str) -> None:

@@ -12,20 +12,22 @@ from blocksim.simulation.schemes import SCHEMES, build_scene, measured_row
 from blocksim.simulation.schemes.explicit import PARTICLES, SURFACE
 from blocksim.simulation.schemes.nonsmooth import RIGID
 from blocksim.simulation.team import ALONE
+from blocksim.world.nonsmooth import may_rebound_in_rounds
 
 OUTLINED = "outlines"  # rigid contacts of blocks that are no rectangles
 SPRUNG_OUTLINES = "outlines-with-springs"  # the same with springs
 OF_OUTLINES = {RIGID: OUTLINED, SURFACE: SPRUNG_OUTLINES}
+IN_ROUNDS = {RIGID: "nonsmooth-in-rounds", OUTLINED: "outlines-in-rounds"}  # where impacts follow from one another
+NONSMOOTH = {"scheme": "nonsmooth"}
 POLYGON = {"any": {"sides": 4, "radius": 0.5, "depth": 1.0, "material": "any"}}
 
 CHANGES: dict[str, dict[str, object]] = {  # in the smallest scene, so that it needs them
     SURFACE: {},
     PARTICLES: {"contact": {"model": "kernel", "particle_spacing": 0.1}},  # the code serves all models with particles
-    RIGID: {"time": {"scheme": "nonsmooth"}},
-    OUTLINED: {
-        "time": {"scheme": "nonsmooth"},
-        "blocks": POLYGON,
-    },
+    RIGID: {"time": NONSMOOTH, "contact": {"restitution": 0.0}},
+    OUTLINED: {"time": NONSMOOTH, "contact": {"restitution": 0.0}, "blocks": POLYGON},
+    IN_ROUNDS[RIGID]: {"time": NONSMOOTH, "contact": {"restitution": 0.5}},
+    IN_ROUNDS[OUTLINED]: {"time": NONSMOOTH, "contact": {"restitution": 0.5}, "blocks": POLYGON},
     SPRUNG_OUTLINES: {"blocks": POLYGON},
 }
 
@@ -41,7 +43,9 @@ SMALLEST_SCENE = {
 def kernels_of(scenario: Scenario) -> str:
     """Return which set of kernels a scenario needs."""
     kernels = kernel_set(scenario.time.scheme, scenario.contact.model)
-    return OF_OUTLINES.get(kernels, kernels) if has_outlines(scenario) else kernels
+    if has_outlines(scenario):
+        kernels = OF_OUTLINES.get(kernels, kernels)
+    return IN_ROUNDS[kernels] if kernels in IN_ROUNDS and may_rebound_in_rounds(scenario) else kernels
 
 
 def kernel_set(scheme: str, model: str) -> str:

@@ -105,6 +105,15 @@ def has_impacts_in_rounds(scenario: Scenario, restitution: float, free: int) -> 
     return restitution > WEAK_RESTITUTION
 
 
+def may_rebound_in_rounds(scenario: Scenario) -> bool:
+    """Return the same of a scenario, without placing its blocks; where not all pairs meet it may be True in vain."""
+    contact = scenario.contact
+    pairs = [pair.restitution or 0.0 for row in scenario.pairs.values() for pair in row.values()]
+    restitution = max(contact.restitution.block_block, contact.restitution.block_ground, *pairs)
+    free = sum(structure.size for structure in scenario.structures) + sum(not body.fixed for body in scenario.bodies)
+    return has_impacts_in_rounds(scenario, restitution, free)
+
+
 def build_nonsmooth(scenario: Scenario) -> Nonsmooth:
     """Return a world at time zero with all that stepping it without springs needs.
 
@@ -182,8 +191,8 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
         ends=numbers((*members, COLOURS + 1), np.int64),
         materials=world.interactions.reshape(*members, -1).view(np.recarray),
         tallies=zeros((*members, groups // PART + 1), TALLY),
-        impacts=zeros((*members, bodies if follows else 1), IMPACT),
-        asides=zeros((*members, groups if follows else 1), ASIDE),
+        impacts=zeros((*members, bodies), IMPACT) if follows else None,
+        asides=zeros((*members, groups), ASIDE) if follows else None,
         residuals=numbers((*members, 2, LINE_WORDS * threads), np.float64),
         stepping=stepping,
     )

@@ -1,12 +1,14 @@
 """Trouble with the folder of compiled kernels has its name."""
 
 import errno
+from typing import Any
 
 import pytest
 
 from blocksim.errors import OutputError
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation import compilation
+from blocksim.simulation.schemes import build_scene
 
 
 def test_full_disk_of_the_kernel_cache_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -30,3 +32,17 @@ def test_blocks_with_outlines_have_sets_of_kernels_of_their_own() -> None:
         rectangular = scenario_from_mapping({**compilation.SMALLEST_SCENE, **without})
         assert compilation.kernels_of(outlined) == name
         assert compilation.kernels_of(rectangular) == plain
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *compilation.CHANGES.values(),
+        {"time": {"scheme": "nonsmooth"}, "pairs": {"any": {"ground": {"restitution": 0.9}}}},
+    ],
+)
+def test_scenes_without_impacts_in_rounds_have_kernels_without_them(change: dict[str, Any]) -> None:
+    scenario = scenario_from_mapping({**compilation.SMALLEST_SCENE, **change})
+    scene: Any = build_scene(scenario)
+    in_rounds = hasattr(scene, "kept") and scene.contacts.asides is not None
+    assert in_rounds == (compilation.kernels_of(scenario) in compilation.IN_ROUNDS.values())

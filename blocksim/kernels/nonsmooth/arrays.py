@@ -4,7 +4,7 @@ A step walks through states and constraints many times, so both are as small as 
 a constraint.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -158,8 +158,8 @@ class Contacts(NamedTuple):
     ends: Integers  # (COLOURS + 1,) where every colour begins among the groups, and where the last one ends
     materials: Records  # (k k,) INTERACTION of all pairs of contact classes, those of the world in one row
     tallies: Records  # (p / PART + 1,) TALLY
-    impacts: Records  # (n + 1,) IMPACT; one of no use where nothing rebounds that much
-    asides: Records  # (g,) ASIDE; likewise
+    impacts: Any  # (n + 1,) IMPACT; None where impacts do not follow from one another
+    asides: Any  # (g,) ASIDE; likewise
     residuals: Floats  # (2, 8 t) m/s: the largest change of velocity that each thread found in a sweep, twice
     stepping: Records  # (1,) STEPPING
 

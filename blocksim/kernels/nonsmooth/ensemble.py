@@ -3,6 +3,7 @@
 from blocksim.kernels.common.arrays import REACHED, Floats, Integers
 from blocksim.kernels.common.jit import entry_kernel, rare_kernel
 from blocksim.kernels.common.members import member as world_of
+from blocksim.kernels.common.members import of_member
 from blocksim.kernels.common.watch import Watched, frame_to_watch, watch
 from blocksim.kernels.nonsmooth.arrays import Contacts, Nonsmooth
 from blocksim.kernels.nonsmooth.energy import measure_nonsmooth
@@ -23,8 +24,8 @@ def member(scenes: Nonsmooth, m: int) -> Nonsmooth:
             contacts.ends[m],
             contacts.materials[m],
             contacts.tallies[m],
-            contacts.impacts[m],
-            contacts.asides[m],
+            of_member(contacts.impacts, m),
+            of_member(contacts.asides, m),
             contacts.residuals[m],
             contacts.stepping[m],
         ),

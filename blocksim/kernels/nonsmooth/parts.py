@@ -16,7 +16,7 @@ and are shifted with its length: by gravity in flight, by their own change where
 
 import math
 
-from blocksim.kernels.common.arrays import Record
+from blocksim.kernels.common.arrays import Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, Nonsmooth
 from blocksim.kernels.nonsmooth.begin import is_start
@@ -49,14 +49,40 @@ def end_of_part(scene: Nonsmooth) -> float:
 
 
 @kernel
-def begin_step(scene: Nonsmooth) -> None:
-    """Begin a step with a part as long as it is."""
+def begin_step(scene: Nonsmooth, asides: Records | None) -> None:
+    """Begin a step with a part as long as it is.
+
+    Where there are no `asides` no impact follows from another, and the compiler leaves parts out altogether.
+    """
+    if asides is None:
+        return
     stepping = scene.contacts.stepping[0]
     if stepping.is_divided:
         stepping.parts = 0
         stepping.gone = 0.0
         stepping.last_substep = stepping.substep
         set_length(scene, scene.world.controls[0].step)
+
+
+@kernel
+def is_continued(scene: Nonsmooth, asides: Records | None) -> bool:
+    """Begin the next part of a step that was cut; return False where there is none. `asides` as in begin_step."""
+    if asides is None:
+        return False
+    if is_cut(scene):
+        begin_next_part(scene)
+        return True
+    return False
+
+
+@kernel
+def is_shortened(scene: Nonsmooth, asides: Records | None) -> bool:
+    """Cut the current part where an impact comes; return False if none does. `asides` as in begin_step."""
+    if asides is None:
+        return False
+    if scene.contacts.stepping[0].is_divided:
+        return cut(scene)
+    return False
 
 
 @rare_kernel

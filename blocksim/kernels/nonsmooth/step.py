@@ -18,7 +18,7 @@ from blocksim.kernels.nonsmooth.loads import show_velocities
 from blocksim.kernels.nonsmooth.manifold import Place, are_four_of_blocks, collide, collide_four
 from blocksim.kernels.nonsmooth.motion import place_all
 from blocksim.kernels.nonsmooth.neighbours import update_pairs
-from blocksim.kernels.nonsmooth.parts import begin_next_part, begin_step, cut, is_cut
+from blocksim.kernels.nonsmooth.parts import begin_step, is_continued, is_shortened
 from blocksim.kernels.nonsmooth.rounds import forget_struck
 from blocksim.kernels.nonsmooth.substep import bodies_of, kick_share, substep
 from blocksim.kernels.nonsmooth.supports import place_supports
@@ -75,8 +75,7 @@ def end_part(scene: Nonsmooth) -> int:
     clock = scene.world.clock[0]
     if has_motion(scene.world.controls[0]):
         place_supports(scene)
-    if is_cut(scene):
-        begin_next_part(scene)
+    if is_continued(scene, scene.contacts.asides):
         return UNDER_WAY
     clock.steps += 1
     return check(scene) if clock.steps % scene.world.controls[0].check_every == 0 else REACHED
@@ -91,11 +90,11 @@ def supervise(scene: Nonsmooth, k: int, task: int) -> int:
         team[STATUS] = REACHED
         if task == NEIGHBOURS:
             if update_pairs(scene):
-                begin_step(scene)
+                begin_step(scene, scene.contacts.asides)
             else:
                 team[STATUS] = PAIRS_FULL
         elif task == GATHER:
-            if scene.contacts.stepping[0].is_divided and cut(scene):
+            if is_shortened(scene, scene.contacts.asides):
                 team[STATUS] = UNDER_WAY
             else:
                 gather(scene.contacts, scene.begins)

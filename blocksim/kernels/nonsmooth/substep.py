@@ -1,6 +1,6 @@
 """One substep of all bodies and constraints, shared by threads."""
 
-from blocksim.kernels.common.arrays import TEAM_SIZE
+from blocksim.kernels.common.arrays import TEAM_SIZE, Records
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import kernel
 from blocksim.kernels.common.supports import has_motion
@@ -93,6 +93,28 @@ def tally(scene: Nonsmooth, k: int, share: float) -> tuple[int, int]:
 
 
 @kernel
+def go_through_impacts(scene: Nonsmooth, k: int, bodies: tuple[int, int], share: float, asides: Records | None) -> None:
+    """Let impacts of a substep follow from one another as thread k; see follow_impacts.
+
+    Where there are no `asides` nothing rebounds that much, and the compiler leaves this out altogether.
+    """
+    if asides is None:
+        return
+    if scene.contacts.stepping[0].has_rebounds:
+        barrier(scene.world.team)
+        follow_impacts(scene.contacts, scene.world.team, k, bodies, share, scene.pushes)
+
+
+@kernel
+def report_impacts(contacts: Contacts, first: int, last: int, asides: Records | None) -> None:
+    """Give some groups the impulses of impacts at the end of a step; `asides` as in go_through_impacts."""
+    if asides is None:
+        return
+    if contacts.stepping[0].has_rebounds:
+        bring_back(contacts, first, last, True)
+
+
+@kernel
 def substep(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
     """Go through substep `number` of a step as thread k; the first one of a run has half a kick of gravity."""
     contacts = scene.contacts
@@ -108,10 +130,8 @@ def substep(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
     drift_all(contacts.states, first, ground, stepping.substep)
     barrier(team)
     velocity_pass(contacts, team, k, FIRST_VELOCITY, stepping.tolerance)
-    if stepping.has_rebounds:
-        barrier(team)
-        follow_impacts(contacts, team, k, (first, last), share, scene.pushes)
+    go_through_impacts(scene, k, (first, last), share, contacts.asides)
     first, last = tally(scene, k, share)
-    if stepping.has_rebounds and number == stepping.substeps - 1:
-        bring_back(contacts, first, last, True)
+    if number == stepping.substeps - 1:
+        report_impacts(contacts, first, last, contacts.asides)
     barrier(team)
