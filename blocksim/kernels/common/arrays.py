@@ -135,7 +135,7 @@ PAIR = record_type(
     "idle",  # candidates that are neither in contact nor a duplicate
     flags="bearing "  # PLANE, ENDS or APART: what its contacts are; see tributary.py
     "is_coming "  # flag: about to touch
-    "is_held "  # flag: the stiffness is held down; see holding.py
+    "is_sliver "  # flag: its overlap is about as deep as long; see slivers.py
     "axis "  # along which the two were apart when last looked at; 0, 1: x, y of body b, 2, 3: of body a
     "is_between "  # flag: its bodies are of two shares
     "normal_left shear_left "  # steps until the dashpots along normals and tangents are made again

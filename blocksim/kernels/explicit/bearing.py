@@ -62,6 +62,10 @@ def measure(world: World, p: int, count: int, stiffness: float) -> None:
     if pair.b == world.bodies.size - 1 or not are_blocks(a, b):
         pair.bearing = PLANE
         keep_bearing(pair, WHOLE, stiffness)
+    elif pair.is_sliver != 0:
+        pair.bearing = APART
+        one = world.points[0]
+        keep_bearing(pair, Bearing(one.stiffness, one.before, one.rate), 1.0)
     else:
         measure_faces(pair, a, b, world.points[0], world.points[count - 1], stiffness, world.corners)
 

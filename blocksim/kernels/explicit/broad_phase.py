@@ -53,7 +53,7 @@ def add_pair(world: World, count: int, a: int, b: int) -> int:
         pair.is_coming = 0
         pair.active = 0
         pair.duplicates = 0
-        pair.is_held = 0
+        pair.is_sliver = 0
         pair.axis = 0
         pair.normal_left = 0
         pair.shear_left = 0
@@ -172,7 +172,7 @@ def carry_history(world: World, count: int) -> None:
                 new.slide = world.pairs[q].slide
                 new.turn = world.pairs[q].turn
                 new.duplicates = world.pairs[q].duplicates
-                new.is_held = world.pairs[q].is_held
+                new.is_sliver = world.pairs[q].is_sliver
                 new.normal_left = world.pairs[q].normal_left
                 new.shear_left = world.pairs[q].shear_left
                 new.sticking = world.pairs[q].sticking

@@ -30,12 +30,12 @@ from blocksim.kernels.explicit.damping import (
 from blocksim.kernels.explicit.depth import is_too_deep
 from blocksim.kernels.explicit.friction import clip_to_cone, draw_spring
 from blocksim.kernels.explicit.history import change_contacts, keep_places
-from blocksim.kernels.explicit.holding import hold_down
 from blocksim.kernels.explicit.inertia import Piece, piece_of
 from blocksim.kernels.explicit.kinematics import coupling, mutual_mass, resolve_point, weigh_onset
 from blocksim.kernels.explicit.laws import elastic_force, has_constant_stiffness, stored_energy, tangent_stiffness
 from blocksim.kernels.explicit.memory import normal_loss, shear_loss, shear_stiffness_before, stiffness_before
 from blocksim.kernels.explicit.models import SURFACE, contact_points
+from blocksim.kernels.explicit.slivers import points_of_sliver
 
 IMPACT_STEPS = 10.0  # an impact lasts some thirty steps; a face lost in a third of that cannot stop a corner
 
@@ -175,8 +175,8 @@ def damp_many(world: World, p: int, count: int, direction: int, ratio: float, st
 
 
 @rare_kernel
-def resolve_points(world: World, p: int, count: int, step: float, tally: Record) -> bool:
-    """Kinematics of all points; history where the set of contacts has changed. Return whether it has."""
+def resolve_points(world: World, p: int, count: int, step: float, tally: Record) -> None:
+    """Kinematics of all points; history where the set of contacts has changed."""
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
@@ -192,12 +192,10 @@ def resolve_points(world: World, p: int, count: int, step: float, tally: Record)
             contact = world.contacts[p, i]
             continuing += 1 if contact.slot == point.slot and contact.face == point.face else 0
         loses_face = loses_face or point.beside < IMPACT_STEPS * abs(point.closing)
-    is_changed = continuing != count or count != pair.active
-    if is_changed:
+    if continuing != count or count != pair.active:
         change_contacts(world, p, count, step, tally)
     if loses_face:
         spare_lost_faces(world, p, count)
-    return is_changed
 
 
 @rare_kernel
@@ -319,27 +317,23 @@ def pair_forces(world: World, p: int, step: float) -> None:
     pair = world.pairs[p]
     action = world.action[0]
     clear_action(action)
-    count = contact_points(world, p)
+    count = points_of_sliver(world, p, contact_points(world, p), world.corners)
     action.is_too_deep = is_too_deep(world, p, count)
     model = world.controls[0].model
     action.asks = count != pair.active and model == SURFACE
-    had = pair.active
-    left = pair.normal_left
     before = pair.stiffness
     if count == 0:
-        if had > 0:
+        if pair.active > 0:
             change_contacts(world, p, 0, step, action)
-            hold_down(world, p, 0, had, True, before, left, step, action, world.corners)
         return
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
     values = world.interactions[a.contact_class, b.contact_class]
     if has_new_neighbours(a, b, model) or not has_constant_stiffness(world.controls[0].law):
         renew_dashpots(pair)
-    is_changed = resolve_points(world, p, count, step, action)
+    resolve_points(world, p, count, step, action)
     if model == SURFACE:
         measure(world, p, count, values.normal_stiffness)
-        hold_down(world, p, count, had, is_changed, before, left, step, action, world.corners)
     shared = step if model == SURFACE else shared_step(a, b, step)
     normal_pass(world, p, count, values, shared)
     shear_pass(world, p, count, values, before, shared, action)

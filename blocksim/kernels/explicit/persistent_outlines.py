@@ -27,6 +27,7 @@ from blocksim.kernels.explicit.outlines import (
     number_of_corners,
 )
 from blocksim.kernels.explicit.persistent_contacts import Motion, PersistentContact, contact_at
+from blocksim.kernels.explicit.slivers import SLIVER, flat_within, is_sliver, least_ratio
 from blocksim.kernels.explicit.tributary import bearing_of_facing, facing_of, flat_of
 
 
@@ -84,6 +85,36 @@ def follow_on_outlines(
     if turns:
         goes_on = goes_on and is_admitted(face, owner, number, touched, table)
     return goes_on, found
+
+
+@kernel
+def ends_in_sliver(contact: Record, a: Record, b: Record, found: PersistentContact, table: Records) -> bool:
+    """Return True if two bodies with one contact overlap by a sliver.
+
+    No other axis, of faces that are not parallel, is less deep than the way to the end of the face times the sine of
+    the angle to it.
+    """
+    slot: Any = np.int64(contact.slot)
+    face: Any = np.int64(contact.face)
+    is_own = slot < MOST_CORNERS
+    touched = b if is_own else a
+    if is_piece(touched):
+        return False
+    side = corner_of(touched, table, face)
+    nx, ny = into_world(touched, side.nx, side.ny)
+    x = found.x - (touched.x - b.x)
+    y = found.y - (touched.y - b.y)
+    end = side.half - abs(y * nx - x * ny - side.middle)
+    cone = cone_of(a, b, table)
+    least = least_ratio(cone) * end * min(side.clear, flat_within(cone))
+    return found.depth * (1.0 + SLIVER) > least and is_sliver(a, b, table)
+
+
+@kernel
+def lie_on_sliver(a: Record, b: Record, one: PersistentContact, two: PersistentContact, table: Records) -> bool:
+    """Return True if two bodies with two contacts overlap by a sliver; no axis is less deep than the way between."""
+    way = max(abs(one.x - two.x), abs(one.y - two.y))
+    return max(one.depth, two.depth) > SLIVER * way * cone_of(a, b, table) and is_sliver(a, b, table)
 
 
 @kernel

@@ -39,12 +39,14 @@ from blocksim.kernels.explicit.persistent_contacts import (
 from blocksim.kernels.explicit.persistent_outlines import (
     are_parallel,
     begins_on_outlines,
+    ends_in_sliver,
     follow_on_outlines,
     has_crossed,
+    lie_on_sliver,
     measure_on_outlines,
 )
 from blocksim.kernels.explicit.separation import begins_contact, choose_axis, gap_along
-from blocksim.kernels.explicit.tributary import APART, PLANE, bearing_of_faces, is_flat, stiffness_between
+from blocksim.kernels.explicit.tributary import APART, PLANE, are_blocks, bearing_of_faces, is_flat, stiffness_between
 
 CHANGED, UNTOUCHED, TOUCHING = range(3)
 
@@ -149,7 +151,7 @@ def apart_or_changed(world: World, p: int, a: Record, b: Record, table: Records)
     if gap_on(axis, a, b, is_ground, table) >= 0.0:
         return UNTOUCHED
     gap = widest_gap(pair, a, b, is_ground, table)
-    if gap < 0.0 and (gap < -pair.limit or begins_on_outlines(world, p, a, b, table)):
+    if gap < 0.0 and (are_blocks(a, b) or gap < -pair.limit or begins_on_outlines(world, p, a, b, table)):
         return CHANGED
     return UNTOUCHED
 
@@ -158,13 +160,13 @@ def apart_or_changed(world: World, p: int, a: Record, b: Record, table: Records)
 def has_changed(world: World, p: int, a: Record, b: Record, table: Records) -> bool:
     """As is_unsettled, for two bodies that touch in a scene with polygons."""
     pair = world.pairs[p]
-    if pair.duplicates != 0 and has_crossed(world, p, a, b, table):
+    if pair.duplicates != 0 and (pair.normal_left == 0 or has_crossed(world, p, a, b, table)):
         return True
     if pair.idle > 0 and begins_on_outlines(world, p, a, b, table):
         return True
     if has_new_neighbours(a, b, SURFACE):
         renew_dashpots(pair)
-    return (pair.is_held != 0 and pair.normal_left == 0) or not has_constant_stiffness(world.controls[0].law)
+    return pair.is_sliver != 0 or not has_constant_stiffness(world.controls[0].law)
 
 
 @kernel
@@ -225,13 +227,19 @@ def are_flat(a: Record, b: Record, found: PersistentContact, corners: Records | 
 
 @kernel
 def are_ends(
-    pair: Record, a: Record, b: Record, found: PersistentContact, is_due: bool, corners: Records | None
+    pair: Record,
+    a: Record,
+    b: Record,
+    found: PersistentContact,
+    other: PersistentContact,
+    is_due: bool,
+    corners: Records | None,
 ) -> bool:
-    """Return True if two contacts are on the ground or the two ends of one interval of parallel faces.
+    """Return True if two contacts are on the ground or the two ends of one interval of parallel faces, no sliver.
 
     That changes by turning only, slowly, and is checked where dashpots are due.
     """
-    if pair.bearing == APART:
+    if pair.bearing == APART or two_are_sliver(a, b, found, other, corners):
         return False
     return not is_due or pair.bearing == PLANE or are_flat(a, b, found, corners)
 
@@ -257,6 +265,20 @@ def use_operator_of_one(
 
 
 @kernel
+def one_is_sliver(contact: Record, a: Record, b: Record, found: PersistentContact, corners: Records | None) -> bool:
+    """Return True if a single contact is that of two polygons which overlap by a sliver; see slivers.py."""
+    return False if corners is None else ends_in_sliver(contact, a, b, found, corners)
+
+
+@kernel
+def two_are_sliver(
+    a: Record, b: Record, one: PersistentContact, two: PersistentContact, corners: Records | None
+) -> bool:
+    """Return True if two contacts are those of two polygons which overlap by a sliver; see slivers.py."""
+    return False if corners is None else lie_on_sliver(a, b, one, two, corners)
+
+
+@kernel
 def single(
     world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float, is_due: bool
 ) -> tuple[int, Effect]:
@@ -269,7 +291,7 @@ def single(
     values = world.interactions[a.contact_class, b.contact_class]
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
     goes_on, found = follow_corner(contact, a, b, dx, dy, motion, step, is_due, world.corners)
-    if not goes_on or found.depth > pair.limit:
+    if not goes_on or found.depth > pair.limit or one_is_sliver(contact, a, b, found, world.corners):
         return CHANGED, NOTHING
     before = pair.stiffness
     if is_due and pair.bearing != PLANE:
@@ -375,7 +397,7 @@ def double(
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
     goes_1, one = follow_corner(first, a, b, dx, dy, motion, step, is_due, world.corners)
     goes_2, two = follow_corner(second, a, b, dx, dy, motion, step, is_due, world.corners)
-    goes_on = goes_1 and goes_2 and are_ends(pair, a, b, one, is_due, world.corners)
+    goes_on = goes_1 and goes_2 and are_ends(pair, a, b, one, two, is_due, world.corners)
     if not goes_on or max(one.depth, two.depth) > pair.limit:
         return CHANGED, NOTHING
     before = pair.stiffness
