@@ -170,7 +170,10 @@ def begins_on_outlines(world: World, p: int, a: Record, b: Record, table: Record
 
 @rare_kernel
 def has_crossed(world: World, p: int, a: Record, b: Record, table: Records) -> bool:
-    """Return True if the faces of a pair that has duplicates are not nearly parallel: others may then be dropped."""
+    """Return True if the faces of a pair that has duplicates are not nearly parallel: others may then be dropped.
+
+    Where dashpots are due, if they are not parallel: of two corners at one end the other may be the inner one by now.
+    """
     contact = world.contacts[p, 0]
     slot: Any = np.int64(contact.slot)
     is_own = slot < MOST_CORNERS
@@ -180,7 +183,8 @@ def has_crossed(world: World, p: int, a: Record, b: Record, table: Records) -> b
     side = corner_of(touched, table, face)
     ahead = abs(side.nx * corner.ahead_x + side.ny * corner.ahead_y)
     back = abs(side.nx * corner.back_x + side.ny * corner.back_y)
-    return min(ahead, back) > cone_of(a, b, table)
+    cone = cone_of(a, b, table)
+    return min(ahead, back) > (flat_within(cone) if world.pairs[p].normal_left == 0 else cone)
 
 
 @rare_kernel

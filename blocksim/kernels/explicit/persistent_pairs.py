@@ -160,7 +160,7 @@ def apart_or_changed(world: World, p: int, a: Record, b: Record, table: Records)
 def has_changed(world: World, p: int, a: Record, b: Record, table: Records) -> bool:
     """As is_unsettled, for two bodies that touch in a scene with polygons."""
     pair = world.pairs[p]
-    if pair.duplicates != 0 and (pair.normal_left == 0 or has_crossed(world, p, a, b, table)):
+    if pair.duplicates != 0 and has_crossed(world, p, a, b, table):
         return True
     if pair.idle > 0 and begins_on_outlines(world, p, a, b, table):
         return True
