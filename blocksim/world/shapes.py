@@ -3,7 +3,7 @@
 Contact of a corner with a face lasts as long as no other face is nearer. At the distance e from the end of a face and
 so deep behind it, all others of a convex body are at least `clear` e minus the depth away: along the face the least
 distance to the others is a concave function, zero at both ends, and `clear` is its value in the middle over half of the
-length.
+length. Near an end only the face beside it can be nearer, as those beyond are `far` from all of the face.
 """
 
 import math
@@ -66,7 +66,13 @@ def corner_rows(corners: Corners) -> list[tuple[float, ...]]:
         half = 0.5 * length
         rows.append((x, y, nx, ny, nx * x + ny * y, half, half - (ny * x - nx * y), cone))
     return [
-        (*row[:-1], _clearance(number, rows), _is_sharp(row, rows[number - 1], rows[(number + 1) % len(rows)]), cone)
+        (
+            *row[:-1],
+            _clearance(number, rows),
+            _distance_of_others(number, rows),
+            _is_sharp(row, rows[number - 1], rows[(number + 1) % len(rows)]),
+            cone,
+        )
         for number, row in enumerate(rows)
     ]
 
@@ -83,6 +89,14 @@ def _clearance(number: int, rows: Sequence[tuple[float, ...]]) -> float:
     return min(row[4] - row[2] * x - row[3] * y for k, row in enumerate(rows) if k != number) / half
 
 
+def _distance_of_others(number: int, rows: Sequence[tuple[float, ...]]) -> float:
+    """Return the distance (m) of a face from all others but those beside it: the lesser one of its two ends."""
+    last = (number + 1) % len(rows)
+    others = [row for k, row in enumerate(rows) if k not in {number - 1, number, last, number - 1 + len(rows)}]
+    ends = [rows[number][:2], rows[last][:2]]
+    return min((row[4] - row[2] * x - row[3] * y for row in others for x, y in ends), default=math.inf)
+
+
 def _rectangle(half_x: float, half_y: float) -> Corners:
     """Return the corners of a rectangle from the lower left one."""
     return ((-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y))
@@ -93,7 +107,7 @@ def _ground_rows(corners: Corners) -> list[tuple[float, ...]]:
     half_x, half_y = corners[2]
     faces = ((0.0, -1.0, half_y, half_x), (1.0, 0.0, half_x, half_y), (0.0, 1.0, half_y, half_x))
     sides = (*faces, (-1.0, 0.0, half_x, half_y))
-    return [(*corner, *side, 0.0, 1.0, 0.0, WIDEST_CONE) for corner, side in zip(corners, sides, strict=True)]
+    return [(*corner, *side, 0.0, 1.0, 0.0, 0.0, WIDEST_CONE) for corner, side in zip(corners, sides, strict=True)]
 
 
 def cone_of(corners: Corners) -> float:

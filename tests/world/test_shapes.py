@@ -75,7 +75,7 @@ def test_slots_have_room_for_the_corners_of_any_block() -> None:
 @pytest.mark.parametrize("outline", [TRIANGLE, regular(16, 0.1), [[0, 0], [1, 0], [1.01, 0.02], [0.5, 0.3], [0, 0.1]]])
 def test_other_faces_are_as_far_as_is_told_along_a_face(outline: list[list[float]]) -> None:
     rows = np.array(corner_rows(centred([(x, y) for x, y in outline])))
-    for k, (x, y, nx, ny, distance, half, middle, clear, *_) in enumerate(rows):
+    for k, (x, y, nx, ny, distance, half, middle, clear, far, *_) in enumerate(rows):
         assert nx * y - ny * x == pytest.approx(middle - half)
         others = np.delete(rows, k, axis=0)
         for end, depth in itertools.product(np.linspace(0.0, 1.0, 9) * half, (0.0, 0.01 * half)):
@@ -83,6 +83,8 @@ def test_other_faces_are_as_far_as_is_told_along_a_face(outline: list[list[float
                 place = (distance - depth) * np.array([nx, ny]) + along * np.array([-ny, nx])
                 least = (others[:, 4] - others[:, 2:4] @ place).min()
                 assert least >= clear * end - depth - 1e-12
+                beyond = np.delete(rows, [k, k - 1, (k + 1) % len(rows)], axis=0)
+                assert np.all(beyond[:, 4] - beyond[:, 2:4] @ place >= far - depth - 1e-12)
         assert clear > 0.0
 
 

@@ -122,6 +122,7 @@ CORNER = record_type(
     "distance half "  # m: of that face from the centroid, and half of its length
     "middle "  # m: of that face along (-ny, nx), from the foot of the centroid
     "clear "  # -: other faces are at least so many times as far as its nearer end; see world/shapes.py
+    "far "  # m: the distance of that face from all but itself and the two beside it
     "sharp "  # -: one where a face beside this one meets it at less than a right angle, else zero
     "cone"  # -: of the shape: sine of the angle up to which a face is parallel to one of another body
 )

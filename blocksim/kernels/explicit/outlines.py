@@ -32,6 +32,18 @@ def number_of_corners(body: Record) -> int:
 
 
 @kernel
+def next_number(body: Record, number: int) -> int:
+    """Return the number of the corner, or face, after one."""
+    return number + 1 if number + 1 < number_of_corners(body) else 0
+
+
+@kernel
+def number_before(body: Record, number: int) -> int:
+    """Return the number of the corner, or face, before one."""
+    return number - 1 if number > 0 else number_of_corners(body) - 1
+
+
+@kernel
 def corner_of(body: Record, table: Records, number: int) -> Record:
     """Return a corner of a body, with the face that begins there, in the frame of the body."""
     return corner_at(hull_of(body, table), number)

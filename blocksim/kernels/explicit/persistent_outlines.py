@@ -24,6 +24,8 @@ from blocksim.kernels.explicit.outlines import (
     into_frame,
     into_world,
     is_piece,
+    next_number,
+    number_before,
     number_of_corners,
 )
 from blocksim.kernels.explicit.persistent_contacts import Motion, PersistentContact, contact_at
@@ -73,7 +75,8 @@ def follow_on_outlines(
     x = ox + sign * dx
     y = oy + sign * dy
     depth = side.distance - (x * nx + y * ny)
-    end = side.half - abs(y * nx - x * ny - side.middle)
+    along = y * nx - x * ny - side.middle
+    end = side.half - abs(along)
     found = contact_at(x if is_own else ox, y if is_own else oy, sign * nx, sign * ny, depth, motion, step)
     goes_on = depth > 0.0
     if is_piece(touched):
@@ -81,10 +84,53 @@ def follow_on_outlines(
     elif end < math.inf:  # else the half-plane
         way = IMPACT_STEPS * abs(found.closing)
         if side.clear * end - depth <= max(depth, way) or depth > side.distance:
-            goes_on = goes_on and stays_on(face, owner, number, touched, way, table)
+            beside = next_number(touched, face) if along > 0.0 else number_before(touched, face)
+            goes_on = goes_on and (
+                is_nearer_than_beside(owner, number, touched, face, beside, x, y, depth, way, end, table)
+                or stays_on(face, owner, number, touched, way, table)
+            )
     if turns:
         goes_on = goes_on and is_admitted(face, owner, number, touched, table)
     return goes_on, found
+
+
+@kernel
+def is_nearer_than_beside(
+    owner: Record,
+    number: int,
+    touched: Record,
+    face: int,
+    beside: int,
+    x: float,
+    y: float,
+    depth: float,
+    way: float,
+    end: float,
+    table: Records,
+) -> bool:
+    """Return True if a corner of `owner` near an end of a face certainly stays on it; see stays_on.
+
+    (x, y) (m) is its place about the centre of `touched`, `beside` the face there, `depth` (m) and `end` (m) how far
+    it is from the face and its end. The other faces are too far away, the one beside farther, or not to be touched.
+    """
+    side = corner_of(touched, table, face)
+    need = max(depth, way)
+    if min(side.far, side.clear * side.half) <= need + depth + max(-end, 0.0) or depth > side.distance:
+        return False
+    other = corner_of(touched, table, beside)
+    nx, ny = into_world(touched, other.nx, other.ny)
+    over = other.distance - (nx * x + ny * y)
+    if over < 0.0:
+        return False
+    fx, fy = into_world(touched, side.nx, side.ny)
+    ahead = corner_of(owner, table, number)
+    back = corner_of(owner, table, number_before(owner, number))
+    ax, ay = into_world(owner, ahead.nx, ahead.ny)
+    bx, by = into_world(owner, back.nx, back.ny)
+    cone = min(side.cone, ahead.cone)
+    if fy * ax - fx * ay < -cone or fx * by - fy * bx < -cone:
+        return False
+    return over > need or ny * ax - nx * ay < -cone or nx * by - ny * bx < -cone
 
 
 @kernel

@@ -52,6 +52,7 @@ from blocksim.kernels.explicit.outlines import (
     cone_of,
     corner_of,
     corner_vector,
+    next_number,
     number_of_corners,
     side_along,
     side_normal,
@@ -88,13 +89,15 @@ class Ends(NamedTuple):
 
 
 @rare_kernel
-def axis_of(of_b: bool, face: int, a: Record, b: Record, table: Records) -> Axis:
-    """Return the axis of a face of b, or of a."""
+def axis_of(of_b: bool, face: int, a: Record, b: Record, table: Records, least: float = math.inf) -> Axis:
+    """Return the axis of a face of b, or of a; of one that cannot be less deep than `least` (m) no corner is sought."""
     body, other = (b, a) if of_b else (a, b)
     nx, ny = side_normal(body, table, face)
     best = -math.inf
     number = 0
     reach = corner_of(body, table, face).distance + nx * (body.x - other.x) + ny * (body.y - other.y)
+    if reach + other.inner_radius > least:
+        return Axis(of_b, face, number, math.inf)
     for k in range(number_of_corners(other)):
         x, y = corner_vector(other, table, k)
         depth = reach - (nx * x + ny * y)
@@ -120,11 +123,11 @@ def nearest_axis(a: Record, b: Record, table: Records) -> Axis:
     """Return the axis of least depth; those of b come first."""
     best = axis_of(True, 0, a, b, table)
     for k in range(1, number_of_corners(b)):
-        axis = axis_of(True, k, a, b, table)
+        axis = axis_of(True, k, a, b, table, best.depth)
         if axis.depth < best.depth:
             best = axis
     for k in range(number_of_corners(a)):
-        axis = axis_of(False, k, a, b, table)
+        axis = axis_of(False, k, a, b, table, best.depth)
         if axis.depth < best.depth:
             best = axis
     return best
@@ -139,7 +142,7 @@ def next_axis(nearest: Axis, across: int, a: Record, b: Record, table: Records) 
         of_b = m < number_of_corners(b)
         face = m if of_b else m - number_of_corners(b)
         if face != (nearest.face if of_b == nearest.of_b else across):
-            axis = axis_of(of_b, face, a, b, table)
+            axis = axis_of(of_b, face, a, b, table, least)
             if axis.depth < least:
                 least = axis.depth
                 best = axis
@@ -196,12 +199,6 @@ def abscissa_of(of_b: bool, corner: int, tx: float, ty: float, a: Record, b: Rec
 
 
 @rare_kernel
-def after(body: Record, face: int) -> int:
-    """Return the corner where a face ends."""
-    return face + 1 if face + 1 < number_of_corners(body) else 0
-
-
-@rare_kernel
 def rounding(apart: Jet, width: Jet) -> Jet:
     """Return by how much a smooth maximum of two numbers exceeds theirs: (w - |d|)^2/(4 w) within w, else nothing."""
     within = plus(width, absolute(apart), -1.0)
@@ -223,7 +220,7 @@ def ends_of(of_a: int, of_b: int, width: Jet, a: Record, b: Record, table: Recor
     norm = math.hypot(bx - ax, by - ay)
     tx, ty = (ay - by) / norm, (bx - ax) / norm
     # corners follow one another counter-clockwise: the face of b leads along the tangent, that of a back
-    a_left, b_right = after(a, of_a), after(b, of_b)
+    a_left, b_right = next_number(a, of_a), next_number(b, of_b)
     left_a = abscissa_of(False, a_left, tx, ty, a, b, table)
     left_b = abscissa_of(True, of_b, tx, ty, a, b, table)
     right_a = abscissa_of(False, of_a, tx, ty, a, b, table)

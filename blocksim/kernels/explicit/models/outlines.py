@@ -31,6 +31,7 @@ from blocksim.kernels.explicit.outlines import (
     corner_vector,
     into_frame,
     is_piece,
+    number_before,
     number_of_corners,
     side_along,
     side_normal,
@@ -58,7 +59,7 @@ def corner_seen(owner: Record, number: int, touched: Record, table: Records) -> 
     """Return a corner of a body as the frame of the touched one has it."""
     x0, y0, c, s = relative_pose(owner, touched)
     ahead = corner_of(owner, table, number)
-    back = corner_of(owner, table, number - 1 if number > 0 else number_of_corners(owner) - 1)
+    back = corner_of(owner, table, number_before(owner, number))
     return Corner(
         x0 + c * ahead.x - s * ahead.y,
         y0 + s * ahead.x + c * ahead.y,
