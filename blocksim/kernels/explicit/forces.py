@@ -5,7 +5,8 @@ from blocksim.kernels.common.integrate import finish_step, start_step
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.partition import add_kept, add_to_first, add_to_second, keep
-from blocksim.kernels.explicit.persistent_pairs import CHANGED, TOUCHING, persistent_forces
+from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING
+from blocksim.kernels.explicit.persistent_pairs import persistent_forces
 
 
 @rare_kernel

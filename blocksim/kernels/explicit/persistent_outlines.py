@@ -29,7 +29,7 @@ from blocksim.kernels.explicit.outlines import (
     number_of_corners,
 )
 from blocksim.kernels.explicit.persistent_contacts import Motion, PersistentContact, contact_at
-from blocksim.kernels.explicit.slivers import SLIVER, flat_within, is_sliver, least_ratio
+from blocksim.kernels.explicit.sliver_axes import SLIVER, flat_within, is_sliver, least_ratio
 from blocksim.kernels.explicit.tributary import bearing_of_facing, facing_of, flat_of
 
 

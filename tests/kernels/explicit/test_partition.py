@@ -18,7 +18,7 @@ from blocksim.kernels.explicit.partition import (
     pairs_before,
     partition,
 )
-from blocksim.kernels.explicit.persistent_pairs import Effect
+from blocksim.kernels.explicit.persistent_forces import Effect
 from blocksim.world.build import with_threads
 from tests.kernels.crews import among_fixed, listed, on_hills, rows, shake, soft_world
 

@@ -14,7 +14,8 @@ from blocksim.kernels.common.geometry import separation
 from blocksim.kernels.common.integrate import renew_rotations
 from blocksim.kernels.explicit.broad_phase import idle_candidates
 from blocksim.kernels.explicit.models import contact_points
-from blocksim.kernels.explicit.persistent_pairs import CHANGED, UNTOUCHED, persistent_forces
+from blocksim.kernels.explicit.persistent_forces import CHANGED, UNTOUCHED
+from blocksim.kernels.explicit.persistent_pairs import persistent_forces
 from blocksim.kernels.explicit.separation import begins_contact, choose_axis, gap_along
 from blocksim.verification.scene import HEIGHT, WIDTH
 from tests.kernels import rectangles

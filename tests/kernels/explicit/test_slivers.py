@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.explicit import slivers
+from blocksim.kernels.explicit.sliver_axes import nearest_axis
 from blocksim.verification.scene import Scene
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def test_energy_of_a_sliver_has_no_step_and_the_force_is_its_slope(name: str) ->
         for i, place in enumerate(places):
             a.x, a.y, a.angle = place
             a.cos, a.sin = cos(place[2]), sin(place[2])
-            nearest = slivers.nearest_axis(a, b, world.corners)
+            nearest = nearest_axis(a, b, world.corners)
             if nearest.depth > 0.0:
                 found = slivers.mean_energy(nearest, power, a, b, world.corners)
                 energies[i] = found.value

@@ -1,0 +1,358 @@
+"""Forces of one or two contacts that continue as they were; persistent_pairs.py says which pairs these are.
+
+A contact that may have ended or changed is found as it is followed: then nothing has been written yet.
+"""
+
+from typing import NamedTuple
+
+from blocksim.kernels.common.arrays import NORMAL, SHEAR, Record, Records, World
+from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.explicit.bearing import measure_soon
+from blocksim.kernels.explicit.damping import (
+    BOTH,
+    are_dashpots_due,
+    count_down,
+    damp_one,
+    damp_two,
+    note_slip,
+)
+from blocksim.kernels.explicit.friction import clip_to_cone, draw_lasting_spring
+from blocksim.kernels.explicit.persistent_contacts import (
+    Motion,
+    PersistentContact,
+    follow,
+    relative_motion,
+    renew_double,
+    renew_single,
+    renew_sliding,
+)
+from blocksim.kernels.explicit.persistent_outlines import (
+    are_parallel,
+    ends_in_sliver,
+    follow_on_outlines,
+    lie_on_sliver,
+    measure_on_outlines,
+)
+from blocksim.kernels.explicit.tributary import APART, PLANE, bearing_of_faces, is_flat, stiffness_between
+
+CHANGED, UNTOUCHED, TOUCHING = range(3)
+
+
+class Effect(NamedTuple):
+    """What a pair does in one step."""
+
+    fx: float  # N, on body a
+    fy: float
+    torque_a: float  # N m, on body a
+    torque_b: float  # against body b
+    dashpot: float  # J, lost to dashpots
+    friction: float  # J, lost to friction
+
+
+NOTHING = Effect(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def follow_corner(
+    contact: Record,
+    a: Record,
+    b: Record,
+    dx: float,
+    dy: float,
+    motion: Motion,
+    step: float,
+    turns: bool,
+    corners: Records | None,
+) -> tuple[bool, PersistentContact]:
+    """Check that a contact continues, and where and how; see persistent_contacts.py."""
+    if corners is None:
+        return follow(contact, a, b, dx, dy, motion, step, turns)
+    return follow_on_outlines(contact, a, b, dx, dy, motion, step, turns, corners)
+
+
+@kernel
+def measure_corner(
+    pair: Record, a: Record, b: Record, found: PersistentContact, stiffness: float, corners: Records | None
+) -> None:
+    """Measure the stiffness of a single contact of two blocks; `stiffness` is that of a corner alone."""
+    if corners is None:
+        bearing = bearing_of_faces(a, b, found.nx, found.ny)
+        pair.stiffness = stiffness * bearing.share
+        pair.slide = stiffness * bearing.slide
+        pair.turn = stiffness * bearing.turn
+    else:
+        measure_on_outlines(pair, a, b, found.nx, found.ny, stiffness, corners)
+
+
+@kernel
+def are_flat(a: Record, b: Record, found: PersistentContact, corners: Records | None) -> bool:
+    """Return True if the faces of two blocks that meet along the normal of a contact are parallel."""
+    if corners is None:
+        return is_flat(a, b)
+    return are_parallel(a, b, found.nx, found.ny, corners)
+
+
+@kernel
+def are_ends(
+    pair: Record,
+    a: Record,
+    b: Record,
+    found: PersistentContact,
+    other: PersistentContact,
+    is_due: bool,
+    corners: Records | None,
+) -> bool:
+    """Return True if two contacts are on the ground or the two ends of one interval of parallel faces, no sliver.
+
+    That changes by turning only, slowly, and is checked where dashpots are due.
+    """
+    if pair.bearing == APART or two_are_sliver(a, b, found, other, corners):
+        return False
+    return not is_due or pair.bearing == PLANE or are_flat(a, b, found, corners)
+
+
+@kernel
+def use_operator_of_one(
+    operator: Record,
+    pair: Record,
+    a: Record,
+    b: Record,
+    found: PersistentContact,
+    values: Record,
+    step: float,
+    is_due: bool,
+) -> None:
+    """Rebuild the operator along the normal of a single contact where it is due, else count down."""
+    if not is_due:
+        count_down(pair)
+    elif pair.slides != 0:
+        renew_sliding(operator, pair, a, b, found, values, step)
+    else:
+        renew_single(operator, pair, a, b, found, NORMAL, values.normal_damping, step, pair.stiffness)
+
+
+@kernel
+def one_is_sliver(contact: Record, a: Record, b: Record, found: PersistentContact, corners: Records | None) -> bool:
+    """Return True if a single contact is that of two polygons which overlap by a sliver; see slivers.py."""
+    return False if corners is None else ends_in_sliver(contact, a, b, found, corners)
+
+
+@kernel
+def two_are_sliver(
+    a: Record, b: Record, one: PersistentContact, two: PersistentContact, corners: Records | None
+) -> bool:
+    """Return True if two contacts are those of two polygons which overlap by a sliver; see slivers.py."""
+    return False if corners is None else lie_on_sliver(a, b, one, two, corners)
+
+
+@kernel
+def single(
+    world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float, is_due: bool
+) -> tuple[int, Effect]:
+    """Return what a pair with one contact does, if it continues; see persistent_forces.
+
+    `is_due` says whether dashpots along the normal are, where there are any.
+    """
+    contact = world.contacts[p, 0]
+    pair = world.pairs[p]
+    values = world.interactions[a.contact_class, b.contact_class]
+    motion = relative_motion(a, b, dx, dy, 0.5 * step)
+    goes_on, found = follow_corner(contact, a, b, dx, dy, motion, step, is_due, world.corners)
+    if not goes_on or found.depth > pair.limit or one_is_sliver(contact, a, b, found, world.corners):
+        return CHANGED, NOTHING
+    before = pair.stiffness
+    if is_due and pair.bearing != PLANE:
+        measure_corner(pair, a, b, found, values.normal_stiffness, world.corners)
+    spring = pair.stiffness * found.depth
+    force = spring
+    if not is_due or values.normal_damping > 0.0:
+        operator = world.operators[p, NORMAL]
+        use_operator_of_one(operator, pair, a, b, found, values, step, is_due)
+        force = damp_one(operator, spring, contact.normal_force, found.closing_rate)
+    normal = max(force, 0.0)
+    dashpot = 0.5 * (contact.normal_force - before * contact.depth + (normal - spring)) * found.closing
+    drawn, shear, lost, friction = shear_of_one(world, p, a, b, values, found, normal, step, before, is_due)
+    keep(contact, drawn, found.depth, normal, shear)
+    measure_soon(pair, found.slip, step * (a.spin - b.spin), world.corners)
+    square = 0.5 * found.depth * found.depth
+    shear += square * pair.slide
+    fx = found.nx * normal + found.ny * shear
+    fy = found.ny * normal - found.nx * shear
+    torque = found.x * fy - found.y * fx - square * pair.turn
+    return TOUCHING, Effect(fx, fy, torque - (dx * fy - dy * fx), torque, dashpot + lost, friction)
+
+
+@kernel
+def shear_of_one(
+    world: World,
+    p: int,
+    a: Record,
+    b: Record,
+    values: Record,
+    found: PersistentContact,
+    normal: float,
+    step: float,
+    before: float,
+    is_due: bool,
+) -> tuple[float, float, float, float]:
+    """Return shear spring (m), shear force (N) and the losses (J) to dashpot and friction of a single contact.
+
+    `before` (N/m) is the stiffness along the normal in the step before; it is another now only where `is_due` says so.
+    """
+    contact = world.contacts[p, 0]
+    pair = world.pairs[p]
+    operator = world.operators[p, SHEAR]
+    k = values.shear_ratio * pair.stiffness
+    old = values.shear_ratio * before
+    drawn, limit, slides, friction = draw_lasting_spring(
+        values, k, old, contact.spring, found.slip, normal, found.slip_rate, is_due
+    )
+    elastic = k * drawn
+    shear = elastic
+    if slides:
+        pair.shear_left = 0
+    elif values.shear_damping > 0.0:
+        if are_dashpots_due(pair, SHEAR):
+            renew_single(operator, pair, a, b, found, SHEAR, values.shear_damping, step, k)
+        free = damp_one(operator, elastic, contact.shear_force, found.slip_rate)
+        shear = clip_to_cone(values, free, limit, normal, found.slip_rate)
+        slides = shear != free
+    if normal > 0.0:
+        note_slip(pair, slides, shear)
+    dashpot = 0.5 * (contact.shear_force - old * contact.spring + (shear - elastic)) * found.slip
+    return drawn, shear, dashpot, friction
+
+
+@kernel
+def keep(contact: Record, spring: float, depth: float, normal_force: float, shear_force: float) -> None:
+    """Write what a contact remembers until the next step."""
+    contact.spring = spring
+    contact.depth = depth
+    contact.normal_force = normal_force
+    contact.shear_force = shear_force
+
+
+@kernel
+def use_operator_of_two(
+    operator: Record,
+    pair: Record,
+    a: Record,
+    b: Record,
+    one: PersistentContact,
+    two: PersistentContact,
+    values: Record,
+    step: float,
+    is_due: bool,
+) -> None:
+    """Rebuild the operator along the normals of two contacts where it is due, else count down."""
+    if is_due:
+        renew_double(operator, pair, a, b, one, two, NORMAL, BOTH, values.normal_damping, step, pair.stiffness)
+    else:
+        count_down(pair)
+
+
+@kernel
+def double(
+    world: World, p: int, a: Record, b: Record, dx: float, dy: float, step: float, is_due: bool
+) -> tuple[int, Effect]:
+    """Return what a pair with two contacts does, if both continue; see single."""
+    first = world.contacts[p, 0]
+    second = world.contacts[p, 1]
+    pair = world.pairs[p]
+    operator = world.operators[p, NORMAL]
+    values = world.interactions[a.contact_class, b.contact_class]
+    motion = relative_motion(a, b, dx, dy, 0.5 * step)
+    goes_1, one = follow_corner(first, a, b, dx, dy, motion, step, is_due, world.corners)
+    goes_2, two = follow_corner(second, a, b, dx, dy, motion, step, is_due, world.corners)
+    goes_on = goes_1 and goes_2 and are_ends(pair, a, b, one, two, is_due, world.corners)
+    if not goes_on or max(one.depth, two.depth) > pair.limit:
+        return CHANGED, NOTHING
+    before = pair.stiffness
+    if is_due and pair.bearing != PLANE:
+        pair.stiffness = stiffness_between(pair, one.x - two.x, one.y - two.y, one.nx, one.ny)
+    k = pair.stiffness
+    spring_1, spring_2 = force_1, force_2 = k * one.depth, k * two.depth
+    if not is_due or values.normal_damping > 0.0:
+        use_operator_of_two(operator, pair, a, b, one, two, values, step, is_due)
+        force_1, force_2 = damp_two(
+            operator, spring_1, spring_2, first.normal_force, second.normal_force, one.closing_rate, two.closing_rate
+        )
+    normal_1, normal_2 = max(force_1, 0.0), max(force_2, 0.0)
+    lost_1 = (first.normal_force - before * first.depth + (normal_1 - spring_1)) * one.closing
+    lost_2 = (second.normal_force - before * second.depth + (normal_2 - spring_2)) * two.closing
+    drawn_1, drawn_2, shear_1, shear_2, lost, friction = shear_of_two(
+        world, p, a, b, values, one, two, normal_1, normal_2, step, before, is_due
+    )
+    keep(first, drawn_1, one.depth, normal_1, shear_1)
+    keep(second, drawn_2, two.depth, normal_2, shear_2)
+    measure_soon(pair, one.slip, step * (a.spin - b.spin), world.corners)
+    half_slide = 0.5 * pair.slide
+    shear_1 += half_slide * one.depth * one.depth
+    shear_2 += half_slide * two.depth * two.depth
+    fx, fy, torque = sum_of_two(one, two, normal_1, normal_2, shear_1, shear_2)
+    return TOUCHING, Effect(fx, fy, torque - (dx * fy - dy * fx), torque, 0.5 * (lost_1 + lost_2) + lost, friction)
+
+
+@kernel
+def sum_of_two(
+    one: PersistentContact, two: PersistentContact, normal_1: float, normal_2: float, shear_1: float, shear_2: float
+) -> tuple[float, float, float]:
+    """Return the force (N) of two contacts on body a and its torque (N m) about the centre of b."""
+    fx_1 = one.nx * normal_1 + one.ny * shear_1
+    fy_1 = one.ny * normal_1 - one.nx * shear_1
+    fx_2 = two.nx * normal_2 + two.ny * shear_2
+    fy_2 = two.ny * normal_2 - two.nx * shear_2
+    torque = one.x * fy_1 - one.y * fx_1 + (two.x * fy_2 - two.y * fx_2)
+    return fx_1 + fx_2, fy_1 + fy_2, torque
+
+
+@kernel
+def shear_of_two(
+    world: World,
+    p: int,
+    a: Record,
+    b: Record,
+    values: Record,
+    one: PersistentContact,
+    two: PersistentContact,
+    normal_1: float,
+    normal_2: float,
+    step: float,
+    before: float,
+    is_due: bool,
+) -> tuple[float, float, float, float, float, float]:
+    """Return shear springs (m) and forces (N) of two contacts, and their losses (J) to dashpots and friction.
+
+    `before` and `is_due` as in shear_of_one.
+    """
+    first = world.contacts[p, 0]
+    second = world.contacts[p, 1]
+    pair = world.pairs[p]
+    operator = world.operators[p, SHEAR]
+    k = values.shear_ratio * pair.stiffness
+    old = values.shear_ratio * before
+    drawn_1, limit_1, slides_1, work_1 = draw_lasting_spring(
+        values, k, old, first.spring, one.slip, normal_1, one.slip_rate, is_due
+    )
+    drawn_2, limit_2, slides_2, work_2 = draw_lasting_spring(
+        values, k, old, second.spring, two.slip, normal_2, two.slip_rate, is_due
+    )
+    elastic_1 = k * drawn_1
+    elastic_2 = k * drawn_2
+    shear_1 = elastic_1
+    shear_2 = elastic_2
+    sticking = (0 if slides_1 else 1) + (0 if slides_2 else 2)
+    if sticking == 0:
+        pair.shear_left = 0
+    elif values.shear_damping > 0.0:
+        if pair.sticking != sticking or are_dashpots_due(pair, SHEAR):
+            renew_double(operator, pair, a, b, one, two, SHEAR, sticking, values.shear_damping, step, k)
+        shear_1, shear_2 = damp_two(
+            operator, elastic_1, elastic_2, first.shear_force, second.shear_force, one.slip_rate, two.slip_rate
+        )
+        # a point that slides has its spring at the limit and no dashpot
+        shear_1 = elastic_1 if slides_1 else clip_to_cone(values, shear_1, limit_1, normal_1, one.slip_rate)
+        shear_2 = elastic_2 if slides_2 else clip_to_cone(values, shear_2, limit_2, normal_2, two.slip_rate)
+    lost_1 = (first.shear_force - old * first.spring + (shear_1 - elastic_1)) * one.slip
+    lost_2 = (second.shear_force - old * second.spring + (shear_2 - elastic_2)) * two.slip
+    return drawn_1, drawn_2, shear_1, shear_2, 0.5 * (lost_1 + lost_2), work_1 + work_2

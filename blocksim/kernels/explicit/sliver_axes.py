@@ -1,0 +1,147 @@
+"""Axes of two polygons that overlap: which face is nearest, which one is next, and whether the overlap is a sliver.
+
+An axis is the normal of a face, its depth how far the deepest corner of the other body lies behind that face; see
+slivers.py. Two faces within the cone of one another are one axis.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from blocksim.kernels.common.arrays import Record, Records
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.explicit.jets import (
+    Jet,
+    absolute,
+)
+from blocksim.kernels.explicit.outlines import (
+    cone_of,
+    corner_of,
+    corner_vector,
+    number_of_corners,
+    side_along,
+    side_normal,
+)
+from blocksim.kernels.explicit.tributary import FLAT, FLAT_SHARE, are_blocks
+
+SLIVER = 0.1  # overlap on the nearest axis over that on the next one, from where on a pair has its own potential
+# of the cone: such an overlap over the next one, from where on the second of two tilted ends counts less; at twice that
+# not at all, before the faces are no longer parallel
+TILTED = 0.45
+
+
+class Axis(NamedTuple):
+    """The normal of a face."""
+
+    of_b: bool  # whose face it is
+    face: int
+    corner: int  # the deepest one of the other body
+    depth: float  # m
+
+
+@rare_kernel
+def axis_of(of_b: bool, face: int, a: Record, b: Record, table: Records, least: float = math.inf) -> Axis:
+    """Return the axis of a face of b, or of a; of one that cannot be less deep than `least` (m) no corner is sought."""
+    body, other = (b, a) if of_b else (a, b)
+    nx, ny = side_normal(body, table, face)
+    best = -math.inf
+    number = 0
+    reach = corner_of(body, table, face).distance + nx * (body.x - other.x) + ny * (body.y - other.y)
+    if reach + other.inner_radius > least:
+        return Axis(of_b, face, number, math.inf)
+    for k in range(number_of_corners(other)):
+        x, y = corner_vector(other, table, k)
+        depth = reach - (nx * x + ny * y)
+        if depth > best:
+            best = depth
+            number = k
+    return Axis(of_b, face, number, best)
+
+
+@rare_kernel
+def face_across(axis: Axis, a: Record, b: Record, table: Records) -> int:
+    """Return the face of the other body that looks at that of an axis, or -1 where none is within the cone."""
+    body, other = (b, a) if axis.of_b else (a, b)
+    nx, ny = side_normal(body, table, axis.face)
+    found: Any = np.int64(side_along(other, table, -nx, -ny))
+    mx, my = side_normal(other, table, found)
+    within = nx * mx + ny * my < 0.0 and abs(nx * my - ny * mx) < cone_of(a, b, table)
+    return found if within else -1
+
+
+@rare_kernel
+def nearest_axis(a: Record, b: Record, table: Records) -> Axis:
+    """Return the axis of least depth; those of b come first."""
+    best = axis_of(True, 0, a, b, table)
+    for k in range(1, number_of_corners(b)):
+        axis = axis_of(True, k, a, b, table, best.depth)
+        if axis.depth < best.depth:
+            best = axis
+    for k in range(number_of_corners(a)):
+        axis = axis_of(False, k, a, b, table, best.depth)
+        if axis.depth < best.depth:
+            best = axis
+    return best
+
+
+@rare_kernel
+def next_axis(nearest: Axis, across: int, a: Record, b: Record, table: Records) -> Axis:
+    """Return the axis of least depth but the nearest one, whose face looks at the face `across`."""
+    best = nearest
+    least = math.inf
+    for m in range(number_of_corners(b) + number_of_corners(a)):
+        of_b = m < number_of_corners(b)
+        face = m if of_b else m - number_of_corners(b)
+        if face != (nearest.face if of_b == nearest.of_b else across):
+            axis = axis_of(of_b, face, a, b, table, least)
+            if axis.depth < least:
+                least = axis.depth
+                best = axis
+    return best
+
+
+@rare_kernel
+def tilt_between(of_a: int, of_b: int, a: Record, b: Record, table: Records) -> Jet:
+    """Return the sine of the angle between a face of a and one of b."""
+    ax, ay = side_normal(a, table, of_a)
+    bx, by = side_normal(b, table, of_b)
+    return absolute(Jet(ax * by - ay * bx, 0.0, 0.0, -ax * bx - ay * by))
+
+
+@rare_kernel
+def tilt_of(axis: Axis, across: int, a: Record, b: Record, table: Records) -> Jet:
+    """Return the sine of the angle between the face of an axis and the one across."""
+    if axis.of_b:
+        return tilt_between(across, axis.face, a, b, table)
+    return tilt_between(axis.face, across, a, b, table)
+
+
+@rare_kernel
+def flat_within(cone: float) -> float:
+    """Return the sine up to which faces are parallel."""
+    return min(FLAT, FLAT_SHARE * cone)
+
+
+@kernel
+def least_ratio(cone: float) -> float:
+    """Return the overlap over the next one from where on tilted faces may have this potential."""
+    return min(SLIVER, TILTED * cone)
+
+
+@rare_kernel
+def is_short(nearest: Axis, across: int, a: Record, b: Record, table: Records) -> bool:
+    """Return True if another axis is about as deep as the nearest one; of parallel faces both are one."""
+    cone = cone_of(a, b, table)
+    if across >= 0 and tilt_of(nearest, across, a, b, table).value > flat_within(cone):
+        return nearest.depth > least_ratio(cone) * next_axis(nearest, -1, a, b, table).depth
+    return nearest.depth > SLIVER * next_axis(nearest, across, a, b, table).depth
+
+
+@rare_kernel
+def is_sliver(a: Record, b: Record, table: Records) -> bool:
+    """Return True if two bodies overlap by a sliver."""
+    if not are_blocks(a, b):
+        return False
+    nearest = nearest_axis(a, b, table)
+    return nearest.depth > 0.0 and is_short(nearest, face_across(nearest, a, b, table), a, b, table)
