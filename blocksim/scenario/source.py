@@ -121,10 +121,19 @@ def override_problem(override: Override, path: KeyPath, message: str, at: str) -
     value = len(text) - len(text[equals + 1 :].lstrip())
     in_key = equals < 0 or (at == "key" and len(path) <= len(override.path))
     start, stop = (0, end) if in_key else (value, len(text))
-    key = "" if path == override.path else format_key(path)
     line, shift = clipped(text, start)
     length = max(1, min(stop - start, len(line) - shift))
-    return Problem(override.label, message, key, None, line, shift, length)
+    return Problem(override.label, message, _key_shown(override, path), None, line, shift, length)
+
+
+def _key_shown(override: Override, path: KeyPath) -> str:
+    """Return the key of a mistake, unless the override names it; of a key that a study varies, what lies below it."""
+    depth = len(override.path)
+    if path[:depth] != override.path or depth == len(path):
+        return "" if path == override.path else format_key(path)
+    if override.path[0] != "sweep":
+        return format_key(path)
+    return "" if isinstance(path[depth], int) else format_key(path[depth:])
 
 
 def clipped(line: str, start: int) -> tuple[str, int]:
