@@ -19,13 +19,14 @@ SPRUNG_OUTLINES = "outlines-with-springs"  # the same with springs
 OF_OUTLINES = {RIGID: OUTLINED, SURFACE: SPRUNG_OUTLINES}
 IN_ROUNDS = {RIGID: "nonsmooth-in-rounds", OUTLINED: "outlines-in-rounds"}  # where impacts follow from one another
 NONSMOOTH = {"scheme": "nonsmooth"}
+TWO = [{"block": "any", "x": x, "y": 0.5} for x in (0.0, 5.0)]  # impacts of a single block are always in rounds
 POLYGON = {"any": {"sides": 4, "radius": 0.5, "depth": 1.0, "material": "any"}}
 
 CHANGES: dict[str, dict[str, object]] = {  # in the smallest scene, so that it needs them
     SURFACE: {},
     PARTICLES: {"contact": {"model": "kernel", "particle_spacing": 0.1}},  # the code serves all models with particles
-    RIGID: {"time": NONSMOOTH, "contact": {"restitution": 0.0}},
-    OUTLINED: {"time": NONSMOOTH, "contact": {"restitution": 0.0}, "blocks": POLYGON},
+    RIGID: {"time": NONSMOOTH, "contact": {"restitution": 0.0}, "bodies": TWO},
+    OUTLINED: {"time": NONSMOOTH, "contact": {"restitution": 0.0}, "blocks": POLYGON, "bodies": TWO},
     IN_ROUNDS[RIGID]: {"time": NONSMOOTH, "contact": {"restitution": 0.5}},
     IN_ROUNDS[OUTLINED]: {"time": NONSMOOTH, "contact": {"restitution": 0.5}, "blocks": POLYGON},
     SPRUNG_OUTLINES: {"blocks": POLYGON},

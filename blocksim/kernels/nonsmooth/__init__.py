@@ -30,7 +30,7 @@ Impacts of bodies that touch one another go in rounds instead (in crowds only wh
 world/nonsmooth.py), and create no energy:
 impacts.py, clusters.py, rounds.py.
 
-Where few blocks rebound (one or two at any restitution, up to twelve above 0.5), steps are cut at impacts: parts.py.
+Where few blocks rebound (two at all, up to twelve above 0.5), and of a single one, steps are cut at impacts: parts.py.
 
 Gravity kicks half a substep at first and whole ones then: velocities live half a substep before positions (leap-frog).
 """
