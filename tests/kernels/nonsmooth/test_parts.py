@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
+from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.kernels.nonsmooth.parts import set_length
+from blocksim.verification.scene import HEIGHT, WIDTH, Scene, Simulation, scenario_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -59,6 +61,22 @@ def test_block_rides_along_on_a_table_though_steps_are_cut(begin: Callable[..., 
     assert abs(float(run.world.bodies.vx[-1])) > 0.01
     assert run.bodies.x[0] == pytest.approx(float(run.world.bodies.x[-1]), abs=1e-7)
     assert run.residual() < 1e-12
+
+
+def test_velocity_of_a_block_that_rolls_does_not_depend_on_lengths_that_are_not_taken() -> None:
+    found = []
+    for lengths in ((0.3,), (0.7, 0.3), (0.1, 0.9, 0.3)):
+        tilted = {"y": 0.5 * (np.sin(0.1) * WIDTH + np.cos(0.1) * HEIGHT), "angle": 0.1}
+        run = Scene([tilted], restitution=0.0, ground_friction=5.0, time={"scheme": "nonsmooth", "end": 1.0}).start()
+        run.to_step(30)
+        assert isinstance(run.scene, Nonsmooth)
+        for share in lengths:
+            set_length(run.scene, share * run.step)
+        state = run.scene.contacts.states[0]
+        found.append((float(state.vx), float(state.vy), float(state.spin)))
+    assert abs(found[0][2]) > 0.1
+    assert found[1] == pytest.approx(found[0], rel=1e-12)
+    assert found[2] == pytest.approx(found[0], rel=1e-12)
 
 
 def test_steps_of_crowds_and_of_weak_rebounds_of_more_than_two_are_not_cut(single: Callable[..., Simulation]) -> None:
