@@ -128,10 +128,10 @@ def override_problem(override: Override, path: KeyPath, message: str, at: str) -
 
 def _key_shown(override: Override, path: KeyPath) -> str:
     """Return the key of a mistake, unless the override names it; of a key that a study varies, what lies below it."""
+    if path == override.path:
+        return ""
     depth = len(override.path)
-    if path[:depth] != override.path or depth == len(path):
-        return "" if path == override.path else format_key(path)
-    if override.path[0] != "sweep":
+    if path[0] != "sweep" or path[:depth] != override.path:
         return format_key(path)
     return "" if isinstance(path[depth], int) else format_key(path[depth:])
 

@@ -91,9 +91,9 @@ def _clearance(number: int, rows: Sequence[tuple[float, ...]]) -> float:
 
 def _distance_of_others(number: int, rows: Sequence[tuple[float, ...]]) -> float:
     """Return the distance (m) of a face from all others but those beside it: the lesser one of its two ends."""
-    last = (number + 1) % len(rows)
-    others = [row for k, row in enumerate(rows) if k not in {number - 1, number, last, number - 1 + len(rows)}]
-    ends = [rows[number][:2], rows[last][:2]]
+    before, after = (number - 1) % len(rows), (number + 1) % len(rows)
+    others = [row for k, row in enumerate(rows) if k not in {before, number, after}]
+    ends = [rows[number][:2], rows[after][:2]]
     return min((row[4] - row[2] * x - row[3] * y for row in others for x, y in ends), default=math.inf)
 
 
