@@ -53,7 +53,7 @@ def verify_command(
     model: Annotated[Model, typer.Option(help="Contact model.")] = Model.SURFACE,
     law: Annotated[Law, typer.Option(help="Force law.")] = Law.LINEAR,
     scheme: Annotated[Scheme, typer.Option(help="Stepping: springs or impulses.")] = Scheme.EXPLICIT,
-    soil: Annotated[bool, typer.Option("--soil", help="The cases of soil, S1 to S10.")] = False,
+    soil: Annotated[bool, typer.Option("--soil", help="The cases of soil, S1 to S11.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Run a reduced version; the last lines say how.")] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
