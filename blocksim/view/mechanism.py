@@ -1,30 +1,22 @@
-"""A mechanism beside its last stable neighbour: blocks coloured by displacement, joints that slide or rock marked.
+"""A mechanism beside its last stable neighbour: blocks coloured by displacement, joints that slide or rock marked."""
 
-A joint is what two bodies pressed on each other through when the run began. Its points are followed on both bodies: it
-slides where points that are still closed are farther apart along it than a hundredth of the shorter block's shortest
-side, as blocks have moved from there on, and rocks about its most closed point where the bodies have turned against
-each other by that over this side, a hundredth.
-"""
-
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.simulation.contacts import SUPPORT, Rows
-from blocksim.simulation.movement import MOVED_SHARE
 from blocksim.view import style
-from blocksim.view.forces import WithContacts, contacts_of
+from blocksim.view.forces import WithContacts
+from blocksim.view.joints import Joint, joints
 from blocksim.view.layout import EDGE, LINE, OWN, Paper, add_axes, wrapped, write_heading, write_text
 from blocksim.view.load_arrows import draw_outside
 from blocksim.view.loads import SPEED, Outside, length_in, outside, with_room
 from blocksim.view.paint import Paint, by_displacement, displacements, draw_key
 from blocksim.view.panel import Canvas, Page, finish_panel, page_for
-from blocksim.view.run_data import Floats, Support, drawable_frames, shortest_sides
+from blocksim.view.run_data import Support, drawable_frames, shortest_sides
 from blocksim.view.scene import corners, draw_scene
 from blocksim.view.window import MILLIMETRES, Extent, extent_of
 
@@ -65,70 +57,6 @@ class Side:
         shortest = shortest_sides(self.frames)
         seen = (displacements(self.frames, self.support)[drawable] > VISIBLE * shortest).any(axis=1)
         return int(drawable[int(np.argmax(seen))] if seen.any() else drawable[-1])
-
-
-class Joint(NamedTuple):
-    """A joint in a frame: its points (m, scene, (k, 2)), whether it slides, and the point about which it rocks."""
-
-    points: Floats
-    slides: bool
-    hinges: Floats  # (1, 2), or (0, 2) where it does not rock
-
-
-def joints(frames: WithContacts, frame: int, support: Support) -> list[Joint]:
-    """Return the joints that slide or rock in a frame; none where no contact was recorded."""
-    contacts = contacts_of(frames)
-    pressed = next((found for found in range(len(contacts)) if len(contacts.at(found))), None)
-    if pressed is None:
-        return []
-    rows = contacts.at(pressed)
-    pairs: dict[tuple[int, int], list[int]] = defaultdict(list)
-    for index, ends in enumerate(zip(rows["body_a"].tolist(), rows["body_b"].tolist(), strict=True)):
-        pairs[ends].append(index)
-    loaded = (rows[chosen] for chosen in pairs.values() if (rows["normal_force"][chosen] > 0.0).any())
-    found = (_joint(frames, (pressed, frame), support, points) for points in loaded)
-    return [one for one in found if one.slides or len(one.hinges)]
-
-
-def _joint(frames: WithContacts, times: tuple[int, int], support: Support, rows: Rows) -> Joint:
-    """Follow the points of a joint on both bodies from one frame to another."""
-    pair = int(rows["body_a"][0]), int(rows["body_b"][0])
-    points = np.stack([rows["x"], rows["y"]], axis=-1)
-    on_a, on_b = (_carried(frames, body, times, points, support) for body in pair)
-    normal = np.stack([rows["normal_x"], rows["normal_y"]], axis=-1) @ _turn(frames, pair[1], times).T
-    apart = on_a - on_b
-    opening = (apart * normal).sum(axis=1)
-    slip = np.abs(apart[:, 1] * normal[:, 0] - apart[:, 0] * normal[:, 1])
-    least = MOVED_SHARE * min(_shortest(frames, body) for body in pair)
-    is_closed = opening <= least
-    turn_a, turn_b = (_angle(frames, body, times) for body in pair)
-    rocks = abs(turn_a - turn_b) > MOVED_SHARE and bool(is_closed.any())
-    hinges = on_a[[int(np.argmin(opening))]] if rocks else on_a[:0]
-    return Joint(on_b, bool((slip[is_closed] > least).any()), hinges)
-
-
-def _shortest(frames: WithContacts, body: int) -> float:
-    return float("inf") if body == SUPPORT else float(shortest_sides(frames)[body])
-
-
-def _angle(frames: WithContacts, body: int, times: tuple[int, int]) -> float:
-    """Return how far a body turns between two frames (rad)."""
-    return 0.0 if body == SUPPORT else float(frames.angle[times[1], body] - frames.angle[times[0], body])
-
-
-def _turn(frames: WithContacts, body: int, times: tuple[int, int]) -> Floats:
-    """Return the matrix that turns as a body has between two frames."""
-    angle = _angle(frames, body, times)
-    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-
-def _carried(frames: WithContacts, body: int, times: tuple[int, int], points: Floats, support: Support) -> Floats:
-    """Return where points (k, 2) of a body are at another frame."""
-    if body == SUPPORT:
-        before, after = support.offset(frames.time[list(times)])
-        return np.asarray(points + after - before)
-    before, after = (np.array([frames.x[time, body], frames.y[time, body]]) for time in times)
-    return np.asarray((points - before) @ _turn(frames, body, times).T + after)
 
 
 def draw_mechanisms(
