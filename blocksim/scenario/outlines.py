@@ -1,5 +1,6 @@
 """Outlines of blocks: convex polygons of few corners, their area, centroid and moments, and what is wrong with one."""
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
@@ -11,6 +12,7 @@ Corners = tuple[Corner, ...]
 """Corners (m) counter-clockwise."""
 
 FEWEST, MOST = 3, 16
+RECTANGLE = 4
 SHORTEST = 1e-3
 """Least length of an edge, and least thickness, in shares of the diagonal of the bounding box: below, contact would
 have to tell corners apart that lie closer to one another than the accuracy of a step."""
@@ -32,6 +34,9 @@ def centred(points: Sequence[Corner]) -> Corners:
     local = [(x - x0, y - y0) for x, y in points]
     if area_of(local) < 0.0:
         local = [local[0], *local[:0:-1]]
+    if is_upright(tuple(local)):
+        cx, cy = middle_of(local)
+        return tuple((x - cx, y - cy) for x, y in local)
     for _ in range(2):  # the second time removes the round-off of the first
         cx, cy = centroid(local)
         local = [(x - cx, y - cy) for x, y in local]
@@ -63,6 +68,16 @@ def box_of(corners: Sequence[Corner]) -> tuple[Corner, Corner]:
     """Return the lower left and the upper right corner (m) of the bounding box."""
     xs, ys = zip(*corners, strict=True)
     return (min(xs), min(ys)), (max(xs), max(ys))
+
+
+@lru_cache(maxsize=256)
+def is_upright(corners: Corners) -> bool:
+    """Return True if the corners are those of a rectangle with sides along the axes.
+
+    It is treated as a rectangle wherever another order of rounding would give another last digit.
+    """
+    low, high = box_of(corners)
+    return len(corners) == RECTANGLE and set(corners) == set(itertools.product(*zip(low, high, strict=True)))
 
 
 def middle_of(corners: Sequence[Corner]) -> Corner:

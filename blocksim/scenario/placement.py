@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 from blocksim.scenario.keys import KeyPath
 from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.outlines import Corners, box_of, least_width, middle_of, section_of
+from blocksim.scenario.outlines import Corners, box_of, is_upright, least_width, middle_of, section_of
 from blocksim.scenario.structures import Pose, Shaped, Structure
 from blocksim.scenario.structures.shaped import Cell
 
@@ -41,16 +41,21 @@ class PlacedBody(NamedTuple):
     outline: Corners = ()  # empty for a rectangle
 
     @property
+    def is_polygon(self) -> bool:
+        """Whether the block has an outline that is no rectangle with sides along its axes."""
+        return bool(self.outline) and not is_upright(self.outline)
+
+    @property
     def mass(self) -> float:
         """Mass in kg."""
-        if self.outline:
+        if self.is_polygon:
             return self.density * section_of(self.outline)[0] * self.depth
         return self.density * self.size_x * self.size_y * self.depth
 
     @property
     def inertia(self) -> float:
         """Moment of inertia about the centroid in kg m²."""
-        if self.outline:
+        if self.is_polygon:
             return self.density * section_of(self.outline)[1] * self.depth
         return self.mass * (self.size_x * self.size_x + self.size_y * self.size_y) / 12.0
 
@@ -65,7 +70,7 @@ class PlacedBody(NamedTuple):
     @property
     def least_width(self) -> float:
         """Smaller side in m; of an outline the least distance of two parallel lines with the block between them."""
-        return least_width(self.outline) if self.outline else min(self.size_x, self.size_y)
+        return least_width(self.outline) if self.is_polygon else min(self.size_x, self.size_y)
 
     @property
     def radius(self) -> float:

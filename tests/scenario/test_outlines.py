@@ -7,7 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.scenario.outlines import Corner, area_of, box_of, centred, centroid, faults, regular, section_of
+from blocksim.scenario.outlines import (
+    Corner,
+    area_of,
+    box_of,
+    centred,
+    centroid,
+    faults,
+    is_upright,
+    regular,
+    section_of,
+)
 
 PLACE = st.floats(-1e3, 1e3)
 ANGLES = st.lists(st.integers(0, 71), min_size=3, max_size=16, unique=True).map(sorted)
@@ -91,3 +101,17 @@ BAD = {
 def test_every_fault_is_told(points: list[Corner], message: str) -> None:
     assert message in told(points)[1]
     assert message in told(points[::-1])[1]
+
+
+@given(st.floats(1e-3, 10.0), st.floats(0.05, 20.0), st.integers(0, 3), st.booleans())
+def test_upright_rectangles_have_no_round_off_of_their_own(
+    wide: float, slender: float, first: int, clockwise: bool
+) -> None:
+    """They are placed with the sides that were given, wherever the corners begin."""
+    tall = wide * slender
+    points = [(0.0, 0.0), (wide, 0.0), (wide, tall), (0.0, tall)]
+    points = [*points[first:], *points[:first]][:: -1 if clockwise else 1]
+    assert is_upright(centred(points))
+    assert {(2.0 * abs(x), 2.0 * abs(y)) for x, y in centred(points)} == {(wide, tall)}
+    assert not is_upright(centred([(0.0, 0.0), (wide, 1e-9 * wide), (wide, tall), (0.0, tall)]))
+    assert not is_upright(centred([(0.0, 0.0), (wide, 0.0), (wide, tall)]))

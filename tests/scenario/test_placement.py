@@ -6,6 +6,8 @@ import weakref
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_from_mapping
 from blocksim.scenario.overrides import frozen
@@ -120,3 +122,13 @@ def test_structures_line_up_the_bounding_boxes_of_outlines() -> None:
 def test_lengths_where_there_are_no_blocks_are_finite_and_those_of_blocks_as_they_are() -> None:
     assert length_beside(smallest_width([])) == length_beside(-math.inf) == LENGTH_WITHOUT_BLOCKS
     assert length_beside(0.025) == 0.025
+
+
+@given(st.floats(1e-3, 1.0), st.floats(1e-3, 1.0), st.floats(1e-3, 1.0), st.floats(500.0, 8000.0))
+def test_a_rectangle_given_as_an_outline_has_its_mass_to_the_last_bit(
+    x: float, y: float, z: float, dense: float
+) -> None:
+    plain = PlacedBody("1", "brick", "stone", x, y, z, dense, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
+    other = plain._replace(outline=plain.corners)
+    assert (other.mass, other.inertia, other.least_width) == (plain.mass, plain.inertia, plain.least_width)
+    assert other.radius == plain.radius

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isnan
 from typing import TYPE_CHECKING
 
 import pytest
@@ -11,13 +12,10 @@ from blocksim.verification.case import Case, Setting
 from blocksim.verification.cases import chosen
 from blocksim.verification.verify import run_case
 from blocksim.world import bodies
-from tests.verification.rows import allowed
 
 if TYPE_CHECKING:
     from blocksim.scenario import PlacedBody, Scenario
 
-# with friction of 5 a domino jams, sweeps do not converge within 1000, and grow round-off to any size
-SENSITIVE = {"V18"}
 LONG = {"V3", "V4", "V9", "V10", "V13", "V15", "V17", "V18", "V23"}  # seconds
 SETTING = Setting(scheme="nonsmooth")
 CASES = [
@@ -36,8 +34,8 @@ def test_rectangles_given_as_outlines_have_the_same_answers(case: Case, monkeypa
     plain = run_case(case, SETTING)
     monkeypatch.setattr(bodies, "place_bodies", as_outlines)
     for was, now in zip(plain.rows, run_case(case, SETTING).rows, strict=True):
-        room = allowed(was) if case.id in SENSITIVE else 1e-9
-        assert now.measured == pytest.approx(was.measured, rel=1e-9, abs=room), was.quantity
+        # to the last bit: in V18 a domino jams, and a difference in the last bit grows to one of 2.5e-3
+        assert now.measured == was.measured or (isnan(was.measured) and isnan(now.measured)), was.quantity
 
 
 @pytest.mark.parametrize("name", [pytest.param("V3", marks=pytest.mark.long), "V5", "V6", "V7", "V8"])

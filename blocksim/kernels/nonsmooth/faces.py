@@ -16,14 +16,19 @@ SLIVER = 1e-5  # of the smaller half side: with less between them two points are
 
 
 class Face(NamedTuple):
-    """A reference face: unit normal, centre of its body, distance of the face from there and half of its length (m)."""
+    """A reference face: unit normal, centre of its body, distance of the face from there, and where it ends (m).
+
+    `left` and `right` lie along the face, to the right, from the foot of the centre: of a rectangle half of its length
+    to either side.
+    """
 
     nx: Lanes
     ny: Lanes
     x: Lanes
     y: Lanes
     distance: Lanes
-    half: Lanes
+    left: Lanes
+    right: Lanes
 
 
 class Edge(NamedTuple):
@@ -71,7 +76,7 @@ def face_of(body: Block, mx: Lanes, my: Lanes, along_x: Mask) -> Face:
     """Return the face of a body with the outward normal (mx, my), on its own x axis or y axis."""
     distance = select(along_x, body.half_x, body.half_y)
     half = select(along_x, body.half_y, body.half_x)
-    return Face(mx, my, body.x, body.y, distance, half)
+    return Face(mx, my, body.x, body.y, distance, -half, half)
 
 
 @kernel
@@ -114,28 +119,28 @@ def opposite_edge(face: Face, body: Block) -> Edge:
 
 
 @kernel
-def clip(edge: Edge, half: Lanes) -> Edge:
+def clip(edge: Edge, face: Face) -> Edge:
     """Cut an edge at both ends of the reference face; empty (left > right) where it lies beyond."""
     left, left_gap, right, right_gap, is_left, is_right = edge
     slope = select(right > left, (right_gap - left_gap) / (right - left), 0.0)
-    is_cut_left = left < -half
-    is_cut_right = right > half
+    is_cut_left = left < face.left
+    is_cut_right = right > face.right
     return Edge(
-        select(is_cut_left, -half, left),
-        select(is_cut_left, left_gap + slope * (-half - left), left_gap),
-        select(is_cut_right, half, right),
-        select(is_cut_right, right_gap - slope * (right - half), right_gap),
+        select(is_cut_left, face.left, left),
+        select(is_cut_left, left_gap + slope * (face.left - left), left_gap),
+        select(is_cut_right, face.right, right),
+        select(is_cut_right, right_gap - slope * (right - face.right), right_gap),
         is_left | is_cut_left,
         is_right | is_cut_right,
     )
 
 
 @kernel
-def clip_one(edge: Edge, half: float) -> Edge:
+def clip_one(edge: Edge, face: Face) -> Edge:
     """Return the same for a single edge, bit by bit, without the division where nothing is cut."""
-    if edge.left >= -half and edge.right <= half:
+    if edge.left >= face.left and edge.right <= face.right:
         return edge
-    return clip(edge, half)
+    return clip(edge, face)
 
 
 @kernel

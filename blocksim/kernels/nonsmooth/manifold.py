@@ -154,7 +154,7 @@ def points_of_blocks(a: Block, b: Block, margin: float) -> tuple[Points, Mask]:
     is_level = lesser(c_abs, s_abs) < LEVEL
     along_x = (of_x > of_y) ^ (is_level & passes_edge(greater(of_x, of_y), lesser(of_x, of_y), a, b))
     face = face_towards(chosen(is_of_b, b, a), select(is_of_b, bx, -ax), select(is_of_b, by, -ay), along_x)
-    edge = clip(opposite_edge(face, chosen(is_of_b, a, b)), face.half)
+    edge = clip(opposite_edge(face, chosen(is_of_b, a, b)), face)
     points = points_of(face, edge, a, b, is_of_b, margin)
     is_near = (farthest <= margin) & (edge.right > edge.left)
     return points, is_near & has_point(points)

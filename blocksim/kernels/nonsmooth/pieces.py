@@ -75,7 +75,7 @@ def points_on_level(block: Block, ground: Block, margin: float) -> tuple[Points,
 @rare_kernel
 def points_on_ground(block: Block, hull: AnyHull, ground: Block, margin: float) -> tuple[Points, bool]:
     """Return the contact manifold of a block and the half-plane, and whether there is one within the margin (m)."""
-    face = Face(0.0, 1.0, block.x, ground.y, 0.0, FAR)
+    face = Face(0.0, 1.0, block.x, ground.y, 0.0, -FAR, FAR)
     edge = edge_opposite(face, block, hull)
     points = points_of(face, edge, block, ground, True, margin)
     return points, min(edge.left_gap, edge.right_gap) <= margin
@@ -145,13 +145,13 @@ def points_on_piece(
     face = face_of(piece, -piece.sin, piece.cos, False)
     edge = edge_opposite(face, block, hull)
     gap = min(edge.left_gap, edge.right_gap)
-    edge = clip(edge, face.half)
+    edge = clip(edge, face)
     is_near = min(edge.left_gap, edge.right_gap) >= -2.0 * piece.half_y
     meeting = best_meeting(block, hull, piece, corners)
     is_of_block = meeting.gap > gap + TIE and (is_edge(meeting) or meeting.cosine > PARALLEL)
     if is_of_block:
         face = meeting.face
-        edge = clip(meeting.edge, face.half)
+        edge = clip(meeting.edge, face)
         is_near = touches_edge(meeting, corners) and edge.right >= edge.left
     else:
         is_near = is_near and edge.right > edge.left

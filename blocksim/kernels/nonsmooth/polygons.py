@@ -82,17 +82,16 @@ def face_numbered(body: Block, hull: AnyHull, number: int) -> Face:
 
 @kernel
 def outline_face(body: Block, hull: Hull, number: int) -> Face:
-    """Return one of the faces of a polygon, seen from its middle."""
+    """Return one of the faces of a polygon: of a rectangle what face_of returns, bit by bit."""
     corner = corner_at(hull, number)
-    px = corner.x - corner.half * corner.ny
-    py = corner.y + corner.half * corner.nx
     return Face(
         body.cos * corner.nx - body.sin * corner.ny,
         body.sin * corner.nx + body.cos * corner.ny,
-        body.x + body.cos * px - body.sin * py,
-        body.y + body.sin * px + body.cos * py,
-        0.0,
-        1.0 * corner.half,
+        body.x,
+        body.y,
+        1.0 * corner.distance,
+        -corner.half - corner.middle,
+        corner.half - corner.middle,
     )
 
 
@@ -112,15 +111,27 @@ def number_opposite(nx: float, ny: float, body: Block, hull: Hull) -> int:
 
 @kernel
 def outline_edge(face: Face, body: Block, hull: Hull, number: int) -> Edge:
-    """Return a face of a polygon that looks towards a reference face: it begins at the left."""
-    one = corner_at(hull, number)
-    two = corner_at(hull, next_corner(hull, number))
-    cos = body.cos
-    sin = body.sin
-    left, left_gap = in_frame(face, body.x + cos * one.x - sin * one.y, body.y + sin * one.x + cos * one.y)
-    right, right_gap = in_frame(face, body.x + cos * two.x - sin * two.y, body.y + sin * two.x + cos * two.y)
-    are_all = abs(left) >= 0.0
-    return Edge(left, left_gap, right, right_gap, are_all, are_all)
+    """Return a face of a polygon that looks towards a reference face: it begins at the left.
+
+    Of a rectangle that is what opposite_edge returns, bit by bit: from the centre to the middle of the face, and from
+    there to both ends.
+    """
+    corner = corner_at(hull, number)
+    x, y = in_frame(face, body.x, body.y)
+    # the body's own x axis in the frame of the reference face
+    c = body.cos * face.ny - body.sin * face.nx
+    s = body.cos * face.nx + body.sin * face.ny
+    # normal and direction of the body's face there
+    mx = corner.nx * c - corner.ny * s
+    my = corner.nx * s + corner.ny * c
+    tx = -corner.ny * c - corner.nx * s
+    ty = corner.nx * c - corner.ny * s
+    x = x + corner.distance * mx + corner.middle * tx
+    y = y + corner.distance * my + corner.middle * ty
+    ex = corner.half * tx
+    ey = corner.half * ty
+    are_all = abs(ex) >= 0.0
+    return Edge(x - ex, y - ey, x + ex, y + ey, are_all, are_all)
 
 
 @kernel
@@ -190,9 +201,9 @@ def clipped_on(body: Block, hull: Hull, number: int, other: Block, other_hull: H
     face = outline_face(body, hull, number)
     against = number_opposite(face.nx, face.ny, other, other_hull)
     whole = outline_edge(face, other, other_hull, against)
-    left = 1 + against if whole.left >= -face.half else OF_B + 1 + next_corner(hull, number)
-    right = 1 + next_corner(other_hull, against) if whole.right <= face.half else OF_B + 1 + number
-    return Clipped(face, clip_one(whole, face.half), left, right)
+    left = 1 + against if whole.left >= face.left else OF_B + 1 + next_corner(hull, number)
+    right = 1 + next_corner(other_hull, against) if whole.right <= face.right else OF_B + 1 + number
+    return Clipped(face, clip_one(whole, face), left, right)
 
 
 @kernel

@@ -43,32 +43,35 @@ def test_face_towards_a_place_is_the_one_on_its_side(
     sign = 1.0 if (x if along_x else y) >= 0.0 else -1.0
     turned = angle if along_x else angle + math.pi / 2
     assert (face.nx, face.ny) == pytest.approx((sign * math.cos(turned), sign * math.sin(turned)), abs=1e-12)
-    assert (face.distance, face.half) == ((0.015, 0.01) if along_x else (0.01, 0.015))
+    assert (face.distance, face.right) == ((0.015, 0.01) if along_x else (0.01, 0.015))
+    assert face.left == -face.right
 
 
 @given(angle=angles, right=places, above=places)
 def test_frame_of_a_face_counts_to_the_right_and_from_the_face_on(angle: float, right: float, above: float) -> None:
     """Seen from inside the body, looking out, the right is at hand where the normal has turned clockwise."""
     n = np.array([math.cos(angle), math.sin(angle)])
-    face = Face(float(n[0]), float(n[1]), 0.2, 0.1, 0.015, 0.01)
+    face = Face(float(n[0]), float(n[1]), 0.2, 0.1, 0.015, -0.01, 0.01)
     x, y = (0.2, 0.1) + (0.015 + above) * n + right * np.array([n[1], -n[0]])
     assert in_frame(face, float(x), float(y)) == pytest.approx((right, above), abs=1e-15)
 
 
-@given(left=places, width=st.floats(1e-4, 0.1), gap=places, rise=places, half=st.floats(0.005, 0.05))
+@given(left=places, width=st.floats(1e-4, 0.1), gap=places, rise=places, half=st.floats(0.005, 0.05), middle=places)
 def test_clipped_edge_stays_on_its_line_and_over_the_face(
-    left: float, width: float, gap: float, rise: float, half: float
+    left: float, width: float, gap: float, rise: float, half: float, middle: float
 ) -> None:
+    face = Face(0.0, 1.0, 0.0, 0.0, 0.0, middle - half, middle + half)
     whole = Edge(left, gap, left + width, gap + rise, False, False)
-    cut = clip(whole, half)
-    assert clip_one(whole, half) == cut
-    if left >= half or left + width <= -half:
+    cut = clip(whole, face)
+    assert clip_one(whole, face) == cut
+    if left >= face.right or left + width <= face.left:
         assert cut.left >= cut.right or math.isclose(cut.left, cut.right)
         return
-    assert (cut.left, cut.right) == (max(left, -half), min(left + width, half))
+    assert (cut.left, cut.right) == (max(left, face.left), min(left + width, face.right))
     for place, height in ((cut.left, cut.left_gap), (cut.right, cut.right_gap)):
         assert height == pytest.approx(gap + rise * (place - left) / width, abs=1e-12)
-    assert (bool(cut.is_left), bool(cut.is_right)) == (left < -half, left + width > half)  # ends of the face can touch
+    # ends of the face can touch
+    assert (bool(cut.is_left), bool(cut.is_right)) == (left < face.left, left + width > face.right)
 
 
 def test_block_ahead_turns_to_third_order_in_the_angle() -> None:

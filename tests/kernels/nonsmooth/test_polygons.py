@@ -122,7 +122,7 @@ def test_rectangles_given_as_outlines_have_the_same_manifolds(mixed: bool) -> No
         if constraint.reach != AWAY:
             near += 1
             names = [name for name in CONSTRAINT.names or () if not name.startswith("corner")]
-            assert [constraint[name] for name in names] == pytest.approx([same[name] for name in names], abs=1e-9)
+            assert [constraint[name] for name in names] == [same[name] for name in names]  # to the last bit
     assert near > PAIRS // 2
 
 
