@@ -16,9 +16,9 @@ SHEAR_RATIO = 0.8  # shear over normal stiffness of a contact
 DAMPING_RATIO = math.sqrt(0.5)
 RAMP = 0.1  # s, in which gravity grows
 SETTLING = 5e-3  # damping meanwhile, in (E / (rho h^2))^(1/2)
-# Stresses of a geostatic start are not quite in equilibrium: in corners between faces, along inclined ones, with
-# corrected gradients (kernels/soil/rows.py), and below slopes. For the time that a wave takes for that many smoothing
-# lengths that shock is damped, in wave speeds over smoothing length; later it would have made the soil flow.
+# Stresses of a geostatic start are not quite in equilibrium: in corners between faces, along inclined ones
+# (kernels/soil/rows.py), and below slopes. For the time that a wave takes for that many smoothing lengths that shock is
+# damped, in wave speeds over smoothing length; later it would have made the soil flow.
 SHOCK_TIME, SHOCK_DAMPING = 60.0, 0.1
 SMOOTHING = 1.5  # smoothing length in spacings
 USUAL_DEPTH = 1.0  # m, out of the plane, where there are no blocks

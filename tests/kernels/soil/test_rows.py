@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.soil.rows import DECAY, ROWS, share_of_row
+from blocksim.kernels.soil.rows import DECAY, ROWS, part_of_kernel, share_of_row
 from blocksim.kernels.sph.wendland_c2 import slope
-from blocksim.world.systems.soil_kinds import SMOOTHING
-from tests.soils import BLOCKS, FAR, LEFT, SMOOTH_WALLS, Soil, column, right, scene
+from blocksim.scenario import Scenario
+from blocksim.world.systems.soil_kinds import SMOOTHING, earth_pressure_at_rest
+from tests.soils import BLOCKS, DEPTH, FAR, LEFT, MATERIALS, SMOOTH_WALLS, UNIT_WEIGHT, Soil, column, right, scene
 
 SPACING = 0.005
 
@@ -35,6 +36,12 @@ def test_the_decay_from_row_to_row_is_that_of_the_kernel_on_its_lattice() -> Non
     assert one * stress[2] + two / 2.0 * (stress[3] + stress[1]) == pytest.approx(one * stress[0], rel=5e-4)
 
 
+def test_the_part_of_the_kernel_of_a_row_is_what_neighbours_give_it() -> None:
+    one, two = weight_of_row(1), weight_of_row(2)
+    parts = [part_of_kernel(float(row)) for row in (1, 2, 3)]
+    assert parts == pytest.approx([0.5, 0.5 + 0.5 * one / (one + two), 1.0], rel=1e-5)
+
+
 @pytest.mark.parametrize("wall", [None, 0.05])
 def test_soil_at_rest_starts_with_all_forces_in_equilibrium(wall: float | None) -> None:
     blocks: dict[str, Any] = {**BLOCKS, "wall": {"width": 0.05, "height": 0.05, "length": 0.05, "material": "smooth"}}
@@ -54,3 +61,47 @@ def test_soil_at_rest_starts_with_all_forces_in_equilibrium(wall: float | None) 
     assert is_corner.sum() == 2 * 4
     assert off[~is_corner].max() < 0.3  # 2.9 without
     assert off[is_corner].max() < 1.5
+
+
+def corrected_column(width: float, **material: Any) -> Scenario:
+    """Return soil with corrected gradients at rest between smooth walls on a smooth ground."""
+    table = column(width, 0.1, SPACING, gradient="corrected")
+    materials = {**MATERIALS, "rods": {**MATERIALS["rods"], **material}}
+    pairs = {"rods": {**SMOOTH_WALLS["rods"], "ground": {"friction": 0.0}}}
+    return scene(table, walls=[LEFT, right(width)], pairs=pairs, materials=materials)
+
+
+def test_corrected_gradients_start_with_the_forces_across_all_faces_in_equilibrium() -> None:
+    width = 0.06
+    soil = Soil(corrected_column(width))
+    points, states, pull = soil.soils.points, soil.soils.states, 9.81 * float(soil.soils.kinds["mass"][0])
+    side = 0.5 * width - np.abs(points["x"] - 0.5 * width)
+    is_low, is_at_wall = points["y"] < 3.0 * SPACING, side < 3.0 * SPACING
+    is_high = points["y"] > 0.1 - 4.0 * SPACING  # no face: up to a quarter of the weight
+    fx, fy = np.abs(states["fx"]) / pull, np.abs(states["fy"] - pull) / pull
+    assert fx[~is_low].max() < 0.05  # 9 with the stress inside
+    assert fy[~is_at_wall & ~is_high].max() < 0.1  # 17
+    assert fy[is_at_wall & ~is_low & ~is_high].max() < 0.3  # what the yield surface leaves to the others
+
+
+@pytest.mark.parametrize(("cohesion", "lacking"), [(0.0, 0.2236), (1e3, 0.0)])
+def test_corrected_soil_at_rest_has_the_pressure_that_its_outer_columns_leave_to_it(
+    cohesion: float, lacking: float
+) -> None:
+    width = 0.06
+    scenario = corrected_column(width, cohesion=cohesion)
+    soil, at_rest = Soil(scenario), earth_pressure_at_rest(scenario.materials["rods"])
+    inside = 0.5 * at_rest * UNIT_WEIGHT * 0.1**2 * DEPTH
+    soil.to_time(0.05)
+    # the others carry what two outer columns lack: 1 - 0.8712 and 1 - 0.9052 of one at either wall
+    assert soil.mean_force_on(1, 0.1)[0] == pytest.approx(-inside * (1.0 + 2.0 * lacking * SPACING / width), rel=0.01)
+
+
+def test_corrected_soil_starts_within_the_yield_surface() -> None:
+    soils = Soil(corrected_column(0.06)).soils
+    states, kind = soils.states, soils.kinds[0]
+    normal = np.array([states["sxx"], states["syy"], states["szz"]])
+    total, shear = normal.sum(axis=0), states["sxy"]
+    deviator = np.sqrt(0.5 * ((normal - total / 3.0) ** 2).sum(axis=0) + shear**2)
+    assert (deviator + kind["slope"] * total).max() < 1e-9 * np.abs(normal).max()
+    assert states["plastic"].max() < 1e-12
