@@ -27,9 +27,8 @@ BANDS = (
     "What is measured lies between"
 )
 SHORT = (
-    "an error of first order in the spacing: with 1.25 mm and raw gradients the column of 100 mm is 1.1 % too "
-    "high, its last particle comes 4.0 % and its connected front 9.8 % too short. A last bit more or less of speed "
-    "moves ends by 1 to 4 %, and heights with 5 mm know whole particles only, of 7 %"
+    "an error of first order in the spacing, as the rows with 5, 2.5 and 1.25 mm show. A last bit more or less of "
+    "speed moves ends by 1 to 4 %, and heights with 5 mm know whole particles only, of 7 %"
 )
 ONE_SPACING = (
     "the reference is one spacing, 2 mm, of another code. What is left falls with the spacing, by a hundredth from 5 "
