@@ -66,3 +66,10 @@ def stepped(one: Jet, low: float, high: float) -> Jet:
 def absolute(one: Jet) -> Jet:
     """Return the absolute value."""
     return mapped(one, abs(one.value), math.copysign(1.0, one.value))
+
+
+@rare_kernel
+def cosine_of(sine: Jet) -> Jet:
+    """Return the cosine of an angle of less than a right one, given its sine."""
+    cosine = math.sqrt(1.0 - sine.value * sine.value)
+    return mapped(sine, cosine, -sine.value / cosine)

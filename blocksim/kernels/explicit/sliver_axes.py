@@ -1,7 +1,7 @@
 """Axes of two polygons that overlap: which face is nearest, which one is next, and whether the overlap is a sliver.
 
 An axis is the normal of a face, its depth how far the deepest corner of the other body lies behind that face; see
-slivers.py. Two faces within the cone of one another are one axis.
+slivers.py. Of two faces within the cone of one another each has the other `across`.
 """
 
 import math

@@ -6,20 +6,28 @@ the elastic energy of a pair is stated as one function of its state that is cont
 the force is its gradient (jets.py): what is put in comes out, whichever way the bodies come and go.
 
 An axis is the normal of a face, its depth D how far the deepest corner of the other body lies behind that face; the
-least one, D1, is the overlap (the nearest edge of the Minkowski difference). Two faces within the cone of one another
-are one axis, with the lesser of both depths. On an axis alone the pair would have s U(D), U the energy of one corner
-contact, with
+least one is the overlap (the nearest edge of the Minkowski difference). On an axis alone the pair would have s U(D), U
+the energy of one corner contact, with
 
-    s = S (1 + (1 - v up) U(d2)/U(d1)) for two faces, their share S and the step `up` as in tributary.py, d1 >= d2 the
-        depths at both ends of their interval, which are measured along the bisector, so that it makes no difference
-        whose corner an end is; v rises from zero to one as the sliver becomes deep, since beyond the cone but the
-        deeper end counts;
+    s = S (1 + (1 - v up) U(d)/U(D)) for a face with another one within the cone, their share S and the step `up` as in
+        tributary.py, measured along the face of the axis, d the depth at the end of their interval that is opposite the
+        deepest corner; v rises from zero to one as the sliver becomes deep, since beyond the cone but the deeper end
+        counts;
     s = 1 for a face without another one.
 
-The pair has the mean of s U(D) over all axes, each with the weight W(D1/D), zero up to SLIVER and one at one: where two
-axes are equally deep both count alike, and so do their forces, so nothing jumps as they change places, and where the
-overlap is longer than D1/SLIVER it is that of tributary.py. In the cone the second of two faces has the weight up W
-of its own, so that they part without a jump.
+The pair has the mean of s U(D) over all axes. An axis has the weight 1/D^2 times a step of D'/D for all other axes D',
+zero up to SLIVER and one from one on: where two axes are equally deep both count alike, and so do their forces, so
+nothing jumps as they change places, whatever a third one does, and where the overlap is longer than ten times its depth
+it is that of tributary.py. (With steps of the least depth alone forces jump where that belongs to another axis while a
+third one has a weight.)
+
+Two faces within the cone are one axis while they are parallel, that of the nearer face, and two beyond it. In between
+the nearer one counts one and the other `up`, since they part without a jump; and where they are equally deep, as
+corners of both pass one another at the deeper end, both count (1 + up)/2: else the force would turn there by (1 -
+up)/(1 + up) of the tilt, up to 5 % of it. The step between the two lasts while the corners are nearer to one another
+than about the overlap, D' - D = tilt times their distance; it shrinks to nothing where faces are parallel to within
+FLAT, as the contacts of tributary.py have none: there the force may turn by that angle. What is left besides is the
+jump of dS/d(slip) where corners pass at the end of a long interval, the overlap over twice its length of the force.
 
 For damping, friction and the ledger the pair has one contact there, the deepest corner on the nearest face, with the
 one spring whose energy and force along the normal are those of the potential; the rest of the force is like that of a
@@ -33,24 +41,12 @@ from typing import NamedTuple
 from blocksim.kernels.common.arrays import Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit.damping import renew_dashpots
-from blocksim.kernels.explicit.jets import (
-    CONSTANT_ONE,
-    Jet,
-    absolute,
-    mapped,
-    plus,
-    powered,
-    product,
-    quotient,
-    stepped,
-)
+from blocksim.kernels.explicit.jets import CONSTANT_ONE, Jet, mapped, plus, powered, product, quotient, stepped
 from blocksim.kernels.explicit.laws import stored_energy
 from blocksim.kernels.explicit.outlines import (
     MOST_CORNERS,
     cone_of,
-    corner_of,
     corner_vector,
-    next_number,
     number_of_corners,
     side_normal,
 )
@@ -63,127 +59,24 @@ from blocksim.kernels.explicit.sliver_axes import (
     flat_within,
     is_short,
     nearest_axis,
-    next_axis,
     tilt_of,
 )
-from blocksim.kernels.explicit.tributary import LEAST, are_blocks, face_per_length
+from blocksim.kernels.explicit.sliver_shares import across_from, depth_behind, energy_of_faces
+from blocksim.kernels.explicit.tributary import are_blocks
 
+AS_NEAR = 1.25  # depth of the second of two faces over that of the nearer one, at most, where both count as that
 FALLS = 2.0  # power of D1/D with which the weight of an axis falls, as the energy on it rises
 ALIKE = 1e-3  # of the energy of a pair, that it may miss where its contacts are those of tributary.py
-ROUND = 0.5  # of the overlap, of a sliver: corners nearer than that are one end
 NEGLIGIBLE = 1e-6  # of the limit of overlap: what such an overlap holds may be round-off
 LEAST_FORCE = 0.1  # of that of a spring of constant stiffness: the force along the normal never vanishes
 
 
-class Ends(NamedTuple):
-    """The interval of two faces that look at each other: its length and the depths of its ends (m)."""
+class Nearness(NamedTuple):
+    """What the other axes make of one: products over all of them, so that nothing jumps as two change places."""
 
-    length: Jet
-    left: Jet
-    right: Jet
-
-
-@rare_kernel
-def depth_behind(of_b: bool, face: int, corner: int, a: Record, b: Record, table: Records) -> Jet:
-    """Return how deep (m) a corner of the other body lies behind a face of b, or of a."""
-    body, other = (b, a) if of_b else (a, b)
-    nx, ny = side_normal(body, table, face)
-    rx, ry = corner_vector(other, table, corner)
-    qx, qy = other.x - body.x + rx, other.y - body.y + ry
-    depth = corner_of(body, table, face).distance - (nx * qx + ny * qy)
-    if of_b:
-        return Jet(depth, -nx, -ny, nx * ry - ny * rx)
-    return Jet(depth, nx, ny, ny * qx - nx * qy)
-
-
-@rare_kernel
-def abscissa_of(of_b: bool, corner: int, tx: float, ty: float, a: Record, b: Record, table: Records) -> Jet:
-    """Return the place (m) of a corner of b, or of a, along a tangent from the centre of b; it turns half as a does."""
-    body = b if of_b else a
-    rx, ry = corner_vector(body, table, corner)
-    x, y = body.x - b.x + rx, body.y - b.y + ry
-    turn = 0.5 * (tx * y - ty * x)
-    if of_b:
-        return Jet(tx * x + ty * y, 0.0, 0.0, turn)
-    return Jet(tx * x + ty * y, tx, ty, turn + ty * rx - tx * ry)
-
-
-@rare_kernel
-def rounding(apart: Jet, width: Jet) -> Jet:
-    """Return by how much a smooth maximum of two numbers exceeds theirs: (w - |d|)^2/(4 w) within w, else nothing."""
-    within = plus(width, absolute(apart), -1.0)
-    if within.value <= 0.0:
-        return Jet(0.0, 0.0, 0.0, 0.0)
-    square = quotient(product(within, within), width)
-    return mapped(square, 0.25 * square.value, 0.25)
-
-
-@rare_kernel
-def ends_of(of_a: int, of_b: int, width: Jet, a: Record, b: Record, table: Records) -> Ends:
-    """Return the interval of a face of a and one of b, along the bisector: of two corners at an end the inner counts.
-
-    Where two are nearer than `width` (m) the interval ends a little farther in, and where it is shorter it is a little
-    longer, so that its length changes smoothly.
-    """
-    ax, ay = side_normal(a, table, of_a)
-    bx, by = side_normal(b, table, of_b)
-    norm = math.hypot(bx - ax, by - ay)
-    tx, ty = (ay - by) / norm, (bx - ax) / norm
-    # corners follow one another counter-clockwise: the face of b leads along the tangent, that of a back
-    a_left, b_right = next_number(a, of_a), next_number(b, of_b)
-    left_a = abscissa_of(False, a_left, tx, ty, a, b, table)
-    left_b = abscissa_of(True, of_b, tx, ty, a, b, table)
-    right_a = abscissa_of(False, of_a, tx, ty, a, b, table)
-    right_b = abscissa_of(True, b_right, tx, ty, a, b, table)
-    if left_a.value > left_b.value:
-        left, low = left_a, depth_behind(True, of_b, a_left, a, b, table)
-    else:
-        left, low = left_b, depth_behind(False, of_a, of_b, a, b, table)
-    if right_a.value < right_b.value:
-        right, high = right_a, depth_behind(True, of_b, of_a, a, b, table)
-    else:
-        right, high = right_b, depth_behind(False, of_a, b_right, a, b, table)
-    length = plus(right, left, -1.0)
-    if length.value <= 0.0:
-        high = low  # it has one end only
-    length = plus(length, rounding(plus(left_a, left_b, -1.0), width), -1.0)
-    length = plus(length, rounding(plus(right_a, right_b, -1.0), width), -1.0)
-    some = length if length.value > 0.0 else mapped(length, 0.0, 0.0)
-    return Ends(plus(some, rounding(length, width), 1.0), low, high)
-
-
-@rare_kernel
-def share_of(
-    of_a: int, of_b: int, up: Jet, deep: Jet, overlap: Jet, power: float, a: Record, b: Record, table: Records
-) -> Jet:
-    """Return the share of a face of a and one of b; `deep` is v at the top."""
-    width = product(deep, overlap)
-    ends = ends_of(of_a, of_b, mapped(width, ROUND * width.value, ROUND), a, b, table)
-    per_length = face_per_length(a, b, corner_of(a, table, of_a).half, corner_of(b, table, of_b).half)
-    ax, ay = side_normal(a, table, of_a)
-    bx, by = side_normal(b, table, of_b)
-    half_sine = 0.5 * math.hypot(ax + bx, ay + by)
-    per_length /= math.sqrt(1.0 - half_sine * half_sine)  # faces are seen shorter along their bisector
-    part = mapped(ends.length, ends.length.value * per_length, per_length)
-    if part.value < LEAST or part.value > 1.0:
-        part = Jet(min(max(part.value, LEAST), 1.0), 0.0, 0.0, 0.0)
-    share = plus(part, product(plus(CONSTANT_ONE, part, -1.0), up), 1.0)
-    deeper, other = (ends.left, ends.right) if ends.left.value >= ends.right.value else (ends.right, ends.left)
-    if deeper.value <= 0.0:
-        both = CONSTANT_ONE
-    elif other.value <= 0.0:
-        return share
-    else:
-        both = powered(quotient(other, deeper), power)
-    counts = plus(CONSTANT_ONE, product(up, deep), -1.0)
-    return product(share, plus(CONSTANT_ONE, product(counts, both), 1.0))
-
-
-@rare_kernel
-def weight_of(overlap: Jet, depth: Jet) -> Jet:
-    """Return the weight W of an axis of some depth; see the top."""
-    ratio = quotient(overlap, depth)
-    return product(stepped(ratio, SLIVER, 1.0), powered(ratio, FALLS))
+    weight: Jet  # W
+    shallow: Jet  # 1 - v: zero where another axis than that of the face across is about as deep
+    long: Jet  # zero where the overlap is so short that corners at an end of it are blended
 
 
 @rare_kernel
@@ -193,49 +86,121 @@ def axis_depth(axis: Axis, a: Record, b: Record, table: Records) -> Jet:
 
 
 @rare_kernel
-def energy_along(
-    axis: Axis, across: int, beside: Jet, overlap: Jet, power: float, a: Record, b: Record, table: Records
-) -> tuple[Jet, Jet]:
-    """Return the weight of an axis, and s D^power times that; `beside` is its depth over that of the next one."""
-    depth = axis_depth(axis, a, b, table)
-    weight = weight_of(overlap, depth)
-    energy = product(weight, powered(depth, power))
-    if across < 0:
-        return energy, weight
+def nearer_of(depth: Jet, other: Jet, tilt: Jet, flat: float, is_first: bool) -> Jet:
+    """Return one for the nearer one of two faces within the cone, zero for the other one, as far as they differ.
+
+    In between, where their depths differ by a smaller share than the sine of the `tilt` exceeds `flat`, which is where
+    their corners are nearer than the overlap, it is a step. Of parallel faces that are equal the one which `is_first`.
+    """
+    apart = plus(other, depth, -1.0)
+    mean = plus(other, depth, 1.0)
+    width = product(mapped(mean, 0.5 * mean.value, 0.5), mapped(tilt, tilt.value - flat, 1.0))
+    if abs(apart.value) < width.value:
+        return stepped(quotient(apart, width), -1.0, 1.0)
+    is_nearer = apart.value > 0.0 or (apart.value == 0.0 and is_first)
+    return CONSTANT_ONE if is_nearer else mapped(CONSTANT_ONE, 0.0, 0.0)
+
+
+@rare_kernel
+def two_of(axis: Axis, second: Axis, a: Record, b: Record, table: Records) -> tuple[Jet, Jet]:
+    """Return `up` of the top of two faces that look at each other, and how far the first is the nearer one."""
     cone = cone_of(a, b, table)
-    up = stepped(tilt_of(axis, across, a, b, table), flat_within(cone), cone)
-    deep = stepped(beside, TILTED * cone, 2.0 * TILTED * cone)
-    of_a, of_b = (across, axis.face) if axis.of_b else (axis.face, across)
-    share = share_of(of_a, of_b, up, deep, overlap, power, a, b, table)
-    second = axis_depth(axis_of(not axis.of_b, across, a, b, table), a, b, table)
-    aside = product(up, weight_of(overlap, second))
-    return product(plus(energy, product(aside, powered(second, power)), 1.0), share), plus(weight, aside, 1.0)
+    flat = flat_within(cone)
+    tilt = tilt_of(axis, second.face, a, b, table)
+    depth, other = axis_depth(axis, a, b, table), axis_depth(second, a, b, table)
+    return stepped(tilt, flat, cone), nearer_of(depth, other, tilt, flat, axis.of_b)
+
+
+@rare_kernel
+def between(one: Jet, two: Jet, part: Jet) -> Jet:
+    """Return a part of one and the rest of two."""
+    return plus(two, product(part, plus(one, two, -1.0)), 1.0)
+
+
+@rare_kernel
+def farther(one: Jet, two: Jet, low: float, high: float) -> Jet:
+    """Return zero where one over two is `high`, one where it is `low`."""
+    return plus(CONSTANT_ONE, stepped(quotient(one, two), low, high), -1.0)
+
+
+@rare_kernel
+def with_other(
+    near: Nearness, depth: Jet, other: Axis, tilted: float, a: Record, b: Record, table: Records
+) -> Nearness:
+    """Return what another axis, and the face across from it, make of an axis of some depth (m); see nearness_of.
+
+    Of two within the cone the nearer one does, and beyond it both; a pair is dealt with where its nearer face is.
+    """
+    across = face_across(other, a, b, table)
+    beside = axis_depth(other, a, b, table)
+    weight = stepped(quotient(beside, depth), SLIVER, 1.0)
+    shallow = farther(depth, beside, tilted, 2.0 * tilted)
+    long = farther(depth, beside, SLIVER, 2.0 * SLIVER)
+    if across >= 0:
+        second = axis_of(not other.of_b, across, a, b, table)
+        if second.depth < other.depth or (second.depth == other.depth and not other.of_b):
+            return near
+        up, nearer = two_of(other, second, a, b, table)
+        behind = axis_depth(second, a, b, table)
+        weight_2 = stepped(quotient(behind, depth), SLIVER, 1.0)
+        shallow_2 = farther(depth, behind, tilted, 2.0 * tilted)
+        long_2 = farther(depth, behind, SLIVER, 2.0 * SLIVER)
+        weight = between(product(weight, weight_2), between(weight, weight_2, nearer), up)
+        shallow = between(product(shallow, shallow_2), between(shallow, shallow_2, nearer), up)
+        long = between(product(long, long_2), between(long, long_2, nearer), up)
+    return Nearness(product(near.weight, weight), product(near.shallow, shallow), product(near.long, long))
+
+
+@rare_kernel
+def nearness_of(axis: Axis, across: int, a: Record, b: Record, table: Records) -> Nearness:
+    """Return what the other axes make of one; `across` is the face across, or -1."""
+    depth = axis_depth(axis, a, b, table)
+    tilted = TILTED * cone_of(a, b, table)
+    near = Nearness(powered(depth, -FALLS), CONSTANT_ONE, CONSTANT_ONE)
+    farthest = depth.value / min(SLIVER, tilted)
+    for m in range(number_of_corners(b) + number_of_corners(a)):
+        of_b = m < number_of_corners(b)
+        face = m if of_b else m - number_of_corners(b)
+        if face != (axis.face if of_b == axis.of_b else across):
+            other = axis_of(of_b, face, a, b, table, farthest)
+            if other.depth < farthest:
+                near = with_other(near, depth, other, tilted, a, b, table)
+    return near
+
+
+@rare_kernel
+def energy_along(axis: Axis, power: float, a: Record, b: Record, table: Records) -> tuple[Jet, Jet]:
+    """Return the weight of an axis times s D^power, and that weight."""
+    across = face_across(axis, a, b, table)
+    depth = axis_depth(axis, a, b, table)
+    if across < 0:
+        weight = nearness_of(axis, across, a, b, table).weight
+        return product(weight, powered(depth, power)), weight
+    second = axis_of(not axis.of_b, across, a, b, table)
+    up, nearer = two_of(axis, second, a, b, table)
+    count = between(CONSTANT_ONE, up, nearer)
+    if count.value <= 0.0:
+        return count, count
+    near = nearness_of(axis, across, a, b, table)
+    weight = product(
+        count, product(near.weight, stepped(quotient(axis_depth(second, a, b, table), depth), SLIVER, 1.0))
+    )
+    return product(weight, energy_of_faces(axis, across, near.shallow, near.long, power, a, b, table)), weight
 
 
 @rare_kernel
 def mean_energy(nearest: Axis, power: float, a: Record, b: Record, table: Records) -> Jet:
     """Return the mean of s D^power over all axes; see the top. `power` is that of the overlap in the energy."""
-    overlap = axis_depth(nearest, a, b, table)
-    across = face_across(nearest, a, b, table)
-    following = next_axis(nearest, across, a, b, table)
-    ratio = quotient(overlap, axis_depth(following, a, b, table))
     total = Jet(0.0, 0.0, 0.0, 0.0)
     weights = Jet(0.0, 0.0, 0.0, 0.0)
+    farthest = AS_NEAR * nearest.depth / SLIVER
     for m in range(number_of_corners(b) + number_of_corners(a)):
         of_b = m < number_of_corners(b)
-        axis = axis_of(of_b, m if of_b else m - number_of_corners(b), a, b, table)
-        other = face_across(axis, a, b, table)
-        second = axis
-        if other >= 0:
-            second = axis_of(not of_b, other, a, b, table)
-        is_first = axis.depth < second.depth or (axis.depth == second.depth and of_b)
-        if min(axis.depth, second.depth) * SLIVER >= overlap.value or not (other < 0 or is_first):
-            continue
-        is_nearest = axis.face == nearest.face and of_b == nearest.of_b
-        beside = ratio if is_nearest else quotient(overlap, axis_depth(axis, a, b, table))
-        energy, weight = energy_along(axis, other, beside, overlap, power, a, b, table)
-        total = plus(total, energy, 1.0)
-        weights = plus(weights, weight, 1.0)
+        axis = axis_of(of_b, m if of_b else m - number_of_corners(b), a, b, table, farthest)
+        if axis.depth < farthest:
+            energy, weight = energy_along(axis, power, a, b, table)
+            total = plus(total, energy, 1.0)
+            weights = plus(weights, weight, 1.0)
     return quotient(total, weights)
 
 
@@ -340,9 +305,8 @@ def has_both_ends(
     """
     law = world.controls[0].law
     sharp = Jet(0.0, 0.0, 0.0, 0.0)
-    of_a, of_b = (across, nearest.face) if nearest.of_b else (nearest.face, across)
-    ends = ends_of(of_a, of_b, sharp, a, b, table)
-    whole = stored_energy(law, 1.0, max(ends.left.value, 0.0)) + stored_energy(law, 1.0, max(ends.right.value, 0.0))
+    other = across_from(nearest, across, sharp, sharp, a, b, table).other.value
+    whole = stored_energy(law, 1.0, nearest.depth) + stored_energy(law, 1.0, max(other, 0.0))
     found = 0.0
     for i in range(count):
         found += stored_energy(law, 1.0, world.points[i].depth)
