@@ -31,13 +31,12 @@ from blocksim.kernels.explicit.depth import is_too_deep
 from blocksim.kernels.explicit.friction import clip_to_cone, draw_spring
 from blocksim.kernels.explicit.history import change_contacts, keep_places
 from blocksim.kernels.explicit.inertia import Piece, piece_of
-from blocksim.kernels.explicit.kinematics import coupling, mutual_mass, resolve_point, weigh_onset
+from blocksim.kernels.explicit.kinematics import IMPACT_STEPS, coupling, mutual_mass, resolve_point, weigh_onset
+from blocksim.kernels.explicit.lasting_points import SEARCH, lasting_points
 from blocksim.kernels.explicit.laws import elastic_force, has_constant_stiffness, stored_energy, tangent_stiffness
 from blocksim.kernels.explicit.memory import normal_loss, shear_loss, shear_stiffness_before, stiffness_before
 from blocksim.kernels.explicit.models import SURFACE, contact_points
 from blocksim.kernels.explicit.slivers import points_of_sliver
-
-IMPACT_STEPS = 10.0  # an impact lasts some thirty steps; a face lost in a third of that cannot stop a corner
 
 
 @kernel
@@ -317,7 +316,9 @@ def pair_forces(world: World, p: int, step: float) -> None:
     pair = world.pairs[p]
     action = world.action[0]
     clear_action(action)
-    count = points_of_sliver(world, p, contact_points(world, p), world.corners)
+    count = lasting_points(world, p, world.corners)
+    if count == SEARCH:
+        count = points_of_sliver(world, p, contact_points(world, p), world.corners)
     action.is_too_deep = is_too_deep(world, p, count)
     model = world.controls[0].model
     action.asks = count != pair.active and model == SURFACE

@@ -6,6 +6,7 @@ from blocksim.kernels.explicit.inertia import Piece, inverse_mass_of
 from blocksim.kernels.explicit.laws import dashpot_weight
 
 ROUND_OFF = 1e-6  # of an overlap after one drift: a small difference of places, where the closing is a small product
+IMPACT_STEPS = 10.0  # an impact lasts some thirty steps; a face lost in a third of that cannot stop a corner
 ONSET_STEPS = 16.0  # after which the mean over a step and the value in its middle differ by less than 1/30000
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from blocksim.kernels.common.arrays import NO_FACE, Record, Records, World
 from blocksim.kernels.common.geometry import END_RATIO
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.contact import IMPACT_STEPS
+from blocksim.kernels.explicit.kinematics import IMPACT_STEPS
 from blocksim.kernels.explicit.models.outlines import DEEPEST, can_touch, corner_seen, face_met
 from blocksim.kernels.explicit.outlines import (
     MOST_CORNERS,

@@ -118,13 +118,15 @@ def apart_or_changed(world: World, p: int, a: Record, b: Record, table: Records)
 def has_changed(world: World, p: int, a: Record, b: Record, table: Records) -> bool:
     """As is_unsettled, for two bodies that touch in a scene with polygons."""
     pair = world.pairs[p]
+    if pair.is_sliver != 0 or not has_constant_stiffness(world.controls[0].law):
+        return True
     if pair.duplicates != 0 and has_crossed(world, p, a, b, table):
         return True
     if pair.idle > 0 and begins_on_outlines(world, p, a, b, table):
         return True
     if has_new_neighbours(a, b, SURFACE):
         renew_dashpots(pair)
-    return pair.is_sliver != 0 or not has_constant_stiffness(world.controls[0].law)
+    return False
 
 
 @kernel

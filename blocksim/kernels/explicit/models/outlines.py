@@ -184,6 +184,20 @@ def add_corner(
     return count + 1
 
 
+@kernel
+def add_slot(a: Record, b: Record, slot: int, table: Records, cone: float, points: Records, count: int) -> int:
+    """Append the corner of a slot of two bodies if it touches; return the new point count."""
+    if slot < MOST_CORNERS:
+        return add_corner(a, slot, b, table, cone, points, count)
+    end = add_corner(b, slot - MOST_CORNERS, a, table, cone, points, count)
+    if end > count:
+        point = points[count]
+        point.slot = slot
+        point.nx = -point.nx
+        point.ny = -point.ny
+    return end
+
+
 @rare_kernel
 def ground_points(owner: Record, near: int, candidates: Integers, level: float, points: Records, table: Records) -> int:
     """Collect the candidate corners of `owner` below the ground, y < level (m). Return how many there are."""
@@ -276,18 +290,9 @@ def block_points(
     count = 0
     of_a = 0
     for m in range(pair.near):
-        slot = candidates[m]
-        if slot < MOST_CORNERS:
-            count = add_corner(a, slot, b, table, cone, points, count)
+        count = add_slot(a, b, candidates[m], table, cone, points, count)
+        if candidates[m] < MOST_CORNERS:
             of_a = count
-        else:
-            before = count
-            count = add_corner(b, slot - MOST_CORNERS, a, table, cone, points, count)
-            if count > before:
-                point = points[before]
-                point.slot = slot
-                point.nx = -point.nx
-                point.ny = -point.ny
     pair.duplicates = 0
     if of_a > 0 and count > of_a:
         count = drop_duplicates(a, b, pair, contacts, points, count, table, cone)
