@@ -19,7 +19,9 @@ NEIGHBOURS = 24  # room in lists, a particle; undisturbed soil takes 13, a list 
 
 POINT = record_type(
     "x y vx vy "  # m, m/s
-    "pxx pxy pyx pyy"  # Pa: stress times kernel correction, what neighbours feel; one cache line with the above
+    # Pa: stress times kernel correction, what neighbours feel; one cache line with the above. Before it is known for a
+    # step, the raw gradient of the velocity, 1/s: dvx/dx, dvx/dy, dvy/dx, dvy/dy
+    "pxx pxy pyx pyy"
 )
 STATE = record_type(
     "sxx syy szz sxy "  # Pa, tension positive

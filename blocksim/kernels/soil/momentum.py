@@ -43,17 +43,17 @@ def forces_on(soils: Soils, near: Integers, places: tuple[int, int, int, int]) -
     fx, fy, drag_x, drag_y = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
     for e in range(near.size):
         other = points[near[e]]
-        dx, dy = other.x - x, other.y - y
+        dx, dy = x - other.x, y - other.y
         r2 = dx * dx + dy * dy
         f = fading(root(r2), inverse)
         gx, gy = f * dx, f * dy
-        fx = fx + ((pxx + other.pxx) * gx + (pxy + other.pxy) * gy)
-        fy = fy + ((pyx + other.pyx) * gx + (pyy + other.pyy) * gy)
-        closing = lesser((other.vx - vx) * dx + (other.vy - vy) * dy, 0.0)
+        fx = fx - ((pxx + other.pxx) * gx + (pxy + other.pxy) * gy)
+        fy = fy - ((pyx + other.pyx) * gx + (pyy + other.pyy) * gy)
+        closing = lesser((vx - other.vx) * dx + (vy - other.vy) * dy, 0.0)
         mean = impedance if is_uniform else 0.5 * (impedance + impedance_of(soils, near[e]))
         q = mean * closing / (r2 + soft)
-        drag_x = drag_x + q * gx
-        drag_y = drag_y + q * gy
+        drag_x = drag_x - q * gx
+        drag_y = drag_y - q * gy
     both = controls.area * steepness(controls.smoothing)
     stiff = both * controls.viscosity * controls.smoothing
     return both * fx, both * fy, stiff * drag_x, stiff * drag_y

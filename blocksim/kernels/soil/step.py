@@ -8,7 +8,7 @@ import math
 from blocksim.kernels.common.arrays import Integers, Record, World
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.simd import fields_0, split, spread
+from blocksim.kernels.common.simd import fields_0, split, spread, write_fields_4
 from blocksim.kernels.common.systems import part_of_thread
 from blocksim.kernels.soil.arrays import CLUSTER, GROUP, Soils
 from blocksim.kernels.soil.contact import particles_of_thread
@@ -113,27 +113,33 @@ def renew_lists(soils: Soils, world: World, k: int) -> None:
 
 
 @rare_kernel
-def stress_particle(
+def stress_particle(point: Record, state: Record, kind: Record, step: float) -> float:
+    """Advance the stress of a particle by its gradient, which lies where its stress is to; return the energy (J) lost.
+
+    That is what flow takes.
+    """
+    lost = strain(state, kind, point.pxx, point.pxy, point.pyx, point.pyy, step)
+    point.pxx = state.sxx
+    point.pxy = point.pyx = state.sxy
+    point.pyy = state.syy
+    return lost
+
+
+@rare_kernel
+def stress_corrected(
     point: Record,
     state: Record,
     kind: Record,
-    gradient: tuple[float, float, float, float],
     halfway: tuple[float, float, float],
     now: tuple[float, float, float],
     step: float,
 ) -> float:
-    """Advance the stress of a particle, and what its neighbours feel of it; return the energy (J) lost to flow.
-
-    Its gradient is corrected as half way through the step, forces as at the end of it.
-    """
-    ux, uy, wx, wy = gradient
-    bxx, bxy, byy = 1.0, 0.0, 1.0
-    if kind.is_corrected:
-        bxx, bxy, byy = halfway
-        ux, uy = ux * bxx + uy * bxy, ux * bxy + uy * byy
-        wx, wy = wx * bxx + wy * bxy, wx * bxy + wy * byy
-        bxx, bxy, byy = now
+    """Do the same with corrected gradients: the gradient as half way through the step, forces as at the end of it."""
+    bxx, bxy, byy = halfway
+    ux, uy = point.pxx * bxx + point.pxy * bxy, point.pxx * bxy + point.pxy * byy
+    wx, wy = point.pyx * bxx + point.pyy * bxy, point.pyx * bxy + point.pyy * byy
     lost = strain(state, kind, ux, uy, wx, wy, step)
+    bxx, bxy, byy = now
     point.pxx = state.sxx * bxx + state.sxy * bxy
     point.pxy = state.sxx * bxy + state.sxy * byy
     point.pyx = state.sxy * bxx + state.syy * bxy
@@ -150,26 +156,43 @@ def is_any_corrected(soils: Soils, c: int) -> bool:
     return is_corrected
 
 
-@kernel
-def stress_cluster(soils: Soils, c: int, near: Integers, step: float) -> float:
-    """Advance the stresses of the particles of a cluster; return the energy (J) lost to flow."""
+@rare_kernel
+def correct_cluster(soils: Soils, c: int, near: Integers, step: float) -> float:
+    """Advance the stresses of a cluster of which some are corrected by their gradients; return the energy (J) lost."""
     controls, points, lag = soils.controls[0], soils.points, 0.5 * step
     x, y, vx, vy = fields_0(None, points, places_of(soils, c))
-    lanes = raw_gradient(controls, points, near, x, y, vx, vy, lag)
-    ux, uy, wx, wy = split(lanes[0]), split(lanes[1]), split(lanes[2]), split(lanes[3])
-    halfway = now = spread(1.0), spread(0.0), spread(1.0)
-    if is_any_corrected(soils, c):
-        halfway = correction(controls, points, near, x, y, vx, vy, lag)
-        now = correction(controls, points, near, x, y, vx, vy, 0.0)
+    halfway = correction(controls, points, near, x, y, vx, vy, lag)
+    now = correction(controls, points, near, x, y, vx, vy, 0.0)
     hxx, hxy, hyy = split(halfway[0]), split(halfway[1]), split(halfway[2])
     bxx, bxy, byy = split(now[0]), split(now[1]), split(now[2])
     lost = 0.0
     for m in range(min(CLUSTER, points.size - CLUSTER * c)):
-        i = CLUSTER * c + m
+        point, state = points[CLUSTER * c + m], soils.states[CLUSTER * c + m]
+        kind = soils.kinds[state.kind]
+        if kind.is_corrected:
+            tensors = (hxx[m], hxy[m], hyy[m]), (bxx[m], bxy[m], byy[m])
+            lost += stress_corrected(point, state, kind, tensors[0], tensors[1], step)
+        else:
+            lost += stress_particle(point, state, kind, step)
+    return lost
+
+
+@kernel
+def stress_cluster(soils: Soils, c: int, near: Integers, step: float) -> float:
+    """Advance the stresses of the particles of a cluster; return the energy (J) lost to flow.
+
+    Until then their gradients lie where what neighbours feel of their stress is to: nobody reads that in this stage.
+    """
+    points, places = soils.points, places_of(soils, c)
+    x, y, vx, vy = fields_0(None, points, places)
+    gradients = raw_gradient(soils.controls[0], points, near, x, y, vx, vy, 0.5 * step)
+    write_fields_4(None, points, places, spread(0.0) <= 0.0, gradients)
+    if is_any_corrected(soils, c):
+        return correct_cluster(soils, c, near, step)
+    lost = 0.0
+    for i in range(CLUSTER * c, min(CLUSTER * (c + 1), points.size)):
         state = soils.states[i]
-        gradient = ux[m], uy[m], wx[m], wy[m]
-        tensors = (hxx[m], hxy[m], hyy[m]), (bxx[m], bxy[m], byy[m])
-        lost += stress_particle(points[i], state, soils.kinds[state.kind], gradient, tensors[0], tensors[1], step)
+        lost += stress_particle(points[i], state, soils.kinds[state.kind], step)
     return lost
 
 
