@@ -85,7 +85,7 @@ def _is_between(before: Corner, here: Corner, after: Corner, near: float) -> boo
 def _geojson(path: Path) -> list[Drawn]:
     try:
         data = json.loads(read_limited(path, MOST_BYTES))
-        return [*_polygons(data, {}, DEEPEST)]
+        return [*_polygons(data, "", {}, DEEPEST)]
     except DrawingError:
         raise
     except BlocksimError as error:
@@ -95,27 +95,47 @@ def _geojson(path: Path) -> list[Drawn]:
         raise DrawingError(message) from None
 
 
-def _polygons(node: Any, properties: Mapping[str, Any], depth: int) -> Iterator[Drawn]:
+def _polygons(node: Any, name: str, properties: Mapping[str, Any], depth: int) -> Iterator[Drawn]:
+    """Yield the polygons of a part of a file; `name` is that part in messages, empty for the whole file."""
+    place = f"{name}: " if name else ""
     kind = node.get("type") if isinstance(node, dict) else None
     if depth == 0:
         raise DrawingError("collections are nested too deeply")
+    if kind is None:
+        raise DrawingError(f"{place}it has no type" if name else "not a GeoJSON file: it has no type")
     if kind in COLLECTIONS:
-        for number, part in enumerate(node[COLLECTIONS[kind]], start=1):
-            name = f"feature {number}" if kind == "FeatureCollection" else f"geometry {number}"
-            yield from (one._replace(name=name) for one in _polygons(part, properties, depth - 1))
+        for number, part in enumerate(_part(node, COLLECTIONS[kind], list, place), start=1):
+            inner = f"feature {number}" if kind == "FeatureCollection" else f"geometry {number}"
+            yield from _polygons(part, inner, properties, depth - 1)
     elif kind == "Feature":
-        yield from _polygons(node["geometry"], node.get("properties") or {}, depth - 1)
+        own = node.get("properties") or {}
+        if not isinstance(own, dict):
+            raise DrawingError(f"{place}its properties are no names with values")
+        yield from _polygons(_part(node, "geometry", dict, place), name, own, depth - 1)
     elif kind in ("Polygon", "MultiPolygon"):
-        several = [node["coordinates"]] if kind == "Polygon" else node["coordinates"]
-        yield from (_polygon(rings, properties) for rings in several)
+        coordinates = _part(node, "coordinates", list, place)
+        several = [coordinates] if kind == "Polygon" else coordinates
+        yield from (_polygon(rings, name, properties) for rings in several)
     else:
-        raise DrawingError(f"{shown(kind)} is not a polygon" if kind else "not a GeoJSON file: it has no type")
+        raise DrawingError(f"{place}{shown(kind)} is not a polygon")
 
 
-def _polygon(rings: Any, properties: Mapping[str, Any]) -> Drawn:
-    if len(rings) != 1:
-        raise DrawingError(f"a polygon with {len(rings) - 1} holes; blocks have none")
-    return Drawn([_point(point) for point in rings[0]], "polygon", properties)
+def _part(node: Mapping[str, Any], key: str, kind: type, place: str) -> Any:
+    """Return what a part of a file has under a key, of the kind that belongs there."""
+    found = node.get(key)
+    if not isinstance(found, kind):
+        raise DrawingError(f"{place}it has no {key}")
+    return found
+
+
+def _polygon(rings: Any, name: str, properties: Mapping[str, Any]) -> Drawn:
+    place = f"{name}: " if name else ""
+    if not rings:
+        raise DrawingError(f"{place}a polygon without corners")
+    if len(rings) > 1:
+        holes = "a hole" if len(rings) == 2 else f"{len(rings) - 1} holes"  # noqa: PLR2004 - its edge and one hole
+        raise DrawingError(f"{place}a polygon with {holes}; blocks have none")
+    return Drawn([_point(point) for point in rings[0]], name or "polygon", properties)
 
 
 def _point(values: Any) -> Corner:

@@ -81,7 +81,19 @@ def test_geometries_without_features_are_read(tmp_path: Path, kind: str) -> None
 
 WRONG = {
     "concave": (collection(feature([[0, 0], [1, 0], [0.2, 0.2], [0, 1], [0, 0]])), "feature 1, corner (0.2, 0.2)"),
-    "hole": (collection(feature(SQUARE, SQUARE)), "1 holes"),
+    "hole": (collection(feature(SQUARE), feature(SQUARE, SQUARE)), "feature 2: a polygon with a hole; blocks"),
+    "holes": (collection(feature(SQUARE, SQUARE, SQUARE)), "feature 1: a polygon with 2 holes"),
+    "no ring": (collection(feature()), "feature 1: a polygon without corners"),
+    "no corners": (collection(feature([])), "feature 1: 0 corners; an outline has 3 to 16"),
+    "no coordinates": ({"type": "Polygon"}, "wall.geojson: it has no coordinates"),
+    "no geometry": (collection({"type": "Feature", "geometry": None}), "feature 1: it has no geometry"),
+    "no type": (collection(feature(SQUARE), {"kind": 1}), "feature 2: it has no type"),
+    "no list": ({"type": "FeatureCollection", "features": 3}, "wall.geojson: it has no features"),
+    "list of properties": (collection(feature(SQUARE) | {"properties": [1]}), "feature 1: its properties are no names"),
+    "a point among them": (
+        collection(feature(SQUARE), {"type": "Feature", "geometry": {"type": "Point", "coordinates": [0, 0]}}),
+        'feature 2: "Point" is not a polygon',
+    ),
     "too small": (collection(feature(SQUARE), feature([[0, 0], [1, 0], [0, 1e-4], [0, 0]])), "feature 2"),
     "line": ({"type": "LineString", "coordinates": [[0, 0], [1, 1]]}, '"LineString" is not a polygon'),
     "empty": (collection(), "no polygon in it"),
