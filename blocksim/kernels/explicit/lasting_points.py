@@ -59,13 +59,14 @@ def ends_that_last(world: World, p: int, table: Records) -> int:
 @kernel
 def are_both_ends(world: World, p: int, a: Record, b: Record, table: Records) -> bool:
     """Return True if two points are both ends of the interval of two parallel faces."""
-    point = world.points[0]
+    point = world.points[1 if world.points[1].depth > world.points[0].depth else 0]
     face: Any = np.int64(point.face)
     of_b = bool(point.slot < MOST_CORNERS)
+    corner: Any = np.int64(point.slot - (0 if of_b else MOST_CORNERS))
     body, other = (b, a) if of_b else (a, b)
     nx, ny = side_normal(body, table, face)
     across = side_along(other, table, -nx, -ny)
     mx, my = side_normal(other, table, across)
     if abs(nx * my - ny * mx) > flat_within(cone_of(a, b, table)):
         return False
-    return has_both_ends(world, 2, Axis(of_b, face, 0, point.depth), across, world.pairs[p].limit, a, b, table)
+    return has_both_ends(world, 2, Axis(of_b, face, corner, point.depth), across, world.pairs[p].limit, a, b, table)
