@@ -15,6 +15,8 @@ from blocksim.kernels.common.arrays import CORNER, Records, zeros
 from blocksim.kernels.explicit.outlines import WIDEST_CONE
 from blocksim.scenario import PlacedBody
 
+NO_FACE = (0.0, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # nothing is beyond it, or looks against it
+FIELDS = ("x", "y", "nx", "ny", "distance", "half", "middle", "clear", "far", "sharp", "cone")
 Corners = tuple[tuple[float, float], ...]  # m, counter-clockwise about the centroid
 HalfSides = tuple[float, float]  # m
 
@@ -32,24 +34,26 @@ def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[HalfSides]) -> Shape
     """Return the corners of all bodies, of rectangles too; None where all blocks are rectangles.
 
     `slabs` (m) are the half sides of the pieces of ground. The half-plane, the last of all bodies, is a rectangle that
-    is infinitely wide and has its upper face in its centre.
+    is infinitely wide and has its upper face in its centre. After the corners of a block come as many others as a block
+    may have here, so that four blocks are gone through together.
     """
     if not any(body.outline for body in placed):
         return None
     places: dict[Corners, int] = {}
     rows: list[tuple[float, ...]] = []
     blocks = [body.corners for body in placed]
+    most = max(len(corners) for corners in blocks)
     ground = [_rectangle(*half_sides) for half_sides in (*slabs, (math.inf, 0.0))]
     for corners in blocks:
         if corners not in places:
             places[corners] = len(rows)
-            rows += corner_rows(corners)
+            rows += [*corner_rows(corners), *[NO_FACE] * (most - len(corners))]
     firsts = [places[corners] for corners in blocks]
     for corners in ground:
         firsts.append(len(rows))
         rows += _ground_rows(corners)
     table = zeros(len(rows), CORNER)
-    for name, column in zip(CORNER.names or (), zip(*rows, strict=True), strict=True):
+    for name, column in zip(FIELDS, zip(*rows, strict=True), strict=True):
         table[name] = column
     sizes = tuple(len(corners) for corners in (*blocks, *ground))
     inner = {corners: float(table["distance"][place : place + len(corners)].min()) for corners, place in places.items()}
@@ -57,7 +61,7 @@ def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[HalfSides]) -> Shape
 
 
 def corner_rows(corners: Corners) -> list[tuple[float, ...]]:
-    """Return the fields of CORNER of the corners of one shape."""
+    """Return the fields of CORNER, in the order of FIELDS, of the corners of one shape."""
     rows: list[tuple[float, ...]] = []
     cone = cone_of(corners)
     for (x, y), (next_x, next_y) in zip(corners, (*corners[1:], corners[0]), strict=True):

@@ -117,10 +117,12 @@ PARTICLE = record_type(
     "share"  # -: tributary length over face length, summed over both faces at a corner that is one particle
 )
 CORNER = record_type(
-    "x y "  # m: place about the centroid, in the body frame; counter-clockwise
+    # What the search for a face needs comes first: four doubles are read at once.
     "nx ny "  # -: outward normal of the face from this corner to the next, in the body frame
-    "distance half "  # m: of that face from the centroid, and half of its length
+    "distance "  # m: of that face from the centroid
     "middle "  # m: of that face along (-ny, nx), from the foot of the centroid
+    "half "  # m: half of its length
+    "x y "  # m: place about the centroid, in the body frame; counter-clockwise
     "clear "  # -: other faces are at least so many times as far as its nearer end; see world/shapes.py
     "far "  # m: the distance of that face from all but itself and the two beside it
     "sharp "  # -: one where a face beside this one meets it at less than a right angle, else zero

@@ -46,8 +46,10 @@ from blocksim.kernels.nonsmooth.faces import (
 )
 from blocksim.kernels.nonsmooth.gap_curvature import bend_of
 from blocksim.kernels.nonsmooth.pieces import points_on_ground, points_on_level, points_on_piece
-from blocksim.kernels.nonsmooth.polygons import corners_on_ground, follow_corners, points_of_polygons
+from blocksim.kernels.nonsmooth.polygons import corners_on_ground, follow_corners
+from blocksim.kernels.nonsmooth.sides import hulls_of_one
 from blocksim.kernels.nonsmooth.slip import Constraints, Motion, presses
+from blocksim.kernels.nonsmooth.slivers import points_of_two
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller half side: two faces that face each other over less are passed by
@@ -323,9 +325,9 @@ def points_with_polygon(
     hull_b = hull_of(b, corners)
     is_first = a.faces >= ALL
     if is_first and b.faces >= ALL and not place.is_ground:
-        found = points_of_polygons(one, hull_a, two, hull_b, place.margin)
+        found = points_of_two(one, hulls_of_one(hull_a), two, hulls_of_one(hull_b), place.margin)
         if found.is_near:
-            follow_corners(constraint, found.one, found.two)
+            follow_corners(constraint, int(found.one), int(found.two))
         return found.points, found.is_near
     if place.is_ground:
         points, is_near = points_on_ground(one, hull_a, two, place.margin)

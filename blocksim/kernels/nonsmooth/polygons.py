@@ -4,60 +4,82 @@ Of all faces of both the reference is the one beyond which the other body reache
 looks most against it is clipped to its length: that gives at most two points. Each of them is a corner of one of the
 bodies, and impulses go with these corners from step to step: where a polygon rolls over a corner, what carried its one
 face at the right carries the next one at the left.
+
+Four pairs at a time, or a single one, by the same sums (sides.py). Where faces hardly face one another a pair is looked
+at alone: slivers.py.
 """
 
-import math
 from typing import NamedTuple
 
 from blocksim.kernels.common.arrays import Record
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.outlines import AnyHull, Hull, corner_at, face_towards, least_along, next_corner
+from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.outlines import AnyHull, Hull, face_towards, next_corner
+from blocksim.kernels.common.simd import Lane, Lanes, Mask, greater, is_all, lesser, select
 from blocksim.kernels.nonsmooth.arrays import FAR
-from blocksim.kernels.nonsmooth.faces import (
-    Block,
-    Edge,
-    Face,
-    Points,
-    clip_one,
-    face_of,
-    has_point,
-    in_frame,
-    opposite_edge,
-)
+from blocksim.kernels.nonsmooth.faces import Block, Edge, Face, Points, clip, face_of, has_point, opposite_edge
 from blocksim.kernels.nonsmooth.faces import points_of as points_on
-from blocksim.kernels.nonsmooth.slip import Constraints
+from blocksim.kernels.nonsmooth.sides import (
+    Hulls,
+    Side,
+    least_along,
+    normal_at,
+    number_against,
+    side_at,
+    side_edge,
+    side_face,
+)
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller inner radius: two faces that face each other over less are passed by
-LEVEL = -0.99498743710662  # cosine: two faces within 0.1 rad of each other can meet as faces
 ROUND_OFF = 0.5 * TIE
 OF_B = 32  # added to the number of a corner of body b, which counts from 1
 RECTANGLE = 4
 
 
+class Pose(NamedTuple):
+    """A body in the frame of another: its centroid (m), and the turn of the first's frame against the other's."""
+
+    x: Lanes
+    y: Lanes
+    c: Lanes
+    s: Lanes
+
+
+class Farthest(NamedTuple):
+    """The face of a body from which the centroid of another is farthest: how far (m), which, and its normal.
+
+    `second` (m) is how far it is from the next face.
+    """
+
+    away: Lanes
+    number: Lanes
+    nx: Lanes
+    ny: Lanes
+    second: Lanes
+
+
 class Best(NamedTuple):
-    """The face of a body beyond which another reaches least, -1 for none, and the gap (m) there."""
+    """The face of a body beyond which another reaches least, -1 for none, and the gap (m) there.
 
-    gap: float
-    face: int
+    `against` is the number of the face of the other body that it meets.
+    """
 
-
-class Clipped(NamedTuple):
-    """A reference face, what of the other body's face lies over it, and the corners that its ends are."""
-
-    face: Face
-    edge: Edge
-    left: int
-    right: int
+    gap: Lanes
+    number: Lanes
+    against: Lanes
 
 
 class Found(NamedTuple):
-    """A manifold of polygons, whether there is one, and the corners that its points are."""
+    """Manifolds of polygons, and the corners that their points are, one of body b from OF_B on.
+
+    `is_near` tells whether there is one, `is_odd` that faces hardly face one another or have no point.
+    """
 
     points: Points
-    is_near: bool
-    one: int
-    two: int
+    is_near: Mask
+    is_odd: Mask
+    one: Lanes
+    two: Lanes
 
 
 @kernel
@@ -69,6 +91,12 @@ def face_count(hull: AnyHull) -> int:
 
 
 @kernel
+def side_numbered(hull: Hull, number: int) -> Side:
+    """Return a face of a polygon."""
+    return side_at(hull.table, 1.0 * (hull.first + number), 0)
+
+
+@kernel
 def face_numbered(body: Block, hull: AnyHull, number: int) -> Face:
     """Return one of the faces of a body."""
     if hull is None:
@@ -77,22 +105,7 @@ def face_numbered(body: Block, hull: AnyHull, number: int) -> Face:
         mx = sign * (body.cos if along_x else -body.sin)
         my = sign * (body.sin if along_x else body.cos)
         return face_of(body, mx, my, along_x)
-    return outline_face(body, hull, number)
-
-
-@kernel
-def outline_face(body: Block, hull: Hull, number: int) -> Face:
-    """Return one of the faces of a polygon: of a rectangle what face_of returns, bit by bit."""
-    corner = corner_at(hull, number)
-    return Face(
-        body.cos * corner.nx - body.sin * corner.ny,
-        body.sin * corner.nx + body.cos * corner.ny,
-        body.x,
-        body.y,
-        1.0 * corner.distance,
-        -corner.half - corner.middle,
-        corner.half - corner.middle,
-    )
+    return side_face(body, side_numbered(hull, number))
 
 
 @kernel
@@ -100,7 +113,7 @@ def edge_opposite(face: Face, body: Block, hull: AnyHull) -> Edge:
     """Return the face of a body that looks most towards a reference face."""
     if hull is None:
         return opposite_edge(face, body)
-    return outline_edge(face, body, hull, number_opposite(face.nx, face.ny, body, hull))
+    return side_edge(face, body, side_numbered(hull, number_opposite(face.nx, face.ny, body, hull)))
 
 
 @kernel
@@ -110,179 +123,182 @@ def number_opposite(nx: float, ny: float, body: Block, hull: Hull) -> int:
 
 
 @kernel
-def outline_edge(face: Face, body: Block, hull: Hull, number: int) -> Edge:
-    """Return a face of a polygon that looks towards a reference face: it begins at the left.
-
-    Of a rectangle that is what opposite_edge returns, bit by bit: from the centre to the middle of the face, and from
-    there to both ends.
-    """
-    corner = corner_at(hull, number)
-    x, y = in_frame(face, body.x, body.y)
-    # the body's own x axis in the frame of the reference face
-    c = body.cos * face.ny - body.sin * face.nx
-    s = body.cos * face.nx + body.sin * face.ny
-    # normal and direction of the body's face there
-    mx = corner.nx * c - corner.ny * s
-    my = corner.nx * s + corner.ny * c
-    tx = -corner.ny * c - corner.nx * s
-    ty = corner.nx * c - corner.ny * s
-    x = x + corner.distance * mx + corner.middle * tx
-    y = y + corner.distance * my + corner.middle * ty
-    ex = corner.half * tx
-    ey = corner.half * ty
-    are_all = abs(ex) >= 0.0
-    return Edge(x - ex, y - ey, x + ex, y + ey, are_all, are_all)
-
-
-@kernel
-def best_above(least: float, body: Block, hull: Hull, other: Block, other_hull: Hull, but: int) -> Best:
-    """Return the face of a body beyond which another one reaches least, of those with a gap above `least` (m).
-
-    The face number `but` is left out. The other body reaches beyond a face at least by its inner radius, from its
-    centroid: most faces are out with that.
-    """
+def pose_of(other: Block, body: Block) -> Pose:
+    """Return another body in the frame of a body; (c, s) turns directions of this frame into the frame of the other."""
     dx = other.x - body.x
     dy = other.y - body.y
-    px = body.cos * dx + body.sin * dy
-    py = body.cos * dy - body.sin * dx
-    # a direction in the frame of the body, in that of the other
-    c = body.cos * other.cos + body.sin * other.sin
-    s = body.sin * other.cos - body.cos * other.sin
-    best = least
-    number = -1
-    for k in range(hull.size):
-        one = hull.table[hull.first + k]
-        away = one.nx * px + one.ny * py - one.distance
-        if away - other_hull.inner > best and k != but:
-            gap = away + least_along(other_hull, c * one.nx - s * one.ny, s * one.nx + c * one.ny)
-            if gap > best:
-                best, number = gap, k
-    return Best(best, number)
+    return Pose(
+        body.cos * dx + body.sin * dy,
+        body.cos * dy - body.sin * dx,
+        body.cos * other.cos + body.sin * other.sin,
+        body.sin * other.cos - body.cos * other.sin,
+    )
 
 
 @kernel
-def best_face(body: Block, hull: Hull, other: Block, other_hull: Hull, thin: float) -> Best:
+def gap_beyond(away: Lanes, nx: Lanes, ny: Lanes, pose: Pose, other: Hulls, lane: Lane) -> tuple[Lanes, Lanes]:
+    """Return the gap (m) beyond a face with a normal, and the number of the face of the other body that it meets.
+
+    `away` (m) is the distance of the other's centroid from the face.
+    """
+    mx = pose.c * nx - pose.s * ny
+    my = pose.s * nx + pose.c * ny
+    against = number_against(other, mx, my, lane)
+    return away + least_along(side_at(other.table, other.first + against, lane), mx, my), against
+
+
+@kernel
+def farthest_face(hulls: Hulls, pose: Pose, lane: Lane) -> Farthest:
+    """Return the face of a body from which the centroid of another one is farthest; of equal ones the first."""
+    fx, fy, distance, _ = normal_at(hulls, 0, lane)
+    most = fx * pose.x + fy * pose.y - distance
+    number = 0.0 * most
+    second = number - FAR
+    for k in range(1, hulls.size):
+        nx, ny, distance, _ = normal_at(hulls, k, lane)
+        away = nx * pose.x + ny * pose.y - distance
+        is_more = away > most
+        second = select(is_more, most, greater(away, second))
+        most = select(is_more, away, most)
+        number = select(is_more, 1.0 * k, number)
+        fx = select(is_more, nx, fx)
+        fy = select(is_more, ny, fy)
+    return Farthest(most, number, fx, fy, second)
+
+
+@kernel
+def best_from(found: Farthest, hulls: Hulls, pose: Pose, other: Hulls, lane: Lane) -> Best:
+    """Return the face of a body beyond which another one reaches least.
+
+    It is mostly that from which the other's centroid is farthest. The other body reaches beyond a face by its inner
+    radius at least, from its centroid: others are out with that.
+    """
+    gap, against = gap_beyond(found.away, found.nx, found.ny, pose, other, lane)
+    best = Best(gap, found.number, against)
+    if is_all(found.second - other.inner < gap):
+        return best
+    return best_of_others(best, hulls, pose, other, lane)
+
+
+@kernel
+def best_of_others(best: Best, hulls: Hulls, pose: Pose, other: Hulls, lane: Lane) -> Best:
+    """Return the best face of a body, or one that is better; of equal ones the first."""
+    gap, number, against = best
+    for k in range(hulls.size):
+        nx, ny, distance, _ = normal_at(hulls, k, lane)
+        away = nx * pose.x + ny * pose.y - distance
+        can_be = (away - other.inner >= gap) & (abs(number - 1.0 * k) > 0.0)
+        if not is_all((away - other.inner < gap) | (abs(number - 1.0 * k) <= 0.0)):
+            its_gap, its_against = gap_beyond(away, nx, ny, pose, other, lane)
+            is_better = can_be & ((its_gap > gap) | ((its_gap >= gap) & (number > 1.0 * k)))
+            gap = select(is_better, its_gap, gap)
+            number = select(is_better, 1.0 * k, number)
+            against = select(is_better, its_against, against)
+    return Best(gap, number, against)
+
+
+@kernel
+def best_face(hulls: Hulls, pose: Pose, other: Hulls, lane: Lane) -> Best:
     """Return the face of a body beyond which another one reaches least."""
-    best = best_above(-EDGE * thin, body, hull, other, other_hull, -1)
-    if best.face < 0:
-        return best_of_all(body, hull, other, other_hull)
-    return best
-
-
-@rare_kernel
-def best_of_all(body: Block, hull: Hull, other: Block, other_hull: Hull) -> Best:
-    """Return the same where bodies lie deep in one another."""
-    return best_above(-math.inf, body, hull, other, other_hull, -1)
+    return best_from(farthest_face(hulls, pose, lane), hulls, pose, other, lane)
 
 
 @kernel
-def best_if_above(least: float, body: Block, hull: Hull, other: Block, other_hull: Hull) -> Best:
+def best_if_above(least: Lanes, hulls: Hulls, pose: Pose, other: Hulls, lane: Lane) -> Best:
     """Return the face of a body beyond which another one reaches least, if the gap there is above `least` (m).
 
     Near centroids exclude that: regular polygons that meet face to face are done then.
     """
-    dx = other.x - body.x
-    dy = other.y - body.y
-    near = least - ROUND_OFF + hull.inner + other_hull.inner
-    if near > 0.0 and dx * dx + dy * dy <= near * near:
-        return Best(least, -1)
-    return best_above(least, body, hull, other, other_hull, -1)
-
-
-@rare_kernel
-def best_face_after_all(body: Block, hull: Hull, other: Block, other_hull: Hull, thin: float) -> Best:
-    """Return the best face of a body where that of the other one, though no worse, has no point."""
-    return best_face(body, hull, other, other_hull, thin)
-
-
-@kernel
-def clipped_on(body: Block, hull: Hull, number: int, other: Block, other_hull: Hull) -> Clipped:
-    """Return what of another body lies over a face; its corners count from 1, those of the body from OF_B + 1."""
-    face = outline_face(body, hull, number)
-    against = number_opposite(face.nx, face.ny, other, other_hull)
-    whole = outline_edge(face, other, other_hull, against)
-    left = 1 + against if whole.left >= face.left else OF_B + 1 + next_corner(hull, number)
-    right = 1 + next_corner(other_hull, against) if whole.right <= face.right else OF_B + 1 + number
-    return Clipped(face, clip_one(whole, face), left, right)
+    none = 0.0 * least - 1.0
+    near = greater(least - ROUND_OFF + hulls.inner + other.inner, 0.0)
+    if is_all(pose.x * pose.x + pose.y * pose.y < near * near):
+        return Best(least, none, none)
+    found = farthest_face(hulls, pose, lane)
+    if is_all(found.away - other.inner <= least):
+        return Best(least, none, none)
+    best = best_from(found, hulls, pose, other, lane)
+    is_above = best.gap > least
+    return Best(select(is_above, best.gap, least), select(is_above, best.number, none), best.against)
 
 
 @kernel
-def can_meet(body: Block, hull: Hull, number: int, other: Block, other_hull: Hull) -> bool:
-    """Return True if another body has a face that is nearly parallel to one."""
-    corner = corner_at(hull, number)
-    nx = body.cos * corner.nx - body.sin * corner.ny
-    ny = body.sin * corner.nx + body.cos * corner.ny
-    against = corner_at(other_hull, number_opposite(nx, ny, other, other_hull))
-    mx = other.cos * against.nx - other.sin * against.ny
-    my = other.sin * against.nx + other.cos * against.ny
-    return nx * mx + ny * my < LEVEL
+def one_of(is_one: Mask, one: Block, two: Block) -> Block:
+    """Return the place of one body or the other."""
+    return Block(
+        select(is_one, one.x, two.x),
+        select(is_one, one.y, two.y),
+        select(is_one, one.cos, two.cos),
+        select(is_one, one.sin, two.sin),
+        one.half_x,
+        one.half_y,
+    )
 
 
 @kernel
-def met_on(best: Best, body: Block, hull: Hull, other: Block, other_hull: Hull, thin: float) -> Clipped:
-    """Return how another body lies over the best face of a body, or over the next best.
+def after(number: Lanes, count: Lanes) -> Lanes:
+    """Return the number of the next corner."""
+    return select(number + 1.0 < count, number + 1.0, 0.0 * number)
 
-    Where two faces face each other over a sliver only, the bodies meet at other faces, if these are nearly parallel: a
-    block that slides over the flush joint of two others would else be stopped by the side of the second, as it sinks in
-    by a little. `thin` is the smaller inner radius of both (m).
+
+@kernel
+def of_other(corner: Lanes) -> Lanes:
+    """Return a corner as one of the other body of a pair."""
+    return select(corner > 1.0 * OF_B, corner - 1.0 * OF_B, corner + 1.0 * OF_B)
+
+
+@kernel
+def found_on(
+    is_of_b: Mask, best: Best, a: Block, hulls_a: Hulls, b: Block, hulls_b: Hulls, margin: float, lane: Lane
+) -> Found:
+    """Return manifolds on faces of bodies b or a. Point one is the right one of a face of b, the left one of one of a.
+
+    Corners count from 1, those of the body with the face from OF_B + 1.
     """
-    found = clipped_on(body, hull, best.face, other, other_hull)
-    if found.edge.right - found.edge.left < EDGE * thin:
-        return met_beside(found, best.face, body, hull, other, other_hull, thin)
-    return found
+    other = one_of(is_of_b, a, b)
+    place = select(is_of_b, hulls_b.first, hulls_a.first) + best.number
+    face = side_face(one_of(is_of_b, b, a), side_at(hulls_a.table, place, lane))
+    place = select(is_of_b, hulls_a.first, hulls_b.first) + best.against
+    whole = side_edge(face, other, side_at(hulls_a.table, place, lane))
+    edge = clip(whole, face)
+    points = points_on(face, edge, a, b, is_of_b, margin)
+    next_number = after(best.number, select(is_of_b, hulls_b.count, hulls_a.count))
+    next_against = after(best.against, select(is_of_b, hulls_a.count, hulls_b.count))
+    left = select(whole.left >= face.left, 1.0 + best.against, (OF_B + 1.0) + next_number)
+    right = select(whole.right <= face.right, 1.0 + next_against, (OF_B + 1.0) + best.number)
+    is_sliver = edge.right - edge.left < EDGE * lesser(hulls_a.inner, hulls_b.inner)
+    return Found(
+        points,
+        (edge.right > edge.left) & has_point(points),
+        is_sliver | (is_of_b & (lesser(points.gap_one, points.gap_two) >= FAR)),
+        select(is_of_b, right, of_other(left)),
+        select(is_of_b, left, of_other(right)),
+    )
 
 
-@rare_kernel
-def met_beside(
-    found: Clipped, number: int, body: Block, hull: Hull, other: Block, other_hull: Hull, thin: float
-) -> Clipped:
-    """Return how another body lies over the next best face after one, if it has one that is nearly parallel.
+@kernel
+def points_of_polygons(
+    a: Block, hulls_a: Hulls, b: Block, hulls_b: Hulls, margin: float, lane: Lane
+) -> tuple[Found, Best, Best]:
+    """Return the contact manifolds of convex polygons within the margin (m), and the best faces of b and a.
 
-    Else return `found`, what lies over the one.
+    That of a has number -1 where that of b is the reference. All of it is inlined: a call that hands over two bodies
+    with their corners takes as long as what it does.
     """
-    next_best = best_above(-EDGE * thin, body, hull, other, other_hull, number)
-    if next_best.face >= 0 and can_meet(body, hull, next_best.face, other, other_hull):
-        return clipped_on(body, hull, next_best.face, other, other_hull)
-    return found
-
-
-@kernel
-def nothing() -> Found:
-    """Return that there is no manifold."""
-    return Found(Points(Constraints(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), FAR, FAR, True), False, 0, 0)
-
-
-@kernel
-def points_of_polygons(a: Block, hull_a: Hull, b: Block, hull_b: Hull, margin: float) -> Found:
-    """Return the contact manifold of two convex polygons within the margin (m).
-
-    All of it is inlined: a call that hands over two bodies with their corners takes as long as what it does.
-    """
-    thin = min(hull_a.inner, hull_b.inner)
-    best_b = best_face(b, hull_b, a, hull_a, thin)
-    if best_b.gap > margin:
-        return nothing()
-    best_a = best_if_above(min(best_b.gap + TIE, margin), a, hull_a, b, hull_b)
-    if best_a.gap > margin:
-        return nothing()
-    if best_a.face < 0:
-        found = found_on(met_on(best_b, b, hull_b, a, hull_a, thin), a, b, True, margin)
-        if found.is_near:
-            return found
-        best_a = best_face_after_all(a, hull_a, b, hull_b, thin)
-        if best_b.gap > best_a.gap:
-            return found
-    return found_on(met_on(best_a, a, hull_a, b, hull_b, thin), a, b, False, margin)
-
-
-@kernel
-def found_on(met: Clipped, a: Block, b: Block, is_of_b: bool, margin: float) -> Found:
-    """Return a manifold on a reference face. Point one is the right one of a face of b, the left one of a face of a."""
-    points = points_on(met.face, met.edge, a, b, is_of_b, margin)
-    is_near = met.edge.right > met.edge.left and has_point(points)
-    if is_of_b:
-        return Found(points, is_near, met.right, met.left)
-    return Found(points, is_near, OF_B ^ met.left, OF_B ^ met.right)
+    best_b = best_face(hulls_b, pose_of(a, b), hulls_a, lane)
+    best_a = best_if_above(lesser(best_b.gap + TIE, margin), hulls_a, pose_of(b, a), hulls_b, lane)
+    is_of_b = best_a.number < 0.0
+    best = Best(
+        select(is_of_b, best_b.gap, best_a.gap),
+        select(is_of_b, best_b.number, best_a.number),
+        select(is_of_b, best_b.against, best_a.against),
+    )
+    found = found_on(is_of_b, best, a, hulls_a, b, hulls_b, margin, lane)
+    is_near = greater(best_b.gap, best.gap) <= margin
+    return (
+        Found(found.points, is_near & found.is_near, is_near & found.is_odd, found.one, found.two),
+        best_b,
+        best_a,
+    )
 
 
 @kernel

@@ -19,6 +19,7 @@ from blocksim.kernels.nonsmooth.manifold import Place, are_four_of_blocks, colli
 from blocksim.kernels.nonsmooth.motion import place_all
 from blocksim.kernels.nonsmooth.neighbours import update_pairs
 from blocksim.kernels.nonsmooth.parts import begin_step, is_continued, is_shortened
+from blocksim.kernels.nonsmooth.polygon_fours import find_manifolds_of_polygons, is_left_to_fours
 from blocksim.kernels.nonsmooth.rounds import forget_struck
 from blocksim.kernels.nonsmooth.substep import bodies_of, kick_share, substep
 from blocksim.kernels.nonsmooth.supports import place_supports
@@ -114,11 +115,14 @@ def find_manifolds(scene: Nonsmooth, begin: int, end: int) -> None:
     stepping = contacts.stepping[0]
     h = stepping.substep
     ahead = 0.5 * (stepping.length - h)
+    find_manifolds_of_polygons(contacts, bodies, begin, end, ahead, scene.world.corners)
     r = begin
     while r < end:
         if r + WIDTH <= end and are_four_of_blocks(constraints, r, bodies):
             collide_four(contacts, bodies, r, ahead)
             r += WIDTH
+        elif is_left_to_fours(constraints[r], bodies, scene.world.corners):
+            r += 1
         else:
             constraint = constraints[r]
             states = contacts.states

@@ -65,6 +65,14 @@ def near_one_another(random: Any, one: Block, other: Block) -> Block:
     return put
 
 
+def over_a_joint(x: float, y: float, sunk: float) -> list[Block]:
+    """Return two blocks beside one another, and a hexagon that has sunk in (m) over their joint."""
+    below = depth_below(HEXAGON)
+    foot = 0.5 * float(np.ptp([x for x, y in HEXAGON if y < -0.99 * below]))
+    slider = Block(x + 0.016 - foot + 0.01 * sunk, y + 0.0125 + below - sunk, outline=HEXAGON)
+    return [Block(x, y), Block(x + 0.032, y), slider]
+
+
 def pairs(random: Any, is_rectangle: bool = False) -> list[tuple[Block, Block]]:
     """Return polygons two by two, all far from one another."""
     found = []
@@ -126,14 +134,36 @@ def test_rectangles_given_as_outlines_have_the_same_manifolds(mixed: bool) -> No
     assert near > PAIRS // 2
 
 
+@pytest.mark.parametrize("flush", [False, True])
+def test_four_pairs_at_a_time_have_the_manifolds_that_each_has_alone(flush: bool) -> None:
+    """To the last bit, as threads divide pairs anywhere; flush blocks have faces that face one another over slivers."""
+    random = np.random.default_rng(11)
+    blocks = [block for pair in (*pairs(random), *pairs(random, is_rectangle=True)) for block in pair]
+    if flush:
+        blocks = [block for k in range(8) for block in over_a_joint(0.5 * k, 2.0, 1e-5 * (1 + k))]
+    scene = posed(blocks)
+    manifolds(scene, blocks)
+    constraints = listed_constraints(scene)
+    for impulse in (0.0, 1.0):  # which goes with corners that have changed places
+        constraints["normal_one"], constraints["normal_two"], constraints["shear"] = impulse, 2.0 * impulse, impulse
+        corners = constraints["corner_two"].copy(), constraints["corner_one"].copy()
+        constraints["corner_one"], constraints["corner_two"] = corners
+        before = constraints.copy()
+        find_manifolds(scene, 0, constraints.size)
+        together = constraints.copy()
+        constraints[:] = before
+        for r in range(constraints.size):
+            find_manifolds(scene, r, r + 1)
+        near = together["reach"] != AWAY
+        assert near.sum() >= 8
+        assert constraints["reach"].tolist() == together["reach"].tolist()
+        for name in CONSTRAINT.names or ():
+            assert constraints[name][near].tolist() == together[name][near].tolist(), name
+
+
 def test_polygon_that_has_sunk_in_a_little_is_not_stopped_by_the_side_of_the_next() -> None:
     """A hexagon slides over the flush joint of two blocks, and overlaps the side of the second by a hair only."""
-    sunk = 5e-5
-    below = depth_below(HEXAGON)
-    foot = 0.5 * float(np.ptp([x for x, y in HEXAGON if y < -0.99 * below]))
-    flush = [Block(0.0, 0.0), Block(0.032, 0.0)]
-    slider = Block(0.016 - foot + 0.01 * sunk, 0.0125 + below - sunk, outline=HEXAGON)
-    blocks = [*flush, slider]
+    blocks = over_a_joint(0.0, 0.0, 5e-5)
     constraints = {
         (int(constraint.a), int(constraint.b)): constraint for constraint in manifolds(posed(blocks), blocks)
     }

@@ -95,12 +95,22 @@ def _transposed(builder: Any, four: list[Any]) -> list[Any]:
     return [mixed(*even, *low), mixed(*odd, *low), mixed(*even, *high), mixed(*odd, *high)]
 
 
+def _one_of(builder: Any, lane: Any, places: list[Any]) -> Any:
+    """Return the place in a lane; of a lane that is known the optimization leaves nothing but that."""
+    chosen = places[0]
+    for k in range(1, WIDTH):
+        chosen = builder.select(builder.icmp_signed("==", lane, ir.Constant(lane.type, k)), places[k], chosen)
+    return chosen
+
+
 def _record_pointers(context: Any, builder: Any, signature: Any, arguments: Any, kind: Any) -> list[Any]:
     """Return pointers to the records at all places, or to that at the place of one lane."""
     array, field = signature.args[1:3]
     start = builder.bitcast(context.make_array(array)(context, builder, arguments[1]).data, BYTE.as_pointer())
     if isinstance(field, types.UniTuple):
         places = cgutils.unpack_tuple(builder, arguments[2], WIDTH)
+        if signature.args[0] != types.none:
+            places = [_one_of(builder, arguments[0], places)]
     else:
         first = context.make_array(field)(context, builder, arguments[2]).data
         lanes = [INDEX(k) for k in range(WIDTH)] if signature.args[0] == types.none else arguments[:1]
@@ -275,6 +285,7 @@ def _define_memory() -> None:
         typed(function, columns, types.NoneType, types.Array, types.NestedArray)(_read_fields(part))
         typed(function, columns, types.NoneType, types.Array, types.UniTuple)(_read_fields(part))
         typed(function, single, types.Integer, types.Array, types.NestedArray)(_read_fields(part))
+        typed(function, single, types.Integer, types.Array, types.UniTuple)(_read_fields(part))
     end = (MaskType, types.UniTuple)
     for writer, part in ((write_fields_0, 0), (write_fields_4, 1), (write_fields_8, 2)):
         typed(writer, types.none, types.NoneType, types.Array, types.NestedArray, *end)(_write_fields(part))
