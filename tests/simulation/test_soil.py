@@ -95,6 +95,26 @@ def test_a_particle_that_strikes_the_ground_keeps_a_fifth_of_its_speed_at_most()
     assert 0.0 < float(soil.soils.points["vy"][flies][0]) < 1.01 * 0.5 * math.exp(-0.5 * math.pi)
 
 
+@pytest.mark.parametrize("degrees", [20.0, 45.0, 80.0])
+def test_a_particle_that_has_flown_off_leaves_a_corner_with_a_fifth_of_the_speed_of_approach(degrees: float) -> None:
+    blocks = {"ram": {"width": 0.04, "height": 0.04, "length": DEPTH, "material": "smooth"}}
+    ram = [{"block": "ram", "x": -1.0, "y": 0.5, "fixed": True}]  # moves on as it is told
+    pairs = {"rods": {"smooth": {"friction": 0.0}}}
+    soil = Soil(scene(column(0.04, 0.04, SPACING), blocks=blocks, bodies=ram, pairs=pairs, gravity=0.0))
+    normal = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
+    struck, away = 0.3 - 1.2 * normal, (0.5 * SPACING + 2e-4) * normal  # m/s, m: straight towards the corner
+    number, points = soil.soils.states["number"], soil.soils.points
+    for name, value in zip(("x", "y", "vx", "vy"), (-0.98 + away[0], 0.52 + away[1], *struck), strict=True):
+        points[name][number == 0] = value
+    soil.world.bodies.vx[0], soil.world.bodies.vy[0] = 0.3, 0.3
+    soil.soils.controls.is_listed[0] = 0
+    soil.to_time(0.004)
+    found = np.array([float(points[name][number == 0][0]) for name in ("vx", "vy")])
+    leaving, most = (found - 0.3) @ normal, 1.2 * math.exp(-0.5 * math.pi)
+    assert 0.8 * most < leaving < most
+    assert np.linalg.norm(found - 0.3) == pytest.approx(leaving, rel=1e-6)
+
+
 def test_particles_that_have_parted_do_not_bounce_off_one_another() -> None:
     soil = Soil(scene(column(0.04, 0.04, SPACING), gravity=0.0))
     points, number = soil.soils.points, soil.soils.states["number"]

@@ -61,7 +61,8 @@ CONTROLS = record_type(
     "travel "  # m: no particle or body has moved farther since the lists were made
     "radius "  # m: of the disc that touches bodies
     "viscosity ramp "  # -, s: factor of artificial viscosity; until when gravity grows
-    "left bottom cell",  # m: of the grid
+    "left bottom cell "  # m: of the grid
+    "least_x most_x least_y most_y",  # m: of all particles, those beyond the grid included
     "columns rows "  # of the grid
     "blocks "  # the first bodies are blocks, the others supports
     "touch_count is_listed is_uniform is_full",  # flags: lists are made; one kind; a list had no room

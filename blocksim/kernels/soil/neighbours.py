@@ -101,6 +101,17 @@ def extent_along(points: Records, is_x: bool) -> tuple[float, float]:
 
 
 @rare_kernel
+def ends_along(points: Records, is_x: bool) -> tuple[float, float]:
+    """Return from where to where (m) all particles lie along an axis, those that have flown off included."""
+    low, high = math.inf, -math.inf
+    for i in range(points.size):
+        place = points[i].x if is_x else points[i].y
+        if math.isfinite(place):
+            low, high = min(low, place), max(high, place)
+    return low, high
+
+
+@rare_kernel
 def lay_cells(soils: Soils) -> None:
     """Lay cells over the particles: as large as clusters ought to be, or larger where there would be too many.
 
@@ -117,6 +128,8 @@ def lay_cells(soils: Soils) -> None:
     controls.left, controls.bottom, controls.cell = left, bottom, size
     controls.columns = int(width / size) + 1
     controls.rows = int(height / size) + 1
+    controls.least_x, controls.most_x = ends_along(soils.points, True)
+    controls.least_y, controls.most_y = ends_along(soils.points, False)
 
 
 @rare_kernel

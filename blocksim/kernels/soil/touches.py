@@ -27,16 +27,17 @@ def extent_of(body: Record, is_ground: bool, reach: float) -> tuple[float, float
 
 @rare_kernel
 def find_near(soils: Soils, world: World, b: int, count: int) -> int:
-    """Append the particles near body b to `by_body`, as far as there is room; return the count needed."""
+    """Append the particles near body b to `by_body`, as far as there is room; return the count needed.
+
+    Those beyond the grid are in its outermost cells, where bodies beyond it look for them.
+    """
     grid = grid_of(soils)
     controls = soils.controls[0]
     body = world.bodies[b]
     is_ground = b == world.bodies.size - 1
     reach = controls.radius + controls.skin
     left, right, bottom, top = extent_of(body, is_ground, reach)
-    if right < grid.left or top < grid.bottom or left > grid.left + grid.columns * grid.size:
-        return count
-    if bottom > grid.bottom + grid.rows * grid.size:
+    if right < controls.least_x or left > controls.most_x or top < controls.least_y or bottom > controls.most_y:
         return count
     first = clipped_cell(left - grid.left, grid.size, grid.columns)
     last = clipped_cell(right - grid.left, grid.size, grid.columns)

@@ -64,7 +64,7 @@ ENERGIES = (
     "ramp",
 )
 FEW_TOUCHES = 128
-COST = Cost(seconds=220e-9, memory=395)  # measured
+COST = Cost(seconds=200e-9, memory=395)  # measured
 QUANTITIES = (
     Quantity("x", "m"),
     Quantity("y", "m"),
