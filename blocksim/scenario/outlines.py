@@ -104,6 +104,21 @@ def edges_of(corners: Sequence[Corner]) -> Iterator[tuple[Corner, Corner, Corner
         yield a, b, ((b[1] - a[1]) / length, (a[0] - b[0]) / length)
 
 
+def shrunk(points: Sequence[Corner], way: float) -> list[Corner]:
+    """Return a convex outline whose edges are all moved inwards by a way (m), in the order of the file.
+
+    A corner moves along (n + m) / (1 + n·m), n and m the inward normals of its edges: to where the moved edges meet.
+    """
+    sense = math.copysign(1.0, area_of(points))
+    ways = [(b[0] - a[0], b[1] - a[1], math.dist(a, b)) for a, b in _edges(points)]
+    normals = [(-sense * y / length, sense * x / length) for x, y, length in ways]
+    moved = []
+    for (x, y), n, m in zip(points, (normals[-1], *normals), normals, strict=False):
+        share = way / (1.0 + _dot(n, m))
+        moved.append((x + share * (n[0] + m[0]), y + share * (n[1] + m[1])))
+    return moved
+
+
 def regular(sides: int, radius: float) -> Corners:
     """Return a regular polygon about its centroid, corners at a radius (m), its lowest side level."""
     first = -0.5 * math.pi - math.pi / sides

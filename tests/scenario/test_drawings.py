@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError, ScenarioError, UnavailableError
@@ -167,3 +168,22 @@ def test_only_points_within_straight_edges_are_left_out() -> None:
     assert simplified(square) == [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
     polygon = [(math.cos(0.4 * k), math.sin(0.4 * k)) for k in range(15)]
     assert simplified(polygon) == polygon
+
+
+def test_blocks_of_rounded_coordinates_fit_once_they_are_shrunk(tmp_path: Path) -> None:
+    # two halves of a square along an inclined joint, of which one is drawn 0.4 units over it
+    left, right = [[0, 0], [40.2, 0], [60.2, 100], [0, 100], [0, 0]], [[39.8, 0], [100, 0], [100, 100], [59.8, 100]]
+    written(tmp_path, collection(feature(left), feature([*right, right[0]][::-1])))
+    with pytest.raises(ScenarioError, match=r"bodies 1 and 2 overlap by 3\.92232 mm"):
+        loaded(tmp_path)
+    changes = {"structures.0.shrink": "2 mm", "structures.0.in_place": True}
+    one, other = place_bodies(load_scenario(tmp_path / "scene.toml", changes))
+    corners = np.array([(one.x + x, one.y + y) for x, y in one.outline])
+    assert corners.min(axis=0) == pytest.approx([0.002, 0.002])
+    across = np.array([1.0, -0.2]) / np.hypot(1.0, 0.2)
+    assert (corners @ across).max() == pytest.approx(0.402 * across[0] - 0.002)
+    reach = min((other.x + x) * across[0] + (other.y + y) * across[1] for x, y in other.outline)
+    assert reach - (corners @ across).max() == pytest.approx(0.004 - 0.00392232, abs=1e-8)
+    for much, message in (("9 mm", "9 mm is too much; at most 0.01 of the least width of a block"), ("-1 mm", "small")):
+        with pytest.raises(ScenarioError, match=message):
+            load_scenario(tmp_path / "scene.toml", {"structures.0.shrink": much})

@@ -12,6 +12,8 @@ from blocksim.scenario.models.base import Identifier, Table, table_path
 from blocksim.scenario.models.geometry import Point
 from blocksim.scenario.structures.shaped import Cell, Shaped
 
+MOST_SHRINK = 0.01  # of the least width of a block
+
 
 class DrawnBlock(Table):
     """One block of a drawing."""
@@ -45,6 +47,10 @@ class Polygons(Shaped):
     table: str | None = Field(default=None, description="GeoJSON or DXF file with an outline for each block")
     unit: q.PositiveLength = Field(default=1.0, description="unit of the coordinates in the file")
     in_place: bool = Field(default=False, description="true keeps all coordinates, whatever left and bottom are")
+    shrink: q.NonNegativeLength = Field(
+        default=0.0,
+        description="how far every edge moves inwards, so that rounded coordinates, or blocks at rest, do not overlap",
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -70,10 +76,24 @@ class Polygons(Shaped):
             raise q.invalid(message)
         return self
 
+    @model_validator(mode="after")
+    def _not_shrunk_away(self) -> Self:
+        width = min(outlines.least_width(tuple(one.outline)) for one in self.cells_given)
+        if self.shrink > MOST_SHRINK * width:
+            most = f"at most {MOST_SHRINK:g} of the least width of a block, {1e3 * MOST_SHRINK * width:.4g} mm"
+            raise q.invalid(f"{1e3 * self.shrink:g} mm is too much; {most}", "shrink")
+        for number, one in enumerate(self.cells_given):
+            if self.shrink and any(outlines.faults(self._outline(one))):
+                raise q.invalid(f"block {number + 1} loses an edge; shrink less", "shrink")
+        return self
+
     @property
     def drawn(self) -> Sequence[Cell]:
         """All blocks in their order."""
-        return [Cell(one.outline, one.fixed, one.block, one.name) for one in self.cells_given]
+        return [Cell(self._outline(one), one.fixed, one.block, one.name) for one in self.cells_given]
+
+    def _outline(self, one: DrawnBlock) -> Sequence[Point]:
+        return outlines.shrunk(one.outline, self.shrink) if self.shrink else one.outline
 
     @property
     def shift(self) -> tuple[float, float]:
