@@ -133,7 +133,8 @@ PAIR = record_type(
     "stiffness "  # of each of its corner contacts, in units of normal_stiffness; see tributary.py
     "slide turn",  # how that changes with the slip of a ahead of b, per m, and by turning a, per rad
     indices="a b "  # bodies, sorted
-    "duplicates",  # bits of the slots whose corner is in touch, but marks the same end of a face contact as another
+    "duplicates "  # bits of the slots whose corner is in touch, but marks the same end of a face contact as another
+    "fronts",  # of the first candidates, 4 bits each: face of the other polygon that each was last seen in front of
     small="near active "  # number of candidate slots; of contacts
     "idle",  # candidates that are neither in contact nor a duplicate
     flags="bearing "  # PLANE, ENDS or APART: what its contacts are; see tributary.py

@@ -18,6 +18,7 @@ from blocksim.kernels.explicit.kinematics import IMPACT_STEPS
 from blocksim.kernels.explicit.models.outlines import DEEPEST, can_touch, corner_seen, face_met
 from blocksim.kernels.explicit.outlines import (
     MOST_CORNERS,
+    UPPER,
     cone_of,
     corner_of,
     corner_vector,
@@ -31,6 +32,10 @@ from blocksim.kernels.explicit.outlines import (
 from blocksim.kernels.explicit.persistent_contacts import Motion, PersistentContact, contact_at
 from blocksim.kernels.explicit.sliver_axes import SLIVER, flat_within, is_sliver, least_ratio
 from blocksim.kernels.explicit.tributary import bearing_of_facing, facing_of, flat_of
+
+FRONT_BITS = 4  # of PAIR.fronts for each of the first candidates, enough for the faces of a block
+FRONT = (1 << FRONT_BITS) - 1
+MOST_FRONTS = 8
 
 
 @rare_kernel
@@ -128,9 +133,9 @@ def is_nearer_than_beside(
     ax, ay = into_world(owner, ahead.nx, ahead.ny)
     bx, by = into_world(owner, back.nx, back.ny)
     cone = min(side.cone, ahead.cone)
-    if fy * ax - fx * ay < -cone or fx * by - fy * bx < -cone:
-        return False
-    return over > need or ny * ax - nx * ay < -cone or nx * by - ny * bx < -cone
+    # no branches, as none is foreseen well
+    admits = (fy * ax - fx * ay >= -cone) & (fx * by - fy * bx >= -cone)
+    return admits & ((over > need) | (ny * ax - nx * ay < -cone) | (nx * by - ny * bx < -cone))
 
 
 @kernel
@@ -164,19 +169,25 @@ def lie_on_sliver(a: Record, b: Record, one: PersistentContact, two: PersistentC
 
 
 @kernel
-def is_in_front(owner: Record, number: int, touched: Record, table: Records) -> bool:
-    """Return True if a corner of `owner` is in front of a face of `touched`, and under no sharp end of another."""
+def face_below(owner: Record, number: int, touched: Record, last: int, table: Records) -> int:
+    """Return a face of `touched` that a corner of `owner` is in front of, under no sharp end of another, or NO_FACE.
+
+    `last` is the one of the last time, which it mostly still is: that is asked first.
+    """
     corner = corner_of(owner, table, number)
     ox, oy = into_world(owner, corner.x, corner.y)
     x, y = into_frame(touched, owner.x - touched.x + ox, owner.y - touched.y + oy)
     if is_piece(touched):
-        return bool(y > touched.half_y)
+        return UPPER if y > touched.half_y else NO_FACE
     room = DEEPEST * touched.radius
-    for k in range(number_of_corners(touched)):
+    count = number_of_corners(touched)
+    k = last if last < count else 0
+    for _ in range(count):
         side = corner_of(touched, table, k)
         if side.nx * x + side.ny * y - side.distance > side.sharp * room:
-            return True
-    return False
+            return k
+        k = k + 1 if k + 1 < count else 0
+    return NO_FACE
 
 
 @rare_kernel
@@ -188,11 +199,22 @@ def has_face(owner: Record, number: int, touched: Record, table: Records) -> boo
 
 
 @kernel
-def touches(owner: Record, number: int, touched: Record, is_ground: bool, table: Records) -> bool:
-    """Return True if a corner of `owner` touches another body, or the half-plane."""
+def touches(pair: Record, m: int, owner: Record, number: int, touched: Record, is_ground: bool, table: Records) -> bool:
+    """Return True if a corner of `owner`, candidate m of a pair, touches another body, or the half-plane.
+
+    Notes which face it is in front of, for the next time.
+    """
     if is_ground:
         return owner.y + corner_vector(owner, table, number)[1] < touched.y
-    return not is_in_front(owner, number, touched, table) and has_face(owner, number, touched, table)
+    place = FRONT_BITS * m if m < MOST_FRONTS else 0
+    fronts: Any = np.int64(pair.fronts)
+    last = (fronts >> place) & FRONT
+    face = face_below(owner, number, touched, last, table)
+    if face == NO_FACE:
+        return has_face(owner, number, touched, table)
+    if face != last:
+        pair.fronts = fronts ^ ((face ^ last) << place)
+    return False
 
 
 @kernel
@@ -207,9 +229,9 @@ def begins_on_outlines(world: World, p: int, a: Record, b: Record, table: Record
             known += 1
         elif (pair.duplicates >> slot) & 1 == 0:
             if slot < MOST_CORNERS:
-                if touches(a, slot, b, is_ground, table):
+                if touches(pair, m, a, slot, b, is_ground, table):
                     return True
-            elif touches(b, slot - MOST_CORNERS, a, False, table):
+            elif touches(pair, m, b, slot - MOST_CORNERS, a, False, table):
                 return True
     return False
 
