@@ -20,9 +20,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Outline = list[list[float]]
-Place = "NDArray[np.float64]"
-RADIUS, WAY, DEPTH = 0.02, 4e-4, 1e-5  # m
-PLACES = 160
+RADIUS, WAY, DEPTH = 0.02, 2e-4, 1e-5  # m
+PLACES = 60
 STEEP = 2e-3  # of the force: changes from one place to the next that may hide a jump
 
 
