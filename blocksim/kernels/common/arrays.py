@@ -116,17 +116,19 @@ PARTICLE = record_type(
     "length "  # m: tributary length
     "share"  # -: tributary length over face length, summed over both faces at a corner that is one particle
 )
-CORNER = record_type(
-    # What the search for a face needs comes first: four doubles are read at once.
-    "nx ny "  # -: outward normal of the face from this corner to the next, in the body frame
-    "distance "  # m: of that face from the centroid
-    "middle "  # m: of that face along (-ny, nx), from the foot of the centroid
-    "half "  # m: half of its length
-    "x y "  # m: place about the centroid, in the body frame; counter-clockwise
-    "clear "  # -: other faces are at least so many times as far as its nearer end; see world/shapes.py
-    "far "  # m: the distance of that face from all but itself and the two beside it
-    "sharp "  # -: one where a face beside this one meets it at less than a right angle, else zero
-    "cone"  # -: of the shape: sine of the angle up to which a face is parallel to one of another body
+CORNER = on_own_lines(
+    record_type(
+        # What the search for a face needs comes first: four doubles are read at once, from one cache line.
+        "nx ny "  # -: outward normal of the face from this corner to the next, in the body frame
+        "distance "  # m: of that face from the centroid
+        "middle "  # m: of that face along (-ny, nx), from the foot of the centroid
+        "half "  # m: half of its length
+        "x y "  # m: place about the centroid, in the body frame; counter-clockwise
+        "clear "  # -: other faces are at least so many times as far as its nearer end; see world/shapes.py
+        "far "  # m: the distance of that face from all but itself and the two beside it
+        "sharp "  # -: one where a face beside this one meets it at less than a right angle, else zero
+        "cone"  # -: of the shape: sine of the angle up to which a face is parallel to one of another body
+    )
 )
 PAIR = record_type(
     "limit "  # m: a deeper overlap ends the run
