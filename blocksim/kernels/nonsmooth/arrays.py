@@ -52,12 +52,13 @@ SINGLE_FLOATS = {  # 1/kg: A of a group of one, of both normals and along the ta
 }
 GROUP = np.dtype(
     {
-        "names": [*LANE_INDICES.split(), "count", "are_simple", *LANES_AT, *SINGLE_FLOATS],
+        "names": [*LANE_INDICES.split(), "count", "are_simple", "is_coupled", *LANES_AT, *SINGLE_FLOATS],
         "formats": [(np.uint32, (WIDTH,))] * 3
-        + [np.uint8] * 2  # number of constraints, the others are copies; flag: static friction is the kinetic one
+        # number of constraints, the others are copies; flags: static friction is the kinetic one; see cone.py
+        + [np.uint8] * 3
         + [(np.float64, (WIDTH,))] * len(LANES_AT)
         + [np.float64] * len(SINGLE_FLOATS),
-        "offsets": [0, 16, 32, 48, 49, *LANES_AT.values(), *SINGLE_FLOATS.values()],
+        "offsets": [0, 16, 32, 48, 49, 50, *LANES_AT.values(), *SINGLE_FLOATS.values()],
         "itemsize": CACHE_LINE + 8 * WIDTH * len(LANES_AT),
     },
 )

@@ -145,6 +145,7 @@ def pack_groups(contacts: Contacts, begin: int, end: int) -> None:
         else:
             pack(contacts, group, None)
         group.are_simple = 1
+        group.is_coupled = 0
         for lane in range(1 if group.count == 1 else WIDTH):
             constraint = contacts.constraints[group.constraint[lane]]
             group.a[lane] = constraint.a

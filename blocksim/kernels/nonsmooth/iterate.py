@@ -4,8 +4,9 @@ import math
 
 from blocksim.kernels.common.arrays import TEAM_SIZE, Integers
 from blocksim.kernels.common.barrier import barrier
-from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.nonsmooth.arrays import COLOURS, Contacts
+from blocksim.kernels.nonsmooth.cone import LATE, find_couplings, forget_couplings
 from blocksim.kernels.nonsmooth.sweeps import (
     first_velocity_constraints,
     part_of,
@@ -64,6 +65,17 @@ def agree(contacts: Contacts, team: Integers, k: int, number: int, largest: floa
     return largest
 
 
+@rare_kernel
+def hold_back(contacts: Contacts, team: Integers, k: int, is_late: bool) -> None:
+    """Let friction that couples strongly go a share of the way from now on, or all of it again; see cone.py."""
+    first, last = part_of(0, contacts.stepping[0].group_count, k, team[TEAM_SIZE])
+    if is_late:
+        find_couplings(contacts, first, last)
+    else:
+        forget_couplings(contacts, first, last)
+    barrier(team)
+
+
 @kernel
 def velocity_pass(contacts: Contacts, team: Integers, k: int, task: int, tolerance: float) -> None:
     """Sweep until no impulse changes a velocity by more than the tolerance (m/s), or as often as allowed."""
@@ -71,8 +83,12 @@ def velocity_pass(contacts: Contacts, team: Integers, k: int, task: int, toleran
     largest = math.inf
     sweeps = 0
     while largest > tolerance and sweeps < stepping.velocity_sweeps:
+        if sweeps == LATE:
+            hold_back(contacts, team, k, True)
         sweeps += 1
         largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
         task = VELOCITY
+    if sweeps > LATE:
+        hold_back(contacts, team, k, False)
     if k == 0:
         stepping.sweeps += sweeps

@@ -8,30 +8,27 @@ when the velocities of the constraint before come.
 """
 
 from blocksim.kernels.common.arrays import Record, Records
-from blocksim.kernels.common.friction import friction_coefficient
 from blocksim.kernels.common.jit import kernel
 from blocksim.kernels.common.simd import (
     Lane,
     Lanes,
     branch,
     fields_0,
-    four,
     greater,
     is_all,
     lesser,
     load,
     select,
-    split,
     store,
     write_fields_0,
 )
 from blocksim.kernels.nonsmooth.aims import aim, gaps
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
+from blocksim.kernels.nonsmooth.cone import shear_limits, shear_within
 from blocksim.kernels.nonsmooth.groups import (
     Bodies,
     bodies_at,
     constraints_of,
-    material_of,
     normal_masses,
     tangent_mass,
 )
@@ -157,39 +154,6 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
 
 
 @kernel
-def shear_limit(material: Record, normal: float, needed: float, mass: float) -> float:
-    """Return the largest shear impulse (N s), given the one that stops all slip and A (1/kg) along the tangent.
-
-    Static friction holds what it can stop within the substep; else kinetic friction at the slip that it leaves.
-    """
-    static = material.static_friction
-    kinetic = material.kinetic_friction
-    if static == kinetic:
-        return kinetic * normal
-    if needed <= static * normal:
-        return static * normal
-    slip = (needed - kinetic * normal) * mass
-    return normal * friction_coefficient(static, kinetic, material.transition_speed, slip)
-
-
-@kernel
-def shear_limits(contacts: Contacts, group: Record, lane: Lane, normal: Lanes, needed: Lanes, mass: Lanes) -> Lanes:
-    """Return the largest shear impulses (N s) of constraints; see shear_limit."""
-    if group.are_simple:
-        return load(lane, group.friction) * normal
-    n_0, n_1, n_2, n_3 = split(normal)
-    s_0, s_1, s_2, s_3 = split(needed)
-    m_0, m_1, m_2, m_3 = split(mass)
-    return four(
-        lane,
-        shear_limit(material_of(contacts, group, 0), n_0, s_0, m_0),
-        shear_limit(material_of(contacts, group, 1), n_1, s_1, m_1),
-        shear_limit(material_of(contacts, group, 2), n_2, s_2, m_2),
-        shear_limit(material_of(contacts, group, 3), n_3, s_3, m_3),
-    )
-
-
-@kernel
 def first_velocity_group(contacts: Contacts, group: Record, lane: Lane) -> Lanes:
     """Begin the velocity pass of constraints; return the largest changes of velocity (m/s)."""
     constraint = constraints_of(group, lane)
@@ -246,10 +210,9 @@ def reach(
     mass = shear_mass(group, lane, constraint, a, b)
     needed = old_shear - rate * (1.0 / mass)
     limit = shear_limits(contacts, group, lane, new_one + new_two, abs(needed), mass)
-    shear = branch(needed > -limit, needed, -limit)
-    shear = branch(shear < limit, shear, limit)
-    d_shear = shear - old_shear
+    shear = shear_within(group, lane, constraint, a, b, old_shear, needed, limit)
     store(lane, group.shear, shear)
+    d_shear = shear - old_shear
     push_and_drag(contacts, group, lane, constraint, a, b, normal, d_two, d_shear)
     return (a.inverse_mass + b.inverse_mass) * greater(greater(abs(d_one), abs(d_two)), abs(d_shear))
 

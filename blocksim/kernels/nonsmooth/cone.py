@@ -1,0 +1,125 @@
+"""Coulomb's cone in a sweep: which shear impulses it allows, and how those that slide are approached.
+
+A sweep finds the normal impulse for the shear impulse that there is, and then the shear impulse for that. Where bodies
+stick that is Gauss and Seidel's method, which always ends. Where they slide, shear is -f times the normal impulse, and
+the next normal impulse changes by the coupling f A_nt/A_nn of it: up and down, slowly to an end where that is a little
+less than one, and without one beyond, as with a tall block on its corner and friction of 1.4 and more. A share of
+1/(1 + coupling) of the way to the next shear impulse is exactly that to where both stay. Constraints that couple so go
+that way in passes that have not ended after LATE sweeps. Not before: with as much friction there may be several
+solutions, and sweeps that go all the way find that in which bodies stick, if there is one.
+"""
+
+from blocksim.kernels.common.arrays import Record
+from blocksim.kernels.common.friction import friction_coefficient
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.simd import Lane, Lanes, branch, four, greater, is_all, load, select, split
+from blocksim.kernels.nonsmooth.arrays import Contacts
+from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, constraints_of, material_of, normal_masses
+from blocksim.kernels.nonsmooth.slip import Constraints
+
+LATE = 50  # sweeps
+STRONG = 0.75  # coupling from which on shear goes a share of the way: 50 sweeps of less end within a millionth
+
+
+@kernel
+def shear_limit(material: Record, normal: float, needed: float, mass: float) -> float:
+    """Return the largest shear impulse (N s), given the one that stops all slip and A (1/kg) along the tangent.
+
+    Static friction holds what it can stop within the substep; else kinetic friction at the slip that it leaves.
+    """
+    static = material.static_friction
+    kinetic = material.kinetic_friction
+    if static == kinetic:
+        return kinetic * normal
+    if needed <= static * normal:
+        return static * normal
+    slip = (needed - kinetic * normal) * mass
+    return normal * friction_coefficient(static, kinetic, material.transition_speed, slip)
+
+
+@kernel
+def shear_limits(contacts: Contacts, group: Record, lane: Lane, normal: Lanes, needed: Lanes, mass: Lanes) -> Lanes:
+    """Return the largest shear impulses (N s) of constraints; see shear_limit."""
+    if group.are_simple:
+        return load(lane, group.friction) * normal
+    n_0, n_1, n_2, n_3 = split(normal)
+    s_0, s_1, s_2, s_3 = split(needed)
+    m_0, m_1, m_2, m_3 = split(mass)
+    return four(
+        lane,
+        shear_limit(material_of(contacts, group, 0), n_0, s_0, m_0),
+        shear_limit(material_of(contacts, group, 1), n_1, s_1, m_1),
+        shear_limit(material_of(contacts, group, 2), n_2, s_2, m_2),
+        shear_limit(material_of(contacts, group, 3), n_3, s_3, m_3),
+    )
+
+
+@kernel
+def within(needed: Lanes, limit: Lanes) -> Lanes:
+    """Return the shear impulses (N s) nearest to those needed that the limits allow."""
+    shear = branch(needed > -limit, needed, -limit)
+    return branch(shear < limit, shear, limit)
+
+
+@kernel
+def coupling(group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies) -> Lanes:
+    """Return the change of a normal impulse over that which it brings by sliding friction, of the worse point (-)."""
+    coupled_a = a.inverse_inertia * constraint.shear_arm_a
+    coupled_b = b.inverse_inertia * constraint.shear_arm_b
+    by_one = coupled_a * constraint.arm_a + coupled_b * constraint.arm_b
+    by_two = by_one - (coupled_a + coupled_b) * constraint.width
+    one, _, two = normal_masses(constraint, a, b)
+    return load(lane, group.friction) * greater(abs(by_one) / one, abs(by_two) / two)
+
+
+@rare_kernel
+def find_couplings(contacts: Contacts, begin: int, end: int) -> None:
+    """Mark those of some groups that have a constraint which sweeps alone may not bring to an end."""
+    for m in range(begin, end):
+        group = contacts.groups[m]
+        if group.count == 1:
+            group.is_coupled = is_coupled(contacts, group, 0)
+        else:
+            group.is_coupled = is_coupled(contacts, group, None)
+
+
+@rare_kernel
+def forget_couplings(contacts: Contacts, begin: int, end: int) -> None:
+    """Mark none of some groups."""
+    for m in range(begin, end):
+        contacts.groups[m].is_coupled = 0
+
+
+@kernel
+def is_coupled(contacts: Contacts, group: Record, lane: Lane) -> bool:
+    """Return True if the coupling of a constraint of a group is strong."""
+    a = bodies_at(contacts, group.a, lane)
+    b = bodies_at(contacts, group.b, lane)
+    return not is_all(coupling(group, lane, constraints_of(group, lane), a, b) <= STRONG)
+
+
+@kernel
+def shear_within(
+    group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies, old: Lanes, needed: Lanes, limit: Lanes
+) -> Lanes:
+    """Return the shear impulses (N s) nearest to those needed that the limits allow, or a share of the way there."""
+    if group.is_coupled:
+        return approached(group, lane, constraint, a, b, old, needed, limit)
+    return within(needed, limit)
+
+
+@rare_kernel
+def approached(
+    group: Record,
+    lane: Lane,
+    constraint: Constraints,
+    a: Bodies,
+    b: Bodies,
+    old: Lanes,
+    needed: Lanes,
+    limit: Lanes,
+) -> Lanes:
+    """Return shear impulses (N s) as `within` does, of bodies that slide a share of the way there from the old ones."""
+    shear = within(needed, limit)
+    factor = coupling(group, lane, constraint, a, b)
+    return select((factor > STRONG) & (abs(needed) > limit), old + (shear - old) / (1.0 + factor), shear)
