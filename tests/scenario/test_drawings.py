@@ -106,6 +106,7 @@ WRONG = {
     "too many": (collection(*[feature(SQUARE)] * 2001), "2001 outlines are too many"),
     "too deep": ('{"type": "Feature", "geometry": ' * 30 + "null" + "}" * 30, "nested too deeply"),
     "overlap": (collection(feature(SQUARE), feature(SQUARE)), "bodies 1 and 2 overlap by 10 mm"),
+    "material": (collection(feature(SQUARE), feature(SQUARE, material="granite")), "feature 2: material is not read"),
     "unknown block": (collection(feature(SQUARE, block="peer")), "unknown block \"peer\", did you mean 'pier'?"),
 }
 

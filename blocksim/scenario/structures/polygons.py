@@ -37,7 +37,7 @@ class Polygons(Shaped):
     """Blocks in `cells`, or in a GeoJSON or DXF file, of which results keep the blocks and not the file.
 
     A polygon of GeoJSON may have the properties block, fixed and name; the layer of a DXF polyline other than 0 is the
-    name of its block.
+    name of its block. The block has the material, and [pairs] of materials say how joints behave.
     """
 
     kind: Literal["polygons"] = Field(description="kind of structure")
@@ -66,6 +66,10 @@ class Polygons(Shaped):
         except DrawingError as error:
             message = f"{path.name}: {error}"
             raise q.invalid(message, "table") from None
+        for one in drawn:
+            if "material" in one.properties and "block" not in one.properties:
+                message = f"{path.name}: {one.name}: material is not read; name a block, which has one"
+                raise q.invalid(message, "table")
         others = {key: value for key, value in data.items() if key not in ("table", "unit")}
         return {**others, "cells": tuple(_table(one, unit) for one in drawn)}
 
