@@ -30,7 +30,7 @@ from blocksim.kernels.explicit.outlines import (
     number_of_corners,
 )
 from blocksim.kernels.explicit.persistent_contacts import Motion, PersistentContact, contact_at
-from blocksim.kernels.explicit.sliver_axes import SLIVER, flat_within, is_sliver, least_ratio
+from blocksim.kernels.explicit.sliver_axes import SLIVER, flat_within, is_sliver, least_ratio, meets_along
 from blocksim.kernels.explicit.tributary import bearing_of_facing, facing_of, flat_of
 
 FRONT_BITS = 4  # of PAIR.fronts for each of the first candidates, enough for the faces of a block
@@ -143,22 +143,26 @@ def ends_in_sliver(contact: Record, a: Record, b: Record, found: PersistentConta
     """Return True if two bodies with one contact overlap by a sliver.
 
     No other axis, of faces that are not parallel, is less deep than the way to the end of the face times the sine of
-    the angle to it.
+    the angle to it. Of a corner at the very end, as of blocks of one width, that says nothing: see meets_along.
     """
     slot: Any = np.int64(contact.slot)
     face: Any = np.int64(contact.face)
     is_own = slot < MOST_CORNERS
-    touched = b if is_own else a
+    owner, touched = (a, b) if is_own else (b, a)
     if is_piece(touched):
         return False
     side = corner_of(touched, table, face)
     nx, ny = into_world(touched, side.nx, side.ny)
     x = found.x - (touched.x - b.x)
     y = found.y - (touched.y - b.y)
-    end = side.half - abs(y * nx - x * ny - side.middle)
+    along = y * nx - x * ny - side.middle
+    end = side.half - abs(along)
     cone = cone_of(a, b, table)
     least = least_ratio(cone) * end * min(side.clear, flat_within(cone))
-    return found.depth * (1.0 + SLIVER) > least and is_sliver(a, b, table)
+    if found.depth * (1.0 + SLIVER) <= least:
+        return False
+    number = slot if is_own else slot - MOST_CORNERS
+    return not meets_along(owner, number, touched, side, nx, ny, along, found.depth, table) and is_sliver(a, b, table)
 
 
 @kernel

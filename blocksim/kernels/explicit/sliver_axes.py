@@ -19,6 +19,8 @@ from blocksim.kernels.explicit.outlines import (
     cone_of,
     corner_of,
     corner_vector,
+    into_world,
+    number_before,
     number_of_corners,
     side_along,
     side_normal,
@@ -145,3 +147,42 @@ def is_sliver(a: Record, b: Record, table: Records) -> bool:
         return False
     nearest = nearest_axis(a, b, table)
     return nearest.depth > 0.0 and is_short(nearest, face_across(nearest, a, b, table), a, b, table)
+
+
+@kernel
+def meets_along(
+    owner: Record,
+    number: int,
+    touched: Record,
+    side: Record,
+    nx: float,
+    ny: float,
+    along: float,
+    depth: float,
+    table: Records,
+) -> bool:
+    """Return True if two bodies, of which a corner touches a face, certainly overlap by no sliver; see is_sliver.
+
+    Corner `number` of `owner` is `depth` (m) behind the face `side` of `touched`, of the normal (nx, ny), and `along`
+    (m) from its middle. Let its face g there be parallel to that face f to within the sine s <= FLAT/2, G be the length
+    of g, and L that of the interval which f and g have in common. Point P of g in its middle and foot Q of P on f are
+    L/2 from all ends, and not farther apart than D = depth + s G, which no corner of g exceeds. All other faces are
+    c L/2 from P or Q, which is of the same body as they, c the least `clear` of f and g (world/shapes.py), and thus at
+    least c L/2 - D from the other one: less deep no other axis can be. The nearest one, f or g, is at most D deep, so
+    there is no sliver where D <= SLIVER (c L/2 - D). Another SLIVER D is more than 1 - cos, up to s^2 of G, can change.
+    """
+    ahead = corner_of(owner, table, number)
+    back = corner_of(owner, table, number_before(owner, number))
+    ax, ay = into_world(owner, ahead.nx, ahead.ny)
+    bx, by = into_world(owner, back.nx, back.ny)
+    cos_ahead = nx * ax + ny * ay
+    cos_back = nx * bx + ny * by
+    is_ahead = cos_ahead < cos_back  # that face goes to the end of f where `along` is least
+    sine = abs(nx * ay - ny * ax) if is_ahead else abs(nx * by - ny * bx)
+    if min(cos_ahead, cos_back) > 0.0 or sine > 0.5 * min(FLAT, FLAT_SHARE * min(side.cone, ahead.cone)):
+        return False
+    place = along if is_ahead else -along
+    length = 2.0 * (ahead.half if is_ahead else back.half)
+    clear = min(side.clear, ahead.clear if is_ahead else back.clear)
+    common = min(length, side.half + place) - max(place - side.half, 0.0)
+    return (1.0 + 2.0 * SLIVER) * (depth + sine * length) <= 0.5 * SLIVER * clear * common
