@@ -128,6 +128,8 @@ def is_nearer_than_beside(
     if over < 0.0:
         return False
     fx, fy = into_world(touched, side.nx, side.ny)
+    if goes_inwards(owner, number, fx, fy, beside == next_number(touched, face), side.cone, table):
+        return True
     ahead = corner_of(owner, table, number)
     back = corner_of(owner, table, number_before(owner, number))
     ax, ay = into_world(owner, ahead.nx, ahead.ny)
@@ -136,6 +138,20 @@ def is_nearer_than_beside(
     # no branches, as none is foreseen well
     admits = (fy * ax - fx * ay >= -cone) & (fx * by - fy * bx >= -cone)
     return admits & ((over > need) | (ny * ax - nx * ay < -cone) | (nx * by - ny * bx < -cone))
+
+
+@kernel
+def goes_inwards(owner: Record, number: int, nx: float, ny: float, is_last: bool, cone: float, table: Records) -> bool:
+    """Return True if a face of a corner of `owner` goes from the near end of a face of normal (nx, ny) along it.
+
+    `is_last` says which end that is, `cone` is that of the other body. The two faces are parallel to within half the
+    cone. Outlines turn at a corner by at least twice the angle of the cone, and at most by half a turn less that
+    (world/shapes.py), so that no face of the corner falls by more than the cone: it can touch this face. Towards the
+    face beside, which turns away by as much, its own falls by more than the cone: that one it cannot touch.
+    """
+    level = corner_of(owner, table, number if is_last else number_before(owner, number))
+    mx, my = into_world(owner, level.nx, level.ny)
+    return (nx * mx + ny * my < 0.0) & (abs(nx * my - ny * mx) <= 0.5 * min(cone, level.cone))
 
 
 @kernel
