@@ -3,8 +3,8 @@
 With a stiffness that changes with the overlap contact.py deals with all pairs at all steps (with a constant one
 persistent_pairs.py has nearly all of them). The search of models/outlines.py, and whether what it finds is a sliver,
 would take longer than the forces. For two bodies that met at both ends of two parallel faces it finds the same again if
-both corners are still on their faces, no other one begins, the interval is far longer than the overlap is deep, and the
-two points are still its ends.
+both corners are still on their faces, no other one begins or is the inner one at its end by now, the interval is far
+longer than the overlap is deep, and the two points are still its ends.
 """
 
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 from blocksim.kernels.common.arrays import Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit.laws import has_constant_stiffness
+from blocksim.kernels.explicit.models.outline_ends import has_passed
 from blocksim.kernels.explicit.models.outlines import add_slot
 from blocksim.kernels.explicit.outlines import MOST_CORNERS, cone_of, side_along, side_normal
 from blocksim.kernels.explicit.persistent_outlines import begins_on_outlines, has_crossed, lie_on_sliver
@@ -43,17 +44,28 @@ def ends_that_last(world: World, p: int, table: Records) -> int:
     b = world.bodies[pair.b]
     if pair.duplicates != 0 and has_crossed(world, p, a, b, table):
         return SEARCH
-    cone = cone_of(a, b, table)
-    for i in range(2):
-        contact = world.contacts[p, i]
-        slot: Any = np.int64(contact.slot)
-        if add_slot(a, b, slot, table, cone, world.points, i) == i or world.points[i].face != contact.face:
-            return SEARCH
+    if not are_found(world, p, a, b, table):
+        return SEARCH
     if pair.idle > 0 and begins_on_outlines(world, p, a, b, table):
         return SEARCH
     if lie_on_sliver(a, b, world.points[0], world.points[1], table) or not are_both_ends(world, p, a, b, table):
         return SEARCH
     return 2
+
+
+@kernel
+def are_found(world: World, p: int, a: Record, b: Record, table: Records) -> bool:
+    """Fill `points` with two contacts of a pair; return True if they are still on their faces, and the inner ones."""
+    cone = cone_of(a, b, table)
+    duplicates: Any = np.int64(world.pairs[p].duplicates)
+    for i in range(2):
+        contact = world.contacts[p, i]
+        slot: Any = np.int64(contact.slot)
+        if add_slot(a, b, slot, table, cone, world.points, i) == i or world.points[i].face != contact.face:
+            return False
+        if duplicates != 0 and has_passed(world.points[i], duplicates, a, b, table):
+            return False
+    return True
 
 
 @kernel

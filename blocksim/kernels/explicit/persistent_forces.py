@@ -62,12 +62,13 @@ def follow_corner(
     motion: Motion,
     step: float,
     turns: bool,
+    duplicates: int,
     corners: Records | None,
 ) -> tuple[bool, PersistentContact]:
     """Check that a contact continues, and where and how; see persistent_contacts.py."""
     if corners is None:
         return follow(contact, a, b, dx, dy, motion, step, turns)
-    return follow_on_outlines(contact, a, b, dx, dy, motion, step, turns, corners)
+    return follow_on_outlines(contact, a, b, dx, dy, motion, step, turns, duplicates, corners)
 
 
 @kernel
@@ -157,7 +158,7 @@ def single(
     pair = world.pairs[p]
     values = world.interactions[a.contact_class, b.contact_class]
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
-    goes_on, found = follow_corner(contact, a, b, dx, dy, motion, step, is_due, world.corners)
+    goes_on, found = follow_corner(contact, a, b, dx, dy, motion, step, is_due, pair.duplicates, world.corners)
     if not goes_on or found.depth > pair.limit or one_is_sliver(contact, a, b, found, world.corners):
         return CHANGED, NOTHING
     before = pair.stiffness
@@ -262,8 +263,8 @@ def double(
     operator = world.operators[p, NORMAL]
     values = world.interactions[a.contact_class, b.contact_class]
     motion = relative_motion(a, b, dx, dy, 0.5 * step)
-    goes_1, one = follow_corner(first, a, b, dx, dy, motion, step, is_due, world.corners)
-    goes_2, two = follow_corner(second, a, b, dx, dy, motion, step, is_due, world.corners)
+    goes_1, one = follow_corner(first, a, b, dx, dy, motion, step, is_due, pair.duplicates, world.corners)
+    goes_2, two = follow_corner(second, a, b, dx, dy, motion, step, is_due, pair.duplicates, world.corners)
     goes_on = goes_1 and goes_2 and are_ends(pair, a, b, one, two, is_due, world.corners)
     if not goes_on or max(one.depth, two.depth) > pair.limit:
         return CHANGED, NOTHING

@@ -15,6 +15,7 @@ from blocksim.kernels.common.arrays import NO_FACE, Record, Records, World
 from blocksim.kernels.common.geometry import END_RATIO
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit.kinematics import IMPACT_STEPS
+from blocksim.kernels.explicit.models.outline_ends import HAND_OVER, has_inner
 from blocksim.kernels.explicit.models.outlines import DEEPEST, can_touch, corner_seen, face_met
 from blocksim.kernels.explicit.outlines import (
     MOST_CORNERS,
@@ -63,6 +64,7 @@ def follow_on_outlines(
     motion: Motion,
     step: float,
     turns: bool,
+    duplicates: int,
     table: Records,
 ) -> tuple[bool, PersistentContact]:
     """As follow in persistent_contacts.py, with corners and faces of the table."""
@@ -90,6 +92,7 @@ def follow_on_outlines(
         way = IMPACT_STEPS * abs(found.closing)
         if side.clear * end - depth <= max(depth, way) or depth > side.distance:
             beside = next_number(touched, face) if along > 0.0 else number_before(touched, face)
+            goes_on = goes_on and not has_inner(duplicates, is_own, touched, face, along, -end - HAND_OVER * depth)
             goes_on = goes_on and (
                 is_nearer_than_beside(owner, number, touched, face, beside, x, y, depth, way, end, table)
                 or stays_on(face, owner, number, touched, way, table)

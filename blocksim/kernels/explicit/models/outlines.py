@@ -21,7 +21,8 @@ from typing import NamedTuple
 from blocksim.kernels.common.arrays import CONTACTS, NO_FACE, Integers, Record, Records, World
 from blocksim.kernels.common.geometry import relative_pose, slab_depth, to_world
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.models.duplicate_corners import CLOSE, PARALLEL, drop_point, keeps_first
+from blocksim.kernels.explicit.models.duplicate_corners import CLOSE, drop_point
+from blocksim.kernels.explicit.models.outline_ends import is_same_end, keeps_inner
 from blocksim.kernels.explicit.outlines import (
     MOST_CORNERS,
     UPPER,
@@ -29,7 +30,6 @@ from blocksim.kernels.explicit.outlines import (
     cone_of,
     corner_of,
     corner_vector,
-    into_frame,
     is_piece,
     number_before,
     number_of_corners,
@@ -218,28 +218,6 @@ def ground_points(owner: Record, near: int, candidates: Integers, level: float, 
     return count
 
 
-@kernel
-def from_middle(body: Record, number: int, table: Records, nx: float, ny: float) -> float:
-    """Return the place (m) of a corner along the tangent (-ny, nx), from the middle of the face that looks along n."""
-    side = corner_of(body, table, side_along(body, table, nx, ny))
-    corner = corner_of(body, table, number)
-    tx, ty = into_frame(body, -ny, nx)
-    x = corner.x - side.x + side.half * side.ny
-    y = corner.y - side.y - side.half * side.nx
-    return tx * x + ty * y
-
-
-@rare_kernel
-def is_same_end(of_a: Record, of_b: Record, a: Record, b: Record, table: Records) -> bool:
-    """Return True if a corner of a and a corner of b (both points) mark the same end of one face contact."""
-    nx = of_a.nx
-    ny = of_a.ny
-    if nx * of_b.nx + ny * of_b.ny < PARALLEL:
-        return False
-    end_a = -from_middle(a, of_a.slot, table, -nx, -ny)
-    return end_a * from_middle(b, of_b.slot - MOST_CORNERS, table, nx, ny) > 0.0
-
-
 @rare_kernel
 def are_oblique(a: Record, b: Record, nx: float, ny: float, table: Records, cone: float) -> bool:
     """Return True if the faces of two bodies that look at each other along a normal are not nearly parallel."""
@@ -271,7 +249,7 @@ def drop_duplicates(
                 near = one if one.depth <= two.depth else two
                 oblique = are_oblique(a, b, near.nx, near.ny, table, cone)
                 if do_meet(one, two, cone) if oblique else is_same_end(one, two, a, b, table):
-                    keep_i = keeps_first(one, two, pair, contacts, oblique)
+                    keep_i = keeps_inner(one, two, a, b, pair, contacts, oblique, table)
                     gone = j if keep_i else i
                     pair.duplicates |= 1 << points[gone].slot
                     count = drop_point(points, gone, count)
