@@ -27,6 +27,7 @@ from blocksim.scenario.structures import MAX_BLOCKS, Polygons, Shaped, UnfitErro
 MAX_SEGMENTS = 1000
 SHAPES = "give it width, height and length, an outline, or sides"
 MAX_OVERLAPS = 20
+ROUNDING = 0.01  # of the least width of two bodies: by no more do rounded drawings overlap
 MAX_PIECES = 1_000_000
 MAX_INTERVALS = 65_000
 """Of particles along one side; the solver counts them in 16 bits."""
@@ -70,7 +71,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
     yield from _equal_names(origins, bodies)
     yield from _below_ground(scenario, origins, bodies)
     yield from _in_walls(scenario, origins, bodies)
-    yield from _overlaps(origins, bodies)
+    yield from _overlaps(scenario, origins, bodies)
     yield from unfit_loads(scenario, bodies)
     yield from unfit_holds(scenario, bodies)
     yield from _unfit_systems(scenario)
@@ -298,10 +299,19 @@ def _in_walls(scenario: Scenario, origins: Sequence[keys.KeyPath], bodies: Seque
         yield Finding(origins[body], f"body {name} and walls.{wall} overlap by {_mm(depth)}; they may only touch")
 
 
-def _overlaps(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+def _overlaps(scenario: Scenario, origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
     for first, second, depth in islice(overlap.overlapping_pairs(bodies), MAX_OVERLAPS):
         names = f"bodies {bodies[first].name} and {bodies[second].name}"
-        yield Finding(origins[second], f"{names} overlap by {_mm(depth)}; they may only touch")
+        text = f"{names} overlap by {_mm(depth)}; they may only touch"
+        is_small = depth <= ROUNDING * smallest_width((bodies[first], bodies[second]))
+        cure = _shrinking(scenario, origins[second], depth) if is_small else ""
+        yield Finding(origins[second], text + cure)
+
+
+def _shrinking(scenario: Scenario, origin: keys.KeyPath, depth: float) -> str:
+    """Return what parts a block of a drawing from another."""
+    is_drawn = origin[0] == "structures" and scenario.structures[int(origin[1])].kind == "polygons"
+    return f'; shrink = "{_mm(depth)}" of its structure parts them' if is_drawn else ""
 
 
 def _mm(length: float) -> str:

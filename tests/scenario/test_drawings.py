@@ -107,6 +107,10 @@ WRONG = {
     "too deep": ('{"type": "Feature", "geometry": ' * 30 + "null" + "}" * 30, "nested too deeply"),
     "overlap": (collection(feature(SQUARE), feature(SQUARE)), "bodies 1 and 2 overlap by 10 mm"),
     "material": (collection(feature(SQUARE), feature(SQUARE, material="granite")), "feature 2: material is not read"),
+    "rounded": (
+        collection(feature(SQUARE), feature([[0.999, 0], [2, 0], [2, 1], [0.999, 1], [0.999, 0]])),
+        'bodies 1 and 2 overlap by 0.01 mm; they may only touch; shrink = "0.01 mm" of its structure parts them',
+    ),
     "unknown block": (collection(feature(SQUARE, block="peer")), "unknown block \"peer\", did you mean 'pier'?"),
 }
 
