@@ -141,14 +141,16 @@ def faults(points: Sequence[Corner]) -> Iterator[tuple[int | None, str]]:
     turns = _turns(local)
     if min(turns) <= 0.0 or sum(turns) > 1.5 * 2.0 * math.pi:  # slow, and cannot happen to others
         yield from _crossed(local)
-    yield from _bent(turns)
-    yield from _thin(local, extent)
+    thin = list(_thin(local, extent))
+    yield from thin or _bent(turns)
 
 
 def _repeated(local: Sequence[Corner], extent: float) -> Iterator[tuple[int, str]]:
     for number, corner in enumerate(local):
         edge = math.dist(corner, local[number - 1])
-        if edge == 0.0:
+        if edge == 0.0 and number == 0:
+            yield len(local) - 1, "the first corner again; an outline closes by itself"
+        elif edge == 0.0:
             yield number, "the same corner as the one before"
         elif edge < SHORTEST:
             yield number, f"this corner is only {1e3 * edge * extent:.3g} mm from the one before; leave one of them out"
