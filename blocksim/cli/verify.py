@@ -61,7 +61,7 @@ def verify_command(
     """Run the verification cases and show the table.
 
     Exit code 1: a number is outside its tolerance. All cases take about four minutes on one core, half a minute with
-    --scheme nonsmooth, which leaves out the cases about springs. --soil runs those of soil instead, six minutes.
+    --scheme nonsmooth, which leaves out the cases about springs. --soil runs those of soil instead, nine minutes.
 
     Example: blocksim verify V3 V7 --law hertz-mindlin
     """

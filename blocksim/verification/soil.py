@@ -51,7 +51,7 @@ SOIL_CASES = (
         "5 mm only",
         {"surface": BANDS},
     ),
-    Case("S3", "smooth wall drawn back, rough base", "below S2", active_on_rough_base, quick="5 mm only"),
+    Case("S3", "smooth wall drawn back, rough base", "below S2", active_on_rough_base, "5 mm only", {"surface": BANDS}),
     Case("S4", "shear band behind a wall drawn back", "Roscoe 45°, Coulomb 45° + φ/2", shear_band, quick="5 mm"),
     Case(
         "S5",

@@ -1,7 +1,7 @@
 """The table of the cases of soil in this folder's README: measured, kept in results/verify_soil.json, as Markdown.
 
 `python -m blocksim.verification.soil_reference blocksim/verification/README.md` writes the table from what is kept;
-with `--measure` all cases are run first (six minutes), or with names after it these.
+with `--measure` all cases are run first (nine minutes), or with names after it these.
 """
 
 import json
