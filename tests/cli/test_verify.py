@@ -100,4 +100,4 @@ def test_soil_has_one_setting(blocksim: Command) -> None:
     answer = blocksim("verify", "--soil", "--scheme", "nonsmooth")
     assert (answer.code, answer.out) == (2, "")
     assert "--soil has one setting" in answer.err
-    assert blocksim("verify", "--soil", "S8").code == 65
+    assert blocksim("verify", "--soil", "S12").code == 65
