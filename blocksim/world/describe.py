@@ -137,7 +137,7 @@ def describe(scenario: Scenario) -> Description:
         step=step,
         steps=steps,
         frames=frames,
-        seconds=steps * (_seconds_per_step(scenario, len(placed), particles) + _seconds_of(others)),
+        seconds=steps * (_seconds_per_step(scenario, len(placed), particles) + _seconds_of(scenario, others)),
         bytes=file_bytes(len(placed), frames, contacts, sum(one.values for one in others)),
         memory=PROCESS_BYTES + size.bytes_needed + more,  # without frames: into a folder, they are written as they come
         frames_at_every_step=is_shorter_than_step(scenario.output.every, step),
@@ -173,9 +173,9 @@ def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
     return OUTLINES_COST * rectangles if has_outlines(scenario) else rectangles
 
 
-def _seconds_of(others: Sequence[Present]) -> float:
+def _seconds_of(scenario: Scenario, others: Sequence[Present]) -> float:
     """Return what a step of further systems costs (s)."""
-    return sum(one.count * one.system.cost.seconds for one in others)
+    return sum(one.count * one.system.cost.seconds * one.system.dearer(scenario) for one in others)
 
 
 def _limits(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World) -> StepLimits | None:

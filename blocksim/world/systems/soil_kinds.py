@@ -79,9 +79,15 @@ def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
         record.slope, record.cohesion = yield_surface(material)
         record.impedance = material.density * wave_speed(material)
         record.settling, record.settled = settling_of(scenario, table)
-        corrected = table.gradient == "corrected" if table.gradient else bool(material.cohesion)
-        record.is_corrected = corrected
+        record.is_corrected = is_corrected(scenario, table)
     return records
+
+
+def is_corrected(scenario: Scenario, table: SoilTable) -> bool:
+    """Return True if the gradients of a soil are corrected: as it says, else where there is cohesion."""
+    if table.gradient:
+        return table.gradient == "corrected"
+    return bool(scenario.materials[table.material].cohesion)
 
 
 def settling_of(scenario: Scenario, table: SoilTable) -> tuple[float, float]:

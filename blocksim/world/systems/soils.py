@@ -14,6 +14,7 @@ from blocksim.world.systems.soil_kinds import (
     SMOOTHING,
     depth_of_scene,
     interactions_with,
+    is_corrected,
     kind_records,
     wave_speed,
 )
@@ -64,7 +65,8 @@ ENERGIES = (
     "ramp",
 )
 FEW_TOUCHES = 128
-COST = Cost(seconds=200e-9, memory=395)  # measured
+COST = Cost(seconds=200e-9, memory=395)  # measured, with raw gradients
+CORRECTED = 1.5  # time of a step with corrected gradients over that, measured
 QUANTITIES = (
     Quantity("x", "m"),
     Quantity("y", "m"),
@@ -199,6 +201,10 @@ def _largest_step(scenario: Scenario) -> float:
     return min(courant * SMOOTHING * table.spacing / wave_speed(scenario.materials[table.material]) for table in tables)
 
 
+def _dearer(scenario: Scenario) -> float:
+    return CORRECTED if any(is_corrected(scenario, table) for table in soil_tables(scenario)) else 1.0
+
+
 def _stages() -> Any:
     from blocksim.kernels.common.systems import Stages  # noqa: PLC0415
     from blocksim.kernels.soil.energy import measure, survey  # noqa: PLC0415 - readers of stored runs compile nothing
@@ -254,6 +260,7 @@ SOILS = System(
     largest_step=_largest_step,
     stages=_stages,
     cost=COST,
+    dearer=_dearer,
     parts=part_names,
     touching=touching,
     shades=SHADES,

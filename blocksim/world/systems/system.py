@@ -105,6 +105,7 @@ class System:
     largest_step: Callable[[Scenario], float] | None = None  # s; None: the scheme knows
     stages: Callable[[], "Stages"] | None = None  # its compiled functions, where they are not those of a scheme
     cost: Cost = field(default_factory=Cost)  # of every element, where it is not part of the blocks'
+    dearer: Callable[[Scenario], float] = lambda _: 1.0  # time of a step of the elements of a scene over that, at most
     parts: Callable[[Scenario], tuple[str, ...]] | None = None  # names of its tables, which probes of force may name
     touching: Callable[[Any, Any], Touching] | None = None  # of its arrays and the world
     shades: tuple[Shade, ...] = ()  # the first one is the default

@@ -106,6 +106,13 @@ def test_arrays_of_soil_take_as_many_bytes_as_check_estimates() -> None:
     assert 0.95 * SOILS.cost.memory < taken / 2000 <= SOILS.cost.memory <= 400
 
 
+def test_check_estimates_more_time_for_corrected_gradients() -> None:
+    raw, corrected = (describe(scene(column(0.25, 0.2, 0.005, gradient=name))).seconds for name in ("raw", "corrected"))
+    clay = describe(scene(column(0.25, 0.2, 0.005, material="clay"))).seconds
+    assert 1.3 * raw < corrected < 1.5 * raw + 1e-3
+    assert clay > 1.3 * raw
+
+
 def test_a_thousand_particles_take_no_more_than_400_bytes_each() -> None:
     built: Any = build_scene(scene(column(0.25, 0.1, 0.005)))
     soils = built.systems[0]
