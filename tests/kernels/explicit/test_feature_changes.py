@@ -32,6 +32,7 @@ def regular(corners: int) -> Outline:
 ROUGH = [[-0.02, -0.004], [-0.006, -0.012], [0.012, -0.01], [0.018, 0.003], [0.004, 0.014], [-0.014, 0.01]]
 SHAPES = {"triangle": regular(3), "square": regular(4), "hexagon": regular(6), "16-gon": regular(16), "rough": ROUGH}
 PAIRS = [("triangle", "square"), ("square", "square"), ("hexagon", "hexagon"), ("hexagon", "16-gon")]
+QUICKEST = ("triangle", "square", "linear")
 PAIRS += [("16-gon", "16-gon"), ("rough", "16-gon"), ("rough", "rough"), ("triangle", "16-gon")]
 
 
@@ -102,8 +103,10 @@ def largest_jump(pair: Pair, low: NDArray[np.float64], high: NDArray[np.float64]
 
 @pytest.mark.parametrize("law", ["linear", "hertz-mindlin"])
 @pytest.mark.parametrize(("one", "two"), PAIRS)
-def test_force_does_not_jump_where_corners_pass_one_another(one: str, two: str, law: str) -> None:
+def test_force_does_not_jump_where_corners_pass_one_another(one: str, two: str, law: str, pace: int) -> None:
     """Faces that are parallel, to within 0.01 rad, may turn the force by as much: so it is between rectangles."""
+    if pace > 1 and (one, two, law) != QUICKEST:
+        pytest.skip("takes half a minute without the compiler")
     pair = Pair(one, two, law)
     seen = set()
     for share in (0.15, 0.3, 0.5, 0.8):
