@@ -51,11 +51,11 @@ def found(world: World, count: int) -> list[tuple[float, ...]]:
 
 
 @pytest.mark.parametrize(("above", "flush"), [(HEXAGON, 0.0), (WEDGE, 0.02)], ids=["hexagon", "wedge"])
-def test_points_that_last_are_those_of_the_search(above: Outline, flush: float, pace: int) -> None:
+def test_points_that_last_are_those_of_the_search(above: Outline, flush: float) -> None:
     """Blocks tilt and are shifted, from where corners are flush by less than they overlap: some come or go."""
     random = np.random.default_rng(3)
     lasting = changing = 0
-    for _ in range(TRIES // pace):
+    for _ in range(TRIES):
         deep = 10.0 ** random.uniform(-7.0, -3.5)
         x = flush + random.normal() * deep if random.random() < 0.5 else random.uniform(-0.01, 0.01)
         world, p = on_one_another(above, x, deep, "hertz-mindlin")
@@ -69,7 +69,7 @@ def test_points_that_last_are_those_of_the_search(above: Outline, flush: float, 
             lasting += 1
             assert world.pairs[p].is_sliver == 0
             assert quick == found(world, searched)
-    assert min(lasting, changing) > TRIES // pace // 8
+    assert min(lasting, changing) > TRIES // 8
 
 
 def test_points_of_a_law_with_one_stiffness_are_searched() -> None:
