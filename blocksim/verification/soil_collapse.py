@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blocksim.verification.case import Row, Setting, absolute, relative
-from blocksim.verification.soil_scene import COARSE, DENSITY, FINE, GRADIENTS, ROUGH, TALL, SoilScene
+from blocksim.verification.soil_scene import COARSE, DENSITY, DEPTH, FINE, GRADIENTS, ROUGH, TALL, SoilScene
 from blocksim.world.systems.soil_shown import connected
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def momentum_gained(gradient: str) -> float:
     The last is the sum of m |v| of particles and block at the start.
     """
     striker = {"block": "striker", "x": -0.6 * STRIKER, "y": 0.52, "velocity": [THROWN, -0.3 * THROWN]}
-    sides = {"width": STRIKER, "height": STRIKER, "length": 0.05, "material": "block"}
+    sides = {"width": STRIKER, "height": STRIKER, "length": DEPTH, "material": "block"}
     scene = SoilScene(
         (0.05, 0.05), COARSE, y=0.5, bodies=[striker], blocks={"striker": sides}, gravity=0.0, gradient=gradient
     )
@@ -34,7 +34,7 @@ def momentum_gained(gradient: str) -> float:
     random = np.random.default_rng(7)
     for name in ("vx", "vy"):
         points[name] = random.uniform(-0.5, 0.5, len(points))
-    block = DENSITY * STRIKER**2 * 0.05
+    block = DENSITY * STRIKER**2 * DEPTH
 
     def momentum() -> tuple[float, float]:
         body = scene.bodies[0]
@@ -84,7 +84,7 @@ def columns_of_rods(setting: Setting) -> Iterator[Row]:
         height = float(y[x < 2.0 * spacing].max()) + 0.5 * spacing
         left = 1.0 if ratio <= 0.65 else 1.0 / (1.42 * ratio ** (2.0 / 3.0))  # noqa: PLR2004 - of the source
         run_out = 3.25 * ratio**0.96 if ratio <= 1.5 else 3.80 * ratio**0.73  # noqa: PLR2004 - of the source
-        head = f"{'corrected: ' if gradient == 'corrected' else ''}{name} mm, s {1e3 * spacing:g} mm"
+        head = f"{dict(GRADIENTS)[gradient]}{name} mm, s {1e3 * spacing:g} mm"
         yield relative(f"{head}: height left", "", left, height / TALL, 0.07)
         last = float(x.max()) + 0.5 * spacing
         yield relative(f"{head}: run-out, last particle", "", run_out, (last - place) / place, 0.15)
@@ -106,5 +106,4 @@ def energy_kept(setting: Setting) -> Iterator[Row]:
         before = scene.entries()["soils_potential"]
         scene.to_time(1.0)
         left = scene.entries()["soils_potential"] / before
-        prefix = "corrected: " if gradient == "corrected" else ""
-        yield absolute(f"{prefix}{name}, energy left, s {1e3 * spacing:g} mm", "", 0.691, left, 0.03)
+        yield absolute(f"{dict(GRADIENTS)[gradient]}{name}, energy left, s {1e3 * spacing:g} mm", "", 0.691, left, 0.03)

@@ -82,12 +82,14 @@ class Polygons(Shaped):
 
     @model_validator(mode="after")
     def _not_shrunk_away(self) -> Self:
+        if not self.shrink:
+            return self
         width = min(outlines.least_width(tuple(one.outline)) for one in self.cells_given)
         if self.shrink > MOST_SHRINK * width:
             most = f"at most {MOST_SHRINK:g} of the least width of a block, {1e3 * MOST_SHRINK * width:.4g} mm"
             raise q.invalid(f"{1e3 * self.shrink:g} mm is too much; {most}", "shrink")
         for number, one in enumerate(self.cells_given):
-            if self.shrink and any(outlines.faults(self._outline(one))):
+            if any(outlines.faults(self._outline(one))):
                 raise q.invalid(f"block {number + 1} loses an edge; shrink less", "shrink")
         return self
 
