@@ -20,11 +20,40 @@ PAGES = [
     ROOT / "scenarios/README.md",
     ROOT / "results/README.md",
 ]
+# Phrases that readers stumbled over, as quoted by them; pages, help, templates and messages have better ones.
+STUMBLING = (
+    "compare the bits", "what it comes to", "throws away", "energy off by", "from its least", "no film format",
+    "is no kind of", "there is: steel", "turns of the blocks", "do not vary", "does the others", "asked for:",
+    "inside in everything", "one more test", "as if nothing came", "from anywhere", "ways of the centres",
+    "finds the same", "members of a sweep", "by hand at most", "all the same", "or mend", "developers' tools",
+    "lies along x, height", "tilt rises", "makes it fall", "put soil behind", "needs its unit",
+    "mistakes are reported together", "that folder, the folder",
+    "at which the structure falls", "if anything is outside", "cannot give the",
+    "is within reach", "unprinted values", "are printed, interlocks", "µm can decide", "Where to read on",
+    "by how much results change", "show where the blocks end", "as far as it came", "far off leave", "blocks fly",
+    "over its value", "drawn for every member", "random members", "blocks move on", "goes by the distance",
+    "last lines say how", "decide where the blocks", "never replaced", "takes up again", "first moved:",
+    "grows with the square", "take turns;", "comes at once would", "aluminium's own: faster", "unit that is meant",
+)  # fmt: skip
 TEXTS = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in PAGES}
 
 
 def test_the_first_page_is_short() -> None:
     assert len(README.encode()) <= 10_000
+
+
+def test_no_text_for_users_has_a_phrase_that_readers_stumbled_over() -> None:
+    sources = [*PAGES, *(ROOT / "blocksim/cli").rglob("*.toml"), *(ROOT / "blocksim/cli").rglob("*.py")]
+    sources += [*(ROOT / "blocksim/study").glob("*.py"), *(ROOT / "blocksim/scenario").glob("*.py")]
+    found = [
+        (str(path.relative_to(ROOT)), phrase)
+        for path in sources
+        if path.name != "CHANGELOG.md"
+        for text in [" ".join(path.read_text(encoding="utf-8").split())]
+        for phrase in STUMBLING
+        if phrase in text
+    ]
+    assert found == []
 
 
 def test_the_table_of_keys_is_the_one_of_the_models() -> None:

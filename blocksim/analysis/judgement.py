@@ -52,7 +52,7 @@ class Judgement:
     def __repr__(self) -> str:
         """Return a line: sweep, table, share inside and the verdict."""
         verdict = "inside" if self.inside else "outside"
-        share = f"{self.inside_all} of {self.members} members inside all ranges"
+        share = f"{self.inside_all} of {self.members} samples inside all ranges"
         return f"<Judgement of {self.sweep} against {self.source}: {share}, {verdict}>"
 
     @property
@@ -112,10 +112,10 @@ def judge(
 
 
 def _incomplete(evidence: Evidence) -> list[str]:
-    """Report measured quantities of which finished members have no value."""
+    """Report measured quantities of which finished samples have no value."""
     finished = int(evidence.members.finished.sum())
     return [
-        f"{finished - pair.known.size} finished members have no {shown_name(pair)}: they count as outside"
+        f"{finished - pair.known.size} finished samples have no {shown_name(pair)}: they count as outside"
         for pair in evidence.pairs
         if pair.known.size < finished
     ]

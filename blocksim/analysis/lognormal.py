@@ -120,12 +120,12 @@ def _special() -> Any:
 def _refusal(counts: Counts, confidence: float) -> NoCurve | None:
     """Return why there is no finite maximum, None where there is one."""
     if len(counts.x) < FEWEST:
-        return NoCurve("a curve needs members at two intensities or more")
+        return NoCurve("a curve needs samples at two intensities or more")
     failing, standing = counts.x[counts.failed > 0], counts.x[counts.failed < counts.members]
     if not failing.size:
-        return NoCurve("no member fails at any intensity", low=_beyond(counts, confidence, failing=False))
+        return NoCurve("no sample fails at any intensity", low=_beyond(counts, confidence, failing=False))
     if not standing.size:
-        return NoCurve("all members fail at all intensities", high=_beyond(counts, confidence, failing=True))
+        return NoCurve("all samples fail at all intensities", high=_beyond(counts, confidence, failing=True))
     if standing.max() <= failing.min():
         low, high = float(standing.max()), float(failing.min())
         where = (

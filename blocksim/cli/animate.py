@@ -31,11 +31,11 @@ def animate_command(
     overwrite: options.Replace = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Show a run as an animation, GIF or MP4.
+    """Render a run as an animation, GIF or MP4.
 
     The default is a GIF, NAME.gif, at a quarter of the real speed; the last frame is held. A run that was
-    stopped or killed is shown as far as it came. --forces needs a run that has stored contacts (output.contacts =
-    true), MP4 the extra `video` or the system's ffmpeg. The window fits what the blocks occupy; a few that fly far off
+    stopped or killed is shown as far as it got. --forces needs a run that has stored contacts (output.contacts =
+    true), MP4 the extra `video` or the system's ffmpeg. The view is fitted to the blocks; a few that travel far may
     leave it. An older animation of blocksim is replaced; any other file only with --overwrite.
 
     Example: blocksim animate scenarios/three_blocks.toml --speed 0.1
@@ -53,5 +53,5 @@ def animate_command(
     if stored.remark:
         note(stored.remark)
     if not quiet:
-        gone = f"; {beyond} of {len(stored.frames.names)} blocks fly out of the window" if beyond else ""
+        gone = f"; {beyond} of {len(stored.frames.names)} blocks leave the view" if beyond else ""
         note(f"animation: {animation} ({older}{count} frames{gone})")

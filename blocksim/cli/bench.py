@@ -36,7 +36,9 @@ def bench_command(
             "soils, start-up; with --peers three-blocks, three-blocks-e0, wall.",
         ),
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Run a reduced version; the last lines say how.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Run reduced cases; the last lines list what was reduced.")
+    ] = False,
     repeats: Annotated[int, typer.Option(min=1, metavar="N", help="Samples of each number.")] = REPEATS,
     peers: Annotated[
         bool, typer.Option("--peers", help="Compare with pymunk and Box2D, and draw the comparison.")

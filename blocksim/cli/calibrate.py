@@ -37,9 +37,11 @@ def calibrate_command(
         ),
     ] = None,
     trials: Annotated[int, typer.Option(min=1, metavar="N", help="Number of trials.")] = TRIALS,
-    members: Annotated[int, typer.Option(min=1, metavar="M", help="Runs over the scatter per trial.")] = MEMBERS,
+    members: Annotated[
+        int, typer.Option("--samples", "--members", min=1, metavar="M", help="Samples of the scatter per trial.")
+    ] = MEMBERS,
     fresh: Annotated[
-        int, typer.Option(min=1, metavar="M", help="Fresh runs for the final estimate of the probability.")
+        int, typer.Option(min=1, metavar="M", help="Fresh samples for the final estimate of the probability.")
     ] = FRESH_MEMBERS,
     seed: Annotated[int, typer.Option(min=0, metavar="S", help="Random seed.")] = 0,
     experiment: options.ExperimentPath = None,
@@ -60,8 +62,8 @@ def calibrate_command(
     Maximises the probability that a run is inside all measured ranges (as in compare) while the other inputs scatter as
     stated, not the agreement of one run. Writes the scenario with the fitted values and where they come from
     in [provenance]. Every trial is kept as it ends; a search that was stopped continues with --resume. Needs the extra
-    blocksim[study]. Exit code 1: nothing inside all ranges was found. The search then goes by the distance to the
-    ranges, and the file holds the nearest values. The example takes the scatter from [sweep], as in
+    blocksim[study]. Exit code 1: nothing inside all ranges was found. The search then minimises the distance to
+    the ranges, and the file holds the nearest values. The example takes the scatter from [sweep], as in
     "structures.0.overlap" = { mean = "10 mm", sd = "0.3 mm" }; --scatter "structures.0.overlap=10 mm+-0.3 mm" says the
     same.
 
@@ -132,7 +134,7 @@ def _nothing_found(found: Fit) -> list[str]:
         for hit in found.hits
     ]
     return [
-        "nothing found: no member is inside all ranges. The values above are the nearest",
+        "nothing found: no sample is inside all ranges. The values above are the nearest",
         "of those tried; widen the priors, fit other keys or raise --trials",
         *table_lines(("quantity", "measured", "median", "inside"), rows, left=1),
     ]
@@ -146,7 +148,7 @@ def _probability(found: Fit) -> list[str]:
     low, high = score.interval
     return [
         f"P(inside all ranges) = {score.share_inside:.3f}, 95 % interval {low:.3f} to {high:.3f} (Clopper-Pearson)",
-        f"of {score.members} fresh random members; search estimate {tried.share_inside:.3f} ({tried.members} members)",
+        f"of {score.members} fresh random samples; search estimate {tried.share_inside:.3f} ({tried.members} samples)",
     ]
 
 
@@ -156,7 +158,7 @@ def _tell_end(found: Fit) -> None:
         note(f"warning: {prior.key} = {value} lies at a bound of its prior; a wider one might fit better")
     failed = found.score.failed
     if failed:
-        note(f"{failed} of {found.score.members} fresh members failed or cannot be simulated; they count as outside")
+        note(f"{failed} of {found.score.members} fresh samples failed or cannot be simulated; they count as outside")
     note(f"written: {found.path}")
 
 

@@ -208,7 +208,7 @@ def _sag(rigid: SagDescription | None) -> list[str]:
     return [
         f"           {rigid.why}",
         f"           in {rigid.substeps} substeps, {solved}; manual limit {rigid.longest_step:.1e} s",
-        f"sag        {MICRO * rigid.sag:.3g} µm of block {rigid.block} at rest; grows with the square of the step",
+        f"sag        {MICRO * rigid.sag:.3g} µm at rest, block {rigid.block}: numerical, proportional to step squared",
         *([f"warning: {rigid.warning}"] if rigid.warning else []),
     ]
 

@@ -38,7 +38,7 @@ def compare_command(
     experiment: options.ExperimentPath = None,
     threshold: Annotated[
         float,
-        typer.Option(min=0.0, max=1.0, help="For sweeps: share of members that must be within all measured ranges."),
+        typer.Option(min=0.0, max=1.0, help="For sweeps: share of samples that must be within all measured ranges."),
     ] = THRESHOLD,
     u_num: Annotated[
         float,
@@ -51,9 +51,9 @@ def compare_command(
 ) -> None:
     """Compare runs with measured repeats.
 
-    Exit code 1: something is outside. A position is inside between the smallest and the largest repeat (0.5 mm
+    Exit code 1: anything is out of range. A position is inside between the smallest and the largest repeat (0.5 mm
     either side where all repeats are equal), a rotation within 5 degrees of the mean. Of a sweep, at least the share
-    --threshold of the members must be within all measured ranges; this needs the extra blocksim[study]. Its numbers:
+    --threshold of the samples must be within all measured ranges; this needs the extra blocksim[study]. Its numbers:
 
     {meanings}
 

@@ -32,8 +32,8 @@ def export_command(
     CSV: a row for each frame and block, with units in the heads; stored contacts go into a second file,
     NAME_contacts.csv. VTKHDF: one file with all times, blocks with number, velocity and rotation,
     ground and walls with number 0; ParaView opens it. GeoJSON and DXF: the outlines of all blocks in the last frame, in
-    m, which a structure of kind "polygons" takes up again; as blocks at rest overlap by what their contacts give way,
-    give it a shrink, such as "0.01 mm". A run that was stopped or killed is written as far as it came.
+    m, which can be re-imported as `polygons`; blocks at rest overlap by the contact deformation, so set `shrink`,
+    such as "0.01 mm". A run that was stopped or killed is written as far as it got.
 
     An older export is replaced; any other file only with --overwrite.
 

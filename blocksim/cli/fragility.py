@@ -21,7 +21,7 @@ from blocksim.study.progress import WHOLE, Shard
 
 DIGITS = 3
 DOUBTFUL = 0.05  # probability of a larger deviance below which counts and curve do not agree
-HEADS = ("members", "failures", "P", "95 % low", "high", "curve", "moving", "no result")
+HEADS = ("samples", "failures", "P", "95 % low", "high", "curve", "still moving", "no result")
 
 
 def fragility_command(
@@ -41,12 +41,14 @@ def fragility_command(
         typer.Option(
             SCATTER,
             metavar="KEY=MEAN+-SD",
-            help="What is drawn for every member: KEY=MEAN+-SD, KEY=FROM:TO or equally likely values, KEY=a,b,c. "
+            help="Quantity to sample: KEY=MEAN+-SD, KEY=FROM:TO or equally likely values, KEY=a,b,c. "
             "Repeatable. Default: the distributions of [sweep].",
             autocompletion=completion.scenario_keys,
         ),
     ] = None,
-    members: Annotated[int, typer.Option(min=1, metavar="N", help="Members at every intensity.")] = MEMBERS,
+    members: Annotated[
+        int, typer.Option("--samples", "--members", min=1, metavar="N", help="Samples at every intensity.")
+    ] = MEMBERS,
     fails: Annotated[
         list[str] | None,
         typer.Option(
@@ -64,12 +66,10 @@ def fragility_command(
     shard: Annotated[
         str | None,
         typer.Option(
-            metavar="I/N", help="Run only members I, I + N, ... (job arrays); then once without, for the curve."
+            metavar="I/N", help="Run only samples I, I + N, ... (job arrays); then once without, for the curve."
         ),
     ] = None,
-    retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Run members again that did not finish.")
-    ] = False,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Rerun samples that did not finish.")] = False,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder to write (default: results/NAME/fragility-HASH)."),
@@ -80,9 +80,9 @@ def fragility_command(
 ) -> None:
     """Find the probability of collapse over an intensity.
 
-    Draws members at every intensity, independently, counts those that fail with exact (Clopper-Pearson) limits, and
+    Draws samples at every intensity, independently, counts those that fail with exact (Clopper-Pearson) limits, and
     fits a lognormal curve by maximum likelihood: median, dispersion and their intervals. Runs that do not finish are
-    listed and not counted (exit code 77). The same command again, also after a kill or with more members, runs only
+    listed and not counted (exit code 77). The same command again, also after a kill or with more samples, runs only
     what is missing. Needs the extra blocksim[study]. Exit code 1: no curve fits, as nothing or everything fails.
 
     Example: blocksim fragility mine.toml --intensity motion.scale=0.5:2:7 --scatter friction.block_block=0.6+-0.05
@@ -180,7 +180,7 @@ def _span(ends: tuple[float, float], unit: str = "") -> str:
 
 
 def _beyond(plan: FragilityPlan, curve: NoCurve) -> list[str]:
-    """Return what the counts say of the median all the same."""
+    """Return what the counts still say of the median."""
     low, high = curve.low, curve.high
     match low > 0.0, high < float("inf"):
         case True, True:
@@ -196,9 +196,9 @@ def _beyond(plan: FragilityPlan, curve: NoCurve) -> list[str]:
 def _tell_end(found: FragilityResult) -> None:
     moving = sum(one.moving_on for one in found.points)
     if moving:
-        note(f"{moving} members have not failed, but end while blocks move on; a larger time.end may decide")
+        note(f"{moving} surviving samples were still moving at the end; increase time.end to decide them")
     if found.failed:
-        note(f"{found.failed} members have no result, see members.csv; they count neither as failures nor as survivors")
+        note(f"{found.failed} samples have no result, see members.csv; they count neither as failures nor as survivors")
     if found.left:
-        note(f"{found.left} members have not run; after all shards, rerun without --shard")
+        note(f"{found.left} samples have not run; after all shards, rerun without --shard")
     note(f"{sum(one.members + one.no_result for one in found.points)} runs, {found.run} of them now: {found.folder}")

@@ -34,7 +34,7 @@ SHARE = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(%?)")
 PERCENT = 100.0
 OUTCOME, MOVER, MOVED, DISPLACEMENT, TURN, *_ = MOVEMENT
 UNSETTLED = "does not settle"
-HEADS = ("verdict", "outcome", "first moved", "at s", "moved mm", "turned °")
+HEADS = ("verdict", "outcome", "first to move", "at s", "moved mm", "turned °")
 
 
 def _share(text: object) -> float:
@@ -69,7 +69,10 @@ def limit_command(
         ),
     ] = DEFAULT,
     to: Annotated[
-        float, typer.Option(metavar="SHARE", parser=_share, help="Width of a bracket over its value, such as 0.1%.")
+        float,
+        typer.Option(
+            metavar="SHARE", parser=_share, help="Relative width of the bracket at which to stop, such as 0.1%."
+        ),
     ] = TOLERANCE,
     over: Annotated[
         str | None,
@@ -105,7 +108,7 @@ def limit_command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Find the value of a key at which the structure falls.
+    """Find the critical value of a parameter (collapse threshold).
 
     Scans the range, as there may be more than one change, and then narrows every change between neighbours to a
     bracket. Failed runs are reported. The same command again, also after a kill, repeats no run. Limits of springs that
@@ -178,7 +181,7 @@ def _show(found: Mapping[str, LimitResult], *, as_given: bool, as_json: bool, qu
     if quiet or as_json:
         return
     if any(Verdict.UNDECIDED in one.verdicts.values() for one in found.values()):
-        note("undecided: the run ends while blocks move on; a larger time.end may decide")
+        note("undecided: blocks were still moving at the end; increase time.end to decide")
     warn_of_give(found.values(), as_given=as_given)
     for one in found.values():
         note(f"{one.runs} runs, {one.run} of them now: {one.folder / 'limit.csv'}")

@@ -39,7 +39,7 @@ def new_command(
 ) -> None:
     """Write a commented scenario, sweep or table from a template.
 
-    The file is ready to be checked and run; an existing file is never replaced.
+    The file is ready to be checked and run; existing files are never overwritten.
 
     Example: blocksim new three-blocks my_blocks
     """

@@ -72,13 +72,13 @@ def plot_command(
 ) -> None:
     """Draw a run, a sweep or a table of sensitivities.
 
-    The strip shows the measured ranges below the final state. --kind final shows where the blocks end, with rotation
+    The strip shows the measured ranges below the final state. --kind final shows the final positions, with rotation
     and measured range below each of them; --kind history shows x, y, rotation, energies, contacts and the ground's
     motion over time, or the panels of --panels; --kind motion shows acceleration, velocity and displacement of the
     supports with their peaks, also of a scenario that has not been run; --kind probe shows what [[probes]] recorded;
     --kind profile shows the surface of soil at several times.
     --forces draws contact forces as arrows, of runs that have stored them (output.contacts = true). A run that was
-    stopped or killed is drawn as far as it came.
+    stopped or killed is drawn as far as it got.
 
     A sweep over one key, or a second one with few values, is drawn as lines of final x; over two keys as a map of
     run-outs and outcomes; a sampled one as a matrix of its inputs. The measured range is marked in all of them. A

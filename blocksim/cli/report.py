@@ -24,7 +24,8 @@ def report_command(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="File to write.")] = Path("report.html"),
     experiment: options.ExperimentPath = None,
     members: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Maximum number of members of a sweep in the page.")
+        int,
+        typer.Option("--runs", "--members", min=0, metavar="N", help="Maximum number of runs of a sweep in the page."),
     ] = MEMBERS,
     overwrite: options.Replace = False,
     quiet: options.Quiet = False,
@@ -32,7 +33,7 @@ def report_command(
     """Write runs and sweeps into one HTML file.
 
     It has a player, time histories, the comparison with measured repeats, energies and provenance; for a sweep the
-    share of members inside, a table, a map and, with --keep-cases, the members. The file is self-contained and can be
+    share of members inside, a table, a map and, with --keep-cases, the samples. The file is self-contained and can be
     opened from disk or sent by mail. Frames are thinned and rounded where they are many; the page says so. A run that
     was killed or damaged is shown as far as it can be read (exit code 65 for damage). An older report is replaced; any
     other file only with --overwrite.

@@ -41,7 +41,7 @@ def run_command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Simulate a scenario and show where the blocks end.
+    """Simulate a scenario and print the final positions.
 
     If the scenario names an experiment, the table has the measured ranges. A finished run is not repeated but shown.
     Ctrl-C, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1 and --wall-time stop a run; --resume continues it with bit-identical
@@ -88,9 +88,7 @@ def warn_of_threads(threads: int) -> None:
     """Warn of more threads than cores, as all wait for one another at every step."""
     count = cores()
     if threads > count:
-        note(
-            f"warning: {threads} threads on {count} core{'s' if count > 1 else ''} take turns; {count} would be faster"
-        )
+        note(f"warning: {threads} threads on {count} core{'s' if count > 1 else ''}: oversubscribed, use {count}")
 
 
 def show_result(result: Result, *, as_json: bool, quiet: bool) -> None:
@@ -144,7 +142,7 @@ def _moved(found: Movement) -> str:
     """Return what moved, how far and first."""
     far = f"{number(found.largest_displacement_mm)} mm (block {found.displaced_block})"
     turned = f"{number(found.largest_rotation_deg)}° (block {found.rotated_block})"
-    first = f"\nfirst moved: block {found.first_mover} at {found.first_moved_s:.3f} s" if found.first_mover else ""
+    first = f"\nfirst to move: block {found.first_mover} at {found.first_moved_s:.3f} s" if found.first_mover else ""
     return f"{found.outcome}: largest displacement {far}, rotation {turned}{first}"
 
 

@@ -1,4 +1,4 @@
-"""blocksim sensitivity: which inputs decide where the blocks end."""
+"""blocksim sensitivity: inputs ranked by their effect on final positions."""
 
 import csv
 import io
@@ -62,7 +62,7 @@ def sensitivity_command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Show which inputs decide where the blocks end.
+    """Rank the inputs by their effect on final positions.
 
     The results are all measured quantities (without an experiment, x of the blocks) and the class of the outcome:
     rotations rounded to quarter turns. Blocks of the design with a failed run are left out and counted.

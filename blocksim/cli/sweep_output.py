@@ -183,12 +183,12 @@ def _tell_movement(result: SweepResult) -> None:
     note(f"{counts}; largest displacement {far:.2f} mm, rotation {turned:.2f}° (start to end)")
     moving = int(table[MOVES_ON].isin([True, "True"]).sum()) if MOVES_ON in table else 0
     if moving:
-        note(f"{moving} of {len(table)} cases end while blocks move on; a larger time.end would show where")
+        note(f"{moving} of {len(table)} cases were still moving at the end; increase time.end to see where they end")
     if MOVER in table and table[MOVER].notna().any():
         movers = table[MOVER].value_counts()
         first = ", ".join(f"block {name} in {count}" for name, count in movers.head(MOST_MOVERS).items())
         more = f", {len(movers) - MOST_MOVERS} others" if len(movers) > MOST_MOVERS else ""
-        note(f"first moved: {first}{more} of {len(table)} cases")
+        note(f"first to move: {first}{more} of {len(table)} cases")
 
 
 def _tell_failures(result: SweepResult, short: dict[str, str]) -> None:

@@ -79,7 +79,7 @@ def _explained(metric: Metric) -> Iterator[str]:
 
 
 def _failures(failures: tuple[Failure, ...]) -> list[str]:
-    """Name the first members that failed, a line each."""
+    """Name the first samples that failed, a line each."""
     lines = [
         textwrap.shorten(f"row {one.row}, case {one.case}: {one.status}: {one.reason}", width_of_screen())
         for one in failures[:MOST_FAILURES]
@@ -132,7 +132,7 @@ def _interval(low: float, high: float, column: Column) -> str:
 
 def _share_line(judgement: Judgement) -> str:
     share, asked = (f"{PERCENT * part:.1f} %" for part in (judgement.share_inside, judgement.settings.threshold))
-    count = f"{judgement.inside_all} of {judgement.members} members ({share})"
+    count = f"{judgement.inside_all} of {judgement.members} samples ({share})"
     return f"{count} are within all measured ranges; threshold: {asked}"
 
 

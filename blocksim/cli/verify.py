@@ -54,13 +54,15 @@ def verify_command(
     law: Annotated[Law, typer.Option(help="Force law.")] = Law.LINEAR,
     scheme: Annotated[Scheme, typer.Option(help="Stepping: springs or impulses.")] = Scheme.EXPLICIT,
     soil: Annotated[bool, typer.Option("--soil", help="The cases of soil, S1 to S11.")] = False,
-    quick: Annotated[bool, typer.Option("--quick", help="Run a reduced version; the last lines say how.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Run reduced cases; the last lines list what was reduced.")
+    ] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Run the verification cases and show the table.
 
-    Exit code 1: a number is outside its tolerance. All cases take about four minutes on one core, half a minute with
+    Exit code 1: a number is out of tolerance. All cases take about four minutes on one core, half a minute with
     --scheme nonsmooth, which leaves out the cases about springs. --soil runs those of soil instead, nine minutes.
 
     Example: blocksim verify V3 V7 --law hertz-mindlin

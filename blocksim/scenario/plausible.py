@@ -45,13 +45,13 @@ def _bare_numbers(scenario: Scenario) -> Iterator[str]:
         key = keys.format_key(("materials", name))
         if not LIGHTEST <= material.density <= HEAVIEST:
             given = "density" if material.unit_weight is None else "unit_weight"
-            yield f"{key}.{given} makes {material.density:.4g} kg/m^3; write the unit that is meant"
+            yield f"{key}.{given} makes {material.density:.4g} kg/m^3; add the intended unit"
         if material.young_modulus < SOFTEST:
-            yield f"{key}.young_modulus = {material.young_modulus:.4g} Pa; write the unit that is meant"
+            yield f"{key}.young_modulus = {material.young_modulus:.4g} Pa; add the intended unit"
     for name, block in scenario.blocks.items():
         for side in ("width", "height", "length", "radius"):
             if (size := getattr(block, side)) is not None and size > LONGEST:
-                yield f"{keys.format_key(('blocks', name, side))} = {size:.4g} m; write the unit that is meant"
+                yield f"{keys.format_key(('blocks', name, side))} = {size:.4g} m; add the intended unit"
 
 
 def _friction_angles(scenario: Scenario) -> Iterator[str]:

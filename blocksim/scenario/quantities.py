@@ -1,7 +1,7 @@
 """Numbers with a unit as written in a scenario, and as SI floats inside.
 
 Every quantity type accepts a number, taken as SI, or a string with a unit ("32 mm"), checked for its
-dimension and its allowed range. An angle needs its unit unless it is zero.
+dimension and its allowed range. An angle must carry a unit unless it is zero.
 """
 
 import functools

@@ -117,7 +117,7 @@ def _plain(table: BaseModel) -> dict[str, Any]:
 
 
 def _field(info: FieldInfo, value: object) -> object:
-    """Write one field; an angle needs its unit, because a bare one would be refused."""
+    """Write one field; an angle must carry a unit, because a bare one would be refused."""
     if si_unit(info) != ANGLE.unit or value is None:
         return _value(value)
     return [f"{one!r} rad" for one in value] if isinstance(value, tuple) else f"{value!r} rad"

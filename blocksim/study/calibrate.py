@@ -36,7 +36,7 @@ OnTrial = Callable[[Trial, Trial, int], None]
 
 @dataclass(frozen=True)
 class Fit:
-    """What a calibration found; `score` is of fresh members, drawn independently, that no trial has seen."""
+    """What a calibration found; `score` is of fresh samples, drawn independently, that no trial has seen."""
 
     plan: Plan
     best: Trial
@@ -147,8 +147,8 @@ def _provenance(plan: Plan, best: Trial, score: Score, trials: int) -> dict[str,
         low, high = score.interval
         scatter = ", ".join(f"{key} {words}" for key, words in plan.scatter.described().items())
         found = (
-            f"seed {plan.seed}, {trials} trials of {plan.members} members, P(inside all ranges) "
-            f"{score.share_inside:.3f} [{low:.3f}, {high:.3f}] of {score.members} fresh members, {table}, "
+            f"seed {plan.seed}, {trials} trials of {plan.members} samples, P(inside all ranges) "
+            f"{score.share_inside:.3f} [{low:.3f}, {high:.3f}] of {score.members} fresh samples, {table}, "
             f"scatter (SI): {scatter}"
         )
     verb = "calibrated" if _is_found(best, score) else "not calibrated (nothing inside all ranges, nearest values)"

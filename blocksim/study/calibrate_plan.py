@@ -30,7 +30,7 @@ TABLE = "experiment.table"
 NO_FIT = "nothing to fit: give --fit KEY=FROM:TO"
 NO_SCATTER = (
     "no input scatter: give --scatter KEY=MEAN+-SD (or KEY=FROM:TO), or a [sweep] table with distributions; "
-    "--members 1 fits a single run, whose agreement may be chance"
+    "--samples 1 fits a single run, whose agreement may be chance"
 )
 
 

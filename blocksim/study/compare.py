@@ -56,7 +56,7 @@ def compare(
 def compare_sweep(
     sweep: SweepResult | Path | str, experiment: Path | str | None = None, settings: Settings | None = None
 ) -> Judgement:
-    """Judge the members of a sweep by its table and an experiment's; by default that of the scenario.
+    """Judge the cases of a sweep by its table and an experiment's; by default that of the scenario.
 
     Raises InputMissingError without any experiment, InvalidInputError for tables that cannot be used or do not go with
     each other, UnavailableError without scipy.

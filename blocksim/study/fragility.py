@@ -141,12 +141,12 @@ def fragility(  # noqa: PLR0913 - one argument for each option of the command
     """Return how probable failure is at each intensity, and the lognormal curve that is most likely.
 
     `intensity` has one key and its values, {"motion.scale": [0.5, 1.0, 1.5]} or {"from": a, "to": b, "count": n};
-    `scatter` what is drawn for every member by itself: {"mean": m, "sd": s}, {"from": a, "to": b} or a list of equally
-    likely values, such as records (default: the distributions of [sweep]). `fails` says what counts as failure (see
-    `blocksim.study.criterion`), any of several. Members are drawn independently at every intensity, so that limits and
-    intervals hold.
+    `scatter` the quantities drawn for each sample by itself: {"mean": m, "sd": s}, {"from": a, "to": b} or a list of
+    equally likely values, such as records (default: the distributions of [sweep]). `fails` says what counts as failure
+    (see `blocksim.study.criterion`), any of several. Samples are drawn independently at every intensity, so that limits
+    and intervals hold.
 
-    Runs are kept in `out` (default: results/NAME/fragility-HASH); the same call, also one with more members, does only
+    Runs are kept in `out` (default: results/NAME/fragility-HASH); the same call, also one with more samples, does only
     what is missing. `executor`, `jobs`, `scheduler`, `shard` and `retry_failed` are those of `sweep`; after all shards
     the call without one makes the curve. Raises ScenarioError, InvalidInputError, OutputExistsError where the
     folder is not free, UnavailableError without scipy (extra `study`), StoppedEarlyError on Ctrl-C.

@@ -124,7 +124,7 @@ def read_fragility(
     head, levels = _levels(bare, _variations(intensity))
     if members < 1 or members * len(levels) > MOST_CASES or not 0 <= seed <= MOST_SEED:
         message = (
-            f"{members} members at {len(levels)} intensities with seed {seed}: 1 to {MOST_CASES} runs are possible"
+            f"{members} samples at {len(levels)} intensities with seed {seed}: 1 to {MOST_CASES} runs are possible"
         )
         raise InvalidInputError(message)
     spread = _scatter(document, _variations(scatter or {}))

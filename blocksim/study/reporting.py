@@ -37,7 +37,7 @@ def report_on(
 ) -> tuple[int, list[str]]:
     """Write runs, sweeps and studies into one HTML file; return its size in bytes and what is damaged in them.
 
-    `members` is the maximum number of members of a sweep in the page; `on_remark` hears which of several runs is taken.
+    `members` is the maximum number of runs of a sweep in the page; `on_remark` hears which of several runs is taken.
     Raises what finding and reading them raises, and OutputError.
     """
     shown: list[Subject] = []

@@ -12,8 +12,8 @@ from blocksim.study.sweep_folder import FRAGILITY, LIMIT, LIMIT_CURVE, FolderKin
 from blocksim.view.layout import OWN
 from blocksim.view.report.studies import StudyPage
 
-HEADS = ("members", "failures", "share", "95 % low", "95 % high", "move on", "no result")
-SIDE_HEADS = ("verdict", "outcome", "first moved", "at s", "moved mm")
+HEADS = ("samples", "failures", "share", "95 % low", "95 % high", "still moving", "no result")
+SIDE_HEADS = ("verdict", "outcome", "first to move", "at s", "moved mm")
 Parts = tuple[list[tuple[str, str]], str, tuple[str, ...], list[list[str]]]
 
 
@@ -50,7 +50,7 @@ def _fragility(folder: Path) -> Parts:
         ]
         for one in points
     ]
-    summary = [("intensity", stored.key), ("failure", stored.fails), ("members", str(sum(p.members for p in points)))]
+    summary = [("intensity", stored.key), ("failure", stored.fails), ("samples", str(sum(p.members for p in points)))]
     return summary, "Failures over the intensity", (with_unit(stored.key, stored.unit), *HEADS), rows
 
 

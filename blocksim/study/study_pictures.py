@@ -180,7 +180,7 @@ def read_fragility_picture(folder: Path) -> Fragility:
     stored, read = read_answer(folder)
     points = [one for one in read if one.members]
     if not points:
-        message = f"{folder}: no member of this study has a result; nothing to draw"
+        message = f"{folder}: no sample of this study has a result; nothing to draw"
         raise InvalidInputError(message)
     x, share, low, high = np.array([(one.intensity, one.share, *one.limits) for one in points]).T
     curve = fit(Counts.of(x.tolist(), [one.failures for one in points], [one.members for one in points]))
@@ -252,7 +252,7 @@ def _side(folder: Path, stored: StoredLimit, value: float, end: StoredSide) -> S
     if first is None:
         told = end.outcome or ""
     else:
-        told = f"{end.outcome}; first moved: block {first} at {end.first_moved_s or 0.0:.3g} s"
+        told = f"{end.outcome}; first to move: block {first} at {end.first_moved_s or 0.0:.3g} s"
     side = Side(run.frames, support_of(run.scenario, run.events), first, said, is_mechanism=end.verdict != STANDS)
     moment = float(run.frames.time[side.frame])
     return replace(side, caption=f"{said}\n{told} (drawn at {moment:.3g} s)")

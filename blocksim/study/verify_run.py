@@ -161,7 +161,7 @@ def _ignore(_: Progress) -> None:
 def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = _ignore) -> RunVerdict:
     """Run the scenario of a run folder again, in memory, and compare everything that the folder keeps.
 
-    A run that was interrupted is repeated as far as it came. Raises InputMissingError where no run is there,
+    A run that was interrupted is repeated as far as it got. Raises InputMissingError where no run is there,
     InvalidInputError (ScenarioError) for files that cannot be read, StoppedEarlyError where the repetition is stopped.
     """
     folder = find_run(place)

@@ -84,7 +84,7 @@ def _draw_points(axes: "Axes", found: Fragility) -> None:
         markersize=4.0,
         linewidth=style.LINE_WIDTH,
         capsize=2.5,
-        label="share of members, 95 % limits",
+        label="share of samples, 95 % limits",
         clip_on=False,
         zorder=3,
     )

@@ -71,7 +71,7 @@ def test_blocks_that_are_not_measured_or_not_there_are_reported() -> None:
     found = judge(members, table_of({("1", "x"): [1, 2]}))
     assert found.messages == (
         "block '2' is not in repeats.csv; it is not compared",
-        "1 finished members have no x of block 1: they count as outside",
+        "1 finished samples have no x of block 1: they count as outside",
     )
     with pytest.raises(InvalidInputError, match=r"repeats\.csv measures block '3', but the sweep has only '1', '2'"):
         judge(members, table_of({("3", "x"): [1, 2]}))

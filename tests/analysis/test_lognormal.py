@@ -64,8 +64,8 @@ def test_the_curve_is_the_most_likely_one_and_its_intervals_are_those_of_the_pro
 @pytest.mark.parametrize(
     ("failed", "low", "high", "why"),
     [
-        ([0] * 8, 1.9, math.inf, "no member fails"),
-        ([32] * 8, 0.0, 0.4, "all members fail"),
+        ([0] * 8, 1.9, math.inf, "no sample fails"),
+        ([32] * 8, 0.0, 0.4, "all samples fail"),
         ([0] * 4 + [32] * 4, 0.85, 1.0, "all stand up to 0.85 and all fail from 1"),
         ([0] * 4 + [7] + [32] * 3, 1.0, 1.0, "both occur at 1 only"),
         ([32] * 4 + [0] * 4, 0.0, math.inf, "do not become more frequent"),
@@ -80,7 +80,7 @@ def test_counts_without_a_finite_dispersion_have_no_curve(failed: list[int], low
 
 
 def test_few_members_do_not_bound_the_median() -> None:
-    assert found([0] * 8, members=4) == NoCurve("no member fails at any intensity", 0.0, math.inf)
+    assert found([0] * 8, members=4) == NoCurve("no sample fails at any intensity", 0.0, math.inf)
     flat = found([6, 5, 4, 5, 6, 4, 6, 7], members=16)
     assert isinstance(flat, Curve)
     assert flat.median_interval[1] == flat.dispersion_interval[1] == math.inf

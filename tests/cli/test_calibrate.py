@@ -16,7 +16,7 @@ TABLE = "block,quantity,unit,replicate,value\nblock,x,mm,1,41\nblock,x,mm,2,43\n
 FIT = ("--fit", f"{FRICTION}=0.2:0.5")
 NEAR = ("--fit", f"{FRICTION}=0.3:0.307")  # all of which stop in the range without scatter
 SCATTER = ("--scatter", f"{SPEED}=0.5 m/s+-0.01 m/s")
-SHORT = ("--trials", 20, "--members", 8, "--fresh", 128)
+SHORT = ("--trials", 20, "--samples", 8, "--fresh", 128)
 Slide = Callable[..., Answer]
 
 
@@ -45,17 +45,17 @@ def test_friction_of_the_slide_is_found(slide: Slide, blocksim: Command) -> None
     assert blocksim("check", "fitted.toml").code == 0
     fitted = Document.read("fitted.toml")
     told = fitted.build().provenance[FRICTION]
-    assert "prior 0.2 to 0.5, seed 0, 20 trials of 8 members" in told
-    assert "of 128 fresh members, measured.csv" in told
+    assert "prior 0.2 to 0.5, seed 0, 20 trials of 8 samples" in told
+    assert "of 128 fresh samples, measured.csv" in told
     assert "# one block sliding" not in fitted.source.text
     assert "as in Table 1" in fitted.source.text  # the user's comments stay
 
 
 def test_nothing_found_is_1_and_the_nearest_is_reported(slide: Slide) -> None:
-    few = ("--trials", 20, "--members", 4, "--fresh", 8)
+    few = ("--trials", 20, "--samples", 4, "--fresh", 8)
     answer = slide("--fit", f"{FRICTION}=0.4:0.9", *SCATTER, *few, "--out", "fitted.toml")
     assert answer.code == 1
-    assert "nothing found: no member is inside all ranges" in answer.out
+    assert "nothing found: no sample is inside all ranges" in answer.out
     head, _, row = (line.split() for line in answer.out.splitlines()[-3:])
     assert head == ["quantity", "measured", "median", "inside"]
     assert row[:5] == ["x_mm", "of", "block", "[41.00,", "43.00]"]
@@ -82,7 +82,7 @@ def test_table_fits_the_screen_and_bounds_are_warned_of(slide: Slide) -> None:
 
 
 def test_nothing_is_overwritten_unless_asked(slide: Slide, tmp_path: Path) -> None:
-    few = (*NEAR, *SCATTER, "--trials", 2, "--members", 2, "--fresh", 2, "--out", "fitted.toml", "--quiet")
+    few = (*NEAR, *SCATTER, "--trials", 2, "--samples", 2, "--fresh", 2, "--out", "fitted.toml", "--quiet")
     assert slide(*few).code == 0
     before = (tmp_path / "fitted.toml").read_text()
     again = slide(*few)
@@ -105,7 +105,7 @@ def test_nothing_is_overwritten_unless_asked(slide: Slide, tmp_path: Path) -> No
 
 
 def test_more_trials_continue_where_fewer_ended(slide: Slide) -> None:
-    many = (*FIT, *SCATTER, "--members", 2, "--fresh", 2)
+    many = (*FIT, *SCATTER, "--samples", 2, "--fresh", 2)
     assert slide(*many, "--trials", 18, "--out", "one.toml").code == 0
     assert slide(*many, "--trials", 20, "--out", "other.toml").code == 0
     told = slide(*many, "--trials", 20, "--out", "one.toml", "--resume", "--overwrite")
@@ -117,7 +117,7 @@ def test_scatter_of_the_scenario_is_the_default_and_stays_in_the_file(slide: Sli
     scenario = tmp_path / "mine" / "slide.toml"
     own = f'\n[sweep]  # my scatter\nmode = "normal"\n"{SPEED}" = {{ mean = "0.5 m/s", sd = "0.01 m/s" }}\n'
     scenario.write_text(scenario.read_text() + own)
-    few = (*FIT, "--trials", 4, "--members", 4, "--fresh", 4)
+    few = (*FIT, "--trials", 4, "--samples", 4, "--fresh", 4)
     assert slide(*few, "--out", "own.toml").code == 0
     assert slide(*few, *SCATTER, "--out", "given.toml").code == 0
     assert own in Path("own.toml").read_text()
@@ -125,14 +125,14 @@ def test_scatter_of_the_scenario_is_the_default_and_stays_in_the_file(slide: Sli
 
 
 def test_single_run_without_scatter_says_that_it_is_one(slide: Slide) -> None:
-    answer = slide(*FIT, "--trials", 20, "--members", 1, "--out", "fitted.toml")
+    answer = slide(*FIT, "--trials", 20, "--samples", 1, "--out", "fitted.toml")
     assert answer.code == 0
     assert "one run, without input scatter: inside all ranges" in answer.out
 
 
 @pytest.mark.long
 def test_stopped_killed_and_resumed_it_finds_the_same(slide: Slide, process: Process, tmp_path: Path) -> None:
-    many = (*FIT, *SCATTER, "--trials", 22, "--members", 4, "--fresh", 4)
+    many = (*FIT, *SCATTER, "--trials", 22, "--samples", 4, "--fresh", 4)
     assert slide(*many, "--out", "whole.toml", "--quiet").code == 0
     given = ("mine/slide.toml", *SOFT, "--experiment", "measured.csv", *many, "--out", "cut.toml", "--resume")
     journal = tmp_path / "cut.trials.jsonl"

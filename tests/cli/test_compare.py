@@ -91,10 +91,10 @@ def test_sweep_is_judged_by_its_share_inside(blocksim: Command) -> None:
     answer = blocksim("compare", "out", "--threshold", 0.6)
     assert answer.code == 1
     last = answer.out.splitlines()[-1]
-    assert last == "1 of 2 members (50.0 %) are within all measured ranges; threshold: 60.0 %"
+    assert last == "1 of 2 samples (50.0 %) are within all measured ranges; threshold: 60.0 %"
     assert ": failed: " in answer.out
     assert json.loads(blocksim("compare", "out", "--json").out)[0]["share_inside"] == 0.5
-    assert "1 of 2 members" in blocksim("compare", "out", "--experiment", TABLE).out
+    assert "1 of 2 samples" in blocksim("compare", "out", "--experiment", TABLE).out
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ SLIDE = ("fragility", "scenarios/slide.toml", *AT_REST)
 TILT = ("--intensity", "ground.tilt=14deg:26deg:5")
 SLIDES = ("--fails", "outcome == slid")
 SCATTER = ("--scatter", "friction.block_ground=0.38+-0.08")
-FEW = ("--members", 6, "--out", "out")
+FEW = ("--samples", 6, "--out", "out")
 
 
 def test_counts_limits_and_curve_are_shown_on_80_columns(blocksim: Command, golden: Golden) -> None:
@@ -42,7 +42,7 @@ def test_without_a_curve_it_says_why_and_where_the_median_is(blocksim: Command, 
 def test_shards_wait_for_one_another(blocksim: Command) -> None:
     first = blocksim(*SLIDE, *TILT, *SLIDES, *SCATTER, *FEW, "--shard", "0/2")
     assert first.code == 0
-    assert "15 members have not run; after all shards, rerun without --shard" in first.err
+    assert "15 samples have not run; after all shards, rerun without --shard" in first.err
     assert blocksim(*SLIDE, *TILT, *SLIDES, *SCATTER, *FEW, "--shard", "1/2").code == 0
     last = blocksim(*SLIDE, *TILT, *SLIDES, *SCATTER, *FEW)
     assert (last.code, last.err.splitlines()[-1]) == (0, "30 runs, 0 of them now: out")
@@ -54,7 +54,7 @@ def test_members_without_a_result_are_exit_code_77(blocksim: Command) -> None:
     answer = blocksim(*SLIDE, *broken, *soft, "--intensity", "gravity=5,10", *FEW)
     assert answer.code == 77
     assert "no result" in answer.out.splitlines()[2]
-    assert "members have no result, see members.csv" in answer.err
+    assert "samples have no result, see members.csv" in answer.err
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_members_without_a_result_are_exit_code_77(blocksim: Command) -> None:
         "--intensity gravity=1,2 --scatter friction.block_ground=0.3",
         "--intensity gravity=1,2 --scatter friction.block_ground=a:b",
         "--intensity gravity=1,2 --shard 3/2",
-        "--intensity gravity=1,2 --members 0",
+        "--intensity gravity=1,2 --samples 0",
     ],
 )
 def test_mistakes_are_shown_and_leave_nothing(
@@ -84,7 +84,7 @@ def test_mistakes_are_shown_and_leave_nothing(
 def test_a_study_killed_again_and_again_ends_as_one_that_was_not(
     blocksim: Command, process: Process, tmp_path: Path
 ) -> None:
-    wall = ("fragility", "scenarios/tilting_wall.toml", "--intensity", "ground.tilt=31deg:34deg:4", "--members", 40)
+    wall = ("fragility", "scenarios/tilting_wall.toml", "--intensity", "ground.tilt=31deg:34deg:4", "--samples", 40)
     study = (*wall, "--scatter", "friction.block_block=0.65+-0.03", "--set", "time.stop_at_rest=false", "--jobs", 1)
     assert blocksim(*study, "--out", "whole").code == 0
     for _ in range(in_all(10)):

@@ -85,7 +85,7 @@ def test_several_places_are_parts_of_one_file(blocksim: Command, tmp_path: Path)
 
 def test_members_beyond_the_limit_are_named(blocksim: Command, tmp_path: Path) -> None:
     write_sweep(tmp_path / "sweep", cases=4, kept=3)
-    assert blocksim("report", "sweep", "--members", 1).code == 0
+    assert blocksim("report", "sweep", "--runs", 1).code == 0
     sweep = data_of(REPORT)
     assert list(sweep["members"]) == ["000000000000"]
     assert sweep["left_out"] == ["000000000001", "000000000002"]
@@ -96,7 +96,7 @@ def test_sweep_is_judged_by_the_repeats(blocksim: Command, tmp_path: Path) -> No
     write_experiment(tmp_path / "repeats.csv")
     assert blocksim("report", "sweep", "--experiment", "repeats.csv").code == 0
     text = REPORT.read_text(encoding="utf-8")
-    assert "3 of 6 members (50.0 %) are within all measured ranges" in text
+    assert "3 of 6 samples (50.0 %) are within all measured ranges" in text
     assert "[67.00, 69.00]" in text
     assert data_of(REPORT)["measured"] == {"1.x_mm": [67.0, 69.0], "1.rotation_deg": [-95.0, -85.0]}
     (tmp_path / "other.csv").write_text("block,quantity,unit,replicate,value\nnobody,x,mm,1,5.0\n", encoding="utf-8")

@@ -132,7 +132,7 @@ def test_more_threads_than_cores_are_a_warning(blocksim: Command, monkeypatch: p
     assert "warning" not in blocksim(*RUN, "--threads", "2", "--out", "two").err
     answer = blocksim(*RUN, "--threads", "3", "--out", "three")
     assert answer.code == 0
-    assert answer.err.startswith("warning: 3 threads on 2 cores take turns; 2 would be faster\n")
+    assert answer.err.startswith("warning: 3 threads on 2 cores: oversubscribed, use 2\n")
 
 
 def test_rigid_contacts_run_compare_and_sweep_like_springs(blocksim: Command, tmp_path: Path) -> None:
@@ -164,7 +164,7 @@ def test_folder_of_a_run_that_is_going_on_is_left_alone(
 def test_largest_movement_outcome_and_first_mover_are_reported(blocksim: Command) -> None:
     answer = blocksim("run", "scenarios/slide.toml", *SOFT, "--out", "slid")
     assert "slid: largest displacement 33." in answer.err
-    assert "(block block)\nfirst moved: block block at 0.001 s" in answer.err  # 0.5 m/s past a hundredth of 25 mm
+    assert "(block block)\nfirst to move: block block at 0.001 s" in answer.err  # 0.5 m/s past a hundredth of 25 mm
     movement = json.loads(Path("slid/run.json").read_text())["movement"]
     assert (movement["outcome"], movement["first_mover"]) == ("slid", "block")
 

@@ -207,7 +207,7 @@ def test_another_study_or_file_is_not_replaced_unasked(tmp_path: Path) -> None:
         ({"gravity": [1.0]}, {MU: [0.3]}, {}, InvalidInputError, "one value does not scatter"),
         ({"gravity": {"from": 1, "to": 2}}, FRICTION, {}, InvalidInputError, "single values are needed"),
         ({"gravity": [1.0]}, {}, {}, InvalidInputError, "no scatter: give --scatter"),
-        ({"gravity": [1.0]}, FRICTION, {"members": 0}, InvalidInputError, "0 members at 1 intensities"),
+        ({"gravity": [1.0]}, FRICTION, {"members": 0}, InvalidInputError, "0 samples at 1 intensities"),
         ({"gravity": [1.0]}, FRICTION, {"fails": "fel"}, InvalidInputError, "--fails fel: write for example"),
         ({"gravity": [1.0]}, FRICTION, {"executor": "dask"}, InvalidInputError, "needs the address of a scheduler"),
     ],

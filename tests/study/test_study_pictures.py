@@ -56,7 +56,7 @@ def test_plot_and_report_take_the_study(
     ("change", "why"),
     [
         ({"points": "none"}, "not the answer of a fragility study"),
-        ({"points": []}, "no member of this study has a result"),
+        ({"points": []}, "no sample of this study has a result"),
     ],
 )
 def test_a_damaged_answer_is_told(study: FragilityResult, tmp_path: Path, change: dict[str, object], why: str) -> None:

@@ -105,7 +105,7 @@ def _complaint(pair: Pair) -> str:
     if not pair.scatters:
         return "as the repeats do not scatter"
     few = min(pair.known.size, len(pair.repeats)) < FEWEST
-    return f"which needs {FEWEST} members and {FEWEST} repeats" if few else ""
+    return f"which needs {FEWEST} samples and {FEWEST} repeats" if few else ""
 
 
 def _row(pair: Pair) -> Row:
@@ -119,12 +119,12 @@ def _row(pair: Pair) -> Row:
 
 AREA = Metric(
     "area",
-    "area between the distributions of members and repeats (mm)",
+    "area between the distributions of samples and repeats (mm)",
     (
         *BLOCK,
-        Column("members", "members", Form.COUNT, "members with a value"),
+        Column("members", "samples", Form.COUNT, "samples with a value"),
         Column("repeats", "repeats", Form.COUNT, "repeats with a value"),
-        Column("area", "area", Form.NUMBER, "integral of |F_members - F_repeats| dx: 0 where they are equal"),
+        Column("area", "area", Form.NUMBER, "integral of |F_samples - F_repeats| dx: 0 where they are equal"),
         Column("interval", "95 %", Form.NUMBER, "bootstrap interval of the area, both samples resampled"),
     ),
     _find,

@@ -50,7 +50,7 @@ def _find_inside(evidence: Evidence) -> Findings:
     passes = {"repeat_passes": repeat_passes_all(ranged)}
     last: Row = {**everything, **_share(int(evidence.inside.sum()), total), **passes}
     failed = total - int(evidence.members.finished.sum())
-    told = f"shares are of all {total} members" + (f"; {failed} did not finish and count as outside" if failed else "")
+    told = f"shares are of all {total} samples" + (f"; {failed} did not finish and count as outside" if failed else "")
     return Findings((*rows, last), (told,))
 
 
@@ -87,12 +87,12 @@ SHARE = (
 )
 INSIDE = Metric(
     "inside",
-    "members inside the measured limits, by the rules for single runs",
+    "samples inside the measured limits, by the rules for single runs",
     (
         *BLOCK,
         Column("limits", "limits", Form.NUMBER, "limits of inside, as for a single run"),
-        Column("inside", "inside", Form.COUNT, "members inside; failed ones count as outside"),
-        Column("of", "", Form.COUNT, "all members, failed ones included"),
+        Column("inside", "inside", Form.COUNT, "samples inside; failed ones count as outside"),
+        Column("of", "", Form.COUNT, "all samples, failed ones included"),
         *SHARE,
         Column("repeat_passes", "repeat", Form.SHARE, "probability that the next repeat is inside: (n-1)/(n+1)", 0),
     ),
@@ -100,12 +100,12 @@ INSIDE = Metric(
 )
 PREDICTION = Metric(
     "prediction",
-    "members inside the 95 % prediction interval for the next test (mm)",
+    "samples inside the 95 % prediction interval for the next test (mm)",
     (
         *BLOCK,
         Column("prediction", "next test", Form.NUMBER, "mean +- t s sqrt(1 + 1/n) of the n repeats"),
-        Column("inside", "inside", Form.COUNT, "members in it; failed ones count as outside"),
-        Column("of", "of", Form.COUNT, "all members, failed ones included"),
+        Column("inside", "inside", Form.COUNT, "samples in it; failed ones count as outside"),
+        Column("of", "of", Form.COUNT, "all samples, failed ones included"),
         *SHARE,
     ),
     _find_predicted,

@@ -99,7 +99,7 @@ def _find(evidence: Evidence) -> Findings:
     complaint = _complaint(repeats, members)
     found = None if complaint else hotelling(repeats, members)
     if found is None:
-        return Findings((), (*messages, f"not computed: {complaint or 'too few members for their scatter'}"))
+        return Findings((), (*messages, f"not computed: {complaint or 'too few samples for their scatter'}"))
     return Findings((_row(chosen, repeats, members, found),), tuple(messages))
 
 
@@ -109,7 +109,7 @@ def _complaint(repeats: "Floats", members: "Floats") -> str:
     if n <= p:
         return f"{n} complete repeats for {p} positions, at least {p + 1} are needed"
     if not len(members):
-        return "no member has all positions"
+        return "no sample has all positions"
     if not np.ptp(repeats, axis=0).all():
         return "a position does not scatter in the complete repeats"
     correlation = np.atleast_2d(np.corrcoef(repeats, rowvar=False))
@@ -134,7 +134,7 @@ JOINT = Metric(
     (
         Column("positions", "positions", Form.TEXT, "blocks and quantities taken together"),
         Column("repeats", "n", Form.COUNT, "repeats in which all of them were measured"),
-        Column("members", "N", Form.COUNT, "members that have all of them"),
+        Column("members", "N", Form.COUNT, "samples that have all of them"),
         Column("T2", "T2", Form.NUMBER, "squared distance of the means in units of their scatter"),
         Column("critical", "5 %", Form.NUMBER, "T2 that is exceeded by chance in 5 % of experiments"),
         Column("F", "", Form.NUMBER, "T2 scaled to follow the F distribution"),

@@ -74,9 +74,9 @@ OUTCOME = Metric(
     "final rotations, rounded to quarter turns (deg)",
     (
         Column("outcome", "outcome", Form.TEXT, "rotation of each block, rounded to 90 degrees"),
-        Column("members", "members", Form.COUNT, "members with this outcome"),
-        Column("of", "of", Form.COUNT, "all members, failed ones included"),
-        Column("share", "share", Form.SHARE, "members / of", 1),
+        Column("members", "samples", Form.COUNT, "samples with this outcome"),
+        Column("of", "of", Form.COUNT, "all samples, failed ones included"),
+        Column("share", "share", Form.SHARE, "samples / of", 1),
         Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability", 1),
         Column("measured", "measured", Form.COUNT, "repeats with this outcome"),
         Column("repeats", "of", Form.COUNT, "all repeats"),

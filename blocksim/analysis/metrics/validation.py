@@ -23,7 +23,7 @@ def _find(evidence: Evidence) -> Findings:
     rows = tuple(_row(pair, evidence.u_num) for pair in lengths)
     messages = [f"u_num = {evidence.u_num:g} mm"] if rows else ["no length was measured"]
     if any(pair.known.size < ENOUGH for pair in lengths):
-        messages.append("u_input needs two members with a value")
+        messages.append("u_input needs two samples with a value")
     if any(pair.measured.n < ENOUGH for pair in lengths):
         messages.append("u_D needs two repeats")
     return Findings(rows, tuple(messages))
@@ -55,12 +55,12 @@ VALIDATION = Metric(
     "error and uncertainty after ASME V&V 20 (mm)",
     (
         *BLOCK,
-        Column("members", "", Form.COUNT, "members with a value, used for S and u_input"),
-        Column("S", "S", Form.NUMBER, "mean of the members"),
+        Column("members", "", Form.COUNT, "samples with a value, used for S and u_input"),
+        Column("S", "S", Form.NUMBER, "mean of the samples"),
         Column("D", "D", Form.NUMBER, "mean of the repeats"),
         Column("E", "E", Form.NUMBER, "S - D"),
         Column("u_num", "", Form.NUMBER, "standard uncertainty of the numerical solution (--u-num)"),
-        Column("u_input", "u_input", Form.NUMBER, "standard deviation of the members"),
+        Column("u_input", "u_input", Form.NUMBER, "standard deviation of the samples"),
         Column("u_D", "u_D", Form.NUMBER, "of D: sqrt(s^2/n + 0.5^2), reading included"),
         Column("u_val", "u_val", Form.NUMBER, "sqrt(u_num^2 + u_input^2 + u_D^2)"),
         Column("within", "|E|<=2u", Form.TEXT, "|E| <= 2 u_val: no error of the model is detected"),

@@ -250,7 +250,7 @@ def _movement(found: Movement | None) -> list[tuple[str, str]]:
         ("largest rotation", f"{found.largest_rotation_deg:.2f}° (block {found.rotated_block})"),
     ]
     if found.first_mover is not None:
-        rows.append(("first moved", f"block {found.first_mover} at {found.first_moved_s:.3f} s"))
+        rows.append(("first to move", f"block {found.first_mover} at {found.first_moved_s:.3f} s"))
     return rows
 
 

@@ -129,5 +129,5 @@ def _summary(table: CaseTable, members: int) -> list[tuple[str, str]]:
         ("finished", f"{finished} of {cases}"),
         *inside,
         ("varied", ", ".join(table.varied) or "nothing"),
-        ("members in this page", str(members)),
+        ("runs in this page", str(members)),
     ]

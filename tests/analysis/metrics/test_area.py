@@ -77,7 +77,7 @@ def test_repeats_without_scatter_give_an_area_and_no_interval(repeats: list[floa
 def test_small_samples_have_no_interval(members: int, repeats: int) -> None:
     found = found_by("area", {X: [float(n) for n in range(members)]}, {X: [float(n) for n in range(repeats)]})
     assert found.rows[0]["interval"] is None
-    assert found.messages == ("x of block a: no interval, which needs 4 members and 4 repeats",)
+    assert found.messages == ("x of block a: no interval, which needs 4 samples and 4 repeats",)
     assert np.isnan(area_interval(np.arange(members, dtype=float), np.arange(repeats, dtype=float))).all()
 
 

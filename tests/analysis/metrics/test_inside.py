@@ -21,7 +21,7 @@ def test_ends_count_as_inside_and_failed_members_as_outside() -> None:
     assert (row["inside"], row["of"], row["share"]) == (3, 6, 0.5)
     assert row["limits"] == (1.0, 3.0)
     assert everything["share"] == 0.5
-    assert found.messages == ("shares are of all 6 members; 1 did not finish and count as outside",)
+    assert found.messages == ("shares are of all 6 samples; 1 did not finish and count as outside",)
 
 
 def test_inside_in_everything_needs_the_same_member_inside_everywhere() -> None:

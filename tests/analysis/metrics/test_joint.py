@@ -102,7 +102,7 @@ def test_distant_means_do_not_agree() -> None:
         ),
         ({ONE: [1.0], TWO: [1.0]}, {ONE: [1, 2, nan], TWO: [nan, 5, 6]}, "1 complete repeats for 2 positions"),
         ({ONE: [1.0]}, {ONE: [1]}, "no measured position scatters"),
-        ({ONE: [nan]}, {ONE: [1, 2]}, "no member has all positions"),
+        ({ONE: [nan]}, {ONE: [1, 2]}, "no sample has all positions"),
         ({ONE: [1.0], TWO: [1.0]}, {ONE: [1, 2, 4, 5], TWO: [2, 4, 8, 10]}, "their covariance is singular"),
         ({ONE: [1.0], TWO: [1.0]}, {ONE: [1, 1, 1, 2], TWO: [1, 2, 3, nan]}, "a position does not scatter"),
     ],

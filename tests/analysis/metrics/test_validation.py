@@ -30,7 +30,7 @@ def test_error_is_held_against_twice_its_uncertainty(shift: float, within: bool)
 def test_one_member_or_one_repeat_gives_an_error_and_no_verdict() -> None:
     one_member = found_by("validation", {X: [5.0]}, {X: [4, 6]})
     assert (one_member.rows[0]["E"], one_member.rows[0]["within"]) == (0.0, None)
-    assert "u_input needs two members with a value" in one_member.messages
+    assert "u_input needs two samples with a value" in one_member.messages
     one_repeat = found_by("validation", {X: [5.0, 6.0]}, {X: [4]})
     assert (one_repeat.rows[0]["E"], one_repeat.rows[0]["within"]) == (1.5, None)
     assert "u_D needs two repeats" in one_repeat.messages

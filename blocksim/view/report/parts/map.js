@@ -127,7 +127,7 @@ class OutcomeMap {
     const verdict = { True: "inside", False: "outside" }[value("inside")];
     const told = [`case ${name}`, ...parts, value("status") + (value("reason") ? ` (${value("reason")})` : ""), ...(verdict ? [verdict] : []), ...ends];
     const key = this.data.members[name];
-    const help = key ? make("a", { href: `#${key}` }, "open member") : make("small", {}, isolated(this.help(name)));
+    const help = key ? make("a", { href: `#${key}` }, "open the run") : make("small", {}, isolated(this.help(name)));
     this.root.querySelector(".map .state").replaceChildren(...told.map((text) => make("span", {}, isolated(text))), help);
   }
 
