@@ -11,8 +11,11 @@ from typing import Any
 import h5py
 import pytest
 
+from blocksim.scenario import Document
+from blocksim.study.rows import MOVEMENT
+from blocksim.study.sweep import sweep
 from tests.cli.conftest import SOFT, Command
-from tests.view.report.folders import write_experiment, write_run, write_sweep
+from tests.view.report.folders import SCENARIOS, write_experiment, write_run, write_sweep
 
 REPORT = Path("report.html")
 
@@ -71,6 +74,18 @@ def test_notes_of_a_sweep_are_whole_sentences(blocksim: Command, tmp_path: Path)
     assert blocksim("report", "sweep", "--experiment", "repeats.csv").code == 0
     text = REPORT.read_text(encoding="utf-8")
     assert "<bdi>of the outcome" not in text
+
+
+def test_varied_inputs_of_a_real_sweep_are_its_keys_and_no_result(blocksim: Command) -> None:
+    falling = Document.read(SCENARIOS / "three_blocks_nonsmooth.toml").with_values({"time.end": 0.01})
+    vary = {"ground.tilt": ["10 deg", "12 deg"], "friction.block_block.kinetic": [0.2, 0.25]}
+    table = sweep(falling, vary, out=Path("swept"), jobs=1)
+    assert blocksim("report", "swept").code == 0
+    columns = data_of(REPORT)["columns"]
+    by_role = {role: [one["name"] for one in columns if one["role"] == role] for role in ("varied", "outcome")}
+    assert by_role["varied"] == list(table.keys) == ["ground.tilt [deg]", "friction.block_block.kinetic"]
+    assert by_role["outcome"] == ["status", "reason", "seconds", "inside", *MOVEMENT]
+    assert "<dt>varied</dt><dd><bdi>ground.tilt [deg], friction.block_block.kinetic</bdi></dd>" in REPORT.read_text()
 
 
 def test_several_places_are_parts_of_one_file(blocksim: Command, tmp_path: Path) -> None:

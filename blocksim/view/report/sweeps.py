@@ -9,8 +9,7 @@ from typing import Any
 from blocksim.scenario import Scenario
 from blocksim.view.report.runs import Subject
 
-MOVES = ("first_mover", "first_moved_s", "displacement_mm", "turn_deg")
-HEAD, TAIL = ("case",), ("status", "reason", "seconds", "inside", "outcome", *MOVES)
+CASE, STATUS = "case", "status"  # what is varied stands between them
 OF_BLOCKS = (".x_mm", ".y_mm", ".rotation_deg", ".left_mm", ".right_mm")
 MOST_VALUES = 400_000  # of blocks in the page; a sweep of 10 000 cases shows 13 blocks
 
@@ -25,8 +24,13 @@ class CaseTable:
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """Columns that are neither common to all sweeps nor of a block."""
-        known = {*HEAD, *TAIL}
+        """Columns of the keys that vary, as `SweepResult.keys` has them."""
+        return self.columns[self.columns.index(CASE) + 1 : self.columns.index(STATUS)]
+
+    @property
+    def results(self) -> tuple[str, ...]:
+        """Columns of what is known of a whole case: status, movement and whatever else is not of a block."""
+        known = {CASE, *self.varied}
         return tuple(name for name in self.columns if name not in known and not name.endswith(OF_BLOCKS))
 
     @property
@@ -92,11 +96,11 @@ def _limits(judged: Mapping[str, Any]) -> dict[str, list[float]]:
 def _columns(table: CaseTable, blocks: Sequence[str]) -> list[dict[str, Any]]:
     """Return names, roles and values; a column whose values are all numbers has numbers, an empty cell is null."""
     ends = [f"{block}{suffix}" for block in blocks for suffix in (".x_mm", ".rotation_deg")]
-    roles = {"varied": table.varied, "case": HEAD, "outcome": TAIL, "block": ends}
-    order = [*HEAD, *table.varied, *TAIL, *ends]
+    roles = {"varied": table.varied, "case": (CASE,), "outcome": table.results, "block": ends}
+    order = [CASE, *table.varied, *table.results, *ends]
     role = {name: kind for kind, names in roles.items() for name in names}
     return [
-        {"name": name, "role": role[name], "values": _values(table.column(name), is_text=name in HEAD)}
+        {"name": name, "role": role[name], "values": _values(table.column(name), is_text=name == CASE)}
         for name in order
         if name in table.columns
     ]
