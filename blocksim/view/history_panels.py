@@ -132,8 +132,7 @@ class Seen:
 
 
 def _rotation(seen: Seen) -> Motion:
-    angle = seen.frames.angle
-    return Motion("rotation (°)", np.degrees(angle[seen.chosen] - angle[0]), "rotation")
+    return Motion("rotation (°)", np.degrees(seen.frames.rotation[seen.chosen]), "rotation")
 
 
 def _displacement(seen: Seen, axis: int) -> Floats:

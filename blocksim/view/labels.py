@@ -42,7 +42,7 @@ def labels_of(frames: FramesLike, frame: int, page: Page, measured: MeasuredTabl
     ranges = _ranges(measured)
     centres = MILLIMETRES * np.stack([frames.x[frame], frames.y[frame]], axis=-1)
     below = _page_x(page, centres)
-    turns = np.degrees(frames.angle[frame] - frames.angle[0])
+    turns = np.degrees(frames.rotation[frame])
     labels = []
     for index, name in enumerate(frames.names):
         lines = (style.shortened(name, LETTERS), f"x {centres[index, 0]:.2f} mm", f"{_plain(turns[index])}°")

@@ -142,8 +142,8 @@ def with_shade(paint: Paint, frames: Any, name: str) -> Paint:
 
 
 def by_turn(frames: FramesLike) -> Paint:
-    """Return a scale of the angle turned since the start, the same to both sides."""
-    turns = np.degrees(frames.angle - frames.angle[0])
+    """Return a scale of the angle turned since the blocks were placed, the same to both sides."""
+    turns = np.degrees(frames.rotation)
     farthest = float(np.abs(turns[drawable_frames(frames)]).max())
     most = min(max(farthest, LEAST_TURN), HALF_TURN)
     return _scaled(

@@ -48,6 +48,11 @@ class FramesLike(Protocol):
         ...
 
     @property
+    def rotation(self) -> Floats:
+        """Angles turned since the blocks were placed (rad), (n, b), as in the final table."""
+        ...
+
+    @property
     def size_x(self) -> Floats:
         """Sizes along the blocks' own x axis (m), (b,)."""
         ...

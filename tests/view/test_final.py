@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from blocksim.simulation.table import final_columns
 from blocksim.view.final import draw_final
+from blocksim.view.history import draw_history
+from blocksim.view.history_panels import Choice
+from blocksim.view.paint import by_turn
 from tests.view.drawings import TABLE
-from tests.view.made_up import boxes_of, toppling
+from tests.view.made_up import boxes_of, stacked, toppling
 from tests.view.test_loads import support
 
 
@@ -26,8 +30,23 @@ def test_labels_and_measured_ranges_stand_below_what_they_are_about(caught: list
 def test_rotation_counts_from_the_start_and_is_not_wrapped(caught: list[Figure]) -> None:
     frames = toppling(1)
     frames.angle[:, 0] = np.linspace(np.pi, 4.0 * np.pi, len(frames))
+    frames.start_angle[0] = np.pi
     draw_final(frames, "final.png")
     assert "540.00°" in [text for text, _ in boxes_of(caught[0])]
+
+
+def test_rotation_of_what_turned_while_settling_is_that_of_the_table(caught: list[Figure]) -> None:
+    frames = stacked(1)
+    frames.angle[:] = np.radians(1.24)  # from the first frame on, which is after settling
+    (rotation,) = final_columns(frames)["rotation_deg"]
+    draw_final(frames, "final.png")
+    draw_history(frames, "history.png", choice=Choice(("rotation",)))
+    assert f"{rotation:.2f}°" == "1.24°" in [text for text, _ in boxes_of(caught[0])]
+    (curve,) = (line for axes in caught[1].axes for line in axes.lines if len(line.get_xdata()) == len(frames))
+    assert np.asarray(curve.get_ydata())[-1] == pytest.approx(rotation)
+    scale = by_turn(frames).scale
+    assert scale is not None
+    assert scale.high == pytest.approx(rotation)
 
 
 def test_loads_are_drawn_and_explained_with_room_for_what_acts_on_all_blocks(caught: list[Figure]) -> None:
