@@ -26,11 +26,14 @@ if TYPE_CHECKING:
 WIDTH, TALLEST, LEAST_WIDTH, LOWEST = 7.2, 3.6, 3.0, 0.5  # inches
 SIDE, GAP, HEAD, ROW_GAP, AXIS = 0.12, 0.16, 0.36, 0.12, 0.30  # inches
 VISIBLE = 0.3  # of a block's shortest side: displacement from which on a mechanism is seen
-SLIDES, ROCKS = "#CC79A7", "#FFFFFF"
+SLIDES, ROCKS = "#E7298A", "#FFFFFF"  # no colour of displacements, loads or edges
 FIRST: dict[str, Any] = {"color": "#000000", "linewidth": 1.8, "zorder": 3.2, "solid_joinstyle": "miter"}
 ARROWS_OF_LOADS = "Red arrows: loads, on a scale of its own on each side."
 ARROWS_OF_SPEED = "Black arrows: velocity of driven bodies."
-LEGEND = "Outlined: block that moved first. Line: joint that slides; circle: point about which one rocks open."
+SLIDING: dict[str, Any] = {"color": SLIDES, "linewidth": 2.6, "marker": "D", "markersize": 2.2, "zorder": 3.3}
+HINGE: dict[str, Any] = {"color": ROCKS, "marker": "o", "markersize": 4.0, "zorder": 3.4}
+HINGE |= {"markeredgecolor": style.INK, "markeredgewidth": 0.8}
+ENTRIES, ENTRIES_WIDTH = 3, 3.8  # of the legend; inches that they need side by side
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +74,10 @@ def draw_mechanisms(
     width = paper.width(WIDTH, LEAST_WIDTH)
     across = 0.5 * (width - GAP)
     key = by_displacement(brackets[0][0].frames, brackets[0][0].support, 1.0).height
-    notes = wrapped([LEGEND, *_told_of_loads(brackets)], width - 2.0 * SIDE)
-    foot = AXIS + key + LINE * len(notes)
+    notes = wrapped(_told_of_loads(brackets), width - 2.0 * SIDE)
+    columns = ENTRIES if width >= ENTRIES_WIDTH else 1
+    legend = LINE * (len(notes) + ENTRIES // columns)
+    foot = AXIS + key + legend
     rows = len(brackets)
     tallest = paper.panel(TALLEST, rows, HEAD + foot + rows * (HEAD + ROW_GAP), LOWEST)
     pages = [page_for(_extent(pair), across, min(tallest, TALLEST), (SIDE, HEAD, ROW_GAP)) for pair in brackets]
@@ -85,7 +90,8 @@ def draw_mechanisms(
                 _draw_side(figure, side, page, (column * (across + GAP) + SIDE, top), most)
             top -= page.height
         paint = by_displacement(brackets[0][0].frames, brackets[0][0].support, most)
-        draw_key(figure, paint, SIDE, EDGE + LINE * len(notes))
+        draw_key(figure, paint, SIDE, EDGE + legend)
+        _draw_legend(figure, columns, EDGE + LINE * len(notes))
         for number, line in enumerate(reversed(notes)):
             write_text(figure, SIDE, EDGE + LINE * number, line, color=style.FAINT_INK)
         write_heading(figure, title, SIDE)
@@ -129,7 +135,7 @@ def _draw_side(figure: "Figure", side: Side, page: Page, corner: tuple[float, fl
     extent = Extent(**{**vars(page.extent), "tilt": side.support.tilt})
     canvas = Canvas(axes, extent, page.points_per_mm)
     paint: Paint = by_displacement(side.frames, side.support, most)
-    draw_scene(canvas, side.frames, side.frame, side.support, paint)
+    draw_scene(canvas, side.frames, side.frame, side.support, paint, with_tops=False)  # they read as sliding joints
     draw_outside(canvas, side.acts, 0, length_in(extent))
     _mark_first(canvas, side)
     _mark_joints(canvas, joints(side.frames, side.frame, side.support))
@@ -152,8 +158,30 @@ def _mark_joints(canvas: Canvas, found: Sequence[Joint]) -> None:
     for joint in found:
         points = MILLIMETRES * joint.points
         if joint.slides:
-            look: dict[str, Any] = {"color": SLIDES, "linewidth": 2.6, "zorder": 3.3, "solid_capstyle": "butt"}
-            canvas.axes.plot(*points.T, transform=canvas.scene, marker="D", markersize=2.2, **look)
+            canvas.axes.plot(*points.T, transform=canvas.scene, solid_capstyle="butt", **SLIDING)
         for x, y in MILLIMETRES * joint.hinges:
-            look = {"color": ROCKS, "markeredgecolor": style.INK, "markeredgewidth": 0.8, "zorder": 3.4}
-            canvas.axes.plot(x, y, marker="o", markersize=4.0, transform=canvas.scene, **look)
+            canvas.axes.plot(x, y, transform=canvas.scene, **HINGE)
+
+
+def _draw_legend(figure: "Figure", columns: int, bottom: float) -> None:
+    """Draw the marks of joints and of the first mover with their meaning, `bottom` inches from the lower edge."""
+    from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
+    from matplotlib.patches import Patch  # noqa: PLC0415
+
+    across, up = (float(size) for size in figure.get_size_inches())
+    handles = [
+        Patch(facecolor="none", edgecolor=FIRST["color"], linewidth=FIRST["linewidth"], label="first block to move"),
+        Line2D([], [], label="sliding joint", **SLIDING),
+        Line2D([], [], linestyle="none", label="hinge", **HINGE),
+    ]
+    figure.legend(
+        handles=handles,
+        ncol=columns,
+        loc="lower left",
+        bbox_to_anchor=(SIDE / across, bottom / up),
+        borderaxespad=0.0,
+        borderpad=0.0,
+        labelspacing=0.3,
+        handlelength=1.6,
+        frameon=False,
+    )

@@ -52,10 +52,18 @@ def readable_scale(frames: FramesLike) -> float:
     return float((np.maximum(wide * lengths, tall) / sizes).max(initial=0.0))
 
 
-def draw_scene(canvas: Canvas, frames: FramesLike, frame: int, support: Support, paint: Paint | None = None) -> None:
-    """Draw the support and the blocks of one frame, with the blocks' names where there is room for all."""
+def draw_scene(
+    canvas: Canvas,
+    frames: FramesLike,
+    frame: int,
+    support: Support,
+    paint: Paint | None = None,
+    *,
+    with_tops: bool = True,
+) -> None:
+    """Draw the support and the blocks of one frame, as `draw_standing` and `draw_blocks` do."""
     draw_standing(canvas, frames, frame, support)
-    draw_blocks(canvas, frames, frame, support, paint)
+    draw_blocks(canvas, frames, frame, support, paint, with_tops=with_tops)
 
 
 def draw_standing(canvas: Canvas, frames: FramesLike, frame: int, support: Support) -> None:
@@ -68,10 +76,19 @@ def draw_standing(canvas: Canvas, frames: FramesLike, frame: int, support: Suppo
     draw_shift(canvas, support, offset, MILLIMETRES * (float(frames.x[0].mean()) if frames.names else 0.0))
 
 
-def draw_blocks(canvas: Canvas, frames: FramesLike, frame: int, support: Support, paint: Paint | None = None) -> None:
+def draw_blocks(
+    canvas: Canvas,
+    frames: FramesLike,
+    frame: int,
+    support: Support,
+    paint: Paint | None = None,
+    *,
+    with_tops: bool = True,
+) -> None:
     """Draw the blocks of one frame, free and fixed ones, with their names where there is room for all.
 
-    Other systems lie below them, each in one colour, or each element in that of the paint.
+    `with_tops` marks the top face that each free block had at the start. Other systems lie below the blocks, each in
+    one colour, or each element in that of the paint.
     """
     paint = paint or by_block(frames)
     for number, track in enumerate(others_of(frames)):
@@ -82,6 +99,8 @@ def draw_blocks(canvas: Canvas, frames: FramesLike, frame: int, support: Support
     own = paint.fills(frame)
     fills = [style.GROUND_COLOUR if held else fill for held, fill in zip(fixed, own, strict=True)]
     _draw_outlines(canvas, frames, frame, fixed, fills)
+    if with_tops:
+        _draw_tops(canvas, frames, frame, ~fixed)
     _draw_names(canvas, frames, frame, fixed, fills)
 
 
@@ -143,26 +162,43 @@ def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: flo
 
 
 def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags, fills: Sequence[str]) -> None:
-    """Draw free blocks each in its colour, fixed ones hatched in that of the ground, and all upper sides."""
-    from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415 - see style
+    """Draw free blocks each in its colour, fixed ones hatched in that of the ground."""
+    from matplotlib.collections import PolyCollection  # noqa: PLC0415 - see style
 
     outlines = corners(frames, frame)
-    smallest = MILLIMETRES * canvas.points_per_mm * float(shortest_sides(frames).min(initial=np.inf))
-    thin = min(style.LINE_WIDTH, 0.05 * smallest)
+    smallest = _smallest(canvas, frames)
+    thin = _edge_width(smallest)
     line: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
     there = are_there(frames, frame)
     colours = [fill for fill, is_free in zip(fills, ~fixed & there, strict=True) if is_free]
     hatch = FIXED_HATCH if smallest >= LEAST_HATCHED else None
     held = PolyCollection(list(outlines[fixed & there]), facecolors=style.GROUND_COLOUR, hatch=hatch, **line)
     free = PolyCollection(list(outlines[~fixed & there]), facecolors=colours, **line)
+    for artist in (held, free):
+        canvas.axes.add_collection(artist)
+
+
+def _draw_tops(canvas: Canvas, frames: FramesLike, frame: int, free: Flags) -> None:
+    """Mark the top faces that free blocks had at the start."""
+    from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
+
     sides = LineCollection(
-        list(_upper_sides(frames, frame)[~fixed & there]),
+        list(_upper_sides(frames, frame)[free & are_there(frames, frame)]),
         colors=style.INK,
-        linewidths=2.0 * thin,
+        linewidths=2.0 * _edge_width(_smallest(canvas, frames)),
         transform=canvas.scene,
     )
-    for artist in (held, free, sides):
-        canvas.axes.add_collection(artist)
+    canvas.axes.add_collection(sides)
+
+
+def _smallest(canvas: Canvas, frames: FramesLike) -> float:
+    """Return the shortest side of all blocks (points)."""
+    return MILLIMETRES * canvas.points_per_mm * float(shortest_sides(frames).min(initial=np.inf))
+
+
+def _edge_width(smallest: float) -> float:
+    """Return the width of the edges of blocks (points)."""
+    return min(style.LINE_WIDTH, 0.05 * smallest)
 
 
 def _draw_names(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags, fills: Sequence[str]) -> None:

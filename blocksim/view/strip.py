@@ -75,7 +75,7 @@ def draw_strip(  # noqa: PLR0913 - one argument for each option of the command
         chosen = moments_at(frames, drawable, times)
         ranges = ranges if chosen[-1] == drawable[-1] else []  # they belong to the final state
     acts = outside(frames, chosen, support)
-    upper = ["Thick line inside a block: its own upper side."] if frames.names else []
+    upper = ["Thick line inside a block: top face at the start."] if frames.names else []
     told = [*upper, _legend(ranges, support, scale), acts.explanation]
     notes = wrap(" ".join(filter(None, told)), int(LETTERS_AN_INCH * paper.width(WIDTH, LEAST_WIDTH)))
     lines = Lines(_captions(support, acts), len(notes), rows_of(ranges), paint.height)

@@ -5,16 +5,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.study.run import run
 from blocksim.view.joints import joints
 from blocksim.view.layout import Paper
-from blocksim.view.mechanism import Side, draw_mechanisms
+from blocksim.view.mechanism import SLIDES, Side, draw_mechanisms
 from blocksim.view.run_data import support_of
 from blocksim.view.scene import corners
+from blocksim.view.style import BLOCK_COLOURS, INK, MEASURED_COLOUR
 from tests.study.test_limit import SLENDER, SQUAT, block_on_a_slope
 from tests.view.made_up import boxes_of
 
@@ -97,6 +100,26 @@ def test_the_picture_is_the_same_every_time_and_says_what_each_side_is(
     bare = side(SQUAT, "25 deg", contacts=False)
     with pytest.raises(InvalidInputError, match=r"output\.contacts=true"):
         draw_mechanisms([(bare, toppling)], tmp_path / "bare.png")
+
+
+def test_no_line_but_a_sliding_joint_reads_as_one_and_the_legend_has_its_colour(
+    sliding: Side, toppling: Side, caught: list[Figure]
+) -> None:
+    draw_mechanisms([(toppling, sliding)], "marks.png")
+    (figure,) = caught
+    panels = [axes for axes in figure.axes if any(isinstance(one, PolyCollection) for one in axes.collections)]
+    assert len(panels) == 2
+    lines = [one for axes in panels for one in axes.collections if isinstance(one, LineCollection)]
+    above_ground = [line for one in lines for line in one.get_segments() if (np.asarray(line)[:, 1] > 0.0).any()]
+    assert above_ground == []  # marks of top faces would lie on joints of voussoirs
+    colours = [{line.get_color() for line in axes.lines if line.get_marker() == "D"} for axes in panels]
+    assert colours == [set(), {SLIDES}]
+    (legend,) = figure.legends
+    named = {text.get_text(): handle for text, handle in zip(legend.texts, legend.legend_handles, strict=True)}
+    assert list(named) == ["first block to move", "sliding joint", "hinge"]
+    assert isinstance(named["sliding joint"], Line2D)
+    assert named["sliding joint"].get_color() == SLIDES
+    assert SLIDES not in {*BLOCK_COLOURS, MEASURED_COLOUR, INK}
 
 
 def test_loads_are_drawn_on_the_side_that_has_them_and_told(sliding: Side, caught: list[Figure]) -> None:
