@@ -1,0 +1,212 @@
+"""python -m tests.plan.figures: figures of the plan of the package, beside the ceilings that they must stay below.
+
+    python -m tests.plan.figures [--update]
+
+Each figure is a count or a share that grows as a plan decays: lines, files, imports, functions of one statement,
+modules that serve a single neighbour, questions that one module should answer for all. `--update` lowers the ceilings
+of those that got better; a ceiling is raised by hand only, with the reason in the commit.
+"""
+
+import ast
+import json
+import re
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+CEILINGS = Path(__file__).with_name("ceilings.json")
+SHAPE_QUESTION = re.compile(
+    r"\b(?:outlines?|shapes) is (?:not )?None"
+    r"|(?:if|not|any\() ?(?:body|one|self|block|bodies\[\w+\])?\.?outlines?\b(?!\.)"
+    r"|is_polygon|has_outlines|== OUTLINE\b|!= OUTLINE\b|if outline\b|corner_count > 0"
+)
+SCHEME_QUESTION = re.compile(
+    r"isinstance\([^)]*\b(?:Explicit|Nonsmooth)\b|scheme\s*(?:==|!=)|\bis_rigid\b|\.rigid\b|[\"'](?:nonsmooth|explicit)[\"']"
+)
+OWNERS_OF_SCHEMES = ("simulation/schemes/", "kernels/")
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+@dataclass(frozen=True)
+class Module:
+    """One Python file of the package."""
+
+    name: str  # dotted
+    path: str  # below the package
+    text: str
+
+    @cached_property
+    def tree(self) -> ast.Module:
+        """The syntax tree."""
+        return ast.parse(self.text)
+
+    @property
+    def folder(self) -> str:
+        """The folder below the package."""
+        return self.path.rpartition("/")[0]
+
+    @property
+    def lines(self) -> int:
+        """The number of lines."""
+        return self.text.count("\n")
+
+    @property
+    def functions(self) -> list[Function]:
+        """All functions and methods."""
+        return [node for node in ast.walk(self.tree) if isinstance(node, Function)]
+
+
+def read_package(root: Path = ROOT) -> list[Module]:
+    """Return all modules of blocksim below a checkout."""
+    folder = root / "blocksim"
+    paths = sorted(folder.rglob("*.py"))
+    return [
+        Module(
+            ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__"),
+            path.relative_to(folder).as_posix(),
+            path.read_text(encoding="utf-8"),
+        )
+        for path in paths
+    ]
+
+
+def _spans(nodes: Iterator[ast.stmt]) -> int:
+    return sum((node.end_lineno or node.lineno) - node.lineno + 1 for node in nodes)
+
+
+def _docstrings(module: Module) -> Iterator[ast.stmt]:
+    for node in ast.walk(module.tree):
+        if isinstance(node, Function | ast.ClassDef | ast.Module) and node.body:
+            first = node.body[0]
+            if (
+                isinstance(first, ast.Expr)
+                and isinstance(first.value, ast.Constant)
+                and isinstance(first.value.value, str)
+            ):
+                yield first
+
+
+def import_share(modules: list[Module]) -> float:
+    """Return the share of lines that import."""
+    imports = (node for one in modules for node in ast.walk(one.tree) if isinstance(node, ast.Import | ast.ImportFrom))
+    return _spans(imports) / sum(one.lines for one in modules)
+
+
+def docstring_share(modules: list[Module]) -> float:
+    """Return the share of lines that are docstrings."""
+    return _spans(node for one in modules for node in _docstrings(one)) / sum(one.lines for one in modules)
+
+
+def single_statement_share(modules: list[Module]) -> float:
+    """Return the share of functions whose body is a single statement."""
+    lengths = [len(node.body) - (ast.get_docstring(node) is not None) for one in modules for node in one.functions]
+    return sum(length <= 1 for length in lengths) / len(lengths)
+
+
+def imported_modules(module: Module, names: set[str]) -> set[str]:
+    """Return the modules of the package that a module imports, those of names in them too."""
+    found = set()
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return (found & names) - {module.name}
+
+
+def one_neighbour(modules: list[Module]) -> list[str]:
+    """Return the modules that a single other module imports, one of the same folder."""
+    by_name = {one.name: one for one in modules}
+    importers = defaultdict(set)
+    for one in modules:
+        for name in imported_modules(one, set(by_name)):
+            importers[name].add(one.name)
+    return sorted(
+        name
+        for name, others in importers.items()
+        if len(others) == 1
+        and by_name[name].folder == by_name[min(others)].folder
+        and "__init__" not in by_name[name].path
+    )
+
+
+def repeated_names(modules: list[Module]) -> list[str]:
+    """Return the file names that stand more than once."""
+    counts = Counter(one.path.rpartition("/")[2] for one in modules)
+    return sorted(name for name, count in counts.items() if count > 1 and name != "__init__.py")
+
+
+def called_once(modules: list[Module]) -> list[str]:
+    """Return the functions of modules whose name is called at a single place of the package."""
+    calls = Counter(
+        getattr(node.func, "id", getattr(node.func, "attr", ""))
+        for one in modules
+        for node in ast.walk(one.tree)
+        if isinstance(node, ast.Call)
+    )
+    names = [node.name for one in modules for node in one.tree.body if isinstance(node, Function)]
+    return sorted(name for name in names if calls[name] == 1)
+
+
+def questions(modules: list[Module], pattern: re.Pattern[str], *, outside: tuple[str, ...] = ()) -> list[str]:
+    """Return the lines, as path:number, that match a pattern."""
+    return [
+        f"{one.path}:{number}"
+        for one in modules
+        if not one.path.startswith(outside)
+        for number, line in enumerate(one.text.splitlines(), start=1)
+        if pattern.search(line)
+    ]
+
+
+def _count(text: str) -> Callable[[list[Module]], float]:
+    return lambda modules: sum(one.text.count(text) for one in modules)
+
+
+FIGURES: Mapping[str, Callable[[list[Module]], float]] = {
+    "lines": lambda modules: sum(one.lines for one in modules),
+    "files": len,
+    "imports, % of lines": lambda modules: 100.0 * import_share(modules),
+    "lines without docstrings, %": lambda modules: 100.0 * (1.0 - docstring_share(modules)),
+    "functions": lambda modules: sum(len(one.functions) for one in modules),
+    "functions of one statement, %": lambda modules: 100.0 * single_statement_share(modules),
+    "functions called once": lambda modules: len(called_once(modules)),
+    "modules of one neighbour": lambda modules: len(one_neighbour(modules)),
+    "file names used twice": lambda modules: len(repeated_names(modules)),
+    "noqa": _count("# noqa"),
+    "lines that ask for the shape": lambda modules: len(questions(modules, SHAPE_QUESTION)),
+    "lines that ask for the scheme": lambda modules: len(
+        questions(modules, SCHEME_QUESTION, outside=OWNERS_OF_SCHEMES)
+    ),
+}
+
+
+def measure(modules: list[Module]) -> dict[str, float]:
+    """Return all figures, rounded to what is kept."""
+    return {name: round(float(figure(modules)), 2) for name, figure in FIGURES.items()}
+
+
+def read_ceilings() -> dict[str, float]:
+    """Return what no figure may exceed."""
+    return dict(json.loads(CEILINGS.read_text(encoding="utf-8")))
+
+
+def main(arguments: list[str]) -> int:
+    """Print figures and ceilings; exit code 1 where a figure is above its ceiling."""
+    found = measure(read_package())
+    ceilings = read_ceilings() if CEILINGS.exists() else {}
+    if "--update" in arguments:
+        ceilings = {name: min(value, ceilings.get(name, value)) for name, value in found.items()}
+        CEILINGS.write_text(json.dumps(ceilings, indent=1) + "\n", encoding="utf-8")
+    for name, value in found.items():
+        mark = "" if value <= ceilings[name] else "  above its ceiling"
+        sys.stdout.write(f"{name:32} {value:10g} {ceilings[name]:10g}{mark}\n")
+    return int(any(value > ceilings[name] for name, value in found.items()))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
