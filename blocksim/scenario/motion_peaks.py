@@ -1,10 +1,15 @@
 """Largest acceleration, velocity and displacement of the supports (PGA, PGV, PGD), exact for their cubic pieces."""
 
+import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from blocksim.scenario.motion import Floats, MotionPieces, displacement_and_velocity
+from blocksim.scenario.models.motion import Harmonic
+from blocksim.scenario.models.pulse import Pulse
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.motion import Floats, MotionPieces, displacement_and_velocity, motion_pieces
 
 
 class Peak(NamedTuple):
@@ -44,6 +49,32 @@ def motion_peaks(pieces: MotionPieces, end: float) -> MotionPeaks:
         _largest(displacement, moments),
         float(displacement_and_velocity(pieces, np.array([end]))[1][0]),
     )
+
+
+def shortest_cycle(scenario: Scenario) -> float:
+    """Return the shortest cycle (s) of harmonic motions and pulses, of supports or bodies; infinite without any."""
+    return min((motion.cycle for motion in _cyclic(scenario)), default=math.inf)
+
+
+def shortest_period(scenario: Scenario) -> float:
+    """Return the shortest period (s) of what moves as prescribed; infinite where nothing does.
+
+    That is the shortest cycle, or 2 pi times the peak velocity of the supports over their peak acceleration: with a
+    harmonic motion the same, with a steep ramp or a table the time in which it does what matters.
+    """
+    shortest = shortest_cycle(scenario)
+    if scenario.motion is None:
+        return shortest
+    peaks = motion_peaks(motion_pieces(scenario), scenario.time.end)
+    if not peaks.acceleration.value > 0.0:
+        return shortest
+    return min(shortest, 2.0 * math.pi * peaks.velocity.value / peaks.acceleration.value)
+
+
+def _cyclic(scenario: Scenario) -> Iterator[Harmonic | Pulse]:
+    for motion in (scenario.motion, *(body.motion for body in scenario.bodies)):
+        if isinstance(motion, Harmonic | Pulse):
+            yield motion
 
 
 def _largest(values: Floats, times: Floats) -> Peak:

@@ -8,12 +8,14 @@ start, or in one substep at that bound.
 
 A block that meets something in a substep h stays there until it ends, and has not yet moved with its new velocity: it
 is behind by what the impact adds to velocity and spin times h/2 on average, and gravity changes its speed by g h
-meanwhile. Every impact passes that on to the next. Against speeds of free falls over sides L, sqrt(g L), that is
-h / sqrt(L/g). A few blocks can afford to have it small: a step is at most a share of sqrt(L/g) that grows with their
+meanwhile. Every impact passes that on to the next. Against speeds of free falls over sides L, sqrt(g L), that is h /
+sqrt(L/g). A few blocks can afford to have it small: a step is at most a share of sqrt(L/g) that grows with their
 number, so that costs are about the same, and that of a crowd is the usual one. A single block of 25 mm takes 1/13 ms,
 three of 32 mm take 1/4 ms; the usual step is divided by whole numbers, so that outputs fall on the ends of steps. So
-with the way in a step at the speed of an impact. Where few blocks rebound strongly that is not enough, as hops multiply
-errors a hundredfold: their steps are cut at impacts, see blocksim.kernels.nonsmooth.parts.
+with the way in a step at the speed of an impact. Supports that move count as bodies that are driven do: they come no
+farther towards a block in a step than blocks may move, and a step is a twentieth of their shortest period at most.
+Where few blocks rebound strongly that is not enough, as hops multiply errors a hundredfold: their steps are cut at
+impacts, see blocksim.kernels.nonsmooth.parts.
 """
 
 import math
@@ -22,9 +24,10 @@ from typing import NamedTuple
 
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Nonsmooth
+from blocksim.scenario.motion_peaks import shortest_cycle, shortest_period
 from blocksim.scenario.structures.arch import Arch
 from blocksim.world.bodies import Outline
-from blocksim.world.bounds import Bounds, given_speed, greatest_speed, impact_speed
+from blocksim.world.bounds import Bounds, given_speed, greatest_speed, impact_speed, support_speed
 from blocksim.world.sag import WARNING_SHARE, arch_shortening, scene_sag, soft_contact
 from blocksim.world.step import MOST_STEPS, StepError, UncountableStepsError
 
@@ -35,6 +38,7 @@ NATURAL = 0.02  # of sqrt(L/g): the step of so many
 CROWD = 100  # free blocks, from which on sagging does not shorten a step
 CALM = 0.9  # of the overlap that is warned of
 SHORTENED = 1.5e-4  # of the thickness of an arch: with 4e-4 friction holds some by up to one per cent less
+PERIOD_SHARE = 0.05  # of the shortest period of a prescribed motion: its velocity changes by a third in a step
 MILLI = 1e3
 
 
@@ -48,6 +52,18 @@ class StepTooLongError(StepError):
             f"{step:.4g} s is too long: blocks could move farther than a tenth of the smallest side "
             f"({MILLI * smallest:.4g} mm) before contacts are detected again; at most {limit:.4g} s with these "
             'substeps. Use step = "auto", or force_step = true to override'
+        )
+
+
+class CoarseStepError(StepError):
+    """A manual step that is not forced is too long for a harmonic motion or a pulse; `limit` in s."""
+
+    def __init__(self, step: float, cycle: float) -> None:
+        """Report both."""
+        self.limit = PERIOD_SHARE * cycle
+        super().__init__(
+            f"{step:.4g} s is too long for a motion with a cycle of {cycle:.4g} s: at most a twentieth of it, "
+            f'{self.limit:.4g} s. Use step = "auto", or force_step = true to override'
         )
 
 
@@ -66,6 +82,9 @@ def choose_rigid_step(outline: Outline, bounds: Bounds) -> float:
     if not step > 0.0 or end / step > MOST_STEPS:
         raise UncountableStepsError(end, step)
     if step > limit and not scenario.time.force_step:
+        cycle = shortest_cycle(scenario)
+        if step > PERIOD_SHARE * cycle:
+            raise CoarseStepError(step, cycle)
         raise StepTooLongError(step, limit, bounds.smallest)
     return step
 
@@ -83,6 +102,7 @@ def reason_of_step(outline: Outline, bounds: Bounds) -> Reason:
             way = SHARE * share * bounds.smallest
             why = f"no point moves farther than {MILLI * way:.3g} mm in it, at most at {speed:.3g} m/s"
             reasons.append(Reason(way / speed, why))
+    reasons += _reasons_of_motion(scenario, bounds, few)
     if bounds.free and scenario.gravity > 0.0:
         share = NATURAL * bounds.free / FEW
         why = f"{share:.2g} √(L/g) for so few blocks, L = {MILLI * bounds.smallest:.4g} mm the smallest side"
@@ -91,6 +111,21 @@ def reason_of_step(outline: Outline, bounds: Bounds) -> Reason:
         reasons += _reasons_of_sag(outline, bounds)
         reasons += _reasons_of_arches(outline)
     return min(reasons, key=lambda reason: reason.step)
+
+
+def _reasons_of_motion(scenario: Scenario, bounds: Bounds, few: float) -> Iterator[Reason]:
+    """Yield the steps that supports in motion admit: by their way towards a block, and by their shortest period."""
+    if scenario.motion is not None:
+        way = SHARE * few * bounds.smallest
+        speed = given_speed(scenario, bounds) + support_speed(scenario)
+        if speed > 0.0:
+            why = (
+                f"supports move no farther than {MILLI * way:.3g} mm in it, at most at {speed:.3g} m/s with the blocks"
+            )
+            yield Reason(way / speed, why)
+    period = shortest_period(scenario)
+    if period > 0.0:
+        yield Reason(PERIOD_SHARE * period, f"a twentieth of {period:.3g} s, the shortest period of a motion")
 
 
 def _reasons_of_sag(outline: Outline, bounds: Bounds) -> Iterator[Reason]:
@@ -135,5 +170,6 @@ def longest_step(outline: Outline, bounds: Bounds) -> float:
     """Return the longest manual step (s)."""
     scenario = outline.scenario
     speed = greatest_speed(scenario, bounds, outline.interactions)
-    rate = max(given_speed(scenario, bounds), speed / _substeps(scenario))
-    return SHARE * bounds.smallest / rate if rate > 0.0 else scenario.time.end
+    rate = max(given_speed(scenario, bounds) + support_speed(scenario), speed / _substeps(scenario))
+    longest = SHARE * bounds.smallest / rate if rate > 0.0 else scenario.time.end
+    return min(longest, PERIOD_SHARE * shortest_cycle(scenario))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import ExitCode
+from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
 from blocksim.simulation import run_ensemble, simulate
 from blocksim.verification.scene import scenario_of
 
@@ -138,6 +139,30 @@ def test_support_that_is_driven_into_a_block_does_not_pass_through_it(scale: flo
     stays_or_says(
         simulate(scene([block, plate], 2.0 / frequency, {"stiffness_scale": scale}, motion=motion)), "block 2", FACE
     )
+
+
+@pytest.mark.parametrize("gravity", [0.0, 1e-6])
+def test_plates_that_are_shaken_strike_a_rigid_block_between_them_and_do_not_pass_through(gravity: float) -> None:
+    """Plates of 0.5 mm went through a block of 2 mm in steps of 1 ms, in which they move by 13 mm."""
+    gap, restitution = 4.75e-3, 0.5
+    plates = [{"x": x, "y": 0.03, "width": 5e-4, "height": 0.04, "fixed": True} for x in (-6e-3, 6e-3)]
+    motion = {"kind": "harmonic", "amplitude": 0.02, "frequency": 100.0, "ramp": 1e-3}
+    scenario = scene(
+        [{"y": 0.03, "width": 2e-3, "height": 2e-3}, *plates],
+        4e-3,
+        {"restitution": restitution},
+        {"scheme": "nonsmooth"},
+        motion=motion,
+    ).model_copy(update={"gravity": gravity})
+    frames = simulate(scenario).held
+    assert frames is not None
+    assert np.max(np.abs(frames.x[:, 0] - frames.x[:, 1:].mean(axis=1))) < 4.75e-3 * (1.0 + 1e-3)
+    moved, speed = displacement_and_velocity(motion_pieces(scenario), frames.time)
+    met = int(np.argmax(moved > gap))
+    pieces = np.linspace(frames.time[met - 1], frames.time[met], 100_001)
+    moved, speed = displacement_and_velocity(motion_pieces(scenario), pieces)
+    struck = (1.0 + restitution) * float(speed[np.argmax(moved > gap)])
+    assert frames.vx[met, 0] == pytest.approx(struck, rel=1e-3)
 
 
 @pytest.mark.parametrize("scale", SCALES)

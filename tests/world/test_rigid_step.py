@@ -12,7 +12,7 @@ from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
 from blocksim.world.describe import describe
 from blocksim.world.nonsmooth import build_nonsmooth
-from blocksim.world.rigid_step import FEW, NATURAL, SHARE, USUAL_STEP, StepTooLongError
+from blocksim.world.rigid_step import FEW, NATURAL, SHARE, USUAL_STEP, CoarseStepError, StepTooLongError
 from blocksim.world.step import UncountableStepsError
 
 if TYPE_CHECKING:
@@ -106,6 +106,33 @@ def test_speed_at_the_start_counts_for_the_whole_step() -> None:
     assert step_of(thrown, step=0.8e-3) == 0.8e-3
     with pytest.raises(StepTooLongError):
         step_of(thrown, step=0.9e-3)
+
+
+HARMONIC = {"kind": "harmonic", "amplitude": "0.1 mm", "frequency": "100 Hz", "ramp": "50 ms"}
+PULSE = {"kind": "pulse", "shape": "half-sine", "amplitude": "5 m/s^2", "duration": "5 ms"}
+
+
+def shaken_step(motion: Mapping[str, object], gravity: float = 0.0, **time: Any) -> float:
+    scenario = scenario_of([RESTING], motion=motion, gravity=gravity, time={"scheme": "nonsmooth", "end": 0.1, **time})
+    return float(build_nonsmooth(scenario).world.controls[0].step)
+
+
+@pytest.mark.parametrize("motion", [HARMONIC, PULSE])
+def test_motions_are_resolved_by_automatic_steps_and_by_those_by_hand(motion: Mapping[str, object]) -> None:
+    assert shaken_step(motion) == pytest.approx(5e-4, rel=1e-2)  # at the end of the ramp it is a little faster
+    assert shaken_step(motion, gravity=G) == step_of(RESTING)
+    assert shaken_step(motion, step=4e-4) == 4e-4
+    with pytest.raises(CoarseStepError, match=r"a cycle of 0\.01 s: at most a twentieth of it, 0\.0005 s"):
+        shaken_step(motion, step=6e-4)
+    assert shaken_step(motion, step=6e-4, force_step=True) == 6e-4
+
+
+def test_supports_in_motion_and_steep_ramps_of_it_shrink_the_automatic_step() -> None:
+    fast = {**HARMONIC, "amplitude": "20 mm", "ramp": "1 ms"}
+    assert shaken_step(fast) * 21.15 == pytest.approx(SHARE / FEW * HEIGHT, rel=1e-3)
+    assert shaken_step({**HARMONIC, "ramp": "1 ms"}) < 2e-4
+    with pytest.raises(StepTooLongError):
+        shaken_step(fast, step=2e-4)
 
 
 @pytest.mark.parametrize("step", [1e-18])

@@ -59,13 +59,18 @@ class Harmonic(Table):
     )
 
     @property
+    def cycle(self) -> float:
+        """Time (s) of one cycle."""
+        return 1.0 / self.frequency
+
+    @property
     def resolved_ramp(self) -> float:
         """Time (s) of the rise, as given or by default."""
         return 1.0 / self.frequency if self.ramp is None else self.ramp
 
     def sections(self, end: float) -> Iterator[tuple[float, float, int]]:
         """Yield start and end (s) of rise, steady part and fall, up to `end`, and the number of pieces of each."""
-        ramp, cycle = self.resolved_ramp, 1.0 / self.frequency
+        ramp, cycle = self.resolved_ramp, self.cycle
         stop = math.inf if self.duration is None else self.start + self.duration
         breaks = [(self.start, min(cycle, ramp)), (self.start + ramp, cycle), (stop - ramp, min(cycle, ramp))]
         lasts = [begin for begin, _ in breaks[1:]] + [stop]

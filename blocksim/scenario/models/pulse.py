@@ -62,6 +62,11 @@ class Pulse(Table):
         return self.resolved_cycles / self.frequency
 
     @property
+    def cycle(self) -> float:
+        """Time (s) of one cycle, whole or not."""
+        return self.resolved_duration / self.resolved_cycles
+
+    @property
     def angular_frequency(self) -> float:
         """Angular frequency w (rad/s)."""
         return 2.0 * math.pi * self.resolved_cycles / self.resolved_duration
