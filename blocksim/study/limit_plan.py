@@ -10,7 +10,7 @@ from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import Document, Scenario, scenario_hash
 from blocksim.scenario.keys import field_of, options
 from blocksim.scenario.models.stepping import SCHEMES
-from blocksim.scenario.models.variation import Uniform
+from blocksim.scenario.models.variation import Uniform, is_descending
 from blocksim.scenario.units import parse_unit
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.study.criterion import Criterion, read_criterion
@@ -90,6 +90,8 @@ def read_limit(
         message = f"{OPTION} {given.texts[key]}: a range is needed, as in {key}=FROM:TO or {key}=FROM:TO:COUNT"
         raise InvalidInputError(message)
     count = _count(table.get("count", SCANNED))
+    if is_descending(table):
+        table = {**table, "from": table["to"], "to": table["from"]}
     ends = {name: value for name, value in table.items() if name != "count"}
     values = varied(bare, Variations({key: ends}, given.texts), OPTION, "sobol").vary[key]
     assert isinstance(values, Uniform)  # noqa: S101 - it has two ends

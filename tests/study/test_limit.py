@@ -57,6 +57,13 @@ def test_a_block_on_a_slope_slides_at_its_friction_angle_or_topples_about_its_ed
     assert len(found.rows) <= 25
 
 
+def test_a_range_that_descends_is_searched_as_one_that_ascends(tmp_path: Path) -> None:
+    folder = tmp_path / "limit"
+    up = limit(block_on_a_slope(SQUAT), TILT, out=folder)
+    down = limit(block_on_a_slope(SQUAT), {"ground.tilt": {"from": "40 deg", "to": "5 deg"}}, out=folder)
+    assert (down.changes, down.run) == (up.changes, 0)
+
+
 def test_a_search_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_nothing_twice(tmp_path: Path) -> None:
     whole = limit(block_on_a_slope(SQUAT), TILT, out=tmp_path / "whole")
     for at in (1, 5, 10, 13):

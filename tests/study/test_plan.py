@@ -16,6 +16,7 @@ from tests.golden import Golden
 from tests.study.plans import SCALE, cases, plan_of
 
 KINETIC = "friction.block_block.kinetic"
+COUNT = "structures.0.count"
 SHAKEN = Path(__file__).parents[2] / "scenarios" / "shaking_table.toml"
 
 
@@ -25,6 +26,9 @@ SHAKEN = Path(__file__).parents[2] / "scenarios" / "shaking_table.toml"
         ({KINETIC: [0.1, 0.2], SCALE: [1.0, 2.0]}, "grid", [(0.1, 1.0), (0.1, 2.0), (0.2, 1.0), (0.2, 2.0)]),
         ({KINETIC: [0.1, 0.2], SCALE: [1.0, 2.0]}, "list", [(0.1, 1.0), (0.2, 2.0)]),
         ({KINETIC: {"from": 0.1, "to": 0.3, "count": 3}}, "grid", [(0.1,), (0.2,), (0.3,)]),
+        ({KINETIC: {"from": 0.3, "to": 0.1, "count": 3}}, "grid", [(0.3,), (0.2,), (0.1,)]),
+        ({COUNT: {"from": 1, "to": 5, "count": 3}}, "grid", [(1,), (3,), (5,)]),
+        ({COUNT: {"from": 100, "to": 1, "count": 3, "scale": "log"}}, "grid", [(100,), (10,), (1,)]),
         ({SCALE: np.array([0.5, 1.0])}, "grid", [(0.5,), (1.0,)]),
     ],
 )
@@ -33,6 +37,14 @@ def test_grids_combine_all_values_and_lists_take_one_of_every_key(
 ) -> None:
     design = design_of(plan_of(with_sweep(nominal, vary, mode)))
     assert [tuple(values.values()) for values in design] == expected
+
+
+def test_a_whole_number_key_takes_a_spaced_range_whose_values_are_whole(nominal: Document) -> None:
+    spread = with_sweep(nominal, {COUNT: {"from": 1, "to": 5, "count": 3}}, "grid")
+    assert [case.scenario is not None for case in cases(spread)] == [True] * 3
+    uneven = with_sweep(nominal, {COUNT: {"from": 1, "to": 6, "count": 3}}, "grid")
+    problems = [case.problem for case in cases(uneven)]
+    assert (problems[0], "3.5 is not a whole number" in problems[1], problems[2]) == ("", True, "")
 
 
 WRONG: dict[str, tuple[dict[str, Values], str]] = {

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from pydantic_core import PydanticCustomError
+
 from blocksim.scenario import quantities as q
 from blocksim.scenario import units
 from blocksim.scenario.models.base import OneOf
@@ -152,7 +154,10 @@ def _refuse_slips(value: Mapping[str, Any], known: tuple[str, ...], needed: tupl
 
 
 def _spread(value: Mapping[str, Any]) -> tuple[object, ...]:
-    """Return `count` evenly spaced values: both ends as written, between them SI numbers, angles as texts in rad."""
+    """Return `count` evenly spaced values: both ends as written, between them SI numbers, angles as texts in rad.
+
+    Between ends that are written as whole numbers such values stay whole, for keys that take no others.
+    """
     count = value["count"]
     if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MAX_VALUES:  # noqa: PLR2004
         message = f"count {q.shown(count)} is not a whole number from 2 to {MAX_VALUES}"
@@ -164,12 +169,23 @@ def _spread(value: Mapping[str, Any]) -> tuple[object, ...]:
         inner = [rounded(first * (last / first) ** step) for step in steps]
     else:
         inner = [first + (last - first) * i / (count - 1) for i in range(1, count - 1)]
+    if type(value["from"]) is type(value["to"]) is int:
+        return tuple(int(number) if number.is_integer() else number for number in (first, *inner, last))
     typed = (value[name] if isinstance(value[name], str) else None for name in ("from", "to"))  # these keep their unit
     ends = [
         written(number, angle=angle) if text is None else text
         for text, number in zip(typed, (first, last), strict=True)
     ]
     return (ends[0], *(written(number, angle=angle) for number in inner), ends[1])
+
+
+def is_descending(value: Mapping[str, Any]) -> bool:
+    """Return True if `from` and `to` are of one kind and `from` is the greater; False for what cannot be read."""
+    try:
+        (first, last), _ = _numbers(value, "from", "to")
+    except PydanticCustomError:
+        return False
+    return first > last
 
 
 def _uniform(value: Mapping[str, Any]) -> Uniform:
