@@ -1,23 +1,32 @@
 """What the shell completes after TAB: kinds, keys of the scenario on the line, names of cases and measurements.
 
-Completion must never fail or print: it offers nothing where something cannot be read.
+Completion must never fail or print: it offers nothing where something cannot be read. Nor may it offer what a shell
+could take for more than a word: zsh evaluates it at TAB, and bash runs it at Enter. A scenario may be a stranger's.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 Complete = Callable[[Any, str], list[str]]
 
+_WORD = re.compile(r"[A-Za-z0-9._-]+")
+
 
 def of_names(names: Callable[[], Any]) -> Complete:
     """Return a completion of some names, which are computed only when TAB is pressed."""
 
     def complete(ctx: Any, incomplete: str) -> list[str]:  # noqa: ARG001 - typer passes both by name
-        return [name for name in names() if name.startswith(incomplete)]
+        return _words(names(), incomplete)
 
     return complete
+
+
+def _words(names: Iterable[str], incomplete: str) -> list[str]:
+    """Return the names that begin as what is typed, and that no shell takes for anything but a word."""
+    return [name for name in names if name.startswith(incomplete) and _WORD.fullmatch(name)]
 
 
 def scenario_keys(ctx: Any, incomplete: str) -> list[str]:
@@ -28,26 +37,28 @@ def scenario_keys(ctx: Any, incomplete: str) -> list[str]:
     place = next((word for word in words if word.endswith(".toml")), None)
     if place is None:
         return []
-    return [f"{key}=" for key in _keys_in(Path(place)) if key.startswith(incomplete)]
+    return [f"{key}=" for key in _words(_keys_in(Path(place)), incomplete)]
 
 
 def _keys_in(path: Path) -> list[str]:
     import tomllib
 
     from blocksim.scenario import load_scenario, scenario_to_toml
+    from blocksim.scenario.keys import format_key
 
     with suppress(Exception):
-        return list(dict.fromkeys(_dotted(tomllib.loads(scenario_to_toml(load_scenario(path))))))
+        paths = _paths(tomllib.loads(scenario_to_toml(load_scenario(path))))
+        return list(dict.fromkeys(map(format_key, paths)))
     return []
 
 
-def _dotted(entry: object, prefix: str = "") -> Iterator[str]:
-    """Yield the keys of all values in nested tables; entries of lists of tables by number."""
+def _paths(entry: object, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    """Yield the paths of all values in nested tables; entries of lists of tables by number."""
     if isinstance(entry, Mapping):
         for key, value in entry.items():
-            yield from _dotted(value, f"{prefix}.{key}" if prefix else str(key))
+            yield from _paths(value, (*path, str(key)))
     elif isinstance(entry, list) and entry and isinstance(entry[0], Mapping):
         for index, value in enumerate(entry):
-            yield from _dotted(value, f"{prefix}.{index}")
+            yield from _paths(value, (*path, index))
     else:
-        yield prefix
+        yield path

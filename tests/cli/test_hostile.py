@@ -160,14 +160,17 @@ def test_nothing_of_a_stranger_steers_the_terminal(blocksim: Command, copied: Pa
 
 
 def test_no_cell_of_a_table_begins_a_formula(blocksim: Command) -> None:
-    formula = "=HYPERLINK(1)"
-    metal = 'density = "2700 kg/m^3"\nyoung_modulus = "69 GPa"\npoisson_ratio = 0.3\n'
+    formula = "=HYPERLINK(1).csv"
+    for name in (formula, "usual.csv"):
+        Path(name).write_text("time_s,displacement_mm\n0,0\n1,1\n", encoding="utf-8")
     nominal = Path(NOMINAL).read_text(encoding="utf-8").partition("[experiment]")[0]
-    Path("theirs.toml").write_text(f'{nominal}\n[materials."{formula}"]\n{metal}', encoding="utf-8")
-    values = ("--vary", f"ground.material={formula},aluminium", "--vary", "ground.tilt=-1 deg,0 deg")
+    Path("theirs.toml").write_text(f'{nominal}\n[motion]\nkind = "table"\ntable = "usual.csv"\n', encoding="utf-8")
+    values = ("--vary", f"motion.table={formula},usual.csv", "--vary", "ground.tilt=-1 deg,0 deg")
     assert blocksim("sweep", "theirs.toml", *SOFT, "--set", "time.end=0.01", *values, "--out", "swept").code == 0
     with Path("swept/sweep.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert {row["ground.material"] for row in rows} == {f"'{formula}", "aluminium"}
+    assert {row["motion.table"] for row in rows} == {f"'{formula}", "usual.csv"}
     assert {row["ground.tilt [deg]"] for row in rows} == {"-1.0", "0.0"}
+    for name in (formula, "usual.csv"):
+        shutil.copy(name, "swept")  # a study holds no copies of varied tables
     assert blocksim("verify-run", "swept").code == 0

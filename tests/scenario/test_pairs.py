@@ -106,10 +106,10 @@ def test_rules_on_the_ground_and_on_walls(given: str, material: str | None, othe
 
 
 def test_names_with_dots_are_quoted_in_rules() -> None:
-    data = scenario_data(pairs={"S 235.JR": {"ground": {"restitution": 0}}})
-    data["materials"]["S 235.JR"] = MATERIAL
-    pair = resolve_pair(scenario_from_mapping(data), "S 235.JR", GROUND, ground=True)
-    assert (pair.restitution, pair.rules["restitution"]) == (0.0, 'pairs."S 235.JR".ground.restitution')
+    data = scenario_data(pairs={"S235.JR": {"ground": {"restitution": 0}}})
+    data["materials"]["S235.JR"] = MATERIAL
+    pair = resolve_pair(scenario_from_mapping(data), "S235.JR", GROUND, ground=True)
+    assert (pair.restitution, pair.rules["restitution"]) == (0.0, 'pairs."S235.JR".ground.restitution')
 
 
 PROMOTED = [
