@@ -45,7 +45,8 @@ def _in_list(data: Data, group: str, key: str, named: str) -> Iterator[Finding]:
 
 
 def _unknown(data: Data, path: keys.KeyPath, group: str) -> Iterator[Finding]:
-    name, known = keys.follow(data, path), data.get(group)
+    name = keys.follow(data, path)
+    known = data.get(group, {} if group == "blocks" else None)  # materials that are missing are told of by themselves
     if isinstance(name, str) and isinstance(known, Mapping) and name not in known:
         hint = did_you_mean_or_list(name, known)
         yield Finding(path, f"unknown {group.removesuffix('s')} {shown(name)}, {hint}")
