@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from blocksim.study.sweep import sweep
     from blocksim.study.sweep_table import read_sweep as open_sweep
 
-__version__ = "0.1.0"
+__version__ = "0.3.0"
 __all__ = [
     "animate",
     "calibrate",

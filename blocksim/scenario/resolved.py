@@ -22,7 +22,8 @@ from blocksim.scenario.models.study import Sweep
 from blocksim.scenario.quantities import ANGLE
 from blocksim.scenario.systems import HELD
 
-HEADER = "# Resolved by blocksim: all values as used, in SI units (m, kg, s, N, Pa), angles in rad.\n"
+MARK = "# Resolved by blocksim"  # of every version; what follows in the line is for people
+HEADER = f"{MARK}: all values as used, in SI units (m, kg, s, N, Pa), angles in rad.\n"
 SCHEME = "time.scheme"
 UNHASHED = {"description", "experiment", "sweep", "provenance"}
 

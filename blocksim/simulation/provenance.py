@@ -10,6 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from blocksim import __version__
 from blocksim.scenario import Scenario, scenario_hash
 
 if TYPE_CHECKING:
@@ -23,8 +24,8 @@ CPU_INFO = Path("/proc/cpuinfo")
 
 
 def code_version() -> str:
-    """Return the version of the installed package."""
-    return metadata.version("blocksim")
+    """Return the version of the code that runs: that of an editable installation may be an older one."""
+    return __version__
 
 
 @functools.cache

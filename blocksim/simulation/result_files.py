@@ -2,9 +2,10 @@
 
 Files are known by name and content together, never by the name alone, as a folder may hold files that a person put
 beside the results, or in their place. Only what is recognised here may be removed or replaced without being named on
-the command line. Folders of version 0.1 keep no list of their files, so the content decides: the head of a file, as
-what comes after may be damaged. An empty file of one of the names, or one of zeros, as a power failure leaves them,
-holds nothing that could be lost.
+the command line. A run of any version is known by the keys of its run.json, which lists its files with their checksums.
+Where a file is not listed (a run that was killed, a folder of version 0.1) or not as it was, the head of it decides, as
+what comes after may be damaged; wordings of versions differ, so no sentence counts, but the mark that all of them bear.
+An empty file of one of the names, or one of zeros, as a power failure leaves them, holds nothing that could be lost.
 
 Copies of the files that a scenario names are kept beside its resolved form, so that the folder can move.
 """
@@ -19,7 +20,7 @@ from blocksim.scenario import Scenario, body_table_contents, motion_table_conten
 from blocksim.scenario.bounded_read import MEGABYTE, read_head, read_limited
 from blocksim.scenario.models.drive import MOST_BODY_TABLES
 from blocksim.scenario.probes import probe_names
-from blocksim.scenario.resolved import HEADER
+from blocksim.scenario.resolved import MARK
 from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
 from blocksim.simulation.table import COLUMNS
 
@@ -41,7 +42,7 @@ MOST_BYTES = 10 * MEGABYTE  # of a scenario or a summary
 TABLE_BYTES = MEGABYTE  # of a table of an experiment, which is not read if larger
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 FRAME_MARKS = (b"h5md", b"n_committed")  # names in the root group, which libver latest keeps at the start of the file
-RESOLVED = HEADER.encode()
+RESOLVED = MARK.encode()
 CHECKPOINT = b'{"format":"blocksim checkpoint '
 Kind = Callable[[bytes], bool]  # whether the first HEAD_BYTES of a file are of a kind
 
@@ -72,9 +73,10 @@ def is_frames(head: bytes) -> bool:
     return head.startswith(SIGNATURE) and all(mark in head for mark in FRAME_MARKS)
 
 
-def holds(*marks: bytes) -> Kind:
-    """Return the kind of content that has all these marks near its start."""
-    return lambda head: all(mark in head for mark in marks)
+def has_keys(*names: str) -> Kind:
+    """Return the kind of content that is a JSON object with these keys near its start, however it is laid out."""
+    keys = [re.compile(rb'"' + name.encode() + rb'"\s*:') for name in names]
+    return lambda head: head.lstrip().startswith(b"{") and all(key.search(head) for key in keys)
 
 
 RUN_KINDS: Mapping[str, Kind] = {
@@ -82,7 +84,7 @@ RUN_KINDS: Mapping[str, Kind] = {
     FINAL: has_header(COLUMNS),
     SOILS: begins(b"soil,left_mm,"),
     FRAMES: is_frames,
-    SUMMARY: holds(b'{\n  "name": "', b'"status": "', b'"scenario_hash": "'),
+    SUMMARY: has_keys("name", "status", "scenario_hash"),
     DONE: begins(b'{"run": "'),
     **dict.fromkeys(CHECKPOINTS, begins(CHECKPOINT)),
 }
@@ -106,7 +108,7 @@ def is_written(path: Path, kinds: Mapping[str, Kind], plan: str = SCENARIO) -> b
     if path.name in COPIES:
         return path.name in copies(path.parent, plan)
     if path.name in kinds:
-        return _is_of_kind(path, kinds[path.name])
+        return _is_of_kind(path, kinds[path.name]) or _is_listed(path, plan)
     if FRAMES in kinds and _is_probe_table(path):
         return True
     return is_leftover(path.name, (*kinds, *COPIES)) or PROBE_LEFTOVER.fullmatch(path.name) is not None
@@ -147,6 +149,12 @@ def copies(folder: Path, plan: str = SCENARIO) -> frozenset[str]:
     return frozenset(name for name in present if _belongs(folder / name, listed.get(name), is_named=name in named))
 
 
+def _is_listed(path: Path, plan: str) -> bool:
+    """Return True for a file that is as the summary beside it says."""
+    digest = _listed(path.parent / origin_of(plan)).get(path.name)
+    return digest is not None and digest == sha256_of(path)
+
+
 def _belongs(path: Path, digest: object, *, is_named: bool) -> bool:
     return is_named if digest is None else digest == sha256_of(path)
 
@@ -173,7 +181,8 @@ def is_resolved(plan: Path) -> bool:
         lines = read_head(plan, HEAD_BYTES).splitlines(keepends=True)
     except BlocksimError:
         return False
-    return not lines or RESOLVED in lines[:2]  # a sweep has a line of its own before
+    is_marked = any(line.startswith(RESOLVED) for line in lines[:2])  # a sweep has a line of its own before
+    return not lines or is_marked or _is_listed(plan, plan.name)
 
 
 def _is_plain_file(path: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -14,7 +15,7 @@ import pytest
 
 from blocksim.errors import OutputError, OutputExistsError
 from blocksim.simulation import Result, renew_copies, simulate_into
-from blocksim.simulation.atomic import write_text
+from blocksim.simulation.atomic import sha256_of, write_text
 from blocksim.simulation.folder import (
     clear_remains,
     default_folder,
@@ -59,6 +60,29 @@ def test_leftovers_of_a_kill_do_not_block_a_folder(copy: Path) -> None:
     (copy / ".final.csv.k2j3h4_x.csv").write_text("half")
     (copy / ".run.h5.new").write_text("half")
     with pytest.raises(OutputExistsError, match="contains an unfinished run"):
+        prepare_folder(copy, overwrite=False)
+    prepare_folder(copy, overwrite=True)
+    assert names(copy) == set()
+
+
+WORDINGS = [  # at the top of scenario.toml
+    "# Resolved by blocksim: every value that was used, in SI units (m, kg, s, N, Pa), angles in rad.\n",  # of 7e5d70f
+    "# a wording of the future\n",
+]
+
+
+@pytest.mark.parametrize(("wording", "is_killed"), [(WORDINGS[0], False), (WORDINGS[0], True), (WORDINGS[1], False)])
+def test_runs_of_other_versions_are_runs_whatever_their_words(copy: Path, wording: str, is_killed: bool) -> None:
+    _, _, rest = (copy / "scenario.toml").read_text().partition("\n")
+    (copy / "scenario.toml").write_text(wording + rest)
+    (copy / "final.csv").write_text("block,columns,of,another,version\n")
+    summary = json.loads((copy / "run.json").read_text())
+    summary["sha256"] = {name: sha256_of(copy / name) for name in ("scenario.toml", "final.csv", "run.h5")}
+    (copy / "run.json").write_text(json.dumps(summary))  # laid out in another way
+    if is_killed:
+        for name in ("run.json", "done.json", "final.csv"):
+            (copy / name).unlink()
+    with pytest.raises(OutputExistsError, match="contains an unfinished run" if is_killed else "contains another run"):
         prepare_folder(copy, overwrite=False)
     prepare_folder(copy, overwrite=True)
     assert names(copy) == set()
