@@ -122,9 +122,11 @@ def find_limit(  # noqa: PLR0913 - as `limit`
                     found = _Stiffening(found, runs, on_stiffer, is_asked=bool(stiffer)).complete()
         except KeyboardInterrupt:
             raise _stopped(len(runs.known)) from None
-        kept = keep_sides(folder, plan, found.limits_as_given, found.rows) if keep_runs else {}
-        result = replace(found, run=runs.ran, kept=kept)
-        write_result(result)
+        result = replace(found, run=runs.ran)
+        write_result(result)  # first: the runs beside it may not fit on the disk
+        if keep_runs:
+            result = replace(result, kept=keep_sides(folder, plan, found.limits_as_given, found.rows))
+            write_result(result)
     return result
 
 

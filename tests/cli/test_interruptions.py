@@ -3,9 +3,7 @@
 import json
 import shutil
 import signal
-import subprocess
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -208,18 +206,6 @@ def test_results_that_cannot_fit_are_reported_before_the_start(blocksim: Command
     assert "out: the results may take " in answer.err
     assert " are free there; write elsewhere with --out DIR" in answer.err
     assert not (tmp_path / "out").exists()
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """Give a disk of 2 MB."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = shutil.which("mount")
-    if mount is None or subprocess.run([mount, "-t", "tmpfs", "-o", "size=2m", "none", folder], check=False).returncode:
-        pytest.skip("a disk can be mounted by root only")
-    yield folder
-    subprocess.run(["umount", folder], check=True)  # noqa: S607 - where mount was found
 
 
 @pytest.mark.long

@@ -3,8 +3,10 @@
 import json
 import math
 import re
+import shutil
 import signal
 import time
+import types
 from pathlib import Path
 
 import pytest
@@ -110,6 +112,29 @@ def test_a_picture_is_named_only_where_both_sides_have_a_run_to_draw(blocksim: C
         assert (f"\npicture of the mechanism: blocksim plot {folder}" in answer.err) is not settles
         assert ("no picture of the mechanism" in answer.err) is settles
     assert blocksim("plot", "settles-True").code == 65  # as it said
+
+
+def test_full_disk_is_74_and_not_a_limit_without_its_runs(
+    blocksim: Command, tmp_path: Path, small_disk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "slope.toml").write_text(scenario_to_toml(scenario_from_mapping(block_on_a_slope(SLENDER))))
+    search = ("limit", "slope.toml", "--vary", "ground.tilt=5deg:40deg:2", "--to", "50%", "--out", small_disk / "out")
+    room = shutil.disk_usage(small_disk).free
+    (small_disk / "others").write_bytes(bytes(room - 200_000))
+    roomy = types.SimpleNamespace(free=10**9)  # as if others filled it while the search runs
+    with monkeypatch.context() as patch:
+        patch.setattr("shutil.disk_usage", lambda _: roomy)
+        answer = blocksim(*search)
+    assert answer.code == 74
+    assert "No space left on device; the limit is found, its runs are not kept" in answer.err
+    (change,) = json.loads((small_disk / "out" / "limit.json").read_text())["changes"]
+    (small_disk / "others").unlink()
+    answer = blocksim(*search)
+    assert answer.code == 0
+    assert ", 0 of them now" in answer.err
+    (again,) = json.loads((small_disk / "out" / "limit.json").read_text())["changes"]
+    assert (again["low"], again["high"]) == (change["low"], change["high"])
+    assert (small_disk / "out" / "cases" / again["below"]["case"] / "done.json").is_file()
 
 
 def test_nothing_that_changes_is_exit_code_1(blocksim: Command, golden: Golden) -> None:
