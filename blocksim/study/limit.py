@@ -105,13 +105,13 @@ def find_limit(  # noqa: PLR0913 - as `limit`
     """Search as planned; see `limit`. `on_stiffer` is called before the first run of every other stiffness."""
     if stiffer:
         refuse_without_springs(plan)
-    run, setting = execution.ready()
+    _, setting = execution.ready()
     base = plan.scenario_at(plan.span.low)
     check_experiment(base)
     folder = Path(out) if out is not None else files.RESULTS / base.name / f"limit-{plan.name}"
     prepare(folder, base, plan.name, overwrite=overwrite, kind=LIMIT)
     compile_kernels(kernels_of(base))
-    with closing(Manifest(folder / MANIFEST, "limit")) as manifest:
+    with closing(Manifest(folder / MANIFEST, "limit")) as manifest, execution.for_rounds() as run:
         runs = _Runs(manifest, run, on_run)
         try:
             with stop_requests() as is_stopped:

@@ -3,8 +3,10 @@
 import json
 import math
 from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
 from functools import partial
+from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
 
@@ -83,6 +85,22 @@ def test_a_search_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_no
         assert (folder / "limit.csv").read_bytes() == (tmp_path / "whole" / "limit.csv").read_bytes()
         assert again.changes == whole.changes
     assert limit(block_on_a_slope(SQUAT), TILT, out=tmp_path / "whole").run == 0
+
+
+def test_processes_are_started_once_and_not_for_every_round(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[int] = []
+
+    class Counted(ProcessPoolExecutor):
+        def __init__(self, workers: int, **options: Any) -> None:
+            started.append(workers)
+            super().__init__(workers, **options)
+
+    monkeypatch.setattr("blocksim.study.executors.processes.ProcessPoolExecutor", Counted)
+    rough = partial(limit, block_on_a_slope(SQUAT), TILT, tolerance=0.02)
+    found = rough(out=tmp_path / "pool", executor="processes", jobs=1)
+    assert found.limits == rough(out=tmp_path / "here").limits
+    assert started == [1]
+    assert not active_children()
 
 
 def test_the_folder_holds_the_answer_for_programs_and_the_scenario(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Generator, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import takewhile
@@ -74,10 +75,14 @@ is given up. Closed before the end, it stops at once.
 
 
 class Executor(NamedTuple):
-    """What runs tasks; `check` raises UnavailableError where it cannot, before anything is written."""
+    """What runs tasks; `check` raises UnavailableError where it cannot, before anything is written.
+
+    `for_rounds` gives the same for one round of tasks after the other.
+    """
 
     run: Run
     check: Callable[[Setting], None]
+    for_rounds: Callable[[], AbstractContextManager[Run]]
 
 
 @dataclass
@@ -106,7 +111,8 @@ def executor_named(name: str) -> Executor:
         message = f"unknown executor '{name}', {did_you_mean_or_list(name, EXECUTORS)}"
         raise InvalidInputError(message)
     module = import_module(EXECUTORS[name])
-    return Executor(module.run_tasks, module.check)
+    for_rounds = getattr(module, "for_rounds", None)  # where it has something that is worth keeping
+    return Executor(module.run_tasks, module.check, for_rounds or (lambda: nullcontext(module.run_tasks)))
 
 
 @dataclass(frozen=True)
@@ -128,6 +134,10 @@ class Execution:
         setting = Setting(self.jobs or os.cpu_count() or 1, scheduler=self.scheduler)
         runner.check(setting)
         return runner.run, setting
+
+    def for_rounds(self) -> AbstractContextManager[Run]:
+        """Give what runs the tasks of one round after the other, on the same processes. Raises InvalidInputError."""
+        return executor_named(self.name).for_rounds()
 
 
 def chosen_executor(executor: str | None, scheduler: str | None, *, keep_cases: bool = False) -> str:

@@ -6,17 +6,18 @@ The only executor that can keep whole runs, in folders of their own.
 import signal
 import threading
 from collections import deque
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from functools import partial
 from multiprocessing import active_children, get_context, parent_process, resource_tracker
 from os import _exit
 from typing import NamedTuple
 
 from blocksim.simulation.provenance import code_hash
 from blocksim.simulation.stopping import FOR_ALL
-from blocksim.study.executors import Batch, BatchSize, Setting, Task, needs_nothing, take
+from blocksim.study.executors import Batch, BatchSize, Run, Setting, Task, needs_nothing, take
 from blocksim.study.executors.ensemble import Outcome, run_batch
 from blocksim.study.rows import Row
 
@@ -27,6 +28,7 @@ DEAD: Row = {
     "reason": "its worker process has died twice (out of memory?); --retry-failed runs it again",
     "seconds": 0.0,
 }
+PoolOf = Callable[[int], AbstractContextManager[ProcessPoolExecutor]]  # of so many processes
 check = needs_nothing
 
 
@@ -86,8 +88,44 @@ class StoppedError(Exception):
     """The user wants to stop: the pool has to end at once."""
 
 
+class LastingPool:
+    """A pool for several rounds of tasks: starting its processes takes longer than most rounds."""
+
+    def __init__(self) -> None:
+        """Start nothing yet."""
+        self._ended = ExitStack()
+        self._pool: ProcessPoolExecutor | None = None
+
+    @contextmanager
+    def of(self, workers: int) -> Iterator[ProcessPoolExecutor]:
+        """Give the pool; one that something goes wrong in ends at once, and the next round has a new one."""
+        if self._pool is None:
+            self._pool = self._ended.enter_context(pool_of(workers))
+        try:
+            yield self._pool
+        except BaseException as error:
+            self._pool = None
+            self._ended.__exit__(type(error), error, error.__traceback__)
+            raise
+
+    def __enter__(self) -> Run:
+        """Give what runs the tasks of each round."""
+        return partial(_run_on, pool_of=self.of)
+
+    def __exit__(self, *error: object) -> None:
+        """End the processes."""
+        self._ended.__exit__(*error)  # type: ignore[arg-type]
+
+
+for_rounds = LastingPool
+
+
 def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
     """Run batches on `setting.jobs` processes, each on one thread; a pool that has died is replaced by a new one."""
+    return _run_on(tasks, setting, pool_of)
+
+
+def _run_on(tasks: Iterator[Task], setting: Setting, pool_of: PoolOf) -> Generator[Batch, None, None]:
     duplicates = Duplicates()
     work = Work(tasks if setting.folder is None else duplicates.without(tasks), setting)
     with suppress(StoppedError):
