@@ -7,7 +7,6 @@ from blocksim.scenario.findings import Finding
 from blocksim.scenario.models.contact import Contact, Pair
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Nonsmooth
-from blocksim.scenario.motion_peaks import shortest_cycle
 from blocksim.scenario.overrides import Data
 from blocksim.scenario.pairs import GROUND
 from blocksim.scenario.quantities import shown
@@ -108,27 +107,12 @@ def unfit_choices(scenario: Scenario) -> Iterator[Finding]:
     yield from _unmodelled_outlines(scenario)
     if not isinstance(scenario.time, Nonsmooth):
         return
-    yield from _hidden_motion(scenario)
     for name in SPRING_CHOICES:
         chosen = getattr(scenario.contact, name)
         usual = Contact.model_fields[name].default
         if chosen != usual:
             message = f'{shown(chosen)} needs springs, time.scheme = "explicit"; here contacts are rigid'
             yield Finding(("contact", name), message, relation=True)
-
-
-def _hidden_motion(scenario: Scenario) -> Iterator[Finding]:
-    """Find frames that are too far apart to show a motion: a harmonic one may seem to rest in them."""
-    longest = 0.5 * shortest_cycle(scenario)
-    if scenario.output.every > longest:
-        message = (
-            f"frames every {scenario.output.every:.4g} s cannot show a motion with a cycle of {2.0 * longest:.4g} s: "
-            f"at most half of it, {longest:.4g} s"
-        )
-        is_given = "every" in scenario.output.model_fields_set
-        yield Finding(
-            ("output", "every") if is_given else ("motion",), message, at="value" if is_given else "key", relation=True
-        )
 
 
 def _unmodelled_outlines(scenario: Scenario) -> Iterator[Finding]:
