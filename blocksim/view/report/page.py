@@ -1,8 +1,10 @@
 """The HTML file: templates, style, scripts and data; runs of one name are labelled by the keys that differ."""
 
 import functools
+from base64 import b64encode
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from hashlib import sha256
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,6 +38,7 @@ def write_report(subjects: Sequence[Subject], path: Path, *, title: str, version
 def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
     """Return the text of the page; those subjects that have a parent are reached from it only."""
     listed = [subject for subject in subjects if not subject.page.get("parent")]
+    style, script = _part("style.css"), _script()
     return (
         _environment()
         .get_template("page.html")
@@ -45,10 +48,29 @@ def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
             subjects=subjects,
             listed=listed,
             labels=labels(listed),
-            style=_part("style.css"),
-            script="\n".join(_part(f"{name}.js") for name in SCRIPTS),
+            policy=_policy(style, script),
+            style=style,
+            script=script,
         )
     )
+
+
+def _script() -> str:
+    """Return all scripts as one, whose names are seen by nothing else in the page."""
+    parts = "\n".join(_part(f"{name}.js") for name in SCRIPTS)
+    return f'\n(() => {{\n"use strict";\n{parts}\n}})();\n'
+
+
+def _policy(style: str, script: str) -> str:
+    """Return what the page may load and run: its own style and script and pictures within it, nothing else."""
+    nothing = ("default-src", "base-uri", "form-action")
+    own = (f"{kind}-src {_source(text)}" for kind, text in (("style", style), ("script", script)))
+    return "; ".join((*(f"{name} 'none'" for name in nothing), *own, "img-src data:"))
+
+
+def _source(text: str) -> str:
+    """Return the source expression of CSP level 2 for a text within the page: the hash of its bytes."""
+    return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
 @functools.cache

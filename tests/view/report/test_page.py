@@ -2,7 +2,10 @@
 
 import json
 import re
+from base64 import b64encode
 from dataclasses import replace
+from hashlib import sha256
+from html import unescape
 from pathlib import Path
 
 import pytest
@@ -33,6 +36,22 @@ def test_hostile_names_stay_text(tmp_path: Path, name: str) -> None:
     found = re.search(r'id="a-data">(.*?)</script>', text, re.DOTALL)
     assert found
     assert json.loads(found[1])["frames"]["names"][0] == name
+
+
+def test_page_runs_nothing_but_its_own_script_and_style(tmp_path: Path) -> None:
+    write_run(tmp_path / "run", count=2)
+    text = page_text([run_subject("a", read_stored(tmp_path / "run"))], title="", version="0")
+    (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', text)
+    allowed = dict(part.split(" ", 1) for part in unescape(policy).split("; "))
+    own = {
+        kind: f"'sha256-{b64encode(sha256(content.encode()).digest()).decode()}'"
+        for kind, content in re.findall(r"<(script|style)>(.*?)</\1>", text, re.DOTALL)
+    }
+    expected = {f"{kind}-src": source for kind, source in own.items()}
+    shut = dict.fromkeys(("default-src", "base-uri", "form-action"), "'none'")
+    assert allowed == {**shut, **expected, "img-src": "data:"}
+    assert set(own) == {"script", "style"}
+    assert not re.search(r"<[^>]*\s(style|on\w+)=", re.sub(r"<(script|style).*?</\1>", "", text, flags=re.DOTALL))
 
 
 def subject(folder: Path, key: str, name: str = "three_blocks", **settings: object) -> Subject:
