@@ -208,6 +208,77 @@ def test_keys_move_the_player(three: tuple[Path, Frames], open_page: Open) -> No
     assert one.page.locator("details.keys").get_attribute("open") is not None
 
 
+CONTROLS = (
+    "button[data-act=first]",
+    "button[data-act=next]",
+    "[data-option=trails]",
+    "label:has-text('names')",
+    "input[type=range]",
+    "details.keys summary",
+    ".stage canvas",
+    ".chart svg",
+    "div[aria-label='Comparison']",
+    "summary:has-text('Final state')",
+    "h2",
+)
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_keys_move_the_player_after_a_click(control: str, three: tuple[Path, Frames], open_page: Open) -> None:
+    one = open_page(three[0])
+    one.page.locator(f"section:not([hidden]) {control}").first.click()
+    one.page.evaluate(f"{PLAYER}.show(3)")
+    one.page.keyboard.press("ArrowRight")
+    assert one.state()["frame"] == 4
+    one.page.keyboard.press("Space")
+    assert one.state()["playing"]
+
+
+def test_controls_that_tab_reaches_keep_their_own_keys(three: tuple[Path, Frames], open_page: Open) -> None:
+    one = open_page(three[0])
+    box = one.page.locator("[data-option=trails]")
+    one.page.locator("[data-option=speed]").focus()
+    one.page.keyboard.press("Tab")
+    one.page.keyboard.press("Space")
+    assert box.is_checked()
+    assert not one.state()["playing"]
+    assert box.evaluate("node => node === document.activeElement")
+
+
+def test_names_are_drawn_when_ticked_however_small_the_blocks(wall: tuple[Path, Frames], open_page: Open) -> None:
+    one = open_page(wall[0])
+    box = one.page.get_by_label("names")
+    assert not box.is_checked()  # there is no room for them
+    before = pixels(one)
+    box.check()
+    changed = (pixels(one) != before).any(axis=-1)
+    centres = np.array(one.state()["centres"])
+    near = [changed[int(y) - 4 : int(y) + 5, int(x) - 4 : int(x) + 5].any() for x, y in centres]
+    assert all(near)
+    box.uncheck()
+    assert (pixels(one) == before).all()
+    one.keep("thousand-names")
+
+
+def test_own_script_runs_and_an_injected_one_does_not(three: tuple[Path, Frames], open_page: Open) -> None:
+    text = three[0].read_text(encoding="utf-8")
+    evil = '<script>document.title = "broken in"</script><img src="data:," onerror="document.title = 1">'
+    evil += '<p id="styled" style="color: rgb(1, 2, 3)">styled</p><style>#styled { top: 7px }</style>'
+    broken = three[0].with_name("broken_in.html")
+    broken.write_text(text.replace("<main>", f"<main>{evil}", 1), encoding="utf-8")
+    one = open_page(broken)
+    one.page.keyboard.press("ArrowRight")
+    assert one.state()["frame"] == 1  # the player works
+    assert one.page.locator("body").evaluate("node => getComputedStyle(node).maxWidth") == "1088px"
+    assert one.page.title().startswith("three_blocks")
+    look = one.page.locator("#styled").evaluate("node => [getComputedStyle(node).color, getComputedStyle(node).top]")
+    assert look[0] != "rgb(1, 2, 3)"
+    assert look[1] == "auto"
+    assert len(one.complaints) == 4
+    assert all("Content Security Policy" in text for text in one.complaints)
+    one.complaints.clear()
+
+
 def test_everything_that_acts_is_reached_by_tab_and_has_a_name(three: tuple[Path, Frames], open_page: Open) -> None:
     one = open_page(three[0])
     nameless = one.page.evaluate(

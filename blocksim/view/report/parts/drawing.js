@@ -1,5 +1,7 @@
 // Draws one frame.
 const FEW_ARROWS = 400;
+const LEAST_NAME = 9; // px
+const MOST_LETTERS = 24; // of a name
 
 class Drawing {
   constructor(canvas, frames) {
@@ -8,6 +10,7 @@ class Drawing {
     this.frames = frames;
     this.view = new View(frames.scene.extent, frames.scene.tilt);
     this.groups = this.grouped();
+    this.widths = []; // of names at their least size, px
     this.loads = new LoadDrawing(this);
     this.takeColours();
   }
@@ -227,22 +230,43 @@ class Drawing {
     }
   }
 
+  // Writes all names; where one has no room on its block, its size stays readable and a margin parts it from what is below.
   drawNames(frame) {
     const { context, frames, view, ratio } = this;
-    const room = (block) => 0.85 * view.scale * frames.widthOf(block);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.textAlign = "center";
     context.textBaseline = "middle";
+    context.lineJoin = "round";
+    context.lineWidth = 3;
     for (let block = 0; block < frames.blocks; block += 1) {
-      const size = Math.min(0.6 * room(block), 18);
-      if (size < 8 || !frames.isThere(frame, block) || frames.names[block].length > 24) continue;
+      if (!frames.isThere(frame, block)) continue;
+      const { text, size, fits } = this.nameOf(block);
       context.font = `${size}px system-ui, sans-serif`;
-      if (context.measureText(frames.names[block]).width > room(block)) continue;
       const [x, y] = view.toPixels(frames.x[frames.blocks * frame + block], frames.y[frames.blocks * frame + block]);
       const fill = this.fillOf(block);
       context.fillStyle = fill === "#0072B2" ? "#ffffff" : fill ? "#222222" : this.colours.ink;
-      context.fillText(frames.names[block], x, y);
+      context.strokeStyle = fill ?? this.colours.ground;
+      if (!fits) context.strokeText(text, x, y);
+      context.fillText(text, x, y);
     }
+  }
+
+  // The name of a block as it is written, its size in pixels, and whether it has room on the block.
+  nameOf(block) {
+    const { context, frames, view } = this;
+    const name = frames.names[block];
+    const text = name.length > MOST_LETTERS ? `${name.slice(0, MOST_LETTERS - 1)}…` : name;
+    const room = 0.85 * view.scale * frames.widthOf(block);
+    const wanted = Math.min(0.6 * room, 18);
+    context.font = `${LEAST_NAME}px system-ui, sans-serif`;
+    const most = LEAST_NAME * room / (this.widths[block] ??= context.measureText(text).width);
+    return { text, size: Math.max(Math.min(wanted, most), LEAST_NAME), fits: Math.min(wanted, most) >= LEAST_NAME };
+  }
+
+  // Whether most names have room on their blocks, so that they are written without being asked for.
+  haveNamesRoom() {
+    const fitting = this.frames.names.filter((_, block) => this.nameOf(block).fits);
+    return 2 * fitting.length >= this.frames.names.length;
   }
 
   // Draws an arrow for every contact in pixels, all in one path. Few get a light line around them, which

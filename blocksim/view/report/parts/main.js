@@ -36,9 +36,9 @@ addEventListener("hashchange", () => {
   section.querySelector("h2").focus({ preventScroll: true });
 });
 
-// Keys work before anything has the focus.
+// Keys work before anything has the focus, and after a click beside the part that is shown.
 addEventListener("keydown", (event) => {
-  if (event.target !== document.body) return;
+  if (event.target.closest("section")) return;
   built.get(sections.find((section) => !section.hidden).id)?.player?.key(event);
 });
 

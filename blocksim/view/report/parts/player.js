@@ -1,7 +1,8 @@
 // Plays the frames of one run on a canvas. Tells every new frame to those who asked by onFrame.
 const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 5];
 const PLAY_SECONDS = 4;
-const MOST_NAMES = 300;
+const PRESSES = [" ", "Enter"];
+const SCROLLS = [" ", "ArrowLeft", "ArrowRight", "Home", "End"];
 
 class Player {
   constructor(root, data) {
@@ -13,11 +14,14 @@ class Player {
     this.marked = -1;
     this.pinned = false;
     this.timer = 0;
-    this.options = { trails: false, particles: false, forces: false, measured: true, loads: Boolean(this.frames.loads), names: this.frames.blocks <= MOST_NAMES, shade: 0 };
+    this.options = { trails: false, particles: false, forces: false, measured: true, loads: Boolean(this.frames.loads), names: false, shade: 0 };
     this.listeners = [];
     this.chosen = [];
+    this.drawing.resize();
+    this.options.names = this.drawing.haveNamesRoom();
     this.wireControls();
     this.wirePointer();
+    this.wireFocus();
     this.wireView();
     this.show(0);
   }
@@ -46,6 +50,18 @@ class Player {
       box.addEventListener("change", () => { this.options[name] = box.checked; this.redraw(); });
     }
     this.root.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  // A control that was clicked leaves the keys to the player; one that Tab has reached keeps them.
+  wireFocus() {
+    let wasClicked = false;
+    const give = (event, controls) => {
+      if (wasClicked && event.target.closest(controls)) this.canvas.focus({ preventScroll: true });
+    };
+    this.root.addEventListener("pointerdown", () => { wasClicked = true; }, true);
+    this.root.addEventListener("keydown", () => { wasClicked = false; }, true);
+    this.root.addEventListener("click", (event) => give(event, "button, summary"));
+    this.root.addEventListener("change", (event) => give(event, "select, input"));
   }
 
   // What the elements of other systems are coloured by, with the value of the lightest colour.
@@ -236,9 +252,7 @@ class Player {
   }
 
   key(event) {
-    const own = event.target.closest("select, input[type=search], summary, pre, .wide, .histories");
-    const isButton = event.target.closest("button, input[type=checkbox]");
-    if (own || event.ctrlKey || event.metaKey || event.altKey || (isButton && event.key === " ")) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || this.isOwn(event)) return;
     const far = event.shiftKey ? 10 : 1;
     const keys = {
       " ": () => this.act("play"), ArrowLeft: () => this.step(-far), ArrowRight: () => this.step(far),
@@ -253,6 +267,14 @@ class Player {
     if (!action) return;
     event.preventDefault();
     action();
+  }
+
+  // Whether what has the focus does something by itself with a key.
+  isOwn({ target, key }) {
+    const box = target.closest(".wide, pre");
+    const canScroll = box && (box.scrollWidth > box.clientWidth || box.scrollHeight > box.clientHeight);
+    if (canScroll && SCROLLS.includes(key)) return true;
+    return target.closest("select, input[type=search]") || (PRESSES.includes(key) && target.closest("a, button, input[type=checkbox], summary"));
   }
 
   // What is on the canvas: the frame, and the centres of all blocks in CSS pixels from its upper left corner.
