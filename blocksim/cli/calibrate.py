@@ -19,6 +19,7 @@ from blocksim.study.calibrate_plan import FIT, SCATTER, read_plan
 from blocksim.study.calibrate_search import Trial
 
 COLUMNS = ("key", "prior", "fitted")
+TIED = ("key", "prior", "equally good", "written")
 TOLD_SECONDS = 2.0
 
 
@@ -117,9 +118,22 @@ def _agreement(trial: Trial, best: Trial) -> str:
 
 
 def _lines(found: Fit) -> list[str]:
-    rows = [[prior.key, str(prior), str(found.best.values[prior.key])] for prior in found.plan.priors]
     nothing = [] if found.found else ["", *_nothing_found(found)]
-    return [*table_lines(COLUMNS, rows, left=1), "", *_probability(found), *nothing]
+    return [*_values(found), "", *_probability(found), *nothing]
+
+
+def _values(found: Fit) -> list[str]:
+    """Return the fitted values or, where trials tie, the ranges of those that are equally good."""
+    rows = [(prior, str(found.best.values[prior.key])) for prior in found.plan.priors]
+    if not found.is_one_of_many:
+        return table_lines(COLUMNS, [[prior.key, str(prior), value] for prior, value in rows], left=1)
+    tied = [[prior.key, str(prior), prior.range_of(*found.equally_good(prior)), value] for prior, value in rows]
+    return [
+        *table_lines(TIED, tied, left=1),
+        "",
+        f"{len(found.ties)} of {found.trials} trials tie: the measurement does not decide between their values;",
+        "the file holds one of them. More measurements or --samples may tell them apart",
+    ]
 
 
 def _nothing_found(found: Fit) -> list[str]:
@@ -174,6 +188,7 @@ def _data(found: Fit) -> dict[str, object]:
                 "unit": prior.unit,
                 "value": found.best.values[prior.key],
                 "at_bound": prior in found.at_bounds,
+                "equally_good": list(found.equally_good(prior)),
             }
             for prior in found.plan.priors
         ],
@@ -183,6 +198,7 @@ def _data(found: Fit) -> dict[str, object]:
         "members": found.plan.members,
         "seed": found.plan.seed,
         "best_trial": found.best.number,
+        "tied_trials": len(found.ties),
         "search_share_inside": found.best.score.share_inside,
         "share_inside": found.score.share_inside,
         "interval": [low, high],

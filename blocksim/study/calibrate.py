@@ -1,6 +1,6 @@
 """Calibration: values within their priors for which agreement with the repeats is most probable under input scatter."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from blocksim.study.calibrate_search import (
     search,
 )
 from blocksim.study.executors.ensemble import Values, run_members
-from blocksim.study.fitted_file import with_fitted
+from blocksim.study.fitted_file import NOTE, with_fitted
 
 TRIALS = 100
 MEMBERS = 64
@@ -44,11 +44,21 @@ class Fit:
     trials: int
     path: Path
     hits: tuple[Hit, ...]  # of the fresh members, a quantity each
+    ties: tuple[Trial, ...] = ()  # all that are as good as the best by `ties_with`, the best among them
 
     @property
     def found(self) -> bool:
         """Return True if a member of the best trial or a fresh one is inside all ranges; if not, it is the nearest."""
         return _is_found(self.best, self.score)
+
+    @property
+    def is_one_of_many(self) -> bool:
+        """Return True if other values are as good: the measurement does not decide between them."""
+        return len(self.ties) > 1
+
+    def equally_good(self, prior: Prior) -> tuple[float, float]:
+        """Return the least and the greatest of the equally good values of a key, in the unit of its prior."""
+        return _span(prior, self.ties or (self.best,))
 
     @property
     def at_bounds(self) -> tuple[Prior, ...]:
@@ -78,15 +88,20 @@ def calibrate(  # noqa: PLR0913 - one argument for each option of the command
     for package in NEEDED:
         loaded(package, PURPOSE)
     prepare(path, journal, resume=resume, overwrite=overwrite)
-    best = _searched(plan, journal, trials, on_trial)
+    best, ties = _searched(plan, journal, trials, on_trial)
     fresh = plan.scatter.fresh_members(best.values, fresh_members if plan.scatter.plan else 1, plan.seed)
     members = list(run_members(plan.bare, fresh))
     score = score_of(members, plan.ranges)
     text = with_fitted(
-        plan.document, best.values, _provenance(plan, best, score, trials), path.parent, _head(plan, best)
+        plan.document,
+        best.values,
+        _provenance(plan, best, score, trials, ties),
+        path.parent,
+        _head(plan, best, ties),
+        f"one of {len(ties)} equally good, see [provenance]" if len(ties) > 1 else NOTE,
     )
     write_text(path, text)
-    return Fit(plan, best, score, trials, path, hits_of(members, plan.ranges))
+    return Fit(plan, best, score, trials, path, hits_of(members, plan.ranges), ties)
 
 
 def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None:
@@ -107,9 +122,10 @@ def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None
         raise OutputExistsError(f"{path.parent}: cannot be created: {error.strerror}") from error
 
 
-def _searched(plan: Plan, journal: Path, trials: int, on_trial: OnTrial) -> Trial:
-    """Return the best trial, the first of equally good ones."""
+def _searched(plan: Plan, journal: Path, trials: int, on_trial: OnTrial) -> tuple[Trial, tuple[Trial, ...]]:
+    """Return the best trial, the first of equally good ones, and all that tie with it, the best among them."""
     best: Trial | None = None
+    tried: list[Trial] = []
 
     def evaluate(values: Mapping[str, object]) -> Score:
         return _score(plan, plan.scatter.members(values, plan.members, plan.seed))
@@ -118,6 +134,7 @@ def _searched(plan: Plan, journal: Path, trials: int, on_trial: OnTrial) -> Tria
         done = len(finished_trials(study))
         try:
             for trial in search(plan.priors, evaluate, study, trials=trials, seed=plan.seed):
+                tried.append(trial)
                 best = trial if best is None or trial.score.value > best.score.value else best
                 if trial.number > done:
                     on_trial(trial, best, trials)
@@ -126,7 +143,12 @@ def _searched(plan: Plan, journal: Path, trials: int, on_trial: OnTrial) -> Tria
             raise StoppedEarlyError(message) from None
     if best is None:
         raise InvalidInputError("at least one trial is needed")
-    return best
+    return best, tuple(trial for trial in tried if trial.score.ties_with(best.score))
+
+
+def _span(prior: Prior, trials: Iterable[Trial]) -> tuple[float, float]:
+    numbers = [prior.number(trial.values[prior.key]) for trial in trials]
+    return min(numbers), max(numbers)
 
 
 def _score(plan: Plan, members: Iterable[Values]) -> Score:
@@ -137,7 +159,7 @@ def _is_found(best: Trial, score: Score) -> bool:
     return best.score.inside + score.inside > 0
 
 
-def _provenance(plan: Plan, best: Trial, score: Score, trials: int) -> dict[str, str]:
+def _provenance(plan: Plan, best: Trial, score: Score, trials: int, ties: Sequence[Trial]) -> dict[str, str]:
     """Say of every fitted value where it comes from."""
     table = Path(plan.table.source).name
     if plan.scatter.plan is None:
@@ -152,9 +174,19 @@ def _provenance(plan: Plan, best: Trial, score: Score, trials: int) -> dict[str,
             f"scatter (SI): {scatter}"
         )
     verb = "calibrated" if _is_found(best, score) else "not calibrated (nothing inside all ranges, nearest values)"
-    return {prior.key: f"{verb}, prior {prior}, {found}" for prior in plan.priors}
+    among = {prior.key: _among(prior, ties) for prior in plan.priors}
+    return {prior.key: f"{verb}{among[prior.key]}, prior {prior}, {found}" for prior in plan.priors}
 
 
-def _head(plan: Plan, best: Trial) -> str:
+def _among(prior: Prior, ties: Sequence[Trial]) -> str:
+    """Say among which values a value is one of several that are equally good."""
+    if len(ties) <= 1:
+        return ""
+    return f", one of {len(ties)} equally good trials ({prior.range_of(*_span(prior, ties))})"
+
+
+def _head(plan: Plan, best: Trial, ties: Sequence[Trial]) -> str:
     name = Path(plan.document.source.where).name
-    return f"{name} calibrated by blocksim: {', '.join(f'{key} = {value}' for key, value in best.values.items())}"
+    which = f"one of {len(ties)} equally good trials: " if len(ties) > 1 else ""
+    values = ", ".join(f"{key} = {value}" for key, value in best.values.items())
+    return f"{name} calibrated by blocksim: {which}{values}"

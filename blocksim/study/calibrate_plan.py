@@ -69,10 +69,14 @@ class Prior:
             ends, number = (log(self.low), log(self.high)), log(number)
         return min(number - ends[0], ends[1] - number) <= AT_BOUND * (ends[1] - ends[0])
 
-    def __str__(self) -> str:
-        """Write the range as a person does: "0.17-0.31"."""
+    def range_of(self, low: float, high: float) -> str:
+        """Write a range within the prior as a person does: "0.17 to 0.31"."""
         unit = f" {self.unit}" if self.unit else ""
-        return f"{self.low:g} to {self.high:g}{unit}"
+        return f"{low:g} to {high:g}{unit}"
+
+    def __str__(self) -> str:
+        """Write the whole range."""
+        return self.range_of(self.low, self.high)
 
 
 def prior_of(key: str, table: Uniform, written: object) -> Prior:

@@ -76,6 +76,13 @@ class Score:
         """The number to be maximised."""
         return self.share_inside - self.miss / (2.0 * self.members)
 
+    def ties_with(self, best: "Score") -> bool:
+        """Return True if a score is as good as the best one: as many members are inside, or none is, and as far off.
+
+        How near the middle of their ranges members are inside only steers the search: no measurement prefers it.
+        """
+        return self.inside == best.inside and (best.inside > 0 or self.miss == best.miss)
+
     @property
     def interval(self) -> tuple[float, float]:
         """95 % limits (Clopper-Pearson) of the probability behind this share, for members drawn independently."""

@@ -30,30 +30,35 @@ _COMMENT = re.compile(r"""([^#"']*?)(\s*)(?:#\s*(.*?)\s*)?""")
 
 
 def with_fitted(
-    document: Document, values: Mapping[str, object], provenance: Mapping[str, str], folder: Path, head: str
+    document: Document,
+    values: Mapping[str, object],
+    provenance: Mapping[str, str],
+    folder: Path,
+    head: str,
+    note: str = NOTE,
 ) -> str:
     """Return the text of a scenario file to stand in `folder`: values set, their notes in [provenance], `head` on top.
 
     Values that were set over the document before are written too; paths of tables are those seen from the folder.
-    Raises what building the scenario raises.
+    `note` is the comment behind every fitted value. Raises what building the scenario raises.
     """
     changed = document.with_values(values)
     changed = changed.with_values({format_key(("provenance", key)): text for key, text in provenance.items()})
     scenario = changed.build()
     moved = _moved(changed, folder)
     with suppress(BlocksimError):  # no scenario any more, half-way through
-        text = f"# {head}\n{_with_values(document.source.text, moved, len(document.overrides))}"
+        text = f"# {head}\n{_with_values(document.source.text, moved, len(document.overrides), note)}"
         if _says(text, scenario, folder):
             return text
     return f"# {head}\n{_resolved(scenario, moved)}"
 
 
-def _with_values(text: str, wanted: Document, settings: int) -> str:
+def _with_values(text: str, wanted: Document, settings: int, note: str) -> str:
     """Return the text with all values that were set over it; the first so many are settings, the others are fitted."""
     fitted = {override.path for override in wanted.overrides[settings:] if override.path[0] != "provenance"}
     for path in dict.fromkeys([*(override.path for override in wanted.overrides), *_tables(wanted)]):
         if follow(wanted.data, path) != follow(Document.parse(text).data if text else {}, path):
-            text = _edited(text, path, wanted, is_fitted=path in fitted)
+            text = _edited(text, path, wanted, note if path in fitted else "")
     return text
 
 
@@ -75,8 +80,8 @@ def _moved(document: Document, folder: Path) -> Document:
     return replace(document, data=data, folder=folder)
 
 
-def _edited(text: str, path: KeyPath, wanted: Document, *, is_fitted: bool) -> str:
-    """Return the text with the value at a path set, as the wanted document has it."""
+def _edited(text: str, path: KeyPath, wanted: Document, note: str) -> str:
+    """Return the text with the value at a path set, as the wanted document has it, and a note behind it."""
     places = locate(text)
     known = next((path[:size] for size in range(len(path), 0, -1) if path[:size] in places), ())
     lines = text.split("\n")
@@ -84,8 +89,8 @@ def _edited(text: str, path: KeyPath, wanted: Document, *, is_fitted: bool) -> s
         return _appended(text, path, wanted)
     place = places[known]
     if not _is_header(lines, place):
-        note = (NOTE if known == path else f"{path[-1]} {NOTE}") if is_fitted else ""
-        return _replaced(lines, place.value, toml_value(follow(wanted.data, known)), note)
+        told = f"{path[-1]} {note}" if note and known != path else note
+        return _replaced(lines, place.value, toml_value(follow(wanted.data, known)), told)
     line = f"{format_key(path[len(known) :])} = {toml_value(follow(wanted.data, path))}"
     return "\n".join([*lines[: place.key.line], line, *lines[place.key.line :]])
 

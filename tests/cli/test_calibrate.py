@@ -1,6 +1,7 @@
 """blocksim calibrate: what it writes, tells and refuses; killed, it continues."""
 
 import json
+import re
 import signal
 import time
 from collections.abc import Callable
@@ -128,6 +129,25 @@ def test_single_run_without_scatter_says_that_it_is_one(slide: Slide) -> None:
     answer = slide(*FIT, "--trials", 20, "--samples", 1, "--out", "fitted.toml")
     assert answer.code == 0
     assert "one run, without input scatter: inside all ranges" in answer.out
+
+
+def test_trials_that_tie_are_reported_with_their_range_and_none_is_called_the_fit(slide: Slide) -> None:
+    few = (*NEAR, "--samples", 1, "--trials", 4, "--out", "fitted.toml")  # every trial stops inside the range
+    answer = slide(*few)
+    assert answer.code == 0
+    heads, _, row, _, tie = answer.out.splitlines()[:5]
+    assert (re.split(r"  +", heads), "fitted" in answer.out) == (["key", "prior", "equally good", "written"], False)
+    low, high, value = (float(text) for text in re.findall(r"0\.30\d*", row)[1:])
+    assert 0.3 < low <= value <= high < 0.307
+    assert high - low > 0.003
+    assert tie.startswith("4 of 4 trials tie: the measurement does not decide")
+    assert max(map(len, answer.out.splitlines())) <= 80
+    text = Path("fitted.toml").read_text()
+    assert f"calibrated, one of 4 equally good trials ({low:g} to {high:g}), prior 0.3 to 0.307" in text
+    assert "calibrated by blocksim: one of 4 equally good trials: " in text.splitlines()[0]
+    assert "# one of 4 equally good, see [provenance]" in text
+    data = json.loads(slide(*few, "--overwrite", "--json").out)
+    assert (data["tied_trials"], data["fitted"][0]["equally_good"]) == (4, [low, high])
 
 
 @pytest.mark.long
