@@ -4,13 +4,14 @@ numba's own cache trusts its files: a flipped byte of machine code kills the pro
 a power failure, ends every run until somebody removes it. It also keeps a list of files for each function, and two
 processes that add to one at the same time may leave a list that names the code of another version. Here every version
 of a function has a file of its own, named after what it was compiled for and holding that as well. A file that is not
-whole is reported; what it held is compiled again and replaces it.
+whole, or that another user may have written, is reported; what it held is compiled again and replaces it.
 """
 
 import contextlib
 import functools
 import hashlib
 import logging
+import os
 import pickle
 import sys
 import tempfile
@@ -23,6 +24,7 @@ from numba.core import serialize
 from numba.core.caching import FunctionCache
 
 from blocksim.kernels.common.compiler import rebuilt
+from blocksim.kernels.common.ownership import is_own
 
 DIGEST_BYTES = hashlib.sha256().digest_size
 NAME_DIGITS = 16
@@ -107,7 +109,11 @@ def _named_tuples(kinds: Any) -> Iterator[type]:
 def _read(path: Path) -> bytes | None:
     """Return what a file holds, None where there is none, or none that is whole."""
     try:
-        stored = path.read_bytes()
+        with path.open("rb") as file:
+            if not (is_own(path.parent.stat()) and is_own(os.fstat(file.fileno()))):
+                _tell_others(path.parents[1])
+                return None
+            stored = file.read()
     except FileNotFoundError:
         return None
     except OSError:
@@ -132,6 +138,12 @@ def _write(path: Path, content: bytes) -> None:
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
+
+
+@functools.cache
+def _tell_others(folder: Path) -> None:
+    """Report files that others may have written, once a process."""
+    log.warning("%s: compiled code that other users may write found; recompiling it (less than a minute) ...", folder)
 
 
 @functools.cache

@@ -8,6 +8,8 @@ llvmlite and numpy versions, so any edit of any kernel file starts an empty cach
 import contextlib
 import functools
 import hashlib
+import logging
+import multiprocessing
 import os
 import tempfile
 from collections.abc import Callable, Iterator
@@ -23,6 +25,7 @@ from numba.core.registry import CPUDispatcher
 
 from blocksim.kernels.common.cache import KernelCache
 from blocksim.kernels.common.compiler import InnerCompiler, LeanCompiler
+from blocksim.kernels.common.ownership import trouble_with
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -34,6 +37,8 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrap
 config: Any = numba_config  # its settings are attributes made at run time
 types: Any = numba_types
 njit: Any = numba.njit  # _nrt is an option that its types leave out
+
+log = logging.getLogger("blocksim")
 
 KERNEL_FOLDER = Path(__file__).resolve().parents[1]
 
@@ -56,16 +61,6 @@ def cache_root() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "blocksim"
 
 
-def _is_usable(folder: Path) -> bool:
-    """Return True if files can be kept there, and only by this user: cached code is executed."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        with tempfile.TemporaryFile(dir=folder):
-            return not hasattr(os, "getuid") or folder.stat().st_uid == os.getuid()
-    except OSError:
-        return False
-
-
 def _cache_roots() -> Iterator[Path]:
     with contextlib.suppress(RuntimeError):  # an unknown user without HOME has no folder
         yield cache_root()
@@ -76,11 +71,37 @@ def _cache_roots() -> Iterator[Path]:
 @functools.cache
 def cache_folder() -> Path | None:
     """Return the cache folder of this exact source, or None where nothing can be kept."""
-    name = source_hash()
+    troubles: list[str] = []
     for root in _cache_roots():
-        if _is_usable(root) and _is_usable(root / name):
-            return root / name
+        with contextlib.suppress(OSError):
+            folder, trouble = _made(root)
+            if not trouble:
+                _tell_refusal(next(iter(troubles), ""), f"kept in {root}")
+                return folder
+            troubles.append(trouble)
+    _tell_refusal(next(iter(troubles), ""), "not kept, and every run compiles them")
     return None
+
+
+def _made(root: Path) -> tuple[Path, str]:
+    """Return the folder of this source below a root, and why others could write to it; raises OSError.
+
+    The path has no links: they may lead elsewhere tomorrow.
+    """
+    folder = root
+    for folder in (root, root / source_hash()):
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if trouble := trouble_with(folder):
+            return folder, trouble
+        with tempfile.TemporaryFile(dir=folder):  # raises where nothing can be written
+            pass
+    return folder.resolve(), ""
+
+
+def _tell_refusal(trouble: str, instead: str) -> None:
+    """Report why the folder that was asked for does not serve, unless the process that began this one has."""
+    if trouble and multiprocessing.parent_process() is None:
+        log.warning("%s; compiled kernels are %s", trouble, instead)
 
 
 def is_compiled() -> bool:

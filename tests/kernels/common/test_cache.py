@@ -28,6 +28,7 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Keep what is compiled in a folder of this test's own."""
     monkeypatch.setattr(jit, "cache_folder", lambda: tmp_path / "kernels")
     cache._tell_damage.cache_clear()
+    cache._tell_others.cache_clear()
     return tmp_path / "kernels"
 
 
@@ -68,6 +69,27 @@ def test_damaged_file_is_reported_compiled_anew_and_whole_again(
     third = double()
     assert third(1.5) == 3.0
     assert loads_and_compilations(third) == (1, 0)
+
+
+OTHERS: dict[str, Callable[[Path], None]] = {
+    "writable for all": lambda file: file.chmod(0o666),
+    "writable for the group": lambda file: file.chmod(0o660),
+    "folder writable for all": lambda file: file.parent.chmod(0o777),
+}
+
+
+@pytest.mark.parametrize("others", OTHERS)
+def test_file_that_others_may_write_is_not_executed(kept: Path, others: str, caplog: pytest.LogCaptureFixture) -> None:
+    assert double()(1.5) == 3.0
+    (file,) = files(kept)
+    OTHERS[others](file)
+    again = double()
+    with caplog.at_level(logging.WARNING, "blocksim"):
+        assert again(1.5) == 3.0
+    assert loads_and_compilations(again) == (0, 1)
+    assert [record.getMessage() for record in caplog.records] == [
+        f"{kept}: compiled code that other users may write found; recompiling it (less than a minute) ..."
+    ]
 
 
 def test_file_that_cannot_be_read_is_no_obstacle(kept: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import multiprocessing
 import os
 import shutil
 import subprocess
@@ -13,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from blocksim.kernels.common import jit
+from blocksim.kernels.common import cache, jit, ownership
 from blocksim.kernels.common.arrays import PAIR, zeros
 
 if TYPE_CHECKING:
@@ -126,6 +128,83 @@ def test_cache_folder_falls_back_to_the_temporary_one(
     assert folder is not None
     assert folder.is_relative_to(tmp_path / "temporary")
     assert folder.name == jit.source_hash()
+
+
+REFUSED = {
+    "group": (0o770, 0o755),
+    "all": (0o777, 0o755),
+    "all, sticky": (0o1777, 0o755),
+    "all, a folder above": (0o700, 0o777),
+    "group, a folder above": (0o700, 0o770),
+}
+
+
+@pytest.fixture
+def chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Choose a cache folder, inside another one; the temporary folder is there as well."""
+    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(tmp_path / "above" / "cache"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    monkeypatch.setattr(multiprocessing, "parent_process", lambda: None)  # a worker process tells nothing
+    (tmp_path / "above" / "cache").mkdir(parents=True)
+    return tmp_path / "above" / "cache"
+
+
+@pytest.mark.usefixtures("fresh_folder_choice")
+@pytest.mark.parametrize("modes", REFUSED.values(), ids=REFUSED)
+def test_cache_folder_that_others_may_write_is_refused_with_a_line(
+    chosen: Path, modes: tuple[int, int], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(ownership, "_is_group_of_one", lambda _: False)
+    chosen.chmod(modes[0])
+    chosen.parent.chmod(modes[1])
+    with caplog.at_level(logging.WARNING, "blocksim"):
+        folder = jit.cache_folder()
+    assert folder is not None
+    assert folder.is_relative_to(tempfile.gettempdir())
+    assert list(chosen.iterdir()) == []
+    (line,) = (record.getMessage() for record in caplog.records)
+    assert line.startswith(f"{chosen}: other users may write ")
+    assert line.endswith(f"; compiled kernels are kept in {folder.parent}")
+
+
+@pytest.mark.usefixtures("fresh_folder_choice")
+def test_cache_folder_of_another_user_is_refused_with_a_line(
+    chosen: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    other = os.getuid() + 1
+    monkeypatch.setattr(os, "getuid", lambda: other)
+    with caplog.at_level(logging.WARNING, "blocksim"):
+        assert jit.cache_folder() is None
+    (line,) = (record.getMessage() for record in caplog.records)
+    assert line.startswith(f"{chosen}: other users may write there; compiled kernels are not kept")
+
+
+@pytest.mark.usefixtures("fresh_folder_choice")
+@pytest.mark.parametrize("way", ["sticky folder above", "link"])
+def test_cache_folder_that_only_this_user_may_write_serves(
+    chosen: Path, way: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    if way == "link":
+        (chosen.parent.parent / "link").symlink_to(chosen.parent)
+        monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(chosen.parent.parent / "link" / "cache"))
+    else:
+        chosen.parent.chmod(0o1777)
+    assert jit.cache_folder() == chosen / jit.source_hash()
+    assert caplog.records == []
+
+
+def test_compiled_code_of_another_user_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "source" / "module" / "code.nbc"
+    cache._write(file, b"code")
+    assert cache._read(file) == b"code"
+    fstat, other = os.fstat, os.getuid() + 1
+
+    def of_another(number: int) -> os.stat_result:
+        state = fstat(number)
+        return os.stat_result((*state[:4], other, *state[5:]))
+
+    monkeypatch.setattr(os, "fstat", of_another)
+    assert cache._read(file) is None
 
 
 @pytest.mark.usefixtures("fresh_folder_choice", "compiler")
