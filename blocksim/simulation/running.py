@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario, scenario_hash
-from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.scenario.placement import smallest_width
 from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint import origin_of, restored
@@ -49,7 +49,7 @@ from blocksim.simulation.summary import Summary
 from blocksim.simulation.table import final_columns
 from blocksim.simulation.team import Team, team_for
 from blocksim.world.memory import is_shorter_than_step
-from blocksim.world.sag import overlap_warning
+from blocksim.world.sag import crushed_now, overlap_warning
 from blocksim.world.scenes import Built
 from blocksim.world.systems import others_of
 
@@ -304,7 +304,7 @@ def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResul
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     for number in ended.pending if ended.outcome.is_finished else ():
         yield f"events.{number} has not happened, as nothing came to rest: {in_words(scenario.events[number])}"
-    if isinstance(scenario.time, Nonsmooth) and ended.outcome.is_finished:
-        sunk = overlap_warning(ended.overlap, smallest_width(placed))
+    if isinstance(ended.scene, Nonsmooth) and ended.outcome.is_finished:
+        sunk = overlap_warning(ended.overlap, crushed_now(ended.scene), smallest_width(placed))
         if sunk:
             yield sunk

@@ -202,7 +202,7 @@ def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, ste
         sag=sag.sag,
         block=sag.block,
         overlap=sag.overlap,
-        warning=overlap_warning(sag.overlap, bounds.smallest),
+        warning=overlap_warning(sag.overlap, sag.crushed, bounds.smallest),
     )
 
 

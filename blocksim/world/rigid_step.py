@@ -28,7 +28,7 @@ from blocksim.scenario.motion_peaks import shortest_cycle, shortest_period
 from blocksim.scenario.structures.arch import Arch
 from blocksim.world.bodies import Outline
 from blocksim.world.bounds import Bounds, given_speed, greatest_speed, impact_speed, support_speed
-from blocksim.world.sag import WARNING_SHARE, arch_shortening, scene_sag, soft_contact
+from blocksim.world.sag import CRUSHED_SHARE, UNLIKE, WARNING_SHARE, arch_shortening, scene_sag, soft_contact
 from blocksim.world.step import MOST_STEPS, StepError, UncountableStepsError
 
 USUAL_STEP = 1e-3  # s
@@ -36,7 +36,7 @@ SHARE = 0.1  # of the smallest side
 FEW = 13  # free blocks: fewer take shorter steps
 NATURAL = 0.02  # of sqrt(L/g): the step of so many
 CROWD = 100  # free blocks, from which on sagging does not shorten a step
-CALM = 0.9  # of the overlap that is warned of
+CALM = 0.9  # of the overlap or sag that is warned of
 SHORTENED = 1.5e-4  # of the thickness of an arch: with 4e-4 friction holds some by up to one per cent less
 PERIOD_SHARE = 0.05  # of the shortest period of a prescribed motion: its velocity changes by a third in a step
 MILLI = 1e3
@@ -134,17 +134,22 @@ def _reasons_of_sag(outline: Outline, bounds: Bounds) -> Iterator[Reason]:
     Most scenes are far from it, which is known from the weight of all; crowds take the usual step anyway.
     """
     scenario = outline.scenario
-    substeps, allowed = _substeps(scenario), CALM * WARNING_SHARE * bounds.smallest
+    masses = [1.0 / kind.inverse_mass for kind in bounds.kinds if kind.inverse_mass > 0.0]
+    crushed = CALM * CRUSHED_SHARE * bounds.smallest
+    allowed = CALM * WARNING_SHARE * bounds.smallest
+    least = crushed if max(masses) >= UNLIKE * min(masses) else allowed
+    substeps = _substeps(scenario)
     compliance = max(
         kind.inverse_mass + max(kind.half_x, kind.half_y) ** 2 * kind.inverse_inertia for kind in bounds.kinds
     )
     square = soft_contact(USUAL_STEP / substeps).frequency ** 2
-    if bounds.free >= CROWD or not 2.0 * compliance * scenario.gravity * bounds.mass > square * allowed:
+    if bounds.free >= CROWD or not 2.0 * compliance * scenario.gravity * bounds.mass > square * least:
         return
-    overlap = scene_sag(USUAL_STEP / substeps, outline.placed, scenario.gravity).overlap
-    if overlap > allowed:
-        why = f"no contact gives way by more than {MILLI * allowed:.3g} mm where light blocks carry heavy ones"
-        yield Reason(USUAL_STEP / math.ceil(math.sqrt(overlap / allowed)), why)
+    sag = scene_sag(USUAL_STEP / substeps, outline.placed, scenario.gravity)
+    for found, most in ((sag.crushed, crushed), (sag.overlap, allowed)):
+        if found > most:
+            why = f"no contact gives way by more than {MILLI * most:.3g} mm where light blocks carry heavy ones"
+            yield Reason(USUAL_STEP / math.ceil(math.sqrt(found / most)), why)
 
 
 def _reasons_of_arches(outline: Outline) -> Iterator[Reason]:

@@ -10,13 +10,23 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.kernels.common.arrays import Records
+from blocksim.kernels.nonsmooth.arrays import AWAY, Nonsmooth
 from blocksim.scenario import PlacedBody
 from blocksim.world.loads import loads_at_rest
 
 FREQUENCY = 0.125  # of the soft contact, per substep: w h = 2 pi / 8. Above 0.15 walls spread like a fluid
 DAMPING = 10.0  # damping ratio of the soft contact
-WARNING_SHARE = 0.01  # of the smallest side
-MILLI = 1e3
+WARNING_SHARE = 0.01  # of the smallest side: overlap of any contact
+CRUSHED_SHARE = 0.001  # of the smallest side: sag of what light blocks carry that is heavier by at least UNLIKE
+UNLIKE = 10.0  # ratio of masses; walls and stacks of alike blocks are far from it
+DRIFT = 25.0  # substeps: time constant of the soft contact, 2 zeta / w
+STILL = 0.1  # of an overlap, that it may change by in that time at rest
+UPRIGHT = 0.1  # cosine of the angle between a normal and the vertical, from which on one body lies on the other
+MILLI, PERCENT = 1e3, 1e2
 
 
 class SoftContact(NamedTuple):
@@ -50,6 +60,7 @@ class Sag(NamedTuple):
     sag: float
     block: str
     overlap: float
+    crushed: float  # of the corner that sinks most into light blocks that carry heavy ones
 
 
 def scene_sag(substep: float, placed: Sequence[PlacedBody], gravity: float) -> Sag:
@@ -59,12 +70,14 @@ def scene_sag(substep: float, placed: Sequence[PlacedBody], gravity: float) -> S
     block on a light one sinks by their ratio further than equal blocks.
     """
     square = soft_contact(substep).frequency ** 2
-    sunk = [0.0] * len(placed)
+    sunk, crushed = [0.0] * len(placed), [0.0] * len(placed)
     most = 0.0
     loads = list(loads_at_rest(placed, gravity))
     total: defaultdict[int, float] = defaultdict(float)
     for load in loads:
         total[load.upper] += load.force
+    masses = [0.0 if body.fixed else body.mass for body in placed]
+    burdened = _burdened(((load.upper, load.lower) for load in loads if load.force > 0.0), masses)
     for load in reversed(loads):  # from below upwards
         if load.force > 0.0:
             lower = None if load.lower is None else placed[load.lower]
@@ -75,8 +88,71 @@ def scene_sag(substep: float, placed: Sequence[PlacedBody], gravity: float) -> S
             below = 0.0 if load.lower is None else sunk[load.lower]
             sunk[load.upper] += load.force / total[load.upper] * (overlap + below)
             most = max(most, overlap)
+            _crush(crushed, (load.upper, load.lower), overlap, burdened)
     deepest = max(range(len(placed)), key=sunk.__getitem__)
-    return Sag(sunk[deepest], placed[deepest].name, most)
+    return Sag(sunk[deepest], placed[deepest].name, most, max(crushed))
+
+
+def _burdened(pairs: Iterable[tuple[int, int | None]], masses: Sequence[float]) -> frozenset[int]:
+    """Return the free bodies below one that is UNLIKE times as heavy, directly or not.
+
+    `pairs` are upper and lower bodies from above downwards, `masses` (kg) are zero for fixed ones.
+    """
+    heaviest = [0.0] * len(masses)  # kg, of what is above
+    for upper, lower in pairs:
+        if lower is not None:
+            heaviest[lower] = max(heaviest[lower], heaviest[upper], masses[upper])
+    return frozenset(i for i, mass in enumerate(masses) if mass > 0.0 and heaviest[i] >= UNLIKE * mass)
+
+
+def _crush(crushed: list[float], pair: tuple[int, int | None], overlap: float, burdened: frozenset[int]) -> None:
+    """Add an overlap (m) to what the upper body of a pair sinks into light ones; pairs come from below upwards."""
+    upper, lower = pair
+    below = 0.0 if lower is None else crushed[lower]
+    own = overlap if upper in burdened or lower in burdened else 0.0
+    crushed[upper] = max(crushed[upper], below + own)
+
+
+def crushed_now(scene: Nonsmooth) -> float:
+    """Return how far (m) a corner has sunk into light blocks that carry heavy ones, where contacts are at rest.
+
+    The same as `Sag.crushed`, measured: also where blocks have come to lie on others.
+    """
+    bodies, controls = scene.world.bodies, scene.world.controls[0]
+    gravity = math.hypot(controls.gravity_x, controls.gravity_y)
+    inverse = bodies["inverse_mass"]
+    free = inverse[inverse > 0.0]
+    if not gravity > 0.0 or free.size == 0 or free.max() < UNLIKE * free.min():
+        return 0.0
+    found = scene.contacts.constraints[: scene.contacts.stepping[0].constraint_count].view(np.recarray)
+    down = (found["nx"] * controls.gravity_x + found["ny"] * controls.gravity_y) / gravity
+    overlap = _overlaps_at_rest(scene, found)
+    heights = -(bodies["x"] * controls.gravity_x + bodies["y"] * controls.gravity_y) / gravity
+    upper = np.where(down < 0.0, found["a"], found["b"]).astype(np.int64)
+    lower = np.where(down < 0.0, found["b"], found["a"]).astype(np.int64)
+    chosen = np.flatnonzero((overlap > 0.0) & (np.abs(down) > UPRIGHT))
+    chosen = chosen[np.argsort(-heights[upper[chosen]], kind="stable")]
+    pairs = list(zip(upper[chosen].tolist(), lower[chosen].tolist(), strict=True))
+    burdened = _burdened(pairs, np.where(inverse > 0.0, bodies["mass"], 0.0).tolist())
+    crushed = [0.0] * len(bodies)
+    for pair, depth in zip(reversed(pairs), overlap[chosen[::-1]].tolist(), strict=True):
+        _crush(crushed, pair, depth, burdened)
+    return max(crushed)
+
+
+def _overlaps_at_rest(scene: Nonsmooth, found: Records) -> NDArray[np.float64]:
+    """Return the overlaps (m) of constraints that press, zero for impacts and for bodies that still move."""
+    bodies, stepping = scene.world.bodies, scene.contacts.stepping[0]
+    one, two = (np.where(found[f"normal_{name}"] > 0.0, -found[f"gap_{name}"], 0.0) for name in ("one", "two"))
+    overlap = np.where((found["reach"] == AWAY) | (found["is_struck"] == 1), 0.0, np.maximum(one, two))
+    a, b = bodies[found["a"]], bodies[found["b"]]
+    rate = (
+        np.hypot(a["vx"] - b["vx"], a["vy"] - b["vy"])
+        + np.abs(a["radius"] * a["spin"])
+        + np.abs(b["radius"] * b["spin"])
+    )
+    still: NDArray[np.float64] = np.where(DRIFT * stepping.substep * rate < STILL * overlap, overlap, 0.0)
+    return still
 
 
 def _inverse_mass_at(body: PlacedBody, x: float) -> float:
@@ -93,11 +169,18 @@ def arch_shortening(voussoir: PlacedBody, count: int, thickness: float, gravity:
     return count**2 * gravity * (1.0 + 0.25 * voussoir.mass * thickness**2 / voussoir.inertia)
 
 
-def overlap_warning(overlap: float, smallest: float) -> str:
-    """Return a warning of an overlap (m) at rest, given the smallest side (m); nothing where it is small."""
-    if not overlap > WARNING_SHARE * smallest:
+def overlap_warning(overlap: float, crushed: float, smallest: float) -> str:
+    """Return a warning of overlaps at rest, given the smallest side; nothing where they are small.
+
+    All in m: of any contact, and `crushed` as in Sag.
+    """
+    if crushed > CRUSHED_SHARE * smallest:
+        found, share = f"rigid contacts give way by {MILLI * crushed:.3g} mm at rest", CRUSHED_SHARE
+    elif overlap > WARNING_SHARE * smallest:
+        found, share = f"rigid contacts overlap by {MILLI * overlap:.3g} mm at rest", WARNING_SHARE
+    else:
         return ""
     return (
-        f"rigid contacts overlap by {MILLI * overlap:.3g} mm at rest, above {WARNING_SHARE:.0%} of the smallest side "
-        f"({MILLI * smallest:.4g} mm): a light block carries a heavy one; overlaps grow with time.step squared"
+        f"{found}, above {PERCENT * share:g}% of the smallest side ({MILLI * smallest:.4g} mm): "
+        "a light block carries a heavy one; overlaps grow with time.step squared"
     )

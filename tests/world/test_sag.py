@@ -32,8 +32,8 @@ def test_column_sinks_by_what_is_reported(count: int, substeps: int) -> None:
     assert (count - 0.5) * HEIGHT - run.bodies.y[-1] == pytest.approx(told.sag, rel=1e-3)
 
 
-def heavy_on_light(ratio: float) -> Scenario:
-    """Return a block on another that has a share of its mass."""
+def heavy_on_light(ratio: float, *, x: float = 0.0, gap: float = 0.0, **time: Any) -> Scenario:
+    """Return a block on another that has a share of its mass, beside its middle by x (m) and above it by a gap (m)."""
     materials = {
         name: {"density": density, "young_modulus": 1e9, "poisson_ratio": 0.25}
         for name, density in (("light", 2000.0), ("heavy", 2000.0 * ratio))
@@ -44,9 +44,9 @@ def heavy_on_light(ratio: float) -> Scenario:
             "name": "unlike",
             "materials": materials,
             "blocks": {name: {"width": 0.04, "height": 0.025, "length": 0.05, "material": name} for name in materials},
-            "bodies": [{"block": "light", "x": 0.0, "y": 0.0125}, {"block": "heavy", "x": 0.0, "y": 0.0375}],
+            "bodies": [{"block": "light", "x": 0.0, "y": 0.0125}, {"block": "heavy", "x": x, "y": 0.0375 + gap}],
             "contact": {"restitution": 0.0},
-            "time": {"scheme": "nonsmooth", "step": 1e-3, "end": 2.0},
+            "time": {"scheme": "nonsmooth", "step": 1e-3, "end": 2.0, **time},
         }
     )
 
@@ -60,7 +60,13 @@ def cube_on_two() -> Scenario:
 
 
 @pytest.mark.parametrize(
-    ("scenario", "is_warned"), [(heavy_on_light(100.0), False), (heavy_on_light(1000.0), True), (cube_on_two(), True)]
+    ("scenario", "is_warned"),
+    [
+        (heavy_on_light(5.0), False),
+        (heavy_on_light(100.0), True),
+        (heavy_on_light(1000.0), True),
+        (cube_on_two(), True),
+    ],
 )
 def test_heavy_blocks_sink_into_light_ones_by_what_is_reported(scenario: Scenario, is_warned: bool) -> None:
     told = describe(scenario).rigid
@@ -89,6 +95,31 @@ def test_automatic_step_keeps_light_blocks_from_being_crushed(ratio: float) -> N
     assert told is not None
     assert (told.warning, "light blocks carry heavy ones" in told.why) == ("", True)
     assert Simulation(build_scene(scenario)).to_time(0.1).measured()[-1] < 0.011 * 0.025
+
+
+@pytest.mark.parametrize("ratio", [30.0, 1e4])
+def test_automatic_step_holds_a_heavy_block_beside_the_middle_of_a_light_one_to_a_thousandth_of_it(
+    ratio: float,
+) -> None:
+    """It sank by a hundredth, and turned by 0.5 degrees, without a warning."""
+    result = simulate(heavy_on_light(ratio, x=0.008, step="auto"))
+    frames = result.held
+    assert frames is not None
+    assert 0.0375 - frames.y[-1, 1] < 1e-3 * 0.025
+    assert abs(frames.rotation[-1]).max() < 1e-3  # rad
+    assert result.summary.warnings == ()
+
+
+@pytest.mark.parametrize(("ratio", "is_warned"), [(5.0, False), (1e3, True)])
+def test_a_run_warns_of_a_heavy_block_that_has_come_to_lie_on_a_light_one(ratio: float, is_warned: bool) -> None:
+    """Before the run nothing lies on anything, so that the step is the usual one of two blocks."""
+    scenario = heavy_on_light(ratio, x=0.008, gap=1e-4, step="auto")
+    told = describe(scenario).rigid
+    assert told is not None
+    assert told.warning == ""
+    result = simulate(scenario)
+    assert result.status == "finished"
+    assert ["a light block carries a heavy one" in text for text in result.summary.warnings] == [True] * is_warned
 
 
 def test_brick_carries_half_of_each_that_stands_on_two() -> None:
