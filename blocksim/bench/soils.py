@@ -41,7 +41,7 @@ QUICK = Sizes((250, 500), 500, Size(10, 10))
 def pushed_soil(particles: int) -> Scenario:
     """Return a square of rods on the ground, with about so many particles; the block that a scene needs is far away."""
     side = round(math.sqrt(particles)) * SPACING
-    soil = {"name": "rods", "material": "rods", "spacing": SPACING, "kind": "rectangle"}
+    soil = {"name": "rods", "material": "rods", "spacing": SPACING, "kind": "rectangle", "gradient": "raw"}
     return scenario_from_mapping(
         {
             "schema": 1,

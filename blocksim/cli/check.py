@@ -64,6 +64,8 @@ def check_command(
     elif not quiet:
         answer("\n\n".join("\n".join(lines) for lines in _tables(ready, description)))
         warn_of_values(ready)
+        for text in description.warnings:
+            note(f"warning: {text}")
         note(f"{ready.name}: valid")
 
 

@@ -51,7 +51,7 @@ from blocksim.simulation.team import Team, team_for
 from blocksim.world.memory import is_shorter_than_step
 from blocksim.world.sag import crushed_now, overlap_warning
 from blocksim.world.scenes import Built
-from blocksim.world.systems import others_of
+from blocksim.world.systems import others_of, warnings_of
 
 
 def _ignore(_: object) -> None:
@@ -302,6 +302,7 @@ def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResul
         yield f"relative energy error {residual:.1e}, above {RESIDUAL_PROMISE:g}"
     if is_shorter_than_step(every, float(ended.scene.world.controls[0].step)):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
+    yield from warnings_of(scenario)
     for number in ended.pending if ended.outcome.is_finished else ():
         yield f"events.{number} has not happened, as nothing came to rest: {in_words(scenario.events[number])}"
     if isinstance(ended.scene, Nonsmooth) and ended.outcome.is_finished:

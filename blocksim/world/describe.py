@@ -32,7 +32,7 @@ from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
 from blocksim.world.scenes import stack_of_one
 from blocksim.world.step import step_of_contacts
-from blocksim.world.systems import largest_step, others_of
+from blocksim.world.systems import largest_step, others_of, warnings_of
 from blocksim.world.systems.system import Present
 
 # measured on one core: a step costs about this for every body with its contacts
@@ -117,6 +117,7 @@ class Description:
     rigid: SagDescription | None  # where contacts are
     systems: Mapping[str, int]  # elements of each system beside blocks and supports
     limits: StepLimits | None  # where there are any
+    warnings: tuple[str, ...]  # of results of these systems that are known to be off
 
 
 def describe(scenario: Scenario) -> Description:
@@ -146,6 +147,7 @@ def describe(scenario: Scenario) -> Description:
         rigid=_rigid(scenario, placed, world, step),
         systems={one.system.name: one.count for one in others},
         limits=_limits(scenario, placed, world) if others else None,
+        warnings=tuple(warnings_of(scenario)),
     )
 
 

@@ -209,6 +209,18 @@ def test_friction_angle_without_its_unit_is_warned_of(blocksim: Command) -> None
     assert "warning" not in blocksim("check", *settings[:2], "friction.block_ground=30 deg").err
 
 
+def test_thrust_of_soil_that_is_too_small_is_warned_of_before_and_after_a_run(
+    blocksim: Command, tmp_path: Path
+) -> None:
+    warning = "warning: soils.backfill.gradient: with raw gradients"
+    settings = ("scenarios/soil/retaining_wall_stands.toml", "--set", "soils.backfill.gradient=raw")
+    assert warning in blocksim("check", *settings).err
+    assert "warning" not in blocksim("check", *settings[:1]).err
+    told = blocksim("run", *settings, "--set", "time.end=1e-3", "--out", str(tmp_path / "run"))
+    assert warning in told.err
+    assert warning.removeprefix("warning: ") in (tmp_path / "run" / "run.json").read_text()
+
+
 def test_a_step_that_one_side_makes_ten_times_shorter_is_told_with_its_cure(blocksim: Command, tmp_path: Path) -> None:
     (tmp_path / "soil.toml").write_text(scenario_to_toml(scene(column(0.05, 0.05, 0.005))))
     told = blocksim("check", "soil.toml").out

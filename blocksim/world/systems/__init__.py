@@ -62,6 +62,13 @@ def largest_step(scenario: Scenario) -> float:
     return min((bound(scenario) for bound in bounds if bound is not None), default=float("inf"))
 
 
+def warnings_of(scenario: Scenario) -> Iterator[str]:
+    """Yield what is known to be off in the results of the systems beside blocks and supports."""
+    for system in systems_of(scenario):
+        if system.warnings is not None:
+            yield from system.warnings(scenario)
+
+
 def interaction_of(one: System, other: System) -> tuple[bool, Interaction]:
     """Return whether a pair stands in the table the other way round, and what happens between the two.
 

@@ -79,15 +79,8 @@ def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
         record.slope, record.cohesion = yield_surface(material)
         record.impedance = material.density * wave_speed(material)
         record.settling, record.settled = settling_of(scenario, table)
-        record.is_corrected = is_corrected(scenario, table)
+        record.is_corrected = table.gradient == "corrected"
     return records
-
-
-def is_corrected(scenario: Scenario, table: SoilTable) -> bool:
-    """Return True if the gradients of a soil are corrected: as it says, else where there is cohesion."""
-    if table.gradient:
-        return table.gradient == "corrected"
-    return bool(scenario.materials[table.material].cohesion)
 
 
 def settling_of(scenario: Scenario, table: SoilTable) -> tuple[float, float]:

@@ -14,7 +14,6 @@ from blocksim.world.systems.soil_kinds import (
     SMOOTHING,
     depth_of_scene,
     interactions_with,
-    is_corrected,
     kind_records,
     wave_speed,
 )
@@ -28,6 +27,7 @@ from blocksim.world.systems.soil_shown import (
     touching,
 )
 from blocksim.world.systems.soil_start import geostatic_stress
+from blocksim.world.systems.soil_thrust import weak_thrusts
 from blocksim.world.systems.system import (
     Cost,
     Elements,
@@ -202,7 +202,7 @@ def _largest_step(scenario: Scenario) -> float:
 
 
 def _dearer(scenario: Scenario) -> float:
-    return CORRECTED if any(is_corrected(scenario, table) for table in soil_tables(scenario)) else 1.0
+    return CORRECTED if any(table.gradient == "corrected" for table in soil_tables(scenario)) else 1.0
 
 
 def _stages() -> Any:
@@ -266,4 +266,5 @@ SOILS = System(
     shades=SHADES,
     ending=ending,
     profile=surface,
+    warnings=weak_thrusts,
 )

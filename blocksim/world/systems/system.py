@@ -3,7 +3,7 @@
 See blocksim/world/README.md. Nothing in here needs the compiler: stored runs are read without it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -111,6 +111,7 @@ class System:
     shades: tuple[Shade, ...] = ()  # the first one is the default
     ending: Callable[[Scenario, "Track"], Table] | None = None  # of the last frame, one row a part
     profile: Callable[["Track", int], list[Floats]] | None = None  # lines (m, (k, 2)) of its surface in a frame
+    warnings: Callable[[Scenario], Iterator[str]] | None = None  # of results that are known to be off
 
 
 @dataclass(frozen=True)

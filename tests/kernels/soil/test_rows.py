@@ -48,7 +48,7 @@ def test_soil_at_rest_starts_with_all_forces_in_equilibrium(wall: float | None) 
     pile = [{"block": "wall", "x": 0.075, "y": 0.025 + 0.05 * k, "fixed": True} for k in (0, 1)]
     pairs = {"rods": {**SMOOTH_WALLS["rods"], "ground": {"friction": 0.0}}}
     held = scene(
-        column(0.05, 0.1, SPACING),
+        column(0.05, 0.1, SPACING, gradient="raw"),
         blocks=blocks,
         bodies=[FAR] if wall else [*pile, FAR],
         walls=[LEFT, right(wall)] if wall else [LEFT],

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import blocksim
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.soil import arrays
 from blocksim.scenario.models.contact import PairFriction
@@ -108,9 +109,47 @@ def test_arrays_of_soil_take_as_many_bytes_as_check_estimates() -> None:
 
 def test_check_estimates_more_time_for_corrected_gradients() -> None:
     raw, corrected = (describe(scene(column(0.25, 0.2, 0.005, gradient=name))).seconds for name in ("raw", "corrected"))
-    clay = describe(scene(column(0.25, 0.2, 0.005, material="clay"))).seconds
     assert 1.3 * raw < corrected < 1.5 * raw + 1e-3
-    assert clay > 1.3 * raw
+
+
+WALL = {"block": "wall", "x": -0.02, "y": 0.06}
+BESIDE = "rows of particles on a rough base the active thrust on blocks is some"
+
+
+@pytest.mark.parametrize(
+    ("keys", "body", "base", "expected"),
+    [
+        (
+            {"gradient": "raw"},
+            {},
+            0.4,
+            [f"soils.column.gradient: with raw gradients and 20 {BESIDE} 11% "],
+        ),
+        ({"gradient": "raw"}, {}, 0.0, []),
+        ({"gradient": "raw"}, {"x": -0.026}, 0.4, []),  # more than a spacing away
+        ({"gradient": "raw"}, {"fixed": True}, 0.4, []),  # feels the pressure at rest, which is right
+        ({"gradient": "raw"}, {"x": 0.05, "y": 0.16}, 0.4, []),  # lies on top
+        ({}, {}, 0.4, []),
+        (
+            {"y": [0.0, 0.05]},
+            {},
+            0.4,
+            [f"soils.column.spacing: with corrected gradients and 10 {BESIDE} 6% "],
+        ),
+        ({"y": [0.0, 0.08]}, {}, 0.4, []),
+    ],
+)
+def test_thrust_that_is_known_to_be_too_small_is_warned_of(
+    keys: dict[str, Any], body: dict[str, Any], base: float, expected: list[str]
+) -> None:
+    blocks = {"wall": {"width": 0.04, "height": 0.12, "length": DEPTH, "material": "smooth"}}
+    pairs = {"rods": {"ground": {"friction": base}}}
+    table = column(0.1, 0.1, 0.005, **keys)
+    held = scene(table, blocks=blocks, bodies=[{**WALL, **body}], pairs=pairs, end=1e-3)
+    found = describe(held).warnings
+    assert [text.partition("too small")[0] for text in found] == expected
+    if expected:
+        assert found == blocksim.run(held).summary.warnings
 
 
 def test_a_thousand_particles_take_no_more_than_400_bytes_each() -> None:
