@@ -158,16 +158,24 @@ def _overlaps_of_springs(world: World) -> Pairs:
     return pairs["a"], pairs["b"], np.maximum(deepest, lost), limit
 
 
+def deepest_overlap(world: World) -> float:
+    """Return the largest overlap (m) of contacts of springs."""
+    count = int(world.clock[0].pair_count)
+    pairs, contacts = world.pairs[:count], world.contacts[:count]
+    is_active = np.arange(contacts.shape[1]) < pairs["active"][:, np.newaxis]
+    return float(np.where(is_active, contacts["depth"], 0.0).max(initial=0.0))
+
+
 def _penetrations(world: World, pairs: NDArray[Any]) -> NDArray[np.float64]:
     """Return how deep (m) the bodies of pairs overlap, or the block lies below the ground."""
     bodies = world.bodies
-    outlines = _outlines(world)
+    outlines = outlines_of(world)
     is_ground = pairs["b"] == bodies.size - 1
     below = bodies[-1].y - outlines.bottom[pairs["a"]]
     return np.where(is_ground, below, penetration(outlines.some(pairs["a"]), outlines.some(pairs["b"])))
 
 
-def _outlines(world: World) -> Outlines:
+def outlines_of(world: World) -> Outlines:
     """Return the outlines of all bodies, those of polygons in boxes about their centroids."""
     bodies = world.bodies
     boxes = Rectangles(*(bodies[name] for name in ("x", "y", "half_x", "half_y", "cos", "sin")))

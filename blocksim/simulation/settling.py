@@ -14,7 +14,11 @@ too, after gravity, as far as the scene carries it at rest: all of it, or up to 
 With springs a scene under a pulse that begins at its peak at time zero settles unasked, if it rests as it was placed.
 
 A scene at rest is one whose blocks have no acceleration (springs), or move no further (rigid contacts). One that fails
-moves on, as no kinetic energy peaks there: it ends once a block has come farther than springs give way.
+moves on, as no kinetic energy peaks there: it ends once a block has come farther than springs give way. With springs,
+whose steps are short, it ends as soon as it is a mechanism (`_is_mechanism`): blocks have come many times as far as
+contacts can give way, faster and faster, and meet nothing on the way that is left to them.
+
+With `start.release = "always"` what does not come to rest begins its run from where it had begun to move, at rest.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,7 +33,9 @@ from blocksim.kernels.common.arrays import REACHED, World
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
+from blocksim.scenario.overlap import Outlines, Rectangles, penetration
 from blocksim.scenario.placement import smallest_width
+from blocksim.simulation.outcome import deepest_overlap, outlines_of
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.settled import NOT_AT_REST, Settled
 from blocksim.simulation.team import Team
@@ -45,6 +51,14 @@ STILL = 1e-10  # of the smallest side of a block: way in a step of rigid contact
 FIRST_SHARE, LAST_SHARE = 0.25, 1e-3  # of the inertial force: parts in which it grows, halved where one is too much
 UNASKED_SHARE = 0.01  # of the smallest side of a block: way in settling that was not asked for; what was to drop drops
 MOVED_SHARE = 0.25  # of the smallest side of a block: soft springs give way by as much as a tenth, what falls goes on
+LEAN_SHARE = 0.02  # of the smallest side of a block: way at which what falls is released
+CHAIN = 3.0  # ways of blocks over those of contacts, times their number and how slender the scene is
+LEAST_SHARE = 2e-4  # of the smallest side of a block: way of a mechanism
+STEADY = 0.95  # of the drive before: that of a mechanism does not fade
+WINDOWS = 3  # of the time since velocities were taken away, in which drives are compared
+LOOKS = 30  # calls between two looks at the drive
+AHEAD = (0.02, 0.05, 0.1, MOVED_SHARE)  # of the smallest side: ways at which a mechanism meets nothing new
+ARC = 2.0  # squares of these ways over that side, by which blocks on arcs overlap if they went straight on
 HELD = ("inverse_mass", "inverse_inertia", "counts")
 FALLS = ("fx", "fy", "torque")
 PATHS = ("shift", "turn")  # pieces of driven bodies that hold
@@ -82,9 +96,14 @@ def settle(scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], te
     """Bring a scene at time zero to rest; return it, still at time zero, and how. Raises SettleError."""
     going = _Settling(scene, scenario, placed, team)
     with going.without_time():
-        going.load_up()
-        going.come_to_rest()
-        going.follow_support()
+        try:
+            going.load_up()
+            going.come_to_rest()
+            going.follow_support()
+        except SettleError:
+            if not going.is_released:
+                raise
+            going.lean_back()
     going.begin()
     return going.scene, going.settled()
 
@@ -110,6 +129,10 @@ class _Settling:
         self.start = self._places()
         self.before = self.start
         self.energy, self.steps = 0.0, 0
+        self.is_released = scenario.start.release == "always"
+        self.lean: tuple[AnyScene, list[NDArray[Any]]] | None = None
+        self.at_rest = True
+        self.path = _Path(self.start)
 
     @property
     def bodies(self) -> Any:
@@ -156,6 +179,7 @@ class _Settling:
                 self._go()
                 if self._unrest() <= ROUGH_BALANCE / PARTS:
                     break
+        self.path = _Path(self._places())  # what moved faster and faster under growing loads is no mechanism yet
 
     def come_to_rest(self) -> None:
         """Go on until nothing moves any more. Raises SettleError."""
@@ -169,6 +193,8 @@ class _Settling:
             self._go()
             if self._unrest() <= BALANCE:
                 self._stop()
+            elif not self.is_released and self._is_mechanism():
+                raise self._error()
 
     def follow_support(self) -> None:
         """Let the inertial force of the supports' acceleration at time zero grow as far as it is carried at rest."""
@@ -220,7 +246,16 @@ class _Settling:
             largest_displacement_mm=MILLI * float(ways[far]),
             displaced_block=self.placed[far].name,
             held=self.names,
+            at_rest=self.at_rest,
         )
+
+    def lean_back(self) -> None:
+        """Go back to where blocks had come a little way, at rest."""
+        self.at_rest = False
+        if self.lean is not None:
+            self.scene = self.lean[0]
+            _restore(*self.lean)
+        self._stop()
 
     def _load(self, share: float, inertial: float = 0.0) -> None:
         world = self.scene.world
@@ -237,10 +272,13 @@ class _Settling:
         energy = self._kinetic()
         if status != REACHED or not np.isfinite(energy) or self._ways().max() > MOVED_SHARE * self.smallest:
             raise self._error()
+        if self.is_released and self._ways().max() <= LEAN_SHARE * self.smallest:
+            self.lean = self.scene, [array.copy() for array in arrays_of(self.scene)]
         if energy < self.energy:
             self._stop()
         else:
             self.energy = energy
+            self.path.speeds.append(float(np.sqrt(energy)))
 
     def _stop(self) -> None:
         for name in ("vx", "vy", "spin"):
@@ -248,6 +286,46 @@ class _Settling:
             if isinstance(self.scene, Nonsmooth):
                 self.scene.contacts.states[name][: self.count] = 0.0
         self.energy = 0.0
+        self.path = _Path(self._places())
+
+    def _is_mechanism(self) -> bool:
+        """Return True where springs do not hold any more what moves, and nothing else will.
+
+        Whatever vibrates about a place of rest slows down before it, and has come no farther than contacts give way,
+        each at most by the deepest overlap: block after block they turn, by that over a side, and move what is above.
+        """
+        speeds = self.path.speeds
+        if isinstance(self.scene, Nonsmooth) or not speeds or len(speeds) % LOOKS:
+            return False
+        window = len(speeds) // WINDOWS
+        last, before = speeds[-1] - speeds[-1 - window], speeds[-1 - window] - speeds[-1 - 2 * window]
+        if not last >= STEADY * before > 0.0:
+            return False
+        change = self._places() - self.path.start
+        way = float((_ways(change, self.bodies["radius"]) * self.is_free).max())
+        give = CHAIN * self.count * self._slenderness() * deepest_overlap(self.scene.world)
+        if way <= max(give, LEAST_SHARE * self.smallest):
+            return False
+        return not any(self._meets(change * (share * self.smallest / way), share) for share in AHEAD)
+
+    def _slenderness(self) -> float:
+        """Return the extent of all free blocks over the smallest side of one."""
+        x, y = self.bodies["x"][self.is_free], self.bodies["y"][self.is_free]
+        return max(1.0, float(max(np.ptp(x), np.ptp(y))) / self.smallest)
+
+    def _meets(self, change: Floats, share: float) -> bool:
+        """Return True if blocks come to bear on one another on a way from where they are, that of some share."""
+        now = outlines_of(self.scene.world)
+        now = now.some(np.arange(now.kinds.size - 1))  # without the half-plane
+        later = _at(now, self._places() + change)
+        one, other = _near(later.boxes, self.is_free)
+        most = ARC * share**2 * self.smallest
+        deeper = penetration(later.some(one), later.some(other)) - np.maximum(
+            penetration(now.some(one), now.some(other)), 0.0
+        )
+        ground = float(self.scene.world.bodies[-1].y)
+        below = (np.minimum(now.bottom, ground) - later.bottom)[: self.count] if np.isfinite(ground) else np.zeros(1)
+        return bool((deeper > most).any() or (below > most).any())
 
     def _kinetic(self) -> float:
         bodies = self.bodies
@@ -285,6 +363,39 @@ class _Settling:
             f"{MILLI * float(speeds[fastest]):.3g} mm/s, block {self.placed[far].name} has come "
             f"{MILLI * float(ways[far]):.3g} mm, after {self.steps} steps"
         )
+
+
+class _Path:
+    """What has moved since velocities were taken away: from where, and roots of the kinetic energy after each call."""
+
+    def __init__(self, start: Floats) -> None:
+        self.start = start
+        self.speeds: list[float] = []
+
+
+def _near(boxes: Rectangles, is_free: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the pairs of free boxes, the first of which may be, with all others.
+
+    Without those whose circles do not meet.
+    """
+    reach = np.hypot(boxes.half_x, boxes.half_y)
+    free = np.flatnonzero(is_free)
+    one, other = (pairs.ravel() for pairs in np.meshgrid(free, np.arange(reach.size), indexing="ij"))
+    apart = np.hypot(boxes.x[one] - boxes.x[other], boxes.y[one] - boxes.y[other]) < reach[one] + reach[other]
+    is_free_too = np.isin(other, free)
+    kept = apart & (~is_free_too | (one < other))
+    return one[kept], other[kept]
+
+
+def _at(outlines: Outlines, places: Floats) -> Outlines:
+    """Return the outlines with the first of them at other places (3, b), x, y (m) and angle (rad)."""
+    boxes, count = outlines.boxes, places.shape[1]
+    values = (places[0], places[1], np.cos(places[2]), np.sin(places[2]))
+    moved = {
+        name: np.concatenate([value, getattr(boxes, name)[count:]])
+        for name, value in zip(("x", "y", "cosine", "sine"), values, strict=True)
+    }
+    return outlines._replace(boxes=boxes._replace(**moved))
 
 
 def _restore(scene: AnyScene, kept: Sequence[NDArray[Any]]) -> None:

@@ -5,7 +5,8 @@ is called again; it comes to the same answer.
 
 Where springs shift a limit by more than SHIFT, the same limit is searched with springs ten times as stiff, near where
 it is foretold, and the answer is that of stiff contacts (limit_stiff.py). Where they may shift it, but nothing says by
-how much, two runs with stiffer springs tell, one beyond either side of the bracket.
+how much, two runs with stiffer springs tell, one beyond either side of the bracket. Limits of rigid contacts are
+verified with half the time step (limit_step.py).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -24,10 +25,12 @@ from blocksim.study import criterion
 from blocksim.study.criterion import Verdict
 from blocksim.study.executors import Execution, Run, Setting, Task
 from blocksim.study.limit_give import give_at, most_shift
+from blocksim.study.limit_margin import with_margins
 from blocksim.study.limit_plan import TOLERANCE, LimitPlan, read_limit
-from blocksim.study.limit_result import BOTH, LimitResult, write_result
+from blocksim.study.limit_result import BOTH, LimitResult, fallen, write_result
 from blocksim.study.limit_search import Change, Number, changes_in, next_near, next_values
 from blocksim.study.limit_sides import keep_sides
+from blocksim.study.limit_step import Choose, Halving
 from blocksim.study.limit_stiff import (
     MOST,
     RATIO,
@@ -49,7 +52,6 @@ NOT_FOUND = "with springs {ratio:g} times as stiff there is no such limit in the
 STILL_FAR = "limits of the last two stiffnesses are too far apart to be extrapolated well; give stiffer springs"
 OnRun = Callable[[Number, Verdict, Row], None]
 OnStiffer = Callable[[LimitPlan], None]
-Choose = Callable[[Mapping[Number, Verdict]], list[Number]]
 
 
 def limit(  # noqa: PLR0913 - one argument for each option of the command
@@ -75,7 +77,8 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     (default: results/NAME/limit-HASH), with `keep_runs` those of both sides of a bracket with frames and contacts, for
     `plot` and `report`; the same call again does only what is missing. `stiffer` says whether limits of springs are
     searched again with springs ten times as stiff, and extrapolated to stiff contacts: True always, False never
-    (`limits` are then those of the springs as given), None where springs shift them by more than 0.25 %. `executor`,
+    (`limits` are then those of the springs, and of the time step, as given), None where springs shift them by more than
+    0.25 %. Under sustained loads runs begin at rest, unless the scenario has `start.settle = false`. `executor`,
     `jobs` and `scheduler` are those of `sweep`, and do not change the answer. Raises ScenarioError, InvalidInputError,
     OutputExistsError where the folder is not free, UnavailableError, StoppedEarlyError on Ctrl-C.
     """
@@ -91,7 +94,7 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     )
 
 
-def find_limit(  # noqa: PLR0913 - as `limit`
+def find_limit(  # noqa: PLR0913, PLR0915 - as `limit`; the steps of a search, one after the other
     plan: LimitPlan,
     execution: Execution,
     *,
@@ -118,14 +121,20 @@ def find_limit(  # noqa: PLR0913 - as `limit`
                 runs.setting = replace(setting, is_stopped=is_stopped)
                 rows = runs.searched(plan, lambda known: next_values(plan.span, known, plan.tolerance))
                 found = LimitResult(plan, folder, rows, runs.ran)
-                if stiffer is not False and can_be_stiffer(plan):
-                    found = _Stiffening(found, runs, on_stiffer, is_asked=bool(stiffer)).complete()
+                if stiffer is not False:
+                    if can_be_stiffer(plan):
+                        found = _Stiffening(found, runs, on_stiffer, is_asked=bool(stiffer)).complete()
+                    found = Halving(found, runs.searched, on_stiffer).complete()
+                found = with_margins(found, max(SHIFT, plan.tolerance), as_given=stiffer is False)
         except KeyboardInterrupt:
             raise _stopped(len(runs.known)) from None
         result = replace(found, run=runs.ran)
         write_result(result)  # first: the runs beside it may not fit on the disk
         if keep_runs:
-            result = replace(result, kept=keep_sides(folder, plan, found.limits_as_given, found.rows))
+            kept = keep_sides(folder, plan, found.falls_as_given, found.rows)
+            released = {value: one.row for value, one in kept.items() if one.is_fall}
+            cases = {value: one.case for value, one in kept.items()}
+            result = replace(result, kept=cases, released=released)
             write_result(result)
     return result
 
@@ -246,8 +255,3 @@ class _Stiffening:
         rows = self.runs.searched(plan, choose)
         self.rows.setdefault(scale, {}).update(rows)
         return rows
-
-
-def fallen(verdicts: Mapping[Number, Verdict]) -> dict[Number, Verdict]:
-    """Return what runs came to, those that move on at the end without having fallen among those that stand."""
-    return {value: Verdict.STANDS if verdict is Verdict.UNDECIDED else verdict for value, verdict in verdicts.items()}

@@ -15,6 +15,7 @@ from blocksim.scenario.units import parse_unit
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.study.criterion import Criterion, read_criterion
 from blocksim.study.limit_search import Number, Span
+from blocksim.study.limit_start import at_rest, comes_at_once
 from blocksim.study.plan import Values, Variations, varied
 
 SCANNED = 9
@@ -51,6 +52,11 @@ class LimitPlan:
     def scenario_at(self, number: Number) -> Scenario:
         """Return the scenario at a value. Raises ScenarioError where the value does not go with the others."""
         return self.document.with_values(self.settings(number)).build()
+
+    @property
+    def comes_at_once(self) -> bool:
+        """True where sustained loads come at once, as the scenario says that it does not begin at rest."""
+        return all(comes_at_once(self.scenario_at(number)) for number in (self.span.low, self.span.high))
 
     def settings(self, number: Number) -> dict[str, object]:
         """Return what distinguishes the run of a value from the document."""
@@ -90,14 +96,14 @@ def read_limit(
         message = f"{OPTION} {given.texts[key]}: a range is needed, as in {key}=FROM:TO or {key}=FROM:TO:COUNT"
         raise InvalidInputError(message)
     count = _count(table.get("count", SCANNED))
-    if is_descending(table):
-        table = {**table, "from": table["to"], "to": table["from"]}
-    ends = {name: value for name, value in table.items() if name != "count"}
+    ends = {name: table[name] for name in table if name != "count"}
+    if is_descending(ends):
+        ends |= {"from": ends["to"], "to": ends["from"]}
     values = varied(bare, Variations({key: ends}, given.texts), OPTION, "sobol").vary[key]
     assert isinstance(values, Uniform)  # noqa: S101 - it has two ends
-    plan = LimitPlan(bare, key, _unit(values), _span(bare, key, values, table, count), criterion, tolerance)
-    _refuse_wrong_ends(plan)
-    return plan
+    plan = LimitPlan(bare, key, _unit(values), _span(bare, key, values, ends, count), criterion, tolerance)
+    ends_of_range = _ends(plan)
+    return replace(plan, document=at_rest(bare, *ends_of_range))
 
 
 def _count(value: object) -> int:
@@ -127,14 +133,16 @@ def takes_whole(document: Document, key: str) -> bool:
     return field is not None and int in options(field.annotation) and float not in options(field.annotation)
 
 
-def _refuse_wrong_ends(plan: LimitPlan) -> None:
-    """Raise InvalidInputError where the scenario cannot be built at either end."""
+def _ends(plan: LimitPlan) -> list[Scenario]:
+    """Return the scenarios at both ends. Raises InvalidInputError where one cannot be built."""
+    found = []
     for number in (plan.span.low, plan.span.high):
         try:
-            plan.scenario_at(number)
+            found.append(plan.scenario_at(number))
         except BlocksimError as error:
             message = f"{plan.key} = {plan.shown(number)}: {str(error).splitlines()[0]}"
             raise InvalidInputError(message) from error
+    return found
 
 
 def variants(document: Document, *, both_laws: bool = False) -> dict[str, Document]:

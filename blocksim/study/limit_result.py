@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from blocksim.simulation.atomic import write_text
 from blocksim.study.criterion import Verdict
@@ -20,10 +20,26 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TABLE = "limit.csv"
-VALUE, VERDICT, SCALE = "value", "verdict", "stiffness_scale"
-COLUMNS = (VERDICT, *MOVEMENT, "status", "reason", "seconds", SCALE)
+VALUE, VERDICT, SCALE, STEP = "value", "verdict", "stiffness_scale", "half_step_s"
+COLUMNS = (VERDICT, *MOVEMENT, "status", "reason", "seconds", SCALE, STEP)
 BOTH = {Verdict.STANDS, Verdict.FALLS}
 BOTH_OR_MOVING = BOTH | {Verdict.UNDECIDED}
+
+
+class Margin(NamedTuple):
+    """Shares of a limit by which it may lie beyond its bracket: see limit_margin.py."""
+
+    rest: float  # on the standing side
+    springs: float  # on the falling side
+
+
+class Finer(NamedTuple):
+    """The bracket of a limit with half the time step (s), or why there is none."""
+
+    step: float
+    low: float
+    high: float
+    problem: str = ""
 
 
 @dataclass(frozen=True)
@@ -38,13 +54,17 @@ class LimitResult:
     rows: Mapping[Number, Row] = field(repr=False)
     run: int  # runs of this call; the others were known
     kept: Mapping[Number, str] = field(default_factory=dict, repr=False)  # folders in `cases`, with frames, by value
+    released: Mapping[Number, Row] = field(default_factory=dict, repr=False)  # of those that fall before time zero
     stiffer: Mapping[float, Mapping[Number, Row]] = field(default_factory=dict, repr=False)
     levels: Mapping[Change[Verdict], Levels] = field(default_factory=dict, repr=False)  # of limits as given
+    finer: Mapping[Change[Verdict], Finer] = field(default_factory=dict, repr=False)  # the same, of rigid contacts
+    finer_rows: Mapping[float, Mapping[Number, Row]] = field(default_factory=dict, repr=False)  # by time step
+    margins: Mapping[Change[Verdict], Margin] = field(default_factory=dict, repr=False)
 
     @property
     def runs(self) -> int:
         """Number of all runs."""
-        return len(self.rows) + sum(map(len, self.stiffer.values()))
+        return len(self.rows) + sum(map(len, (*self.stiffer.values(), *self.finer_rows.values())))
 
     @property
     def verdicts(self) -> dict[Number, Verdict]:
@@ -77,10 +97,21 @@ class LimitResult:
         return [self.answer(change) for change in self.limits_as_given]
 
     def answer(self, change: Change[Verdict]) -> Change[Verdict]:
-        """Return a bracket as it is with stiff contacts, where that is known."""
-        levels = self.levels.get(change)
-        stiff = None if levels is None else levels.stiff
-        return change if stiff is None else replace(change, low=stiff[0], high=stiff[1])
+        """Return a bracket as it is with stiff contacts and short steps, as far as known, and as wide as is unknown."""
+        levels, finer = self.levels.get(change), self.finer.get(change)
+        low, high = change.low, change.high
+        if levels is not None and levels.stiff is not None:
+            low, high = levels.stiff
+        if finer is not None and (finer.low, finer.high) != (low, high):
+            on = max(finer.low - high, 0.0) + min(finer.high - low, 0.0)  # what lies between both
+            low, high = min(low, finer.low + min(on, 0.0)), max(high, finer.high + max(on, 0.0))
+        rest, springs = self.margins.get(change, Margin(0.0, 0.0))
+        below, above = (rest, springs) if change.above is Verdict.FALLS else (springs, rest)
+        return replace(change, low=low - below * abs(low), high=high + above * abs(high))
+
+    def seen(self, value: Number) -> Row:
+        """Return what a run came to; of one that falls before time zero, as it was released then and kept."""
+        return self.released.get(value, self.rows[value])
 
     @property
     def is_extrapolated(self) -> bool:
@@ -89,8 +120,8 @@ class LimitResult:
 
     @property
     def pictured(self) -> list[Change[Verdict]]:
-        """The limits of which both sides are kept as runs: a side that does not settle has none."""
-        return [one for one in self.limits_as_given if {one.low, one.high} <= self.kept.keys()]
+        """The limits of which both sides are kept as runs."""
+        return [one for one in self.falls_as_given if {one.low, one.high} <= self.kept.keys()]
 
     @property
     def scale(self) -> float | None:
@@ -133,11 +164,16 @@ class LimitResult:
             told["extrapolated"] = levels.stiff is not None
             told["levels"] = [{SCALE: one.scale, "low": one.low, "high": one.high} for one in levels.found]
             told["problem"] = levels.problem
+        finer, margin = self.finer.get(change), self.margins.get(change)
+        if finer is not None:
+            told["half_step"] = finer._asdict()
+        if margin is not None:
+            told["undecided"] = margin._asdict()
         return told
 
     def _side(self, value: Number, verdict: Verdict) -> dict[str, object]:
-        row = self.rows[value]
-        told = {name: row.get(name) for name in (*MOVEMENT, "status", "reason")}
+        row, seen = self.rows[value], self.seen(value)
+        told = {name: seen.get(name) for name in MOVEMENT} | {name: row.get(name) for name in ("status", "reason")}
         return {VALUE: value, VERDICT: verdict.value, **told, "case": self.kept.get(value)}
 
     def __repr__(self) -> str:
@@ -164,9 +200,17 @@ def _head(plan: LimitPlan) -> str:
 
 
 def _records(result: LimitResult) -> Iterator[list[object]]:
-    """Yield the rows of limit.csv: those of the scenario as given, then those of stiffer springs."""
-    for scale, rows in ((result.scale, result.rows), *result.stiffer.items()):
+    """Yield the rows of limit.csv: those of the scenario as given, then of stiffer springs, and of half the step."""
+    given = (result.scale, None, result.rows)
+    stiffer = ((scale, None, rows) for scale, rows in result.stiffer.items())
+    finer = ((result.scale, step, rows) for step, rows in result.finer_rows.items())
+    for scale, step, rows in (given, *stiffer, *finer):
         for value in sorted(rows):
             row = rows[value]
-            cells = (as_cell(row.get(name)) for name in COLUMNS[1:-1])
-            yield [value, result.plan.criterion.verdict(row).value, *cells, scale]
+            cells = (as_cell(row.get(name)) for name in COLUMNS[1:-2])
+            yield [value, result.plan.criterion.verdict(row).value, *cells, scale, step]
+
+
+def fallen(verdicts: Mapping[Number, Verdict]) -> dict[Number, Verdict]:
+    """Return what runs came to, those that move on at the end without having fallen among those that stand."""
+    return {value: Verdict.STANDS if verdict is Verdict.UNDECIDED else verdict for value, verdict in verdicts.items()}

@@ -101,17 +101,21 @@ def test_springs_that_give_way_are_extrapolated_to_stiff_contacts_unless_wanted_
     assert "extrapolated from" in Path("report.html").read_text()
 
 
-def test_a_picture_is_named_only_where_both_sides_have_a_run_to_draw(blocksim: Command, tmp_path: Path) -> None:
+def test_the_mechanism_of_a_limit_is_drawn_also_where_its_load_falls_before_time_zero(
+    blocksim: Command, tmp_path: Path
+) -> None:
     for settles in (True, False):
         scene = {**block_on_a_slope(SLENDER), "start": {"settle": settles}}
         (tmp_path / "slender.toml").write_text(scenario_to_toml(scenario_from_mapping(scene)))
         folder = f"settles-{settles}"
         rough = ("--vary", "ground.tilt=5deg:30deg:2", "--to", "90%", *FELL, "--out", folder)
         answer = blocksim("limit", "slender.toml", *rough)
-        assert answer.out.splitlines()[-1].startswith("stands up to 5 deg")
-        assert (f"\npicture of the mechanism: blocksim plot {folder}" in answer.err) is not settles
-        assert ("no picture of the mechanism" in answer.err) is settles
-    assert blocksim("plot", "settles-True").code == 65  # as it said
+        assert "\nstands up to " in answer.out
+        assert f"\npicture of the mechanism: blocksim plot {folder}" in answer.err
+        assert ("start.settle = false: loads that come at once shift limits" in answer.err) is not settles
+        (change,) = json.loads(Path(folder, "limit.json").read_text())["changes"]
+        assert change["above"]["outcome"] == "fell"
+        assert blocksim("plot", folder).code == 0
 
 
 def test_full_disk_is_74_and_not_a_limit_without_its_runs(

@@ -16,7 +16,7 @@ from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError,
 from blocksim.scenario import Document
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit import limit as searched
-from blocksim.study.limit_plan import variants
+from blocksim.study.limit_plan import read_limit, variants
 from blocksim.study.progress import MANIFEST, Manifest
 
 limit = partial(searched, keep_runs=False)
@@ -49,13 +49,13 @@ def block_on_a_slope(size: tuple[float, float], **time: object) -> dict[str, Any
 def test_a_block_on_a_slope_slides_at_its_friction_angle_or_topples_about_its_edge(
     tmp_path: Path, size: tuple[float, float], degrees: float, outcome: str
 ) -> None:
-    found = limit(block_on_a_slope(size), TILT, out=tmp_path / "limit")
+    found = searched(block_on_a_slope(size), TILT, out=tmp_path / "limit")
     (change,) = found.limits
     assert change.low == pytest.approx(degrees, rel=2e-3)
     assert change.high == pytest.approx(degrees, rel=2e-3)
     assert change.high - change.low <= 1e-3 * change.high
     assert (change.below, change.above) == (Verdict.STANDS, Verdict.FALLS)
-    assert found.rows[change.high]["outcome"] == outcome
+    assert found.seen(change.high)["outcome"] == outcome
     assert len(found.rows) <= 25
 
 
@@ -67,7 +67,8 @@ def test_a_range_that_descends_is_searched_as_one_that_ascends(tmp_path: Path) -
 
 
 def test_a_search_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_nothing_twice(tmp_path: Path) -> None:
-    whole = limit(block_on_a_slope(SQUAT), TILT, out=tmp_path / "whole")
+    values: list[float] = []
+    whole = limit(block_on_a_slope(SQUAT), TILT, out=tmp_path / "whole", on_run=lambda value, *_: values.append(value))
     for at in (1, 5, 10, 13):
         seen: list[float] = []
 
@@ -80,8 +81,8 @@ def test_a_search_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_no
         with pytest.raises(StoppedEarlyError, match="rerun the command to finish"):
             limit(block_on_a_slope(SQUAT), TILT, out=folder, jobs=1, on_run=stop)
         again = limit(block_on_a_slope(SQUAT), TILT, out=folder, on_run=stop)
-        assert sorted(seen) == sorted(whole.rows)
-        assert again.run == len(whole.rows) - at
+        assert sorted(seen) == sorted(values)
+        assert again.run == whole.runs - at
         assert (folder / "limit.csv").read_bytes() == (tmp_path / "whole" / "limit.csv").read_bytes()
         assert again.changes == whole.changes
     assert limit(block_on_a_slope(SQUAT), TILT, out=tmp_path / "whole").run == 0
@@ -104,9 +105,9 @@ def test_processes_are_started_once_and_not_for_every_round(tmp_path: Path, monk
 
 
 def test_the_folder_holds_the_answer_for_programs_and_the_scenario(tmp_path: Path) -> None:
-    found = limit(block_on_a_slope(SQUAT), TILT, out=tmp_path, tolerance=0.1)
+    found = searched(block_on_a_slope(SQUAT), TILT, out=tmp_path, tolerance=0.1)
     data = json.loads((tmp_path / "limit.json").read_text())
-    assert (data["key"], data["unit"], data["runs"]) == ("ground.tilt", "deg", len(found.rows))
+    assert (data["key"], data["unit"], data["runs"]) == ("ground.tilt", "deg", len(found.rows) + 2)
     assert data["changes"][0]["above"]["outcome"] == "slid"
     assert data["environment"]["blocksim"]
     assert (tmp_path / "limit.csv").read_text().startswith("value [deg],verdict,outcome,")
@@ -131,11 +132,11 @@ def test_whole_numbers_of_blocks_are_searched_as_such(tmp_path: Path) -> None:
         "bodies": [],
         "structures": [{"kind": "staircase", "block": "b", "count": 2, "overlap": "81 mm"}],
     }
-    found = limit(leaning, {"structures.0.count": {"from": 2, "to": 9}}, out=tmp_path, tolerance=1e-3)
+    found = searched(leaning, {"structures.0.count": {"from": 2, "to": 9}}, out=tmp_path, tolerance=1e-3)
     # shifted by 19 mm each, the blocks above the lowest have their centre at n 19 mm/2: beyond its edge for n = 6
     (change,) = found.limits
     assert (change.low, change.high) == (5.0, 6.0)
-    assert found.rows[6.0]["outcome"] == "fell"
+    assert found.seen(6.0)["outcome"] == "fell"
 
 
 def test_values_that_do_not_go_with_the_others_are_told_and_not_taken_for_falling(tmp_path: Path) -> None:
@@ -183,3 +184,65 @@ def test_a_folder_in_which_another_process_searches_is_left_to_it(tmp_path: Path
         pytest.raises(OutputExistsError, match="this limit is already running"),
     ):
         limit(block_on_a_slope(SQUAT), TILT, out=tmp_path, tolerance=0.1)
+
+
+def unsettled(scene: dict[str, Any]) -> dict[str, Any]:
+    return scene | {"start": {"settle": False}}
+
+
+def test_sustained_loads_come_at_rest_unless_told_not_to_and_others_as_they_are() -> None:
+    slope = block_on_a_slope(SQUAT)
+    push = {"kind": "force", "body": "1", "magnitude": "1 N"}
+    ramp = {"kind": "ramp", "end": 1.0}
+    above = {"block": "b", "x": 0, "y": 0.2}
+    for settles, scene in (
+        (True, slope),
+        (True, slope | {"loads": [push]}),
+        (False, unsettled(slope)),
+        (False, slope | {"loads": [push | {"history": ramp}]}),
+        (False, slope | {"bodies": [*slope["bodies"], above]}),  # to drop
+        (False, slope | {"bodies": [{"block": "b", "x": 0, "y": 0.025, "velocity": [0.1, 0]}]}),
+        (False, slope | {"motion": {"kind": "pulse", "shape": "sine", "amplitude": 1.0, "duration": 0.1}}),
+        (False, slope | {"events": [{"at": 0.1, "remove": ["1"]}]}),
+    ):
+        plan = read_limit(Document.from_mapping(scene), TILT, stands="outcome != fell")
+        assert plan.scenario_at(10.0).start.settle is settles
+        assert plan.comes_at_once is (scene == unsettled(slope))
+
+
+def test_springs_that_are_not_settled_slip_too_soon_and_settled_ones_at_their_friction_angle(tmp_path: Path) -> None:
+    degrees = math.degrees(math.atan(FRICTION))
+    near = {"ground.tilt": {"from": "19.5 deg", "to": "21.5 deg", "count": 3}}
+    slope = block_on_a_slope(SQUAT) | {"time": {"scheme": "explicit", "end": 0.3}}
+    for scheme in ("explicit", "nonsmooth"):
+        scene = slope | {"time": {"scheme": scheme, "end": 0.3}}
+        (change,) = limit(scene, near, out=tmp_path / scheme).limits
+        assert change.low <= degrees <= change.high
+        assert change.high - change.low < 2e-3 * degrees
+
+
+def test_limits_of_rigid_contacts_that_go_with_the_step_hold_those_of_half_of_it(tmp_path: Path) -> None:
+    ring = {
+        "schema": 1,
+        "name": "ring",
+        "materials": {"stone": {"density": 2000, "young_modulus": "10 GPa", "poisson_ratio": 0.2}},
+        "blocks": {"v": {"depth": 0.1, "material": "stone"}},
+        "structures": [
+            {"kind": "arch", "block": "v", "radius": 0.2, "thickness": 0.03, "embrace": "162 deg", "count": 16}
+        ],
+        "friction": {"block_block": 1.0, "block_ground": 1.0},
+        "contact": {"restitution": 0},
+        "time": {"scheme": "nonsmooth", "end": 0.5, "step": 1e-3},
+    }
+    near = {"ground.tilt": {"from": "16.4 deg", "to": "19 deg", "count": 4}}
+    found = limit(ring, near, out=tmp_path / "long", tolerance=3e-3)
+    (given,), (answer,) = found.limits_as_given, found.limits
+    (half,) = found.finer.values()
+    assert half.low > given.high
+    assert (answer.low, answer.high) == (given.low, 2.0 * half.high - given.high + half.low - half.high)
+    (short,) = limit(
+        ring | {"time": {**ring["time"], "step": 1e-4}}, near, out=tmp_path / "short", tolerance=3e-3
+    ).limits
+    assert answer.low < short.low < short.high < answer.high
+    (plain,) = limit(ring, near, out=tmp_path / "given", tolerance=3e-3, stiffer=False).limits
+    assert plain == given

@@ -1,11 +1,13 @@
 """How a run begins: at once, or after everything has come to rest."""
 
-from typing import Self
+from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import Table
+from blocksim.scenario.models.base import OneOf, Table
+
+Release = Literal["at rest", "always"]
 
 
 class Start(Table):
@@ -21,9 +23,18 @@ class Start(Table):
         default=(), description="names of bodies that are kept still meanwhile and released at time zero"
     )
 
+    release: Annotated[Release, OneOf(get_args(Release))] = Field(
+        default="at rest",
+        description='what is released at time zero: a scene "at rest" only, any other ends the run; or "always", which '
+        "records how it falls",
+    )
+
     @model_validator(mode="after")
     def _holds_while_it_settles(self) -> Self:
         if self.hold and not self.settle:
             message = "nothing is held without settle = true"
             raise q.invalid(message, "hold")
+        if self.release != "at rest" and not self.settle:
+            message = "all is released at once without settle = true"
+            raise q.invalid(message, "release")
         return self
