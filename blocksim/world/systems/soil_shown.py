@@ -56,29 +56,51 @@ def connected(x: Floats, gap: float) -> tuple[float, float]:
 def ending(scenario: Scenario, track: Track) -> Table:
     """Return the table of the last frame: a row for each soil.
 
-    left and right end the part without a gap of 2 spacings, first and last particle wherever they are; the back is the
-    end that has moved less, and the height there that of the highest particle within 2 spacings. At rest is what is
-    slower than time.rest_speed.
+    left and right end the part without a gap of 2 spacings, first and last particle wherever they are. The back is the
+    end at a wall, so that it is the same in all runs of a scenario; where both or neither are, the one that has moved
+    less by more than a spacing, else the left one. The height there is that of the highest particle within 2 spacings.
+    At rest is what is slower than time.rest_speed.
     """
     names = ("soil", "left_mm", "right_mm", "first_mm", "last_mm", "back", "back_height_mm", "at_rest")
-    rows = [_ending_of(track, own, scenario.time.rest_speed) for own in parts_of(track).values()]
+    rows = [_ending_of(track, own, scenario) for own in parts_of(track).values()]
     columns = [list(parts_of(track)), *(list(column) for column in zip(*rows, strict=True))]
     return dict(zip(names, columns, strict=True))
 
 
-def _ending_of(track: Track, own: Indices, rest_speed: float) -> tuple[Any, ...]:
+def _ending_of(track: Track, own: Indices, scenario: Scenario) -> tuple[Any, ...]:
     spacing = float(track["spacing"][own[0]])
     half = 0.5 * spacing
-    start = track.at_start("x")[own]
     x, y, vx, vy = (track[name][-1, own] for name in ("x", "y", "vx", "vy"))
     left, right = connected(x, GAP * spacing)
-    is_left = abs(left - start.min()) <= abs(right - start.max())
+    is_left = _is_left_back(track, own, scenario, (left, right))
     near = x <= left + BACK * spacing if is_left else x >= right - BACK * spacing
     near &= (x >= left) & (x <= right)
     ends = (left - half, right + half, x.min() - half, x.max() + half)
     height = MILLI * float(y[near].max() + half)
-    rests = float(np.mean(np.hypot(vx, vy) < rest_speed))
+    rests = float(np.mean(np.hypot(vx, vy) < scenario.time.rest_speed))
     return (*(MILLI * float(end) for end in ends), "left" if is_left else "right", height, rests)
+
+
+def _is_left_back(track: Track, own: Indices, scenario: Scenario, ends: tuple[float, float]) -> bool:
+    """Return True if the left end of a soil is its back; `ends` are where it ends now (m)."""
+    spacing = float(track["spacing"][own[0]])
+    x, y = track.at_start("x")[own], track.at_start("y")[own]
+    left, right = float(x.min()), float(x.max())
+    at_left, at_right = (_is_at_wall(end, (float(y.min()), float(y.max())), spacing, scenario) for end in (left, right))
+    if at_left != at_right:
+        return at_left
+    return abs(ends[0] - left) <= abs(ends[1] - right) + spacing
+
+
+def _is_at_wall(end: float, heights: tuple[float, float], spacing: float, scenario: Scenario) -> bool:
+    """Return True if a wall steeper than 45 degrees stands within GAP spacings of an end at some of these heights."""
+    for wall in scenario.walls:
+        (x0, y0), (x1, y1) = wall.start, wall.end
+        is_steep = abs(y1 - y0) > abs(x1 - x0)
+        is_near = min(x0, x1) <= end + GAP * spacing and max(x0, x1) >= end - GAP * spacing
+        if is_steep and is_near and min(y0, y1) < heights[1] and max(y0, y1) > heights[0]:
+            return True
+    return False
 
 
 def surface(track: Track, frame: int) -> list[Floats]:

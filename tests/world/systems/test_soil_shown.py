@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from blocksim.world.systems.soil_shown import connected, ending, pressure, surface, touching
 from blocksim.world.systems.soils import SOILS
 from blocksim.world.systems.system import Present, Track
-from tests.soils import LEFT, Soil, column, scene
+from tests.soils import LEFT, Soil, column, right, scene
 
 SPACING = 0.005
 SCENE = scene(column(0.05, 0.05, SPACING), walls=[LEFT])
@@ -51,6 +51,16 @@ def test_the_front_ends_at_the_first_gap_and_the_last_particle_is_told_beside_it
     assert [moved[name][0] for name in ("left_mm", "right_mm", "first_mm", "last_mm")] == pytest.approx([0, 45, 0, 80])
     assert (moved["back"], moved["at_rest"]) == (["left"], [0.9])
     assert moved["back_height_mm"] == pytest.approx([50.0])
+
+
+def test_the_back_of_a_soil_is_the_same_however_little_its_ends_have_moved() -> None:
+    apart = 1e-6 * np.sign(still()["x"][0] - 0.025)  # m
+    places = still()["x"][0]
+    end = right(0.05)
+    for walls, back in (([LEFT], "left"), ([end], "right"), ([LEFT, end], "left"), ([], "left")):
+        walled = scene(column(0.05, 0.05, SPACING), walls=walls)
+        for one_end in (0.0 * apart, np.maximum(apart, 0.0), np.minimum(apart, 0.0)):
+            assert ending(walled, still(x=places + one_end))["back"] == [back]
 
 
 def test_the_surface_is_the_top_of_columns_and_gaps_interrupt_it() -> None:
