@@ -139,11 +139,11 @@ def _ending_lines(result: Result) -> list[str]:
 
 
 def _moved(found: Movement) -> str:
-    """Return what moved, how far and first."""
+    """Return what moved, how far on the way and first: blocks may end nearer."""
     far = f"{number(found.largest_displacement_mm)} mm (block {found.displaced_block})"
     turned = f"{number(found.largest_rotation_deg)}° (block {found.rotated_block})"
     first = f"\nfirst to move: block {found.first_mover} at {found.first_moved_s:.3f} s" if found.first_mover else ""
-    return f"{found.outcome}: largest displacement {far}, rotation {turned}{first}"
+    return f"{found.outcome}: peak displacement {far}, peak rotation {turned}{first}"
 
 
 def _moving(result: Result) -> str:

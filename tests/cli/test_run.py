@@ -163,7 +163,7 @@ def test_folder_of_a_run_that_is_going_on_is_left_alone(
 
 def test_largest_movement_outcome_and_first_mover_are_reported(blocksim: Command) -> None:
     answer = blocksim("run", "scenarios/slide.toml", *SOFT, "--out", "slid")
-    assert "slid: largest displacement 33." in answer.err
+    assert "slid: peak displacement 33." in answer.err
     assert "(block block)\nfirst to move: block block at 0.001 s" in answer.err  # 0.5 m/s past a hundredth of 25 mm
     movement = json.loads(Path("slid/run.json").read_text())["movement"]
     assert (movement["outcome"], movement["first_mover"]) == ("slid", "block")
