@@ -2,14 +2,15 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from blocksim import __version__
-from blocksim.analysis.compare import compare_final
+from blocksim.analysis.compare import Comparison, compare_final
 from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.analysis.judgement import Judgement
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
 from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario.bounded_read import MEGABYTE
-from blocksim.scenario.path_policy import near
 from blocksim.simulation import folder as files
 from blocksim.study.compare import compare_sweep
 from blocksim.study.rows import FINISHED, TABLE
@@ -21,6 +22,7 @@ from blocksim.study.sweep_table import NEEDED, NO_COLUMNS, NO_TABLE, is_sweep, l
 from blocksim.view.report.page import write_report
 from blocksim.view.report.player import MOST_BYTES
 from blocksim.view.report.runs import PartialRun, Subject, read_stored, run_subject
+from blocksim.view.report.shared import shared_path, shared_text
 from blocksim.view.report.studies import study_subject
 from blocksim.view.report.sweeps import CaseTable, sweep_subject
 
@@ -46,7 +48,7 @@ def report_on(
         key = f"part-{len(shown) + 1}"
         study = study_in(place)
         if study is not None:
-            shown.append(study_subject(key, study_page(place, study), near(str(place))))
+            shown.append(study_subject(key, study_page(place, study), str(place)))
             continue
         subjects, found = _sweep(key, place, experiment, members) if is_sweep(place) else _run(key, place, experiment)
         remark = "" if is_sweep(place) else choice(place, _folder(place))
@@ -85,11 +87,17 @@ def _compared(run: PartialRun, experiment: Path | None) -> tuple[dict[str, objec
         if run.status != FINISHED:
             return None, ("only a finished run is compared with the measurement",)
         found = compare_final(run.final, table)
-        return {**found.to_dict(), "experiment": near(found.source)}, ()
+        return _shown(found), ()
     except BlocksimError as error:
         if experiment is not None:
             raise
         return None, (str(error),)
+
+
+def _shown(found: Comparison | Judgement) -> dict[str, Any]:
+    """Return a comparison as a report has it, without paths of the machine."""
+    messages = [shared_text(text) for text in found.messages]
+    return {**found.to_dict(), "experiment": shared_path(found.source), "messages": messages}
 
 
 def _measured(scenario: Scenario | None, experiment: Path | None) -> ExperimentTable | None:
@@ -131,7 +139,7 @@ def _judged(
         return None, ()
     try:
         found = compare_sweep(place, experiment)
-        return {**found.to_dict(), "experiment": near(found.source)}, ()
+        return _shown(found), ()
     except BlocksimError as error:
         if experiment is not None and not isinstance(error, UnavailableError):
             raise

@@ -15,6 +15,7 @@ from blocksim.cli.app import app
 from blocksim.simulation.frames import Frames
 from blocksim.view.report.page import write_report
 from blocksim.view.report.runs import read_stored, run_subject
+from blocksim.view.report.studies import StudyPage, study_subject
 from tests.browser.conftest import PLAYER, Open, Opened
 from tests.view.made_up import polygons
 from tests.view.report.folders import write_experiment, write_run, write_sweep
@@ -480,6 +481,34 @@ def test_page_fits_phones_and_has_dark_colours(
     back = one.page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert (back == "rgb(255, 255, 255)") == (name != "dark")
     one.keep(f"{kind}-{name}")
+
+
+def test_tables_and_pictures_wider_than_a_phone_say_that_they_scroll(tmp_path: Path, open_page: Open) -> None:
+    write_run(tmp_path / "run", count=5)
+    stored = read_stored(tmp_path / "run")
+    study = StudyPage("study", "", [], "Title", ("head",), [("cell",)], picture=sheet_png())
+    subjects = [study_subject("part-2", study, "study"), run_subject("part-1", stored)]
+    write_report(subjects, tmp_path / "report.html", title="wide", version="0")
+    phone = {"viewport": {"width": 390, "height": 740}, "is_mobile": True, "has_touch": True}
+    hint = "(node) => [node.scrollWidth > node.clientWidth, getComputedStyle(node, '::before').content !== 'none']"
+    for options, expected in ((phone, True), ({}, False)):
+        for part in ("#part-1", "#part-2"):
+            one = open_page(tmp_path / "report.html", part, **options)
+            boxes = one.page.locator("section:not([hidden]) .wide")
+            boxes.first.wait_for()
+            one.page.wait_for_timeout(100)
+            found = [box.evaluate(hint) for box in boxes.all()]
+            assert [wide == told for wide, told in found] == [True] * len(found)
+            assert found[0] == [expected, expected]
+            assert one.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+            one.keep(f"wide-{part[1:]}-{expected}")
+
+
+def sheet_png() -> bytes:
+    """Return a picture of the size of those of studies."""
+    file = io.BytesIO()
+    Image.new("RGB", (1080, 640), "white").save(file, "PNG")
+    return file.getvalue()
 
 
 def test_paper_is_white_and_has_no_controls(three: tuple[Path, Frames], open_page: Open) -> None:

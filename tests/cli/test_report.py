@@ -18,6 +18,7 @@ from tests.cli.conftest import SOFT, Command
 from tests.view.report.folders import SCENARIOS, write_experiment, write_run, write_sweep
 
 REPORT = Path("report.html")
+KINETIC = "friction.block_block.kinetic"
 
 
 def data_of(path: Path, key: str = "part-1") -> dict[str, Any]:
@@ -38,6 +39,32 @@ def test_report_of_a_run_is_written_and_told(blocksim: Command, tmp_path: Path) 
     for part in ("Comparison with the measurement", "Energy ledger (J)", "Resolved scenario", "Provenance", "Keys"):
         assert part in text
     assert not re.search(r"""(src|href)=["'](?!#|data:,)|url\(|https?://(?!www\.w3\.org/2000/svg)""", text)
+
+
+@pytest.mark.parametrize("damaged", [False, True])
+def test_report_does_not_name_folders_of_the_machine(
+    blocksim: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, damaged: bool
+) -> None:
+    run, swept = tmp_path / "store" / "run", tmp_path / "store" / "swept"
+    write_run(run)
+    write_sweep(swept)
+    summary = json.loads((run / "run.json").read_text())
+    summary["environment"]["command"] = (
+        f"{tmp_path}/bin/blocksim run '{tmp_path}/my walls/x.toml' --set a.b={tmp_path}/c"
+    )
+    (run / "run.json").write_text(json.dumps(summary))
+    if damaged:
+        (run / "run.h5").write_bytes(b"nothing")
+    write_experiment(tmp_path / "repeats.csv")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    answer = blocksim("report", run, swept, "--experiment", tmp_path / "repeats.csv")
+    assert answer.code == (65 if damaged else 0)
+    text = REPORT.read_text(encoding="utf-8")
+    assert str(tmp_path) not in text
+    assert "<bdi>blocksim run &#39;x.toml&#39; --set a.b=c</bdi>" in text
+    assert "repeats.csv" in text
 
 
 def test_report_of_a_folder_whose_name_is_no_text_is_written(blocksim: Command, tmp_path: Path) -> None:
@@ -78,12 +105,12 @@ def test_notes_of_a_sweep_are_whole_sentences(blocksim: Command, tmp_path: Path)
 
 def test_varied_inputs_of_a_real_sweep_are_its_keys_and_no_result(blocksim: Command) -> None:
     falling = Document.read(SCENARIOS / "three_blocks_nonsmooth.toml").with_values({"time.end": 0.01})
-    vary = {"ground.tilt": ["10 deg", "12 deg"], "friction.block_block.kinetic": [0.2, 0.25]}
-    table = sweep(falling, vary, out=Path("swept"), jobs=1)
+    tilts, frictions = ["10 deg", "12 deg"], [0.2, 0.25]
+    table = sweep(falling, {"ground.tilt": tilts, KINETIC: frictions}, out=Path("swept"), jobs=1)
     assert blocksim("report", "swept").code == 0
     columns = data_of(REPORT)["columns"]
     by_role = {role: [one["name"] for one in columns if one["role"] == role] for role in ("varied", "outcome")}
-    assert by_role["varied"] == list(table.keys) == ["ground.tilt [deg]", "friction.block_block.kinetic"]
+    assert by_role["varied"] == list(table.keys) == ["ground.tilt [deg]", KINETIC]
     assert by_role["outcome"] == ["status", "reason", "seconds", "inside", *MOVEMENT]
     assert "<dt>varied</dt><dd><bdi>ground.tilt [deg], friction.block_block.kinetic</bdi></dd>" in REPORT.read_text()
 

@@ -42,7 +42,7 @@ def test_rotation_of_what_turned_while_settling_is_that_of_the_table(caught: lis
     draw_final(frames, "final.png")
     draw_history(frames, "history.png", choice=Choice(("rotation",)))
     assert f"{rotation:.2f}°" == "1.24°" in [text for text, _ in boxes_of(caught[0])]
-    (curve,) = (line for axes in caught[1].axes for line in axes.lines if len(line.get_xdata()) == len(frames))
+    (curve,) = (line for axes in caught[1].axes for line in axes.lines if np.size(line.get_xdata()) == len(frames))
     assert np.asarray(curve.get_ydata())[-1] == pytest.approx(rotation)
     scale = by_turn(frames).scale
     assert scale is not None

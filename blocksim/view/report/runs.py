@@ -22,6 +22,7 @@ from blocksim.simulation.table import Columns, read_table, rows_of
 from blocksim.view.probes import panels_of, probe_picture
 from blocksim.view.report.loads import pack_loads
 from blocksim.view.report.player import MOST_BYTES, frame_indices, pack_forces, pack_frames, scene_data
+from blocksim.view.report.shared import shared_path, shared_text
 
 Part = TypeVar("Part")
 
@@ -156,11 +157,11 @@ def run_subject(
         data["measured"] = _measured(data["names"], comparison)
     page = {
         "parent": parent,
-        "place": str(run.folder),
+        "place": shared_path(str(run.folder)),
         "status": run.status,
         "reason": _reason(run),
         "summary": _summary(run),
-        "problems": [*run.problems, *problems, *remarks],
+        "problems": [shared_text(text) for text in (*run.problems, *problems, *remarks)],
         "scenario": run.scenario_text,
         "values": None if run.scenario is None else run.scenario.model_dump(by_alias=True, exclude={"sweep"}),
         "description": None if run.scenario is None else run.scenario.description,
@@ -214,7 +215,7 @@ def _measured(names: Sequence[str], comparison: Mapping[str, Any] | None) -> lis
 
 def _reason(run: PartialRun) -> str:
     if run.summary is not None:
-        return run.summary.reason
+        return shared_text(run.summary.reason)
     return "no summary: the run was killed, is still running, or its run.json cannot be read"
 
 
@@ -236,7 +237,7 @@ def _summary(run: PartialRun) -> list[tuple[str, str]]:
             f"{summary.solver_seconds:.2f} s on {summary.threads} thread{'s' if summary.threads > 1 else ''}",
         ),
         ("relative energy error", _share(summary.energy_J.relative_residual)),
-        *(("warning", warning) for warning in summary.warnings),
+        *(("warning", shared_text(warning)) for warning in summary.warnings),
     ]
 
 
@@ -246,8 +247,8 @@ def _movement(found: Movement | None) -> list[tuple[str, str]]:
         return []
     rows = [
         ("outcome", str(found.outcome)),
-        ("largest displacement", f"{found.largest_displacement_mm:.2f} mm (block {found.displaced_block})"),
-        ("largest rotation", f"{found.largest_rotation_deg:.2f}° (block {found.rotated_block})"),
+        ("peak displacement", f"{found.largest_displacement_mm:.2f} mm (block {found.displaced_block})"),
+        ("peak rotation", f"{found.largest_rotation_deg:.2f}° (block {found.rotated_block})"),
     ]
     if found.first_mover is not None:
         rows.append(("first to move", f"block {found.first_mover} at {found.first_moved_s:.3f} s"))
@@ -287,4 +288,5 @@ def _provenance(run: PartialRun) -> list[tuple[str, str]]:
         return []
     summary = run.summary
     hashes = [("run", summary.run), ("scenario", summary.scenario_hash), ("final state", summary.final_state_sha256)]
-    return [("ended at", summary.ended_at), *hashes, *summary.environment.items(), *summary.sha256.items()]
+    environment = [(name, shared_text(text)) for name, text in summary.environment.items()]  # the command names folders
+    return [("ended at", summary.ended_at), *hashes, *environment, *summary.sha256.items()]

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from blocksim.view.report.runs import Subject
+from blocksim.view.report.shared import shared_path, shared_text
 
 
 @dataclass(frozen=True)
@@ -25,13 +26,13 @@ def study_subject(key: str, study: StudyPage, place: str) -> Subject:
     """Return a study for a report."""
     picture = None if study.picture is None else f"data:image/png;base64,{b64encode(study.picture).decode()}"
     page = {
-        "place": place,
+        "place": shared_path(place),
         "description": study.description,
         "summary": list(study.summary),
         "title": study.title,
         "heads": list(study.heads),
         "rows": [list(row) for row in study.rows],
         "picture": picture,
-        "problems": list(study.problems),
+        "problems": [shared_text(text) for text in study.problems],
     }
-    return Subject(key, "study", study.name, page, {"kind": "study", "name": study.name, "place": place})
+    return Subject(key, "study", study.name, page, {"kind": "study", "name": study.name, "place": shared_path(place)})

@@ -8,6 +8,7 @@ from typing import Any
 
 from blocksim.scenario import Scenario
 from blocksim.view.report.runs import Subject
+from blocksim.view.report.shared import shared_path, shared_text
 
 CASE, STATUS = "case", "status"  # what is varied stands between them
 OF_BLOCKS = (".x_mm", ".y_mm", ".rotation_deg", ".left_mm", ".right_mm")
@@ -67,10 +68,10 @@ def sweep_subject(  # noqa: PLR0913 - the parts of a sweep
     name = table.folder.name if scenario is None else scenario.name
     shown = table.blocks[: max(1, MOST_VALUES // (2 * max(1, len(table.rows))))]
     page = {
-        "place": str(table.folder),
+        "place": shared_path(str(table.folder)),
         "description": None if scenario is None else scenario.description,
         "summary": _summary(table, len(members)),
-        "problems": list(problems),
+        "problems": [shared_text(text) for text in problems],
         "hidden_blocks": len(table.blocks) - len(shown),
         "has_members": bool(members),
         "judged": judged,
@@ -78,7 +79,7 @@ def sweep_subject(  # noqa: PLR0913 - the parts of a sweep
     data = {
         "kind": "sweep",
         "name": name,
-        "place": str(table.folder),
+        "place": shared_path(str(table.folder)),
         "columns": _columns(table, shown),
         "left_out": list(left_out),
         "measured": {} if judged is None else _limits(judged),

@@ -87,6 +87,8 @@ def test_report_names_the_outcome_and_the_block_that_moved_first(tmp_path: Path)
     moved = replace(stored, summary=stored.summary.model_copy(update={"movement": movement}))
     rows = dict(run_subject("a", moved).page["summary"])
     assert rows["outcome"] == "fell"
+    assert rows["peak displacement"] == "12.30 mm (block 2)"  # on the way: it may end nearer
+    assert rows["peak rotation"] == "90.00° (block 3)"
     assert rows["first to move"] == "block 3 at 0.045 s"
     assert "outcome" not in dict(run_subject("a", stored).page["summary"])
 

@@ -42,6 +42,15 @@ addEventListener("keydown", (event) => {
   built.get(sections.find((section) => !section.hidden).id)?.player?.key(event);
 });
 
+// A box whose table or picture is wider than the page says so: on phones nothing else shows that it scrolls.
+const boxes = new ResizeObserver((entries) => {
+  for (const { target } of entries) {
+    const box = target.closest(".wide");
+    box.classList.toggle("cut", box.scrollWidth > box.clientWidth + 1);
+  }
+});
+for (const node of document.querySelectorAll(".wide, .wide > *")) boxes.observe(node);
+
 // On paper nothing can be opened.
 const opened = new Set();
 addEventListener("beforeprint", () => {
