@@ -8,6 +8,12 @@ just where failures and survivals overlap (Silvapulle, J. R. Stat. Soc. B 43 (19
 Intervals are those of the profile likelihood: the range of a parameter over all (a, b) whose logarithmic likelihood is
 less than half a quantile of chi-squared (one degree of freedom) below the largest. That set is convex, so its boundary
 is found on rays from the maximum; median, dispersion and curve all have their ranges from it.
+
+Counts of the same records at all intensities are not independent of one another: a record that is harmless at one
+intensity is so at the next. The place of the maximum stays consistent, but twice the drop of the likelihood is then
+lambda times chi-squared, lambda being an eigenvalue of H^-1 J, with Fisher's information H and the covariance J of the
+scores summed by record (Godambe's information of a composite likelihood; Varin, Reid and Firth, Statistica Sinica 21
+(2011) 5-42). The drop is made larger by the greatest lambda, so that no interval is too narrow.
 """
 
 import math
@@ -86,8 +92,12 @@ class Curve:
         return ndtr(eta.min(axis=0)), ndtr(eta.max(axis=0))
 
 
-def fit(counts: Counts, confidence: float = CONFIDENCE) -> Curve | NoCurve:
-    """Return the most likely curve, or why there is none. Raises UnavailableError without scipy."""
+def fit(counts: Counts, confidence: float = CONFIDENCE, inflation: float | None = None) -> Curve | NoCurve:
+    """Return the most likely curve, or why there is none. Raises UnavailableError without scipy.
+
+    `inflation` is that of `inflation_of` for counts of the same records at all intensities; the deviance of these has
+    no known distribution, so that `fits` is NaN.
+    """
     refused = _refusal(counts, confidence)
     if refused is not None:
         return refused
@@ -97,7 +107,7 @@ def fit(counts: Counts, confidence: float = CONFIDENCE) -> Curve | NoCurve:
     best = centred.maximum()
     if best[1] <= 0.0:
         return NoCurve("failures do not become more frequent with the intensity")
-    drop = HALF * float(_special().chdtri(1.0, 1.0 - confidence))
+    drop = HALF * float(_special().chdtri(1.0, 1.0 - confidence)) * (inflation or 1.0)
     a, b = centred.boundary(best, drop)
     deviance, freedom = centred.deviance(best), len(t) - 2
     return Curve(
@@ -107,10 +117,27 @@ def fit(counts: Counts, confidence: float = CONFIDENCE) -> Curve | NoCurve:
         dispersion_interval=(1.0 / float(b.max()), 1.0 / float(b.min()) if b.min() > 0.0 else math.inf),
         deviance=deviance,
         freedom=freedom,
-        fits=float(_special().chdtrc(freedom, deviance)) if freedom > 0 else math.nan,
+        fits=float(_special().chdtrc(freedom, deviance)) if freedom > 0 and inflation is None else math.nan,
         confidence=confidence,
         boundary=(a - b * middle, b),
     )
+
+
+def inflation_of(counts: Counts, failed: Floats, members: Floats) -> float:
+    """Return by how much records that counts have in common widen the variance of the curve: 1 or more.
+
+    `failed` and `members` are counts by record, shape (records, intensities); summed over records they are `counts`.
+    1 where there is no curve, or a single record, of which nothing can be said. Raises UnavailableError without scipy.
+    """
+    if len(failed) < FEWEST or _refusal(counts, CONFIDENCE) is not None:
+        return 1.0
+    centred = _Probit(counts, np.log(counts.x) - float(np.log(counts.x).mean()))
+    a, b = centred.maximum()
+    eta = a + b * centred.t
+    scores = failed * _hazard(eta) - (members - failed) * _hazard(-eta)
+    sums = np.column_stack([scores.sum(axis=1), scores @ centred.t])
+    covariance = sums.T @ sums * len(failed) / (len(failed) - 1)
+    return max(1.0, float(np.linalg.eigvals(np.linalg.solve(centred.information(a, b), covariance)).real.max()))
 
 
 def _special() -> Any:

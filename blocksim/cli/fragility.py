@@ -1,5 +1,6 @@
 """blocksim fragility: the probability of collapse over an intensity."""
 
+from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +17,16 @@ from blocksim.scenario import Document
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study.executors import Execution
 from blocksim.study.fragility import FragilityResult, run_fragility
-from blocksim.study.fragility_plan import COLLAPSE, FAILS, INTENSITY, MEMBERS, SCATTER, FragilityPlan, read_fragility
+from blocksim.study.fragility_plan import (
+    COLLAPSE,
+    FAILS,
+    INTENSITY,
+    MEMBERS,
+    SCATTER,
+    STRIPES,
+    FragilityPlan,
+    read_fragility,
+)
 from blocksim.study.progress import WHOLE, Shard
 
 DIGITS = 3
@@ -46,9 +56,26 @@ def fragility_command(
             autocompletion=completion.scenario_keys,
         ),
     ] = None,
+    stripes: Annotated[
+        list[str] | None,
+        typer.Option(
+            STRIPES,
+            metavar="KEY=a,b,c",
+            help="Records that all intensities share, each once at each of them, such as motion.table=a.csv,b.csv. "
+            "Repeatable: keys whose values go together.",
+            autocompletion=completion.scenario_keys,
+        ),
+    ] = None,
     members: Annotated[
-        int, typer.Option("--samples", "--members", min=1, metavar="N", help="Samples at every intensity.")
-    ] = MEMBERS,
+        int | None,
+        typer.Option(
+            "--samples",
+            "--members",
+            min=1,
+            metavar="N",
+            help=f"Samples at every intensity (default: {MEMBERS}, or one of each record of {STRIPES}).",
+        ),
+    ] = None,
     fails: Annotated[
         list[str] | None,
         typer.Option(
@@ -81,8 +108,9 @@ def fragility_command(
     """Find the probability of collapse over an intensity.
 
     Draws samples at every intensity, independently, counts those that fail with exact (Clopper-Pearson) limits, and
-    fits a lognormal curve by maximum likelihood: median, dispersion and their intervals. Runs that do not finish are
-    listed and not counted (exit code 77). The same command again, also after a kill or with more samples, runs only
+    fits a lognormal curve by maximum likelihood: median, dispersion and their intervals. --stripes runs the same
+    records at every intensity, each once, and widens the intervals of the curve accordingly. Runs that do not finish
+    are listed and not counted (exit code 77). The same command again, also after a kill or with more samples, runs only
     what is missing. Needs the extra blocksim[study]. Exit code 1: no curve fits, as nothing or everything fails.
 
     Example: blocksim fragility mine.toml --intensity motion.scale=0.5:2:7 --scatter friction.block_block=0.6+-0.05
@@ -92,6 +120,7 @@ def fragility_command(
         Document.read(scenario).with_settings(settings or []),
         read_variations([intensity], INTENSITY),
         read_variations(scatter or [], SCATTER),
+        stripes=read_variations(stripes or [], STRIPES),
         members=members,
         fails=fails or [COLLAPSE],
         seed=seed,
@@ -114,7 +143,7 @@ def fragility_command(
     if as_json:
         print_json({"folder": str(found.folder), **found.to_dict()})
     else:
-        answer("\n".join([*_table(found), "", *_told(plan, found.curve)]))
+        answer("\n".join([*_table(found), "", *_told(plan, found.curve), *_common(found)]))
     if not silent:
         _tell_end(found)
     raise typer.Exit(_exit_code(found))
@@ -164,12 +193,20 @@ def _told(plan: FragilityPlan, curve: Curve | NoCurve) -> list[str]:
         f"median      {plan.shown(curve.median)}, 95 % {_span(curve.median_interval, plan.head.unit)}",
         f"dispersion  {curve.dispersion:.4g}, 95 % {_span(curve.dispersion_interval)}",
     ]
-    if curve.freedom > 0:
+    if curve.freedom > 0 and isfinite(curve.fits):
         agrees = "" if curve.fits >= DOUBTFUL else ": counts and curve do not agree"
         lines.append(
             f"deviance    {curve.deviance:.3g}, degrees of freedom {curve.freedom}, p = {curve.fits:.2g}{agrees}"
         )
     return lines
+
+
+def _common(found: FragilityResult) -> list[str]:
+    """Say by how much the records that all intensities share widen the intervals of a curve."""
+    if found.inflation is None or isinstance(found.curve, NoCurve):
+        return []
+    wider = f"{found.inflation**0.5:.3g} times as wide as those of independent draws"
+    return [f"intervals   {wider}: {found.plan.records} records shared"]
 
 
 def _span(ends: tuple[float, float], unit: str = "") -> str:
@@ -197,6 +234,10 @@ def _tell_end(found: FragilityResult) -> None:
     moving = sum(one.moving_on for one in found.points)
     if moving:
         note(f"{moving} surviving samples were still moving at the end; increase time.end to decide them")
+    if isinstance(found.curve, Curve) and found.is_extrapolated:
+        x = [one.intensity for one in found.points if one.members]
+        side, end = ("above", max(x)) if found.curve.median > max(x) else ("below", min(x))
+        note(f"warning: the median lies {side} {found.plan.shown(end)}, beyond all intensities that were run")
     if found.failed:
         note(f"{found.failed} samples have no result, see members.csv; they count neither as failures nor as survivors")
     if found.left:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from blocksim.analysis.lognormal import PURPOSE, Counts, Curve, NoCurve, fit
+from blocksim.analysis.lognormal import PURPOSE, Counts, Curve, NoCurve, fit, inflation_of
 from blocksim.extras import loaded
 from blocksim.scenario import Source, document_of
 from blocksim.simulation import folder as files
@@ -24,7 +24,7 @@ from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.study.criterion import falls_before_zero
 from blocksim.study.executors import Execution
 from blocksim.study.fragility_counts import Point
-from blocksim.study.fragility_plan import COLLAPSE, MEMBERS, FragilityPlan, read_fragility
+from blocksim.study.fragility_plan import COLLAPSE, FragilityPlan, read_fragility
 from blocksim.study.plan import Values
 from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Manifest, Shard, Timings
 from blocksim.study.rows import FINISHED, MOVEMENT, Row, check_experiment
@@ -53,11 +53,18 @@ class FragilityResult:
     curve: Curve | NoCurve
     run: int  # members of this call; the others were known
     left: int = 0  # members that have not run: those of other shards
+    inflation: float | None = None  # of the curve's variance, as intensities share their records
 
     @property
     def failed(self) -> int:
         """How many runs did not finish."""
         return sum(point.no_result for point in self.points)
+
+    @property
+    def is_extrapolated(self) -> bool:
+        """Return True if the median lies beyond all intensities that have been run."""
+        x = [point.intensity for point in self.points if point.members]
+        return isinstance(self.curve, Curve) and not min(x) <= self.curve.median <= max(x)
 
     @property
     def table(self) -> "pd.DataFrame":
@@ -79,10 +86,12 @@ class FragilityResult:
             "fails": plan.failure,
             "members": plan.members,
             "seed": plan.seed,
-            "scatter": _described(plan),
+            "scatter": plan.described(),
+            "records": plan.records,
             "points": [dict(zip((INTENSITY, *COLUMNS), map(_finite, row), strict=True)) for row in _records(self)],
             "missing": self.left,
-            "curve": _curve(self.curve),
+            "curve": {**_curve(self.curve), "median_extrapolated": self.is_extrapolated},
+            "inflation": self.inflation,
         }
 
     def __repr__(self) -> str:
@@ -95,11 +104,6 @@ class FragilityResult:
         if isinstance(self.curve, NoCurve):
             return f"no curve, {self.curve.reason}"
         return f"median {self.plan.shown(self.curve.median)}, dispersion {self.curve.dispersion:.4g}"
-
-
-def _described(plan: FragilityPlan) -> Mapping[str, object]:
-    table = plan.scatter.as_table()
-    return {key: table[key] for key in plan.scatter.vary}
 
 
 def _finite(value: object) -> object:
@@ -126,7 +130,8 @@ def fragility(  # noqa: PLR0913 - one argument for each option of the command
     intensity: Mapping[str, Values],
     scatter: Mapping[str, Values] | None = None,
     *,
-    members: int = MEMBERS,
+    stripes: Mapping[str, Values] | None = None,
+    members: int | None = None,
     fails: str | Sequence[str] = COLLAPSE,
     seed: int = 0,
     executor: str | None = None,
@@ -144,14 +149,17 @@ def fragility(  # noqa: PLR0913 - one argument for each option of the command
     `scatter` the quantities drawn for each sample by itself: {"mean": m, "sd": s}, {"from": a, "to": b} or a list of
     equally likely values, such as records (default: the distributions of [sweep]). `fails` says what counts as failure
     (see `blocksim.study.criterion`), any of several. Samples are drawn independently at every intensity, so that limits
-    and intervals hold.
+    and intervals hold. `stripes` are records, {"motion.table": ["a.csv", "b.csv"]}, of which every intensity has each
+    equally often, by default once; several keys go together. The curve's intervals are then those of common records.
 
     Runs are kept in `out` (default: results/NAME/fragility-HASH); the same call, also one with more samples, does only
     what is missing. `executor`, `jobs`, `scheduler`, `shard` and `retry_failed` are those of `sweep`; after all shards
     the call without one makes the curve. Raises ScenarioError, InvalidInputError, OutputExistsError where the
     folder is not free, UnavailableError without scipy (extra `study`), StoppedEarlyError on Ctrl-C.
     """
-    plan = read_fragility(document_of(scenario), intensity, scatter, members=members, fails=fails, seed=seed)
+    plan = read_fragility(
+        document_of(scenario), intensity, scatter, stripes=stripes, members=members, fails=fails, seed=seed
+    )
     return run_fragility(
         plan,
         Execution(executor, jobs, scheduler),
@@ -191,29 +199,60 @@ def run_fragility(  # noqa: PLR0913 - as `fragility`
         table = SweepTable(folder / shard.file(MEMBERS_TABLE), cases, done, None, shard)
         timings = Timings(folder / shard.file(TIMINGS), execution.name)
         SweepRun(cases, shard, kept, done, table, timings, on_row).run(run, setting, fail_fast=False)
-        points = tuple(_points(plan, done))
+        rows = _rows(plan, done)
+        points = tuple(_points(plan, rows))
         counts = Counts.of(*zip(*((one.intensity, one.failures, one.members) for one in points), strict=True))
-        missing = len(cases) - done.count()
-        result = FragilityResult(plan, folder, points, fit(counts), done.count() - before, missing)
+        inflation = inflation_of(counts, *_by_record(plan, rows)) if plan.records else None
+        curve, missing = fit(counts, inflation=inflation), len(cases) - done.count()
+        result = FragilityResult(plan, folder, points, curve, done.count() - before, missing, inflation)
         if shard == WHOLE:
             _write(result)
     return result
 
 
-def _points(plan: FragilityPlan, done: CaseIndex) -> Iterator[Point]:
-    """Count the members of every intensity that have a row."""
-    rows: dict[float, list[Row]] = {number: [] for number in plan.levels}
+def _rows(plan: FragilityPlan, done: CaseIndex) -> dict[float, dict[int, Row]]:
+    """Return the rows that there are, by intensity and number of the member."""
+    rows: dict[float, dict[int, Row]] = {number: {} for number in plan.levels}
     numbers = list(plan.levels)
     with closing(done.reader()) as reader:
         for case, settings in enumerate(plan.cases.design):
             entry = reader.entry(case) if done.holds(case, settings) else None
             if entry is not None:
-                rows[numbers[case % len(numbers)]].append(entry.row)
+                rows[numbers[case % len(numbers)]][case // len(numbers)] = entry.row
+    return rows
+
+
+def _points(plan: FragilityPlan, rows: Mapping[float, Mapping[int, Row]]) -> Iterator[Point]:
+    """Count the members of every intensity that have a row."""
     for number, found in rows.items():
-        ended = [row for row in found if row["status"] == FINISHED or falls_before_zero(row)]
-        failures = [falls_before_zero(row) or plan.has_failed(row) for row in ended]
+        ended = [row for row in found.values() if _has_ended(row)]
+        failures = [_has_failed(plan, row) for row in ended]
         moving = sum(bool(row.get(MOVES_ON)) for row, fails in zip(ended, failures, strict=True) if not fails)
         yield Point(number, len(ended), sum(failures), moving, len(found) - len(ended))
+
+
+def _has_ended(row: Row) -> bool:
+    return row["status"] == FINISHED or falls_before_zero(row)
+
+
+def _has_failed(plan: FragilityPlan, row: Row) -> bool:
+    return falls_before_zero(row) or plan.has_failed(row)
+
+
+def _by_record(
+    plan: FragilityPlan, rows: Mapping[float, Mapping[int, Row]]
+) -> tuple["NDArray[np.float64]", "NDArray[np.float64]"]:
+    """Return failures and members by record, shape (records, intensities that have any)."""
+    import numpy as np  # noqa: PLC0415 - as pandas
+
+    ended = [{member: row for member, row in found.items() if _has_ended(row)} for found in rows.values()]
+    kept = [found for found in ended if found]
+    failed, members = np.zeros((plan.records, len(kept))), np.zeros((plan.records, len(kept)))
+    for place, found in enumerate(kept):
+        for member, row in found.items():
+            members[member % plan.records, place] += 1.0
+            failed[member % plan.records, place] += _has_failed(plan, row)
+    return failed, members
 
 
 def _head(plan: FragilityPlan) -> str:

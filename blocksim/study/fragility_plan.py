@@ -4,12 +4,16 @@ The draws of one intensity are independent of those of all others, and random ra
 counts binomial, and independent of one another, as exact limits and the likelihood of a curve assume. With common
 draws, or a Latin hypercube, the intervals would be too narrow or too wide. Member i at an intensity is the same
 whatever the other intensities are and however many members are drawn.
+
+Stripes are records that all intensities share, each of them equally often at each (multiple stripe analysis; Jalayer,
+dissertation, Stanford 2003): member i has record i modulo their number. Curves of these have wider intervals, see
+`blocksim.analysis.lognormal`.
 """
 
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from blocksim.errors import InvalidInputError
@@ -34,12 +38,13 @@ from blocksim.study.rows import Head, heads_of, si_number
 from blocksim.study.sampling import Places, drawn, generator, open_interval
 from blocksim.study.typed_levels import typed_levels
 
-INTENSITY, SCATTER, FAILS = "--intensity", "--scatter", "--fails"
+INTENSITY, SCATTER, STRIPES, FAILS = "--intensity", "--scatter", "--stripes", "--fails"
 COLLAPSE = "outcome = fell"
 MEMBERS = 64
 MOST_SEED = 2**53
 NO_SCATTER = (
-    "no scatter: give --scatter KEY=MEAN+-SD (or KEY=FROM:TO, KEY=a,b,c), or a [sweep] table with distributions"
+    "no scatter: give --scatter KEY=MEAN+-SD (or KEY=FROM:TO, KEY=a,b,c), --stripes KEY=a,b,c, or a [sweep] table with "
+    "distributions"
 )
 
 
@@ -50,10 +55,26 @@ class FragilityPlan:
     document: Document  # without [sweep]
     head: Head  # key and unit of the intensity
     levels: Mapping[float, object]  # value of the key by its number in that unit
-    scatter: Sweep
+    scatter: Sweep | None  # None where there are stripes alone
     members: int  # at every intensity
     seed: int
     fails: tuple[Criterion, ...]  # any of them
+    stripes: Mapping[str, tuple[object, ...]] = field(default_factory=dict)  # values of a key by record
+
+    @property
+    def records(self) -> int:
+        """How many records the intensities share; 0 where every draw is independent."""
+        return len(next(iter(self.stripes.values()), ()))
+
+    @property
+    def spread(self) -> Mapping[str, Variation]:
+        """Everything that differs between the members of an intensity, by key."""
+        return {**self.stripes, **({} if self.scatter is None else self.scatter.vary)}
+
+    def described(self) -> dict[str, object]:
+        """Return what differs between the members of an intensity as a [sweep] table has it, stripes as lists."""
+        table = {} if self.scatter is None else self.scatter.as_table()
+        return {key: list(self.stripes[key]) if key in self.stripes else table[key] for key in self.spread}
 
     def shown(self, number: float) -> str:
         """Return an intensity for people."""
@@ -72,8 +93,11 @@ class FragilityPlan:
     def name(self) -> str:
         """A hash of all that decides a member; neither their number nor what counts as failure does."""
         levels = [self.head.key, *map(str, self.levels.values())]
-        about = [scenario_hash(self.document.build()), levels, self.scatter.as_table(), self.seed, code_hash()]
-        tables = table_digests(self.document, self.scatter.vary)
+        scatter = None if self.scatter is None else self.scatter.as_table()
+        about = [scenario_hash(self.document.build()), levels, scatter, self.seed, code_hash()]
+        if self.stripes:
+            about.append({key: list(map(str, values)) for key, values in self.stripes.items()})
+        tables = table_digests(self.document, self.spread)
         if tables:
             about.append(tables)
         return hashlib.sha256(json.dumps(about, default=str).encode()).hexdigest()[:HASH_DIGITS]
@@ -85,11 +109,22 @@ class FragilityPlan:
         More members come after those that are there. Raises ScenarioError where a distribution gave a value that its
         key cannot have, InvalidInputError where no case can be simulated.
         """
-        draws = {key: self._draws(key, values) for key, values in self.scatter.vary.items()}
-        design = Together({self.head.key: tuple(self.levels.values()) * self.members, **draws})
-        refuse_wrong_draws(self.document, self.scatter, design)
-        cases = cases_of(self.document, Sweep.model_validate({"mode": "list", **design.columns}))
-        return replace(cases, heads=(self.head, *heads_of(self.scatter)))
+        drawn_keys = {} if self.scatter is None else self.scatter.vary
+        draws = {key: self._draws(key, values) for key, values in drawn_keys.items()}
+        design = Together({self.head.key: tuple(self.levels.values()) * self.members, **self._shared(), **draws})
+        if self.scatter is not None:
+            refuse_wrong_draws(self.document, self.scatter, design)
+        striped = Sweep.model_validate({"mode": "list", **design.columns})
+        heads = {head.key: head for head in (*heads_of(striped), *(heads_of(self.scatter) if self.scatter else ()))}
+        cases = cases_of(self.document, striped)
+        return replace(cases, heads=(self.head, *(heads[key] for key in self.spread)))
+
+    def _shared(self) -> dict[str, tuple[object, ...]]:
+        """Return the value of each stripe by case: all intensities of a member have the same record."""
+        return {
+            key: tuple(values[member % len(values)] for member in range(self.members) for _ in self.levels)
+            for key, values in self.stripes.items()
+        }
 
     def _draws(self, key: str, values: Variation) -> tuple[object, ...]:
         """Return the values of a key in the order of the cases."""
@@ -105,33 +140,48 @@ class FragilityPlan:
         return open_interval(generator(self.seed, name).random(self.members))
 
 
-def read_fragility(
+def read_fragility(  # noqa: PLR0913 - one argument for each option of the command
     document: Document,
     intensity: Mapping[str, Values] | Variations,
     scatter: Mapping[str, Values] | Variations | None = None,
     *,
-    members: int = MEMBERS,
+    stripes: Mapping[str, Values] | Variations | None = None,
+    members: int | None = None,
     fails: str | Sequence[str] = COLLAPSE,
     seed: int = 0,
 ) -> FragilityPlan:
     """Return the plan of a study; without `scatter`, the [sweep] table of the scenario counts if it has distributions.
 
-    Raises ScenarioError for keys and values that the scenario cannot have, InvalidInputError for a wrong criterion,
-    anything but one intensity, nothing that scatters, and too many members.
+    `members` is their number at every intensity (default: 64, or one a record of `stripes`). Raises ScenarioError for
+    keys and values that the scenario cannot have, InvalidInputError for a wrong criterion, anything but one intensity,
+    nothing that scatters, stripes that are not all equally often there, and too many members.
     """
     criteria = tuple(read_criterion(text, FAILS) for text in ([fails] if isinstance(fails, str) else fails))
     bare = document.without_sweep()
     head, levels = _levels(bare, _variations(intensity))
+    shared = _stripes(bare, _variations(stripes or {}))
+    records = len(next(iter(shared.values()), ()))
+    members = (records or MEMBERS) if members is None else members
     if members < 1 or members * len(levels) > MOST_CASES or not 0 <= seed <= MOST_SEED:
         message = (
             f"{members} samples at {len(levels)} intensities with seed {seed}: 1 to {MOST_CASES} runs are possible"
         )
         raise InvalidInputError(message)
-    spread = _scatter(document, _variations(scatter or {}))
-    if parse_key(head.key) in {parse_key(key) for key in spread.vary}:
+    if records and members % records:
+        message = (
+            f"{members} samples of {records} records: each must be there equally often; give a multiple of {records}"
+        )
+        raise InvalidInputError(message)
+    spread = _scatter(document, _variations(scatter or {}), needed=not shared)
+    keys = [parse_key(key) for key in (head.key, *shared, *(spread.vary if spread is not None else ()))]
+    twice = next((key for i, key in enumerate(keys) if key in keys[:i]), None)
+    if twice == keys[0]:
         message = f"{head.key} is the intensity; it cannot scatter too"
         raise InvalidInputError(message)
-    return FragilityPlan(bare, head, levels, spread, members, seed, criteria)
+    if twice is not None:
+        message = f"{format_key(twice)} is given as stripes; it cannot be drawn too"
+        raise InvalidInputError(message)
+    return FragilityPlan(bare, head, levels, spread, members, seed, criteria, shared)
 
 
 def _variations(given: Mapping[str, Values] | Variations) -> Variations:
@@ -153,7 +203,20 @@ def _levels(document: Document, given: Variations) -> tuple[Head, dict[float, ob
     return head, levels
 
 
-def _scatter(document: Document, given: Variations) -> Sweep:
+def _stripes(document: Document, given: Variations) -> dict[str, tuple[object, ...]]:
+    """Return the values of each key by record."""
+    if not given.tables:
+        return {}
+    shared = {key: levels_of(values) for key, values in varied(document, given, STRIPES, "list").vary.items()}
+    for key, values in shared.items():
+        if len(set(map(str, values))) < len(values) or len(values) == 1:
+            why = "one record does not scatter; set it with --set" if len(values) == 1 else "a record is given twice"
+            message = f"{STRIPES} {given.texts[key]}: {why}"
+            raise InvalidInputError(message)
+    return shared
+
+
+def _scatter(document: Document, given: Variations, *, needed: bool) -> Sweep | None:
     if given.tables:
         spread = varied(document.without_sweep(), given, SCATTER, "normal")
         constant = next(
@@ -165,5 +228,7 @@ def _scatter(document: Document, given: Variations) -> Sweep:
         return spread
     own = document.build().sweep
     if own is None or not own.is_sampled:
-        raise InvalidInputError(NO_SCATTER)
+        if needed:
+            raise InvalidInputError(NO_SCATTER)
+        return None
     return own

@@ -46,6 +46,7 @@ class StoredFragility(BaseModel, frozen=True):
     unit: str
     fails: str
     points: tuple[StoredPoint, ...]
+    inflation: float | None = Field(default=None, ge=1.0, lt=1e6)
 
 
 class StoredSide(BaseModel, frozen=True):
@@ -183,7 +184,8 @@ def read_fragility_picture(folder: Path) -> Fragility:
         message = f"{folder}: no sample of this study has a result; nothing to draw"
         raise InvalidInputError(message)
     x, share, low, high = np.array([(one.intensity, one.share, *one.limits) for one in points]).T
-    curve = fit(Counts.of(x.tolist(), [one.failures for one in points], [one.members for one in points]))
+    counts = Counts.of(x.tolist(), [one.failures for one in points], [one.members for one in points])
+    curve = fit(counts, inflation=stored.inflation)
     at = places(x)
     band = Band(at, curve.probability(at), *curve.band(at)) if isinstance(curve, Curve) else None
     return Fragility(stored.key, stored.unit, x, share, low, high, band, notes=(f"{_told(curve, stored)}.",))

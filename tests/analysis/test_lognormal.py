@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 from scipy.stats import binom, norm
 
 from blocksim.analysis.intervals import interval
-from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit
+from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit, inflation_of
 
 X = np.array([0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.5, 1.9])
 MEDIAN, DISPERSION, MEMBERS = 1.0, 0.4, 32
@@ -93,3 +93,27 @@ def test_counts_that_jump_up_and_down_do_not_pass_for_a_curve() -> None:
     assert isinstance(jumps, Curve)
     assert curve.fits > 0.05
     assert jumps.fits < 1e-6
+
+
+def test_intervals_of_a_curve_hold_what_they_say_where_all_intensities_share_their_records() -> None:
+    stream, records, held = np.random.default_rng(7), 20, np.zeros(2)
+    for _ in range(120):
+        strength = MEDIAN * np.exp(DISPERSION * stream.standard_normal(records))
+        failed = (strength[:, None] < X).astype(float)  # a record that is fatal at one intensity is so at all above
+        counts = Counts.of(X.tolist(), failed.sum(axis=0).astype(int).tolist(), [records] * len(X))
+        shared = inflation_of(counts, failed, np.ones_like(failed))
+        assert shared >= 1.0
+        for place, inflation in enumerate((None, shared)):
+            curve = fit(counts, inflation=inflation)
+            assert isinstance(curve, Curve)
+            held[place] += curve.median_interval[0] <= MEDIAN <= curve.median_interval[1]
+    assert held[0] < 0.85 * 120  # as if independent: 95 % are asked for
+    assert held[1] > 0.92 * 120
+
+
+def test_independent_draws_widen_no_interval_by_much() -> None:
+    stream = np.random.default_rng(3)
+    failed = (stream.random((200, len(X))) < P).astype(float)
+    counts = Counts.of(X.tolist(), failed.sum(axis=0).astype(int).tolist(), [200] * len(X))
+    assert inflation_of(counts, failed, np.ones_like(failed)) == pytest.approx(1.0, abs=0.25)
+    assert inflation_of(counts, failed[:1], np.ones((1, len(X)))) == 1.0

@@ -39,6 +39,16 @@ def test_without_a_curve_it_says_why_and_where_the_median_is(blocksim: Command, 
     golden("\n\n".join(answer.out.partition("\n\n")[2].partition("\n\n")[2] for answer in (nothing, step)))
 
 
+def test_a_median_beyond_what_was_run_is_warned_of_and_shared_records_are_named(blocksim: Command) -> None:
+    records = ("--stripes", "friction.block_ground=0.2,0.26,0.33,0.37,0.41,0.45,0.5", "--out", "out")
+    answer = blocksim(*SLIDE, "--intensity", "ground.tilt=14deg:20deg:3", *SLIDES, *records)
+    assert answer.code == 0
+    assert "warning: the median lies above 20 deg, beyond all intensities that were run" in answer.err
+    assert "times as wide as those of independent draws: 7 records shared" in answer.out
+    assert "deviance" not in answer.out  # of counts that are not independent
+    assert max(map(len, answer.out.splitlines())) <= 80
+
+
 def test_shards_wait_for_one_another(blocksim: Command) -> None:
     first = blocksim(*SLIDE, *TILT, *SLIDES, *SCATTER, *FEW, "--shard", "0/2")
     assert first.code == 0

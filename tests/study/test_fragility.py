@@ -11,13 +11,14 @@ import pytest
 from scipy.stats import norm
 
 from blocksim.analysis.intervals import interval
-from blocksim.analysis.lognormal import Curve, NoCurve
+from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit
 from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError, StoppedEarlyError, UnavailableError
 from blocksim.scenario import Document
 from blocksim.study import executors as batches
 from blocksim.study.fragility import FragilityResult, fragility
 from blocksim.study.fragility_plan import read_fragility
 from blocksim.study.progress import Shard
+from blocksim.study.study_pictures import read_fragility_picture
 from tests.sizes import in_all
 
 MU = "friction.block_ground"
@@ -258,3 +259,49 @@ def test_counts_and_members_are_the_same_from_a_cluster(tmp_path: Path, whole: F
         slides(tmp_path, scheduler=cluster.scheduler_address)
     for name in ("fragility.csv", "members.csv"):
         assert (tmp_path / name).read_bytes() == (whole.folder / name).read_bytes()
+
+
+RECORDS = [0.25, 0.29, 0.33, 0.37, 0.41, 0.45]
+
+
+def test_stripes_have_each_record_once_at_each_intensity_and_wider_intervals(tmp_path: Path) -> None:
+    stripes = {"stripes": {MU: RECORDS}, "fails": SLIDES, "jobs": 1}
+    found = fragility(SLOPE, TILTS, **stripes, out=tmp_path / "study")
+    table = _members(tmp_path / "study")
+    assert [sorted(rows[MU]) for _, rows in table.groupby("ground.tilt [deg]")] == [RECORDS] * 5
+    assert [point.members for point in found.points] == [6] * 5
+    assert found.inflation is not None
+    assert found.inflation > 1.5
+    both = [found.curve, fit(Counts.of([14, 17, 20, 23, 26], [p.failures for p in found.points], [6] * 5))]
+    narrow, wide = sorted(c.median_interval[1] - c.median_interval[0] for c in both if isinstance(c, Curve))
+    assert narrow < 0.8 * wide
+    assert read_fragility_picture(tmp_path / "study").band is not None
+    twice = fragility(SLOPE, TILTS, {"gravity": [9.8, 9.9]}, **stripes, members=12, out=tmp_path / "twice")
+    assert [point.members for point in twice.points] == [12] * 5
+    assert twice.to_dict()["records"] == 6
+
+
+@pytest.mark.parametrize(
+    ("stripes", "members", "why"),
+    [
+        ({MU: [0.2, 0.3, 0.2]}, None, "a record is given twice"),
+        ({MU: [0.2]}, None, "one record does not scatter"),
+        ({MU: [0.2, 0.3]}, 3, "each must be there equally often; give a multiple of 2"),
+        ({"gravity": [9.8, 9.9]}, None, "gravity is given as stripes; it cannot be drawn too"),
+        ({"ground.tilt": ["1 deg", "2 deg"]}, None, "is the intensity"),
+    ],
+)
+def test_stripes_that_are_not_equally_often_there_are_refused(
+    stripes: dict[str, list[Any]], members: int | None, why: str
+) -> None:
+    document, drawn = Document.from_mapping(SLOPE), {"gravity": [9.7, 9.8]}
+    with pytest.raises((InvalidInputError, ScenarioError), match=why):
+        read_fragility(document, {"ground.tilt": ["10 deg", "20 deg"]}, drawn, stripes=stripes, members=members)
+
+
+def test_a_median_beyond_what_was_run_is_known_as_such(whole: FragilityResult, tmp_path: Path) -> None:
+    low = {"ground.tilt": ["14 deg", "17 deg"]}
+    found = fragility(SLOPE, low, stripes={MU: [0.2, 0.26, *RECORDS[2:]]}, fails=SLIDES, jobs=1, out=tmp_path / "low")
+    assert isinstance(found.curve, Curve)
+    assert found.curve.median > 17.0
+    assert (found.is_extrapolated, whole.is_extrapolated) == (True, False)
