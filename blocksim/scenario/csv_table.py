@@ -20,6 +20,7 @@ LONGEST_LINE = 1_000  # characters
 MOST_PROBLEMS_SHOWN = 20
 
 CELL = re.compile(r'[ ]*("(?:[^"]|"")*"|[^",]*)[ ]*(,|$)')
+DIALECT = "separate them by commas, and write decimals with a point"
 NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
@@ -92,6 +93,7 @@ def read_table(path: Path, columns: Sequence[str]) -> Table:
     notes, content = _content(_lines(path))
     if not content:
         raise_problems([Problem(where=str(path), message=f"the table is empty, {_expected(columns)}")])
+    _refuse_semicolons(content[0])
     names, problems = _header(content[0], columns)
     table = Table(where=str(path), notes=notes, header=content[0], problems=problems)
     return _filled(table, names, content[1:])
@@ -106,6 +108,7 @@ def read_open_table(path: Path, limit: int) -> tuple[tuple[Cell, ...], Table]:
     if not content:
         raise_problems([Problem(where=str(path), message="the table is empty")])
     line = content[0]
+    _refuse_semicolons(line)
     places = _cells(line)
     if places is None:
         raise_problems([line.problem(_shape_complaint(line, places, 0))])
@@ -224,6 +227,12 @@ def _shape_complaint(line: Line, cells: list[tuple[str, Line, int, int]] | None,
     if len(cells) < count:
         return f"{len(cells)} cells where the header has {count} columns"
     return ""
+
+
+def _refuse_semicolons(header: Line) -> None:
+    """Raise InvalidInputError for a table as spreadsheets write it where decimals have a comma."""
+    if ";" in header.text and "," not in header.text:
+        raise_problems([header.problem(f"columns are separated by semicolons; {DIALECT}")])
 
 
 def _header(line: Line, columns: Sequence[str]) -> tuple[list[str], list[Problem]]:

@@ -4,25 +4,43 @@ And of soil whose particles leave a part of its shape empty.
 """
 
 from collections.abc import Iterator
-from math import ceil
+from math import ceil, dist
+from statistics import median
 
-from blocksim.scenario import keys
+from blocksim.scenario import keys, outlines
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.variation import Normal, Uniform
 from blocksim.scenario.polygons import count_across
 from blocksim.scenario.soil_places import soil_tables
+from blocksim.scenario.structures.polygons import Polygons
 
 STEEPEST = 5.0
 """Friction coefficient (79 degrees) above which a friction angle without its unit is more likely."""
 LIGHTEST, HEAVIEST = 25.0, 25_000.0  # kg/m3: foams and osmium
 SOFTEST = 1e4  # Pa: gels
 LONGEST = 50.0  # m
+LONGEST_DRAWN = 10.0  # m, of most blocks of a drawing: bricks and stones in mm come out larger
 MOST_EMPTY = 0.01  # of the width or height of a soil: its thrust goes with the square of the height
 
 
 def implausible_values(scenario: Scenario) -> list[str]:
     """Return a warning for each value that looks like one in another unit; of frictions swept ones too."""
-    return [*_bare_numbers(scenario), *_friction_angles(scenario), *_unfilled_soils(scenario)]
+    return [
+        *_bare_numbers(scenario),
+        *_large_drawings(scenario),
+        *_friction_angles(scenario),
+        *_unfilled_soils(scenario),
+    ]
+
+
+def _large_drawings(scenario: Scenario) -> Iterator[str]:
+    """Find drawings whose coordinates are hardly in m."""
+    for number, structure in enumerate(scenario.structures):
+        if isinstance(structure, Polygons):
+            size = median(dist(*outlines.box_of(one.outline)) for one in structure.cells_given)
+            if size > LONGEST_DRAWN:
+                key = keys.format_key(("structures", number))
+                yield f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"'
 
 
 def _unfilled_soils(scenario: Scenario) -> Iterator[str]:

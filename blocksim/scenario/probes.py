@@ -17,8 +17,11 @@ from blocksim.scenario.segments import TOLERANCE
 from blocksim.scenario.spelling import did_you_mean_or_list
 
 GROUND, WALL, WALLS, SUPPORTS = "ground", "wall", "walls", "supports"
-PARALLEL = 1e-6
-"""Sine of the angle between two faces up to which they make a joint."""
+LEAST_ANGLE = 1.0
+PARALLEL = math.sin(math.radians(LEAST_ANGLE))
+"""Sine of the angle between two faces up to which they make a joint: corners of drawings are rounded."""
+LEAST_SHARE = 1e-6
+"""Of the smallest width of both: what faces share at least, and by how much they may overlap across."""
 Point = tuple[float, float]
 
 
@@ -71,7 +74,7 @@ def _unfit(
             yield from unknown
             if not unknown and joint_between(*(bodies[name] for name in probe.bodies)) is None:
                 message = f"bodies {probe.bodies[0]} and {probe.bodies[1]} have no faces that lie opposite each other"
-                yield Finding((*path, "bodies"), f"{message} at the start")
+                yield Finding((*path, "bodies"), f"{message} at the start, parallel within {LEAST_ANGLE:g} deg")
 
 
 def _unknown(named: Sequence[tuple[KeyPath, str]], known: Sequence[str]) -> Iterator[Finding]:
@@ -83,8 +86,9 @@ def _unknown(named: Sequence[tuple[KeyPath, str]], known: Sequence[str]) -> Iter
 class Joint(NamedTuple):
     """A joint between bodies a and b at the start, in the own axes of each (m).
 
-    Its two ends as points of a and of b, the outward normal of a's face, and the tangent along it, which is the normal
-    turned by -90 degrees: towards +x where b lies on a. The first end is the one farther back along the tangent.
+    Its two ends as points of a and of b, straight across the gap that there is at each of them, the outward normal of
+    a's face, and the tangent along it, which is the normal turned by -90 degrees: towards +x where b lies on a. The
+    first end is the one farther back along the tangent.
     """
 
     ends_of_a: tuple[Point, Point]
@@ -96,37 +100,38 @@ class Joint(NamedTuple):
 def joint_between(a: PlacedBody, b: PlacedBody) -> Joint | None:
     """Return the joint between the faces of two bodies that lie opposite each other, None where none do.
 
-    The faces are parallel, and overlap along each other. Of several such pairs that with the widest gap is the joint.
+    The faces are parallel but for `PARALLEL`, and overlap along each other. Of several such pairs that with the widest
+    gap is the joint.
     """
     found = [one for one in (_facing(a, b, *edge) for edge in edges_of(a.corners)) if one is not None]
     return max(found, key=lambda one: one[0])[1] if found else None
 
 
 def _facing(a: PlacedBody, b: PlacedBody, begin: Point, end: Point, normal: Point) -> tuple[float, Joint] | None:
-    """Return the gap (m) and the joint between a face of a and the face of b opposite it."""
+    """Return the least gap (m) and the joint between a face of a and the face of b opposite it."""
     opposite = _opposite(a, b, normal)
     if opposite is None:
         return None
     tangent = (normal[1], -normal[0])
     across, along = np.array(opposite) @ np.array(normal), np.array(opposite) @ np.array(tangent)
     half = _dot(begin, normal)
-    gap = float(across.min()) - half
     first, last = max(float(along.min()), _dot(end, tangent)), min(float(along.max()), _dot(begin, tangent))
     smallest = min(a.least_width, b.least_width)
-    if gap < -max(TOLERANCE, PARALLEL * smallest) or last - first < PARALLEL * smallest:
+    order = np.argsort(along)
+    gaps = (np.interp((first, last), along[order], across[order]) - half).tolist()
+    if min(gaps) < -max(TOLERANCE, LEAST_SHARE * smallest) or last - first < LEAST_SHARE * smallest:
         return None
     ends = [(half * normal[0] + s * tangent[0], half * normal[1] + s * tangent[1]) for s in (first, last)]
-    places = [(x + gap * normal[0], y + gap * normal[1]) for x, y in ends]
+    places = [(x + gap * normal[0], y + gap * normal[1]) for (x, y), gap in zip(ends, gaps, strict=True)]
     of_b = [_local(b, *_placed(a, *point)) for point in places]
-    return gap, Joint((ends[0], ends[1]), (of_b[0], of_b[1]), normal, tangent)
+    return min(gaps), Joint((ends[0], ends[1]), (of_b[0], of_b[1]), normal, tangent)
 
 
 def _opposite(a: PlacedBody, b: PlacedBody, normal: Point) -> tuple[Point, Point] | None:
     """Return the ends of the face of b that is parallel to one of a with this normal and faces it, in the axes of a."""
-    for begin, end, of_b in edges_of([_local(a, *_placed(b, *corner)) for corner in b.corners]):
-        if _dot(of_b, normal) < 0.0 and abs(of_b[0] * normal[1] - of_b[1] * normal[0]) <= PARALLEL:
-            return begin, end
-    return None
+    edges = edges_of([_local(a, *_placed(b, *corner)) for corner in b.corners])
+    begin, end, of_b = min(edges, key=lambda edge: _dot(edge[2], normal))
+    return (begin, end) if abs(of_b[0] * normal[1] - of_b[1] * normal[0]) <= PARALLEL else None
 
 
 def _dot(one: Point, other: Point) -> float:

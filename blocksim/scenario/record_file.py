@@ -113,9 +113,17 @@ def _rows(lines: Iterable[Line]) -> Iterator[tuple[int, float, float]]:
     for number, text in lines:
         cells = _cells(text)
         if len(cells) != COLUMNS:
-            message = f"line {number}: {shown(text.strip())}: a time and an acceleration are needed"
+            hint = "; decimals are written with a point" if _has_decimal_commas(text) else ""
+            message = f"line {number}: {shown(text.strip())}: a time and an acceleration are needed{hint}"
             raise MotionTableError(message)
         yield number, _number(number, cells[0]), _number(number, cells[1])
+
+
+def _has_decimal_commas(text: str) -> bool:
+    """Return True for a line such as 0,01;0,12 or 0,01,0,12: its numbers have a comma where a point belongs."""
+    by_others = [cell for cell in re.split(r"[;\s]+", text.strip(" ;\t")) if cell]
+    commas = text.count(",")
+    return (len(by_others) == COLUMNS and 0 < commas <= COLUMNS) or (len(by_others) == 1 and commas == 1 + COLUMNS)
 
 
 def _cells(text: str) -> list[str]:
@@ -155,15 +163,21 @@ def _check_steps(lines: Sequence[int], times: Sequence[float], mean: float) -> N
     """Raise MotionTableError at the first time that does not increase, after a gap, or off a constant step (s)."""
     steps = [after - before for before, after in pairwise(times)]
     usual = statistics.median(steps)
-    for place, step in enumerate(steps, start=1):
-        why = ""
-        if step <= 0.0 or times[0] < 0.0:
-            why = "times must increase from 0 or later"
-        elif step > GAP * usual:
-            why = f"a gap of {step:g} s, the step is {usual:g} s"
-        if why:
-            message = f"line {lines[place]}: time {times[place]:g} s: {why}"
-            raise MotionTableError(message)
+    place, why = 0, "times must increase from 0 or later" if times[0] < 0.0 else ""
+    if not why and min(steps) <= 0.0:  # before gaps: where times are repeated, the usual step means nothing
+        place = next(number for number, step in enumerate(steps, start=1) if step <= 0.0)
+        again = f"the time of line {lines[place - 1]} is repeated"
+        why = (
+            again
+            if steps[place - 1] == 0.0
+            else f"times must increase, line {lines[place - 1]} has {times[place - 1]:g} s"
+        )
+    elif not why and max(steps) > GAP * usual:
+        place = next(number for number, step in enumerate(steps, start=1) if step > GAP * usual)
+        why = f"a gap of {steps[place - 1]:g} s, the step is {usual:g} s"
+    if why:
+        message = f"line {lines[place]}: time {times[place]:g} s: {why}"
+        raise MotionTableError(message)
     for place, time in enumerate(times):
         if abs(time - times[0] - place * mean) > UNEVEN * mean:
             why = f'not at a constant step of {usual:g} s; a motion of kind "table" takes any steps'

@@ -21,6 +21,7 @@ BROKEN = {
     "mistyped column beside mistakes in its rows": "block,quantity,units,replicate,value\n1,x,kg,1,16\n1,x,mm,2,wide\n",
     "column twice": "block,quantity,unit,replicate,value,block\n" + GOOD,
     "semicolons": "block;quantity;unit\n" + GOOD,
+    "semicolons and decimal commas": HEADER.replace(",", ";") + "1;x;mm;1;71,69\n",
     "nothing in it": "",
     "comments only": "# only\n\n  # notes\n",
     "header only": "# source\n" + HEADER,

@@ -1,5 +1,7 @@
 """Warnings about values that are allowed and hardly meant."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +48,19 @@ def test_numbers_that_look_like_another_unit_are_warned_of(settings: dict[str, A
     given = {key: {**base, **value} if isinstance(value, dict) else value for key, value in settings.items()}
     found = implausible_values(Document.read(APART).with_values(given).build())
     assert [text.removesuffix("; add the intended unit") for text in found] == expected
+
+
+@pytest.mark.parametrize(("unit", "warned"), [({}, True), ({"unit": "1 mm"}, False)])
+def test_a_drawing_in_mm_that_is_read_in_m_is_warned_of(tmp_path: Path, unit: dict[str, str], *, warned: bool) -> None:
+    squares = [[[0, 25 * i], [50, 25 * i], [50, 25 + 25 * i], [0, 25 + 25 * i]] for i in range(3)]
+    drawing = {"type": "MultiPolygon", "coordinates": [[[*one, one[0]]] for one in squares]}
+    (tmp_path / "wall.geojson").write_text(json.dumps(drawing))
+    structure = {"kind": "polygons", "table": "wall.geojson", "block": "stone", **unit}
+    given = Document.read(APART).with_values(
+        {"blocks.stone": {"depth": 0.1, "material": "aluminium"}, "structures": [structure], "bodies": []}
+    )
+    found = implausible_values(replace(given, folder=tmp_path).build())
+    assert found == ['structures.0: blocks of 55.9 m; for a drawing in mm add unit = "1 mm"'] * warned
 
 
 @pytest.mark.parametrize(

@@ -39,6 +39,24 @@ def test_a_gap_is_part_of_a_joint_and_a_quarter_turn_too() -> None:
     assert (*joint.ends_of_b[1], *joint.ends_of_b[0]) == pytest.approx((-0.07, 0.05, 0.03, 0.05), abs=1e-12)
 
 
+@pytest.mark.parametrize("corner", [0.1, 0.1007, 0.1017])
+def test_a_joint_of_a_drawing_may_have_the_rounding_of_its_corners(corner: float) -> None:
+    """The lower face of the upper block rises by 0, 0.4 and 1.0 degrees along 0.1 m."""
+    blocks = {"brick": {"depth": 0.1, "material": "oak"}}
+    cells = [
+        {"outline": [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]]},
+        {"outline": [[0.0, 0.1], [0.1, corner], [0.1, 0.2], [0.0, 0.2]]},
+    ]
+    structure = {"kind": "polygons", "block": "brick", "in_place": True, "cells": cells}
+    drawn = data_of(blocks=blocks, structures=(structure,), bodies=())
+    lower, upper = place_bodies(scenario_from_mapping(drawn))
+    joint = joint_between(lower, upper)
+    assert joint is not None
+    assert joint.normal == pytest.approx((0.0, 1.0))
+    gaps = [upper.y + of_b[1] - lower.y - of_a[1] for of_a, of_b in zip(joint.ends_of_a, joint.ends_of_b, strict=True)]
+    assert gaps == pytest.approx([0.0, corner - 0.1], abs=1e-12)
+
+
 @pytest.mark.parametrize("other", [(0.3, 1.2, 0.0), (0.0, 1.3, 20.0)])
 def test_bodies_that_face_no_other_have_no_joint(other: tuple[float, float, float]) -> None:
     assert joint_between(*bodies((0.0, 1.0, 0.0), other)) is None

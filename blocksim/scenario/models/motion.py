@@ -22,7 +22,7 @@ from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, Wit
 from blocksim.errors import BlocksimError
 from blocksim.scenario import quantities as q
 from blocksim.scenario.bounded_read import read_limited
-from blocksim.scenario.csv_table import bare_rows
+from blocksim.scenario.csv_table import DIALECT, bare_rows
 from blocksim.scenario.models.base import Table, table_path
 from blocksim.scenario.units import STANDARD_GRAVITY
 
@@ -142,6 +142,9 @@ def _columns(lines: Sequence[tuple[int, list[str]]]) -> list[str]:
     others = [name for name in names if name != TIME]
     if len(names) != 2 or len(others) != 1 or others[0] not in COLUMNS:  # noqa: PLR2004 - two columns
         found = ",".join(names)
+        if ";" in found:
+            message = f"line {number}: {q.shown(found)}: columns are separated by semicolons; {DIALECT}"
+            raise MotionTableError(message)
         message = f"line {number}: the columns are {q.shown(found)}; {TIME} and one of {', '.join(COLUMNS)} are needed"
         raise MotionTableError(message)
     return names
@@ -152,11 +155,13 @@ def _samples(lines: Sequence[tuple[int, list[str]]], first: int) -> Iterator[tup
     before = -math.inf
     for number, cells in lines:
         if len(cells) != 2:  # noqa: PLR2004 - two columns
-            message = f"line {number}: a time and a value are needed"
+            hint = f"; {DIALECT}" if len(cells) > 2 or any(";" in cell for cell in cells) else ""  # noqa: PLR2004
+            message = f"line {number}: {q.shown(','.join(cells))}: a time and a value are needed{hint}"
             raise MotionTableError(message)
         time, value = (_number(number, cells[place]) for place in (first, 1 - first))
         if time < 0.0 or time <= before:
             why = "times must not be negative" if time < 0.0 else f"times must increase, the one before is {before:g} s"
+            why = "the time of the line before is repeated" if time == before else why
             message = f"line {number}: time {time:g} s: {why}"
             raise MotionTableError(message)
         before = time
