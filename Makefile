@@ -156,10 +156,10 @@ paper: $(RUN_STAMP) ## The paper's figures, tables and equations from the shippe
 	$(VENV_PYTHON) -m blocksim.verification.paper.write $(PAPER)
 
 .PHONY: demo
-demo: $(RUN_STAMP) ## Run the three blocks with contact forces; strip, film and report in results/demo
+demo: $(RUN_STAMP) ## Run the three blocks with contact forces; strip, animation and report in results/demo
 	$(BLOCKSIM) run $(SCENARIO) --set output.contacts=true --out $(DEMO)/run --overwrite --quiet
 	$(BLOCKSIM) plot $(DEMO)/run --forces --out $(DEMO)/strip.png
-	$(BLOCKSIM) animate $(DEMO)/run --forces --speed 0.1 --fps 20 --width 640 --out $(DEMO)/film.gif --overwrite
+	$(BLOCKSIM) animate $(DEMO)/run --forces --speed 0.1 --fps 20 --width 640 --out $(DEMO)/animation.gif --overwrite
 	$(BLOCKSIM) report $(DEMO)/run --out $(DEMO)/report.html
 
 .PHONY: setup

@@ -90,6 +90,15 @@ def test_every_scenario_that_ships_is_described() -> None:
     assert not [path.name for path in (ROOT / "scenarios").glob("*.toml") if f"`{path.name}`" not in page]
 
 
+def test_the_pages_lead_to_the_reproduction_of_the_paper_and_to_the_targets_that_make_pictures() -> None:
+    for page, link in (("README.md", "results/paper/README.md"), ("results/README.md", "paper/README.md")):
+        assert f"]({link})" in TEXTS[page]
+        assert {"`make paper`", "`make demo`"} <= set(re.findall(r"`make [a-z]+`", TEXTS[page]))
+    assert "`make help`" in README
+    targets = re.findall(r"^([a-z-]+):.*## ", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    assert {"help", "demo", "paper"} <= set(targets)
+
+
 def test_every_command_is_named_on_the_first_page() -> None:
     group = typer.main.get_command(app)
     assert not [name for name in getattr(group, "commands", {}) if name not in README]

@@ -12,6 +12,7 @@ from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.placement import PlacedBody, place_bodies
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.segments import TOLERANCE, PlacedSegment, place_segments, surface_heights
+from blocksim.scenario.structures.shaped import Shaped
 
 UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 MOST_MEETINGS = 20
@@ -21,6 +22,12 @@ PLACES_ON_A_WALL = 33
 def soil_tables(scenario: Scenario) -> list[SoilTable]:
     """Return the soils of a scenario."""
     return [table for table in scenario.systems.get("soils", ()) if isinstance(table, SoilTable)]
+
+
+def has_outlines(scenario: Scenario) -> bool:
+    """Return True if a block is no rectangle, which no soil can meet."""
+    shaped = any(isinstance(structure, Shaped) for structure in scenario.structures)
+    return shaped or any(block.polygon for block in scenario.blocks.values())
 
 
 def meetings(soil: SoilTable, key: str, scenario: Scenario) -> Iterator[tuple[str, str]]:

@@ -108,19 +108,21 @@ class SoilTable(SystemTable):
 
     def impossible(self, scenario: "Scenario") -> Iterator[tuple[str, str]]:
         """Find a material that is no soil, a spacing that does not suit, and what the outline meets."""
-        from blocksim.scenario.soil_places import meetings  # noqa: PLC0415 - needs the scenario's own model
+        from blocksim.scenario.soil_places import has_outlines, meetings  # noqa: PLC0415 - needs the scenario's own model
 
         if self.material not in scenario.materials:
             hint = did_you_mean_or_list(self.material, scenario.materials)
             yield "material", f"unknown material {q.shown(self.material)}, {hint}"
         elif not scenario.materials[self.material].is_soil:
             yield "material", f"{q.shown(self.material)} is no soil; give this material a friction_angle"
+        if has_outlines(scenario):  # refused: they say nothing about spacing and place
+            return
         unfit = list(self._unfit_spacing(scenario))
         yield from unfit or meetings(self, "outline" if self.kind == "outline" else "kind", scenario)
 
     def _unfit_spacing(self, scenario: "Scenario") -> Iterator[tuple[str, str]]:
         """Find a spacing that is too large, too small, or not that of the first soil."""
-        sides = [min(block.size_x, block.size_y) for block in scenario.blocks.values()]
+        sides = [side for block in scenario.blocks.values() if (side := min(block.size_x, block.size_y)) > 0.0]
         across = polygons.count_across(self.corners, self.spacing)
         first = scenario.systems["soils"][0]
         if isinstance(first, SoilTable) and self.spacing != first.spacing:
