@@ -35,6 +35,7 @@ def test_a_new_scenario_passes_the_check(blocksim: Command, kind: str) -> None:
     ("kind", "key"),
     [
         ("wall", "missing"),
+        ("wall", "shear_velocity"),
         ("voronoi", "smallest"),
         ("retaining-wall", "cohesion"),
         ("retaining-wall", "start"),
@@ -51,16 +52,30 @@ def test_a_line_left_in_a_comment_works_too(blocksim: Command, kind: str, key: s
     assert blocksim("check", "mine.toml").code == 0
 
 
-@pytest.mark.parametrize("kind", ["wall", "pyramid"])
-def test_a_new_structure_stands_up_to_one_percent_below_the_tilt_of_its_friction(blocksim: Command, kind: str) -> None:
+# The pyramid slides at its angle of friction; the wall topples at its ends, from 25.28 degrees with stiff contacts
+# (`blocksim limit`, extrapolated from the stiffness scales 0.001, 0.01 and 0.1).
+@pytest.mark.parametrize(("kind", "limit"), [("wall", 25.28), ("pyramid", math.degrees(math.atan(0.31)))])
+def test_a_new_structure_stands_up_to_one_percent_below_its_limit_of_tilt(
+    blocksim: Command, kind: str, limit: float
+) -> None:
     blocksim("new", kind, "mine")
     document = Document.read(Path("mine.toml"))
     still = replace(document, data={key: table for key, table in document.data.items() if key != "motion"})
-    pushed = {"structures.0.shear_velocity": 0.0} if kind == "wall" else {}
-    tilt = 0.99 * math.degrees(math.atan(0.31))
-    result = simulate(still.with_values({**pushed, "ground.tilt": f"{tilt} deg", "time.end": 0.05}).build())
+    result = simulate(still.with_values({"ground.tilt": f"{0.99 * limit} deg", "time.end": 0.05}).build())
     assert result.summary.movement is not None
     assert result.summary.movement.outcome == "stands"
+
+
+def test_a_new_wall_is_of_stone_and_stands_until_its_push_is_uncommented(blocksim: Command) -> None:
+    blocksim("new", "wall", "mine")
+    assert "aluminium" not in Path("mine.toml").read_text()
+    document = Document.read(Path("mine.toml"))
+    outcomes = []
+    for push in (0.0, 6.0):
+        movement = simulate(document.with_values({"structures.0.shear_velocity": push}).build()).summary.movement
+        outcomes.append("" if movement is None else movement.outcome)
+    assert document.data["structures"][0].get("shear_velocity") is None  # type: ignore[index]
+    assert outcomes == ["stands", "fell"]
 
 
 @pytest.mark.parametrize("kind", SWEEPS)
