@@ -2,15 +2,20 @@
 
 import contextlib
 import errno
+import fcntl
 import hashlib
 import os
-import tempfile
+import re
+import secrets
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 from blocksim.errors import OutputError
 
+DIGITS = 8  # in the names of files that are being written
+PERMISSIONS = 0o666  # of new files, less what the umask takes away
 NO_SUCH_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EPERM}  # file systems that cannot do it to folders
 
 
@@ -18,15 +23,18 @@ NO_SUCH_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EPERM}  # file 
 def replacing(path: Path) -> Iterator[Path]:
     """Give a name beside a file, with its suffix, to write to; in the end the new file takes the place of the old one.
 
-    Raises OutputError when writing fails; whatever happens on the way, the old file stays and nothing else is left.
+    It has the permissions of the old one, else those that the user's umask leaves. What a writer of the same file left
+    half written when it was killed goes. Raises OutputError when writing fails; whatever happens on the way, the old
+    file stays and nothing else is left.
     """
     temporary: Path | None = None
+    handle = -1
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
-        os.close(handle)
-        temporary = Path(name)
+        _remove_leftovers(path)
+        handle, temporary = _created_beside(path)
+        mode = _take_permissions(path, handle)
         yield temporary
-        temporary.chmod(0o644)
+        temporary.chmod(mode)
         temporary.replace(path)
         sync_folder(path.parent)
     except OSError as error:
@@ -36,6 +44,57 @@ def replacing(path: Path) -> Iterator[Path]:
         if temporary is not None:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
+            os.close(handle)  # only now: with it goes the lock
+
+
+def _created_beside(path: Path) -> tuple[int, Path]:
+    """Return an empty file beside another, open and locked, so that others see that its writer lives. Raises OSError.
+
+    It is not made by `tempfile`, which takes away what the umask would leave, and default permissions of the folder.
+    """
+    while True:
+        name = path.with_name(f".{path.name}.{secrets.token_hex(DIGITS // 2)}{path.suffix}")
+        handle = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL, PERMISSIONS)
+        with contextlib.suppress(OSError):  # file systems without locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        if name.exists():
+            return handle, name
+        os.close(handle)  # taken for a leftover before it was locked
+
+
+def _take_permissions(path: Path, handle: int) -> int:
+    """Give a new file the group of the one that it replaces, and return the permissions that it is to have."""
+    old = permissions_of(path)
+    if old is None:
+        return stat.S_IMODE(os.fstat(handle).st_mode)
+    with contextlib.suppress(OSError):  # a group that one is not in
+        os.fchown(handle, -1, path.stat().st_gid)
+    os.fchmod(handle, old | stat.S_IWUSR)  # before it holds anything
+    return old
+
+
+def permissions_of(path: Path) -> int | None:
+    """Return the permissions of a file, None where there is none, or a link."""
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return None
+    return stat.S_IMODE(mode) if stat.S_ISREG(mode) else None
+
+
+def _remove_leftovers(path: Path) -> None:
+    """Remove what was half written of a file by those that do not live any more; where files have no locks, nothing."""
+    form = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]{{{DIGITS}}}{re.escape(path.suffix)}")
+    with os.scandir(path.parent) as entries:
+        leftovers = [entry.path for entry in entries if form.fullmatch(entry.name)]
+    for leftover in leftovers:
+        with contextlib.suppress(OSError):  # its writer lives, or it has gone
+            handle = os.open(leftover, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                os.unlink(leftover)  # noqa: PTH108 - a name from scandir
+            finally:
+                os.close(handle)
 
 
 def sync_folder(folder: Path) -> None:

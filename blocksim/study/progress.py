@@ -27,6 +27,7 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.scenario.bounded_read import open_regular
+from blocksim.simulation.atomic import PERMISSIONS
 from blocksim.simulation.folder import takes_lock
 from blocksim.study.rows import FINISHED, Row, as_cell, blocks_in
 
@@ -134,7 +135,7 @@ class Manifest:
         """Open the file and keep others out. Raises OutputExistsError where another process has it, and OutputError."""
         self.path = path
         try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, 0o644)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, PERMISSIONS)
         except OSError as error:
             message = f"{path}: cannot be written: {error.strerror}"
             raise OutputError(message) from error

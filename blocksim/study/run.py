@@ -1,8 +1,9 @@
 """One run, kept in a folder or in memory."""
 
+from contextlib import suppress
 from pathlib import Path
 
-from blocksim.errors import InvalidInputError
+from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario, Source, load_scenario
 from blocksim.simulation import Progress, Result, Watcher, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation import folder as files
@@ -49,6 +50,7 @@ def run(  # noqa: PLR0913 - what a user can choose for a run
     folder = Path(out)
     if not overwrite and files.holds_run(folder, scenario):
         _refuse_changed(folder)
+        _clear_after_kill(folder)
         renew_copies(scenario, folder)
         result = read_result(folder)
         listener.on_remark(f"already computed; rerun with --overwrite: {folder}")
@@ -63,6 +65,12 @@ def run(  # noqa: PLR0913 - what a user can choose for a run
         on_progress=on_progress,
         listener=listener,
     )
+
+
+def _clear_after_kill(folder: Path) -> None:
+    """Remove what a run left beside its results that was killed right after its end."""
+    with suppress(OutputExistsError, OutputError), files.folder_lock(folder):
+        files.clear_remains(folder, files.CHECKPOINTS)
 
 
 def _refuse_changed(folder: Path) -> None:

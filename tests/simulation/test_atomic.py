@@ -1,6 +1,11 @@
 """A file is whole or not there."""
 
 import errno
+import os
+import stat
+import subprocess
+import sys
+from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -8,6 +13,7 @@ import pytest
 
 from blocksim.errors import OutputError
 from blocksim.simulation import atomic
+from blocksim.study.progress import Manifest
 
 
 def test_text_is_written_in_utf8_with_plain_line_ends(tmp_path: Path) -> None:
@@ -25,6 +31,64 @@ def test_failed_write_leaves_the_old_file_and_nothing_else(tmp_path: Path, monke
     with pytest.raises(OutputError, match=r"a\.txt: cannot be written: No space left on device"):
         atomic.write_text(tmp_path / "a.txt", "new")
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "old"}
+
+
+@pytest.fixture
+def umask() -> Iterator[None]:
+    """Restore the umask."""
+    before = os.umask(0o022)
+    yield
+    os.umask(before)
+
+
+def mode_of(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+@pytest.mark.parametrize(("mask", "mode"), [(0o077, 0o600), (0o027, 0o640), (0o002, 0o664)])
+@pytest.mark.usefixtures("umask")
+def test_a_new_file_has_the_permissions_that_the_umask_leaves(tmp_path: Path, mask: int, mode: int) -> None:
+    os.umask(mask)
+    atomic.write_text(tmp_path / "a.csv", "x")
+    Manifest(tmp_path / "manifest.jsonl").close()
+    assert {mode_of(path) for path in tmp_path.iterdir()} == {mode}
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o444])
+@pytest.mark.usefixtures("umask")
+def test_a_file_keeps_its_permissions_when_it_is_replaced(tmp_path: Path, mode: int) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("old")
+    path.chmod(mode)
+    with atomic.replacing(path) as temporary:
+        assert mode_of(temporary) | 0o200 == mode | 0o200  # what may not be read is at no time there to be read
+        temporary.write_text("new")
+    assert (path.read_text(), mode_of(path)) == ("new", mode)
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from blocksim.simulation.atomic import replacing
+with replacing(Path(sys.argv[1])) as temporary:
+    temporary.write_text("half")
+    print("half", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_what_a_kill_leaves_goes_with_the_next_write_and_what_others_write_stays(tmp_path: Path) -> None:
+    path, edits = tmp_path / "a.csv", tmp_path / ".a.csv.unsaved1.csv"
+    edits.write_text("of an editor")
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", WRITER, str(path)], stdin=pipe, stdout=pipe) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == b"half\n"
+        atomic.write_text(path, "new")
+        assert len(list(tmp_path.iterdir())) == 3  # the other one is still writing
+        other.kill()
+    atomic.write_text(path, "newer")
+    assert {one.name: one.read_text() for one in tmp_path.iterdir()} == {path.name: "newer", edits.name: "of an editor"}
 
 
 def test_the_name_goes_to_the_disk_too_once_the_file_has_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

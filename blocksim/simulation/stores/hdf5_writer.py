@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import OutputError
 from blocksim.scenario import PlacedBody
-from blocksim.simulation.atomic import sync_file
+from blocksim.simulation.atomic import PERMISSIONS, permissions_of, sync_file
 from blocksim.simulation.contacts import Rows
 from blocksim.simulation.probes import NO_PROBES, Probes
 from blocksim.simulation.recorder import Frame
@@ -88,6 +88,7 @@ class FrameFile:
                 self._create(scenario_toml)
                 self.file.swmr_mode = True
                 self._begin_with(kept)
+                unnamed.chmod(permissions_of(path) or permissions_of(unnamed) or PERMISSIONS)
                 unnamed.replace(path)
             except BaseException:
                 self._abandon(unnamed)
