@@ -7,6 +7,7 @@ import contextlib
 import fcntl
 import json
 import os
+import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -33,6 +34,8 @@ from blocksim.simulation.result_files import (
 
 RESULTS = Path("results")
 MOST_BYTES = MEGABYTE  # of done.json
+PATIENCE = 30.0  # s that files of a study may take to change together; jobs of an array begin at the same time
+POLL = 0.01  # s
 
 __all__ = [
     "BODY_MOTIONS",
@@ -47,6 +50,7 @@ __all__ = [
     "SCENARIO",
     "SOILS",
     "SUMMARY",
+    "brief_lock",
     "check_folder",
     "clear_remains",
     "default_folder",
@@ -151,6 +155,29 @@ def takes_lock(handle: int) -> bool:
     except OSError:
         return True
     return True
+
+
+@contextlib.contextmanager
+def brief_lock(folder: Path) -> Iterator[None]:
+    """Keep other processes out of a folder while files in it change together; waits for them to be ready.
+
+    Raises OutputExistsError where one has the folder for long, as a run in it, or where it cannot be opened.
+    """
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        message = f"{folder}: cannot be opened: {error.strerror}"
+        raise OutputExistsError(message) from error
+    latest = time.monotonic() + PATIENCE
+    try:
+        while not takes_lock(handle):
+            if time.monotonic() > latest:
+                message = f"{folder}: another process is writing here; wait for it, or write elsewhere with --out DIR"
+                raise OutputExistsError(message)
+            time.sleep(POLL)
+        yield
+    finally:
+        os.close(handle)
 
 
 @contextlib.contextmanager

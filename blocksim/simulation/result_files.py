@@ -10,10 +10,14 @@ An empty file of one of the names, or one of zeros, as a power failure leaves th
 Copies of the files that a scenario names are kept beside its resolved form, so that the folder can move.
 """
 
+import csv
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from typing import Self
+
+from pydantic import BaseModel
 
 from blocksim.errors import BlocksimError, OutputExistsError
 from blocksim.scenario import Scenario, body_table_contents, motion_table_content, scenario_to_toml
@@ -38,6 +42,7 @@ DONE = "done.json"  # written last: a folder without it is not finished
 CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run continues, removed when it has finished
 OURS = (SCENARIO, EXPERIMENT, MOTION, *BODY_MOTIONS, FINAL, SOILS, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
 HEAD_BYTES = 4096
+LONGEST_HEADER = 100_000  # bytes
 MOST_BYTES = 10 * MEGABYTE  # of a scenario or a summary
 TABLE_BYTES = MEGABYTE  # of a table of an experiment, which is not read if larger
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -62,10 +67,62 @@ def grows_from(start: bytes) -> Kind:
     return is_kind
 
 
+def heads(form: bytes) -> Kind:
+    """Return the kind of a CSV file whose first line has this form (a regular expression)."""
+    return lambda head: re.fullmatch(form, head.split(b"\n", 1)[0].rstrip(b"\r")) is not None
+
+
 def has_header(columns: Iterable[str]) -> Kind:
     """Return the kind of a CSV file with exactly these columns."""
     line = ",".join(columns).encode()
     return lambda head: head.split(b"\n", 1)[0].rstrip(b"\r") == line
+
+
+class TableRecord(BaseModel, frozen=True):
+    """What the summary of a study says of a table that was written."""
+
+    header: str  # empty where it is longer than a summary can hold
+    sha256: str
+
+    @classmethod
+    def of(cls, path: Path) -> Self:
+        """Return that of a table, which may still have another name. Raises OSError."""
+        return cls(header=header_of(path), sha256=sha256_of(path))
+
+
+def header_of(path: Path) -> str:
+    """Return the first line of a table, nothing where it is long. Raises OSError."""
+    with path.open("rb") as file:
+        line = file.readline(LONGEST_HEADER).rstrip(b"\r\n")
+    return "" if len(line) >= LONGEST_HEADER else line.decode(errors="replace")
+
+
+def is_own(path: Path, records: Iterable[TableRecord]) -> bool:
+    """Return True for a table as it was written, by its whole header and its checksum, or one that holds nothing.
+
+    `records` are of what was written last, and before: they are noted first, and a kill may come between.
+    """
+    try:
+        head = read_head(path, HEAD_BYTES)
+    except BlocksimError:
+        return False
+    return not head.strip(b"\0") or TableRecord.of(path) in records
+
+
+def columns_added(path: Path, records: Iterable[TableRecord]) -> list[str] | None:
+    """Return the columns that a table has beyond those that were written, where these are known.
+
+    None where some of those are not there: it is another table.
+    """
+    present = _columns(header_of(path))
+    written = [columns for record in records if set(columns := _columns(record.header)) <= set(present)]
+    if not written:
+        return None
+    return [name for name in present if name not in written[-1]] if written[-1] else []
+
+
+def _columns(header: str) -> list[str]:
+    return next(csv.reader([header]), [])
 
 
 def is_frames(head: bytes) -> bool:

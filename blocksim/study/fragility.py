@@ -5,9 +5,6 @@ that is called again, after a kill too, does only what is missing. What counts a
 criterion, or fewer members, runs nothing again.
 """
 
-import csv
-import io
-import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
@@ -19,7 +16,6 @@ from blocksim.analysis.lognormal import PURPOSE, Counts, Curve, NoCurve, fit, in
 from blocksim.extras import loaded
 from blocksim.scenario import Source, document_of
 from blocksim.simulation import folder as files
-from blocksim.simulation.atomic import write_text
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.study.criterion import falls_before_zero
 from blocksim.study.executors import Execution
@@ -29,7 +25,7 @@ from blocksim.study.plan import Values
 from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Manifest, Shard, Timings
 from blocksim.study.rows import FINISHED, MOVEMENT, Row, check_experiment
 from blocksim.study.sweep import TIMINGS, SweepRun, refuse_loss
-from blocksim.study.sweep_folder import FRAGILITY, INTENSITY, prepare, read_origin
+from blocksim.study.sweep_folder import FRAGILITY, INTENSITY, prepare, write_answer
 from blocksim.study.sweep_table import SweepTable
 
 if TYPE_CHECKING:
@@ -196,7 +192,7 @@ def run_fragility(  # noqa: PLR0913 - as `fragility`
         if retry_failed:
             done.forget_failed(shard)
         before = sum(done.holds(number, settings) for number, settings in enumerate(cases.design))
-        table = SweepTable(folder / shard.file(MEMBERS_TABLE), cases, done, None, shard)
+        table = SweepTable(folder / shard.file(MEMBERS_TABLE), cases, done, None, shard, FRAGILITY)
         timings = Timings(folder / shard.file(TIMINGS), execution.name)
         SweepRun(cases, shard, kept, done, table, timings, on_row).run(run, setting, fail_fast=False)
         rows = _rows(plan, done)
@@ -274,11 +270,5 @@ def _records(result: FragilityResult) -> Iterator[list[Any]]:
 
 def _write(result: FragilityResult) -> None:
     """Write fragility.csv, and the answer into fragility.json."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([_head(result.plan), *COLUMNS])
-    writer.writerows([["" if _finite(cell) is None else cell for cell in row] for row in _records(result)])
-    write_text(result.folder / TABLE, text.getvalue())
-    origin = read_origin(result.folder, FRAGILITY)
-    begun = {} if origin is None else origin.model_dump(exclude_none=True)
-    write_text(result.folder / FRAGILITY.origin, json.dumps({**begun, **result.to_dict()}, indent=2) + "\n")
+    rows = [["" if _finite(cell) is None else cell for cell in row] for row in _records(result)]
+    write_answer(result.folder / TABLE, FRAGILITY, [[_head(result.plan), *COLUMNS], *rows], result.to_dict())

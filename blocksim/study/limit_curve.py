@@ -3,9 +3,7 @@
 Each value has a search of its own in a folder of its own, so what was stopped goes on where it was.
 """
 
-import csv
 import hashlib
-import io
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -16,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Document, Source, document_of
 from blocksim.simulation import folder as files
-from blocksim.simulation.atomic import write_text
 from blocksim.simulation.provenance import HASH_DIGITS
 from blocksim.study import criterion
 from blocksim.study.executors import Execution
@@ -26,7 +23,7 @@ from blocksim.study.limit_result import LimitResult
 from blocksim.study.limit_stiff import refuse_without_springs
 from blocksim.study.plan import Values, Variations
 from blocksim.study.rows import Head
-from blocksim.study.sweep_folder import LIMIT_CURVE, OVER, prepare, read_origin
+from blocksim.study.sweep_folder import LIMIT_CURVE, OVER, prepare, write_answer
 from blocksim.study.typed_levels import typed_levels
 
 if TYPE_CHECKING:
@@ -197,11 +194,4 @@ def _records(result: CurveResult) -> Iterator[list[Any]]:
 
 def _write(result: CurveResult) -> None:
     """Write limits.csv, and the answer into limits.json."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_heads(result.plan))
-    writer.writerows(_records(result))
-    write_text(result.folder / TABLE, text.getvalue())
-    origin = read_origin(result.folder, LIMIT_CURVE)
-    begun = {} if origin is None else origin.model_dump(exclude_none=True)
-    write_text(result.folder / LIMIT_CURVE.origin, json.dumps({**begun, **result.to_dict()}, indent=2) + "\n")
+    write_answer(result.folder / TABLE, LIMIT_CURVE, [_heads(result.plan), *_records(result)], result.to_dict())

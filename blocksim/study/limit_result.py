@@ -1,20 +1,16 @@
 """What a search for a limit has found, and its files: limit.csv with all runs, limit.json with the answer."""
 
-import csv
-import io
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from blocksim.simulation.atomic import write_text
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit_plan import SPRINGS, LimitPlan
 from blocksim.study.limit_search import Change, Number, changes_in
 from blocksim.study.limit_stiff import Levels
 from blocksim.study.rows import MOVEMENT, Row, as_cell
-from blocksim.study.sweep_folder import LIMIT, read_origin
+from blocksim.study.sweep_folder import LIMIT, write_answer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -185,14 +181,8 @@ class LimitResult:
 
 def write_result(result: LimitResult) -> None:
     """Write limit.csv, and the answer into limit.json."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([_head(result.plan), *COLUMNS])
-    writer.writerows(_records(result))
-    write_text(result.folder / TABLE, text.getvalue())
-    origin = read_origin(result.folder, LIMIT)
-    begun = {} if origin is None else origin.model_dump(exclude_none=True)
-    write_text(result.folder / LIMIT.origin, json.dumps({**begun, **result.to_dict()}, indent=2) + "\n")
+    rows = [[_head(result.plan), *COLUMNS], *_records(result)]
+    write_answer(result.folder / TABLE, LIMIT, rows, result.to_dict())
 
 
 def _head(plan: LimitPlan) -> str:

@@ -28,7 +28,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.scenario.bounded_read import open_regular
 from blocksim.simulation.atomic import PERMISSIONS
-from blocksim.simulation.folder import takes_lock
+from blocksim.simulation.folder import brief_lock, takes_lock
 from blocksim.study.rows import FINISHED, Row, as_cell, blocks_in
 
 SHARD_FORM = re.compile(r"(\d{1,6})/(\d{1,6})")
@@ -134,12 +134,14 @@ class Manifest:
     def __init__(self, path: Path, what: str = "sweep") -> None:
         """Open the file and keep others out. Raises OutputExistsError where another process has it, and OutputError."""
         self.path = path
-        try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, PERMISSIONS)
-        except OSError as error:
-            message = f"{path}: cannot be written: {error.strerror}"
-            raise OutputError(message) from error
-        if not takes_lock(self._file):
+        with brief_lock(path.parent):  # who empties the folder sees the file locked, or not at all
+            try:
+                self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, PERMISSIONS)
+            except OSError as error:
+                message = f"{path}: cannot be written: {error.strerror}"
+                raise OutputError(message) from error
+            is_free = takes_lock(self._file)
+        if not is_free:
             os.close(self._file)
             message = f"{path.parent}: this {what} is already running; wait for it, or write elsewhere with --out DIR"
             raise OutputExistsError(message)

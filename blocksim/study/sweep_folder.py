@@ -1,8 +1,12 @@
 """The folder of a sweep, or of a search: whose it is, what it came from, and that nothing in it is lost by mistake."""
 
+import csv
 import hashlib
+import io
+import json
+import logging
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -10,17 +14,21 @@ from pathlib import Path
 
 from pydantic import BaseModel, ValidationError
 
-from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError
+from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.bounded_read import MEGABYTE, read_head, read_limited
-from blocksim.simulation.atomic import write_text
-from blocksim.simulation.folder import make_folder, remove_run
+from blocksim.simulation.atomic import replacing, sync_file, write_text
+from blocksim.simulation.folder import brief_lock, make_folder, remove_run
 from blocksim.simulation.provenance import environment
 from blocksim.simulation.result_files import (
     Kind,
-    begins,
+    TableRecord,
+    columns_added,
     grows_from,
+    has_keys,
+    heads,
     is_leftover,
+    is_own,
     is_resolved,
     is_written,
     keep_scenario,
@@ -30,6 +38,8 @@ from blocksim.simulation.result_files import (
 )
 from blocksim.study.progress import is_in_use
 
+MOST_SHOWN, LONGEST_NAME = 5, 40  # columns in a message, and characters of each
+log = logging.getLogger(__name__)
 PLAN = "sweep.toml"
 CASES = "cases"
 SHARD = r"(?:-\d+-of-\d+)?"
@@ -45,6 +55,11 @@ class FolderKind:
     head: bytes  # of the plan
     results: Mapping[str, Kind]  # kinds of content by the patterns of their names
     leftover: re.Pattern[str]  # names of what is left of them when their writer was killed
+    tables: re.Pattern[str]  # names of those results whose checksums are kept; the others grow by lines
+
+    def is_table(self, name: str) -> bool:
+        """Return True for the name of a table that is written anew each time."""
+        return self.tables.fullmatch(name) is not None
 
     @property
     def origin(self) -> str:
@@ -58,6 +73,10 @@ class FolderKind:
     def is_ours(self, path: Path) -> bool:
         """Return True for a file that a study has written, or left half written when it was killed."""
         kind = self.kind_of(path.name)
+        if self.is_table(path.name) and path.is_file() and not path.is_symlink():
+            records = _records_of(path, self)
+            if records is not None:
+                return is_own(path, records)
         if kind is not None:
             return is_written(path, {path.name: kind}, self.plan)
         named = self.leftover.fullmatch(path.name)
@@ -65,27 +84,31 @@ class FolderKind:
 
 
 MANIFESTS: Mapping[str, Kind] = {rf"manifest{SHARD}\.jsonl": grows_from(b'{"number":')}
-ORIGINS = begins(b'{\n  "began_at": "')
+ORIGINS = has_keys("began_at")
+UNIT = r"(?: \[[^\[\]]*\])?"
+OF_CASES = heads(rb"case,(?:.*,)?status,reason,seconds(?:,.*)?")
 SWEEP = FolderKind(
     what="a sweep",
     command="blocksim sweep FILE",
     plan=PLAN,
     head=b"# Sweep ",
     results={  # shards have files of their own
-        rf"sweep{SHARD}\.csv": begins(b"case,"),
+        rf"sweep{SHARD}\.csv": OF_CASES,
         **MANIFESTS,
         rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
         r"sweep\.json": ORIGINS,
     },
     leftover=re.compile(r"\.(sweep[-\w]*\.csv|sweep\.json|sweep\.toml)\..*"),
+    tables=re.compile(rf"sweep{SHARD}\.csv"),
 )
 LIMIT = FolderKind(
     what="a limit",
     command="blocksim limit FILE",
     plan="limit.toml",
     head=b"# Limit ",
-    results={r"limit\.csv": begins(b"value"), r"limit\.json": ORIGINS, **MANIFESTS},
+    results={r"limit\.csv": heads(rf"value{UNIT},verdict,.*".encode()), r"limit\.json": ORIGINS, **MANIFESTS},
     leftover=re.compile(r"\.(limit\.csv|limit\.json|limit\.toml)\..*"),
+    tables=re.compile(r"limit\.csv"),
 )
 OVER = "over"
 LIMIT_CURVE = FolderKind(
@@ -93,8 +116,9 @@ LIMIT_CURVE = FolderKind(
     command="blocksim limit FILE",
     plan="limits.toml",
     head=b"# Limits ",
-    results={r"limits\.csv": begins(OVER.encode()), r"limits\.json": ORIGINS},
+    results={r"limits\.csv": heads(rf"{OVER}{UNIT},low.*,high.*".encode()), r"limits\.json": ORIGINS},
     leftover=re.compile(r"\.(limits\.csv|limits\.json|limits\.toml)\..*"),
+    tables=re.compile(r"limits\.csv"),
 )
 INTENSITY = "intensity"
 FRAGILITY = FolderKind(
@@ -103,13 +127,14 @@ FRAGILITY = FolderKind(
     plan="fragility.toml",
     head=b"# Fragility ",
     results={
-        rf"members{SHARD}\.csv": begins(b"case,"),
-        r"fragility\.csv": begins(INTENSITY.encode()),
+        rf"members{SHARD}\.csv": OF_CASES,
+        r"fragility\.csv": heads(rf"{INTENSITY}{UNIT},members,failures,.*".encode()),
         r"fragility\.json": ORIGINS,
         rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
         **MANIFESTS,
     },
     leftover=re.compile(r"\.(members[-\w]*\.csv|fragility\.csv|fragility\.json|fragility\.toml)\..*"),
+    tables=re.compile(rf"members{SHARD}\.csv|fragility\.csv"),
 )
 
 
@@ -121,20 +146,22 @@ class Origin(BaseModel, frozen=True):
     seed: int | None = None
     environment: dict[str, str]
     sha256: dict[str, str] = {}  # of the copies of tables, as they were written
+    tables: dict[str, tuple[TableRecord, ...]] | None = None  # last two of each result; None in older versions
 
 
 def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: FolderKind = SWEEP) -> None:
     """Make the folder and write the plan into it. Raises OutputExistsError when something else is there."""
     head = f"{kind.head.decode()}{name}. To run it again: {kind.command}\n"
     tables = read_tables(base)
-    try:
-        make_folder(folder)
-        _make_free(folder, head.encode(), tables, kind, overwrite=overwrite)
-    except OSError as error:
-        message = f"{folder}: cannot be created: {error.strerror}"
-        raise OutputExistsError(message) from error
-    keep_scenario(base, tables, folder, kind.plan, head)
-    _keep_origin(folder, base, tables, kind)
+    make_folder(folder)
+    with brief_lock(folder):
+        try:
+            _make_free(folder, head.encode(), tables, kind, overwrite=overwrite)
+        except OSError as error:
+            message = f"{folder}: cannot be created: {error.strerror}"
+            raise OutputExistsError(message) from error
+        keep_scenario(base, tables, folder, kind.plan, head)
+        _keep_origin(folder, base, tables, kind)
 
 
 def _keep_origin(folder: Path, base: Scenario, tables: Mapping[str, bytes], kind: FolderKind) -> None:
@@ -154,6 +181,7 @@ def _origin_of(base: Scenario) -> Origin:
         mode=None if plan is None else plan.mode,
         seed=seed,
         environment=environment(),
+        tables={},
     )
 
 
@@ -182,28 +210,101 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
         which = kind.what.replace("a ", "another ", 1)
         message = f"{folder}: contains {which}; --overwrite replaces it, --out DIR writes elsewhere"
         raise OutputExistsError(message)
-    _refuse_foreign(present, kind)
-    refuse_foreign_copies(tables, folder, kind.plan)
     if overwrite:
-        _empty(folder, kind)
+        _refuse_use(present, kind)
+    refuse_foreign_copies(tables, folder, kind.plan)
+    changed = _refuse_foreign(present, kind, overwrite=overwrite)
+    if overwrite:
+        _empty(folder, kind, changed)
 
 
-def _refuse_foreign(present: Sequence[Path], kind: FolderKind) -> None:
-    """Raise OutputExistsError where a file of somebody else has the name of a result."""
-    foreign = next((path for path in present if kind.kind_of(path.name) and not kind.is_ours(path)), None)
-    if foreign is not None:
-        whose = kind.what.replace("a ", "the ", 1)
-        message = f"{foreign}: changed since {whose} wrote it; move it away, or write elsewhere with --out DIR"
-        raise OutputExistsError(message)
+def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: bool = False) -> list[Path]:
+    """Raise OutputExistsError where a file of somebody else has the name of a result, or somebody has changed one.
+
+    With `overwrite` a table may be replaced to which a person has added something; returns those, and tells what goes.
+    """
+    whose = kind.what.replace("a ", "the ", 1)
+    changed = [path for path in present if kind.kind_of(path.name) and not kind.is_ours(path)]
+    told = []
+    for path in changed:
+        added = _columns_added(path, kind)
+        which = f" (columns added: {_shown(added)})" if added else ""
+        text = f"{path}: changed since {whose} wrote it{which}; "
+        if not overwrite or added is None:
+            again = "" if added is None else "--overwrite replaces it, or "
+            message = f"{text}{again}move it away, or write elsewhere with --out DIR"
+            raise OutputExistsError(message)
+        told.append(f"{text}it is replaced")
+    for text in told:
+        log.warning("%s", text)
+    return changed
 
 
-def _empty(folder: Path, kind: FolderKind) -> None:
-    """Remove the results of a study, unless somebody is writing them; whatever else lies there stays."""
+def _shown(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MOST_SHOWN} more" if len(names) > MOST_SHOWN else ""
+    return ", ".join(repr(name[:LONGEST_NAME]) for name in names[:MOST_SHOWN]) + more
+
+
+def _columns_added(path: Path, kind: FolderKind) -> list[str] | None:
+    """Return the columns that somebody has added to a table; None for what is no table of the study any more."""
+    if not kind.is_table(path.name) or path.is_symlink() or not path.is_file():
+        return None
+    return columns_added(path, _records_of(path, kind) or ())
+
+
+def _records_of(path: Path, kind: FolderKind) -> tuple[TableRecord, ...] | None:
+    """Return what the summary beside a table says of it; None where the study is older than such records."""
+    try:
+        origin = read_origin(path.parent, kind)
+    except BlocksimError:
+        return None
+    return None if origin is None or origin.tables is None else origin.tables.get(path.name, ())
+
+
+def note_table(path: Path, written: Path, kind: FolderKind) -> None:
+    """Note in the summary of a study what a table is about to hold, `written` beside it, and what it holds until then.
+
+    Shards have one summary in common, so nobody else writes it meanwhile. Raises OutputError, and OutputExistsError
+    where somebody has changed the table since it was written.
+    """
+    with brief_lock(path.parent):
+        origin = read_origin(path.parent, kind)
+        if origin is None:
+            return
+        is_there = path.exists() or path.is_symlink()
+        _refuse_foreign([path] if is_there else [], kind)
+        holds = tuple(TableRecord.of(one) for one in ([path, written] if is_there else [written]))
+        noted = origin.model_copy(update={"tables": {**(origin.tables or {}), path.name: holds}})
+        kept = json.loads(read_limited(path.parent / kind.origin, MEGABYTE))
+        data = {**kept, "tables": noted.model_dump(mode="json")["tables"]}
+        write_text(path.parent / kind.origin, json.dumps(data, indent=2) + "\n")
+
+
+def write_answer(path: Path, kind: FolderKind, rows: Iterable[Sequence[object]], answer: Mapping[str, object]) -> None:
+    """Write the table of a study (heads first), and its answer into the summary. Raises OutputError."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    with replacing(path) as temporary:
+        temporary.write_bytes(text.getvalue().encode())
+        sync_file(temporary)
+        note_table(path, temporary, kind)
+    origin = read_origin(path.parent, kind)
+    begun = {} if origin is None else origin.model_dump(mode="json", exclude_none=True)
+    write_text(path.parent / kind.origin, json.dumps({**begun, **answer}, indent=2) + "\n")
+
+
+def _refuse_use(present: Sequence[Path], kind: FolderKind) -> None:
+    """Raise OutputExistsError where somebody is writing the results of a study."""
+    for path in present:
+        if path.suffix == ".jsonl" and kind.is_ours(path) and is_in_use(path):
+            message = f"{path.parent}: {kind.what} is running here; wait for it, or write elsewhere with --out DIR"
+            raise OutputExistsError(message)
+
+
+def _empty(folder: Path, kind: FolderKind, changed: Sequence[Path]) -> None:
+    """Remove the results of a study, and those which somebody has changed; whatever else lies there stays."""
     results = [path for path in folder.iterdir() if path.name != kind.plan and kind.is_ours(path)]
-    if any(is_in_use(path) for path in results if path.suffix == ".jsonl"):
-        message = f"{folder}: {kind.what} is running here; wait for it, or write elsewhere with --out DIR"
-        raise OutputExistsError(message)
-    for path in results:
+    for path in {*results, *changed}:
         path.unlink()
     cases = folder / CASES
     if cases.is_dir() and not cases.is_symlink():

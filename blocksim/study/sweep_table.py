@@ -4,19 +4,20 @@ import csv
 import io
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.errors import InvalidInputError
+from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.scenario.bounded_read import MEGABYTE, read_limited, refuse_large
-from blocksim.simulation.atomic import writing
+from blocksim.simulation.atomic import replacing, sync_file
 from blocksim.study.plan import Cases
 from blocksim.study.progress import WHOLE, CaseIndex, Shard
 from blocksim.study.rows import FINISHED, KEPT, MOVEMENT, TABLE, Ranges, as_cell, varied_cells
+from blocksim.study.sweep_folder import SWEEP, FolderKind, note_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,22 +42,26 @@ class SweepTable:
     done: CaseIndex
     ranges: Ranges | None
     shard: Shard = WHOLE
+    kind: FolderKind = SWEEP
     next_at: float = field(default_factory=lambda: time.monotonic() + SOONEST)
 
     def write_now_and_then(self) -> None:
         """Write the table unless it was written a short while ago; the more rows, the longer the while."""
         if time.monotonic() >= self.next_at:
-            self.write()
+            with suppress(OutputExistsError):  # somebody has changed it: the sweep goes on, and says so at its end
+                self.write()
 
     def write(self) -> None:
-        """Write all rows so far, one after the other: none is kept. Raises OutputError."""
+        """Write all rows so far, one after the other: none is kept. Raises as `note_table`."""
         began = time.monotonic()
-        with writing(self.path) as file:
-            text = io.TextIOWrapper(file, encoding="utf-8", newline="")
-            writer = csv.writer(text, lineterminator="\n")
-            writer.writerow(self._columns())
-            writer.writerows(self._rows())
-            text.detach()
+        self.next_at = began + SOONEST
+        with replacing(self.path) as temporary:
+            with temporary.open("w", encoding="utf-8", newline="") as file:
+                writer = csv.writer(file, lineterminator="\n")
+                writer.writerow(self._columns())
+                writer.writerows(self._rows())
+            sync_file(temporary)
+            note_table(self.path, temporary, self.kind)
         ended = time.monotonic()
         self.next_at = ended + max(SOONEST, (ended - began) / SHARE)
 

@@ -99,6 +99,31 @@ def test_same_sweep_twice_at_a_time_is_refused(process: Process, tmp_path: Path)
     first.communicate()
 
 
+SLOWLY = """
+import time
+from blocksim.study import sweep_folder
+look = sweep_folder.is_resolved
+sweep_folder.is_resolved = lambda plan: time.sleep(2.0) or look(plan)  # until the others are there too
+"""
+
+
+@pytest.mark.long
+def test_of_three_sweeps_that_begin_in_a_folder_at_once_two_are_refused(process: Process) -> None:
+    sweep = ("sweep", "scenarios/three_blocks_nonsmooth.toml", "--out", "out", "--overwrite")
+    finish(process(*sweep, "--vary", "time.end=1e-3,2e-3"))
+    endless = ("--vary", "time.end=1e4,2e4", "--set", "time.stop_at_rest=false", "--jobs", 1)
+    three = [process(*sweep, *endless, before=SLOWLY) for _ in range(3)]
+    began = time.monotonic()
+    while sum(one.poll() is None for one in three) > 1:
+        assert time.monotonic() - began < PATIENCE
+        time.sleep(0.05)
+    for one in three:
+        one.kill()
+    told = [(one.communicate()[1], one.returncode) for one in three]
+    assert sorted(code for _, code in told) == [-signal.SIGKILL, 73, 73], told
+    assert all("is running here" in err or "is already running" in err for err, code in told if code == 73)
+
+
 @pytest.mark.long
 def test_shards_at_a_time_share_a_folder(start: Sweep, process: Process, tmp_path: Path) -> None:
     finish(start("whole", 20))
