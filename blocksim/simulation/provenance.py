@@ -10,7 +10,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim import __version__
 from blocksim.scenario import Scenario, scenario_hash
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ CPU_INFO = Path("/proc/cpuinfo")
 
 def code_version() -> str:
     """Return the version of the code that runs: that of an editable installation may be an older one."""
-    return __version__
+    return str(sys.modules["blocksim"].__version__)  # the package is no room to import from
 
 
 @functools.cache
