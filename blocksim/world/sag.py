@@ -160,15 +160,6 @@ def _inverse_mass_at(body: PlacedBody, x: float) -> float:
     return 0.0 if body.fixed else 1.0 / body.mass + (x - body.x) ** 2 / body.inertia
 
 
-def arch_shortening(voussoir: PlacedBody, count: int, thickness: float, gravity: float) -> float:
-    """Return w^2 times the overlap (m) of all joints of an arch of a thickness (m), if each gives way as the lowest do.
-
-    The springings carry half the weight each, N = n m g / 2, as far from the middle of the joint as its end:
-    s = N A / w^2 with A = 2 (1/m + (t/2)^2 / I). So an arch of n voussoirs is shorter by n^2 g (1 + m t^2 / 4 I) / w^2.
-    """
-    return count**2 * gravity * (1.0 + 0.25 * voussoir.mass * thickness**2 / voussoir.inertia)
-
-
 def overlap_warning(overlap: float, crushed: float, smallest: float) -> str:
     """Return a warning of overlaps at rest, given the smallest side; nothing where they are small.
 
