@@ -6,6 +6,10 @@ side in it. That speed is a bound, a fall of the highest corner to the lowest gr
 time; walls do not fall that fast. A manual step is therefore refused only where blocks go farther from the
 start, or in one substep at that bound.
 
+Contacts give way at rest as if they were springs, in proportion to the step squared. The step of few blocks is so short
+that this leaves their strength as it is: see thrust.py for arches and leaning columns, sag.py for heavy blocks on
+light ones.
+
 A block that meets something in a substep h stays there until it ends, and has not yet moved with its new velocity: it
 is behind by what the impact adds to velocity and spin times h/2 on average, and gravity changes its speed by g h
 meanwhile. Every impact passes that on to the next. Against speeds of free falls over sides L, sqrt(g L), that is h /

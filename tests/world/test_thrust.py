@@ -1,0 +1,162 @@
+"""The thrust of blocks at rest chooses the step of rigid contacts, however the blocks were declared."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from blocksim.scenario import load_scenario, place_bodies
+from blocksim.simulation.schemes import build
+from blocksim.simulation.settling import SettleError, settle
+from blocksim.simulation.team import ALONE
+from blocksim.world.bodies import outline_of
+from blocksim.world.nonsmooth import build_nonsmooth
+from blocksim.world.rigid_step import USUAL_STEP
+from blocksim.world.thrust import thrust_shift
+from tests.verification.test_arch_joints import RADIUS, limit_analysis
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from blocksim.scenario import PlacedBody, Scenario
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+RING = {
+    "kind": "arch",
+    "block": "voussoir",
+    "radius": "0.05 m",
+    "thickness": "7.5 mm",
+    "embrace": "162 deg",
+    "count": 16,
+}
+
+
+def ring_of(*structures: Mapping[str, object], **values: object) -> Scenario:
+    """Return a ring of 16 voussoirs on fixed abutments, at the step that it takes by itself."""
+    time = {"time.step": "auto", "time.end": 1.0, "friction": {"block_block": 1.0, "block_ground": 1.0}}
+    overrides = {**time, "structures": list(structures), **values}
+    return load_scenario(SCENARIOS / "tilting_arch.toml", overrides, allow_outside=True)
+
+
+def as_cells(**values: object) -> Scenario:
+    """Return the same ring drawn block by block."""
+    return ring_of({"kind": "polygons", "block": "voussoir", "cells": drawn_ring()}, **values)
+
+
+def drawn_ring() -> list[dict[str, Any]]:
+    return [{"outline": corners_of(body), "fixed": body.fixed} for body in place_bodies(ring_of(RING))]
+
+
+def corners_of(body: PlacedBody) -> list[list[float]]:
+    """Return the corners (m) of a block that is not turned."""
+    assert body.angle == 0.0
+    return [[body.x + x, body.y + y] for x, y in body.corners]
+
+
+def as_outlines() -> Scenario:
+    """Return the same ring as bodies, each of its own block."""
+    placed = place_bodies(ring_of(RING))
+    blocks = {
+        f"b{number}": {"outline": [list(corner) for corner in body.corners], "depth": 1.0, "material": "stone"}
+        for number, body in enumerate(placed)
+    }
+    bodies: Any = [
+        {"block": f"b{number}", "x": body.x, "y": body.y, "fixed": body.fixed} for number, body in enumerate(placed)
+    ]
+    return ring_of(blocks=blocks, bodies=bodies)
+
+
+def drawing_of(cells: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return GeoJSON."""
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"fixed": cell["fixed"]},
+            "geometry": {"type": "Polygon", "coordinates": [[*cell["outline"], cell["outline"][0]]]},
+        }
+        for cell in cells
+    ]
+    return {"type": "FeatureCollection", "features": features}
+
+
+def test_one_ring_takes_one_step_however_it_is_declared(tmp_path: Path) -> None:
+    drawing = tmp_path / "ring.geojson"
+    drawing.write_text(json.dumps(drawing_of(drawn_ring())))
+    drawn = ring_of({"kind": "polygons", "block": "voussoir", "table": str(drawing)})
+    steps = [own_step(one) for one in (ring_of(RING), as_cells(), as_outlines(), drawn)]
+    assert steps == pytest.approx([steps[0]] * 4)
+    assert steps[0] < 0.1 * USUAL_STEP
+
+
+def test_ring_of_outlines_falls_at_the_tilt_of_limit_analysis() -> None:
+    pull, _ = limit_analysis(16, 0.15 * RADIUS, math.radians(162.0), 1.0, pulls=True)
+
+    def comes_to_rest(share: float) -> bool:
+        return is_settled(as_cells(**{"ground.tilt": f"{math.atan(share * pull)} rad", "start.settle": True}))
+
+    assert comes_to_rest(0.998)
+    assert not comes_to_rest(1.002)
+
+
+def column(count: int, **values: object) -> Scenario:
+    """Return a column of blocks of 32 x 25 mm."""
+    return load_scenario(
+        SCENARIOS / "tower.toml",
+        {
+            "time": {"scheme": "nonsmooth", "end": 3.0},
+            "structures.0.count": count,
+            "friction": {"block_block": 0.5, "block_ground": 0.5},
+            "contact.restitution": 0.0,
+            **values,
+        },
+    )
+
+
+def test_tilted_column_stands_until_its_weight_leaves_the_base() -> None:
+    """At the step of the upright one it would fall at 14 % less."""
+    tilt = math.atan(0.998 * 32.0 / (16.0 * 25.0))
+    assert is_settled(column(16, **{"ground.tilt": f"{tilt} rad", "start.settle": True}))
+
+
+def test_columns_and_walls_that_stand_upright_keep_their_step() -> None:
+    assert thrust_shift(outline_of(column(16))) == 0.0
+    assert own_step(load_scenario(SCENARIOS / "tilting_wall.toml")) == USUAL_STEP
+    leaning = {"ground.tilt": "3 deg"}
+    assert own_step(column(16, **leaning)) < 0.2 * own_step(column(16))
+    few = {"structures.0.offset": "3.5 mm"}
+    assert own_step(column(3, **few, **leaning)) == own_step(column(3, **few)) == 0.25 * USUAL_STEP
+
+
+def test_constant_loads_lean_a_column_as_a_tilt_does() -> None:
+    push = {"kind": "horizontal", "magnitude": math.tan(math.radians(3.0))}
+    tilted, pushed = (own_step(column(16, **value)) for value in ({"ground.tilt": "3 deg"}, {"loads": [push]}))
+    assert pushed == pytest.approx(tilted, rel=0.1)
+    assert pushed < 0.2 * own_step(column(16))
+
+
+def test_what_nothing_carries_is_left_out_of_the_thrust_and_what_turns_freely_is_no_structure() -> None:
+    stone = {"block": "voussoir", "outline": [[0.0, 0.2], [0.02, 0.2], [0.0, 0.22]]}
+    cells = {"kind": "polygons", "block": "voussoir", "cells": [*drawn_ring(), stone], "in_place": True}
+    with_stone = thrust_shift(outline_of(ring_of(cells)))
+    assert with_stone == pytest.approx(thrust_shift(outline_of(as_cells())))
+    on_its_corner = [[0.0, 0.0], [0.1, 0.15], [0.0, 0.3], [-0.1, 0.15]]
+    alone = {"kind": "polygons", "block": "voussoir", "cells": [{"outline": on_its_corner}]}
+    assert thrust_shift(outline_of(ring_of(alone))) == 0.0
+
+
+def own_step(scenario: Scenario) -> float:
+    return float(build_nonsmooth(scenario).world.controls[0].step)
+
+
+def is_settled(scenario: Scenario) -> bool:
+    """Return whether a scene comes to rest before time zero."""
+    built = build(scenario)
+    try:
+        settle(built.scene, scenario, built.placed, ALONE)
+    except SettleError:
+        return False
+    return True
