@@ -127,6 +127,73 @@ def test_rectangles_given_as_outlines_have_the_same_motion(angle: float) -> None
     assert states[1] == pytest.approx(states[0], rel=1e-9, abs=1e-12)
 
 
+SIDES = (0.032, 0.025)  # m
+
+
+def rectangle(width: float, height: float) -> Outline:
+    x, y = 0.5 * width, 0.5 * height
+    return [[-x, -y], [x, -y], [x, y], [-x, y]]
+
+
+def bouncing(shape: dict[str, object], law: str, nudge: float = 0.0) -> Simulation:
+    """Return two blocks, one that falls flat on both, and one that tumbles on the ground; `nudge` (m) shifts these."""
+    height = SIDES[1]
+    poses: list[dict[str, object]] = [
+        {"x": -0.02, "y": 0.5 * height},
+        {"x": 0.02, "y": 0.5 * height},
+        {"x": 0.003 + nudge, "y": 1.5 * height + 0.01},
+        {"x": 0.09 + nudge, "y": 0.03, "angle": 0.4, "velocity": [0.1, -0.3], "spin": 3.0},
+    ]
+    contact = {"law": law, "stiffness_scale": 1e-2 if law == "linear" else 1.0}
+    return Scene([{**pose, **shape} for pose in poses], restitution=0.6, friction=0.3, contact=contact).start()
+
+
+@pytest.mark.parametrize("law", LAW_CODES)
+def test_rectangles_given_as_outlines_bounce_and_tumble_as_rectangles_do(law: str) -> None:
+    """To no more than what a shift by 1e-16 m grows to, or 1e-9 of a width: impacts multiply round-off."""
+    plain: dict[str, object] = {"width": SIDES[0], "height": SIDES[1]}
+    runs = bouncing(plain, law), bouncing(plain, law, 1e-16), bouncing({"outline": rectangle(*SIDES)}, law)
+    speeds, growth = [], 0.0
+    for time in np.linspace(0.001, 0.16, 160).tolist():
+        state, shifted, outlined = (run.to_time(time).state() for run in runs)
+        speeds.append(state[2:, 4])
+        growth = max(growth, float(np.abs(shifted - state)[:, :3].max()))
+        assert np.abs(outlined - state)[:, :3].max() < 1e-9 * SIDES[0]
+    impacts = (np.diff(speeds, axis=0) > 0.02).sum(axis=0)
+    assert impacts.min() >= 3
+    assert impacts.sum() >= 10
+    assert growth < 1e-9 * SIDES[0]  # else the scene says nothing
+
+
+# sides of two (m), place beside and tilt of the upper one, stiffness scale: the overlap is as deep as it is long
+AT_ENDS = [
+    ((0.0224, 0.0151), (0.0367, 0.0138), -0.02947, -0.00153, 0.1),
+    ((0.0382, 0.0245), (0.0145, 0.0117), 0.02618, 0.0, 0.01),
+]
+
+
+@pytest.mark.parametrize(("below", "above", "x", "angle", "scale"), AT_ENDS)
+def test_rectangles_given_as_outlines_keep_their_energy_near_the_ends_of_faces(
+    below: tuple[float, float], above: tuple[float, float], x: float, angle: float, scale: float
+) -> None:
+    low = min(sin(angle) * u + cos(angle) * v for u, v in rectangle(*above))
+    bodies: list[dict[str, object]] = [
+        {"y": 1.0, "outline": rectangle(*below)},
+        {
+            "x": x,
+            "y": 1.0 + 0.5 * below[1] - low + ABOVE,
+            "angle": angle,
+            "velocity": [0.0, -1.0],
+            "outline": rectangle(*above),
+        },
+    ]
+    run = Scene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact={"stiffness_scale": scale}).start()
+    before = run.kinetic
+    run.to_step(1200)
+    assert run.bodies[1].spin != 0.0
+    assert run.mechanical == pytest.approx(before, rel=1e-3)
+
+
 def test_only_corners_near_the_other_body_are_candidates() -> None:
     bodies = [
         {"y": 0.1, "outline": regular(3), "angle": 0.5 * pi},
