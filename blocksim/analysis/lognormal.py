@@ -35,6 +35,7 @@ CLOSE = 1e-10  # of a step, where it ends
 RAYS = 360  # an interval is short by at most (pi/360)^2/2 = 4e-5 of itself
 FEWEST = 2  # intensities for two parameters
 HALF = 0.5
+LARGEST = 700.0  # of the logarithm of a median: beyond are no numbers
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ def fit(counts: Counts, confidence: float = CONFIDENCE, inflation: float | None 
     middle = float(t.mean())
     centred = _Probit(counts, t - middle)
     best = centred.maximum()
-    if best[1] <= 0.0:
+    if best[1] <= 0.0 or abs(middle - best[0] / best[1]) > LARGEST:
         return NoCurve("failures do not become more frequent with the intensity")
     drop = HALF * float(_special().chdtri(1.0, 1.0 - confidence)) * (inflation or 1.0)
     a, b = centred.boundary(best, drop)
@@ -178,7 +179,8 @@ def _beyond(counts: Counts, confidence: float, *, failing: bool) -> float:
 def _medians(a: Floats, b: Floats, middle: float) -> tuple[float, float]:
     """Return the range of the median over the part b > 0 of a region with this boundary, a closed polygon."""
     inside = b > 0.0
-    ends = np.exp(middle - a[inside] / b[inside])
+    with np.errstate(over="ignore"):  # beyond all numbers: not bounded
+        ends = np.exp(middle - a[inside] / b[inside])
     low, high = float(ends.min()), float(ends.max())
     ring = [*zip(a, b, strict=True), (a[0], b[0])]
     crossings = [p + (r - p) * q / (q - s) for (p, q), (r, s) in pairwise(ring) if (q > 0.0) != (s > 0.0)]

@@ -19,16 +19,17 @@ from blocksim.errors import ExitCode
 from blocksim.scenario import Document
 from blocksim.scenario.plausible import implausible_values
 from blocksim.simulation.compilation import kernels_of
+from blocksim.simulation.movement import Manner
 from blocksim.study.criterion import DEFAULT, Verdict
 from blocksim.study.executors import Execution
 from blocksim.study.limit import OnRun, find_limit
 from blocksim.study.limit_curve import OPTION as OVER
 from blocksim.study.limit_curve import read_curve
-from blocksim.study.limit_plan import NAMES, OPTION, SPRINGS, TOLERANCE, LimitPlan, read_limit, variants
+from blocksim.study.limit_plan import NAMES, OPTION, SCANNED, SPRINGS, TOLERANCE, LimitPlan, read_limit, variants
 from blocksim.study.limit_result import LimitResult
 from blocksim.study.limit_search import Change, Number
 from blocksim.study.limit_stiff import refuse_without_springs
-from blocksim.study.rows import MOVEMENT, Row
+from blocksim.study.rows import MOVEMENT, PEAK, Row
 
 SHARE = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(%?)")
 PERCENT = 100.0
@@ -60,8 +61,8 @@ def limit_command(
         typer.Option(
             OPTION,
             metavar="KEY=FROM:TO",
-            help="The key and its range. KEY=FROM:TO:COUNT scans COUNT values first (default: 9); :log at the end "
-            "spaces them logarithmically.",
+            help="The key and its range. KEY=FROM:TO:COUNT scans COUNT values first (default: those of --scan); :log "
+            "at the end spaces them logarithmically.",
         ),
     ],
     stands: Annotated[
@@ -78,6 +79,15 @@ def limit_command(
             metavar="SHARE", parser=_share, help="Relative width of the bracket at which to stop, such as 0.1%."
         ),
     ] = TOLERANCE,
+    scan: Annotated[
+        int,
+        typer.Option(
+            "--scan",
+            metavar="N",
+            help="How many values are scanned first. An island between two of them, in which other things happen, is "
+            "not seen.",
+        ),
+    ] = SCANNED,
     over: Annotated[
         str | None,
         typer.Option(
@@ -130,7 +140,7 @@ def limit_command(
             raise typer.BadParameter(
                 "a curve of limits is searched with one law; leave --both-laws out", param_hint=OVER
             )
-        curve = read_curve(document, given, read_variations([over], OVER), stands=stands, tolerance=to)
+        curve = read_curve(document, given, read_variations([over], OVER), stands=stands, tolerance=to, scan=scan)
         _warn(curve.one, silent=silent)
         show_curve(
             curve,
@@ -142,7 +152,7 @@ def limit_command(
             quiet=quiet,
         )
     plans = {
-        name: read_limit(one, given, stands=stands, tolerance=to)
+        name: read_limit(one, given, stands=stands, tolerance=to, scan=scan)
         for name, one in variants(document, both_laws=both_laws).items()
     }
     if stiffer:
@@ -191,6 +201,10 @@ def _show(found: Mapping[str, LimitResult], *, as_given: bool, as_json: bool, qu
     if any(Verdict.UNDECIDED in one.verdicts.values() for one in found.values()):
         note("undecided: blocks were still moving at the end; increase time.end to decide")
     warn_of_give(found.values(), as_given=as_given)
+    plan = next(iter(found.values())).plan
+    if not plan.span.is_whole and (plan.has_islands or not all(one.changes for one in found.values())):
+        spacing = f"a {plan.span.count - 1}th of the range" if plan.span.is_log else plan.shown(plan.span.spacing)
+        note(f"islands narrower than {spacing}, between values of the scan, are not seen: --scan N for more values")
     for one in found.values():
         note(f"{one.runs} runs, {one.run} of them now: {one.folder / 'limit.csv'}")
         if one.pictured:
@@ -237,12 +251,18 @@ def _cells(value: Number, verdict: Verdict, row: Row) -> list[str]:
     return [
         f"{value:.8g}",
         verdict.value,
-        str(row[OUTCOME]),
+        _outcome(row),
         first,
         "" if moved is None else number(float(str(moved)), 3),
         number(float(str(row[DISPLACEMENT]))),
         number(float(str(row[TURN]))),
     ]
+
+
+def _outcome(row: Row) -> str:
+    """Return the outcome, with the amplitude of what still rocks."""
+    is_known = row[OUTCOME] == Manner.ROCKING.value and PEAK in row
+    return f"{row[OUTCOME]} ±{float(str(row[PEAK])):.2g}°" if is_known else str(row[OUTCOME])
 
 
 def _told(found: LimitResult, change: Change[Verdict]) -> list[str]:

@@ -151,7 +151,8 @@ class Ensemble:
         reach, thresholds = self.moves.shapes.reach, self.moves.thresholds
         # compiled code sees no motion relative to a support that moves
         periods = np.where([support.moves for support in self.supports], 0.0, self.periods)
-        self.watched = Watched(periods, steps, places, start, reach, thresholds)
+        peaks = np.zeros(len(ends))
+        self.watched = Watched(self.periods, periods, steps, places, start, reach, thresholds, peaks)
 
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
@@ -246,15 +247,23 @@ class Ensemble:
         """Return where the members ended, in order."""
         self._see_ends()
         closing = Closing(self.scenes, self.placed, self._measured(np.arange(len(self.codes))))
+        peaks = self._peaks()
         return [
             self._from_rest(
                 m,
                 self._run_alone(m, self._start(m))
                 if code == PAIRS_FULL
-                else closing.end(m, self._start(m), code, self.moves.found[m]),
+                else replace(closing.end(m, self._start(m), code, self.moves.found[m]), peak_deg=float(peaks[m])),
             )
             for m, code in enumerate(self.codes.tolist())
         ]
+
+    def _peaks(self) -> NDArray[np.float64]:
+        """Return the largest rotation (degrees) of each member, in frames and at the end."""
+        turns = np.abs(self._positions(self.scenes, slice(None))[:, 2] - self.moves.start[:, 2])
+        at_end = np.where(self.moves.shapes.is_free, turns, 0.0).max(axis=1, initial=0.0)
+        peaks: NDArray[np.float64] = np.degrees(np.fmax(self.watched.peaks, at_end))
+        return peaks
 
     def _from_rest(self, m: int, end: Ended) -> Ended:
         """Return the end of a member with the places in which it settled, where it did."""

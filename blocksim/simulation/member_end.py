@@ -41,6 +41,7 @@ class MemberEnd:
     rows: Rows = field(repr=False)  # one: the last
     first_move: FirstMove | None = None
     end_speed: EndSpeed | None = None
+    peak_deg: float | None = None  # largest rotation on the way; None where it was not followed
     start: NDArray[np.float64] | None = field(default=None, repr=False)  # (3, b) x, y, angle (m, rad) where it settled
 
     @cached_property

@@ -6,7 +6,8 @@ shortest side. A scene
 
     stands       where no block has moved at the end,
     rocked back  where none has at the end, but some had in a frame on the way,
-    slid         where some block has moved and none has fallen,
+    rocking      where some block has moved, none has fallen, and some block turns on at the end,
+    slid         where some block has moved, none has fallen, and none turns on,
     fell         where some block has fallen.
 
 All of this is relative to the support: what rides on a shaking table has not moved. Fixed and driven blocks do not
@@ -43,6 +44,7 @@ class Manner(StrEnum):
 
     STANDS = "stands"
     ROCKED = "rocked back"
+    ROCKING = "rocking"
     SLID = "slid"
     FELL = "fell"
 
@@ -55,11 +57,12 @@ class FirstMove(NamedTuple):
 
 
 class EndSpeed(NamedTuple):
-    """The fastest block at the end, its speed (m/s), and whether it moves on."""
+    """The fastest block at the end, its speed (m/s), whether any block moves on, and whether any turns on."""
 
     block: str
     speed: float
     moves_on: bool
+    turns_on: bool = False
 
 
 class Movement(BaseModel, frozen=True):
@@ -88,7 +91,7 @@ class Movement(BaseModel, frozen=True):
         """The three entries about the end together."""
         if self.fastest_block is None or self.fastest_m_s is None or self.moves_on is None:
             return None
-        return EndSpeed(self.fastest_block, self.fastest_m_s, self.moves_on)
+        return EndSpeed(self.fastest_block, self.fastest_m_s, self.moves_on, self.outcome is Manner.ROCKING)
 
 
 class _Shapes(NamedTuple):
@@ -142,12 +145,14 @@ def end_speeds(
     """
     shapes = _shapes_of([body for bodies in placed for body in bodies]).split(len(placed))
     velocity = np.hypot(motion[:, 3] - support[:, :1], motion[:, 4] - support[:, 1:])
-    speed = np.where(shapes.is_free, np.fmax(velocity, np.abs(motion[:, 5]) * shapes.reach), 0.0)
-    ahead = FURTHER * np.asarray(seconds)[:, None] * speed
-    moves_on = np.any(ahead > MOVED_SHARE * shapes.shortest, axis=1).tolist()
+    turning = np.where(shapes.is_free, np.abs(motion[:, 5]) * shapes.reach, 0.0)
+    speed = np.where(shapes.is_free, np.fmax(velocity, turning), 0.0)
+    later, threshold = FURTHER * np.asarray(seconds)[:, None], MOVED_SHARE * shapes.shortest
+    moves_on = np.any(later * speed > threshold, axis=1).tolist()
+    turns_on = np.any(later * turning > threshold, axis=1).tolist()
     fastest = np.nanargmax(np.where(np.isnan(speed), -1.0, speed), axis=1).tolist()
     return [
-        EndSpeed(bodies[block].name, float(speed[m, block]), moves_on[m])
+        EndSpeed(bodies[block].name, float(speed[m, block]), moves_on[m], turns_on[m])
         for m, (bodies, block) in enumerate(zip(placed, fastest, strict=True))
     ]
 
@@ -158,13 +163,15 @@ def from_start_to_end(
     first: FirstMove | None,
     carried: Way = RESTED,
     start: Floats | None = None,
+    *,
+    turns_on: bool = False,
 ) -> tuple[Manner, float, float]:
     """Return manner, largest displacement of a centre (mm) and largest rotation (degrees), of a final table.
 
     `first` is the first move on the way, if there was any: it distinguishes what rocked back from what stands.
     `carried` is the way (m) of the support; of blocks that were removed on the way it is not known, and taken as none.
     `start` is where blocks have settled before time zero, (3, b) as x, y (m), angle (rad); without it they began as
-    placed.
+    placed. `turns_on` says whether some block turns on at the end.
     """
     shapes = _shapes_of(placed)
     is_there = ~np.isnan(np.array(final["vx_mm_s"], dtype=np.float64))
@@ -174,12 +181,14 @@ def from_start_to_end(
     dy = np.array(final["y_mm"]) / MILLI - y - carried[1] * is_there
     turn = np.abs(np.array(final["rotation_deg"]) - np.degrees(angle - drawn[2]))
     way = np.hypot(dx, dy)
-    manner = _with_way_there(_manner(shapes, way, -dy, np.radians(turn)), first)
+    manner = _with_way_there(_manner(shapes, way, -dy, np.radians(turn)), first, turns_on=turns_on)
     return manner, float(MILLI * (way * shapes.is_free).max()), float((turn * shapes.is_free).max())
 
 
-def _with_way_there(manner: Manner, first: FirstMove | None) -> Manner:
-    """Return the manner of an end, given what moved before it."""
+def _with_way_there(manner: Manner, first: FirstMove | None, *, turns_on: bool) -> Manner:
+    """Return the manner of an end, given what moved before it, and whether some block turns on."""
+    if manner is Manner.SLID and turns_on:
+        return Manner.ROCKING
     return Manner.ROCKED if manner is Manner.STANDS and first is not None else manner
 
 
@@ -255,7 +264,7 @@ class Watch:
         (end,) = end_speeds([self.placed], motion[None], np.array([support]), [time])
         far, turned = (int(np.argmax(most * self.shapes.is_free)) for most in (self.way, self.turn))
         return Movement(
-            outcome=_with_way_there(self.manner, self.first),
+            outcome=_with_way_there(self.manner, self.first, turns_on=end.turns_on),
             largest_displacement_mm=float(MILLI * self.way[far] * self.shapes.is_free[far]),
             displaced_block=self.placed[far].name,
             largest_rotation_deg=float(np.degrees(self.turn[turned] * self.shapes.is_free[turned])),

@@ -26,7 +26,7 @@ from blocksim.study.criterion import Verdict
 from blocksim.study.executors import Execution, Run, Setting, Task
 from blocksim.study.limit_give import give_at, most_shift
 from blocksim.study.limit_margin import with_margins
-from blocksim.study.limit_plan import TOLERANCE, LimitPlan, read_limit
+from blocksim.study.limit_plan import SCANNED, TOLERANCE, LimitPlan, read_limit
 from blocksim.study.limit_result import BOTH, LimitResult, fallen, write_result
 from blocksim.study.limit_search import Change, Number, changes_in, next_near, next_values
 from blocksim.study.limit_sides import keep_sides
@@ -43,7 +43,7 @@ from blocksim.study.limit_stiff import (
 )
 from blocksim.study.plan import Values
 from blocksim.study.progress import MANIFEST, Entry, Manifest, read_entries, values_hash
-from blocksim.study.rows import Row, check_experiment, invalid_row
+from blocksim.study.rows import PEAK, Row, check_experiment, invalid_row
 from blocksim.study.sweep_folder import LIMIT, prepare
 
 AGAIN = "rerun the command to finish"
@@ -60,6 +60,7 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     *,
     stands: str = criterion.DEFAULT,
     tolerance: float = TOLERANCE,
+    scan: int = SCANNED,
     executor: str | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
@@ -72,8 +73,9 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     """Find the values of a key at which a structure stops, or begins, to stand.
 
     `vary` has one key and its range, {"ground.tilt": {"from": "20 deg", "to": "40 deg"}}, with the number of values
-    that are scanned as `count` (default 9); there may be several changes. `stands` says what counts as standing (see
-    `blocksim.study.criterion`), `tolerance` how narrow a bracket gets relative to its ends. Runs are kept in `out`
+    that are scanned as `count` (default: `scan`); there may be several changes, but those of an island between two of
+    them are not seen. `stands` says what counts as standing (see `blocksim.study.criterion`), `tolerance` how narrow a
+    bracket gets relative to its ends, without what rest speed and stiffness cannot decide. Runs are kept in `out`
     (default: results/NAME/limit-HASH), with `keep_runs` those of both sides of a bracket with frames and contacts, for
     `plot` and `report`; the same call again does only what is missing. `stiffer` says whether limits of springs are
     searched again with springs ten times as stiff, and extrapolated to stiff contacts: True always, False never
@@ -82,7 +84,7 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     `jobs` and `scheduler` are those of `sweep`, and do not change the answer. Raises ScenarioError, InvalidInputError,
     OutputExistsError where the folder is not free, UnavailableError, StoppedEarlyError on Ctrl-C.
     """
-    plan = read_limit(document_of(scenario), vary, stands=stands, tolerance=tolerance)
+    plan = read_limit(document_of(scenario), vary, stands=stands, tolerance=tolerance, scan=scan)
     return find_limit(
         plan,
         Execution(executor, jobs, scheduler),
@@ -119,7 +121,9 @@ def find_limit(  # noqa: PLR0913, PLR0915 - as `limit`; the steps of a search, o
         try:
             with stop_requests() as is_stopped:
                 runs.setting = replace(setting, is_stopped=is_stopped)
-                rows = runs.searched(plan, lambda known: next_values(plan.span, known, plan.tolerance))
+                rows = runs.searched(
+                    plan, lambda known: next_values(plan.span, known, plan.tolerance, runs.peaks(plan, known))
+                )
                 found = LimitResult(plan, folder, rows, runs.ran)
                 if stiffer is not False:
                     if can_be_stiffer(plan):
@@ -171,6 +175,13 @@ class _Runs:
                 raise _stopped(len(self.known))
             rows |= {value: self.known[name] for value, name in hashes.items()}
         return rows
+
+    def peaks(self, plan: LimitPlan, values: Iterable[Number]) -> dict[Number, float]:
+        """Return the largest rotation (degrees) at those values at which supports move and nothing has failed."""
+        if not plan.has_islands:
+            return {}
+        rows = {value: self.known[values_hash(plan.settings(value))] for value in values}
+        return {value: float(str(row[PEAK])) for value, row in rows.items() if PEAK in row}
 
     def _tasks(self, plan: LimitPlan, values: Iterable[Number]) -> Iterator[Task]:
         """Make the tasks of a round; a value that does not go with the others has its row at once."""

@@ -18,7 +18,7 @@ from blocksim.simulation.provenance import HASH_DIGITS
 from blocksim.study import criterion
 from blocksim.study.executors import Execution
 from blocksim.study.limit import OnRun, find_limit
-from blocksim.study.limit_plan import TOLERANCE, LimitPlan, read_limit
+from blocksim.study.limit_plan import SCANNED, TOLERANCE, LimitPlan, read_limit
 from blocksim.study.limit_result import LimitResult
 from blocksim.study.limit_stiff import refuse_without_springs
 from blocksim.study.plan import Values, Variations
@@ -100,6 +100,7 @@ def limit_curve(  # noqa: PLR0913 - one argument for each option of the command
     *,
     stands: str = criterion.DEFAULT,
     tolerance: float = TOLERANCE,
+    scan: int = SCANNED,
     executor: str | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
@@ -111,7 +112,7 @@ def limit_curve(  # noqa: PLR0913 - one argument for each option of the command
 
     Searches are kept in `out` (default: results/NAME/limits-HASH). Raises as `limit`.
     """
-    plan = read_curve(document_of(scenario), vary, over, stands=stands, tolerance=tolerance)
+    plan = read_curve(document_of(scenario), vary, over, stands=stands, tolerance=tolerance, scan=scan)
     return find_curve(plan, Execution(executor, jobs, scheduler), out=out, overwrite=overwrite, stiffer=stiffer)
 
 
@@ -122,6 +123,7 @@ def read_curve(
     *,
     stands: str,
     tolerance: float,
+    scan: int = SCANNED,
 ) -> CurvePlan:
     """Return the plan of a curve. Raises as `read_limit`, for every value of the other key."""
     given = over if isinstance(over, Variations) else Variations.of(over)
@@ -136,7 +138,7 @@ def read_curve(
     return CurvePlan(
         head,
         {
-            number: read_limit(bare.with_values({head.key: value}), vary, stands=stands, tolerance=tolerance)
+            number: read_limit(bare.with_values({head.key: value}), vary, stands=stands, tolerance=tolerance, scan=scan)
             for number, value in levels.items()
         },
     )

@@ -58,6 +58,11 @@ class LimitPlan:
         """True where sustained loads come at once, as the scenario says that it does not begin at rest."""
         return all(comes_at_once(self.scenario_at(number)) for number in (self.span.low, self.span.high))
 
+    @property
+    def has_islands(self) -> bool:
+        """True where a value may fall between others that stand: supports move."""
+        return self.document.build().motion is not None
+
     def settings(self, number: Number) -> dict[str, object]:
         """Return what distinguishes the run of a value from the document."""
         return {self.key: self.value(number), **self.apart}
@@ -76,6 +81,7 @@ def read_limit(
     *,
     stands: str,
     tolerance: float = TOLERANCE,
+    scan: int = SCANNED,
 ) -> LimitPlan:
     """Return the plan of a search.
 
@@ -95,7 +101,7 @@ def read_limit(
     if not isinstance(table, Mapping) or not {"from", "to"} <= set(table):
         message = f"{OPTION} {given.texts[key]}: a range is needed, as in {key}=FROM:TO or {key}=FROM:TO:COUNT"
         raise InvalidInputError(message)
-    count = _count(table.get("count", SCANNED))
+    count = _count(table.get("count", scan))
     ends = {name: table[name] for name in table if name != "count"}
     if is_descending(ends):
         ends |= {"from": ends["to"], "to": ends["from"]}

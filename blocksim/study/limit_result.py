@@ -9,7 +9,7 @@ from blocksim.study.criterion import Verdict
 from blocksim.study.limit_plan import SPRINGS, LimitPlan
 from blocksim.study.limit_search import Change, Number, changes_in
 from blocksim.study.limit_stiff import Levels
-from blocksim.study.rows import MOVEMENT, Row, as_cell
+from blocksim.study.rows import MOVEMENT, PEAK, Row, as_cell
 from blocksim.study.sweep_folder import LIMIT, write_answer
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 TABLE = "limit.csv"
 VALUE, VERDICT, SCALE, STEP = "value", "verdict", "stiffness_scale", "half_step_s"
-COLUMNS = (VERDICT, *MOVEMENT, "status", "reason", "seconds", SCALE, STEP)
+COLUMNS = (VERDICT, *MOVEMENT, PEAK, "status", "reason", "seconds", SCALE, STEP)
 BOTH = {Verdict.STANDS, Verdict.FALLS}
 BOTH_OR_MOVING = BOTH | {Verdict.UNDECIDED}
 
@@ -169,7 +169,9 @@ class LimitResult:
 
     def _side(self, value: Number, verdict: Verdict) -> dict[str, object]:
         row, seen = self.rows[value], self.seen(value)
-        told = {name: seen.get(name) for name in MOVEMENT} | {name: row.get(name) for name in ("status", "reason")}
+        told = {name: seen.get(name) for name in (*MOVEMENT, PEAK)} | {
+            name: row.get(name) for name in ("status", "reason")
+        }
         return {VALUE: value, VERDICT: verdict.value, **told, "case": self.kept.get(value)}
 
     def __repr__(self) -> str:

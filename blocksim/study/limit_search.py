@@ -1,11 +1,14 @@
 """The search for the values of a key at which what a run says changes: which values to try next, from those known.
 
-First a scan of evenly spaced values, as there may be more than one change; then every pair of neighbours with different
-verdicts is divided in three, until it is as narrow as wanted. Two values a round and change, not one: they run side by
-side, and four rounds narrow a bracket 81 times. What is tried depends on the answers of whole rounds
-alone, so neither on the number of threads nor on when a search was stopped and resumed.
+First a scan of evenly spaced values, as there may be more than one change. What rocks under a moving support may fall
+in an island between two of them: so the scan is denser, down to a quarter of its spacing, beside values at which the
+largest rotation is larger than at both neighbours. Narrower islands are not seen. Then every pair of neighbours with
+different verdicts is divided in three, until it is as narrow as wanted. Two values a round and change, not one: they
+run side by side, and four rounds narrow a bracket 81 times. What is tried depends on the answers of whole rounds alone,
+so neither on the number of threads nor on when a search was stopped and resumed.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,6 +17,7 @@ from typing import Generic, TypeVar
 Answer = TypeVar("Answer")
 DIGITS = 12  # of a value that is tried: what people read is what was run
 PARTS = 3
+HALVINGS = 2  # of the spacing of a scan, beside a peak
 OUTWARD = 2.0  # widths of what is known, by which a search near a value goes on beyond it
 FLOOR = 1e-6  # of the range: brackets about zero get no narrower
 Number = float  # in the unit of the range
@@ -37,6 +41,27 @@ class Span:
         """Return the values that divide a bracket, without its ends."""
         inner = Span(low, high, PARTS + 1, self.is_log, self.is_whole).scanned()
         return [value for value in inner if low < value < high]
+
+    def middle(self, low: Number, high: Number) -> Number:
+        """Return the value half way between two."""
+        return Span(low, high, 3, self.is_log, self.is_whole).scanned()[1]
+
+    def is_scanned_enough(self, low: Number, high: Number) -> bool:
+        """Return True if two values are so near each other that no other is tried beside a peak."""
+        if self.is_whole and high - low <= 1.0:
+            return True
+        share = math.log(high / low) / math.log(self.high / self.low) if self.is_log else (high - low) / self.width
+        return share * (self.count - 1) < 1.5 * 0.5**HALVINGS
+
+    @property
+    def spacing(self) -> float:
+        """Distance of two values of the first round."""
+        return self.width / (self.count - 1)
+
+    @property
+    def width(self) -> float:
+        """Length of the range."""
+        return self.high - self.low
 
     def _at(self, share: float) -> Number:
         if share in (0.0, 1.0):
@@ -76,13 +101,31 @@ def changes_in(known: Mapping[Number, Answer]) -> list[Change[Answer]]:
     ]
 
 
-def next_values(span: Span, known: Mapping[Number, Answer], tolerance: float) -> list[Number]:
-    """Return the values to try next; none when every change is as narrow as wanted."""
+def next_values(
+    span: Span, known: Mapping[Number, Answer], tolerance: float, peaks: Mapping[Number, float] | None = None
+) -> list[Number]:
+    """Return the values to try next; none when every change is as narrow as wanted.
+
+    `peaks` are the largest rotations at those known values at which the scan may have to be denser.
+    """
     scan = [value for value in span.scanned() if value not in known]
+    scan = scan or _beside_peaks(span, known, peaks or {})
     if scan:
         return scan
     wide = (one for one in changes_in(known) if not span.is_narrow(one.low, one.high, tolerance))
     return [value for one in wide for value in span.between(one.low, one.high)]
+
+
+def _beside_peaks(span: Span, known: Mapping[Number, Answer], peaks: Mapping[Number, float]) -> list[Number]:
+    """Return the values half way to both neighbours of those with a larger peak, and the same answer."""
+    values = sorted(known)
+    found: list[Number] = []
+    for low, here, high in zip(values, values[1:], values[2:], strict=False):
+        is_alike = known[low] == known[here] == known[high] and {low, here, high} <= peaks.keys()
+        if is_alike and peaks[low] < peaks[here] > peaks[high]:
+            wide = (pair for pair in ((low, here), (here, high)) if not span.is_scanned_enough(*pair))
+            found += [span.middle(*pair) for pair in wide]
+    return [value for value in dict.fromkeys(found) if value not in known]
 
 
 def next_near(span: Span, known: Mapping[Number, Answer], near: Change[Answer], tolerance: float) -> list[Number]:

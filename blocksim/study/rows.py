@@ -36,6 +36,8 @@ TABLE = "sweep.csv"
 X = ".x_mm"
 MOVEMENT = ("outcome", "first_mover", "first_moved_s", "displacement_mm", "turn_deg", "end_speed_mm_s", "moves_on")
 """As in run.json, but displacement and rotation are the largest of all blocks that can move, from start to end."""
+PEAK = "peak_deg"
+"""The largest rotation of any block on the way; beside what tables of sweeps hold."""
 KEPT = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")  # of the final table, for every block
 QUARTER = 90.0  # deg
 DIGITS = 12  # of a number in the table: more show the rounding of the unit
@@ -58,16 +60,21 @@ class Course(NamedTuple):
     end_speed: EndSpeed | None = None
     carried: Way = RESTED  # m: of the support, from start to end
     start: NDArray[np.float64] | None = None
+    peak_deg: float | None = None
 
 
 def row_of(course: Course, final: Columns, placed: Sequence[PlacedBody]) -> Row:
     """Return the row of a case that was run; `placed` are the blocks as they were placed."""
     row: Row = {"status": course.status, "reason": course.reason, "seconds": course.seconds}
-    manner, displacement, rotation = from_start_to_end(placed, final, course.first_move, course.carried, course.start)
     mover, moved = course.first_move or (None, None)
-    _, speed, moves_on = course.end_speed or (None, None, None)
+    _, speed, moves_on, turns_on = course.end_speed or (None, None, None, False)
+    manner, displacement, rotation = from_start_to_end(
+        placed, final, course.first_move, course.carried, course.start, turns_on=turns_on
+    )
     values_of = (manner.value, mover, moved, displacement, rotation, None if speed is None else MILLI * speed, moves_on)
     row |= dict(zip(MOVEMENT, values_of, strict=True))
+    if course.peak_deg is not None:
+        row[PEAK] = course.peak_deg
     for block, *values in zip(final["block"], *(final[name] for name in KEPT), strict=True):
         row |= {f"{block}.{name}": value for name, value in zip(KEPT, values, strict=True)}
     return row

@@ -117,3 +117,12 @@ def test_independent_draws_widen_no_interval_by_much() -> None:
     counts = Counts.of(X.tolist(), failed.sum(axis=0).astype(int).tolist(), [200] * len(X))
     assert inflation_of(counts, failed, np.ones_like(failed)) == pytest.approx(1.0, abs=0.25)
     assert inflation_of(counts, failed[:1], np.ones((1, len(X)))) == 1.0
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_median_that_counts_hardly_bound_is_infinite_without_a_warning() -> None:
+    curve = fit(Counts.of([0.2595391074269312, 2.1758645130121113], [1, 21], [2, 40]))
+    assert isinstance(curve, Curve)
+    assert curve.median_interval == (0.0, math.inf)
+    flat = fit(Counts.of([0.6869940416447975, 1.0008499195306126], [2, 1], [10, 5]))
+    assert isinstance(flat, NoCurve)

@@ -99,12 +99,19 @@ def rocking(**time: object) -> Scenario:
 def test_members_that_rock_back_are_told_from_those_that_stand() -> None:
     scenarios = [rocking(), rocking(step=2e-6), rocking(end=0.005)]
     members = run_ensemble(scenarios, threads=1)
-    ends = [from_start_to_end(one.placed, one.columns, one.first_move)[0] for one in members]
-    assert ends == [Manner.ROCKED, Manner.ROCKED, Manner.SLID]  # the last one is caught on its way
+    ends = [
+        from_start_to_end(
+            one.placed, one.columns, one.first_move, turns_on=one.end_speed is not None and one.end_speed.turns_on
+        )[0]
+        for one in members
+    ]
+    assert ends == [Manner.ROCKED, Manner.ROCKED, Manner.ROCKING]  # the last one is caught on its way
     for scenario, member in zip(scenarios, members, strict=True):
         found = simulate(scenario).summary.movement
         assert found is not None
         assert (found.outcome, found.first_move) == (ends[members.index(member)], member.first_move)
+        assert member.peak_deg == pytest.approx(found.largest_rotation_deg, rel=1e-9)
+        assert member.peak_deg > 1.0
 
 
 def test_resumed_run_has_seen_what_came_before(tmp_path: Path) -> None:

@@ -228,3 +228,56 @@ def test_what_is_to_drop_or_moves_already_does_not_settle_unasked_under_such_a_s
 def test_impossible_starts_are_told_with_their_place(start: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         stack("explicit", start=start)
+
+
+def tilted_ring(**changes: Any) -> Scenario:
+    """Return a ring of eight stones on springs, which falls from 17.44 degrees on."""
+    ring = {"kind": "arch", "block": "b", "radius": 0.2, "thickness": 0.03, "embrace": "162 deg", "count": 8}
+    data = {
+        "blocks": {"b": {"depth": 0.1, "material": "stone"}},
+        "bodies": [],
+        "structures": [ring],
+        "friction": {"block_block": 1.0, "block_ground": 1.0},
+        "contact": {"restitution": 0.0, "stiffness_scale": 10.0},
+        **changes,
+    }
+    return stack("explicit", **data)
+
+
+def test_a_mechanism_on_springs_is_told_before_it_has_gone_far() -> None:
+    with pytest.raises(SettleError, match=r"has come 0\.0\d+ mm, after \d+ steps") as caught:
+        simulate(tilted_ring(ground={"tilt": "19 deg"}))
+    assert int(str(caught.value).split()[-2]) < 100_000
+    assert simulate(tilted_ring(ground={"tilt": "17.3 deg"})).summary.settled is not None
+
+
+def test_what_closes_a_gap_and_then_rests_is_no_mechanism() -> None:
+    gap = 0.004  # 2 % of the smallest side
+    fixed = {"block": "b", "x": 0.4 + gap, "y": 0.1, "fixed": True}
+    friction = {"block_block": 0.2, "block_ground": 0.2}
+    contact = {"restitution": 0.0}
+    scenario = stack(
+        "explicit",
+        bodies=[{"block": "b", "x": 0.0, "y": 0.1}, fixed],
+        friction=friction,
+        contact=contact,
+        ground={"tilt": "-15 deg"},
+    )
+    settled = simulate(scenario).summary.settled
+    assert settled is not None
+    assert settled.largest_displacement_mm == pytest.approx(1e3 * gap, rel=0.01)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_what_does_not_come_to_rest_is_recorded_as_it_falls_where_it_is_released(scheme: str) -> None:
+    start = {"settle": True, "release": "always"}
+    time = {"scheme": scheme, "end": 0.3, "stop_at_rest": False}
+    result = simulate(stack(scheme, ground={"tilt": "35 deg"}, start=start, time=time, output={"every": 0.05}))
+    assert result.summary.settled is not None
+    assert not result.summary.settled.at_rest
+    assert result.summary.movement is not None
+    assert result.summary.movement.outcome != "stands"
+    assert np.abs(result.frames.x[0] - [0.0, 0.05, 0.1]).max() < 0.02 * 0.2 + 1e-9
+    assert np.abs(result.frames.vx[0]).max() == 0.0
+    (one,) = run_ensemble([result.scenario])
+    assert one.final.equals(result.final)

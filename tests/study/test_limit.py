@@ -246,3 +246,26 @@ def test_limits_of_rigid_contacts_that_go_with_the_step_hold_those_of_half_of_it
     assert answer.low < short.low < short.high < answer.high
     (plain,) = limit(ring, near, out=tmp_path / "given", tolerance=3e-3, stiffer=False).limits
     assert plain == given
+
+
+def test_a_range_from_its_upper_end_down_is_searched_as_the_same_one(tmp_path: Path) -> None:
+    slope = block_on_a_slope(SQUAT)
+    up, down = (
+        limit(slope, {"ground.tilt": {"from": first, "to": last, "count": 3}}, out=tmp_path / first, tolerance=0.1)
+        for first, last in (("5 deg", "40 deg"), ("40 deg", "5 deg"))
+    )
+    assert up.changes == down.changes
+
+
+def test_an_acceleration_that_passes_for_rest_is_in_the_bracket(tmp_path: Path) -> None:
+    degrees = math.degrees(math.atan(FRICTION))
+    scene = unsettled(block_on_a_slope(SQUAT, rest_hold=0.05, rest_speed=1e-4))
+    near = {"from": f"{degrees - 0.1} deg", "to": f"{degrees + 0.1} deg", "count": 3}
+    found = limit(scene, {"ground.tilt": near}, out=tmp_path, tolerance=1e-5)
+    (given,), (answer,), (margin,) = found.limits_as_given, found.limits, found.margins.values()
+    assert given.low > degrees + 1e-3  # 2e-3 m/s2 for 50 ms is no motion
+    assert answer.low < degrees < answer.high
+    assert margin.rest == pytest.approx(1e-4 / 0.05 / 9.81 / math.radians(degrees), rel=0.01)
+    data = json.loads((tmp_path / "limit.json").read_text())
+    assert data["changes"][0]["undecided"] == {"rest": margin.rest, "springs": 0.0}
+    assert data["changes"][0]["below"]["value"] == given.low

@@ -42,6 +42,17 @@ def test_structures_that_stand_again_beyond_a_range_of_falling_have_all_changes_
     assert len(changes_in(known)) == len(ends)
 
 
+@pytest.mark.parametrize("is_log", [False, True])
+def test_an_island_between_two_values_of_the_scan_is_found_where_rotations_peak_beside_it(is_log: bool) -> None:
+    span, known = Span(0.264, 0.748, 9, is_log), {}
+    while values := next_values(span, known, 1e-3, {value: 1.0 / (0.01 + abs(value - 0.47)) for value in known}):
+        known |= {value: "falls" if 0.4613 < value < 0.4815 else "stands" for value in values}
+    assert [round(one.low, 3) for one in changes_in(known)] == pytest.approx([0.461, 0.481], abs=1e-3)
+    assert len(known) < 45
+    alone = searched(span, lambda value: "falls" if 0.4613 < value < 0.4815 else "stands", 1e-3)
+    assert len(changes_in(alone)) == 0
+
+
 def test_whole_numbers_are_tried_as_such_and_end_as_neighbours() -> None:
     known = searched(Span(1.0, 12.0, 4, is_whole=True), lambda value: str(value > 4), 1e-3)
     assert changes_in(known) == [Change(4.0, 5.0, "False", "True")]

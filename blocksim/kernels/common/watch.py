@@ -1,7 +1,7 @@
-"""The first frame in which a block has moved, found while members of ensembles advance, which record no frames.
+"""The first frame in which a block has moved, and the largest rotation in any, while members of ensembles advance.
 
-Compiled code keeps the step and the places; which block was first is decided by blocksim.simulation.movement, as for a
-run with frames.
+They record no frames. Compiled code keeps the step and the places; which block was first is decided by
+blocksim.simulation.movement, as for a run with frames.
 """
 
 import math
@@ -15,12 +15,14 @@ from blocksim.kernels.common.jit import rare_kernel
 class Watched(NamedTuple):
     """What is watched of m members with b blocks each."""
 
-    periods: Floats  # (m,) steps between two frames, zero where nothing is watched
+    frames: Floats  # (m,) steps between two frames, zero where there are none
+    periods: Floats  # (m,) the same, zero where it is not watched what moves first
     steps: Integers  # (m,) output: the first frame in which a block had moved, zero before
     places: Floats  # (m, 3, b) output: x, y (m), angle (rad) then
     start: Floats  # (m, 3, b) x, y (m), angle (rad)
     reach: Floats  # (m, b) m, half a diagonal
     thresholds: Floats  # (m, b) m, infinite for fixed blocks
+    peaks: Floats  # (m,) output: rad, the largest rotation of a block that can move
 
 
 step_of_next = rare_kernel(next_frame)
@@ -28,9 +30,8 @@ step_of_next = rare_kernel(next_frame)
 
 @rare_kernel
 def frame_to_watch(watched: Watched, m: int, done: int) -> int:
-    """Return the next step with a frame of a member that has not moved yet, zero where none is of interest."""
-    is_watched = watched.periods[m] > 0.0 and watched.steps[m] == 0
-    return step_of_next(done, watched.periods[m]) if is_watched else 0
+    """Return the next step with a frame of a member, zero where there is none."""
+    return step_of_next(done, watched.frames[m]) if watched.frames[m] > 0.0 else 0
 
 
 @rare_kernel
@@ -48,8 +49,12 @@ def has_moved(bodies: Records, watched: Watched, m: int) -> bool:
 
 @rare_kernel
 def watch(bodies: Records, watched: Watched, m: int, step: int) -> None:
-    """Examine a frame of a member that had not moved before."""
-    if has_moved(bodies, watched, m):
+    """Examine a frame of a member: how far blocks are turned, and what has moved if nothing had before."""
+    for i in range(watched.thresholds.shape[1]):
+        turn = abs(bodies[i].angle - watched.start[m, 2, i])
+        if turn > watched.peaks[m] and watched.thresholds[m, i] < math.inf:
+            watched.peaks[m] = turn
+    if watched.periods[m] > 0.0 and watched.steps[m] == 0 and has_moved(bodies, watched, m):
         watched.steps[m] = step
         for i in range(watched.thresholds.shape[1]):
             watched.places[m, 0, i] = bodies[i].x

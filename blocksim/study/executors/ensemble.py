@@ -109,7 +109,14 @@ def _row_of(member: MemberEnd | MemberFailure, scenario: Scenario) -> Row:
         return row_of_error(member.error)
     outcome, carried = member.outcome, MovingSupport(scenario).way(member.seconds)
     course = Course(
-        outcome.status, outcome.reason, member.seconds, member.first_move, member.end_speed, carried, member.start
+        outcome.status,
+        outcome.reason,
+        member.seconds,
+        member.first_move,
+        member.end_speed,
+        carried,
+        member.start,
+        member.peak_deg,
     )
     return row_of(course, member.columns, member.placed)
 
@@ -191,7 +198,9 @@ def _course(summary: Summary, folder: Path, scenario: Scenario) -> Course:
     if summary.settled is not None:
         frames = read_frames(folder / files.FRAMES, scenario)
         start = np.stack([frames.x[0], frames.y[0], frames.angle[0]])
-    return Course(summary.status, summary.reason, seconds, first, end, MovingSupport(scenario).way(seconds), start)
+    peak = None if moved is None else moved.largest_rotation_deg
+    way = MovingSupport(scenario).way(seconds)
+    return Course(summary.status, summary.reason, seconds, first, end, way, start, peak)
 
 
 def _has_ended(folder: Path, summary: Summary) -> bool:

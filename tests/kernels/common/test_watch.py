@@ -25,7 +25,9 @@ def watched(threshold: float = THRESHOLD) -> Watched:
     thresholds = np.array([[math.inf, math.inf], [threshold, math.inf]])
     places = np.zeros((2, 3, 2))
     periods, steps = np.array([0.0, 3.0]), np.zeros(2, dtype=np.int64)
-    return Watched(periods, steps, places, np.zeros((2, 3, 2)), np.full((2, 2), REACH), thresholds)
+    return Watched(
+        periods, periods, steps, places, np.zeros((2, 3, 2)), np.full((2, 2), REACH), thresholds, np.zeros(2)
+    )
 
 
 def bodies(**state: float) -> Records:
@@ -61,8 +63,11 @@ def test_fixed_blocks_do_not_count() -> None:
     assert seen.steps.tolist() == [0, 0]
 
 
-def test_frames_are_examined_until_something_has_moved() -> None:
+def test_the_largest_rotation_is_followed_to_the_end_and_the_first_frame_of_a_move_kept() -> None:
     seen = watched()
     assert [frame_to_watch(seen, m, 4) for m in (0, 1)] == [0, 6]
-    seen.steps[1] = 6
-    assert frame_to_watch(seen, 1, 7) == 0
+    for step, angle in ((6, -0.2), (9, 0.1)):
+        watch(bodies(angle=angle), seen, 1, step)
+    assert seen.steps.tolist() == [0, 6]
+    assert seen.peaks.tolist() == [0.0, 0.2]
+    assert frame_to_watch(seen, 1, 7) == 9

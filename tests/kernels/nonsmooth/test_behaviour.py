@@ -219,7 +219,9 @@ def test_members_of_an_ensemble_have_the_same_bits(begin: Callable[..., Any]) ->
     scenes = only(build_stacks([rigid(scenario) for scenario in scenarios], NONSMOOTH)).scenes
     codes, starts = np.zeros(2, dtype=np.int64), np.zeros((2, len(NONSMOOTH_LEDGER) + 2))
     places, lengths = np.zeros((2, 3, 3)), np.zeros((2, 3))
-    watched = Watched(np.zeros(2), np.zeros(2, dtype=np.int64), places, places, lengths, lengths)  # no frames
+    watched = Watched(
+        np.zeros(2), np.zeros(2), np.zeros(2, dtype=np.int64), places, places, lengths, lengths, np.zeros(2)
+    )  # no frames
     advance_nonsmooth_members(scenes, np.arange(2), np.full(2, 400), starts, codes, watched)
     for m in range(2):
         assert codes[m] == alone[m].status

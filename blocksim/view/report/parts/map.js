@@ -1,7 +1,7 @@
 // The outcome of every case over two varied keys.
 const EDGE = { left: 74, right: 16, top: 12, bottom: 46 };
 const SIGNS = { inside: "#009E73", outside: "#D55E00", finished: "#56B4E9", other: "#777777" };
-const OUTCOMES = { stands: "#009E73", "rocked back": "#56B4E9", slid: "#E69F00", fell: "#D55E00" };
+const OUTCOMES = { stands: "#009E73", "rocked back": "#56B4E9", rocking: "#CC79A7", slid: "#E69F00", fell: "#D55E00" };
 const DECADES = 30;
 
 // Returns whether the median is nearer to the middle of a logarithmic axis than to that of a linear one.
