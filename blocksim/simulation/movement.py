@@ -78,6 +78,7 @@ class Movement(BaseModel, frozen=True):
     fastest_block: str | None = None  # at the end; None in runs of earlier versions
     fastest_m_s: float | None = None  # its speed relative to the support, or that of its corners by its spin
     moves_on: bool | None = None
+    turns_on: bool | None = None
 
     @property
     def first_move(self) -> FirstMove | None:
@@ -91,7 +92,7 @@ class Movement(BaseModel, frozen=True):
         """The three entries about the end together."""
         if self.fastest_block is None or self.fastest_m_s is None or self.moves_on is None:
             return None
-        return EndSpeed(self.fastest_block, self.fastest_m_s, self.moves_on, self.outcome is Manner.ROCKING)
+        return EndSpeed(self.fastest_block, self.fastest_m_s, self.moves_on, bool(self.turns_on))
 
 
 class _Shapes(NamedTuple):
@@ -274,4 +275,5 @@ class Watch:
             fastest_block=end.block,
             fastest_m_s=end.speed,
             moves_on=end.moves_on,
+            turns_on=end.turns_on,
         )

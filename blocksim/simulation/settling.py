@@ -14,11 +14,12 @@ too, after gravity, as far as the scene carries it at rest: all of it, or up to 
 With springs a scene under a pulse that begins at its peak at time zero settles unasked, if it rests as it was placed.
 
 A scene at rest is one whose blocks have no acceleration (springs), or move no further (rigid contacts). One that fails
-moves on, as no kinetic energy peaks there: it ends once a block has come farther than springs give way. With springs,
-whose steps are short, it ends as soon as it is a mechanism (`_is_mechanism`): blocks have come many times as far as
-contacts can give way, faster and faster, and meet nothing on the way that is left to them.
+moves on, as no kinetic energy peaks there: it ends once a block has come farther than springs give way, or as soon as
+it is a mechanism (`_is_mechanism`): blocks have come many times as far as contacts can give way, faster and faster, and
+meet nothing on the way that is left to them.
 
-With `start.release = "always"` what does not come to rest begins its run from where it had begun to move, at rest.
+With `start.release = "always"` what does not come to rest begins its run from where it had begun to move, as fast as it
+did.
 """
 
 from collections.abc import Iterator, Sequence
@@ -53,13 +54,14 @@ UNASKED_SHARE = 0.01  # of the smallest side of a block: way in settling that wa
 MOVED_SHARE = 0.25  # of the smallest side of a block: soft springs give way by as much as a tenth, what falls goes on
 LEAN_SHARE = 0.02  # of the smallest side of a block: way at which what falls is released
 CHAIN = 3.0  # ways of blocks over those of contacts, times their number and how slender the scene is
-LEAST_SHARE = 2e-4  # of the smallest side of a block: way of a mechanism
+LEAST_SHARE = {"explicit": 2e-4, "nonsmooth": 0.01}  # of the smallest side of a block: way of a mechanism
 STEADY = 0.95  # of the drive before: that of a mechanism does not fade
 WINDOWS = 3  # of the time since velocities were taken away, in which drives are compared
 LOOKS = 30  # calls between two looks at the drive
 AHEAD = (0.02, 0.05, 0.1, MOVED_SHARE)  # of the smallest side: ways at which a mechanism meets nothing new
 ARC = 2.0  # squares of these ways over that side, by which blocks on arcs overlap if they went straight on
 HELD = ("inverse_mass", "inverse_inertia", "counts")
+VELOCITIES = ("vx", "vy", "spin")
 FALLS = ("fx", "fy", "torque")
 PATHS = ("shift", "turn")  # pieces of driven bodies that hold
 MILLI = 1e3
@@ -131,7 +133,7 @@ class _Settling:
         self.energy, self.steps = 0.0, 0
         self.is_released = scenario.start.release == "always"
         self.lean: tuple[AnyScene, list[NDArray[Any]]] | None = None
-        self.at_rest = True
+        self.leaving: dict[str, Floats] = {}
         self.path = _Path(self.start)
 
     @property
@@ -147,7 +149,7 @@ class _Settling:
         _freeze_paths(world)
         controls, loads, pieces = world.controls.copy(), world.loads.copy(), world.load_pieces.copy()
         held = {name: self.bodies[name][self.held].copy() for name in HELD}
-        velocities = {name: self.bodies[name].copy() for name in ("vx", "vy", "spin")}
+        velocities = {name: self.bodies[name].copy() for name in VELOCITIES}
         for name in HELD:
             self.bodies[name][self.held] = 0
         world.controls["motion_x"] = world.controls["motion_y"] = 0.0
@@ -193,7 +195,7 @@ class _Settling:
             self._go()
             if self._unrest() <= BALANCE:
                 self._stop()
-            elif not self.is_released and self._is_mechanism():
+            elif self._is_mechanism() and not (self.is_released and self._leans_little()):
                 raise self._error()
 
     def follow_support(self) -> None:
@@ -224,6 +226,8 @@ class _Settling:
 
     def begin(self) -> None:
         """Make this time zero: clock and books begin anew, contacts stay as they are."""
+        for name, values in self.leaving.items():
+            self.bodies[name] = values
         world = self.scene.world
         clock, ledger = world.clock, world.ledger
         for name in clock.dtype.names or ():
@@ -246,16 +250,18 @@ class _Settling:
             largest_displacement_mm=MILLI * float(ways[far]),
             displaced_block=self.placed[far].name,
             held=self.names,
-            at_rest=self.at_rest,
+            at_rest=not self.leaving,
         )
 
     def lean_back(self) -> None:
-        """Go back to where blocks had come a little way, at rest."""
-        self.at_rest = False
+        """Go back to where blocks had come a little way, and let them go on as fast as they were."""
         if self.lean is not None:
             self.scene = self.lean[0]
             _restore(*self.lean)
-        self._stop()
+        self.leaving = {name: self.bodies[name].copy() for name in VELOCITIES}
+
+    def _leans_little(self) -> bool:
+        return bool(self._ways().max() <= LEAN_SHARE * self.smallest)
 
     def _load(self, share: float, inertial: float = 0.0) -> None:
         world = self.scene.world
@@ -272,7 +278,7 @@ class _Settling:
         energy = self._kinetic()
         if status != REACHED or not np.isfinite(energy) or self._ways().max() > MOVED_SHARE * self.smallest:
             raise self._error()
-        if self.is_released and self._ways().max() <= LEAN_SHARE * self.smallest:
+        if self.is_released and self._leans_little():
             self.lean = self.scene, [array.copy() for array in arrays_of(self.scene)]
         if energy < self.energy:
             self._stop()
@@ -281,7 +287,7 @@ class _Settling:
             self.path.speeds.append(float(np.sqrt(energy)))
 
     def _stop(self) -> None:
-        for name in ("vx", "vy", "spin"):
+        for name in VELOCITIES:
             self.bodies[name] = 0.0
             if isinstance(self.scene, Nonsmooth):
                 self.scene.contacts.states[name][: self.count] = 0.0
@@ -289,13 +295,13 @@ class _Settling:
         self.path = _Path(self._places())
 
     def _is_mechanism(self) -> bool:
-        """Return True where springs do not hold any more what moves, and nothing else will.
+        """Return True where contacts do not hold any more what moves, and nothing else will.
 
         Whatever vibrates about a place of rest slows down before it, and has come no farther than contacts give way,
         each at most by the deepest overlap: block after block they turn, by that over a side, and move what is above.
         """
         speeds = self.path.speeds
-        if isinstance(self.scene, Nonsmooth) or not speeds or len(speeds) % LOOKS:
+        if not speeds or len(speeds) % LOOKS:
             return False
         window = len(speeds) // WINDOWS
         last, before = speeds[-1] - speeds[-1 - window], speeds[-1 - window] - speeds[-1 - 2 * window]
@@ -303,8 +309,9 @@ class _Settling:
             return False
         change = self._places() - self.path.start
         way = float((_ways(change, self.bodies["radius"]) * self.is_free).max())
-        give = CHAIN * self.count * self._slenderness() * deepest_overlap(self.scene.world)
-        if way <= max(give, LEAST_SHARE * self.smallest):
+        depth = 0.0 if isinstance(self.scene, Nonsmooth) else deepest_overlap(self.scene.world)
+        give = CHAIN * self.count * self._slenderness() * depth
+        if way <= max(give, LEAST_SHARE[self.kind] * self.smallest):
             return False
         return not any(self._meets(change * (share * self.smallest / way), share) for share in AHEAD)
 

@@ -97,7 +97,7 @@ def rocking(**time: object) -> Scenario:
 
 
 def test_members_that_rock_back_are_told_from_those_that_stand() -> None:
-    scenarios = [rocking(), rocking(step=2e-6), rocking(end=0.005)]
+    scenarios = [rocking(), rocking(step=2e-6), rocking(end=0.005), rocking(end=0.06)]
     members = run_ensemble(scenarios, threads=1)
     ends = [
         from_start_to_end(
@@ -105,13 +105,14 @@ def test_members_that_rock_back_are_told_from_those_that_stand() -> None:
         )[0]
         for one in members
     ]
-    assert ends == [Manner.ROCKED, Manner.ROCKED, Manner.ROCKING]  # the last one is caught on its way
+    # the last ones are caught on their way, the first of them long before it would be seen to go on
+    assert ends == [Manner.ROCKED, Manner.ROCKED, Manner.SLID, Manner.ROCKING]
     for scenario, member in zip(scenarios, members, strict=True):
         found = simulate(scenario).summary.movement
         assert found is not None
         assert (found.outcome, found.first_move) == (ends[members.index(member)], member.first_move)
         assert member.peak_deg == pytest.approx(found.largest_rotation_deg, rel=1e-9)
-        assert member.peak_deg > 1.0
+        assert found.largest_rotation_deg > 0.5
 
 
 def test_resumed_run_has_seen_what_came_before(tmp_path: Path) -> None:

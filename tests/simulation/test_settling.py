@@ -278,6 +278,6 @@ def test_what_does_not_come_to_rest_is_recorded_as_it_falls_where_it_is_released
     assert result.summary.movement is not None
     assert result.summary.movement.outcome != "stands"
     assert np.abs(result.frames.x[0] - [0.0, 0.05, 0.1]).max() < 0.02 * 0.2 + 1e-9
-    assert np.abs(result.frames.vx[0]).max() == 0.0
+    assert np.abs(result.frames.vx[0]).max() > 0.0
     (one,) = run_ensemble([result.scenario])
     assert one.final.equals(result.final)
