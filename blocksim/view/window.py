@@ -21,6 +21,7 @@ FEW_LEFT_OUT, MANY = (
     20,
 )  # share of the blocks that may be left out of an animation's window; number of many blocks
 GAP, WIDE_GAP = 0.2, 1.5  # over the reach of all others: how far off a block has to be, of many and of few
+LEAST_TOGETHER = 3  # blocks, of which one can be far from the others
 NEAR = 0.15  # of a side: what of the support is this near is shown as well; at least the largest block's diagonal
 
 
@@ -96,11 +97,11 @@ def together(frames: FramesLike, chosen: Indices, support: Support | None = None
 
     Far off is what leaves a gap to the reach of all others, to a side or upwards, of a fifth of their width or height;
     with few blocks, of which each matters, of one and a half times that. At most a twentieth of the blocks are left
-    out, or one, and never a fixed one.
+    out, or one, and never a fixed one; of two, each as far from the other, none.
     """
     count = len(frames.names)
-    if count == 0:
-        return np.zeros(0, dtype=bool)
+    if count < LEAST_TOGETHER:
+        return np.ones(count, dtype=bool)
     support = support or Support()
     reached = _reached(frames, chosen, support)
     low, high = reached.min(axis=0), reached.max(axis=0)
@@ -110,6 +111,8 @@ def together(frames: FramesLike, chosen: Indices, support: Support | None = None
         order = np.argsort(reach, kind="stable")
         for last in range(max(count - most, 1), count):
             near, far = order[:last], order[last:]
+            if stays[far].sum() + (~stays).sum() > most:
+                continue
             if reach[far[0]] - reach[near].max() > share * float(reach[near].max() - other[near].min()):
                 stays[far] = False
                 break

@@ -221,6 +221,14 @@ def test_one_far_flyer_leaves_the_window_and_debris_and_each_of_few_blocks_stay_
     assert [np.flatnonzero(~film.seen).tolist() for film in films] == [[], [59], [], []]
 
 
+def test_blocks_far_from_one_another_stay_in_the_window_but_one() -> None:
+    two, three = toppling(2), toppling(3)
+    for frames in (two, three):
+        frames.x[:, 1] += 5.0
+    three.y[:, 2] += 5.0
+    assert [Animation(frames, Support(), SMALL).seen.sum() for frames in (two, three)] == [2, 2]
+
+
 def test_missing_package_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setenv("PATH", "")
