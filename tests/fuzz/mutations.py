@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import copy
 import re
-from typing import TYPE_CHECKING
+import tomllib
+from typing import TYPE_CHECKING, Any
 
+import tomli_w
 from hypothesis import strategies as st
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
 HOSTILE = (
     *("nan", "inf", "-inf", "1e308", "-1e308", "1e-308", "5e-324", "-0", "-0.0", "0", "-1", "0.5", "1e400", "00", "+1"),
@@ -135,3 +138,23 @@ def damaged(draw: st.DrawFn, content: bytes, ways: Sequence[Callable[[st.DrawFn,
     for _ in range(draw(st.integers(1, 3))):
         content = draw(st.sampled_from(ways))(draw, content)
     return content
+
+
+def removals(content: bytes) -> Iterator[bytes]:
+    """Yield a scenario without each of its tables, keys and entries of lists of tables."""
+    data = tomllib.loads(content.decode())
+    for path in _paths(data):
+        less = copy.deepcopy(data)
+        table: Any = less
+        for part in path[:-1]:
+            table = table[part]
+        del table[path[-1]]
+        yield tomli_w.dumps(less).encode()
+
+
+def _paths(entry: Any) -> Iterator[tuple[str | int, ...]]:
+    parts = entry if isinstance(entry, dict) else [i for i, one in enumerate(entry) if isinstance(one, dict)]
+    for part in parts:
+        yield (part,)
+        if isinstance(entry[part], dict | list):
+            yield from ((part, *path) for path in _paths(entry[part]))

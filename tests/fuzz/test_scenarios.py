@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.fuzz.conftest import LONG, QUICK, ROOT, check_damaged
-from tests.fuzz.mutations import SCENARIO, damaged
+from tests.fuzz.mutations import SCENARIO, damaged, removals
 from tests.sizes import in_all
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tests.fuzz.child import Child
 
 TEXTS = tuple(path.read_bytes() for path in sorted((ROOT / "scenarios").glob("*.toml")))
+USUAL = ROOT / "scenarios" / "three_blocks_nominal.toml"
 SCENARIOS = st.sampled_from(TEXTS).flatmap(lambda text: damaged(text, SCENARIO))
 
 
@@ -32,3 +33,15 @@ def test_damaged_scenarios_are_refused_with_their_place(child: Child, folder: Pa
 @given(content=SCENARIOS)
 def test_five_thousand_damaged_scenarios(child: Child, folder: Path, content: bytes) -> None:
     check_damaged(child, folder, content)
+
+
+def test_scenario_without_a_table_or_a_key_is_read_or_refused_with_its_place(child: Child, folder: Path) -> None:
+    for content in removals(USUAL.read_bytes()):
+        check_damaged(child, folder, content)
+
+
+@pytest.mark.long
+def test_every_scenario_without_a_table_or_a_key_is_read_or_refused(child: Child, folder: Path) -> None:
+    for text in TEXTS:
+        for content in removals(text):
+            check_damaged(child, folder, content)
