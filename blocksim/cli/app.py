@@ -6,7 +6,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from blocksim.cli.process import leave_all, take_interrupts
-from blocksim.errors import ExitCode
 
 if TYPE_CHECKING:
     from blocksim.cli.commands import app as app  # noqa: PLC0414 - found when first asked for, as in blocksim
@@ -27,6 +26,7 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a terminal without ± is no reason to fail
     from blocksim.cli.commands import app
     from blocksim.cli.failures import tell_internal_error
+    from blocksim.errors import ExitCode
 
     try:
         app()

@@ -2,7 +2,7 @@
 
 Ctrl-C may come while the program is loaded, while a command works, and while the process ends. Python would raise
 KeyboardInterrupt wherever it happens to be, and print a traceback from where nobody catches it: in the middle of an
-import, or of leaving.
+import, or of leaving, or in a function that the compiler or the collector calls, where it would also be lost.
 
 Packages and compiled kernels come as 200 000 objects, none of which is garbage. The collector would look at all of them
 again and again while they come in, and once more when the process ends: a fifth of the time of a short run.
@@ -12,11 +12,15 @@ import atexit
 import gc
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, NoReturn
 
-from blocksim.errors import ExitCode
+STOPPED_EARLY = 75  # the exit code; its own module takes longer to import than all that is needed here, unprotected
+
+
+AGAIN = 0.01  # s, after which Ctrl-C that was lost comes again: whoever lost it has gone on by then
 
 
 class Interrupts:
@@ -35,12 +39,26 @@ class Interrupts:
         self.has_to_clear_up, self.has_come = False, True
         raise KeyboardInterrupt
 
+    def come_again(self, lost: Any) -> None:
+        """Take Ctrl-C that was raised where nothing can be raised; report anything else as Python does."""
+        if not issubclass(lost.exc_type, KeyboardInterrupt):
+            sys.__unraisablehook__(lost)
+            return
+        import threading
+
+        self.has_to_clear_up, self.has_come = self.has_come, False
+        again = threading.Timer(AGAIN, os.kill, (os.getpid(), signal.SIGINT))
+        again.daemon = True
+        again.start()
+
 
 def take_interrupts() -> None:
     """Take over Ctrl-C for the rest of the process, unless it is taken or ignored."""
     with suppress(ValueError):  # not the main thread, which alone receives signals
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            signal.signal(signal.SIGINT, Interrupts())
+            interrupts = Interrupts()
+            signal.signal(signal.SIGINT, interrupts)
+            sys.unraisablehook = interrupts.come_again
             # Python's end would bring the system's handler back, and with it another exit code; what is ignored stays
             atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
 
@@ -66,7 +84,7 @@ def leave_now() -> NoReturn:
     """End the process."""
     with suppress(OSError):
         os.write(2, b"stopped\n")
-    os._exit(ExitCode.STOPPED_EARLY)
+    os._exit(STOPPED_EARLY)
 
 
 @contextmanager

@@ -5,15 +5,20 @@ import json
 import os
 import pty
 import signal
+import subprocess
+import sys
 import termios
 import time
 from pathlib import Path
 
 import pytest
 
+from blocksim.cli.process import STOPPED_EARLY
+from blocksim.errors import ExitCode
 from tests.cli.conftest import PATIENCE, SOFT, Process, wait_for, wait_for_frames
 
-LONG = ("run", "scenarios/three_blocks_nominal.toml", *SOFT, "--set", "time.end=500")
+NOMINAL = "scenarios/three_blocks_nominal.toml"
+LONG = ("run", NOMINAL, *SOFT, "--set", "time.end=500")
 LONGER = (*LONG, "--set", "time.stop_at_rest=false", "--out", "out")
 WHILE_IMPORTED = """
 import os, signal, sys
@@ -33,6 +38,43 @@ def test_ctrl_c_during_an_import_prints_no_traceback(process: Process, module: s
     running = process(*LONGER, before=WHILE_IMPORTED.format(module=module))
     out, err = running.communicate(timeout=PATIENCE)
     assert (running.returncode, out, err) == (75, "", "stopped\n")
+
+
+def test_ctrl_c_in_a_function_that_the_compiler_calls_is_not_lost(process: Process) -> None:
+    called = (
+        "import ctypes, os, signal, time\n"
+        "import blocksim.scenario as s\n"
+        "call = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGINT))\n"  # as those of the compiler are
+        "s.json_schema = lambda: (call(), time.sleep(20))"
+    )
+    running = process("schema", before=called)
+    out, err = running.communicate(timeout=PATIENCE)
+    assert (running.returncode, out, err) == (75, "", "stopped\n")
+
+
+def test_exit_code_after_ctrl_c_is_the_one_that_is_documented() -> None:
+    assert STOPPED_EARLY == ExitCode.STOPPED_EARLY
+
+
+def test_nothing_heavy_is_imported_before_ctrl_c_is_handled() -> None:
+    code = "import sys; import blocksim.cli.app; print({'dataclasses', 'inspect', 'typer'} & set(sys.modules))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "set()"
+
+
+def test_ctrl_c_while_worker_processes_start_prints_no_traceback(process: Process) -> None:
+    early = (
+        "import multiprocessing.popen_spawn_posix as p, os, signal, time\n"
+        "launch = p.Popen._launch\n"
+        "interrupt = lambda: (time.sleep(0.3), os.killpg(0, signal.SIGINT), time.sleep(0.7))\n"  # as a terminal does
+        "p.Popen._launch = lambda *a: (launch(*a), interrupt())"
+    )
+    cases = ("--executor", "processes", "--jobs", "2", "--vary", "ground.tilt=0deg:1deg:8", "--out", "out")
+    running = process("sweep", NOMINAL, *SOFT, *cases, before=early, start_new_session=True)
+    _, err = running.communicate(timeout=PATIENCE)
+    assert running.returncode == 75, err
+    assert "Traceback" not in err
+    assert "rerun the command to finish" in err
 
 
 def test_ctrl_c_during_the_last_moments_keeps_the_exit_code_of_the_command(process: Process) -> None:

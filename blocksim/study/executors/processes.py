@@ -13,7 +13,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, suppre
 from functools import partial
 from multiprocessing import active_children, get_context, parent_process, resource_tracker
 from os import _exit
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from blocksim.simulation.provenance import code_hash
 from blocksim.simulation.stopping import FOR_ALL
@@ -38,7 +38,7 @@ def pool_of(workers: int) -> Iterator[ProcessPoolExecutor]:
     others = set(active_children())
     _start_tracker()
     # spawned, not forked: threads of numerical libraries do not survive a fork
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
+    pool = _Pool(workers, mp_context=get_context("spawn"), initializer=_start_worker)
     try:
         yield pool
     except BaseException:
@@ -49,18 +49,35 @@ def pool_of(workers: int) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown(cancel_futures=True)
 
 
-def _start_tracker() -> None:
-    """Start the process in which Python counts semaphores so that it outlives what a terminal sends to all processes.
+class _Pool(ProcessPoolExecutor):
+    """A pool whose processes never see what a terminal sends to all: they would be stopped while they import."""
 
-    It would be killed otherwise, and its successor complain. What is blocked while it starts is blocked in it for ever.
-    """
+    def submit(self, *task: Any, **named: Any) -> Future[Any]:
+        """Submit a task; this is where processes are started."""
+        with _signals_held():
+            return super().submit(*task, **named)
+
+
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """Hold back what a terminal sends to all processes; it is held for ever in those that are started meanwhile."""
     if not hasattr(signal, "pthread_sigmask"):
+        yield
         return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, FOR_ALL)
     try:
-        resource_tracker.ensure_running()
+        yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _start_tracker() -> None:
+    """Start the process in which Python counts semaphores so that it outlives what a terminal sends to all processes.
+
+    It would be killed otherwise, and its successor complain.
+    """
+    with _signals_held():
+        resource_tracker.ensure_running()
 
 
 def _start_worker() -> None:
