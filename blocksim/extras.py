@@ -1,5 +1,7 @@
 """Packages of the extras, imported when something needs them."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
@@ -14,8 +16,25 @@ def loaded(module: str, purpose: str, extra: str = STUDY, package: str = "") -> 
     Raises UnavailableError.
     """
     try:
-        return import_module(module)
+        with _without_settings():
+            return import_module(module)
     except ImportError as error:
         name = package or module.partition(".")[0]
         message = f"{purpose} needs the package {name} ({error}); install the extra: pip install 'blocksim[{extra}]'"
         raise UnavailableError(message) from None
+
+
+@contextmanager
+def _without_settings() -> Iterator[None]:
+    """Keep packages from reading settings while they are imported.
+
+    ezdxf looks for some in the current folder, which may be a stranger's.
+    """
+    from configparser import ConfigParser  # noqa: PLC0415 - few commands need a package of an extra
+
+    settings: Any = ConfigParser
+    settings.read = lambda *_, **__: []  # in place of what it inherits
+    try:
+        yield
+    finally:
+        del settings.read

@@ -79,8 +79,9 @@ def calibrate(  # noqa: PLR0913 - one argument for each option of the command
     """Find the best values in `trials` trials, measure how probable agreement is with them, write a scenario file.
 
     The file is `out` (default: results/NAME/calibrate-HASH/scenario.toml); beside it every trial is kept as it ends, in
-    FILE.trials.jsonl. `resume` continues with trials that are there, `overwrite` replaces them and the file. `on_trial`
-    is reported every new trial, the best so far, and how many are to be made. Raises OutputExistsError, OutputError,
+    FILE.trials.jsonl. `resume` continues with trials that are there, `overwrite` replaces them and the file; a finished
+    calibration that is resumed leaves its file as it is. `on_trial` is reported every new trial, the best so far, and
+    how many are to be made. Raises OutputExistsError, OutputError,
     UnavailableError without the extra `study`, and StoppedEarlyError on Ctrl-C.
     """
     path = out or files.RESULTS / plan.base.name / f"calibrate-{plan.name()}" / WRITTEN
@@ -88,7 +89,8 @@ def calibrate(  # noqa: PLR0913 - one argument for each option of the command
     for package in NEEDED:
         loaded(package, PURPOSE)
     prepare(path, journal, resume=resume, overwrite=overwrite)
-    best, ties = _searched(plan, journal, trials, on_trial)
+    kept = path if path.exists() and not overwrite else None
+    best, ties = _searched(plan, journal, trials, on_trial, kept)
     fresh = plan.scatter.fresh_members(best.values, fresh_members if plan.scatter.plan else 1, plan.seed)
     members = list(run_members(plan.bare, fresh))
     score = score_of(members, plan.ranges)
@@ -100,7 +102,10 @@ def calibrate(  # noqa: PLR0913 - one argument for each option of the command
         _head(plan, best, ties),
         f"one of {len(ties)} equally good, see [provenance]" if len(ties) > 1 else NOTE,
     )
-    write_text(path, text)
+    if kept is None:
+        write_text(path, text)
+    elif kept.read_bytes() != text.encode():
+        raise OutputExistsError(_taken(kept))
     return Fit(plan, best, score, trials, path, hits_of(members, plan.ranges), ties)
 
 
@@ -108,9 +113,10 @@ def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None
     """Make the folder, and room in it. Raises OutputExistsError for files that must not go."""
     if path.is_dir():
         raise OutputExistsError(f"{path}: this is a folder; a file name is needed")
-    if path.exists() and not overwrite:
-        raise OutputExistsError(f"{path}: already exists; --overwrite replaces it, --out FILE writes elsewhere")
-    if journal.exists() and journal.stat().st_size and not (resume or overwrite):
+    has_trials = journal.exists() and journal.stat().st_size > 0
+    if path.exists() and not overwrite and not (resume and has_trials):
+        raise OutputExistsError(_taken(path))
+    if has_trials and not (resume or overwrite):
         message = f"{journal}: has trials of a calibration; --resume continues them, --overwrite starts again"
         raise OutputExistsError(message)
     try:
@@ -122,7 +128,13 @@ def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None
         raise OutputExistsError(f"{path.parent}: cannot be created: {error.strerror}") from error
 
 
-def _searched(plan: Plan, journal: Path, trials: int, on_trial: OnTrial) -> tuple[Trial, tuple[Trial, ...]]:
+def _taken(path: Path) -> str:
+    return f"{path}: already exists; --overwrite replaces it, --out FILE writes elsewhere"
+
+
+def _searched(
+    plan: Plan, journal: Path, trials: int, on_trial: OnTrial, kept: Path | None
+) -> tuple[Trial, tuple[Trial, ...]]:
     """Return the best trial, the first of equally good ones, and all that tie with it, the best among them."""
     best: Trial | None = None
     tried: list[Trial] = []
@@ -132,6 +144,8 @@ def _searched(plan: Plan, journal: Path, trials: int, on_trial: OnTrial) -> tupl
 
     with opened(journal, plan.fingerprint()) as study, interruptible():
         done = len(finished_trials(study))
+        if kept is not None and done < trials:  # they would change the file
+            raise OutputExistsError(_taken(kept))
         try:
             for trial in search(plan.priors, evaluate, study, trials=trials, seed=plan.seed):
                 tried.append(trial)

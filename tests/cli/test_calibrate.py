@@ -105,6 +105,18 @@ def test_nothing_is_overwritten_unless_asked(slide: Slide, tmp_path: Path) -> No
     assert (tmp_path / "fitted.trials.jsonl").read_text() == "trials in the lab, by hand"
 
 
+def test_finished_calibration_that_is_resumed_ends_with_0_and_leaves_its_file(slide: Slide, tmp_path: Path) -> None:
+    few = (*NEAR, *SCATTER, "--trials", 2, "--samples", 2, "--fresh", 2, "--out", "fitted.toml", "--quiet")
+    first, file = slide(*few), tmp_path / "fitted.toml"
+    before = file.read_text()
+    assert slide(*few, "--resume") == first
+    assert file.read_text() == before
+    assert slide(*few, "--resume", "--trials", 3).code == 73
+    file.write_text(f"{before}# mine\n")
+    assert slide(*few, "--resume").code == 73
+    assert file.read_text().endswith("# mine\n")
+
+
 def test_more_trials_continue_where_fewer_ended(slide: Slide) -> None:
     many = (*FIT, *SCATTER, "--samples", 2, "--fresh", 2)
     assert slide(*many, "--trials", 18, "--out", "one.toml").code == 0

@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -138,6 +140,13 @@ def test_dxf_without_its_package_names_the_extra(tmp_path: Path, monkeypatch: py
     monkeypatch.setitem(__import__("sys").modules, "ezdxf", None)
     with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[dxf\]'"):
         read_drawing(written(tmp_path, "", "wall.dxf"))
+
+
+def test_settings_in_the_current_folder_do_not_reach_the_reader_of_dxf(tmp_path: Path) -> None:
+    (tmp_path / "ezdxf.ini").write_text("[core]\nlog_unprocessed_tags = true\n")
+    code = "from blocksim.extras import loaded; print(loaded('ezdxf', 'reading').options.log_unprocessed_tags)"
+    command = [sys.executable, "-c", code]
+    assert subprocess.run(command, cwd=tmp_path, check=True, capture_output=True).stdout == b"False\n"
 
 
 def test_closed_polylines_of_a_dxf_file_are_blocks_by_their_layers(tmp_path: Path) -> None:
