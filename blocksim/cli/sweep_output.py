@@ -17,6 +17,7 @@ from blocksim.study.executors.ensemble import is_still_running
 from blocksim.study.plan import Estimate, estimate
 from blocksim.study.rows import FINISHED, MOVEMENT, Head, Row
 from blocksim.study.sweep_table import SweepResult
+from blocksim.view.sweeps.data import short_names as names_of_keys
 from blocksim.world.free_memory import readable
 
 OnRow = Callable[[int, int, Row], None]
@@ -122,16 +123,8 @@ def shown(value: object) -> str:
 
 
 def short_names(keys: Sequence[str]) -> dict[str, str]:
-    """Return keys with the shortest ends that tell them apart."""
-    return {
-        key: next(end for end in _ends(key) if sum(f".{other}".endswith(f".{end}") for other in keys) == 1)
-        for key in keys
-    }
-
-
-def _ends(key: str) -> list[str]:
-    parts = key.split(".")
-    return [".".join(parts[start:]) for start in reversed(range(len(parts)))]
+    """Return keys by the names that they have in pictures."""
+    return dict(zip(keys, names_of_keys(keys), strict=True))
 
 
 def show_sweep(result: SweepResult, *, quiet: bool) -> None:

@@ -16,7 +16,7 @@ from blocksim.view.measured import MeasuredTable, widened
 from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import Canvas, Page, depth_of, draw_ruler, finish_panel, page_for
 from blocksim.view.run_data import FramesLike, Support, drawable_frames, moments_at
-from blocksim.view.scene import draw_centres, draw_scene
+from blocksim.view.scene import TOP, draw_centres, draw_scene
 from blocksim.view.window import Extent, extent_of
 
 if TYPE_CHECKING:
@@ -189,10 +189,10 @@ def _legend(labels: Sequence[Label], *, is_labelled: bool) -> str:
     if not labels:
         return ""
     if not is_labelled:
-        return f"{len(labels)} blocks: too many to name x and rotation of each."
-    texts = ["Below each block: x of its centre, rotation."]
+        return f"{len(labels)} blocks: too many to name x and rotation of each. {TOP}"
+    is_listed = any(label.left == label.right for label in labels)
+    where = "Listed by block" if is_listed else "Below each block"
+    texts = [f"{where}: x of the centre (marked on the ground), rotation.", TOP]
     if any(label.bar for label in labels):
-        texts.append("Dot and bar: measured mean and range of the centre (mm).")
-    elif any(label.left == label.right for label in labels):
-        texts = ["Of each block: x of its centre, rotation."]
+        texts.insert(1, "Dot and bar: measured mean and range of the centre (mm).")
     return " ".join(texts)

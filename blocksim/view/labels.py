@@ -20,7 +20,7 @@ FONT = 7.0  # points
 BAR = 9.0  # points, of a measured range
 SPACE = 10.0, 7.0  # points between labels, across and down
 LETTERS = 14  # of a name
-MOST_ROWS = 4  # of labels below their blocks
+MOST_ROWS = 4  # of labels with measured ranges below their blocks; others in rows are hard to find
 CAP = 2.2  # points
 
 
@@ -51,9 +51,13 @@ def labels_of(frames: FramesLike, frame: int, page: Page, measured: MeasuredTabl
 
 
 def arranged(labels: Sequence[Label], page: Page) -> list[Label]:
-    """Return the labels below their blocks, or one after the other where too many blocks are above one another."""
+    """Return the labels below their blocks, or one after the other where too many blocks are above one another.
+
+    Where ranges are measured, labels below their blocks may take several rows.
+    """
     placed = placed_labels(labels)
-    if all(label.row < MOST_ROWS for label in placed):
+    most = MOST_ROWS if any(label.bar for label in labels) else 1
+    if all(label.row < most for label in placed):
         return placed
     return listed_labels(labels, page.panel_width * style.POINTS_PER_INCH)
 

@@ -18,6 +18,7 @@ from blocksim.world.systems.system import Track
 
 Flags = NDArray[np.bool_]
 EDGE_INSET = 0.86  # where the mark of the upper side runs, as a part of half the height
+TOP = "Thick line inside a block: top face at the start."
 NAME_ROOM = 0.85, 0.7  # width and height for a block's name, as parts of its smaller side
 LEAST_SINE = 1e-9  # between two edges that are not parallel
 LETTERS = 100  # of a name; longer ones have no room anywhere

@@ -16,7 +16,7 @@ from blocksim.view.measured import MeasuredTable, measured_ranges, rows_of, wide
 from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import ROW_HEIGHT, Canvas, depth_of, draw_ruler, finish_panel
 from blocksim.view.run_data import FramesLike, Indices, Support, drawable_frames, moments_at, moments_by_motion
-from blocksim.view.scene import MeasuredRange, draw_centres, draw_measured, draw_scene, readable_scale
+from blocksim.view.scene import TOP, MeasuredRange, draw_centres, draw_measured, draw_scene, readable_scale
 from blocksim.view.strip_layout import (
     LEAST_WIDTH,
     LINE,
@@ -75,7 +75,7 @@ def draw_strip(  # noqa: PLR0913 - one argument for each option of the command
         chosen = moments_at(frames, drawable, times)
         ranges = ranges if chosen[-1] == drawable[-1] else []  # they belong to the final state
     acts = outside(frames, chosen, support)
-    upper = ["Thick line inside a block: top face at the start."] if frames.names else []
+    upper = [TOP] if frames.names else []
     told = [*upper, _legend(ranges, support, scale), acts.explanation]
     notes = wrap(" ".join(filter(None, told)), int(LETTERS_AN_INCH * paper.width(WIDTH, LEAST_WIDTH)))
     lines = Lines(_captions(support, acts), len(notes), rows_of(ranges), paint.height)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 BAR, GAP, FOOT = 0.15, 0.46, 0.34  # inches: height of a bar, between panels, below them
 LEAST_ROOM, MOST_ROOM = 0.5, 1.75  # inches, for the name of a key; longer ones take several lines
-BROKEN = 0.8  # of the height of a bar, for each line of keys
+BROKEN = 0.95  # of the height of a bar, for each line of keys
 NARROWEST, LEAST_BAR = 0.8, 0.12  # inches, on a page whose size was asked for
 MOST_KEYS, MOST_PANELS = 10, 8
 MOST_INTERVAL = 0.6  # of the longest bar, that an axis makes room for
@@ -64,7 +64,7 @@ def draw_tornado(
         for panel, heading, count in zip(panels, titles, rows, strict=True):
             bottom -= bar * count + layout.LINE * heading.count("\n")
             axes = layout.add_axes(figure, left, bottom, width - left - 2.0 * layout.EDGE, bar * count)
-            _draw_bars(axes, panel)
+            _draw_bars(axes, panel, _font(bar, lines))
             layout.write_text(figure, layout.EDGE, bottom + bar * count + 0.05, heading)
             bottom -= GAP
         place = (layout.EDGE / width, layout.EDGE / height)
@@ -90,7 +90,12 @@ def _room_for_keys(panels: Sequence[Bars]) -> float:
     return max(widest, LEAST_ROOM) + 0.2
 
 
-def _draw_bars(axes: "Axes", panel: Bars) -> None:
+def _font(bar: float, lines: int) -> float:
+    """Return the size of the letters of keys in so many lines, for bars of a height (inches)."""
+    return min(style.FONT_SIZE, bar * style.POINTS_PER_INCH / (style.LETTER[1] * lines))
+
+
+def _draw_bars(axes: "Axes", panel: Bars, font: float) -> None:
     order = order_of(panel.values)
     places = np.arange(len(order))[::-1]
     intervals = np.nan_to_num(panel.half_widths[order])
@@ -99,7 +104,7 @@ def _draw_bars(axes: "Axes", panel: Bars) -> None:
     if panel.part is not None:
         axes.barh(places, panel.part[order], 0.36, color=FIRST_COLOUR)
     axes.axvline(0.0, color=style.FAINT_INK, linewidth=style.LINE_WIDTH)
-    axes.set_yticks(places, [panel.keys[key] for key in order])
+    axes.set_yticks(places, [panel.keys[key] for key in order], fontsize=font)
     axes.set_ylim(-0.8, len(order) - 0.2)
     axes.tick_params(axis="y", length=0.0)
     axes.spines[["right", "top", "left"]].set_visible(False)

@@ -85,9 +85,9 @@ def test_log_spacing_and_units_on_the_command_line(blocksim: Command) -> None:
     answer = blocksim(*slide, *vary)
     assert answer.code == 0
     head, _, *rows = (line.split() for line in answer.out.splitlines())
-    assert head[:3] == ["stiffness_scale", "tilt", "[deg]"]
+    assert head[:3] == ["contact.stiffness_scale", "ground.tilt", "[deg]"]
     assert [row[:2] for row in rows] == [[scale, tilt] for scale in ("0.0001", "0.001", "0.01") for tilt in ("0", "2")]
-    assert "6/6 finished: stiffness_scale = 0.01, tilt = 2 deg" in answer.err
+    assert "6/6 finished: contact.stiffness_scale = 0.01, ground.tilt = 2 deg" in answer.err
 
 
 def test_many_rows_and_columns_are_cut_and_counted(blocksim: Command) -> None:
@@ -114,15 +114,15 @@ def test_short_keys_are_the_shortest_ends_that_differ() -> None:
     assert list(short_names(keys).values()) == [
         "block_block.kinetic",
         "block_ground.kinetic",
-        "stiffness_scale",
-        "end",
+        "contact.stiffness_scale",
+        "time.end",
     ]
 
 
 def test_failures_are_listed_up_to_a_few(blocksim: Command) -> None:
     answer = blocksim(*SHORT, "--vary", "contact.max_overlap=1e-3," + ",".join(f"{k}e-9" for k in range(1, 9)))
     assert answer.code == 77
-    assert answer.err.count("  failed: max_overlap = ") == 5
+    assert answer.err.count("  failed: contact.max_overlap = ") == 5
     assert "8 of 9 cases did not finish; the first: an overlap exceeds contact.max_overlap" in answer.err
     assert "  and 3 more; --retry-failed runs them again" in answer.err
 

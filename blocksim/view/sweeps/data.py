@@ -110,7 +110,7 @@ class SweepData:
 
 
 def short_names(keys: Sequence[str]) -> list[str]:
-    """Return the keys with the shortest ends that distinguish them."""
+    """Return the keys with the shortest ends that distinguish them and name what they are of: "time.end", not "end"."""
     ends = [_ends(key) for key in keys]
     return [next(end for end in mine if sum(end in others for others in ends) == 1 or end == mine[-1]) for mine in ends]
 
@@ -123,8 +123,10 @@ def outcome_label(outcome: tuple[int, ...], most: int = 6) -> str:
 
 
 def _ends(key: str) -> list[str]:
+    """Return the ends of a key, of two parts at least and none that begins with a number, the whole last."""
     parts = key.split(".")
-    return [".".join(parts[start:]) for start in reversed(range(len(parts)))]
+    ends = [".".join(parts[start:]) for start in reversed(range(len(parts))) if not parts[start].isdigit()]
+    return ends[1:] or [key]
 
 
 def percent(share: float) -> str:

@@ -9,8 +9,9 @@ from tests.view.sweeps.made_up import made_up
 
 def test_keys_get_the_shortest_ends_that_tell_them_apart() -> None:
     keys = ["friction.block_block.static", "friction.block_ground.static", "contact.restitution", "gravity"]
-    assert short_names(keys) == ["block_block.static", "block_ground.static", "restitution", "gravity"]
+    assert short_names(keys) == ["block_block.static", "block_ground.static", "contact.restitution", "gravity"]
     assert short_names(["a", "b.a"]) == ["a", "b.a"]
+    assert short_names(["time.end", "structures.0.rows"]) == ["time.end", "structures.0.rows"]  # of what, too
 
 
 def test_outcomes_are_quarters_of_a_turn_and_none_where_a_case_failed() -> None:
