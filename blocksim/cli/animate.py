@@ -53,5 +53,4 @@ def animate_command(
     if stored.remark:
         note(stored.remark)
     if not quiet:
-        gone = f"; {beyond} of {len(stored.frames.names)} blocks leave the view" if beyond else ""
-        note(f"animation: {animation} ({older}{count} frames{gone})")
+        note(f"animation: {animation} ({older}{count} frames{f'; {beyond}' if beyond else ''})")

@@ -1,6 +1,6 @@
 """A run as an animation: choice of frames, and one picture after the other."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Pixels = NDArray[np.uint8]  # (height, width, 3), red, green, blue
+Flags = NDArray[np.bool_]
 Writer = Callable[[Path, Iterator[Pixels], Floats], None]
 
 WRITERS: dict[str, Writer] = {".gif": write_gif, ".mp4": write_mp4}  # by suffix; one function and one line a format
@@ -34,6 +35,7 @@ KEY_FOOT = 0.04  # inches, below what explains the colours
 HELD = 1.5  # s that the last picture stays
 MOST_PICTURES = 10_000
 TIME_ROOM, MARKS_ROOM = 60.0, 70.0  # points: for the time, and for a mark of what acts on all bodies
+FEW_NAMES = 2  # of blocks that leave the view
 FEW_BLOCKS = 30  # up to which trails are drawn by default
 TRAIL: dict[str, Any] = {"linewidths": 1.0, "alpha": 0.5, "zorder": 2.5}  # below names
 
@@ -64,11 +66,11 @@ def draw_animation(
     look: Look | None = None,
     support: Support | None = None,
     on_picture: Callable[[int, int], None] = lambda *_: None,
-) -> tuple[int, int]:
+) -> tuple[int, str]:
     """Write a run as GIF or MP4; the last frame is held.
 
-    Returns the number of frames, and of blocks that leave the window. `support` is what the blocks stand on: level
-    ground at rest if it is not given. `on_picture` is called with the numbers of frames drawn and to draw. Raises
+    Returns the number of frames, and which blocks leave the view, as written in the pictures. `support` is what the
+    blocks stand on: level ground at rest if it is not given. `on_picture` is called with the numbers of frames drawn and to draw. Raises
     InvalidInputError for an unknown format, forces that were not stored, nothing to draw or too many frames,
     OutputError when the file cannot be written and UnavailableError when what writes MP4 is missing.
     """
@@ -83,7 +85,7 @@ def draw_animation(
             on_picture(number, len(chosen))
 
     write(path, pictures(), seconds)
-    return len(chosen), int((~animation.seen).sum())
+    return len(chosen), animation.beyond
 
 
 def writer_of(path: Path) -> Writer:
@@ -116,6 +118,17 @@ def timed(frames: FramesLike, drawable: Indices, pace: Pace) -> tuple[Indices, F
     return drawable[nearest], seconds
 
 
+def beyond_view(names: Sequence[str], seen: Flags) -> str:
+    """Return which blocks leave the view, by name where they are few; empty where all stay."""
+    gone = [name for name, is_seen in zip(names, seen, strict=True) if not is_seen]
+    if not gone:
+        return ""
+    verb = "leaves" if len(gone) == 1 else "leave"
+    if len(gone) <= FEW_NAMES:
+        return f"block{'' if len(gone) == 1 else 's'} {' and '.join(gone)} {verb} the view"
+    return f"{len(gone)} of {len(names)} blocks {verb} the view"
+
+
 class Animation:
     """Draws one frame after the other on the same page; fixed parts are drawn once."""
 
@@ -130,6 +143,7 @@ class Animation:
         tallest = HIGHEST * (across - 2.0 * MARGINS[0])
         margins = (*MARGINS[:2], MARGINS[2] + self.paint.height)
         self.seen = together(frames, self.drawable, support)
+        self.beyond = beyond_view(frames.names, self.seen)
         extent = extent_of(frames, self.drawable, support, self.seen)
         self.acts, self.length = outside(frames, self.drawable, support), length_in(extent)
         self.page = page_for(with_room(extent, self.acts, self.length), across, tallest, margins)
@@ -156,15 +170,16 @@ class Animation:
         place = MARGINS[0] / self.page.width, 1.0 - 0.06 / self.page.height
         figure.text(*place, shown, va="top", fontsize=style.TITLE_SIZE)
         draw_key(figure, self.paint, MARGINS[0], KEY_FOOT)
-        scales = [] if self.forces is None else [f"forces: {self.forces.example}"]
+        scales = [self.beyond] if self.beyond else []
+        scales += [] if self.forces is None else [f"forces: {self.forces.example}"]
         scales += [f"loads: {self.acts.sizes}"] if self.acts.sizes else []
         if scales:
-            self._tell_scale("; ".join(scales))
+            self._tell("; ".join(scales))
         if self.support.is_still:
             draw_standing(self.canvas, self.frames, int(self.drawable[0]), self.support)
 
-    def _tell_scale(self, scales: str) -> None:
-        """Write the scale of arrows at the right, in the line of the time, as far as there is room."""
+    def _tell(self, scales: str) -> None:
+        """Write what leaves the view and the scale of arrows at the right, beside the time, where there is room."""
         marks = MARKS_ROOM * max(map(len, self.acts.marks), default=0)
         room = self.page.panel_width * style.POINTS_PER_INCH - TIME_ROOM - marks
         top = self.page.extent.top + 4.0 / self.page.points_per_mm

@@ -14,7 +14,7 @@ from blocksim.errors import InvalidInputError, OutputError, UnavailableError
 from blocksim.scenario import load_scenario
 from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.frames import Frames
-from blocksim.view.animation import Animation, Look, Pace, Pixels, draw_animation, timed
+from blocksim.view.animation import Animation, Look, Pace, Pixels, beyond_view, draw_animation, timed
 from blocksim.view.animation_files import ticks
 from blocksim.view.paint import PAINTS
 from blocksim.view.run_data import Support
@@ -103,7 +103,7 @@ def test_uneven_frames_are_shown_at_their_times_and_a_single_one_is_an_animation
 def test_gif_plays_as_long_as_it_should_in_the_blocks_own_colours_with_the_same_bytes(tmp_path: Path) -> None:
     frames, look, paths = toppling(6), Look(400), [tmp_path / f"{number}.gif" for number in (1, 2)]
     for path in paths:
-        assert draw_animation(frames, path, Pace(0.5, 30.0), look) == (37, 0)
+        assert draw_animation(frames, path, Pace(0.5, 30.0), look) == (37, "")
     assert paths[0].read_bytes() == paths[1].read_bytes()
     length = 0
     with GifImageFile(paths[0]) as animation:
@@ -227,6 +227,18 @@ def test_blocks_far_from_one_another_stay_in_the_window_but_one() -> None:
         frames.x[:, 1] += 5.0
     three.y[:, 2] += 5.0
     assert [Animation(frames, Support(), SMALL).seen.sum() for frames in (two, three)] == [2, 2]
+
+
+def test_pictures_say_which_blocks_leave_the_view() -> None:
+    frames = toppling(60)
+    frames.x[-1, 59] += 5.0
+    film = Animation(frames, Support(), SMALL)
+    assert film.beyond == "block 60 leaves the view"
+    assert film.beyond in [text.get_text() for text in film.canvas.axes.texts]
+    near = Animation(toppling(60), Support(), SMALL).canvas.axes.texts
+    assert not any("the view" in text.get_text() for text in near)
+    assert beyond_view(frames.names, np.arange(60) >= 2) == "blocks 1 and 2 leave the view"
+    assert beyond_view(frames.names, np.arange(60) >= 3) == "3 of 60 blocks leave the view"
 
 
 def test_missing_package_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
