@@ -70,9 +70,9 @@ def draw_animation(
     """Write a run as GIF or MP4; the last frame is held.
 
     Returns the number of frames, and which blocks leave the view, as written in the pictures. `support` is what the
-    blocks stand on: level ground at rest if it is not given. `on_picture` is called with the numbers of frames drawn and to draw. Raises
-    InvalidInputError for an unknown format, forces that were not stored, nothing to draw or too many frames,
-    OutputError when the file cannot be written and UnavailableError when what writes MP4 is missing.
+    blocks stand on: level ground at rest if it is not given. `on_picture` is called with the numbers of frames drawn
+    and to draw. Raises InvalidInputError for an unknown format, forces that were not stored, nothing to draw or too
+    many frames, OutputError when the file cannot be written and UnavailableError when what writes MP4 is missing.
     """
     path = Path(path)
     write = writer_of(path)

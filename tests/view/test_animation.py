@@ -232,7 +232,7 @@ def test_blocks_far_from_one_another_stay_in_the_window_but_one() -> None:
 def test_pictures_say_which_blocks_leave_the_view() -> None:
     frames = toppling(60)
     frames.x[-1, 59] += 5.0
-    film = Animation(frames, Support(), SMALL)
+    film = Animation(frames, Support(), Look(width=400))
     assert film.beyond == "block 60 leaves the view"
     assert film.beyond in [text.get_text() for text in film.canvas.axes.texts]
     near = Animation(toppling(60), Support(), SMALL).canvas.axes.texts
