@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli import options
+from blocksim.cli import completion, options
 from blocksim.cli.output import note, number, show, table_lines
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.vary import RANGE, SPREAD, read_variations
@@ -26,7 +26,13 @@ TOLD_SECONDS = 2.0
 def calibrate_command(
     scenario: options.ScenarioPath,
     fit: Annotated[
-        list[str] | None, typer.Option(FIT, metavar="KEY=FROM:TO", help="A key to fit, and its prior. Repeatable.")
+        list[str] | None,
+        typer.Option(
+            FIT,
+            metavar="KEY=FROM:TO",
+            help="A key to fit, and its prior. Repeatable.",
+            autocompletion=completion.scenario_keys,
+        ),
     ] = None,
     scatter: Annotated[
         list[str] | None,
@@ -35,6 +41,7 @@ def calibrate_command(
             metavar="KEY=MEAN+-SD",
             help="Scatter of an input (KEY=FROM:TO: uniform); of a fitted key, about its fitted value. Repeatable. "
             "Default: the distributions of [sweep].",
+            autocompletion=completion.scenario_keys,
         ),
     ] = None,
     trials: Annotated[int, typer.Option(min=1, metavar="N", help="Number of trials.")] = TRIALS,

@@ -29,6 +29,29 @@ def _words(names: Iterable[str], incomplete: str) -> list[str]:
     return [name for name in names if name.startswith(incomplete) and _WORD.fullmatch(name)]
 
 
+def _kinds() -> list[str]:
+    from blocksim.view.kinds import MOTION, PROBE, RUN_KINDS, SWEEP_KINDS
+
+    return [*RUN_KINDS, MOTION, PROBE, *SWEEP_KINDS, "tornado"]
+
+
+def _colours() -> tuple[str, ...]:
+    from blocksim.view.paint import COLOURS
+
+    return COLOURS
+
+
+def _cases() -> list[str]:
+    from blocksim.verification.cases import CASES
+    from blocksim.verification.soil import SOIL_CASES
+
+    return [case.id for case in (*CASES, *SOIL_CASES)]
+
+
+kinds, colours, cases = of_names(_kinds), of_names(_colours), of_names(_cases)
+"""Completions of kinds of pictures, of ways to colour them, and of verification cases."""
+
+
 def scenario_keys(ctx: Any, incomplete: str) -> list[str]:
     """Return the dotted keys of the scenario on the line, each with its equals sign."""
     words = [

@@ -63,6 +63,7 @@ def limit_command(
             metavar="KEY=FROM:TO",
             help="The key and its range. KEY=FROM:TO:COUNT scans COUNT values first (default: those of --scan); :log "
             "at the end spaces them logarithmically.",
+            autocompletion=completion.scenario_keys,
         ),
     ],
     stands: Annotated[

@@ -114,6 +114,7 @@ Colour = Annotated[
         "--color",
         parser=colour_name,
         metavar="BY",
+        autocompletion=completion.colours,
         help="Colour blocks by block, material, speed or turn; soil by displacement (default), speed, plastic or "
         "pressure.",
     ),

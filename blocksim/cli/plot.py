@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli import options
+from blocksim.cli import completion, options
 from blocksim.cli.output import note
 from blocksim.simulation.own_files import is_picture, refuse_foreign
 from blocksim.study.pictures import draw
@@ -42,6 +42,7 @@ def plot_command(
             "or probe. Of a sweep: lines, "
             "map (two inputs), matrix (every two inputs) or histogram; tornado for sensitivities (default: what "
             "suits).",
+            autocompletion=completion.kinds,
         ),
     ] = None,
     frames: Annotated[

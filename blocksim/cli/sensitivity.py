@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli import options
+from blocksim.cli import completion, options
 from blocksim.cli.output import note, number, show, table_lines
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.progress import counting
@@ -42,6 +42,7 @@ def sensitivity_command(
             metavar="KEY=FROM:TO",
             help="An input and its distribution: KEY=FROM:TO, KEY=MEAN+-SD or KEY=a,b,c. Repeatable. "
             "Default: the distributions of [sweep].",
+            autocompletion=completion.scenario_keys,
         ),
     ] = None,
     method: Annotated[MethodName, typer.Option(help="Elementary effects, or shares of the variance.")] = (

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from blocksim.cli import options
+from blocksim.cli import completion, options
 from blocksim.cli.output import print_json
 from blocksim.cli.prepare import tell_compilation, warn_of_values
 from blocksim.cli.sweep_output import leaving_unfinished_cases, reporting, short_names, show_estimate, show_sweep
@@ -40,6 +40,7 @@ def sweep_command(
             metavar="KEY=VALUES",
             help="KEY=a,b,c or KEY=from:to:count; for random draws KEY=from:to or KEY=mean+-sd. With :log at the end, "
             "from:to is spaced logarithmically. Repeatable.",
+            autocompletion=completion.scenario_keys,
         ),
     ] = None,
     mode: Annotated[

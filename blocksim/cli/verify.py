@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli import options
+from blocksim.cli import completion, options
 from blocksim.cli.output import grouped_lines, note, show
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.progress import one_by_one
@@ -49,7 +49,10 @@ class Scheme(StrEnum):
 
 
 def verify_command(
-    cases: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="V1 to V25 (default: all).")] = None,
+    cases: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[CASE]...", help="V1 to V25 (default: all).", autocompletion=completion.cases),
+    ] = None,
     model: Annotated[Model, typer.Option(help="Contact model.")] = Model.SURFACE,
     law: Annotated[Law, typer.Option(help="Force law.")] = Law.LINEAR,
     scheme: Annotated[Scheme, typer.Option(help="Stepping: springs or impulses.")] = Scheme.EXPLICIT,
