@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import Records
-from blocksim.kernels.nonsmooth.arrays import AWAY, Nonsmooth
+from blocksim.kernels.nonsmooth.arrays import AWAY, NOT_STRUCK, Nonsmooth
 from blocksim.scenario import PlacedBody
 from blocksim.world.loads import loads_at_rest
 
@@ -144,7 +144,7 @@ def _overlaps_at_rest(scene: Nonsmooth, found: Records) -> NDArray[np.float64]:
     """Return the overlaps (m) of constraints that press, zero for impacts and for bodies that still move."""
     bodies, stepping = scene.world.bodies, scene.contacts.stepping[0]
     one, two = (np.where(found[f"normal_{name}"] > 0.0, -found[f"gap_{name}"], 0.0) for name in ("one", "two"))
-    overlap = np.where((found["reach"] == AWAY) | (found["is_struck"] == 1), 0.0, np.maximum(one, two))
+    overlap = np.where((found["reach"] == AWAY) | (found["is_struck"] != NOT_STRUCK), 0.0, np.maximum(one, two))
     a, b = bodies[found["a"]], bodies[found["b"]]
     rate = (
         np.hypot(a["vx"] - b["vx"], a["vy"] - b["vy"])

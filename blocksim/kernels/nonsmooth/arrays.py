@@ -29,7 +29,8 @@ CONSTRAINT = record_type(
     "normal_one normal_two shear "  # N s: impulses of the last substep: pushing apart, on body a along the tangent
     "bend shear_bend",  # m/s: gain of the velocities at the points in half a substep, as bodies turn; gap_curvature.py
     indices="a b material",  # bodies; place in the table of interactions
-    # of the manifold in the current step: AWAY, OPEN or TOUCHING; its impulses are those of impacts that are over
+    # of the manifold in the current step: AWAY, OPEN or TOUCHING; its impulses are those of impacts that are over:
+    # NOT_STRUCK, STRUCK, STRUCK_AT_REST; FORGOTTEN of the last one when the next step has begun without them
     flags="reach is_struck "
     "corner_one corner_two",  # of a polygon's pair: the corners that the points are, see polygons.py; else zero
 )
@@ -86,7 +87,8 @@ ASIDE_LANES = (
     "rise_one rise_two "  # m/s: that a rebound gets against gravity after all rounds; -FAR before it is hit
     "all_one all_two "  # m/s: targets of a round with all rebounds
     "after_one after_two after_shear "  # N s: of the solutions of restraint.py, as in IMPACT
-    "low_one low_two low_shear"
+    "low_one low_two low_shear "
+    "held"  # N s: normal impulses of the substep before; FAR of what presses though they are forgotten
 )
 ASIDE = on_own_lines(
     np.dtype([*((name, np.float64, (WIDTH,)) for name in ASIDE_LANES.split()), ("is_hit", np.uint8)], align=True)
@@ -99,7 +101,7 @@ LISTED = record_type(
 KEPT = record_type(
     "nx ny normal_one normal_two shear",  # of a constraint whose pair is in the next list too
     indices="a b colour next",  # bodies of a listed pair, its colour; the next old one with the same body a, from 1
-    flags="corner_one corner_two",
+    flags="corner_one corner_two is_struck",
 )
 STEPPING = record_type(
     "substep "  # s
@@ -133,6 +135,7 @@ STEPPING = record_type(
     "is_driven "  # flag: bodies move differently from the supports
     "is_settled "  # flag: the run begins at rest, with impulses that hold against gravity
     "is_shaken "  # flag: supports or driven bodies move, so that impulses on them do work
+    "has_forgotten "  # flag: impulses of what pressed are forgotten in the current part of a step, after an impact
     "has_rebounds "  # flag: anything rebounds in the current substep
     "has_gain",  # flag: the last round has created energy in a cluster
 )
@@ -145,6 +148,7 @@ TALLY = record_type("impacts friction to_support")  # J: what normal and shear i
 
 FAR = 1e9  # m or m/s: of points that are not there, or do not count
 AWAY, OPEN, TOUCHING = range(3)  # no point within the margin; a gap at all points; a point that touches or pressed
+NOT_STRUCK, STRUCK, STRUCK_AT_REST, FORGOTTEN = range(4)  # the last two pressed before the impact too
 COLOURS = 64  # the last one is for pairs that found no other; one thread goes through it
 PART = 4  # groups that share a tally; threads take whole ones
 

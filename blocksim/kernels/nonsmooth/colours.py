@@ -38,6 +38,7 @@ def forget(one: Record) -> None:
     one.shear = 0.0
     one.corner_one = 0
     one.corner_two = 0
+    one.is_struck = 0
 
 
 @kernel
@@ -50,6 +51,7 @@ def copy_impulses(source: Record, target: Record) -> None:
     target.shear = source.shear
     target.corner_one = source.corner_one
     target.corner_two = source.corner_two
+    target.is_struck = source.is_struck
 
 
 @rare_kernel

@@ -7,8 +7,9 @@ are hit, with u as it is then:
 
     0 <= lambda  complementary to  J v + e u >= 0
 
-Points that touched when the substep began and neither approach nor part push back at once (target zero): blocks that
-press on one another are struck as one. All other points wait until they are hit in a later round. Rounds continue
+Points that pressed when the substep began and neither approach nor part push back at once (target zero): blocks that
+press on one another are struck as one. All other points wait until they are hit in a later round, also those that touch
+without pressing: in a row of blocks one is struck after the other, whether they touch or not. Rounds continue
 until nothing approaches; then gravity and what rests are solved as ever, and points that were hit keep their rebound.
 
 Without friction the energy of a round changes by -(1 - e) / 2 sum(lambda |u|): none is created, and with e = 1 none is

@@ -1,14 +1,27 @@
 """What a round of impacts does to the constraints of the clusters that are hit; see impacts.py."""
 
+import math
+
 from blocksim.kernels.common.arrays import Record
-from blocksim.kernels.common.jit import rare_kernel
-from blocksim.kernels.common.simd import WIDTH, Lane, Lanes, Mask, fields_0, greater, load, select, store
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.simd import WIDTH, Lane, Lanes, Mask, fields_0, greater, lesser, load, select, store
 from blocksim.kernels.nonsmooth.aims import gaps, pulls
-from blocksim.kernels.nonsmooth.arrays import FAR, PART, Contacts
+from blocksim.kernels.nonsmooth.arrays import (
+    AWAY,
+    FAR,
+    FORGOTTEN,
+    NOT_STRUCK,
+    PART,
+    STRUCK,
+    STRUCK_AT_REST,
+    Contacts,
+)
 from blocksim.kernels.nonsmooth.clusters import of_constraint
 from blocksim.kernels.nonsmooth.groups import bodies_at, constraints_of, highest, total
 from blocksim.kernels.nonsmooth.passes import taken_by
-from blocksim.kernels.nonsmooth.slip import slip_of
+from blocksim.kernels.nonsmooth.slip import presses, slip_of
+
+UPRIGHT = 0.1  # cosine of the angle between a normal and gravity, from which on it presses at the start of a run
 
 
 @rare_kernel
@@ -18,6 +31,32 @@ def clear(group: Record) -> None:
     store(None, group.normal_one, none)
     store(None, group.normal_two, none)
     store(None, group.shear, none)
+
+
+@kernel
+def keep_held(contacts: Contacts, begin: int, end: int) -> None:
+    """Keep the normal impulses with which a substep begins for some groups: they tell what presses."""
+    for m in range(begin, end):
+        group = contacts.groups[m]
+        store(None, contacts.asides[m].held, load(None, group.normal_one) + load(None, group.normal_two))
+
+
+@rare_kernel
+def hold(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None:
+    """Let constraints of some groups press that did so before an impact, in the first substep after it.
+
+    At the start of a run, with a gravity (gx, gy), all those press that are not upright: nothing is known of them yet.
+    """
+    least = UPRIGHT * math.hypot(gx, gy)
+    for m in range(begin, end):
+        group = contacts.groups[m]
+        for lane in range(WIDTH):
+            constraint = contacts.constraints[group.constraint[lane]]
+            across = abs(constraint.nx * gx + constraint.ny * gy)
+            if constraint.is_struck == FORGOTTEN or across > least:
+                contacts.asides[m].held[lane] = FAR
+        for lane in range(group.count):
+            contacts.constraints[group.constraint[lane]].is_struck = NOT_STRUCK
 
 
 @rare_kernel
@@ -55,11 +94,16 @@ def forget_hits(contacts: Contacts, group: Record, aside: Record) -> None:
 
 
 @rare_kernel
-def aim_point(u: Lanes, start: Lanes, active: Lanes, after: Lanes, bend: Lanes, stepping: Record) -> tuple[Lanes, Mask]:
-    """Return the target (m/s) of a point in the next round, and whether it is hit and has to reach `after`."""
+def aim_point(
+    u: Lanes, start: Lanes, active: Lanes, after: Lanes, bend: Lanes, held: Mask, stepping: Record
+) -> tuple[Lanes, Mask]:
+    """Return the target (m/s) of a point in the next round, and whether it is hit and has to reach `after`.
+
+    A point that is not `held` does not press: it waits until what it touches comes nearer.
+    """
     counts = active > -FAR
     is_hit = counts & (u < -stepping.threshold)
-    rests = counts & (abs(u) <= stepping.threshold) & (start <= stepping.rest_gap)
+    rests = counts & held & (abs(u) <= stepping.threshold) & (start <= stepping.rest_gap)
     return select(is_hit, bend + after, select(rests, bend - greater(u, 0.0), -FAR)), is_hit
 
 
@@ -91,8 +135,9 @@ def aim_group(contacts: Contacts, m: int, lane: Lane, is_first: bool) -> Lanes:
     last_two = old_two if is_first else -e * u.two - 0.5 * pull
     after_one = least_after(u.one, last_one, pull, e)
     after_two = least_after(u.two, last_two, pull, e)
-    t_one, hit_one = aim_point(u.one, load(lane, group.start_one), old_one, after_one, bend, stepping)
-    t_two, hit_two = aim_point(u.two, load(lane, group.start_two), old_two, after_two, bend, stepping)
+    held = presses(load(lane, aside.held), a.inverse_mass + b.inverse_mass, stepping)
+    t_one, hit_one = aim_point(u.one, load(lane, group.start_one), old_one, after_one, bend, held, stepping)
+    t_two, hit_two = aim_point(u.two, load(lane, group.start_two), old_two, after_two, bend, held, stepping)
     store(lane, group.target_one, t_one)
     store(lane, group.target_two, t_two)
     rise_one = load(lane, aside.rise_one)
@@ -144,7 +189,11 @@ def tally_round(contacts: Contacts, begin: int, end: int, gx: float, gy: float) 
 
 @rare_kernel
 def aim_rest_of(contacts: Contacts, m: int, lane: Lane) -> None:
-    """Set what the points of a group keep after all impacts: their rebound against gravity, else no approach."""
+    """Set what the points of a group keep after all impacts: their rebound against gravity, else no approach.
+
+    Two free bodies that only touched have nothing to rebound against: what moves slower than the threshold pushes one
+    of them, and must not push the other away from it.
+    """
     stepping = contacts.stepping[0]
     group = contacts.groups[m]
     aside = contacts.asides[m]
@@ -156,8 +205,13 @@ def aim_rest_of(contacts: Contacts, m: int, lane: Lane) -> None:
     vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
     u = slip_of(constraint, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
     bend = stepping.bend_share * load(lane, group.bend)
-    one = kept(u.one, load(lane, aside.rise_one), bend, gap_one, stepping)
-    two = kept(u.two, load(lane, aside.rise_two), bend, gap_two, stepping)
+    are_free = lesser(a.inverse_mass, b.inverse_mass) > 0.0
+    held = presses(load(lane, aside.held), a.inverse_mass + b.inverse_mass, stepping)
+    none = 0.0 * bend - FAR
+    rise_one = select(are_free, select(held, load(lane, aside.rise_one), none), load(lane, aside.rise_one))
+    rise_two = select(are_free, select(held, load(lane, aside.rise_two), none), load(lane, aside.rise_two))
+    one = kept(u.one, rise_one, bend, gap_one, stepping)
+    two = kept(u.two, rise_two, bend, gap_two, stepping)
     store(lane, group.target_one, select(load(lane, aside.target_one) > -FAR, one, -FAR))
     store(lane, group.target_two, select(load(lane, aside.target_two) > -FAR, two, -FAR))
 
@@ -195,7 +249,10 @@ def bring_back(contacts: Contacts, begin: int, end: int, are_hit: bool) -> None:
             is_hit = of_constraint(contacts, group, min(lane, group.count - 1)).is_hit == 1
             if is_hit == are_hit:
                 if aside.normal_one[lane] + aside.normal_two[lane] > 0.0 and is_hit:
-                    contacts.constraints[group.constraint[lane]].is_struck = 1
+                    states = contacts.states
+                    inverse_mass = states[group.a[lane]].inverse_mass + states[group.b[lane]].inverse_mass
+                    is_held = presses(aside.held[lane], inverse_mass, contacts.stepping[0])
+                    contacts.constraints[group.constraint[lane]].is_struck = STRUCK_AT_REST if is_held else STRUCK
                 group.normal_one[lane] += aside.normal_one[lane]
                 group.normal_two[lane] += aside.normal_two[lane]
                 group.shear[lane] += aside.shear[lane]
@@ -203,9 +260,18 @@ def bring_back(contacts: Contacts, begin: int, end: int, are_hit: bool) -> None:
 
 @rare_kernel
 def forget_struck(contacts: Contacts, begin: int, end: int) -> None:
-    """Let some constraints begin a step without the impulses of impacts: nothing presses on them any more."""
+    """Let some constraints begin a step without the impulses of impacts: nothing presses on them any more.
+
+    Those that pressed before are still known, for the first substep; see hold.
+    """
     for r in range(begin, end):
         constraint = contacts.constraints[r]
-        if constraint.is_struck:
-            constraint.is_struck = 0
+        if constraint.is_struck == STRUCK or constraint.is_struck == STRUCK_AT_REST:
             constraint.normal_one = constraint.normal_two = constraint.shear = 0.0
+            if constraint.is_struck == STRUCK_AT_REST:
+                constraint.is_struck = FORGOTTEN
+                contacts.stepping[0].has_forgotten = 1  # the same by every thread
+            else:
+                constraint.is_struck = NOT_STRUCK
+        elif constraint.reach == AWAY:
+            constraint.is_struck = NOT_STRUCK

@@ -74,6 +74,7 @@ def check(scene: Nonsmooth) -> int:
 def end_part(scene: Nonsmooth) -> int:
     """End a part of a step for all; return UNDER_WAY, or the status of a step that has come to its end."""
     clock = scene.world.clock[0]
+    scene.contacts.stepping[0].has_forgotten = 0
     if has_motion(scene.world.controls[0]):
         place_supports(scene)
     if is_continued(scene, scene.contacts.asides):

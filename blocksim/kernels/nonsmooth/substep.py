@@ -10,7 +10,7 @@ from blocksim.kernels.nonsmooth.impacts import follow_impacts
 from blocksim.kernels.nonsmooth.iterate import FIRST_VELOCITY, POSITION, WARM, sweep, velocity_pass
 from blocksim.kernels.nonsmooth.loads import kick_by_loads, pull_of_loads, tally_loads
 from blocksim.kernels.nonsmooth.motion import drift_all, kick_all, kick_all_warm
-from blocksim.kernels.nonsmooth.rounds import bring_back
+from blocksim.kernels.nonsmooth.rounds import bring_back, hold, keep_held
 from blocksim.kernels.nonsmooth.supports import drive
 from blocksim.kernels.nonsmooth.sweeps import part_of, tally_constraints
 
@@ -93,6 +93,20 @@ def tally(scene: Nonsmooth, k: int, share: float) -> tuple[int, int]:
 
 
 @kernel
+def note_what_presses(scene: Nonsmooth, k: int, number: int, is_first_step: bool, asides: Records | None) -> None:
+    """Note what presses before substep `number` as thread k; `asides` as in go_through_impacts."""
+    if asides is None:
+        return
+    contacts = scene.contacts
+    first, last = part_of(0, contacts.stepping[0].group_count, k, scene.world.team[TEAM_SIZE])
+    keep_held(contacts, first, last)
+    if number == 0 and (is_first_step or contacts.stepping[0].has_forgotten):
+        controls = scene.world.controls[0]
+        share = 1.0 if is_first_step else 0.0
+        hold(contacts, first, last, share * controls.gravity_x, share * controls.gravity_y)
+
+
+@kernel
 def go_through_impacts(scene: Nonsmooth, k: int, bodies: tuple[int, int], share: float, asides: Records | None) -> None:
     """Let impacts of a substep follow from one another as thread k; see follow_impacts.
 
@@ -124,6 +138,7 @@ def substep(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
     first, last = bodies_of(contacts, k, team[TEAM_SIZE])
     if k == 0:
         prepare(scene, number, share)
+    note_what_presses(scene, k, number, is_first_step, contacts.asides)
     start(scene, k, number, is_first_step)
     sweep(contacts, POSITION, team, k)
     ground = last + (k == team[TEAM_SIZE] - 1)  # which may move, is the last
