@@ -94,7 +94,7 @@ def test_row_of_blocks_apart_loses_at_every_blow_what_newton_says(
 def struck_row(count: int, gap: float, **more: Any) -> tuple[list[dict[str, Any]], list[int]]:
     """Return a row of blocks that stand on the ground (m between them), `incoming` ones at 1 m/s, and their places.
 
-    Optional are `heights` (m), `is_mirrored`, and the `order` in which they are given.
+    Optional are `heights` (m) and `middle` (m), `is_mirrored`, `has_outlines`, and the `order` in which they are given.
     """
     heights = more.get("heights", [HEIGHT] * count)
     incoming, sign = more.get("incoming", 1), -1.0 if more.get("is_mirrored") else 1.0
@@ -104,7 +104,9 @@ def struck_row(count: int, gap: float, **more: Any) -> tuple[list[dict[str, Any]
         x = i * WIDTH + max(0, i - incoming + 1) * gap - (1e-3 if i < incoming else 0.0)
         speed = 1.0 if i < incoming else 0.0
         middle = more.get("middle", 0.5 * heights[i])
-        blocks.append({"x": sign * x, "y": middle, "height": heights[i], "velocity": [sign * speed, 0.0]})
+        corners = [[0.5 * a * WIDTH, 0.5 * b * heights[i]] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        shape = {"outline": corners} if more.get("has_outlines") else {"height": heights[i]}
+        blocks.append({"x": sign * x, "y": middle, **shape, "velocity": [sign * speed, 0.0]})
     return blocks, [order.index(i) for i in range(count)]
 
 
@@ -115,6 +117,7 @@ CRADLES: dict[str, tuple[int, dict[str, Any], list[float]]] = {
     "seven": (7, {}, [0.0] * 6 + [1.0]),
     "two on three": (5, {"incoming": 2}, [0.0, 0.0, 0.0, 1.0, 1.0]),
     "from the right": (5, {"is_mirrored": True}, [0.0, 0.0, 0.0, 0.0, 1.0]),
+    "outlines": (5, {"has_outlines": True}, [0.0, 0.0, 0.0, 0.0, 1.0]),
     "in another order": (5, {"order": [3, 0, 4, 2, 1]}, [0.0, 0.0, 0.0, 0.0, 1.0]),
 }
 
