@@ -183,7 +183,7 @@ class LimitResult:
 
 def write_result(result: LimitResult) -> None:
     """Write limit.csv, and the answer into limit.json."""
-    rows = [[_head(result.plan), *COLUMNS], *_records(result)]
+    rows: list[list[object]] = [[_head(result.plan), *COLUMNS], *_records(result)]
     write_answer(result.folder / TABLE, LIMIT, rows, result.to_dict())
 
 

@@ -265,7 +265,7 @@ RECORDS = [0.25, 0.29, 0.33, 0.37, 0.41, 0.45]
 
 
 def test_stripes_have_each_record_once_at_each_intensity_and_wider_intervals(tmp_path: Path) -> None:
-    stripes = {"stripes": {MU: RECORDS}, "fails": SLIDES, "jobs": 1}
+    stripes: dict[str, Any] = {"stripes": {MU: RECORDS}, "fails": SLIDES, "jobs": 1}
     found = fragility(SLOPE, TILTS, **stripes, out=tmp_path / "study")
     table = _members(tmp_path / "study")
     assert [sorted(rows[MU]) for _, rows in table.groupby("ground.tilt [deg]")] == [RECORDS] * 5

@@ -222,7 +222,7 @@ def test_sustained_loads_slip_at_the_friction_angle_with_both_schemes(tmp_path: 
 
 
 def test_limits_of_rigid_contacts_that_go_with_the_step_hold_those_of_half_of_it(tmp_path: Path) -> None:
-    ring = {
+    ring: dict[str, Any] = {
         "schema": 1,
         "name": "ring",
         "materials": {"stone": {"density": 2000, "young_modulus": "10 GPa", "poisson_ratio": 0.2}},

@@ -44,7 +44,8 @@ def test_structures_that_stand_again_beyond_a_range_of_falling_have_all_changes_
 
 @pytest.mark.parametrize("is_log", [False, True])
 def test_an_island_between_two_values_of_the_scan_is_found_where_rotations_peak_beside_it(is_log: bool) -> None:
-    span, known = Span(0.264, 0.748, 9, is_log), {}
+    span = Span(0.264, 0.748, 9, is_log)
+    known: dict[int | float, str] = {}
     while values := next_values(span, known, 1e-3, {value: 1.0 / (0.01 + abs(value - 0.47)) for value in known}):
         known |= {value: "falls" if 0.4613 < value < 0.4815 else "stands" for value in values}
     assert [round(one.low, 3) for one in changes_in(known)] == pytest.approx([0.461, 0.481], abs=1e-3)

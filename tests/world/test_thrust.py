@@ -17,7 +17,8 @@ from blocksim.world.bodies import outline_of
 from blocksim.world.nonsmooth import build_nonsmooth
 from blocksim.world.rigid_step import USUAL_STEP
 from blocksim.world.thrust import thrust_shift
-from tests.verification.test_arch_joints import RADIUS, limit_analysis
+from tests.verification.test_arch_joints import limit_analysis
+from tests.verification.test_arches import RADIUS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
