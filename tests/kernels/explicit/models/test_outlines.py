@@ -167,8 +167,8 @@ def test_rectangles_given_as_outlines_bounce_and_tumble_as_rectangles_do(law: st
 
 # sides of two (m), place beside and tilt of the upper one, stiffness scale: the overlap is as deep as it is long
 AT_ENDS = [
-    ((0.0224, 0.0151), (0.0367, 0.0138), -0.02947, -0.00153, 0.1),
-    ((0.0382, 0.0245), (0.0145, 0.0117), 0.02618, 0.0, 0.01),
+    ((0.0224, 0.0151), (0.0367, 0.0138), -0.0294, -0.0015, 0.003),
+    ((0.0382, 0.0245), (0.0145, 0.0117), 0.02623, 0.0, 0.01),
 ]
 
 
@@ -189,7 +189,8 @@ def test_rectangles_given_as_outlines_keep_their_energy_near_the_ends_of_faces(
     ]
     run = Scene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact={"stiffness_scale": scale}).start()
     before = run.kinetic
-    run.to_step(1200)
+    run.to_step(490)
+    assert run.contacts == 0
     assert run.bodies[1].spin != 0.0
     assert run.mechanical == pytest.approx(before, rel=1e-3)
 
