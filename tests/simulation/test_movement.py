@@ -82,9 +82,9 @@ def test_run_and_member_of_an_ensemble_move_alike(scheme: str) -> None:
     assert found.largest_displacement_mm >= displacement - 1e-9
 
 
-def rocking(**time: object) -> Scenario:
-    """Return a block of 20 mm by 60 mm that starts to turn about its left corner at 2 rad/s, and falls back."""
-    block = {"block": "slab", "x": 0.0, "y": 0.03, "velocity": [-0.06, 0.02], "spin": 2.0}
+def rocking(spin: float = 2.0, **time: object) -> Scenario:
+    """Return a block of 20 mm by 60 mm that starts to turn about its left corner (rad/s), and falls back."""
+    block = {"block": "slab", "x": 0.0, "y": 0.03, "velocity": [-0.03 * spin, 0.01 * spin], "spin": spin}
     changes = {
         "blocks.slab": {"width": 0.02, "height": 0.06, "length": 0.05, "material": "aluminium"},
         "bodies": [block, {**block, "x": 1.0, "velocity": [0.0, 0.0], "spin": 0.0}],
@@ -97,7 +97,7 @@ def rocking(**time: object) -> Scenario:
 
 
 def test_members_that_rock_back_are_told_from_those_that_stand() -> None:
-    scenarios = [rocking(), rocking(step=2e-6), rocking(end=0.005), rocking(end=0.06)]
+    scenarios = [rocking(), rocking(step=2e-6), rocking(end=0.005), rocking(spin=4.5, end=0.1)]
     members = run_ensemble(scenarios, threads=1)
     ends = [
         from_start_to_end(

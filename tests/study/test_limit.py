@@ -39,6 +39,10 @@ def block_on_a_slope(size: tuple[float, float], **time: object) -> dict[str, Any
     }
 
 
+def unsettled(scene: dict[str, Any]) -> dict[str, Any]:
+    return scene | {"start": {"settle": False}}
+
+
 @pytest.mark.parametrize(
     ("size", "degrees", "outcome"),
     [
@@ -68,7 +72,9 @@ def test_a_range_that_descends_is_searched_as_one_that_ascends(tmp_path: Path) -
 
 def test_a_search_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_nothing_twice(tmp_path: Path) -> None:
     values: list[float] = []
-    whole = limit(block_on_a_slope(SQUAT), TILT, out=tmp_path / "whole", on_run=lambda value, *_: values.append(value))
+    whole = limit(
+        unsettled(block_on_a_slope(SQUAT)), TILT, out=tmp_path / "whole", on_run=lambda value, *_: values.append(value)
+    )
     for at in (1, 5, 10, 13):
         seen: list[float] = []
 
@@ -79,13 +85,13 @@ def test_a_search_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_no
 
         folder = tmp_path / f"stopped-{at}"
         with pytest.raises(StoppedEarlyError, match="rerun the command to finish"):
-            limit(block_on_a_slope(SQUAT), TILT, out=folder, jobs=1, on_run=stop)
-        again = limit(block_on_a_slope(SQUAT), TILT, out=folder, on_run=stop)
+            limit(unsettled(block_on_a_slope(SQUAT)), TILT, out=folder, jobs=1, on_run=stop)
+        again = limit(unsettled(block_on_a_slope(SQUAT)), TILT, out=folder, on_run=stop)
         assert sorted(seen) == sorted(values)
         assert again.run == whole.runs - at
         assert (folder / "limit.csv").read_bytes() == (tmp_path / "whole" / "limit.csv").read_bytes()
         assert again.changes == whole.changes
-    assert limit(block_on_a_slope(SQUAT), TILT, out=tmp_path / "whole").run == 0
+    assert limit(unsettled(block_on_a_slope(SQUAT)), TILT, out=tmp_path / "whole").run == 0
 
 
 def test_processes_are_started_once_and_not_for_every_round(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,9 +121,9 @@ def test_the_folder_holds_the_answer_for_programs_and_the_scenario(tmp_path: Pat
 
 
 def test_another_search_or_file_is_not_replaced_unasked(tmp_path: Path) -> None:
-    limit(block_on_a_slope(SQUAT), TILT, out=tmp_path, tolerance=0.1)
+    limit(unsettled(block_on_a_slope(SQUAT)), TILT, out=tmp_path, tolerance=0.1)
     (tmp_path / "notes.txt").write_text("mine")
-    other = block_on_a_slope(SLENDER)
+    other = unsettled(block_on_a_slope(SLENDER))
     with pytest.raises(OutputExistsError, match="contains another limit; --overwrite replaces it"):
         limit(other, TILT, out=tmp_path, tolerance=0.1)
     limit(other, TILT, out=tmp_path, tolerance=0.1, overwrite=True)
@@ -178,16 +184,12 @@ def test_both_laws_are_the_same_scene_without_what_only_one_of_them_knows() -> N
 
 
 def test_a_folder_in_which_another_process_searches_is_left_to_it(tmp_path: Path) -> None:
-    limit(block_on_a_slope(SQUAT), TILT, out=tmp_path, tolerance=0.1)
+    limit(unsettled(block_on_a_slope(SQUAT)), TILT, out=tmp_path, tolerance=0.1)
     with (
         closing(Manifest(tmp_path / MANIFEST)),
         pytest.raises(OutputExistsError, match="this limit is already running"),
     ):
-        limit(block_on_a_slope(SQUAT), TILT, out=tmp_path, tolerance=0.1)
-
-
-def unsettled(scene: dict[str, Any]) -> dict[str, Any]:
-    return scene | {"start": {"settle": False}}
+        limit(unsettled(block_on_a_slope(SQUAT)), TILT, out=tmp_path, tolerance=0.1)
 
 
 def test_sustained_loads_come_at_rest_unless_told_not_to_and_others_as_they_are() -> None:
