@@ -79,5 +79,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return what `help(blocksim)` and completion show."""
-    return sorted({*globals(), *__all__})
+    """Return what `help(blocksim)` and completion show: the functions for users, and the version."""
+    return sorted([*__all__, "__version__"])

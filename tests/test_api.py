@@ -1,7 +1,9 @@
 """What a script or a notebook gets from `import blocksim`."""
 
 import doctest
+import inspect
 import pydoc
+import re
 import struct
 import tomllib
 from collections.abc import Callable
@@ -32,6 +34,41 @@ def test_example_of_the_package_prints_what_it_says(monkeypatch: pytest.MonkeyPa
 def test_help_lists_every_public_function() -> None:
     text = pydoc.plain(pydoc.render_doc(blocksim))
     assert [name for name in blocksim.__all__ if f"    {name}(" not in text and f"    {name} = " not in text] == []
+
+
+def test_completion_of_the_package_offers_the_functions_for_users_alone() -> None:
+    assert dir(blocksim) == sorted([*blocksim.__all__, "__version__"])
+
+
+@pytest.mark.parametrize("name", blocksim.__all__)
+def test_defaults_in_help_are_readable(name: str) -> None:
+    shown = str(inspect.signature(getattr(blocksim, name)))
+    assert not re.search(r"lambda|0x[0-9a-f]+", shown), shown
+
+
+@pytest.mark.parametrize("scenario", ["slide", "record_column", "tilting_arch"])
+def test_a_scenario_shows_in_a_notebook_with_its_blocks_and_all_values(scenario: str) -> None:
+    loaded = blocksim.load(ROOT / f"scenarios/{scenario}.toml")
+    html = loaded._repr_html_()
+    assert html.startswith(f"<p>Scenario {loaded.name}: ")
+    assert f"<td>{next(iter(loaded.blocks))}</td>" in html
+    assert "[contact]" in html
+
+
+def test_a_comparison_shows_in_a_notebook_as_its_table(slide: Result, tmp_path: Path) -> None:
+    block = slide.columns["block"][0]
+    (tmp_path / "a<b>.csv").write_text(f"block,quantity,unit,replicate,value\n{block},x,mm,1,41\n{block},x,mm,2,43\n")
+    html = blocksim.compare(slide, tmp_path / "a<b>.csv")._repr_html_()
+    assert "a&lt;b&gt;.csv" in html
+    assert "<b>" not in html
+    assert "<th>verdict</th>" in html
+    folder = blocksim.sweep(SLIDE, {"gravity": [9.8, 9.9]}, out=tmp_path / "sweep", jobs=1)
+    assert "samples inside all ranges" in blocksim.compare(folder, tmp_path / "a<b>.csv")._repr_html_()
+
+
+def test_a_data_set_and_tables_have_their_types() -> None:
+    assert inspect.signature(Result.to_xarray).return_annotation == "xr.Dataset"
+    assert inspect.signature(Result.to_frame).return_annotation == "pd.DataFrame"
 
 
 def test_a_scenario_from_dictionaries_is_that_of_the_file() -> None:

@@ -17,6 +17,7 @@ prediction interval for the next test, t_(n-1, 0.975) s sqrt(1 + 1/n).
 from collections import Counter
 from dataclasses import asdict, dataclass
 from enum import StrEnum
+from html import escape
 from math import inf, isfinite, nan, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -94,6 +95,10 @@ class Comparison:
         frame["verdict"] = [row.verdict.value for row in self.rows]
         return frame
 
+    def _repr_html_(self) -> str:
+        """Return the same line above the table, for notebooks."""
+        return html_of(self, self.to_frame())
+
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON; a missing number is None."""
         rows = [{key: plain(value) for key, value in asdict(row).items()} for row in self.rows]
@@ -103,6 +108,11 @@ class Comparison:
             "rows": rows,
             "messages": list(self.messages),
         }
+
+
+def html_of(shown: object, table: "pd.DataFrame") -> str:
+    """Return the line of a comparison above its table (no text of it is taken for HTML)."""
+    return f"<p>{escape(repr(shown)[1:-1])}</p>{table.to_html(index=False, float_format='{:.4g}'.format)}"
 
 
 def compare_final(final: "pd.DataFrame | Mapping[str, Sequence[Any]]", table: ExperimentTable) -> Comparison:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING
 
-from blocksim.analysis.compare import plain
+from blocksim.analysis.compare import html_of, plain
 from blocksim.analysis.experiment import ExperimentTable
 from blocksim.analysis.members import Failure, Members
 from blocksim.analysis.metrics import METRICS
@@ -71,6 +71,10 @@ class Judgement:
 
         names = [column.name for column in METRICS[metric].columns]
         return pd.DataFrame(self.findings[metric].rows, columns=names)
+
+    def _repr_html_(self) -> str:
+        """Return the same line above the samples inside the measured limits, for notebooks."""
+        return html_of(self, self.to_frame())
 
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON, with the meaning of each; a missing number is None."""

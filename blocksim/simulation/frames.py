@@ -16,6 +16,7 @@ from blocksim.world.systems.system import Elements, Present, Track
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
 EXTRA = "xarray"
 Floats = NDArray[np.float64]
@@ -88,7 +89,7 @@ def tidy_table(frames: Frames, system: str = BLOCKS.name) -> "pd.DataFrame":
     return pd.DataFrame(columns | {name: values.ravel() for name, values in track.columns().items()})
 
 
-def data_set(frames: Frames, name: str) -> Any:
+def data_set(frames: Frames, name: str) -> "xr.Dataset":
     """Return an xarray.Dataset in SI with dimensions time and block, energies over time, units as attributes.
 
     Variables of another system begin with its name, and have a dimension of their own. Raises UnavailableError without
@@ -105,4 +106,5 @@ def data_set(frames: Frames, name: str) -> Any:
             told = {"units": one.unit, "long_name": one.meaning}
             variables[prefix + one.name] = (("time", element), one.of(track), told)
     energies = {f"energy_{key}": (("time",), values, {"units": "J"}) for key, values in frames.energy.items()}
-    return xarray.Dataset({**variables, **energies}, coords=coordinates, attrs={"scenario": name})
+    found: xr.Dataset = xarray.Dataset({**variables, **energies}, coords=coordinates, attrs={"scenario": name})
+    return found

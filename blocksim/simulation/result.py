@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, load_stored, place_bodies
@@ -18,6 +18,7 @@ from blocksim.simulation.table import Columns, as_frame, read_table
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
 MOST_ROWS = 20  # of the table that a notebook shows
 
@@ -68,7 +69,7 @@ class Result:
         """Return the trajectories, one row per frame and block: time_s, block, x_mm, y_mm, rotation_deg, velocities."""
         return tidy_table(self.frames)
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> "xr.Dataset":
         """Return the trajectories as an xarray.Dataset (time, block) in SI. Raises UnavailableError without xarray."""
         return data_set(self.frames, self.name)
 

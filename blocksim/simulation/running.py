@@ -13,6 +13,7 @@ from pathlib import Path
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario, scenario_hash
 from blocksim.scenario.placement import smallest_width
+from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint import origin_of, restored
 from blocksim.simulation.checkpoint_policy import DEFAULTS, NO_PAST, CheckpointPolicy, CheckpointWriter, Past
@@ -54,23 +55,19 @@ from blocksim.world.scenes import Built
 from blocksim.world.systems import others_of, warnings_of
 
 
-def _ignore(_: object) -> None:
-    pass
-
-
 @dataclass(frozen=True)
 class Listener:
     """What is called before the first step of a run; nothing by default."""
 
-    on_remark: Callable[[str], None] = _ignore  # a line: a run already computed, or resumed and where
-    on_start: Callable[[str], None] = _ignore  # the set of kernels, which is compiled next
+    on_remark: Callable[[str], None] = silent  # a line: a run already computed, or resumed and where
+    on_start: Callable[[str], None] = silent  # the set of kernels, which is compiled next
 
 
 SILENT = Listener()
 
 
 def simulate(
-    scenario: Scenario, *, threads: int = 1, on_progress: Watcher = _ignore, wall_time: float | None = None
+    scenario: Scenario, *, threads: int = 1, on_progress: Watcher = silent, wall_time: float | None = None
 ) -> Result:
     """Run a scenario in memory, without writing anything. A signal or the limit of wall time (s) interrupts it.
 
@@ -95,7 +92,7 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
     resume: bool = False,
     threads: int = 1,
     precautions: CheckpointPolicy = DEFAULTS,
-    on_progress: Watcher = _ignore,
+    on_progress: Watcher = silent,
     listener: Listener = SILENT,
 ) -> Result:
     """Run a scenario and keep everything in a folder, frames while it runs, the mark of a finished run last.

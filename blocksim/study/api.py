@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Source, document_of
+from blocksim.silence import silent
 from blocksim.simulation import Result
 from blocksim.simulation.own_files import is_film, is_picture, is_report, refuse_foreign
 from blocksim.study import calibrate as calibration
@@ -160,7 +161,7 @@ def calibrate(  # noqa: PLR0913 - one argument for each option of the command
         out=None if out is None else Path(out),
         resume=resume,
         overwrite=overwrite,
-        on_trial=lambda *_: None,
+        on_trial=silent,
     )
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from blocksim.errors import InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.extras import loaded
+from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.stopping import interruptible
@@ -74,7 +75,7 @@ def calibrate(  # noqa: PLR0913 - one argument for each option of the command
     out: Path | None = None,
     resume: bool = False,
     overwrite: bool = False,
-    on_trial: OnTrial = lambda *_: None,
+    on_trial: OnTrial = silent,
 ) -> Fit:
     """Find the best values in `trials` trials, measure how probable agreement is with them, write a scenario file.
 

@@ -17,6 +17,7 @@ from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, Source, load_scenario, place_bodies
 from blocksim.scenario.models.stepping import Explicit, Nonsmooth
 from blocksim.scenario.soil_places import soil_tables
+from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.provenance import run_hash
@@ -62,7 +63,7 @@ def converge(  # noqa: PLR0913 - one argument for each option of the command
     studies: Iterable[str] | None = None,
     out: Path | str | None = None,
     jobs: int | None = 1,
-    on_run: OnRun = lambda *_: None,
+    on_run: OnRun = silent,
 ) -> Convergence:
     """Refine each setting until two refinements in a row move no block by more than the tolerance.
 

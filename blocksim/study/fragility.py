@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from blocksim.analysis.lognormal import PURPOSE, Counts, Curve, NoCurve, fit, inflation_of
 from blocksim.extras import loaded
 from blocksim.scenario import Source, document_of
+from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.study.criterion import falls_before_zero
@@ -137,7 +138,7 @@ def fragility(  # noqa: PLR0913 - one argument for each option of the command
     out: Path | str | None = None,
     overwrite: bool = False,
     retry_failed: bool = False,
-    on_row: OnRow = lambda *_: None,
+    on_row: OnRow = silent,
 ) -> FragilityResult:
     """Return how probable failure is at each intensity, and the lognormal curve that is most likely.
 
@@ -175,7 +176,7 @@ def run_fragility(  # noqa: PLR0913 - as `fragility`
     out: Path | str | None = None,
     overwrite: bool = False,
     retry_failed: bool = False,
-    on_row: OnRow = lambda *_: None,
+    on_row: OnRow = silent,
 ) -> FragilityResult:
     """Run what is planned; see `fragility`."""
     loaded("scipy.special", PURPOSE)

@@ -17,6 +17,7 @@ from pathlib import Path
 from blocksim.errors import BlocksimError, StoppedEarlyError
 from blocksim.scenario import Source, document_of
 from blocksim.scenario.motion import settles
+from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.provenance import run_hash
@@ -68,7 +69,7 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     overwrite: bool = False,
     keep_runs: bool = True,
     stiffer: bool | None = None,
-    on_run: OnRun = lambda *_: None,
+    on_run: OnRun = silent,
 ) -> LimitResult:
     """Find the values of a key at which a structure stops, or begins, to stand.
 
@@ -104,7 +105,7 @@ def find_limit(  # noqa: PLR0913, PLR0915 - as `limit`; the steps of a search, o
     overwrite: bool = False,
     keep_runs: bool = True,
     stiffer: bool | None = None,
-    on_run: OnRun = lambda *_: None,
+    on_run: OnRun = silent,
     on_stiffer: OnStiffer = lambda _: None,
 ) -> LimitResult:
     """Search as planned; see `limit`. `on_stiffer` is called before the first run of every other stiffness."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Document, Source, document_of
+from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.provenance import HASH_DIGITS
 from blocksim.study import criterion
@@ -151,8 +152,8 @@ def find_curve(  # noqa: PLR0913 - as `limit_curve`
     out: Path | str | None = None,
     overwrite: bool = False,
     stiffer: bool | None = None,
-    on_run: OnRun = lambda *_: None,
-    on_limit: OnLimit = lambda *_: None,
+    on_run: OnRun = silent,
+    on_limit: OnLimit = silent,
 ) -> CurveResult:
     """Search as planned, one value after the other; see `limit_curve`."""
     execution.ready()

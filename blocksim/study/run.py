@@ -5,17 +5,14 @@ from pathlib import Path
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario, Source, load_scenario
-from blocksim.simulation import Progress, Result, Watcher, read_result, renew_copies, simulate, simulate_into
+from blocksim.silence import silent
+from blocksim.simulation import Result, Watcher, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint_policy import DEFAULTS, CheckpointPolicy
 from blocksim.simulation.running import SILENT, Listener
 from blocksim.simulation.summary import changed_results, read_summary
 from blocksim.study.rows import check_experiment
 from blocksim.study.stored_run import find_run
-
-
-def _ignore(_: Progress) -> None:
-    pass
 
 
 def run(  # noqa: PLR0913 - what a user can choose for a run
@@ -26,7 +23,7 @@ def run(  # noqa: PLR0913 - what a user can choose for a run
     resume: bool = False,
     threads: int = 1,
     precautions: CheckpointPolicy = DEFAULTS,
-    on_progress: Watcher = _ignore,
+    on_progress: Watcher = silent,
     listener: Listener = SILENT,
 ) -> Result:
     """Simulate a scenario and return the result; with `out` it is kept in that folder as well.

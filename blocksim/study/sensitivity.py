@@ -11,6 +11,7 @@ from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.scenario import Document, Sweep
 from blocksim.scenario.models.variation import Normal, Variation
+from blocksim.silence import silent
 from blocksim.simulation.table import Columns
 from blocksim.study.executors.ensemble import Member, run_members
 from blocksim.study.plan import Variations, varied
@@ -156,7 +157,7 @@ def sensitivity(
     *,
     samples: int | None = None,
     seed: int = 0,
-    on_member: OnMember = lambda *_: None,
+    on_member: OnMember = silent,
 ) -> Sensitivity:
     """Run a design of `samples` blocks over the distributions of a plan, and return the indices of every output.
 

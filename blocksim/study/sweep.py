@@ -17,6 +17,7 @@ from typing import NamedTuple
 from blocksim.errors import InputMissingError, InvalidInputError, StoppedEarlyError, UnavailableError
 from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
 from blocksim.scenario.models.study import Sweep
+from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernel_set, kernels_of
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
@@ -54,7 +55,7 @@ def sweep(  # noqa: PLR0913 - one argument for each option of the command
     fail_fast: bool = False,
     retry_failed: bool = False,
     overwrite: bool = False,
-    on_row: OnRow = lambda *_: None,
+    on_row: OnRow = silent,
 ) -> SweepResult:
     """Run every case of a sweep that has no row yet, on `jobs` threads or processes (default: one a core).
 

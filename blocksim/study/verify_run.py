@@ -17,7 +17,8 @@ from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, load_stored, scenario_hash
 from blocksim.scenario.bounded_read import read_limited
-from blocksim.simulation import Progress, Result, Watcher, read_result, simulate
+from blocksim.silence import silent
+from blocksim.simulation import Result, Watcher, read_result, simulate
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Floats
 from blocksim.simulation.probe_series import ProbeSeries
@@ -154,11 +155,7 @@ class RunVerdict:
         return {"agrees": self.agrees, "kind": "run", **asdict(self), "folder": str(self.folder)}
 
 
-def _ignore(_: Progress) -> None:
-    pass
-
-
-def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = _ignore) -> RunVerdict:
+def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = silent) -> RunVerdict:
     """Run the scenario of a run folder again, in memory, and compare everything that the folder keeps.
 
     A run that was interrupted is repeated as far as it got. Raises InputMissingError where no run is there,

@@ -1,5 +1,6 @@
 """The whole scenario, and its JSON Schema."""
 
+from html import escape
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -90,6 +91,23 @@ class Scenario(Table):
         if self.bodies:
             parts.append(f"{len(self.bodies)} single {'body' if len(self.bodies) == 1 else 'bodies'}")
         return f"<Scenario {self.name}: {', '.join(parts)}; scheme {self.time.scheme}>"
+
+    def _repr_html_(self) -> str:
+        """Return the same line, blocks and materials, and all values as they stand in a file, for notebooks."""
+        from blocksim.scenario.resolved import scenario_to_toml  # noqa: PLC0415 - needs this model
+
+        blocks = [
+            (
+                name,
+                "shaped by its structure" if block.size_x == 0.0 else f"{block.size_x:g} × {block.size_y:g} m",
+                f"{block.depth:g} m deep",
+                block.material,
+            )
+            for name, block in self.blocks.items()
+        ]
+        rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in blocks)
+        values = f"<details><summary>all values</summary><pre>{escape(scenario_to_toml(self))}</pre></details>"
+        return f"<p>{escape(repr(self)[1:-1])}</p><table>{rows}</table>{values}"
 
 
 def json_schema() -> dict[str, Any]:
