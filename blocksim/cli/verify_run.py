@@ -1,7 +1,7 @@
 """blocksim verify-run: check bitwise reproducibility of stored results."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -12,11 +12,14 @@ from blocksim.cli.output import note, show
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.progress import watching
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedEarlyError
+from blocksim.scenario import load_stored
 from blocksim.simulation.compilation import kernels_of
+from blocksim.study.study_pictures import study_in
 from blocksim.study.sweep import kernels_for
-from blocksim.study.sweep_folder import read_plan
+from blocksim.study.sweep_folder import FolderKind, read_plan
 from blocksim.study.sweep_table import is_sweep
-from blocksim.study.verify_run import Origin, RunVerdict, scenario_of, verify_run
+from blocksim.study.verify_run import EntryDifference, Origin, RunVerdict, scenario_of, verify_run
+from blocksim.study.verify_study import verify_study
 from blocksim.study.verify_sweep import SAMPLE, SweepVerdict, verify_sweep
 
 INDENT = "  "
@@ -40,21 +43,26 @@ def verify_run_command(
     places: Annotated[
         list[Path],
         typer.Argument(
-            metavar="DIR", help="Run folder, results/NAME (its newest finished run), scenario file, or sweep folder."
+            metavar="DIR",
+            help="Run folder, results/NAME (its newest finished run), scenario file, or folder of a sweep, "
+            "limit or fragility study.",
         ),
     ],
     threads: options.Threads = 1,
-    sample: Annotated[int, typer.Option(min=1, metavar="N", help="Number of rows of a sweep to run again.")] = SAMPLE,
+    sample: Annotated[
+        int, typer.Option(min=1, metavar="N", help="Number of rows of a sweep or study to run again.")
+    ] = SAMPLE,
     seed: Annotated[int, typer.Option(min=0, metavar="S", help="Random seed for the choice of rows.")] = 0,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Run stored results again and check bitwise reproducibility.
 
-    Of a run: checksums of all files, final state, every frame of run.h5, final.csv, and the steps, times, energies and
-    end in run.json. Of a sweep: the name of every case, and every cell of a sample of rows. Exit code 1: something
-    differs; the answer gives the first and the largest difference, and what has changed since: code, versions,
-    processor. Nothing is written.
+    Of a run: checksums of all files, final state, every frame of run.h5, final.csv, and the steps, times, energies,
+    movement and end in run.json. Of a sweep: the name of every case, and every cell of a sample of rows. Of limits and
+    fragility studies: tables and answer, which are made again from the manifest, and a sample of runs. Exit code 1:
+    something differs; the answer gives the first and the largest difference, and what has changed since: code,
+    versions, processor. Nothing is written.
 
     Example: blocksim verify-run results/three_blocks
     """
@@ -67,6 +75,9 @@ def verify_run_command(
 def _verified(place: Path, threads: int, sample: int, seed: int, *, silent: bool) -> Verified:
     """Verify one place; an error in it does not stop the others."""
     try:
+        study = study_in(place)
+        if study is not None:
+            return _of_study(_repeat_study(place, study, sample, seed, silent=silent))
         if is_sweep(place):
             return _of_sweep(_sample_again(place, sample, seed, silent=silent))
         return _of_run(_run_again(place, threads, silent=silent), told=not silent)
@@ -91,6 +102,23 @@ def _sample_again(folder: Path, sample: int, seed: int, *, silent: bool) -> Swee
     return verify_sweep(folder, sample, seed)
 
 
+def _repeat_study(folder: Path, kind: FolderKind, sample: int, seed: int, *, silent: bool) -> tuple[SweepVerdict, ...]:
+    tell_compilation(kernels_of(load_stored(folder / kind.plan)), quiet=silent)
+    return verify_study(folder, kind, sample, seed)
+
+
+def _of_study(verdicts: tuple[SweepVerdict, ...]) -> Verified:
+    """Report a study, of a curve of limits every search and then the curve."""
+    found = [_of_sweep(one, "runs", "table and answer follow from the runs; ") for one in verdicts]
+    agrees = all(one.agrees for one in verdicts)
+    told: dict[str, object] = {**found[-1].data, "agrees": agrees, "kind": "study"}
+    if len(found) > 1:
+        told["searches"] = [one.data for one in found[:-1]]
+        if verdicts[-1].agrees:
+            found[-1] = replace(found[-1], lines=(f"{verdicts[-1].folder}: table and answer follow from the searches",))
+    return Verified(tuple(line for one in found for line in one.lines), told, _code(agrees=agrees))
+
+
 def _of_run(verdict: RunVerdict, *, told: bool) -> Verified:
     count = verdict.frames.frames[0]
     if verdict.agrees:
@@ -112,12 +140,17 @@ def _reasons(verdict: RunVerdict) -> Iterator[str]:
         yield "the final state has another hash than in run.json"
     if not verdict.table:
         yield "final.csv differs"
-    for one in verdict.entries[:MOST_ENTRIES]:
-        yield f"{one.file}: {one.entry}: {one.stored!r} stored, {one.now!r} now"
-    if len(verdict.entries) > MOST_ENTRIES:
-        yield f"and {len(verdict.entries) - MOST_ENTRIES} entries more"
+    yield from _entries(verdict.entries)
     yield from _parting(verdict)
     yield from _told_origins(verdict.origins)
+
+
+def _entries(found: Sequence[EntryDifference]) -> Iterator[str]:
+    """Report which entries of a summary differ."""
+    for one in found[:MOST_ENTRIES]:
+        yield f"{one.file}: {one.entry}: {one.stored!r} stored, {one.now!r} now"
+    if len(found) > MOST_ENTRIES:
+        yield f"and {len(found) - MOST_ENTRIES} entries more"
 
 
 def _parting(verdict: RunVerdict) -> Iterator[str]:
@@ -161,15 +194,17 @@ def _change(one: Origin) -> str:
     return f"{one.then[:LONGEST]} -> {one.now[:LONGEST]}"
 
 
-def _of_sweep(verdict: SweepVerdict) -> Verified:
-    count = f"{len(verdict.checked)} of {verdict.rows} rows"
+def _of_sweep(verdict: SweepVerdict, what: str = "rows", study: str = "") -> Verified:
+    count = f"{len(verdict.checked)} of {verdict.rows} {what}"
     if verdict.agrees:
         kept = f", bit-identical in {len(verdict.runs)} kept runs" if verdict.runs else ""
-        lines = [f"{verdict.folder}: identical numbers in {count}{kept}"]
+        lines = [f"{verdict.folder}: {study}identical numbers in {count}{kept}"]
     else:
         rows = {one.row for one in verdict.cells}
-        lines = [f"{verdict.folder}: differs in {len(rows)} of the {count} that were run again"]
+        where = "" if study else f" in {len(rows)} of the {count} that were run again"
+        lines = [f"{verdict.folder}: differs{where}"]
         lines += [INDENT + line for line in _cells(verdict)]
+        lines += [INDENT + line for line in _entries(verdict.entries)]
         runs = [_of_run(run, told=False) for run in verdict.runs if not run.agrees]
         lines += [INDENT + line for run in runs for line in run.lines]
     return Verified(tuple(lines), verdict.to_dict(), _code(agrees=verdict.agrees))

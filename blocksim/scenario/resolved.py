@@ -33,15 +33,18 @@ def scenario_to_toml(
     experiment_table: str | None = None,
     motion_table: str | None = None,
     body_tables: Mapping[str, str] | None = None,
+    *,
+    is_varied: bool = False,
 ) -> str:
     """Write every key with its value; loading the text gives an equal scenario, floats to the last bit.
 
     Where a sweep varies the scheme, keys that only one scheme has are left out; a sweep is refused unless they have
-    their defaults. `experiment_table` and `motion_table` replace the paths of tables, for copies kept beside the
-    resolved file; `body_tables` those of the motions of bodies, by the digest of the table.
+    their defaults. What follows other values is left out where these vary, with `is_varied` in any case.
+    `experiment_table` and `motion_table` replace the paths of tables, for copies kept beside the resolved file;
+    `body_tables` those of the motions of bodies, by the digest of the table.
     """
     data = _plain(scenario)
-    if scenario.sweep is not None:
+    if scenario.sweep is not None or is_varied:
         _leave_to_static(scenario, data)
     if scenario.sweep is not None and SCHEME in scenario.sweep.vary:
         data["time"] = {key: value for key, value in data["time"].items() if key in Time.model_fields}

@@ -271,7 +271,7 @@ def keep_scenario(
     refuse_foreign_copies(tables, folder, plan)
     if _is_there(folder / plan) and not is_resolved(folder / plan):
         raise _foreign(folder / plan)
-    text = head + resolved_beside(scenario, tables)
+    text = head + resolved_beside(scenario, tables, is_varied=plan != SCENARIO)
     write_text(folder / plan, text)
     for name, content in tables.items():
         write_bytes(folder / name, content)
@@ -306,8 +306,8 @@ def _foreign(path: Path) -> OutputExistsError:
     )
 
 
-def resolved_beside(scenario: Scenario, tables: Mapping[str, bytes]) -> str:
-    """Return the resolved scenario (TOML) that refers to the copies beside it."""
+def resolved_beside(scenario: Scenario, tables: Mapping[str, bytes], *, is_varied: bool = False) -> str:
+    """Return the resolved scenario (TOML) that refers to the copies beside it; the base of others is `is_varied`."""
     names = {name: name if name in tables else None for name in (EXPERIMENT, MOTION)}
     of_bodies = dict(zip(body_table_contents(scenario), BODY_MOTIONS, strict=False))
-    return scenario_to_toml(scenario, names[EXPERIMENT], names[MOTION], of_bodies)
+    return scenario_to_toml(scenario, names[EXPERIMENT], names[MOTION], of_bodies, is_varied=is_varied)

@@ -57,7 +57,12 @@ class CurvePlan:
 
     def shown(self, number: float) -> str:
         """Return a value of the other key for people."""
-        return f"{number:.6g} {self.head.unit}".rstrip()
+        return shown(number, self.head.unit)
+
+
+def shown(number: float, unit: str) -> str:
+    """Return a value of the other key for people."""
+    return f"{number:.6g} {unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,7 @@ class CurveResult:
         """The brackets as limits.csv has them: one row each, one without numbers where nothing changes."""
         import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
 
-        return pd.DataFrame(list(_records(self)), columns=_heads(self.plan))
+        return pd.DataFrame(list(curve_rows(self.searches)), columns=_heads(self.plan))
 
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON."""
@@ -164,7 +169,7 @@ def find_curve(  # noqa: PLR0913 - as `limit_curve`
     prepare(folder, base, plan.name, overwrite=overwrite, kind=LIMIT_CURVE)
     found: dict[float, LimitResult] = {}
     for number, search in plan.searches.items():
-        place = folder / _named(plan.shown(number))
+        place = folder / folder_named(number, plan.head.unit)
         found[number] = find_limit(
             search, execution, out=place, overwrite=overwrite, keep_runs=False, stiffer=stiffer, on_run=on_run
         )
@@ -174,9 +179,9 @@ def find_curve(  # noqa: PLR0913 - as `limit_curve`
     return result
 
 
-def _named(shown: str) -> str:
-    """Return the name of a folder that needs no quotes in a shell."""
-    return re.sub(r"[^A-Za-z0-9.+-]+", "-", shown)
+def folder_named(number: float, unit: str) -> str:
+    """Return the name of the folder of a value of the other key, one that needs no quotes in a shell."""
+    return re.sub(r"[^A-Za-z0-9.+-]+", "-", shown(number, unit))
 
 
 def _heads(plan: CurvePlan) -> list[str]:
@@ -185,9 +190,9 @@ def _heads(plan: CurvePlan) -> list[str]:
     return [f"{OVER} [{other}]" if other else OVER, *names]
 
 
-def _records(result: CurveResult) -> Iterator[list[Any]]:
+def curve_rows(searches: Mapping[float, LimitResult]) -> Iterator[list[Any]]:
     """Yield the rows of limits.csv."""
-    for value, search in result.searches.items():
+    for value, search in searches.items():
         for one in search.changes:
             yield [value, one.low, one.high, one.below.value, one.above.value]
         if not search.changes:
@@ -197,4 +202,5 @@ def _records(result: CurveResult) -> Iterator[list[Any]]:
 
 def _write(result: CurveResult) -> None:
     """Write limits.csv, and the answer into limits.json."""
-    write_answer(result.folder / TABLE, LIMIT_CURVE, [_heads(result.plan), *_records(result)], result.to_dict())
+    rows = [_heads(result.plan), *curve_rows(result.searches)]
+    write_answer(result.folder / TABLE, LIMIT_CURVE, rows, result.to_dict())

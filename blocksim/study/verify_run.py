@@ -34,6 +34,7 @@ CODE = "code"
 DECIDES = ("blocksim", ROOM_PREFIX, "python", "numpy", "numba", "llvmlite", "platform", "processor", "cpu")
 ALWAYS = ("name", "steps", "time_step_s", "simulated_time_s", "energy_J")
 UNLESS_INTERRUPTED = ("reason", "exit_code")
+OF_THE_MOTION = ("settled", "events", "movement")  # what earlier versions did not keep is not there, or null
 HASHES = ("run", "scenario_hash")  # of the code, or of what it makes of a file, too
 
 
@@ -57,7 +58,9 @@ def differing_entries(folder: Path, then: Summary, now: Summary, *, same_code: b
     stored, wanted = _read_entries(folder / files.SUMMARY), json.loads(now.to_json())
     if not whole and same_code:  # the repetition is of a scenario with another end
         wanted |= {name: getattr(then, name) for name in HASHES}
-    found = [one for name in names for one in _apart(files.SUMMARY, name, stored.get(name), wanted[name])]
+    found = [one for name in names for one in apart(files.SUMMARY, name, stored.get(name), wanted[name])]
+    kept = [name for name in OF_THE_MOTION if same_code or stored.get(name)]
+    found += [one for name in kept for one in apart(files.SUMMARY, name, stored.get(name), wanted[name])]
     if whole and not _are_warnings(then, now.warnings):
         found.append(EntryDifference(files.SUMMARY, "warnings", list(then.warnings), list(now.warnings)))
     return (*found, *_of_the_mark(folder, then))
@@ -68,14 +71,17 @@ def _of_the_mark(folder: Path, then: Summary) -> Iterator[EntryDifference]:
     if files.is_finished(folder):
         stored = _read_entries(folder / files.DONE)
         for name in ("run", "status"):
-            yield from _apart(files.DONE, name, stored.get(name), getattr(then, name))
+            yield from apart(files.DONE, name, stored.get(name), getattr(then, name))
 
 
-def _apart(file: str, entry: str, stored: Any, now: Any) -> Iterator[EntryDifference]:
+def apart(file: str, entry: str, stored: Any, now: Any) -> Iterator[EntryDifference]:
     """Yield the differences of an entry, or of those in it."""
     if isinstance(stored, dict) and isinstance(now, dict):
         for name, value in stored.items():  # a version before may have had fewer
-            yield from _apart(file, f"{entry}.{name}", value, now.get(name))
+            yield from apart(file, f"{entry}.{name}".lstrip("."), value, now.get(name))
+    elif isinstance(stored, list) and isinstance(now, list) and len(stored) == len(now):
+        for number, values in enumerate(zip(stored, now, strict=True)):
+            yield from apart(file, f"{entry}.{number}", *values)
     elif stored != now:
         yield EntryDifference(file, entry, stored, now)
 
@@ -97,11 +103,11 @@ def differing_samples(stored: Mapping[str, ProbeSeries], again: Mapping[str, Pro
         for column, values in now.columns.items():
             before = then.columns.get(column)
             if before is None or before.tobytes() != values.tobytes():
-                yield _first_apart(f"{place}/{column}", before, values, now)
+                yield _firstapart(f"{place}/{column}", before, values, now)
                 break
 
 
-def _first_apart(place: str, before: Floats | None, values: Floats, probe: ProbeSeries) -> EntryDifference:
+def _firstapart(place: str, before: Floats | None, values: Floats, probe: ProbeSeries) -> EntryDifference:
     if before is None:
         return EntryDifference(files.FRAMES, place, None, float(values[0]))
     first = int(np.flatnonzero(before.view(np.int64) != values.view(np.int64))[0])

@@ -17,7 +17,7 @@ from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, inv
 from blocksim.study.sweep import cases_in, measured_ranges
 from blocksim.study.sweep_folder import case_folder, read_origin, read_plan
 from blocksim.study.sweep_table import NO_TABLE, OUTCOME, lines_in
-from blocksim.study.verify_run import Origin, RunVerdict, changed_origins, tells_of_code, verify_run
+from blocksim.study.verify_run import EntryDifference, Origin, RunVerdict, changed_origins, tells_of_code, verify_run
 
 SAMPLE = 16  # rows, where nobody says how many
 CASE, INSIDE = "case", "inside"
@@ -47,11 +47,12 @@ class SweepVerdict:
     largest_deg: float
     origins: tuple[Origin, ...]  # what is not the same as when the sweep was made
     runs: tuple[RunVerdict, ...] = ()  # of those rows whose folders were kept
+    entries: tuple[EntryDifference, ...] = ()  # of the answer of a study
 
     @cached_property
     def agrees(self) -> bool:
         """Return True if all rows that were run again have come out as they stand in the table."""
-        return not self.cells and all(run.agrees for run in self.runs)
+        return not (self.cells or self.entries) and all(run.agrees for run in self.runs)
 
     def to_dict(self) -> dict[str, object]:
         """Return it for programs."""
@@ -94,8 +95,8 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
         len(lines),
         tuple(row + 1 for row in rows),
         tuple(found),
-        _largest(found, MM),
-        _largest(found, DEGREES),
+        largest(found, MM),
+        largest(found, DEGREES),
         origins,
         tuple(verify_run(kept) for row in rows if (kept := case_folder(folder, lines[row][0])) is not None),
     )
@@ -151,7 +152,7 @@ def _cells(columns: Sequence[str], case: Case, row: Row, ranges: Ranges | None) 
     return dict(zip(columns, next(csv.reader(io.StringIO(text.getvalue(), newline=""))), strict=True))
 
 
-def _largest(found: Sequence[CellDifference], unit: str) -> float:
+def largest(found: Sequence[CellDifference], unit: str) -> float:
     """Return the largest difference of two numbers in columns of a unit."""
     return max((_apart(one) for one in found if one.column.endswith(unit)), default=0.0)
 

@@ -4,7 +4,9 @@ import csv
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import pytest
@@ -12,9 +14,16 @@ from typer.testing import CliRunner
 
 from blocksim.cli.app import app
 from blocksim.simulation.atomic import sha256_of
+from blocksim.study.fragility import fragility
+from blocksim.study.limit import limit
+from blocksim.study.limit_curve import limit_curve
+from blocksim.study.progress import read_entries
 from tests.cli.conftest import SCENARIOS, Command
+from tests.cli.test_limit import on_soft_springs
 from tests.golden import Golden
+from tests.study.test_fragility import SLOPE
 
+STATIC = "friction.block_ground.static"
 BRIEF = ("contact.stiffness_scale=0.001", "time.end=0.02")
 SHORT = ("--set", BRIEF[0], "--set", BRIEF[1])
 
@@ -143,8 +152,16 @@ def test_first_difference_is_reported_with_frame_block_and_quantity(blocksim: Co
     assert data["frames"]["largest_deg"] == 0.0
 
 
+def other(value: object) -> object:
+    """Return another outcome, number, name or truth."""
+    if isinstance(value, float):
+        return value * (1 + 1e-15)
+    return {"fell": "slid", True: False, False: True}.get(value, "7")  # type: ignore[call-overload]
+
+
 def test_every_changed_entry_of_the_summary_is_named(blocksim: Command, copied: Path) -> None:
     told = json.loads((copied / "run.json").read_text())
+    others = {name: other(value) for name, value in told["movement"].items()}
     changed = {
         "name": "other",
         "reason": "at rest?",
@@ -156,6 +173,8 @@ def test_every_changed_entry_of_the_summary_is_named(blocksim: Command, copied: 
         "simulated_time_s": told["simulated_time_s"] * (1 + 1e-15),
         "warnings": ["other"],
         "energy_J": {name: value * (1 + 1e-15) + 1e-300 for name, value in told["energy_J"].items()},
+        "movement": others,
+        "events": [{"event": 0, "step": 1, "time_s": 0.1, "what": "1 freed", "energy_J": 0.0}],
     }
     (copied / "run.json").write_text(json.dumps({**told, **changed}))
     altered(copied, "done.json", '"status": "finished"', '"status": "failed"')
@@ -165,8 +184,9 @@ def test_every_changed_entry_of_the_summary_is_named(blocksim: Command, copied: 
     found = {(one["file"], one["entry"]) for one in data["entries"]}
     energies = {("run.json", f"energy_J.{name}") for name in told["energy_J"]}
     assert found == {
-        *(("run.json", name) for name in changed if name not in {"energy_J", "warnings"}),
+        *(("run.json", name) for name in changed if name not in {"energy_J", "movement", "warnings"}),
         *energies,
+        *(("run.json", f"movement.{name}") for name in others),
         ("run.json", "warnings"),
         ("done.json", "run"),
         ("done.json", "status"),
@@ -257,6 +277,91 @@ def test_kept_cases_are_verified_as_runs(blocksim: Command) -> None:
     one = next(Path("kept/cases").iterdir())
     altered(one, "final.csv", "block,", "blocks,")
     assert blocksim("verify-run", "kept").code == 65
+
+
+def write_study(folder: Path, name: str) -> None:
+    """Search, or count, in less than a second."""
+    slope = {**SLOPE, "friction": {"block_ground": {"static": 0.38}}}  # kinetic friction follows
+    few: dict[str, Any] = {"ground.tilt": {"from": "5 deg", "to": "40 deg", "count": 2}}
+    if name == "limit":
+        limit(slope, few, out=folder, tolerance=0.5)
+    elif name == "limits":
+        limit_curve(slope, few, {STATIC: [0.05, 0.3]}, out=folder, tolerance=0.5)
+    elif name == "stiff":
+        limit(on_soft_springs(), {"ground.tilt": {"from": "24.8 deg", "to": "26.6 deg", "count": 2}}, out=folder)
+    else:
+        scatter: dict[str, Any] = {STATIC: {"mean": 0.38, "sd": 0.06}}
+        fragility(slope, {"ground.tilt": ["17 deg", "23 deg"]}, scatter, members=4, fails="outcome = slid", out=folder)
+
+
+STUDIES = ("limit", "limits", "fragility", pytest.param("stiff", marks=pytest.mark.long))
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_studies_come_out_again(blocksim: Command, tmp_path: Path, name: str) -> None:
+    write_study(tmp_path / "study", name)
+    before = {path: path.read_bytes() for path in (tmp_path / "study").rglob("*") if path.is_file()}
+    answer = blocksim("verify-run", "study", "--sample", 100)
+    assert (answer.code, answer.err) == (0, "")
+    assert "follow from the runs; identical numbers in " in answer.out
+    assert "kept runs" in answer.out or name in {"limits", "fragility"}
+    assert {path: path.read_bytes() for path in (tmp_path / "study").rglob("*") if path.is_file()} == before
+
+
+def shift_a_run(folder: Path) -> None:
+    """Move the block of every run by a nanometre, in the manifest, with sums that fit."""
+    entries = [entry for _, entry in read_entries(folder / "manifest.jsonl")]
+    lines = [replace(one, row={**one.row, "1.x_mm": float(str(one.row["1.x_mm"])) + 1e-6}) for one in entries]
+    (folder / "manifest.jsonl").write_bytes(b"".join(one.to_line() for one in lines))
+
+
+STUDY_CHANGES: dict[str, tuple[str, Callable[[Path], object], str]] = {
+    "bracket": (
+        "limit",
+        lambda folder: altered(folder, "limit.json", '"low": ', '"low": 1'),
+        "limit.json: changes.0.low",
+    ),
+    "verdict": ("limit", lambda folder: altered(folder, "limit.csv", ",falls,", ",stands,"), "verdict: stands stored"),
+    "run": ("limit", shift_a_run, "1.x_mm: "),
+    "curve": ("limits", lambda folder: altered(folder, "limits.csv", ",stands,", ",falls,"), "below: falls stored"),
+    "point": (
+        "limits",
+        lambda folder: altered(folder, "limits.json", '"runs": ', '"runs": 9'),
+        "limits.json: over 0.05.runs",
+    ),
+    "count": (
+        "fragility",
+        lambda folder: altered(folder, "fragility.json", '"failures": 4', '"failures": 3'),
+        "fragility.json: points.1.failures: 3 stored, 4 now",
+    ),
+    "members": (
+        "fragility",
+        lambda folder: altered(folder, "members.csv", ",slid,", ",stands,"),
+        "outcome: stands stored",
+    ),
+    "share": (
+        "fragility",
+        lambda folder: altered(folder, "fragility.csv", ",1.0,", ",0.9,"),
+        "share: 0.9 stored, 1.0 now",
+    ),
+}
+
+
+@pytest.mark.parametrize("change", STUDY_CHANGES)
+def test_a_changed_study_is_told(blocksim: Command, tmp_path: Path, change: str) -> None:
+    name, alter, told = STUDY_CHANGES[change]
+    write_study(tmp_path / "study", name)
+    alter(tmp_path / "study")
+    answer = blocksim("verify-run", "study", "--sample", 100)
+    assert answer.code == 1
+    assert told in answer.out
+
+
+def test_a_study_whose_manifest_lacks_a_run_is_told(blocksim: Command, tmp_path: Path) -> None:
+    write_study(tmp_path / "study", "limit")
+    without_line(tmp_path / "study", "manifest.jsonl", 0)
+    answer = blocksim("verify-run", "study")
+    assert (answer.code, answer.err) == (65, "study: the manifest lacks runs of this search\n")
 
 
 def test_sweep_keeps_what_it_came_from(swept: Path) -> None:
