@@ -163,7 +163,8 @@ def _tell_end(result: Result) -> None:
     )
     if summary.settled is not None:
         far = f"{number(summary.settled.largest_displacement_mm)} mm (block {summary.settled.displaced_block})"
-        note(f"settled before time zero in {summary.settled.steps} steps; largest displacement {far}")
+        settled = "settled" if summary.settled.at_rest else "released where it did not settle"
+        note(f"{settled} before time zero in {summary.settled.steps} steps; largest displacement {far}")
     for one in summary.events:
         note(f"{one.time_s:.3f} s: {one.what}")
     if summary.movement is not None:

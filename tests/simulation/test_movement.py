@@ -97,7 +97,7 @@ def rocking(spin: float = 2.0, **time: object) -> Scenario:
 
 
 def test_members_that_rock_back_are_told_from_those_that_stand() -> None:
-    scenarios = [rocking(), rocking(step=2e-6), rocking(end=0.005), rocking(spin=4.5, end=0.1)]
+    scenarios = [rocking(), rocking(step=2e-6), rocking(end=0.005), rocking(spin=4.5, end=0.2)]
     members = run_ensemble(scenarios, threads=1)
     ends = [
         from_start_to_end(
