@@ -16,6 +16,7 @@ from blocksim.cli.prepare import read_scenario, warn_of_values
 from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
 from blocksim.scenario.units import STANDARD_GRAVITY
+from blocksim.simulation.probe_series import bytes_of_series
 from blocksim.study.rows import check_experiment
 from blocksim.world.describe import (
     Description,
@@ -26,7 +27,7 @@ from blocksim.world.describe import (
     describe,
 )
 from blocksim.world.free_memory import readable
-from blocksim.world.memory import PROCESS_BYTES
+from blocksim.world.memory import FRAME_VALUES, PROCESS_BYTES
 
 MOST_BODIES = 12
 SIDES = ("along x", "upright", "depth mm", "mass kg", "inertia kg m²")
@@ -159,7 +160,7 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
         *_sag(description.rigid),
         f"solving    at most about {duration(description.seconds)} on one core{_until_rest(scenario)}",
         f"memory     about {readable(description.memory)}, of which {readable(PROCESS_BYTES)} for the program itself",
-        f"results    at most {description.frames} frames, about {readable(description.bytes)}",
+        f"results    at most {description.frames} frames, about {readable(_bytes(scenario, description))}",
         *_short_interval(scenario, description),
         *_motion(description.motion),
         *lines_of(scenario),
@@ -167,6 +168,11 @@ def _cost(scenario: Scenario, description: Description) -> list[str]:
         *(f"{name:<10} {count} particles or elements" for name, count in description.systems.items()),
         f"neighbours checked up to {MILLI * description.skin:.3g} mm apart",
     ]
+
+
+def _bytes(scenario: Scenario, description: Description) -> int:
+    """Return the bytes of frames and of probes."""
+    return description.bytes + bytes_of_series(scenario, description.steps, description.step, FRAME_VALUES)
 
 
 def _limits(limits: StepLimits | None) -> list[str]:

@@ -10,7 +10,7 @@ from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.probe_series import bytes_of_series
 from blocksim.simulation.schemes import AnyScene, ledger_names
 from blocksim.world.free_memory import readable
-from blocksim.world.memory import file_bytes, output_count, recorded_contacts
+from blocksim.world.memory import output_count, recorded_contacts, run_bytes
 from blocksim.world.scenes import arrays_of
 from blocksim.world.systems import others_of
 
@@ -35,8 +35,7 @@ def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
     frames = output_count(steps, scenario.time.end, scenario.output.every) + 2  # the first, and wherever it ends
     bodies, particles = scene.world.bodies.size - 1, scene.world.particles
     contacts = recorded_contacts(bodies, 0 if particles is None else particles.size) if scenario.output.contacts else 0
-    values = sum(one.values for one in others_of(scenario))
     arrays = sum(array.nbytes for array in arrays_of(scene))
     step = float(scene.world.controls[0].step)
     series = bytes_of_series(scenario, steps, step, len(ledger_names(scene)))
-    return series + file_bytes(bodies, frames, contacts, values) + CHECKPOINT_FILES * arrays
+    return series + run_bytes(bodies, frames, contacts, others_of(scenario)) + CHECKPOINT_FILES * arrays

@@ -21,6 +21,7 @@ WRITTEN = {"m": ("_mm", 1e3), "m/s": ("_mm_s", 1e3), "rad": ("_deg", math.degree
            "J": ("_J", 1.0), "1": ("", 1.0)}  # fmt: skip
 """Ending of the name and factor of a column in tables for people, by its SI unit."""
 ROWS_AT_ONCE = 50_000
+CHUNK_ROWS = 1024  # of a column in run.h5
 DIGITS = 20  # characters of a number in CSV
 
 
@@ -125,7 +126,8 @@ def bytes_of_series(scenario: Scenario, steps: int, step: float, energies: int) 
     for probe in scenario.probes:
         every = step if probe.every == STEP else float(probe.every or scenario.output.every)
         columns = energies if probe.kind == ENERGY else len(COLUMNS[probe.kind])
-        total += (steps * step / max(every, step) + 1) * (2 + columns) * (8 + DIGITS)
+        rows = steps * step / max(every, step) + 1
+        total += (2 + columns) * (8 * CHUNK_ROWS * math.ceil(rows / CHUNK_ROWS) + DIGITS * rows)
     return int(total)
 
 

@@ -21,10 +21,10 @@ from blocksim.world.memory import (
     PROCESS_BYTES,
     RigidSize,
     SceneSize,
-    file_bytes,
     is_shorter_than_step,
     output_count,
     recorded_contacts,
+    run_bytes,
 )
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
 from blocksim.world.particles import division, particle_count
@@ -38,6 +38,7 @@ from blocksim.world.systems.system import Present
 # measured on one core: a step costs about this for every body with its contacts
 SECONDS_PER_BODY_AND_STEP = 75e-9
 SECONDS_IN_A_CROWD = 250e-9  # where bodies have neighbours on all sides
+PARTICLES_OF_A_CONTACT = 6  # on boundaries, for each that is recorded; measured 5 to 11
 CROWD = 50  # bodies
 OUTLINES_COST = 1.5  # times as much, where blocks with outlines are on springs: 1.0 to 1.7 measured
 # with particles: a block, and each particle around it; in a crowd as many times that, as all its faces touch others
@@ -128,7 +129,8 @@ def describe(scenario: Scenario) -> Description:
     steps = max(1, round(scenario.time.end / step))
     frames = output_count(steps, scenario.time.end, scenario.output.every) + 1
     particles = _particles(scenario, placed)
-    contacts = recorded_contacts(len(placed), particles) if scenario.output.contacts else 0
+    touching = 0 if world.particles is None else particles // PARTICLES_OF_A_CONTACT
+    contacts = recorded_contacts(len(placed), touching) if scenario.output.contacts else 0
     others = others_of(scenario)
     more = sum(one.count * one.system.cost.memory for one in others)
     return Description(
@@ -139,7 +141,7 @@ def describe(scenario: Scenario) -> Description:
         steps=steps,
         frames=frames,
         seconds=steps * (_seconds_per_step(scenario, len(placed), particles) + _seconds_of(scenario, others)),
-        bytes=file_bytes(len(placed), frames, contacts, sum(one.values for one in others)),
+        bytes=run_bytes(len(placed), frames, contacts, others),
         memory=PROCESS_BYTES + size.bytes_needed + more,  # without frames: into a folder, they are written as they come
         frames_at_every_step=is_shorter_than_step(scenario.output.every, step),
         particles=particles,

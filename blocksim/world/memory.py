@@ -4,6 +4,7 @@ Sizes follow from the types in blocksim.kernels.common.arrays, so that they chan
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from blocksim.kernels.common.arrays import BODY, CONTACT, CONTACTS, OPERATOR, PA
 from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth.arrays import ASIDE, BEFORE, CONSTRAINT, GROUP, IMPACT, KEPT, LISTED, PART, STATE, TALLY
 from blocksim.world.free_memory import available_bytes, readable
+from blocksim.world.systems.system import Present
 
 LISTS = 2  # of candidate pairs: the present one and the one being built
 OPERATORS = 2  # of a pair: along the normal and along the tangent
@@ -24,6 +26,9 @@ FRAME_VALUES = 14  # of a frame in addition: step, time, energies, number of con
 CONTACT_VALUES = 8  # of a recorded contact: two bodies in one, place, normal, overlap, forces
 CONTACTS_OF_A_BODY = 4  # recorded in a frame, of corners and rigid faces: hardly ever more
 PROCESS_BYTES = 210_000_000  # Python, packages and compiled kernels; measured 207 to 210 MB
+FILE_BYTES = 35_000  # of run.h5 beside its values; measured 25 to 39 kB
+MOST_CHUNK_ROWS = 64  # frames in a chunk of run.h5
+CHUNK_VALUES = 1 << 17  # a megabyte
 ROUNDING = 1e-9  # of a step, by which the time between frames may miss it
 COPIES = 2  # of all frames at the end of a run: as they came, and joined
 
@@ -128,6 +133,19 @@ def is_shorter_than_step(every: float, step: float) -> bool:
 def file_bytes(bodies: int, frames: int, contacts: int = 0, further: int = 0) -> int:
     """Return the bytes in a file of frames with so many contacts, and values of further systems, each."""
     return frames * VALUE * (FRAME_VALUES + MOTION_VALUES * bodies + CONTACT_VALUES * contacts + further)
+
+
+def chunk_rows(elements: int) -> int:
+    """Return how many frames of so many elements, the most of any system, run.h5 takes room for at a time."""
+    return min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // max(elements, 1)))
+
+
+def run_bytes(bodies: int, frames: int, contacts: int = 0, others: Sequence[Present] = ()) -> int:
+    """Return the bytes of run.h5 with so many frames, the room of the last chunk included, and contacts in each."""
+    rows = chunk_rows(max([bodies, *(one.count for one in others)]))
+    whole = -(-frames // rows) * rows
+    values = sum(one.values for one in others)
+    return FILE_BYTES + file_bytes(bodies, whole, 0, values) + frames * VALUE * CONTACT_VALUES * contacts
 
 
 def recorded_contacts(bodies: int, particles: int) -> int:

@@ -10,12 +10,14 @@ import pytest
 
 import blocksim
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.scenario import Scenario
+from blocksim.scenario import Scenario, load_scenario
 from blocksim.simulation import Result
+from blocksim.simulation.probe_series import bytes_of_series
 from blocksim.study import run as single
 from blocksim.study.compare import compare_run
 from blocksim.study.run import run
 from blocksim.study.stored_run import find_run
+from blocksim.world.describe import describe
 from tests.golden import Golden
 from tests.study.conftest import SCENARIOS
 
@@ -157,3 +159,26 @@ def test_folder_without_a_run_says_what_it_is(tmp_path: Path, golden: Golden, fi
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("block,quantity,unit,replicate,value\n1,x,mm,1,16\n" * name.startswith("measured"))
     golden(refused(tmp_path / place))
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("tower", {"time.end": 0.05}),
+        ("three_blocks_nonsmooth", {"time.end": 0.2, "output.every": "1 ms", "output.contacts": True}),
+        ("record_column", {"time.end": 0.5}),
+        ("soil/vertical_cut", {"time.end": 0.01}),
+    ],
+)
+def test_size_of_a_run_is_forecast_within_a_factor_of_two(
+    tmp_path: Path, name: str, changes: dict[str, object]
+) -> None:
+    scenario = load_scenario(SCENARIOS / f"{name}.toml", changes)
+    result = run(scenario, out=tmp_path / "run")
+    described = describe(scenario)
+    assert result.frames.time.size > 0.9 * described.frames  # nothing came to rest before
+    stored = sum(
+        path.stat().st_size for path in (tmp_path / "run").iterdir() if path.name.startswith(("run.h5", "probe-"))
+    )
+    told = described.bytes + bytes_of_series(scenario, described.steps, described.step, 14)
+    assert 0.5 * stored < told < 2.0 * stored

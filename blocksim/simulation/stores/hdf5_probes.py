@@ -12,14 +12,13 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
 from blocksim.scenario.probes import probe_names
-from blocksim.simulation.probe_series import ProbeSeries
+from blocksim.simulation.probe_series import CHUNK_ROWS, ProbeSeries
 from blocksim.simulation.stores import hdf5_open as safety
 from blocksim.simulation.stores.hdf5_open import DAMAGE, opened
 
 GROUP = "probes"
 STEP, TIME, COMMITTED = "step", "time", "n_committed"
 OWN = (STEP, TIME, COMMITTED)
-CHUNK_ROWS = 1024
 
 
 def create_probes(file: Any, probes: Iterable[ProbeSeries]) -> None:

@@ -26,13 +26,13 @@ from blocksim.simulation.probes import NO_PROBES, Probes
 from blocksim.simulation.recorder import Frame
 from blocksim.simulation.stores import hdf5_layout as layout
 from blocksim.simulation.stores.hdf5_contacts import append_contacts, bytes_of_contacts, create_contacts
+from blocksim.simulation.stores.hdf5_open import SIGNATURE, SUPERBLOCK, VERSION
 from blocksim.simulation.stores.hdf5_probes import append_probes, bytes_of_probes, commit_probes, create_probes
+from blocksim.world.memory import chunk_rows
 from blocksim.world.systems.blocks import blocks_placed
 from blocksim.world.systems.system import Present
 
 FLUSH_SECONDS = 0.25
-MOST_CHUNK_ROWS = 64
-CHUNK_VALUES = 1 << 17  # a megabyte
 RESERVE = 1 << 18  # bytes
 
 
@@ -42,6 +42,16 @@ def _try_room(path: Path) -> None:
         path.write_bytes(bytes(RESERVE))
     finally:
         path.unlink(missing_ok=True)
+
+
+def _give_back(path: Path) -> None:
+    """Cut off what was reserved at the end of a closed file, which HDF5 knows nothing of. Raises OSError."""
+    with path.open("r+b") as file:
+        head = file.read(SUPERBLOCK.size)
+        if len(head) == SUPERBLOCK.size:
+            signature, version, *_, end, _, _ = SUPERBLOCK.unpack(head)
+            if (signature, version) == (SIGNATURE, VERSION) and SUPERBLOCK.size < end < path.stat().st_size:
+                file.truncate(end)
 
 
 class FrameFile:
@@ -73,7 +83,7 @@ class FrameFile:
         self.probes = probes
         self.time_step = time_step
         self.count = 0
-        self.chunk_rows = min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // max(one.count for one in self.systems)))
+        self.chunk_rows = chunk_rows(max(one.count for one in self.systems))
         self.is_broken = False
         self.waiting: list[Frame] = []
         self.flushed_at = -np.inf
@@ -223,6 +233,7 @@ class FrameFile:
         self.commit()
         with self._telling_trouble():
             self.file.close()
+            _give_back(self.path)
             sync_file(self.path)  # no mark of a finished run may outlive its frames
 
     def __enter__(self) -> Self:
