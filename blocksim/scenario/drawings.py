@@ -19,6 +19,9 @@ MOST_OUTLINES, MOST_CORNERS = 2000, 16_000
 STRAY = 1e-6
 """Distance of a point from the line through its neighbours, in sizes of the block, up to which it is left out."""
 DXF = "dxf"
+DXF_APPLICATION = "BLOCKSIM"
+"""Of the extended data of a polyline: the name of a block (text), and whether it is fixed (integer)."""
+DXF_TEXT, DXF_INTEGER = 1000, 1070  # group codes
 FARTHEST = 1e12
 COLLECTIONS = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
 DEEPEST = 20
@@ -170,4 +173,14 @@ def _polylines(space: Any) -> Iterator[Drawn]:
             continue
         if entity.has_arc:
             raise DrawingError(f"{name}: has arcs; blocks have straight edges")
-        yield Drawn(points, name, {} if entity.dxf.layer == "0" else {"block": entity.dxf.layer})
+        layer = {} if entity.dxf.layer == "0" else {"block": entity.dxf.layer}
+        yield Drawn(points, name, layer | _extended(entity))
+
+
+def _extended(entity: Any) -> dict[str, Any]:
+    """Return name and fixed as `blocksim export` has written them; nothing for lines of other programs."""
+    if not entity.has_xdata(DXF_APPLICATION):
+        return {}
+    tags = {tag.code: tag.value for tag in entity.get_xdata(DXF_APPLICATION)}
+    names = {"name": str(tags[DXF_TEXT])} if DXF_TEXT in tags else {}
+    return names | ({"fixed": bool(tags[DXF_INTEGER])} if DXF_INTEGER in tags else {})

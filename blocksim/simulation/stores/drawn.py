@@ -11,7 +11,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.extras import loaded
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
-from blocksim.scenario.drawings import DXF
+from blocksim.scenario.drawings import DXF, DXF_APPLICATION, DXF_INTEGER, DXF_TEXT
 from blocksim.simulation.atomic import replacing, write_text
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.own_files import DXF_PROPERTY, GEOJSON_MARK
@@ -19,6 +19,8 @@ from blocksim.world.systems.blocks import are_removed, distinct, local_corners, 
 from blocksim.world.systems.system import Floats
 
 UNFIT_FOR_LAYERS = re.compile(r"[<>/\\\":;?*|=']")
+CONTROLS = re.compile(r"[\x00-\x1f\x7f]")  # would end a line of the file
+MOST_LETTERS = 60  # of a name, 4 bytes each at most: extended data have 255
 METRES = 6  # DXF's number of the unit
 
 
@@ -57,16 +59,20 @@ def write_geojson(path: Path, frames: Frames, scenario: Scenario) -> int:
 def write_dxf(path: Path, frames: Frames, scenario: Scenario) -> int:
     """Write the outlines (m) of the last frame, each in the layer of its block, and return the number of blocks.
 
+    Extended data of BLOCKSIM have the name of each and whether it is fixed; `read_drawing` takes them up again.
     Raises UnavailableError without the package for it, else as `write_geojson`.
     """
     ezdxf = loaded("ezdxf", f"writing {path.name}", DXF)
     blocks = [*_last_blocks(frames, scenario)]
     document = ezdxf.new("R2010", units=METRES)
     document.header.custom_vars.append(*DXF_PROPERTY)
+    document.appids.new(DXF_APPLICATION)
     space = document.modelspace()
     for one in blocks:
         layer = {"layer": UNFIT_FOR_LAYERS.sub("_", one.body.block)}
-        space.add_lwpolyline(one.corners.tolist(), close=True, dxfattribs=layer)
+        line = space.add_lwpolyline(one.corners.tolist(), close=True, dxfattribs=layer)
+        name = CONTROLS.sub("_", one.body.name)[:MOST_LETTERS]
+        line.set_xdata(DXF_APPLICATION, [(DXF_TEXT, name), (DXF_INTEGER, int(one.body.fixed))])
     with replacing(path) as temporary:
         document.saveas(temporary)
     return len(blocks)

@@ -53,3 +53,13 @@ def test_dxf_has_them_in_the_layers_of_their_blocks(tmp_path: Path) -> None:
     read = read_drawing(path)
     assert {one.properties["block"] for one in read} == {place_bodies(SCENARIO)[0].block}
     assert np.array(read[0].outline) == pytest.approx(1e-3 * corners(FRAMES, 4)[0, :3])
+
+
+def test_dxf_keeps_names_and_what_is_fixed(tmp_path: Path) -> None:
+    pytest.importorskip("ezdxf", reason="DXF needs the extra dxf")
+    support = {"block": "brick", "x": "0.5 m", "y": "25 mm", "fixed": True, "name": "key-stone"}
+    scenario = load_scenario(Path(__file__).parents[3] / "scenarios" / "three_blocks.toml", {"bodies": [support]})
+    write_dxf(tmp_path / "end.dxf", toppling(4, steps=2), scenario)
+    told = [(one.properties["name"], one.properties["fixed"]) for one in read_drawing(tmp_path / "end.dxf")]
+    assert told == [(body.name, body.fixed) for body in place_bodies(scenario)]
+    assert ("key-stone", True) in told
