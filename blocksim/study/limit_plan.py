@@ -102,7 +102,7 @@ def read_limit(
         message = f"{OPTION} {given.texts[key]}: a range is needed, as in {key}=FROM:TO or {key}=FROM:TO:COUNT"
         raise InvalidInputError(message)
     count = _count(table.get("count", scan))
-    ends = {name: table[name] for name in table if name != "count"}
+    ends: dict[str, Any] = {name: table[name] for name in table if name != "count"}
     if is_descending(ends):
         ends |= {"from": ends["to"], "to": ends["from"]}
     values = varied(bare, Variations({key: ends}, given.texts), OPTION, "sobol").vary[key]
