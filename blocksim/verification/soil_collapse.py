@@ -96,7 +96,7 @@ def energy_kept(setting: Setting) -> Iterator[Row]:
 
     SPHinXsys has one yield surface, that called plane-strain-associated here: a weaker soil, sin(phi) = 3 a.
     """
-    its, own = ("rods of SPHinXsys", "its surface"), ("rods", "Mohr–Coulomb")
+    its, own = ("rods_of_SPHinXsys", "its surface"), ("rods", "Mohr–Coulomb")
     cases = [(COARSE, its, "raw"), (COARSE, own, "raw")]
     if not setting.quick:
         cases += [(0.004, its, "raw"), (0.004, own, "raw"), (FINE, its, "raw"), (0.002, its, "raw")]

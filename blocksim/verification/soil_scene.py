@@ -37,7 +37,7 @@ SOFT = {"young_modulus": YOUNG_MODULUS, "poisson_ratio": POISSON_RATIO}
 RODS = {**SOFT, "unit_weight": UNIT_WEIGHT, "friction_angle": f"{math.degrees(ANGLE)!r} deg"}
 MATERIALS: dict[str, dict[str, Any]] = {
     "rods": RODS,
-    "rods of SPHinXsys": {**RODS, "yield_surface": "plane-strain-associated"},  # the only one that it has
+    "rods_of_SPHinXsys": {**RODS, "yield_surface": "plane-strain-associated"},  # the only one that it has
     "wall": {**SOFT, "density": DENSITY},
     "block": {**SOFT, "density": DENSITY},
 }
