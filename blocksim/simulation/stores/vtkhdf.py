@@ -26,6 +26,7 @@ BATCH = 1 << 16  # blocks times frames that are computed at once
 CHUNK = 1 << 14  # rows of a data set that are packed together
 PACKED: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 PLACE, VELOCITY, VELOCITY_DATA = ("x", "y"), ("vx", "vy"), "velocity_m_s"
+WAY_DATA = "displacement_m"  # from the first frame
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
@@ -89,7 +90,7 @@ def _points_of(track: Track, some: Indices) -> Floats:
 def _data_of(tracks: Sequence[Track]) -> dict[str, int]:
     """Return the data of cells at every time, with their components: what systems show beside their places."""
     shown = (one for track in tracks for one in track.system.outputs if one.name not in (*PLACE, *VELOCITY))
-    return {VELOCITY_DATA: 3, **{one.column: 1 for one in shown}}
+    return {VELOCITY_DATA: 3, WAY_DATA: 3, **{one.column: 1 for one in shown}}
 
 
 def _write_cells(group: Any, blocks: int, corners: NDArray[np.int64]) -> None:
@@ -152,6 +153,8 @@ def _cell_data(tracks: Sequence[Track], name: str, some: Indices) -> Floats:
     """Return the data of all cells in some frames, (cells * frames,) or (cells * frames, 3)."""
     if name == VELOCITY_DATA:
         return _in_space(np.concatenate([_velocities(one.some(some)) for one in tracks], axis=1))
+    if name == WAY_DATA:
+        return _in_space(np.concatenate([_ways(one, some) for one in tracks], axis=1))
     parts = [_shown(one, name, some) for one in tracks]
     return np.concatenate(parts, axis=1).ravel()
 
@@ -160,6 +163,14 @@ def _shown(track: Track, name: str, some: Indices) -> Floats:
     """Return what a system shows under a name in some frames, (f, b), zero where it has nothing of the kind."""
     found = next((one for one in track.system.outputs if one.column == name), None)
     return np.zeros((len(some), len(track.names))) if found is None else found.factor * found.of(track.some(some))
+
+
+def _ways(track: Track, some: Indices) -> Floats:
+    """Return how far (m) elements have come since the first frame, (f, b, 2)."""
+    if {one.name for one in track.system.quantities} >= set(PLACE):
+        return np.stack([track[name][some] - track[name][0] for name in PLACE], axis=-1)
+    first = np.zeros(1, dtype=np.intp)
+    return np.asarray((track.system.outlines(track, some) - track.system.outlines(track, first)).mean(axis=2))
 
 
 def _velocities(track: Track) -> Floats:

@@ -102,6 +102,8 @@ def test_vtk_reads_back_every_time(written: tuple[Frames, Path]) -> None:
         assert values(data, "block").tolist() == [1, 2, 3, 0]
         assert values(data, "rotation_deg")[:3].tolist() == np.degrees(frames.rotation[frame]).tolist()
         assert values(data, "spin_deg_s")[:3].tolist() == np.degrees(frames.spin[frame]).tolist()
+        way = np.stack([frames.x[frame] - frames.x[0], frames.y[frame] - frames.y[0], np.zeros(3)], axis=-1)
+        assert values(data, "displacement_m").tolist() == [*way.tolist(), [0.0, 0.0, 0.0]]
         assert values(data, "velocity_m_s").tolist() == [[0.25, -0.5, 0.0]] * 3 + [[0.0, 0.0, 0.0]]
 
 
