@@ -31,6 +31,8 @@ ROUNDING = 0.01  # of the least width of two bodies: by no more do rounded drawi
 MAX_PIECES = 1_000_000
 MAX_INTERVALS = 65_000
 """Of particles along one side; the solver counts them in 16 bits."""
+MAX_PROBES = 200
+"""Each has a table, and a data set a column; a run would end seconds after its last step."""
 MAX_PARTICLES = 1_000_000
 SHORTEST_SHARE = 0.01
 """Least length of a segment of boundary, in smallest sides of the blocks."""
@@ -102,6 +104,9 @@ def _too_many(scenario: Scenario) -> Iterator[Finding]:
         most = MAX_BLOCKS if what == "bodies" else MAX_SEGMENTS
         if count > most:
             yield Finding(path, f"{count} {what} are too many; at most {most} are allowed")
+    if len(scenario.probes) > MAX_PROBES:
+        message = f"{len(scenario.probes)} probes are too many; at most {MAX_PROBES} are allowed"
+        yield Finding(("probes",), f"{message} (output.contacts = true keeps the forces of all contacts)")
 
 
 def _endless_motion(scenario: Scenario) -> Iterator[Finding]:

@@ -17,6 +17,7 @@ from blocksim.simulation.schemes import AnyScene, measured_row
 from blocksim.simulation.team import ALONE, Team
 
 CALL_SECONDS = 0.05
+LONGEST_CALL = 0.2  # s, with all that is sampled on the way
 BODY_STEPS_AT_FIRST = 100_000  # ten milliseconds or so; particles and rigid contacts take longer
 MOST_GROWTH = 4  # from one call to the next: the first steps of a scene may be quick, as nothing touches
 
@@ -175,13 +176,18 @@ class _Going:
         self.on_progress(Progress(self.done * self.step, self.end, self.done, ledger.relative_residual))
 
     def _go_by_probes(self, last_step: int) -> None:
-        """Advance to a step in one call, or in several where probes are to be sampled on the way."""
-        probes = self.recorder.probes
+        """Advance to a step in one call, or in several where probes are to be sampled on the way.
+
+        It ends early where that takes long, as sampling may take longer than the steps.
+        """
+        probes, began = self.recorder.probes, time.perf_counter()
         if not probes.all:
             self._advance(last_step)
             return
         while self.status == REACHED and self.done < last_step:
             self._advance(min(last_step, probes.next_step(self.done)))
+            if time.perf_counter() - began > LONGEST_CALL:
+                return
             if self.status == REACHED and self.done < last_step:
                 probes.sample(self.scene)
 

@@ -78,7 +78,7 @@ def simulate(
     began += _compiled(scenario)
     recorder = _recorder(scenario, built)
     with _attended(built.scene, scenario, threads, limit, on_progress) as (team, attendance):
-        scene, settled = begun(built.scene, scenario, built.placed, team)
+        scene, settled = begun(built.scene, scenario, built.placed, team, attendance.stop)
         watched = replace(attendance, timeline=_timeline(scenario, recorder))
         ended = run_loop(scene, recorder, scenario.time.end, team=team, attendance=watched)
     return _result(scenario, recorder, ended, time.perf_counter() - began, settled)
@@ -114,7 +114,7 @@ def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
         with _attended(built.scene, scenario, threads, limit, on_progress) as (team, attendance):
             settled = None if resumption.checkpoint is None else resumption.checkpoint.position.settled
             if resumption.checkpoint is None:
-                scene, settled = begun(built.scene, scenario, built.placed, team)
+                scene, settled = begun(built.scene, scenario, built.placed, team, attendance.stop)
                 built = built._replace(scene=scene)
             part = Part(scenario, folder, built, resumption, settled)
             toml = part.prepare(tables, overwrite=overwrite or resume)

@@ -22,14 +22,14 @@ With `start.release = "always"` what does not come to rest begins its run from w
 did.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.errors import BlocksimError, ExitCode
+from blocksim.errors import BlocksimError, ExitCode, StoppedEarlyError
 from blocksim.kernels.common.arrays import REACHED, World
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario
@@ -66,6 +66,8 @@ FALLS = ("fx", "fy", "torque")
 PATHS = ("shift", "turn")  # pieces of driven bodies that hold
 MILLI = 1e3
 Floats = NDArray[np.float64]
+Stop = Callable[[], str]
+"""Why to stop now; nothing as long as the scene may go on."""
 
 
 class SettleError(BlocksimError):
@@ -75,28 +77,34 @@ class SettleError(BlocksimError):
 
 
 def begun(
-    scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team
+    scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team, stop: Stop = str
 ) -> tuple[AnyScene, Settled | None]:
     """Return a scene at time zero as its run begins, and how it settled, where it did.
 
-    Raises SettleError where that was asked for and fails; otherwise the scene begins as it was placed.
+    Raises SettleError where that was asked for and fails; otherwise the scene begins as it was placed. Raises
+    StoppedEarlyError where `stop` says why.
     """
     if scenario.start.settle:
-        return settle(scene, scenario, placed, team)
+        return settle(scene, scenario, placed, team, stop)
     if not settles(scenario) or any(body.vx or body.vy or body.spin for body in placed):
         return scene, None
     kept = [array.copy() for array in arrays_of(scene)]
     with suppress(SettleError):
-        found, settled = settle(scene, scenario, placed, team)
+        found, settled = settle(scene, scenario, placed, team, stop)
         if settled.largest_displacement_mm <= MILLI * UNASKED_SHARE * smallest_width(placed):
             return found, settled
     _restore(scene, kept)
     return scene, None
 
 
-def settle(scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team) -> tuple[AnyScene, Settled]:
-    """Bring a scene at time zero to rest; return it, still at time zero, and how. Raises SettleError."""
-    going = _Settling(scene, scenario, placed, team)
+def settle(
+    scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team, stop: Stop = str
+) -> tuple[AnyScene, Settled]:
+    """Bring a scene at time zero to rest; return it, still at time zero, and how.
+
+    Raises SettleError, and StoppedEarlyError where `stop` says why.
+    """
+    going = _Settling(scene, scenario, placed, team, stop)
     with going.without_time():
         try:
             going.load_up()
@@ -113,8 +121,10 @@ def settle(scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], te
 class _Settling:
     """A scene on its way to rest."""
 
-    def __init__(self, scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team) -> None:
-        self.scene, self.placed, self.team = scene, placed, team
+    def __init__(
+        self, scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team, stop: Stop
+    ) -> None:
+        self.scene, self.placed, self.team, self.stop = scene, placed, team, stop
         self.kind = scenario.time.scheme
         self.count = len(placed)
         names = {body.name: number for number, body in enumerate(placed)}
@@ -271,7 +281,12 @@ class _Settling:
             world.loads[name] = share * self.loads[name]
 
     def _go(self) -> None:
-        """Take some steps; take all velocities away where the kinetic energy falls. Raises SettleError."""
+        """Take some steps; take all velocities away where the kinetic energy falls.
+
+        Raises SettleError, and StoppedEarlyError.
+        """
+        if why := self.stop():
+            raise StoppedEarlyError(f"{why} while the scene settled; nothing is kept of that")
         self.before = self._places()
         self.steps += CALL_STEPS[self.kind]
         self.scene, status = self.team.advance(self.scene, self.steps)

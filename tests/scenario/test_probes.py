@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from blocksim.errors import ScenarioError
 from blocksim.scenario import PlacedBody, place_bodies, scenario_from_mapping
 from blocksim.scenario.probes import joint_between
 from tests.scenario.conftest import data_of
@@ -60,3 +61,10 @@ def test_a_joint_of_a_drawing_may_have_the_rounding_of_its_corners(corner: float
 @pytest.mark.parametrize("other", [(0.3, 1.2, 0.0), (0.0, 1.3, 20.0)])
 def test_bodies_that_face_no_other_have_no_joint(other: tuple[float, float, float]) -> None:
     assert joint_between(*bodies((0.0, 1.0, 0.0), other)) is None
+
+
+def test_more_probes_than_a_run_can_write_at_its_end_are_refused() -> None:
+    probes = [{"kind": "energy", "name": f"e{number}"} for number in range(201)]
+    assert len(scenario_from_mapping(data_of(probes=probes[:200])).probes) == 200
+    with pytest.raises(ScenarioError, match="201 probes are too many; at most 200 are allowed"):
+        scenario_from_mapping(data_of(probes=probes))

@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.simulation import Result, simulate, simulate_into
+from blocksim.simulation import Result, loop, simulate, simulate_into
 from blocksim.simulation.folder import prepare_folder
 from blocksim.simulation.probe_series import ProbeSeries
 from blocksim.simulation.stores.hdf5_probes import read_probes
@@ -46,6 +46,18 @@ def scene(scheme: str, probes: list[dict[str, Any]], end: float = 0.3, **tables:
 
 def probed(scheme: str, probes: list[dict[str, Any]], end: float = 0.3, **tables: Any) -> dict[str, ProbeSeries]:
     return simulate(scene(scheme, probes, end, **tables)).probes
+
+
+def test_a_call_ends_early_where_sampling_takes_long_and_samples_stay_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    every_step = scene("nonsmooth", [{"kind": "energy", "every": "step"}], 0.02)
+    steps: list[int] = []
+    usual = simulate(every_step)
+    monkeypatch.setattr(loop, "LONGEST_CALL", 0.0, raising=False)
+    slow = simulate(every_step, on_progress=lambda progress: steps.append(progress.steps))
+    assert set(np.diff(steps)) == {1}
+    (one,), (other,) = usual.probes.values(), slow.probes.values()
+    for name, values in one.columns.items():
+        np.testing.assert_array_equal(values, other.columns[name])
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.errors import ExitCode, ScenarioError
+from blocksim.errors import ExitCode, ScenarioError, StoppedEarlyError
 from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import simulate, simulate_into
+from blocksim.simulation.checkpoint_policy import CheckpointPolicy
 from blocksim.simulation.ensemble import run_ensemble
 from blocksim.simulation.schemes import build, scheme_of
 from blocksim.simulation.settling import SettleError, begun, settle
@@ -166,6 +167,13 @@ def test_a_resumed_run_an_ensemble_and_threads_have_the_bits_of_a_run(scheme: st
     first = simulate_into(scenario, tmp_path / "run")
     assert first.summary.final_state_sha256 == whole.summary.final_state_sha256
     assert first.summary.settled == whole.summary.settled
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_the_limit_of_wall_time_holds_while_a_scene_settles(scheme: str, tmp_path: Path) -> None:
+    with pytest.raises(StoppedEarlyError, match=r"^wall-time limit of 1e-09 s reached while the scene settled"):
+        simulate_into(stack(scheme), tmp_path / "out", precautions=CheckpointPolicy(wall_time=1e-9))
+    assert not (tmp_path / "out").exists()
 
 
 def test_nothing_settles_unless_it_is_asked_for() -> None:

@@ -48,8 +48,9 @@ def append_probes(file: Any, probes: Iterable[ProbeSeries]) -> None:
             group = file[f"{GROUP}/{probe.name}"]
             count = int(group[COMMITTED][()])
             for name, values in {STEP: probe.step, TIME: probe.time, **probe.columns}.items():
-                group[name].resize(count + len(probe), axis=0)
-                group[name][count:] = values
+                data_set = group[name]
+                data_set.resize(count + len(probe), axis=0)
+                data_set[count:] = values
 
 
 def commit_probes(file: Any, probes: Iterable[ProbeSeries]) -> None:

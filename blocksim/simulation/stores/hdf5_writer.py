@@ -33,6 +33,7 @@ from blocksim.world.systems.blocks import blocks_placed
 from blocksim.world.systems.system import Present
 
 FLUSH_SECONDS = 0.25
+APART = 10.0  # times what the last flush took: a tenth of a run at most
 RESERVE = 1 << 18  # bytes
 
 
@@ -87,6 +88,7 @@ class FrameFile:
         self.is_broken = False
         self.waiting: list[Frame] = []
         self.flushed_at = -np.inf
+        self.flush_seconds = 0.0
         numbers = sum(len(one.system.quantities) * one.count for one in self.systems)
         self.row_bytes = 8 * (2 + numbers + len(self.units))
         unnamed = path.with_name(f".{path.name}.new")
@@ -160,12 +162,13 @@ class FrameFile:
         self.keep_up()
 
     def keep_up(self) -> None:
-        """Write what has come together, a few times a second. Raises OutputError."""
-        if time.monotonic() - self.flushed_at > FLUSH_SECONDS:
+        """Write what has come together, a few times a second; less often where that takes long. Raises OutputError."""
+        if time.monotonic() - self.flushed_at > max(FLUSH_SECONDS, APART * self.flush_seconds):
             self.commit()
 
     def commit(self) -> None:
         """Bring all frames so far to the disk and then say how many there are. Raises OutputError (disk full …)."""
+        began = time.monotonic()
         samples = self.probes.taken().values()
         with self._telling_trouble():
             if self.waiting or any(map(len, samples)):
@@ -178,6 +181,7 @@ class FrameFile:
             self.file[layout.COMMITTED][()] = self.count
             self.file.flush()
         self.flushed_at = time.monotonic()
+        self.flush_seconds = self.flushed_at - began
 
     def sync(self) -> None:
         """Commit, and wait until it is on the disk, where it outlives a power failure. Raises OutputError."""

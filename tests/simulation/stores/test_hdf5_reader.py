@@ -1,6 +1,7 @@
 """run.h5: complete, with units, and readable when cut off, damaged or still open."""
 
 import shutil
+import time
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +71,14 @@ def test_file_of_a_run_under_way_can_be_read(soft: Shipped, tmp_path: Path) -> N
     frames = read_frames(tmp_path / "run.h5", soft())
     assert len(frames) == 203
     assert frames.x[-1].tolist() == [199.0] * 3
+
+
+def test_a_flush_that_takes_long_is_a_tenth_of_the_time_at_most(soft: Shipped, tmp_path: Path) -> None:
+    with open_file(tmp_path / "run.h5", soft) as sink:
+        for took, waiting in ((60.0, 1), (0.0, 0)):
+            sink.flushed_at, sink.flush_seconds = time.monotonic() - 300.0, took
+            add_frames(sink, 1)
+            assert len(sink.waiting) == waiting
 
 
 def test_reader_takes_committed_frames_only(soft: Shipped, tmp_path: Path) -> None:
