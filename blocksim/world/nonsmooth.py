@@ -1,7 +1,7 @@
 """Build the arrays of the non-smooth scheme from a scenario, in addition to the world that both schemes share."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -103,9 +103,12 @@ def has_row(placed: Sequence[PlacedBody]) -> bool:
     return any(touching) and not any(load.lower is not None and not placed[load.lower].fixed for load in loads)
 
 
-def has_impacts_in_rounds(scenario: Scenario, restitution: float, placed: Sequence[PlacedBody]) -> bool:
-    """Return True if impacts of one substep follow from one another, given the greatest restitution of the scene.
+def has_impacts_in_rounds(
+    scenario: Scenario, restitution: float, free: int, placed: Callable[[], Sequence[PlacedBody]]
+) -> bool:
+    """Return True if impacts of one substep follow from one another.
 
+    Given are the greatest restitution of the scene, how many blocks are free, and what places them where that matters.
     Up to WEAK_RESTITUTION, where no impact was seen to create energy, all impacts of a substep happen at once, and what
     is struck in it strikes what it meets without a rebound of its own. The two are one law as steps become shorter, as
     they differ only where two impacts fall into one substep. Rounds from any restitution on were tried: walls of 30 to
@@ -120,12 +123,11 @@ def has_impacts_in_rounds(scenario: Scenario, restitution: float, placed: Sequen
     Up to twelve have them too where some stand in a row and none lies on another at the start: blocks that touch, or
     nearly so, are struck one after the other, however small the gaps are, and lose at every blow what Newton says.
     """
-    free = sum(not body.fixed for body in placed)
     if restitution > WEAK_RESTITUTION or not is_cut_at_impacts(scenario, free):
         return restitution > WEAK_RESTITUTION
     if free <= 1:
         return True
-    return restitution > 0.0 and (free <= ALONE or has_row(placed))
+    return restitution > 0.0 and (free <= ALONE or has_row(placed()))
 
 
 def may_rebound_in_rounds(scenario: Scenario) -> bool:
@@ -133,7 +135,8 @@ def may_rebound_in_rounds(scenario: Scenario) -> bool:
     contact = scenario.contact
     pairs = [pair.restitution or 0.0 for row in scenario.pairs.values() for pair in row.values()]
     restitution = max(contact.restitution.block_block, contact.restitution.block_ground, *pairs)
-    return has_impacts_in_rounds(scenario, restitution, place_bodies(scenario))
+    free = sum(structure.size for structure in scenario.structures) + sum(not body.fixed for body in scenario.bodies)
+    return has_impacts_in_rounds(scenario, restitution, free, lambda: place_bodies(scenario))
 
 
 def build_nonsmooth(scenario: Scenario) -> Nonsmooth:
@@ -177,7 +180,7 @@ def _stepping(outline: Outline, stride: Stride) -> dict[str, float]:
     soft = soft_contact(substep)
     restitution = max(material.restitution for row in outline.interactions for material in row)
     free = sum(not body.fixed for body in outline.placed)
-    rounds = has_impacts_in_rounds(outline.scenario, restitution, outline.placed)
+    rounds = has_impacts_in_rounds(outline.scenario, restitution, free, lambda: outline.placed)
     return {
         "substep": substep,
         "length": stride.step,

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +41,9 @@ class Formula(Execution):
                 yield Batch((task,), (self.row(task.scenario),), 0.0, "")
 
         return run, Setting(1)
+
+    def for_rounds(self) -> AbstractContextManager[Run]:
+        return nullcontext(self.ready()[0])
 
     def row(self, scenario: Scenario) -> dict[str, object]:
         tilt, scale = math.degrees(scenario.ground.tilt), scenario.contact.stiffness_scale
