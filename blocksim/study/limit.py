@@ -97,7 +97,7 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     )
 
 
-def find_limit(  # noqa: PLR0913, PLR0915 - as `limit`; the steps of a search, one after the other
+def find_limit(  # noqa: PLR0913 - as `limit`; the steps of a search, one after the other
     plan: LimitPlan,
     execution: Execution,
     *,
@@ -136,12 +136,16 @@ def find_limit(  # noqa: PLR0913, PLR0915 - as `limit`; the steps of a search, o
         result = replace(found, run=runs.ran)
         write_result(result)  # first: the runs beside it may not fit on the disk
         if keep_runs:
-            kept = keep_sides(folder, plan, found.falls_as_given, found.rows)
-            released = {value: one.row for value, one in kept.items() if one.is_fall}
-            cases = {value: one.case for value, one in kept.items()}
-            result = replace(result, kept=cases, released=released)
+            result = with_sides(result)
             write_result(result)
     return result
+
+
+def with_sides(found: LimitResult) -> LimitResult:
+    """Return a result with the runs beside its limits, kept in its folder. Raises as `keep_sides`."""
+    kept = keep_sides(found.folder, found.plan, found.falls_as_given, found.rows)
+    released = {value: one.row for value, one in kept.items() if one.is_fall}
+    return replace(found, kept={value: one.case for value, one in kept.items()}, released=released)
 
 
 def _stopped(runs: int) -> StoppedEarlyError:

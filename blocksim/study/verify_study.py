@@ -10,6 +10,7 @@ import io
 import json
 import os
 import random
+import shutil
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
@@ -25,12 +26,12 @@ from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.fragility import MEMBERS_TABLE, run_fragility
 from blocksim.study.fragility import TABLE as COUNTS
 from blocksim.study.fragility_plan import read_fragility
-from blocksim.study.limit import find_limit
+from blocksim.study.limit import find_limit, with_sides
 from blocksim.study.limit_curve import TABLE as CURVE
 from blocksim.study.limit_curve import curve_rows, folder_named
 from blocksim.study.limit_plan import read_limit
 from blocksim.study.limit_result import TABLE as RUNS
-from blocksim.study.limit_result import LimitResult
+from blocksim.study.limit_result import LimitResult, write_result
 from blocksim.study.progress import PATTERN, Entry, read_entries, values_hash
 from blocksim.study.rows import Row, as_cell
 from blocksim.study.study_pictures import MOST_BYTES
@@ -182,6 +183,7 @@ def _limit(folder: Path, answer: Answer) -> Repeated:
         replay = Replay(look=lambda task: known.get(values_hash(task.settings)))
         with TemporaryDirectory() as place, suppress(InvalidInputError):
             found = find_limit(plan, replay, out=Path(place) / "limit", keep_runs=False, stiffer=stiffer)
+            found = _with_kept(found, folder)
             tried.append(replace(_read_repeated(found.folder, LIMIT, (RUNS,), replay), limit=found))
             if _bare(tried[-1].answer) == _bare(answer):
                 return tried[-1]
@@ -189,6 +191,16 @@ def _limit(folder: Path, answer: Answer) -> Repeated:
         message = f"{folder}: the manifest lacks runs of this search"
         raise InvalidInputError(message)
     return tried[0]
+
+
+def _with_kept(found: LimitResult, folder: Path) -> LimitResult:
+    """Return a result with what the runs show that were kept of the stored one; those are not run again."""
+    if not (folder / CASES).is_dir():
+        return found
+    shutil.copytree(folder / CASES, found.folder / CASES)
+    result = with_sides(found)
+    write_result(result)
+    return result
 
 
 def _fragility(folder: Path, answer: Answer) -> Repeated:

@@ -24,6 +24,7 @@ from tests.golden import Golden
 from tests.study.test_fragility import SLOPE
 
 STATIC = "friction.block_ground.static"
+X = "1.x_mm"
 BRIEF = ("contact.stiffness_scale=0.001", "time.end=0.02")
 SHORT = ("--set", BRIEF[0], "--set", BRIEF[1])
 
@@ -311,7 +312,8 @@ def test_studies_come_out_again(blocksim: Command, tmp_path: Path, name: str) ->
 def shift_a_run(folder: Path) -> None:
     """Move the block of every run by a nanometre, in the manifest, with sums that fit."""
     entries = [entry for _, entry in read_entries(folder / "manifest.jsonl")]
-    lines = [replace(one, row={**one.row, "1.x_mm": float(str(one.row["1.x_mm"])) + 1e-6}) for one in entries]
+    shifted = [{name: float(str(value)) + 1e-6 for name, value in one.row.items() if name == X} for one in entries]
+    lines = [replace(one, row={**one.row, **moved}) for one, moved in zip(entries, shifted, strict=True)]
     (folder / "manifest.jsonl").write_bytes(b"".join(one.to_line() for one in lines))
 
 
@@ -322,7 +324,7 @@ STUDY_CHANGES: dict[str, tuple[str, Callable[[Path], object], str]] = {
         "limit.json: changes.0.low",
     ),
     "verdict": ("limit", lambda folder: altered(folder, "limit.csv", ",falls,", ",stands,"), "verdict: stands stored"),
-    "run": ("limit", shift_a_run, "1.x_mm: "),
+    "run": ("limit", shift_a_run, f"{X}: "),
     "curve": ("limits", lambda folder: altered(folder, "limits.csv", ",stands,", ",falls,"), "below: falls stored"),
     "point": (
         "limits",

@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import closing
+from contextlib import AbstractContextManager, closing
 from functools import partial
 from multiprocessing import active_children
 from pathlib import Path
@@ -15,6 +15,7 @@ import pytest
 from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError, StoppedEarlyError
 from blocksim.scenario import Document
 from blocksim.study.criterion import Verdict
+from blocksim.study.executors.processes import pool_of
 from blocksim.study.limit import limit as searched
 from blocksim.study.limit_plan import read_limit, variants
 from blocksim.study.progress import MANIFEST, Manifest
@@ -97,12 +98,11 @@ def test_a_search_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_no
 def test_processes_are_started_once_and_not_for_every_round(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[int] = []
 
-    class Counted(ProcessPoolExecutor):
-        def __init__(self, workers: int, **options: Any) -> None:
-            started.append(workers)
-            super().__init__(workers, **options)
+    def counted(workers: int) -> AbstractContextManager[ProcessPoolExecutor]:
+        started.append(workers)
+        return pool_of(workers)
 
-    monkeypatch.setattr("blocksim.study.executors.processes.ProcessPoolExecutor", Counted)
+    monkeypatch.setattr("blocksim.study.executors.processes.pool_of", counted)
     rough = partial(limit, block_on_a_slope(SQUAT), TILT, tolerance=0.02)
     found = rough(out=tmp_path / "pool", executor="processes", jobs=1)
     assert found.limits == rough(out=tmp_path / "here").limits
