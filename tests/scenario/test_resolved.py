@@ -211,7 +211,7 @@ time = { end = 1.0, step = 1e-6, safety = 0.1, force_step = true, stop_at_rest =
 output = { every = 1.0, contacts = true }
 probes.0 = { name = "crown", every = "step", body = "2", at = [0.1, 0] }
 loads.0 = { name = "push", body = "2", magnitude = 2, direction = "1 deg", axes = "body", point = [0.1, 0] }
-start = { settle = false, hold = ["2"] }
+start = { settle = false, hold = ["2"], release = "always" }
 """
 
 

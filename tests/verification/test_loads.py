@@ -102,6 +102,7 @@ def test_the_shipped_dam_stands_until_its_base_is_too_narrow() -> None:
     assert stands.summary.simulated_time_s > 4.0
     narrow = simulate(load_scenario("scenarios/dam.toml", ["blocks.dam.width=3.65 m"])).summary.movement
     assert narrow is not None
-    assert narrow.outcome in {"slid", "fell"}
+    assert narrow.outcome in {"rocking", "fell"}  # it turns over at the end
+    assert narrow.moves_on
     assert narrow.first_moved_s is not None
     assert 3.9 < narrow.first_moved_s < 6.0  # as the level comes near the crest
