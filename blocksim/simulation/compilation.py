@@ -2,11 +2,12 @@
 
 import functools
 import time
+from collections.abc import Sequence
 
 from blocksim.errors import OutputError
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.compiler import compiling
-from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario import PlacedBody, Scenario, scenario_from_mapping
 from blocksim.scenario.placement import has_outlines
 from blocksim.simulation.schemes import SCHEMES, build_scene, measured_row
 from blocksim.simulation.schemes.explicit import PARTICLES, SURFACE
@@ -41,12 +42,12 @@ SMALLEST_SCENE = {
 }
 
 
-def kernels_of(scenario: Scenario) -> str:
-    """Return which set of kernels a scenario needs."""
+def kernels_of(scenario: Scenario, placed: Sequence[PlacedBody] | None = None) -> str:
+    """Return which set of kernels a scenario needs; `placed` are its bodies, where they are known."""
     kernels = kernel_set(scenario.time.scheme, scenario.contact.model)
     if has_outlines(scenario):
         kernels = OF_OUTLINES.get(kernels, kernels)
-    return IN_ROUNDS[kernels] if kernels in IN_ROUNDS and may_rebound_in_rounds(scenario) else kernels
+    return IN_ROUNDS[kernels] if kernels in IN_ROUNDS and may_rebound_in_rounds(scenario, placed) else kernels
 
 
 def kernel_set(scheme: str, model: str) -> str:

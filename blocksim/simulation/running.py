@@ -276,7 +276,7 @@ def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds:
         time_step_s=step,
         simulated_time_s=steps * step,
         ended_at=datetime.now(UTC).isoformat(timespec="seconds"),
-        compile_seconds=compile_kernels(kernels_of(scenario)),
+        compile_seconds=compile_kernels(kernels_of(scenario, recorder.placed)),
         solver_seconds=ended.solver_seconds,
         total_seconds=seconds,
         energy_J=ended.ledger,

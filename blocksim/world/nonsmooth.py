@@ -130,13 +130,13 @@ def has_impacts_in_rounds(
     return restitution > 0.0 and (free <= ALONE or has_row(placed()))
 
 
-def may_rebound_in_rounds(scenario: Scenario) -> bool:
+def may_rebound_in_rounds(scenario: Scenario, placed: Sequence[PlacedBody] | None = None) -> bool:
     """Return the same of a scenario before it is built; where not all pairs meet it may be True in vain."""
     contact = scenario.contact
     pairs = [pair.restitution or 0.0 for row in scenario.pairs.values() for pair in row.values()]
     restitution = max(contact.restitution.block_block, contact.restitution.block_ground, *pairs)
     free = sum(structure.size for structure in scenario.structures) + sum(not body.fixed for body in scenario.bodies)
-    return has_impacts_in_rounds(scenario, restitution, free, lambda: place_bodies(scenario))
+    return has_impacts_in_rounds(scenario, restitution, free, lambda: placed or place_bodies(scenario))
 
 
 def build_nonsmooth(scenario: Scenario) -> Nonsmooth:
