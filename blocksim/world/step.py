@@ -17,6 +17,7 @@ reaches.
 """
 
 import math
+from collections.abc import Sequence
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -29,7 +30,7 @@ from blocksim.scenario.placement import length_beside
 from blocksim.world.applied import greatest_push, steepest_tilt
 from blocksim.world.bounds import Bounds, Kind, fastest_fall, given_speed, greatest_speed, support_speed
 from blocksim.world.interactions import Interactions
-from blocksim.world.stable_step import ContactBody, ContactStiffness, Load, stable_step, steepest
+from blocksim.world.stable_step import ContactBody, ContactStiffness, Load, frequency_squared, stable_step, steepest
 from blocksim.world.systems import largest_step
 
 MOST_STEPS = 2**53  # beyond that a step number is no exact float
@@ -92,11 +93,22 @@ def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: str
     grounded = [
         (body, None, stiffness(c, ground, body.inverse_mass)) for body, c in kinds for ground in {0, *bounds.grounds}
     ]
-    paired = [
-        (a, b, stiffness(ca, cb, a.inverse_mass + b.inverse_mass))
-        for (a, ca), (b, cb) in combinations_with_replacement(kinds, 2)
-    ]
+    if law == "linear":  # stiffness goes with the classes only: of hundreds of kinds in a class the stiffest decides
+        classes = combinations_with_replacement(dict.fromkeys(c for _, c in kinds), 2)
+        springs = [(ca, cb, stiffness(ca, cb, 0.0)) for ca, cb in classes]
+        paired = [(_stiffest(kinds, ca, one), _stiffest(kinds, cb, one), one) for ca, cb, one in springs]
+    else:
+        paired = [
+            (a, b, stiffness(ca, cb, a.inverse_mass + b.inverse_mass))
+            for (a, ca), (b, cb) in combinations_with_replacement(kinds, 2)
+        ]
     return stable_step([*grounded, *paired], safety)
+
+
+def _stiffest(kinds: Sequence[tuple[ContactBody, int]], of_class: int, springs: ContactStiffness) -> ContactBody:
+    """Return the body of a class with the stiffest mode on given springs."""
+    bodies = (body for body, one in kinds if one == of_class)
+    return max(bodies, key=lambda body: frequency_squared(body, springs.normal, springs.shear))
 
 
 def _contact_body(kind: Kind) -> ContactBody:
