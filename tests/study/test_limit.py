@@ -250,15 +250,6 @@ def test_limits_of_rigid_contacts_that_go_with_the_step_hold_those_of_half_of_it
     assert plain == given
 
 
-def test_a_range_from_its_upper_end_down_is_searched_as_the_same_one(tmp_path: Path) -> None:
-    slope = block_on_a_slope(SQUAT)
-    up, down = (
-        limit(slope, {"ground.tilt": {"from": first, "to": last, "count": 3}}, out=tmp_path / first, tolerance=0.1)
-        for first, last in (("5 deg", "40 deg"), ("40 deg", "5 deg"))
-    )
-    assert up.changes == down.changes
-
-
 def test_an_acceleration_that_passes_for_rest_is_in_the_bracket(tmp_path: Path) -> None:
     degrees = math.degrees(math.atan(FRICTION))
     scene = unsettled(block_on_a_slope(SQUAT, rest_hold=0.05, rest_speed=1e-4))
