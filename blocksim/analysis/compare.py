@@ -89,7 +89,7 @@ class Comparison:
 
     def to_frame(self) -> "pd.DataFrame":
         """Return one row a quantity, columns as in ComparisonRow."""
-        import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+        import pandas as pd
 
         frame = pd.DataFrame([asdict(row) for row in self.rows])
         frame["verdict"] = [row.verdict.value for row in self.rows]
@@ -148,7 +148,7 @@ def data_uncertainty(s: float, n: int) -> float:
 
 def prediction_half_width(s: float, n: int) -> float:
     """Return half width of the 95 % prediction interval for the next test (unit of `s`); NaN for n = 1."""
-    if n < 2:  # noqa: PLR2004 - no scatter without a second repeat
+    if n < 2:
         return nan
     return quantile(0.5 * (1.0 + CONFIDENCE), n - 1) * s * sqrt(1.0 + 1.0 / n)
 

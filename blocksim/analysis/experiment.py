@@ -153,7 +153,7 @@ def quoted(names: Sequence[str]) -> str:
 
 def _frame(rows: Iterable[Any]) -> "pd.DataFrame":
     """Return rows with names as a table of pandas."""
-    import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+    import pandas as pd
 
     return pd.DataFrame(list(rows))
 

@@ -67,7 +67,7 @@ class Judgement:
 
     def to_frame(self, metric: str = "inside") -> "pd.DataFrame":
         """Return the rows of one metric; its columns are explained in METRICS."""
-        import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+        import pandas as pd
 
         names = [column.name for column in METRICS[metric].columns]
         return pd.DataFrame(self.findings[metric].rows, columns=names)

@@ -92,7 +92,7 @@ class Members:
         return np.where(np.isfinite(values), values, np.nan)
 
     def _numbers(self, name: str) -> "NDArray[np.float64]":
-        import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+        import pandas as pd
 
         column = self.table[name]
         numbers = pd.to_numeric(column, errors="coerce")

@@ -280,7 +280,7 @@ def _told(found: LimitResult, change: Change[Verdict]) -> list[str]:
 
 def _compare(found: Mapping[str, LimitResult]) -> None:
     """Report how far the limits of several laws lie apart, where they have as many."""
-    if len(found) < 2:  # noqa: PLR2004 - two to compare
+    if len(found) < 2:
         return
     (first, one), *others = found.items()
     for name, other in others:

@@ -75,7 +75,7 @@ def cleaned(cell: Sequence[Corner], least: float) -> list[Corner]:
     corners = [*cell]
     extent = max((math.dist(a, b) for a in corners for b in corners), default=0.0)
     shortest = max(least, 2.0 * SHORTEST * extent)
-    while len(corners) > 3:  # noqa: PLR2004 - a triangle is left
+    while len(corners) > 3:
         needless = [number for number in range(len(corners)) if _is_needless(corners, number, shortest)]
         if not needless and len(corners) <= MOST:
             break

@@ -136,7 +136,7 @@ def _polygon(rings: Any, name: str, properties: Mapping[str, Any]) -> Drawn:
     if not rings:
         raise DrawingError(f"{place}a polygon without corners")
     if len(rings) > 1:
-        holes = "a hole" if len(rings) == 2 else f"{len(rings) - 1} holes"  # noqa: PLR2004 - its edge and one hole
+        holes = "a hole" if len(rings) == 2 else f"{len(rings) - 1} holes"
         raise DrawingError(f"{place}a polygon with {holes}; blocks have none")
     return Drawn([_point(point) for point in rings[0]], name or "polygon", properties)
 

@@ -111,7 +111,7 @@ def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tup
 
 def _in_given_order(data: Data, parts: Sequence[str | int]) -> Sequence[str | int]:
     """Reverse pairs.B.A if the data have pairs.A.B: it is the same pair."""
-    if parts[0] != "pairs" or len(parts) < 3 or follow(data, parts[:3]) is not MISSING:  # noqa: PLR2004 - pairs.A.B
+    if parts[0] != "pairs" or len(parts) < 3 or follow(data, parts[:3]) is not MISSING:
         return parts
     turned = (parts[0], parts[2], parts[1])
     return parts if follow(data, turned) is MISSING else (*turned, *parts[3:])
@@ -119,7 +119,7 @@ def _in_given_order(data: Data, parts: Sequence[str | int]) -> Sequence[str | in
 
 def _with_own_friction(data: Data, parts: Sequence[str | int]) -> Data:
     """Give a pair of materials the general friction to start from, before a value in its own is set."""
-    inside_friction = parts[0] == "pairs" and tuple(parts[3:4]) == ("friction",) and len(parts) > 4  # noqa: PLR2004
+    inside_friction = parts[0] == "pairs" and tuple(parts[3:4]) == ("friction",) and len(parts) > 4
     if not inside_friction or follow(data, parts[:4]) is not MISSING:
         return data
     side = "block_ground" if GROUND in parts[1:3] else "block_block"

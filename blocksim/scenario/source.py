@@ -190,7 +190,7 @@ class _Scanner:
             self.places.setdefault(path, Place(span, span))
         path = (*path, parts[-1])
         self.places.setdefault(path, Place(span, span))
-        if brackets == 2:  # noqa: PLR2004 - [[ ]]
+        if brackets == 2:
             self.list_sizes[path] = self.list_sizes.get(path, 0) + 1
             path = self.latest(path)
             self.places[path] = Place(span, span)

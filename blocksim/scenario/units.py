@@ -177,7 +177,7 @@ def parse_unit(text: str) -> Unit:
 @functools.lru_cache(maxsize=256)
 def unit_by_pint(text: str) -> Unit:
     """Let pint read a unit expression; raises UnitError."""
-    import pint  # noqa: PLC0415 - a third of a second that scenarios in everyday units do not pay
+    import pint
 
     registry: Any = _registry()  # pint's own hints do not follow `non_int_type`
     numbers = _NO_NUMBER.search(text)
@@ -200,7 +200,7 @@ def _for_pint(text: str) -> str:
 
 @functools.cache
 def _registry() -> "pint.UnitRegistry[Fraction]":
-    import pint  # noqa: PLC0415 - see unit_by_pint
+    import pint
 
     registry: pint.UnitRegistry[Fraction] = pint.UnitRegistry(None, non_int_type=Fraction)
     registry.load_definitions(DEFINITIONS.strip().splitlines())

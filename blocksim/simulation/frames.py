@@ -81,7 +81,7 @@ def tidy_table(frames: Frames, system: str = BLOCKS.name) -> "pd.DataFrame":
 
     Of blocks: time_s, block, x_mm, … kinetic_energy_J. Raises KeyError for a system that is not in the run.
     """
-    import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+    import pandas as pd
 
     track = {one.system.name: one for one in frames.tracks}[system]
     count, elements = len(frames), len(track.names)

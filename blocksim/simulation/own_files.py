@@ -105,12 +105,12 @@ def _movie_box(file: BinaryIO) -> bytes:
     while True:
         file.seek(place)
         header = file.read(8)
-        if len(header) < 8:  # noqa: PLR2004 - size and name
+        if len(header) < 8:
             return b""
         size, kind = struct.unpack(">I4s", header)
         if kind == b"moov":
             return file.read(min(size, 100 * MEGABYTE))
-        if size < 8:  # noqa: PLR2004 - the last box, or one beyond 4 GB
+        if size < 8:
             return b""
         place += size
 

@@ -105,7 +105,7 @@ class ProbeSeries:
 
     def to_frame(self) -> "pd.DataFrame":
         """Return a pandas table, one row per sample: time_s, then the columns in mm, degrees, N and J."""
-        import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+        import pandas as pd
 
         return pd.DataFrame({"time_s": self.time, **self.written()})
 

@@ -59,7 +59,7 @@ def steps_per_frame(every: float, step: float) -> float:
 class Recorder:
     """Frames, growing as the run continues; with a sink only the last one, so that long runs need no more memory."""
 
-    def __init__(  # noqa: PLR0913 - what there is to record
+    def __init__(
         self,
         placed: Sequence[PlacedBody],
         every: float,

@@ -84,7 +84,7 @@ def simulate(
     return _result(scenario, recorder, ended, time.perf_counter() - began, settled)
 
 
-def simulate_into(  # noqa: PLR0913 - what a user can choose for a run
+def simulate_into(
     scenario: Scenario,
     folder: Path,
     *,

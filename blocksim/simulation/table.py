@@ -86,7 +86,7 @@ def final_values(motion: Floats, shapes: Floats, outlines: Floats | None = None)
 
 def as_frame(columns: Columns) -> "pd.DataFrame":
     """Return the same table for people who know pandas."""
-    import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+    import pandas as pd
 
     return pd.DataFrame(columns)
 

@@ -67,7 +67,7 @@ def plot(  # noqa: PLR0913 - one argument for each option of the command
     return draw(_folder(place), None if out is None else Path(out), look, table, kind, paper, ready=ready)[0]
 
 
-def animate(  # noqa: PLR0913 - one argument for each option of the command
+def animate(
     place: Path | str | Result,
     out: Path | str | None = None,
     *,

@@ -67,7 +67,7 @@ class Fit:
         return tuple(prior for prior in self.plan.priors if prior.lies_at_bound(self.best.values[prior.key]))
 
 
-def calibrate(  # noqa: PLR0913 - one argument for each option of the command
+def calibrate(
     plan: Plan,
     *,
     trials: int = TRIALS,

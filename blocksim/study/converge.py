@@ -55,7 +55,7 @@ PARTICLE_MODELS = frozenset({"particles", "kernel"})
 SOFTEST = 1e-3  # stiffness scale
 
 
-def converge(  # noqa: PLR0913 - one argument for each option of the command
+def converge(
     scenario: Source,
     *,
     tolerance_mm: float = TOLERANCE_MM,

@@ -255,7 +255,7 @@ def verdict_of(changes_mm: Sequence[float], tolerance_mm: float, *, flips: bool)
     `flips` says that an outcome changes in one of the last two refinements.
     """
     last = changes_mm[-2:]
-    if len(last) < 2 or not all(map(isfinite, last)):  # noqa: PLR2004 - two refinements in a row
+    if len(last) < 2 or not all(map(isfinite, last)):
         return Verdict.FAILED
     if flips:
         return Verdict.FLIPS

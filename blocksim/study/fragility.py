@@ -66,7 +66,7 @@ class FragilityResult:
     @property
     def table(self) -> "pd.DataFrame":
         """The counts as fragility.csv has them."""
-        import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+        import pandas as pd
 
         return pd.DataFrame(list(_records(self)), columns=[_head(self.plan), *COLUMNS])
 
@@ -168,7 +168,7 @@ def fragility(  # noqa: PLR0913 - one argument for each option of the command
     )
 
 
-def run_fragility(  # noqa: PLR0913 - as `fragility`
+def run_fragility(
     plan: FragilityPlan,
     execution: Execution,
     shard: Shard = WHOLE,

@@ -140,7 +140,7 @@ class FragilityPlan:
         return open_interval(generator(self.seed, name).random(self.members))
 
 
-def read_fragility(  # noqa: PLR0913 - one argument for each option of the command
+def read_fragility(
     document: Document,
     intensity: Mapping[str, Values] | Variations,
     scatter: Mapping[str, Values] | Variations | None = None,

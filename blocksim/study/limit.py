@@ -97,7 +97,7 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     )
 
 
-def find_limit(  # noqa: PLR0913 - as `limit`; the steps of a search, one after the other
+def find_limit(
     plan: LimitPlan,
     execution: Execution,
     *,

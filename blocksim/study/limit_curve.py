@@ -76,7 +76,7 @@ class CurveResult:
     @property
     def table(self) -> "pd.DataFrame":
         """The brackets as limits.csv has them: one row each, one without numbers where nothing changes."""
-        import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+        import pandas as pd
 
         return pd.DataFrame(list(curve_rows(self.searches)), columns=_heads(self.plan))
 
@@ -150,7 +150,7 @@ def read_curve(
     )
 
 
-def find_curve(  # noqa: PLR0913 - as `limit_curve`
+def find_curve(
     plan: CurvePlan,
     execution: Execution,
     *,

@@ -113,7 +113,7 @@ def read_limit(
 
 
 def _count(value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 2 <= value <= MOST_SCANNED:  # noqa: PLR2004
+    if isinstance(value, bool) or not isinstance(value, int) or not 2 <= value <= MOST_SCANNED:
         message = f"{value} values cannot be scanned; a whole number from 2 to {MOST_SCANNED} is needed"
         raise InvalidInputError(message)
     return value

@@ -128,7 +128,7 @@ class LimitResult:
     @property
     def table(self) -> "pd.DataFrame":
         """All runs as limit.csv has them."""
-        import pandas as pd  # noqa: PLC0415 - a third of a second that a run does not pay
+        import pandas as pd
 
         return pd.DataFrame(list(_records(self)), columns=[_head(self.plan), *COLUMNS])
 

@@ -111,7 +111,7 @@ def _measured_ranges(scenario: Scenario) -> dict[str, tuple[float, float]]:
     return dict(zip(centres["block"], zip(*ends, strict=True), strict=True))
 
 
-def draw(  # noqa: PLR0913 - what a picture is made of
+def draw(
     place: Path,
     out: Path | None,
     asked: RunLook,

@@ -26,7 +26,7 @@ def read_published(path: Path, over_unit: str, unit: str) -> tuple[Series, ...]:
                 place.append(cell.number())
             except ValueError as error:
                 problems.append(cell.problem(str(error)))
-        if len(place) == 2:  # noqa: PLR2004 - both are numbers
+        if len(place) == 2:
             found.setdefault(row[SERIES].text, []).append((place[0], place[1]))
     if not problems and not found:
         problems.append(Problem(str(path), "the table has no rows"))

@@ -15,7 +15,7 @@ from blocksim.study.rows import check_experiment
 from blocksim.study.stored_run import find_run
 
 
-def run(  # noqa: PLR0913 - what a user can choose for a run
+def run(
     scenario: Source,
     *,
     out: Path | str | None = None,

@@ -75,7 +75,7 @@ class RunLook:
         return {"--panels": self.panels is not None, "--block": self.blocks is not None, "--relative": self.relative}
 
 
-def draw_run(  # noqa: PLR0913 - what a picture is made of
+def draw_run(
     run: Path,
     out: Path | None,
     asked: RunLook,

@@ -134,7 +134,7 @@ class Sensitivity:
 
     def to_frame(self) -> "pd.DataFrame":
         """Return the same rows as a pandas table."""
-        import pandas as pd  # noqa: PLC0415 - a third of a second that the command does not pay
+        import pandas as pd
 
         return pd.DataFrame(list(self.records()))
 

@@ -122,7 +122,7 @@ def study_in(place: Path | str) -> FolderKind | None:
     return next((kind for kind in DRAWN if (Path(place) / kind.origin).is_file()), None)
 
 
-def draw_study(  # noqa: PLR0913 - what a picture is made of
+def draw_study(
     folder: Path,
     kind: FolderKind,
     path: Path | None,

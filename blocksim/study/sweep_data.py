@@ -1,9 +1,9 @@
 """A sweep, read back from its folder as pictures need it."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from blocksim.analysis.compare import limits, prediction_half_width
@@ -18,6 +18,9 @@ from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarte
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import read_sweep
 from blocksim.view.sweeps.data import Input, Measured, SweepData, Typed
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 LARGEST = 1e30  # of inputs (SI) and of places (mm) that are drawn
@@ -85,11 +88,11 @@ def _refuse_cut(members: Members, cut: NDArray[np.bool_]) -> None:
         raise InvalidInputError(f"{members.source}: case {case} has finished, but its row lacks positions of blocks")
 
 
-def _inside(table: pd.DataFrame, ranges: Ranges) -> NDArray[np.bool_]:
+def _inside(table: "pd.DataFrame", ranges: Ranges) -> NDArray[np.bool_]:
     return np.array(ranges.inside(table), dtype=np.bool_)
 
 
-def _inputs(scenario: Scenario, table: pd.DataFrame) -> tuple[Input, ...]:
+def _inputs(scenario: Scenario, table: "pd.DataFrame") -> tuple[Input, ...]:
     """Return the keys that take more than one value, or the first where none does."""
     vary = {} if scenario.sweep is None else scenario.sweep.vary
     heads = [head for name in table.columns if (head := Head.read(str(name))).key in vary]
@@ -102,7 +105,7 @@ def _inputs(scenario: Scenario, table: pd.DataFrame) -> tuple[Input, ...]:
     return tuple(varied or inputs[:1])
 
 
-def _input(scenario: Scenario, head: Head, column: pd.Series) -> Input:
+def _input(scenario: Scenario, head: Head, column: "pd.Series") -> Input:
     key = head.key
     numbers = [None if (number := _number(value)) is None else head.si(number) for value in column]
     if not all(number is None or abs(number) <= LARGEST for number in numbers):

@@ -166,7 +166,7 @@ def lines_in(path: Path, most_bytes: int = MOST_BYTES) -> list[list[str]]:
 
 
 def _read(path: Path) -> "pd.DataFrame":
-    import pandas as pd  # noqa: PLC0415 - a third of a second that a sweep need not wait for before it begins
+    import pandas as pd
 
     try:
         refuse_large(path, MOST_BYTES)

@@ -151,7 +151,7 @@ class Animation:
 
     def _prepare(self, title: str) -> None:
         """Draw the fixed parts: title, axis, and the support unless it moves."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415 - see style
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         with style.styled_figure(*_even(self.page)) as figure, style.no_word_of_missing_letters():
             figure.set_dpi(DOTS_PER_INCH)
@@ -218,7 +218,7 @@ class Animation:
 
     def _draw_trails(self, frame: int) -> None:
         """Draw the path of every free centre up to a frame."""
-        from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
+        from matplotlib.collections import LineCollection
 
         past = self.drawable[self.drawable <= frame]
         free = ~np.array(self.support.fixed or (False,) * len(self.frames.names), dtype=bool)

@@ -90,7 +90,7 @@ class Palette:
 
     def reduced(self, picture: Pixels) -> "Image":
         """Return a picture in these colours."""
-        from PIL import Image  # noqa: PLC0415 - comes with matplotlib, only for animations
+        from PIL import Image
 
         packed = _packed(picture)
         unknown = np.unique(packed[self.numbers[packed] == UNKNOWN])

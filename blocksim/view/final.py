@@ -32,7 +32,7 @@ LEAST_WIDTH, LOWEST = 2.0, 0.6  # inches, of a page and of a panel on a page who
 FITTINGS = 4  # a lower panel has labels nearer to each other, so in more rows
 
 
-def draw_final(  # noqa: PLR0913 - one argument for each option of the command
+def draw_final(
     frames: WithContacts,
     path: Path | str,
     title: str | None = None,

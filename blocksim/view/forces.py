@@ -115,7 +115,7 @@ def draw_forces(canvas: Canvas, frames: WithContacts, frame: int, scale: ForceSc
 
 def _draw_veil(canvas: Canvas) -> None:
     """Make everything above the ground paler."""
-    from matplotlib.patches import Rectangle  # noqa: PLC0415 - see style
+    from matplotlib.patches import Rectangle
 
     extent = canvas.extent
     place = (extent.left, extent.lowest), extent.width, extent.top - extent.lowest
@@ -127,7 +127,7 @@ def arrow_parts(found: Floats, canvas: Canvas, size: float, colour: str = style.
 
     `size` is that of heads and lines over their usual one.
     """
-    from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415 - see style
+    from matplotlib.collections import LineCollection, PolyCollection
 
     ways = found[:, 1] - found[:, 0]
     lengths = np.hypot(*ways.T)

@@ -21,7 +21,7 @@ MOST_ALIGNED = -0.8  # cosine between two walls that turn back so sharply that a
 
 def draw_support(canvas: Canvas, support: Support, offset: Floats) -> None:
     """Draw ground and walls, displaced by `offset` (mm) along x and y."""
-    from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
+    from matplotlib.collections import LineCollection
 
     low, high = canvas.box()
     deep = [ground_line(support, canvas)[[-1, 0]] * [1.0, 0.0] + [0.0, low[1] - canvas.extent.height]]
@@ -42,7 +42,7 @@ def draw_start(canvas: Canvas, support: Support, offset: Floats, outlines: Float
 
     Pieces that have moved along themselves, such as level ground on a shaking table, look the same and are left out.
     """
-    from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
+    from matplotlib.collections import LineCollection
 
     least = LEAST_SHIFT / canvas.points_per_mm
     if float(np.hypot(*offset)) < least:
@@ -123,9 +123,9 @@ def _faces(support: Support, canvas: Canvas) -> list[Floats]:
 
 def _fill(canvas: Canvas, outline: Floats, zorder: float) -> None:
     """Fill the part of an outline (mm, scene) that can be seen."""
-    from matplotlib.patches import PathPatch  # noqa: PLC0415 - see style
-    from matplotlib.path import Path  # noqa: PLC0415
-    from matplotlib.transforms import Bbox  # noqa: PLC0415
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+    from matplotlib.transforms import Bbox
 
     seen = Path(np.concatenate([outline, outline[:1]]), closed=True).clip_to_bbox(Bbox(np.stack(canvas.box())))
     patch = PathPatch(seen, facecolor=style.GROUND_COLOUR, linewidth=0.0, zorder=zorder, transform=canvas.scene)

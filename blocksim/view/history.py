@@ -103,7 +103,7 @@ class _Drawing:
         return MOTIONS[name](Seen(self.frames, self.chosen, self.support, self.relative))
 
 
-def draw_history(  # noqa: PLR0913 - one argument for each option of the command
+def draw_history(
     frames: HistoryLike,
     path: Path | str,
     title: str | None = None,
@@ -230,8 +230,8 @@ def _draw_panel(axes: "Axes", drawing: _Drawing, name: str, measured: MeasuredTa
 
 
 def _draw_motion(axes: "Axes", drawing: _Drawing, motion: Motion) -> None:
-    from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
-    from matplotlib.patheffects import Normal, Stroke  # noqa: PLC0415
+    from matplotlib.collections import LineCollection
+    from matplotlib.patheffects import Normal, Stroke
 
     others = (
         np.setdiff1d(np.arange(motion.values.shape[1]), drawing.shown) if drawing.others else np.zeros(0, dtype=int)
@@ -269,8 +269,8 @@ def _draw_measured(axes: "Axes", drawing: _Drawing, motion: Motion, measured: Me
 
 def _finish(panels: dict[str, "Axes"], drawing: _Drawing) -> None:
     """Name the coloured blocks at their first panel, write plain numbers, give all panels one axis of time."""
-    from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
-    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import MaxNLocator
 
     first = next((axes for name, axes in panels.items() if name in MOTIONS), None)
     if drawing.shown and first is not None:

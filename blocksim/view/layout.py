@@ -110,14 +110,14 @@ def write_heading(figure: "Figure", title: str | None, side: float, top: float =
 
 def plain_numbers(side: "Axis") -> None:
     """Write numbers along an axis as they are, with a proper minus sign, and not in powers of ten."""
-    from matplotlib.ticker import FuncFormatter  # noqa: PLC0415 - see style
+    from matplotlib.ticker import FuncFormatter
 
     side.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}".replace("-", "−")))
 
 
 def number_axis(side: "Axis", most: int = MANY, *, is_log: bool = False) -> None:
     """Write plain numbers along an axis."""
-    from matplotlib.ticker import MaxNLocator, NullFormatter  # noqa: PLC0415 - see style
+    from matplotlib.ticker import MaxNLocator, NullFormatter
 
     plain_numbers(side)
     side.set_minor_formatter(NullFormatter())

@@ -147,7 +147,7 @@ def _draw_panel(axes: "Axes", panel: Panel, shown: Sequence[int], width: float) 
 
 def _number_axes(axes: "Axes", panel: Panel, most: int) -> None:
     """Write numbers below the levels, below every n-th one where they are many, always below the scenario's own."""
-    from matplotlib.ticker import FuncFormatter, NullLocator  # noqa: PLC0415 - see style
+    from matplotlib.ticker import FuncFormatter, NullLocator
 
     first, last = float(panel.values[0]), float(panel.values[-1])
     margin = (last / first) ** 0.04
@@ -193,7 +193,7 @@ def _mark_values(axes: "Axes", panel: Panel) -> None:
 
 def _legend(blocks: Sequence[str], shown: Sequence[int]) -> "list[Line2D]":
     """Name the lines."""
-    from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
+    from matplotlib.lines import Line2D
 
     room = LEGEND_NAME * style.POINTS_PER_INCH
     names = [style.cut_to(blocks[block], room, style.FONT_SIZE) for block in shown]

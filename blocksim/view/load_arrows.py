@@ -40,7 +40,7 @@ def arc(centre: Floats, radius: float, sweep: float) -> Floats:
 
 
 def _draw_turn(canvas: Canvas, points: Floats) -> None:
-    from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415 - see style
+    from matplotlib.collections import LineCollection, PolyCollection
 
     way = points[-1] - points[-2]
     way /= np.hypot(*way)

@@ -165,8 +165,8 @@ def _mark_joints(canvas: Canvas, found: Sequence[Joint]) -> None:
 
 def _draw_legend(figure: "Figure", columns: int, bottom: float) -> None:
     """Draw the marks of joints and of the first mover with their meaning, `bottom` inches from the lower edge."""
-    from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
-    from matplotlib.patches import Patch  # noqa: PLC0415
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
     across, up = (float(size) for size in figure.get_size_inches())
     handles = [

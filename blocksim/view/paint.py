@@ -217,8 +217,8 @@ def _scaled(values: Floats, scale: Scale) -> Paint:
     """Return fills from a map of colours; `values` are (n, b)."""
 
     def fills(frame: int) -> list[str]:
-        from matplotlib import colormaps  # noqa: PLC0415 - see style
-        from matplotlib.colors import to_hex  # noqa: PLC0415
+        from matplotlib import colormaps
+        from matplotlib.colors import to_hex
 
         shares = (np.nan_to_num(values[frame]) - scale.low) / (scale.high - scale.low)
         return [to_hex(colour) for colour in colormaps[scale.colours](shares.clip(0.0, 1.0))]
@@ -227,9 +227,9 @@ def _scaled(values: Floats, scale: Scale) -> Paint:
 
 
 def _draw_scale(figure: "Figure", scale: Scale, left: float, bottom: float) -> None:
-    from matplotlib.cm import ScalarMappable  # noqa: PLC0415 - see style
-    from matplotlib.colors import Normalize  # noqa: PLC0415
-    from matplotlib.ticker import FuncFormatter, MaxNLocator  # noqa: PLC0415
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     across, up = (float(size) for size in figure.get_size_inches())
     width = min(0.4 * across, 3.0)
@@ -244,7 +244,7 @@ def _draw_scale(figure: "Figure", scale: Scale, left: float, bottom: float) -> N
 
 
 def _draw_entries(figure: "Figure", entries: Sequence[tuple[str, str]], left: float, bottom: float) -> None:
-    from matplotlib.patches import Patch  # noqa: PLC0415 - see style
+    from matplotlib.patches import Patch
 
     across, up = (float(size) for size in figure.get_size_inches())
     handles = [Patch(facecolor=colour, edgecolor=style.INK, linewidth=0.5, label=name) for name, colour in entries]

@@ -34,7 +34,7 @@ class Canvas:
     @cached_property
     def scene(self) -> "Transform":
         """From the scene's millimetres to the paper."""
-        from matplotlib.transforms import Affine2D  # noqa: PLC0415 - see style
+        from matplotlib.transforms import Affine2D
 
         return Affine2D().rotate(self.extent.tilt) + self.axes.transData
 
@@ -105,7 +105,7 @@ def room_below(extent: Extent, rows: int) -> float:
 
 def finish_panel(canvas: Canvas, size: tuple[float, float], *, labelled: bool) -> None:
     """Fix the scale of a panel of this size (inches) and leave only its x axis; tilted ground has its own ruler."""
-    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - see style
+    from matplotlib.ticker import MaxNLocator
 
     axes, extent = canvas.axes, canvas.extent
     axes.set_xlim(extent.left, extent.right)
@@ -122,7 +122,7 @@ def finish_panel(canvas: Canvas, size: tuple[float, float], *, labelled: bool) -
 
 def draw_ruler(canvas: Canvas, depth: float) -> None:
     """Draw numbers of x (mm) along tilted ground, `depth` (points) below its lowest part."""
-    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - see style
+    from matplotlib.ticker import MaxNLocator
 
     y = canvas.extent.base - depth / canvas.points_per_mm
     low, high = canvas.extent.span(y)

@@ -32,7 +32,7 @@ PALE = "#e8e8e8"
 THICK = 1.4  # points
 
 
-def draw_profile(  # noqa: PLR0913 - as all kinds of pictures
+def draw_profile(
     frames: WithContacts,
     path: Path | str,
     title: str | None = None,
@@ -90,8 +90,8 @@ def _lines(frames: FramesLike, frame: int) -> Iterator[Floats]:
 
 def _shades(count: int) -> list[str]:
     """Return a colour for each time, from dark to light."""
-    from matplotlib import colormaps  # noqa: PLC0415 - see style
-    from matplotlib.colors import to_hex  # noqa: PLC0415
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
 
     return [to_hex(colour) for colour in colormaps[COLOURS](np.linspace(0.0, 0.85, count))]
 

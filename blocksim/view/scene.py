@@ -107,7 +107,7 @@ def draw_blocks(
 
 def _draw_system(canvas: Canvas, track: Track, frame: int, colours: str | Sequence[str]) -> None:
     """Draw the elements of a system in one frame; where each has a colour of its own, edges have it too."""
-    from matplotlib.collections import PolyCollection  # noqa: PLC0415 - see style
+    from matplotlib.collections import PolyCollection
 
     (outlines,) = MILLIMETRES * outlines_of(track, np.array([frame]))
     size = canvas.points_per_mm * float(np.ptp(outlines[:, :, 0], axis=1).min(initial=1.0))
@@ -164,7 +164,7 @@ def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: flo
 
 def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags, fills: Sequence[str]) -> None:
     """Draw free blocks each in its colour, fixed ones hatched in that of the ground."""
-    from matplotlib.collections import PolyCollection  # noqa: PLC0415 - see style
+    from matplotlib.collections import PolyCollection
 
     outlines = corners(frames, frame)
     smallest = _smallest(canvas, frames)
@@ -181,7 +181,7 @@ def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags,
 
 def _draw_tops(canvas: Canvas, frames: FramesLike, frame: int, free: Flags) -> None:
     """Mark the top faces that free blocks had at the start."""
-    from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
+    from matplotlib.collections import LineCollection
 
     sides = LineCollection(
         list(_upper_sides(frames, frame)[free & are_there(frames, frame)]),
@@ -205,7 +205,7 @@ def _edge_width(smallest: float) -> float:
 def _draw_names(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags, fills: Sequence[str]) -> None:
     """Write the names of free and of fixed blocks, of either kind only where there is room for all."""
     places = _centres(frames, frame)
-    from matplotlib.patheffects import withStroke  # noqa: PLC0415 - see style
+    from matplotlib.patheffects import withStroke
 
     fonts = _label_fonts(frames, canvas.points_per_mm)
     there = are_there(frames, frame)

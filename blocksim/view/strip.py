@@ -38,7 +38,7 @@ CAPTION = 3.0  # points, from a panel to the text above it
 LEAST_MOVED = 0.005  # mm; less is zero in two decimals
 
 
-def draw_strip(  # noqa: PLR0913 - one argument for each option of the command
+def draw_strip(
     frames: WithContacts,
     path: Path | str,
     times: Sequence[float] | None = None,
@@ -90,7 +90,7 @@ def draw_strip(  # noqa: PLR0913 - one argument for each option of the command
         style.save_figure(figure, path)
 
 
-def _draw_panels(  # noqa: PLR0913, PLR0917 - what is drawn, and where
+def _draw_panels(
     figure: "Figure",
     frames: FramesLike,
     chosen: Indices,

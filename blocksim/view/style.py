@@ -92,8 +92,8 @@ def picture_suffix(path: Path) -> str:
 @contextmanager
 def styled_figure(width: float, height: float, dots: float | None = None) -> Iterator["Figure"]:
     """Give an empty figure of `width` x `height` inches, in this style; needs no display. `dots` are those an inch."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415 - see in_style
-    from matplotlib.figure import Figure  # noqa: PLC0415
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
 
     with in_style(dots):
         figure = Figure(figsize=(width, height))
@@ -104,7 +104,7 @@ def styled_figure(width: float, height: float, dots: float | None = None) -> Ite
 @contextmanager
 def in_style(dots: float | None = None) -> Iterator[None]:
     """Draw in this style, a PNG with so many dots per inch."""
-    from matplotlib import rc_context, rcParamsDefault  # noqa: PLC0415 - half a second, only for pictures
+    from matplotlib import rc_context, rcParamsDefault
 
     # A user's own matplotlibrc must not change the file, but the backend is the user's choice.
     settings: dict[Any, Any] = {key: value for key, value in rcParamsDefault.items() if not key.startswith("backend")}
@@ -145,8 +145,8 @@ def shortened(text: str, letters: int) -> str:
 
 def width_of(text: str, size: float, *, bold: bool = False) -> float:
     """Return the width (points) of one line of text at a font size (points), as it is on paper."""
-    from matplotlib.font_manager import FontProperties  # noqa: PLC0415 - see in_style
-    from matplotlib.textpath import text_to_path  # noqa: PLC0415
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import text_to_path
 
     font = FontProperties(family=FONT, size=size, weight="bold" if bold else "normal")
     with no_word_of_missing_letters():

@@ -126,7 +126,7 @@ def limits_of(panel: Bars) -> tuple[float, float]:
 
 
 def _entries(labels: tuple[str, str]) -> list[Any]:
-    from matplotlib.patches import Patch  # noqa: PLC0415 - see style
+    from matplotlib.patches import Patch
 
     pairs = zip((MAIN_COLOUR, FIRST_COLOUR), labels, strict=True)
     return [Patch(color=colour, label=label) for colour, label in pairs if label]

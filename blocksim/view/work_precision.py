@@ -131,7 +131,7 @@ def _draw_level(axes: "Axes", level: float, meaning: str) -> None:
 
 def _number_axes(axes: "Axes") -> None:
     """Write plain numbers; between the powers of ten too where an axis has less than two of them."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: PLC0415 - see style
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
         between = (1.0, 2.0, 5.0) if high < MANY_DECADES * low else (1.0,)

@@ -286,7 +286,7 @@ class Ground(Table):
     def _profile_is_a_surface(self) -> Self:
         if self.profile is None:
             return self
-        if len(self.profile) < 2:  # noqa: PLR2004 - two points make a piece
+        if len(self.profile) < 2:
             message = "a profile needs at least two points [x, y]"
             raise q.invalid(message, "profile")
         for number, message in _slips(self.profile):

@@ -166,7 +166,7 @@ def _rows(path: Path, column: str) -> list[tuple[float, float]]:
     if table.problems:
         first = min(table.problems, key=lambda problem: problem.line_number or 0)
         raise _mistake(path, first.line_number or 1, first.message)
-    if not 2 <= len(table.rows) <= MAX_ROWS:  # noqa: PLR2004 - two samples make a line
+    if not 2 <= len(table.rows) <= MAX_ROWS:
         message = f"{len(table.rows)} lines with samples; 2 to {MAX_ROWS} are allowed"
         raise q.invalid(f"{path.name}: {message}", "table")
     return list(_numbers(path, table.rows, column))

@@ -140,7 +140,7 @@ def read_motion_table(path: Path) -> MotionTable:
 def _columns(lines: Sequence[tuple[int, list[str]]]) -> list[str]:
     number, names = lines[0] if lines else (1, [])
     others = [name for name in names if name != TIME]
-    if len(names) != 2 or len(others) != 1 or others[0] not in COLUMNS:  # noqa: PLR2004 - two columns
+    if len(names) != 2 or len(others) != 1 or others[0] not in COLUMNS:
         found = ",".join(names)
         if ";" in found:
             message = f"line {number}: {q.shown(found)}: columns are separated by semicolons; {DIALECT}"
@@ -154,8 +154,8 @@ def _samples(lines: Sequence[tuple[int, list[str]]], first: int) -> Iterator[tup
     """Yield time and value of every line; `first` is the column of the time."""
     before = -math.inf
     for number, cells in lines:
-        if len(cells) != 2:  # noqa: PLR2004 - two columns
-            hint = f"; {DIALECT}" if len(cells) > 2 or any(";" in cell for cell in cells) else ""  # noqa: PLR2004
+        if len(cells) != 2:
+            hint = f"; {DIALECT}" if len(cells) > 2 or any(";" in cell for cell in cells) else ""
             message = f"line {number}: {q.shown(','.join(cells))}: a time and a value are needed{hint}"
             raise MotionTableError(message)
         time, value = (_number(number, cells[place]) for place in (first, 1 - first))

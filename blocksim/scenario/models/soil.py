@@ -80,7 +80,7 @@ class SoilTable(SystemTable):
     def _is_a_polygon(self) -> Self:
         if self.outline is None:
             return self
-        if len(self.outline) < 3:  # noqa: PLR2004 - a triangle
+        if len(self.outline) < 3:
             raise q.invalid("an outline needs at least three corners [x, y]", "outline")
         if len(set(self.outline)) < len(self.outline):
             raise q.invalid("two corners are the same", "outline")

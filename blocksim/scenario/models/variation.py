@@ -159,7 +159,7 @@ def _spread(value: Mapping[str, Any]) -> tuple[object, ...]:
     Between ends that are written as whole numbers such values stay whole, for keys that take no others.
     """
     count = value["count"]
-    if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MAX_VALUES:  # noqa: PLR2004
+    if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MAX_VALUES:
         message = f"count {q.shown(count)} is not a whole number from 2 to {MAX_VALUES}"
         raise q.invalid(message)
     (first, last), angle = _numbers(value, "from", "to")
@@ -205,7 +205,7 @@ def _normal(value: Mapping[str, Any]) -> Normal:
         raise q.invalid(message, "sd")
     ends = dict(zip(bounds, given, strict=True))
     low, high = ends.get("from", -math.inf), ends.get("to", math.inf)
-    if len(bounds) == 2:  # noqa: PLR2004 - both ends
+    if len(bounds) == 2:
         _refuse_empty(value, low, high)
     if low > mean + FARTHEST * sd or high < mean - FARTHEST * sd:
         message = f"the bounds exclude everything within {FARTHEST:g} standard deviations of the mean"

@@ -155,7 +155,7 @@ def data_set(file: Any, name: str, dimensions: int) -> Any:
         raise UnsafeError(f"{name}: not a data set")
     if found.is_virtual or found.external:
         raise UnsafeError(f"{name}: its values are in other files, which are not read")
-    if found.dtype.kind not in NUMBERS or found.dtype.itemsize > 8 or found.dtype.shape:  # noqa: PLR2004 - bytes
+    if found.dtype.kind not in NUMBERS or found.dtype.itemsize > 8 or found.dtype.shape:
         raise UnsafeError(f"{name}: holds {found.dtype}, not plain numbers")
     if found.ndim != dimensions:
         raise UnsafeError(f"{name}: has {found.ndim} dimensions, not {dimensions}")

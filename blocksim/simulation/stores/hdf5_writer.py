@@ -58,7 +58,7 @@ def _give_back(path: Path) -> None:
 class FrameFile:
     """Writes frames as they come; use as a context manager."""
 
-    def __init__(  # noqa: PLR0913 - what a file begins with
+    def __init__(
         self,
         path: Path,
         placed: Sequence[PlacedBody],

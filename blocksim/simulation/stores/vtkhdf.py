@@ -104,7 +104,7 @@ def _write_cells(group: Any, blocks: int, corners: NDArray[np.int64]) -> None:
         group[name] = np.array([count], dtype=np.int64)
     group["Connectivity"] = np.arange(points, dtype=np.int64)
     group["Offsets"] = np.concatenate([[0], np.cumsum(corners)]).astype(np.int64)
-    group["Types"] = np.where(corners == 4, QUAD, POLYGON).astype(np.uint8)  # noqa: PLR2004 - corners
+    group["Types"] = np.where(corners == 4, QUAD, POLYGON).astype(np.uint8)
     numbers = np.zeros(cells, dtype=np.int64)
     numbers[:blocks] = np.arange(1, blocks + 1)
     group["CellData/block"] = numbers

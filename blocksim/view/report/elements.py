@@ -71,8 +71,8 @@ def _shade(shade: Shade, track: Track, kept: Indices) -> dict[str, Any]:
 
 def palette() -> list[str]:
     """Return the colours of elements, in even steps from none to most."""
-    from matplotlib import colormaps  # noqa: PLC0415 - see style
-    from matplotlib.colors import to_hex  # noqa: PLC0415
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
 
     return [to_hex(colour) for colour in colormaps[ELEMENT_COLOURS](np.linspace(0.0, 1.0, STEPS))]
 

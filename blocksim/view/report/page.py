@@ -75,8 +75,8 @@ def _source(text: str) -> str:
 
 @functools.cache
 def _environment() -> "Environment":
-    from jinja2 import DictLoader, Environment, StrictUndefined  # noqa: PLC0415 - only reports need it
-    from markupsafe import Markup  # noqa: PLC0415
+    from jinja2 import DictLoader, Environment, StrictUndefined
+    from markupsafe import Markup
 
     texts = {name: _part(name) for name in ("page.html", "parts.html")}
     environment = Environment(

@@ -51,7 +51,7 @@ COLUMN_OF = {"x": "x_mm", "rotation": "rotation_deg"}
 """Measured quantities whose final values are in the page."""
 
 
-def sweep_subject(  # noqa: PLR0913 - the parts of a sweep
+def sweep_subject(
     key: str,
     table: CaseTable,
     scenario: Scenario | None,

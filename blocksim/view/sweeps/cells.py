@@ -39,9 +39,9 @@ class Classes:
 
 def run_out_scale(x_mm: Floats) -> "tuple[Colormap, BoundaryNorm]":
     """Return a map of colours in round steps over all but the rarest run-outs (mm)."""
-    from matplotlib import colormaps  # noqa: PLC0415 - see style
-    from matplotlib.colors import BoundaryNorm  # noqa: PLC0415
-    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415
+    from matplotlib import colormaps
+    from matplotlib.colors import BoundaryNorm
+    from matplotlib.ticker import MaxNLocator
 
     low, high = np.nanpercentile(x_mm, [RARE, 100.0 - RARE])
     spare = 0.5 * max(LEAST_SPAN_MM - (high - low), 0.0)
@@ -128,7 +128,7 @@ def on_grid(plane: Plane, numbers: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _draw_cells(axes: "Axes", plane: Plane, numbers: Floats, colours: dict[str, Any], agrees: Flags | None) -> None:
-    from matplotlib.collections import LineCollection  # noqa: PLC0415 - see style
+    from matplotlib.collections import LineCollection
 
     x, y, table = on_grid(plane, numbers)
     edges = (edges_of(x, is_log=plane.axes[0].is_log), edges_of(y, is_log=plane.axes[1].is_log))

@@ -134,8 +134,8 @@ _INTERVAL: dict[str, Any] = {
 
 def _entries(sweep: SweepData) -> list[Any]:
     """Return the entries of the legend."""
-    from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
-    from matplotlib.patches import Patch  # noqa: PLC0415
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
     entries: list[Any] = [Patch(color=ALL_COLOUR, label=f"all {len(sweep.finished)} cases")]
     if sweep.inside is not None:

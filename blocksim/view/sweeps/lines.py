@@ -98,7 +98,7 @@ def _axis_and_other(sweep: SweepData) -> tuple[Input, Input | None]:
     return axis, others[0] if others and sweep.is_grid else None
 
 
-def draw_series(  # noqa: PLR0913 - what is drawn, and where
+def draw_series(
     series: Sequence[Series],
     blocks: Sequence[str],
     key: tuple[str, str],
@@ -250,7 +250,7 @@ def _draw_band(axes: "Axes", band: tuple[float, float] | None) -> None:
 
 
 def _finish(axes: "Axes", *, is_log: bool, is_first: bool, is_last: bool) -> None:
-    from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter  # noqa: PLC0415 - see style
+    from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
     axes.spines[["right", "top"]].set_visible(False)
     axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))

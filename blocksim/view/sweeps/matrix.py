@@ -239,7 +239,7 @@ def _number(side: "Axis", one: Variable) -> None:
 
 def _clear_of_the_start(low: float, high: float, *, is_log: bool) -> list[float]:
     """Return two numbers for an axis, none so near to its start that it runs into the last one of the panel before."""
-    from matplotlib.ticker import LogLocator, MaxNLocator  # noqa: PLC0415 - see style
+    from matplotlib.ticker import LogLocator, MaxNLocator
 
     locator = LogLocator() if is_log else MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10])
     first = low * (high / low) ** CROWDED if is_log else low + CROWDED * (high - low)
@@ -249,7 +249,7 @@ def _clear_of_the_start(low: float, high: float, *, is_log: bool) -> list[float]
 
 def _entries(sweep: SweepData) -> list[Any]:
     """Return the entries of the legend."""
-    from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
+    from matplotlib.lines import Line2D
 
     dot: dict[str, Any] = {"linestyle": "", "marker": "o", "markeredgewidth": 0.0}
     entries = []

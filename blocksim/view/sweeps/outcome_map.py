@@ -182,8 +182,8 @@ def _draw_block(figure: "Figure", found: _Map, block: int, bottom: float) -> Non
 
 
 def _draw_bar(axes: "Axes", colours: Any, norm: Any, band: tuple[float, float] | None) -> None:
-    from matplotlib.cm import ScalarMappable  # noqa: PLC0415 - see style
-    from matplotlib.colorbar import Colorbar  # noqa: PLC0415
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colorbar import Colorbar
 
     bar = Colorbar(axes, ScalarMappable(norm, colours), spacing="proportional", extendfrac=0.06)
     bar.ax.minorticks_off()
@@ -194,7 +194,7 @@ def _draw_bar(axes: "Axes", colours: Any, norm: Any, band: tuple[float, float] |
 
 
 def _draw_classes(figure: "Figure", found: _Map, classes: Classes, bottom: float) -> None:
-    from matplotlib.colors import BoundaryNorm, ListedColormap  # noqa: PLC0415 - see style
+    from matplotlib.colors import BoundaryNorm, ListedColormap
 
     look = {
         "cmap": ListedColormap(list(classes.colours)),
@@ -230,8 +230,8 @@ def _shown_classes(classes: Classes) -> list[tuple[str, str]]:
 
 
 def _draw_legend(figure: "Figure", found: _Map, classes: Classes, top: float) -> None:
-    from matplotlib.lines import Line2D  # noqa: PLC0415 - see style
-    from matplotlib.patches import Patch  # noqa: PLC0415
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
     handles: list[Any] = []
     for label, colour in _shown_classes(classes):

@@ -132,7 +132,7 @@ def _build(scenario: Scenario) -> "Soils":
     n = start.shape[1]
     points, states = zeros(n, POINT), zeros(n, STATE)
     for number, quantity in enumerate(QUANTITIES):
-        holder = points if number < 4 else states  # noqa: PLR2004 - x, y, vx, vy
+        holder = points if number < 4 else states
         holder[quantity.name] = start[number]
     states["number"] = np.arange(n)
     states["kind"] = np.repeat(np.arange(len(tables)), [len(one) for one in places])
@@ -183,7 +183,7 @@ def _state(soils: "Soils", count: int) -> Floats:
     number = soils.states["number"]
     values: Floats = np.empty((len(QUANTITIES), count))
     for row, quantity in enumerate(QUANTITIES):
-        holder = soils.points if row < 4 else soils.states  # noqa: PLR2004 - x, y, vx, vy
+        holder = soils.points if row < 4 else soils.states
         values[row, number] = holder[quantity.name]
     return values
 
