@@ -97,7 +97,7 @@ bench: $(RUN_STAMP) ## Measure speed and memory, some minutes; nothing else shou
 
 .PHONY: bench-peers
 bench-peers: $(BENCH_STAMP) ## The same scenes by pymunk and Box2D too, some minutes; draws the picture in results/
-	$(BLOCKSIM) bench --peers --out results/bench-peers.json
+	$(VENV_PYTHON) -m tests.bench.peers --out results/bench-peers.json
 
 .PHONY: smoke
 smoke: $(RUN_STAMP) ## Short run, 2 x 2 sweep and compare, for your CI: does this installation work?

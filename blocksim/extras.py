@@ -7,11 +7,11 @@ from typing import Any
 
 from blocksim.errors import UnavailableError
 
-STUDY, CLUSTER, BENCH = "study", "cluster", "bench"
+STUDY, CLUSTER = "study", "cluster"
 
 
-def loaded(module: str, purpose: str, extra: str = STUDY, package: str = "") -> Any:
-    """Return a module; the message says what needs it, and its `package` if that has another name.
+def loaded(module: str, purpose: str, extra: str = STUDY) -> Any:
+    """Return a module; the message says what needs it.
 
     Raises UnavailableError.
     """
@@ -19,7 +19,7 @@ def loaded(module: str, purpose: str, extra: str = STUDY, package: str = "") -> 
         with _without_settings():
             return import_module(module)
     except ImportError as error:
-        name = package or module.partition(".")[0]
+        name = module.partition(".")[0]
         message = f"{purpose} needs the package {name} ({error}); install the extra: pip install 'blocksim[{extra}]'"
         raise UnavailableError(message) from None
 

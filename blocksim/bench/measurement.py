@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from blocksim.bench.machine import Machine
-    from blocksim.view.work_precision import Panel
 
 REPEATS = 5
 
@@ -66,7 +65,6 @@ class Findings:
     numbers: tuple[Number, ...]
     notes: tuple[str, ...] = ()  # notes on the numbers
     details: tuple[Mapping[str, object], ...] = ()  # more of it, for programs
-    panel: Panel | None = None  # part of the work-precision picture
 
 
 @dataclass(frozen=True)

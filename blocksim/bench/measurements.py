@@ -1,10 +1,9 @@
-"""All measurements: one file each, and one line here; those with other engines apart."""
+"""All measurements: one line each."""
 
 from collections.abc import Sequence
 
 from blocksim.bench import ensemble, soils, startup, threads, three_blocks, walls
 from blocksim.bench.measurement import Measurement
-from blocksim.bench.peers import PEERS, require_all
 from blocksim.errors import BlocksimError, ExitCode
 from blocksim.scenario.spelling import nearest
 
@@ -29,23 +28,17 @@ class UnknownMeasurementError(BlocksimError):
     exit_code = ExitCode.USAGE
 
 
-def chosen(names: Sequence[str], *, peers: bool = False) -> tuple[Measurement, ...]:
-    """Return the measurements of some names, in the order of the registry; all without names.
+def chosen(names: Sequence[str], table: Sequence[Measurement] | None = None) -> tuple[Measurement, ...]:
+    """Return the measurements of some names, in the order of a table, by default MEASUREMENTS; all without names.
 
-    Raises UnknownMeasurementError, and UnavailableError where a package of other engines is missing.
+    Raises UnknownMeasurementError.
     """
-    table = PEERS if peers else MEASUREMENTS
+    table = MEASUREMENTS if table is None else table
     known = [one.name for one in table]
     unknown = [name for name in dict.fromkeys(names) if name not in known]
     if unknown:
-        raise UnknownMeasurementError("\n".join(_unknown(name, known, peers=peers) for name in unknown))
-    if peers:
-        require_all()
+        meant = {name: nearest(name, known, MOST_SLIPS) for name in unknown}
+        hints = {name: f", did you mean '{near}'? Choose" if near else "; choose" for name, near in meant.items()}
+        lines = (f"bench: NAME '{name}': no such measurement{hint}: {', '.join(known)}" for name, hint in hints.items())
+        raise UnknownMeasurementError("\n".join(lines))
     return tuple(one for one in table if not names or one.name in names)
-
-
-def _unknown(name: str, known: Sequence[str], *, peers: bool) -> str:
-    meant = nearest(name, known, MOST_SLIPS)
-    hint = f", did you mean '{meant}'? Choose" if meant else "; choose"
-    where = " with --peers" if peers else ""
-    return f"bench: NAME '{name}': no such measurement{hint}{where}: {', '.join(known)}"

@@ -17,7 +17,6 @@ FRICTION = {"block_block": 0.31, "block_ground": 0.38}
 OVERLAP = 0.01  # m
 RESTITUTION = 0.2
 WALL_RESTITUTION = 0.1
-HEXAGONS, HEXAGONS_GAP = (0.02, 0.04), 0.002  # m, smallest and largest of a heap, and the least distance at the start
 PUSH = 1.0  # m/s, of the upper edge of a wall
 LOW_COURSES = "height"  # `upright` of the wall that non-smooth engines are compared on: bricks of 32 x 25 mm
 SUBSTEPS = 4
@@ -51,7 +50,7 @@ def three_blocks(contact: Table | None = None, time: Table | None = None, fricti
     """Return the three blocks of scenarios/three_blocks_nominal.toml; more keys of [contact] and [time]."""
     stairs = {"kind": "staircase", "block": "brick", "count": 3, "overlap": OVERLAP}
     more = {"contact": {"restitution": RESTITUTION, **(contact or {})}, "time": {"end": 2.0, **(time or {})}}
-    return _scenario("three_blocks", "length", stairs, {**more, "friction": friction})
+    return one_structure("three_blocks", _brick("length"), stairs, {**more, "friction": friction})
 
 
 def pushed_wall(
@@ -65,24 +64,11 @@ def pushed_wall(
     wall = {"kind": "wall", "block": "brick", "columns": columns, "rows": rows, "shear_velocity": PUSH}
     more = {"contact": {"restitution": WALL_RESTITUTION, **(contact or {})}}
     more["time"] = {"end": 1.0, "stop_at_rest": False, **(time or {})}
-    return _scenario("pushed_wall", upright, wall, {**more, "friction": FRICTION})
+    return one_structure("pushed_wall", _brick(upright), wall, {**more, "friction": FRICTION})
 
 
-def hexagon_heap(columns: int, rows: int, contact: Table | None = None, time: Table | None = None) -> Scenario:
-    """Return random hexagons of 20 to 40 mm in rows, apart from one another, that fall to a heap."""
-    sizes = {"smallest": HEXAGONS[0], "largest": HEXAGONS[1], "fewest_sides": 6, "most_sides": 6}
-    heap = {"kind": "rubble", "block": "stone", "columns": columns, "count": columns * rows, "gap": HEXAGONS_GAP}
-    more = {"contact": {"restitution": WALL_RESTITUTION, **(contact or {})}, "friction": FRICTION}
-    more["time"] = {"end": 1.0, "stop_at_rest": False, **(time or {})}
-    stone = {"depth": SIDES["length"], "material": "aluminium"}
-    return _placed("hexagon_heap", {"stone": stone}, {**heap, **sizes}, more)
-
-
-def _scenario(name: str, upright: str, structure: Table, more: Table) -> Scenario:
-    return _placed(name, {"brick": {**SIDES, "upright": upright, "material": "aluminium"}}, structure, more)
-
-
-def _placed(name: str, blocks: Table, structure: Table, more: Table) -> Scenario:
+def one_structure(name: str, blocks: Table, structure: Table, more: Table) -> Scenario:
+    """Return the scenario of one structure of aluminium blocks; `more` are other tables."""
     data: dict[str, Any] = {
         "schema": 1,
         "name": name,
@@ -93,3 +79,7 @@ def _placed(name: str, blocks: Table, structure: Table, more: Table) -> Scenario
         **more,
     }
     return scenario_from_mapping(data)
+
+
+def _brick(upright: str) -> Table:
+    return {"brick": {**SIDES, "upright": upright, "material": "aluminium"}}

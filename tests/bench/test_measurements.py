@@ -24,16 +24,15 @@ def test_chosen_keeps_the_order_of_the_registry() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "peers", "told"),
+    ("name", "told"),
     [
-        ("wals", False, ", did you mean 'walls'? Choose: three-blocks, ensemble, walls, threads, nonsmooth-blocks"),
-        ("wals", True, ", did you mean 'wall'? Choose with --peers: three-blocks, three-blocks-e0, wall"),
-        ("memory", False, "; choose: three-blocks, ensemble, walls, threads, nonsmooth-blocks"),
+        ("wals", ", did you mean 'walls'? Choose: three-blocks, ensemble, walls, threads, nonsmooth-blocks"),
+        ("memory", "; choose: three-blocks, ensemble, walls, threads, nonsmooth-blocks"),
     ],
 )
-def test_unknown_names_are_wrong_usage(name: str, peers: bool, told: str) -> None:
+def test_unknown_names_are_wrong_usage(name: str, told: str) -> None:
     with pytest.raises(UnknownMeasurementError) as caught:
-        chosen(["three-blocks", name], peers=peers)
+        chosen(["three-blocks", name])
     assert f"NAME '{name}': no such measurement{told}" in str(caught.value)
     assert caught.value.exit_code == ExitCode.USAGE
 

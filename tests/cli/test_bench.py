@@ -1,16 +1,12 @@
 """blocksim bench: the table on a screen, for programs, its file, and wrong usage."""
 
 import json
-import struct
-import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from blocksim.bench import measurements
 from blocksim.bench.measurement import Findings, Measurement, Number, Setting, single
-from blocksim.view.work_precision import Curve, Panel
 from tests.cli.conftest import Command
 
 
@@ -69,21 +65,3 @@ def test_a_stop_keeps_what_was_measured(blocksim: Command) -> None:
     assert "a step" in answer.out
     assert "stopped" in answer.err
     assert len(json.loads(Path("bench.json").read_text(encoding="utf-8"))["measurements"]) == 1
-
-
-def test_peers_draw_a_picture_beside_the_file(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    panel = Panel("made up", "error (mm)", (Curve("a", "a", np.ones(2), np.ones(2)),))
-    findings = Findings((single("time", "CPU ms", 1.0),), panel=panel)
-    table = (Measurement("drawn", "made up", lambda _: findings, quick=""),)
-    monkeypatch.setattr(measurements, "PEERS", table)
-    for module in ("pymunk", "Box2D"):
-        monkeypatch.setitem(sys.modules, module, sys)
-    assert blocksim("bench", "--peers").code == 0
-    assert Path("work_precision.png").stat().st_size > 0
-    answer = blocksim("bench", "--peers", "drawn", "--out", "peers.json")
-    assert "written: peers.png" in answer.err
-    assert Path("peers.png").stat().st_size > 0
-    small = blocksim("bench", "--peers", "drawn", "--out", "small.json", "--size", "30x30mm")
-    assert (small.code, small.out) == (65, "")  # nothing was measured
-    assert blocksim("bench", "--peers", "drawn", "--size", "400x300px", "--dpi", 80).code == 0
-    assert struct.unpack(">II", Path("work_precision.png").read_bytes()[16:24]) == (400, 300)

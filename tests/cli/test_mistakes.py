@@ -61,7 +61,6 @@ def test_mistakes(blocksim: Command, place: Path, golden: Golden, line: str) -> 
 
 NEEDED = {
     "ffmpeg of animate": ("imageio_ffmpeg", "animate run --out film.mp4"),
-    "pymunk of bench": ("pymunk", "bench --peers"),
     "optuna of calibrate": ("optuna", f"{FIT} {SCATTER}"),
     "scipy of calibrate": ("scipy.stats", f"{FIT} {SCATTER}"),
     "scipy of compare": ("scipy.special", JUDGED),

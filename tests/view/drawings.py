@@ -24,8 +24,8 @@ from blocksim.view.run_data import Support
 from blocksim.view.strip import draw_strip
 from blocksim.view.sweeps.lines import Series, draw_series
 from blocksim.view.tornado import Bars, draw_tornado
-from blocksim.view.work_precision import Curve, draw_work_precision
-from blocksim.view.work_precision import Panel as Work
+from tests.bench.peers.work_precision import Curve, draw_work_precision
+from tests.bench.peers.work_precision import Panel as Work
 from tests.view.made_up import HOSTILE, pressed, stacked, toppling
 from tests.view.sweeps.made_up import grid, made_up, samples
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from blocksim.bench.measurement import Findings, Measurement, Number, Setting, single
-from blocksim.bench.peers.engine import Final, Scene, Series, Solver
-from blocksim.bench.peers.series import wall_racers, wall_series
+from blocksim.bench.measurement import Measurement, Number, Setting, single
 from blocksim.bench.scenes import LOW_COURSES, WALL_RESTITUTION, pushed_wall
 from blocksim.scenario.structures.base import draws
-from blocksim.view.work_precision import Curve, Panel
+from tests.bench.peers.engine import Final, Findings, Scene, Series, Solver
+from tests.bench.peers.series import wall_racers, wall_series
+from tests.bench.peers.work_precision import Curve, Panel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""What engines have in common: a scene, its result, the timed loop over steps, and their optional packages."""
+"""What engines have in common: a scene, its result, and the timed loop over steps."""
 
 from __future__ import annotations
 
@@ -10,26 +10,23 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim import extras
+from blocksim.bench import measurement
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from tests.bench.peers.work_precision import Panel
+
 Floats = NDArray[np.float64]
-PACKAGES = {"pymunk": "pymunk", "Box2D": "box2d"}  # module: name of its package
 CALLS = 20_000  # that are timed on an empty scene
 
 
-def loaded(module: str) -> Any:
-    """Return the module of an engine; raises UnavailableError."""
-    return extras.loaded(module, "bench --peers", extras.BENCH, PACKAGES[module])
+@dataclass(frozen=True)
+class Findings(measurement.Findings):
+    """Result of a measurement, with its part of the work-precision picture."""
 
-
-def require_all() -> None:
-    """Raise UnavailableError before anything is measured."""
-    for module in PACKAGES:
-        loaded(module)
+    panel: Panel | None = None
 
 
 class Make(Protocol):

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from blocksim.view import style
 from blocksim.view.layout import OWN, PanelPage, Paper, write_heading
@@ -131,8 +132,6 @@ def _draw_level(axes: "Axes", level: float, meaning: str) -> None:
 
 def _number_axes(axes: "Axes") -> None:
     """Write plain numbers; between the powers of ten too where an axis has less than two of them."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
         between = (1.0, 2.0, 5.0) if high < MANY_DECADES * low else (1.0,)
         axis.set_major_locator(LogLocator(subs=between))

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.bench.measurement import Findings, Measurement, Number, Setting, single
-from blocksim.bench.peers.blocksim_engine import Nonsmooth
-from blocksim.bench.peers.box2d_engine import Box2D, empty_world
-from blocksim.bench.peers.engine import Final, Scene, Series, Solver, call_time
-from blocksim.bench.peers.pymunk_engine import Pymunk, empty_space
-from blocksim.bench.peers.series import BOX2D, NONSMOOTH, PYMUNK, three_blocks_series
+from blocksim.bench.measurement import Measurement, Number, Setting, single
 from blocksim.bench.scenes import RESTITUTION, Stepping, Table, three_blocks
 from blocksim.scenario.structures.base import draws
-from blocksim.view.work_precision import Curve, Panel
+from tests.bench.peers.blocksim_engine import Nonsmooth
+from tests.bench.peers.box2d_engine import Box2D, empty_world
+from tests.bench.peers.engine import Final, Findings, Scene, Series, Solver, call_time
+from tests.bench.peers.pymunk_engine import Pymunk, empty_space
+from tests.bench.peers.series import BOX2D, NONSMOOTH, PYMUNK, three_blocks_series
+from tests.bench.peers.work_precision import Curve, Panel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

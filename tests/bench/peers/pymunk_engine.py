@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from blocksim.bench.peers.engine import Stepper, loaded
 from blocksim.bench.scenes import FRICTION
+from tests.bench.peers.engine import Stepper
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.bench.peers.engine import Scene
+    from tests.bench.peers.engine import Scene
 
 # Overlap that is left alone so that contacts last. The default of 0.1 is a tenth of a pixel; here it would be 0.1 m.
 SLOP = 1e-6  # m
@@ -31,7 +32,7 @@ class Pymunk(Stepper):
         `collision_bias` stays as it is: a tenth of the overlap beyond the slop goes in a sixtieth of a second, by
         velocities that are forgotten after the step, so that it brings no energy in.
         """
-        pymunk = loaded("pymunk")
+        pymunk = import_module("pymunk")
         space = empty_space()
         space.iterations = self.iterations
         # Both coefficients of a pair are products: blocks a and ground b with a*a and a*b as wanted.
@@ -56,7 +57,7 @@ class Pymunk(Stepper):
 
 def empty_space() -> Any:
     """Return an empty space."""
-    space = loaded("pymunk").Space()
+    space = import_module("pymunk").Space()
     space.gravity = (0.0, -9.81)
     space.collision_slop = SLOP
     return space

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from blocksim.bench.peers.blocksim_engine import Explicit, Nonsmooth
-from blocksim.bench.peers.box2d_engine import Box2D
-from blocksim.bench.peers.engine import Series
-from blocksim.bench.peers.pymunk_engine import Pymunk
 from blocksim.bench.scenes import UNTIL_SOLVED, Stepping
+from tests.bench.peers.blocksim_engine import Explicit, Nonsmooth
+from tests.bench.peers.box2d_engine import Box2D
+from tests.bench.peers.engine import Series
+from tests.bench.peers.pymunk_engine import Pymunk
 
 if TYPE_CHECKING:
-    from blocksim.bench.peers.engine import Solver
+    from tests.bench.peers.engine import Solver
 
 PYMUNK, BOX2D, EXPLICIT, NONSMOOTH = "pymunk", "Box2D", "explicit", "non-smooth"
 STEPS = (4e-3, 2.8e-3, 2e-3, 1.4e-3, 1e-3, 7e-4, 5e-4, 2e-4, 1e-4, 5e-5)  # s

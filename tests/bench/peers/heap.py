@@ -11,18 +11,19 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from blocksim.bench.measurement import Findings, Measurement, Number, Setting
-from blocksim.bench.peers.engine import Final, Scene
-from blocksim.bench.peers.series import heap_racers
-from blocksim.bench.peers.wall import distances
-from blocksim.bench.scenes import WALL_RESTITUTION, Table, hexagon_heap
+from blocksim.bench.scenes import FRICTION, SIDES, WALL_RESTITUTION, Table, one_structure
+from tests.bench.peers.engine import Final, Scene
+from tests.bench.peers.series import heap_racers
+from tests.bench.peers.wall import distances
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from blocksim.bench.peers.engine import Solver
     from blocksim.scenario import Scenario
+    from tests.bench.peers.engine import Solver
 
 ROUNDS = 3  # of engines in turns, at most
+HEXAGONS, HEXAGONS_GAP = (0.02, 0.04), 0.002  # m, smallest and largest of a heap, and the least distance at the start
 
 
 class Heap(NamedTuple):
@@ -39,6 +40,16 @@ class Heap(NamedTuple):
     def scene(self) -> Scene:
         """Return it, let go."""
         return Scene(self.make, np.zeros(self.columns * self.rows), WALL_RESTITUTION, self.end)
+
+
+def hexagon_heap(columns: int, rows: int, contact: Table | None = None, time: Table | None = None) -> Scenario:
+    """Return random hexagons of 20 to 40 mm in rows, apart from one another, that fall to a heap."""
+    sizes = {"smallest": HEXAGONS[0], "largest": HEXAGONS[1], "fewest_sides": 6, "most_sides": 6}
+    heap = {"kind": "rubble", "block": "stone", "columns": columns, "count": columns * rows, "gap": HEXAGONS_GAP}
+    more = {"contact": {"restitution": WALL_RESTITUTION, **(contact or {})}, "friction": FRICTION}
+    more["time"] = {"end": 1.0, "stop_at_rest": False, **(time or {})}
+    stone = {"depth": SIDES["length"], "material": "aluminium"}
+    return one_structure("hexagon_heap", {"stone": stone}, {**heap, **sizes}, more)
 
 
 FULL, SMALL = Heap(40, 25, 1.0), Heap(5, 4, 0.1)

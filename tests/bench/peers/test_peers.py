@@ -1,28 +1,32 @@
 """Other engines on the same scenes; those that are not installed are left out."""
 
+import json
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from blocksim.bench import peers
-from blocksim.bench.measurement import Setting
-from blocksim.bench.measurements import chosen
-from blocksim.bench.peers.blocksim_engine import Explicit, Nonsmooth
-from blocksim.bench.peers.box2d_engine import Box2D
-from blocksim.bench.peers.engine import Final, Scene, Series, Solver, Stepper
-from blocksim.bench.peers.heap import SMALL as SMALL_HEAP
-from blocksim.bench.peers.heap import Heap
-from blocksim.bench.peers.pymunk_engine import Pymunk
-from blocksim.bench.peers.series import three_blocks_series, wall_racers, wall_series
-from blocksim.bench.peers.three_blocks import starts
-from blocksim.bench.peers.wall import SMALL, Computed, distances, raced, wasserstein
+from blocksim.bench.measurement import Measurement, Setting, single
 from blocksim.bench.scenes import Stepping, three_blocks
-from blocksim.errors import ExitCode, UnavailableError
 from blocksim.scenario import Scenario
 from blocksim.scenario.outlines import edges_of
+from tests.bench.peers import __main__ as script
+from tests.bench.peers import three_blocks as three_blocks_peers
+from tests.bench.peers import wall
+from tests.bench.peers.__main__ import main
+from tests.bench.peers.blocksim_engine import Explicit, Nonsmooth
+from tests.bench.peers.box2d_engine import Box2D
+from tests.bench.peers.engine import Final, Findings, Scene, Series, Solver, Stepper
+from tests.bench.peers.heap import HEAP, Heap
+from tests.bench.peers.heap import SMALL as SMALL_HEAP
+from tests.bench.peers.pymunk_engine import Pymunk
+from tests.bench.peers.series import three_blocks_series, wall_racers, wall_series
+from tests.bench.peers.three_blocks import starts
+from tests.bench.peers.wall import SMALL, Computed, distances, raced, wasserstein
+from tests.bench.peers.work_precision import Curve, Panel
 
 ENGINES = pytest.mark.parametrize(
     ("module", "solver"),
@@ -116,7 +120,7 @@ def test_hexagons_have_their_own_mass_and_inertia_in_every_engine(engine: Steppe
 def test_a_heap_of_hexagons_is_timed_and_compared() -> None:
     for module in ("pymunk", "Box2D"):
         pytest.importorskip(module, exc_type=ImportError)
-    found = peers.HEAP.measure(Setting(quick=True, repeats=2))
+    found = HEAP.measure(Setting(quick=True, repeats=2))
     own, *others = found.numbers
     assert own.quantity == "non-smooth, step 1 ms / 4"
     assert [one.quantity for one in others] == [f"{name}, 10 iterations: times that" for name in ("Box2D", "pymunk")]
@@ -140,14 +144,15 @@ def test_starts_differ_by_a_micrometre_and_are_the_same_every_time() -> None:
 def test_error_is_the_distance_from_the_reference_of_the_same_start(monkeypatch: pytest.MonkeyPatch) -> None:
     levels = tuple(Shifted(by) for by in (1.9e-3, 3e-3, 2.1e-3, 2.05e-3))  # the first is right by chance
     series = (Series("made up", "made up, a", levels, Shifted(2e-3)), Series("made up", "b", levels[1:2], Shifted(9.0)))
-    monkeypatch.setattr(peers.three_blocks, "three_blocks_series", lambda *_, **__: series)
-    monkeypatch.setattr(peers.three_blocks, "_calls", lambda _: {})
-    found = peers.PAPER.measure(QUICK)
+    monkeypatch.setattr(three_blocks_peers, "three_blocks_series", lambda *_, **__: series)
+    monkeypatch.setattr(three_blocks_peers, "_calls", lambda _: {})
+    found = three_blocks_peers.PAPER.measure(QUICK)
     assert [row["error_mm"] for row in found.details] == pytest.approx([0.1, 1.0, 0.1, 0.05, 1.0])
     best, none = found.numbers
     assert best.quantity == "made up, a: by 0.00205"  # of two that are close it takes less time
     assert best.median == pytest.approx(2.05)
     assert (none.quantity, none.median) == ("b: none", np.inf)
+    assert isinstance(found, Findings)
     assert found.panel is not None
     assert [curve.label for curve in found.panel.curves] == ["made up, a", "b"]
 
@@ -162,10 +167,10 @@ def test_others_are_reported_as_multiples_of_the_non_smooth_scheme_with_and_with
         for engine, row in tables.items()
         for seconds in row
     ]
-    monkeypatch.setattr(peers.three_blocks, "three_blocks_series", lambda *_, **__: series)
-    monkeypatch.setattr(peers.three_blocks, "END", 3.0)
-    monkeypatch.setattr(peers.three_blocks, "_calls", lambda _: {"pymunk": 1.0, "Box2D": 2.0, "non-smooth": 0.5})
-    found = {one.quantity: one.median for one in peers.PAPER.measure(QUICK).numbers}
+    monkeypatch.setattr(three_blocks_peers, "three_blocks_series", lambda *_, **__: series)
+    monkeypatch.setattr(three_blocks_peers, "END", 3.0)
+    monkeypatch.setattr(three_blocks_peers, "_calls", lambda _: {"pymunk": 1.0, "Box2D": 2.0, "non-smooth": 0.5})
+    found = {one.quantity: one.median for one in three_blocks_peers.PAPER.measure(QUICK).numbers}
     for engine, times in (("pymunk", 3.0), ("Box2D", 4.0), ("explicit", 2.0)):
         assert found[f"{engine}: times non-smooth"] == pytest.approx(times)
     assert found["pymunk: the same without calls"] == pytest.approx((6.0 - 3.0) / (2.0 - 1.5))
@@ -223,9 +228,9 @@ def test_heaps_are_compared_level_by_level() -> None:
 
 def test_a_wall_is_measured_by_blocksim_alone_where_it_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     series = tuple(one for one in wall_series(quick=True) if one.engine == "explicit")
-    monkeypatch.setattr(peers.wall, "wall_series", lambda **_: series)
-    monkeypatch.setattr(peers.wall, "wall_racers", lambda: {"made up": Shifted(1.0)})
-    found = peers.WALL.measure(QUICK)
+    monkeypatch.setattr(wall, "wall_series", lambda **_: series)
+    monkeypatch.setattr(wall, "wall_racers", lambda: {"made up": Shifted(1.0)})
+    found = wall.WALL.measure(QUICK)
     coarse, fine, change, _ = found.numbers
     assert 0.0 < coarse.median < fine.median
     assert 0.0 < change.median < 2.0
@@ -252,12 +257,29 @@ def test_a_run_of_blocksim_that_breaks_off_has_no_answer() -> None:
     assert np.isnan(Explicit(1e-4, 0.1).solve(replace(scene, make=make)).x).all()
 
 
-@pytest.mark.parametrize(("module", "package"), [("pymunk", "pymunk"), ("Box2D", "box2d")])
-def test_a_missing_package_names_the_extra(monkeypatch: pytest.MonkeyPatch, module: str, package: str) -> None:
+@pytest.mark.parametrize("arguments", [["heap"], ["wals"]], ids=["package", "name"])
+def test_a_missing_package_and_an_unknown_name_are_wrong_usage(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
     for name in ("pymunk", "Box2D"):
         monkeypatch.setitem(sys.modules, name, sys)  # there, whatever it is
-    assert chosen(["wall"], peers=True) == peers.PEERS[2:3]
-    monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(UnavailableError, match=rf"package {package} .*blocksim\[bench\]") as caught:
-        chosen([], peers=True)
-    assert caught.value.exit_code == ExitCode.UNAVAILABLE
+    if arguments == ["heap"]:
+        monkeypatch.setitem(sys.modules, "Box2D", None)
+    with pytest.raises(SystemExit):
+        main(arguments)
+    told = "package box2d is missing" if arguments == ["heap"] else "did you mean 'wall'?"
+    assert told in capsys.readouterr().err
+
+
+def test_the_script_writes_numbers_and_draws_the_picture_beside_them(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    panel = Panel("made up", "error (mm)", (Curve("a", "a", np.ones(2), np.ones(2)),))
+    findings = Findings((single("time", "CPU ms", 1.0),), panel=panel)
+    monkeypatch.setattr(script, "PEERS", (Measurement("drawn", "made up", lambda _: findings, quick="less"),))
+    for module in ("pymunk", "Box2D"):
+        monkeypatch.setitem(sys.modules, module, sys)
+    main(["--quick", "--out", str(tmp_path / "peers.json")])
+    assert "drawn: made up\n  time" in capsys.readouterr().out
+    assert json.loads((tmp_path / "peers.json").read_text())["measurements"][0]["shortened"] == "less"
+    assert (tmp_path / "peers.png").stat().st_size > 0

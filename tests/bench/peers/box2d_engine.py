@@ -9,17 +9,18 @@ would cut the motion of long steps short, ten times less would end bounces at 50
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from blocksim.bench.peers.engine import Stepper, loaded
 from blocksim.bench.scenes import FRICTION
 from blocksim.scenario.outlines import edges_of
+from tests.bench.peers.engine import Stepper
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.bench.peers.engine import Scene
     from blocksim.scenario import PlacedBody
+    from tests.bench.peers.engine import Scene
 
 UNITS = 200.0  # a metre
 GRAVITY = 9.81  # m/s2
@@ -37,7 +38,7 @@ class Box2D(Stepper):
 
     def made(self, scene: Scene) -> tuple[Any, list[Any]]:
         """Return world and blocks, lengths in the engine's units."""
-        box2d = loaded("Box2D")
+        box2d = import_module("Box2D")
         world = empty_world()
         # Friction of a pair is the root of the product, restitution the larger one.
         blocks = {"friction": FRICTION["block_block"], "restitution": scene.restitution}
@@ -65,7 +66,7 @@ def empty_world() -> Any:
     Nothing sleeps: a stack has to stand by itself. Continuous physics, which keeps fast bodies from passing through the
     ground, is off: at these steps none does, and without it a step takes 10 to 25 % less time for the same answers.
     """
-    world = loaded("Box2D").b2World(gravity=(0.0, -GRAVITY * UNITS), doSleep=False)
+    world = import_module("Box2D").b2World(gravity=(0.0, -GRAVITY * UNITS), doSleep=False)
     world.continuousPhysics = False
     return world
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.bench.peers.engine import Final, Scene, timed
 from blocksim.bench.timing import Rerun
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.team import ALONE
+from tests.bench.peers.engine import Final, Scene, timed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

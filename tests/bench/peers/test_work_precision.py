@@ -7,7 +7,7 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.view.layout import Paper
-from blocksim.view.work_precision import (
+from tests.bench.peers.work_precision import (
     SMALLEST_SHARE,
     Curve,
     Panel,
