@@ -13,10 +13,10 @@ MEASUREMENTS = (
     three_blocks.EXPLICIT,
     ensemble.ENSEMBLE,
     walls.EXPLICIT,
-    threads.EXPLICIT,
+    threads.EXPLICIT_THREADS,
     three_blocks.NONSMOOTH,
     walls.NONSMOOTH,
-    threads.NONSMOOTH,
+    threads.NONSMOOTH_THREADS,
     soils.SOILS,
     startup.START_UP,
 )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from blocksim.bench.measurement import Findings, Measurement, Number, Setting, single
 from blocksim.bench.scenes import MATERIAL, PUSH, SIDES
-from blocksim.bench.threads import Case, compared
+from blocksim.bench.threads import Case, thread_numbers
 from blocksim.bench.timing import Rerun
 from blocksim.bench.walls import Size, explicit_wall
 from blocksim.scenario import scenario_from_mapping
@@ -118,7 +118,7 @@ def _threads(sizes: Sizes, setting: Setting) -> Iterable[Number]:
     soil = PushedSoil(sizes.threads)
     steps = QUICK_THREADS_STEPS if setting.quick else THREADS_STEPS
     case = Case(soil, soil.particles, steps, SCHEMES["explicit"].least_bodies, element="particle")
-    return compared(case, setting.repeats)
+    return thread_numbers(case, setting.repeats)
 
 
 SOILS = Measurement("soils", "pushed soil", measure, quick="250 and 500 particles, a wall of 100 blocks, 60 steps")

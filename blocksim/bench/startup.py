@@ -55,8 +55,8 @@ def _seconds(code: str, *arguments: str, **environment: str) -> float:
     )
     seconds = time.perf_counter() - began
     if done.returncode != 0:
-        told = done.stderr.strip().splitlines() or ["no message"]
-        raise StartError(f"blocksim {' '.join(arguments)}: exit code {done.returncode}: {told[-1]}")
+        lines = done.stderr.strip().splitlines() or ["no message"]
+        raise StartError(f"blocksim {' '.join(arguments)}: exit code {done.returncode}: {lines[-1]}")
     return seconds
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from blocksim.bench.timing import Rerun
 
 THREADS = 2
-STIFFNESS_SCALE = 1e-3  # a wall of a hundred blocks has fallen by then; softer ones would overlap too far
+SOFT_SCALE = 1e-3  # a wall of a hundred blocks has fallen by then; softer ones would overlap too far
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Case:
         return useful_threads(THREADS, self.blocks, self.least_bodies)
 
 
-def measure(plan: Plan, setting: Setting) -> Findings:
+def measure_threads(plan: Plan, setting: Setting) -> Findings:
     """Advance walls with one thread and with two, in turns, from the start: the smaller they are, the longer."""
     block_steps, most_steps = plan.block_steps[setting.quick], plan.most_steps[setting.quick]
     least = SCHEMES[plan.scheme].least_bodies
@@ -56,11 +56,11 @@ def measure(plan: Plan, setting: Setting) -> Findings:
         Case(plan.wall(size), size.blocks, min(most_steps, block_steps // size.blocks), least)
         for size in plan.sizes[setting.quick]
     ]
-    numbers = [number for case in cases for number in compared(case, setting.repeats)]
+    numbers = [number for case in cases for number in thread_numbers(case, setting.repeats)]
     return Findings(tuple(numbers), notes=notes(cases))
 
 
-def compared(case: Case, repeats: int) -> Iterable[Number]:
+def thread_numbers(case: Case, repeats: int) -> Iterable[Number]:
     """Yield the time with two threads, and by how much that is faster than one."""
     times: list[float] = []
     gains: list[float] = []
@@ -94,29 +94,29 @@ def _seconds(scene: Rerun, team: Team, steps: int) -> float:
     return time.perf_counter() - began
 
 
-ON_SPRINGS = Plan(
+SPRINGS_PLAN = Plan(
     "explicit",
-    functools.partial(explicit_wall, stiffness_scale=STIFFNESS_SCALE),
+    functools.partial(explicit_wall, stiffness_scale=SOFT_SCALE),
     sizes=((Size(10, 10), Size(20, 10), Size(40, 25), Size(125, 80)), (Size(10, 10), Size(25, 16))),
     block_steps=(2_000_000, 200_000),
     most_steps=(5000, 5000),
 )
-RIGID = Plan(
+RIGID_PLAN = Plan(
     "nonsmooth",
     nonsmooth_wall,
     sizes=((Size(10, 10), Size(20, 10), Size(40, 25), Size(90, 56)), (Size(8, 5), Size(40, 25))),
     block_steps=(1_000_000, 1_000_000),
     most_steps=(1000, 20),
 )
-EXPLICIT = Measurement(
+EXPLICIT_THREADS = Measurement(
     "threads",
     "two threads on one wall",
-    functools.partial(measure, ON_SPRINGS),
+    functools.partial(measure_threads, SPRINGS_PLAN),
     quick="walls of 100 and 400 blocks, a tenth of the steps",
 )
-NONSMOOTH = Measurement(
+NONSMOOTH_THREADS = Measurement(
     "nonsmooth-threads",
     "two threads on one wall, non-smooth",
-    functools.partial(measure, RIGID),
+    functools.partial(measure_threads, RIGID_PLAN),
     quick="walls of 40 and 1000 blocks, 20 steps",
 )

@@ -44,7 +44,7 @@ class Level:
     steps: int
 
     @property
-    def told(self) -> str:
+    def text(self) -> str:
         """For people."""
         return ", ".join(f"{name} {value:g}" for name, value in self.setting.items())
 
@@ -101,7 +101,7 @@ def measure_explicit(setting: Setting) -> Findings:
     )
     note = (
         f"converged: here and at all greater stiffnesses, centres at rest within {1e3 * CLOSE:g} mm of the stiffest "
-        f"run ({finest.told}); the cheapest of {len(close)} such settings of {len(levels)} has {cheapest.told}, "
+        f"run ({finest.text}); the cheapest of {len(close)} such settings of {len(levels)} has {cheapest.text}, "
         f"{cheapest.steps} steps, and is off by {1e3 * cheapest.off(finest):.2f} mm"
     )
     return Findings(numbers, notes=(note,), details=tuple(level.detail(finest) for level in levels))
@@ -129,18 +129,18 @@ def measure_nonsmooth(setting: Setting) -> Findings:
     cheapest = min(close, key=lambda level: level.median)
     members = QUICK_MEMBERS if setting.quick else MEMBERS
     numbers = (*_alone_and_among(members, 0.0, without), *_alone_and_among(members, RESTITUTION, cheapest))
-    told = (
-        f"e = 0: {without.told}, {without.steps} steps, blocks 2 and 3 at x = {_places(without)}; all runs until rest; "
+    meaning = (
+        f"e = 0: {without.text}, {without.steps} steps, blocks 2 and 3 at x = {_places(without)}; all runs until rest; "
         f"alone includes one call from Python; among many: {members} equal members"
     )
     converged = (
-        f"e = {RESTITUTION:g}: {cheapest.told}, {cheapest.steps} steps, blocks 2 and 3 at x = {_places(cheapest)}; the "
+        f"e = {RESTITUTION:g}: {cheapest.text}, {cheapest.steps} steps, blocks 2 and 3 at x = {_places(cheapest)}; the "
         f"cheapest of {len(close)} settings that are, as all with shorter steps, within {1e3 * CLOSE:g} mm of "
-        f"{finest.told}; itself off by {1e3 * cheapest.off(finest):.2f} mm"
+        f"{finest.text}; itself off by {1e3 * cheapest.off(finest):.2f} mm"
     )
     details = [level.detail(finest) for row in rows for level in row]
     details += [finest.detail(finest), without.detail(without)]
-    return Findings(numbers, notes=(told, converged), details=tuple(details))
+    return Findings(numbers, notes=(meaning, converged), details=tuple(details))
 
 
 def _nonsmooth(stepping: Stepping, restitution: float, setting: Setting) -> Level:

@@ -24,7 +24,7 @@ def test_levels_count_as_converged_from_where_all_finer_ones_agree() -> None:
     levels = [level(1e-4, 0.9 * CLOSE), level(1e-3, 2.0 * CLOSE), level(1e-2, -0.9 * CLOSE), level(1.0, 0.0)]
     assert [one.setting["scale"] for one in settled(levels, levels[-1])] == [1.0, 1e-2]
     told = levels[1].detail(levels[-1])
-    assert (levels[1].told, told["scale"], told["steps"], told["cpu_ms"]) == ("scale 0.001", 1e-3, 10, 2000.0)
+    assert (levels[1].text, told["scale"], told["steps"], told["cpu_ms"]) == ("scale 0.001", 1e-3, 10, 2000.0)
     assert told["off_mm"] == pytest.approx(0.4)
 
 
@@ -62,10 +62,10 @@ def test_ensemble_tells_its_rates_by_both_schemes_and_its_members_differ() -> No
     schemes = ("explicit", "nonsmooth")
     assert [one.quantity for one in found.numbers] == [f"{scheme}: {name}" for scheme in schemes for name in names]
     assert all(len(one.samples) == 2 and one.median > 1.0 for one in found.numbers)
-    for way in ensemble.WAYS:
-        members = ensemble.scattered(5, way)
+    for setting in ensemble.SETTINGS:
+        members = ensemble.scattered(5, setting)
         assert len({scenario.friction.model_dump_json() for scenario in members}) == 5
-        assert {scenario.time.scheme for scenario in members} == {way.scheme}
+        assert {scenario.time.scheme for scenario in members} == {setting.scheme}
 
 
 def test_walls_on_springs_tell_time_memory_and_growth() -> None:
