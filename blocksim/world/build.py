@@ -33,7 +33,7 @@ from blocksim.world.applied import stacked
 from blocksim.world.bodies import Outline, all_moved_records, support_direction
 from blocksim.world.bounds import Bounds
 from blocksim.world.interactions import interaction_tables
-from blocksim.world.memory import SceneSize, refuse_if_too_large
+from blocksim.world.memory import Size, refuse_if_too_large, scene_size
 from blocksim.world.scenes import Construction, Parts, Stride, build_one, joined
 from blocksim.world.step import MOST_STEPS, choose_approach, choose_skin, choose_step
 
@@ -61,9 +61,9 @@ def _choose(outline: Outline, bounds: Bounds) -> Stride:
     return Stride(step, skin, choose_approach(outline.scenario, bounds, outline.interactions, step))
 
 
-def _size(parts: Parts) -> SceneSize:
+def _size(parts: Parts) -> Size:
     bodies = parts.bodies.shape[1]
-    return SceneSize(bodies, first_capacity(bodies), parts.slots, has_particles=parts.particles is not None)
+    return scene_size(bodies, first_capacity(bodies), parts.slots, has_particles=parts.particles is not None)
 
 
 def _assemble(parts: Parts, strides: Sequence[Stride]) -> World:
@@ -181,7 +181,7 @@ def with_more_room(world: World) -> World:
     """Return the same world with more room for candidate pairs. Raises SceneTooLargeError."""
     used = world.pairs.size
     capacity, slots = math.ceil(GROWTH * used), world.candidates.shape[1]
-    refuse_if_too_large(SceneSize(world.bodies.size, capacity, slots, has_particles=world.particles is not None))
+    refuse_if_too_large(scene_size(world.bodies.size, capacity, slots, has_particles=world.particles is not None))
     lists = empty_lists(capacity, slots, world.before)
     for name in ("pairs", "contacts", "candidates", "operators"):
         lists[name][:used] = getattr(world, name)

@@ -19,12 +19,13 @@ from blocksim.world.coupled import couple
 from blocksim.world.interactions import ContactClass, contact_classes, pair_of
 from blocksim.world.memory import (
     PROCESS_BYTES,
-    RigidSize,
-    SceneSize,
+    Size,
     is_shorter_than_step,
     output_count,
     recorded_contacts,
+    rigid_size,
     run_bytes,
+    scene_size,
 )
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
 from blocksim.world.particles import division, particle_count
@@ -142,7 +143,7 @@ def describe(scenario: Scenario) -> Description:
         frames=frames,
         seconds=steps * (_seconds_per_step(scenario, len(placed), particles) + _seconds_of(scenario, others)),
         bytes=run_bytes(len(placed), frames, contacts, others),
-        memory=PROCESS_BYTES + size.bytes_needed + more,  # without frames: into a folder, they are written as they come
+        memory=PROCESS_BYTES + size.bytes + more,  # without frames: into a folder, they are written as they come
         frames_at_every_step=is_shorter_than_step(scenario.output.every, step),
         particles=particles,
         skin=float(world.controls[0].skin),
@@ -153,16 +154,16 @@ def describe(scenario: Scenario) -> Description:
     )
 
 
-def _built(scenario: Scenario, count: int) -> tuple[World, SceneSize | RigidSize]:
+def _built(scenario: Scenario, count: int) -> tuple[World, Size]:
     """Build the scene of so many bodies; return the arrays that all schemes have, and its size."""
     if isinstance(scenario.time, Nonsmooth):
         scene = build_nonsmooth(scenario)
-        return scene.world, RigidSize(count, scene.contacts.constraints.size)
+        return scene.world, rigid_size(count, scene.contacts.constraints.size)
     world = build_world(scenario)
     if scenario.systems:
         couple(scenario, world, others_of(scenario))  # refuses pairs that are not modelled
     slots = world.candidates.shape[1]
-    return world, SceneSize(count, world.pairs.size, slots, has_particles=world.particles is not None)
+    return world, scene_size(count, world.pairs.size, slots, has_particles=world.particles is not None)
 
 
 def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:

@@ -67,16 +67,12 @@ def compliance(scenario: Scenario, a: ContactClass, b: ContactClass) -> float:
     return sum((1.0 - m.poisson_ratio**2) / m.young_modulus for m in pair)
 
 
-def normal_stiffness(scenario: Scenario, a: ContactClass, b: ContactClass) -> float:
+def _normal_stiffness(scenario: Scenario, a: ContactClass, b: ContactClass, pair: ResolvedPair) -> float:
     """Return the stiffness of one corner contact.
 
     Linear: scale E* L (N/m), L the shorter depth, or what the scenario gives instead of E* L. Hertz-Mindlin: scale
     4/3 E* R*^(1/2) (N/m^1.5), R* the scenario's `contact_radius`.
     """
-    return _normal_stiffness(scenario, a, b, pair_of(scenario, a, b))
-
-
-def _normal_stiffness(scenario: Scenario, a: ContactClass, b: ContactClass, pair: ResolvedPair) -> float:
     contact = scenario.contact
     if contact.law == "hertz-mindlin":
         return contact.stiffness_scale * 4.0 / 3.0 * math.sqrt(contact.contact_radius) / compliance(scenario, a, b)
@@ -85,15 +81,11 @@ def _normal_stiffness(scenario: Scenario, a: ContactClass, b: ContactClass, pair
     return contact.stiffness_scale * min(a.depth, b.depth) / compliance(scenario, a, b)
 
 
-def shear_stiffness_ratio(scenario: Scenario, a: ContactClass, b: ContactClass) -> float:
+def _shear_stiffness_ratio(scenario: Scenario, a: ContactClass, b: ContactClass, given: ResolvedPair) -> float:
     """Return shear over normal stiffness (-): as given, else Mindlin's 4 G*/E*, 1/G* = 2 sum (2 - nu)(1 + nu)/E.
 
     For two equal materials this is 2 (1 - nu)/(2 - nu). R. D. Mindlin, J. Appl. Mech. 16 (1949) 259-268.
     """
-    return _shear_stiffness_ratio(scenario, a, b, pair_of(scenario, a, b))
-
-
-def _shear_stiffness_ratio(scenario: Scenario, a: ContactClass, b: ContactClass, given: ResolvedPair) -> float:
     if given.shear_stiffness_ratio is not None:
         return given.shear_stiffness_ratio
     pair = [scenario.materials[name] for name in _materials(a, b)]
@@ -119,13 +111,12 @@ def interaction(scenario: Scenario, a: ContactClass, b: ContactClass) -> Interac
 
 def interactions_of(scenario: Scenario, classes: tuple[ContactClass, ...]) -> Interactions:
     """Return the parameters of all pairs of classes."""
-    half = [[_touch(scenario, a, b) for b in classes[: i + 1]] for i, a in enumerate(classes)]
+    half = [
+        [NOTHING if a.is_ground and b.is_ground else interaction(scenario, a, b) for b in classes[: i + 1]]
+        for i, a in enumerate(classes)
+    ]
     count = range(len(classes))
     return tuple(tuple(half[max(i, j)][min(i, j)] for j in count) for i in count)
-
-
-def _touch(scenario: Scenario, a: ContactClass, b: ContactClass) -> Interaction:
-    return NOTHING if a.is_ground and b.is_ground else interaction(scenario, a, b)
 
 
 def interaction_tables(members: Sequence[Interactions]) -> Records:

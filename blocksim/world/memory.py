@@ -3,9 +3,8 @@
 Sizes follow from the types in blocksim.kernels.common.arrays, so that they change with them.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,7 +29,6 @@ FILE_BYTES = 35_000  # of run.h5 beside its values; measured 25 to 39 kB
 MOST_CHUNK_ROWS = 64  # frames in a chunk of run.h5
 CHUNK_VALUES = 1 << 17  # a megabyte
 ROUNDING = 1e-9  # of a step, by which the time between frames may miss it
-COPIES = 2  # of all frames at the end of a run: as they came, and joined
 
 
 class SceneTooLargeError(InvalidInputError):
@@ -38,86 +36,40 @@ class SceneTooLargeError(InvalidInputError):
 
     def __init__(self, size: "Size", available: int) -> None:
         """Report both, and the parts of the need."""
-        self.needed = size.bytes_needed
+        self.needed = size.bytes
         self.available = available
-        frames = f", {readable(size.record_bytes)} for {size.frames} frames (output.every)" if size.frames else ""
         super().__init__(
             f"this scene is too large: it needs about {readable(self.needed)} of memory, and {readable(available)} are "
-            f"free; {readable(size.world_bytes)} for {size.bodies} bodies and {size.pairs} pairs of neighbours{frames}"
+            f"free; {readable(size.bytes)} for {size.bodies} bodies and {size.pairs} pairs of neighbours"
         )
 
 
-class Size(ABC):
-    """Quantities that determine the memory of a run."""
+class Size(NamedTuple):
+    """Quantities that determine the memory of a scene."""
 
     bodies: int
     pairs: int  # of neighbours that there is room for
-    frames: int  # recorded, at most
-    contacts: int  # recorded in every frame, at most
-
-    @property
-    @abstractmethod
-    def world_bytes(self) -> int:
-        """Bytes of the arrays of a scene and of the bodies as they were placed."""
-
-    @property
-    def record_bytes(self) -> int:
-        """Bytes that all frames take until the end of a run."""
-        return COPIES * file_bytes(self.bodies, self.frames, self.contacts)
-
-    @property
-    def bytes_needed(self) -> int:
-        """Bytes that a run needs at most."""
-        return self.world_bytes + self.record_bytes
+    bytes: int  # of its arrays, and of the bodies as they were placed
 
 
-@dataclass(frozen=True)
-class SceneSize(Size):
-    """Of the explicit scheme."""
-
-    bodies: int
-    pairs: int
-    slots: int  # corners or particles of a pair that can come into contact
-    frames: int = 0
-    has_particles: bool = False
-    contacts: int = 0
-
-    @property
-    def world_bytes(self) -> int:
-        """As Size."""
-        if self.has_particles:
-            contacts, candidates = self.slots * PARTICLE_CONTACT.itemsize, self.slots * INDEX
-        else:
-            contacts, candidates = CONTACTS * CONTACT.itemsize, self.slots
-        pair = LISTS * (PAIR.itemsize + candidates) + OPERATORS * OPERATOR.itemsize + contacts
-        work = (self.slots + 1) * POINT.itemsize + contacts
-        return self.bodies * (BODY.itemsize + OBJECT_BYTES) + self.pairs * pair + work
+def scene_size(bodies: int, pairs: int, slots: int, *, has_particles: bool = False) -> Size:
+    """Return the size of a scene of the explicit scheme; `slots` of a pair can come into contact."""
+    if has_particles:
+        contacts, candidates = slots * PARTICLE_CONTACT.itemsize, slots * INDEX
+    else:
+        contacts, candidates = CONTACTS * CONTACT.itemsize, slots
+    pair = LISTS * (PAIR.itemsize + candidates) + OPERATORS * OPERATOR.itemsize + contacts
+    work = (slots + 1) * POINT.itemsize + contacts
+    return Size(bodies, pairs, bodies * (BODY.itemsize + OBJECT_BYTES) + pairs * pair + work)
 
 
-@dataclass(frozen=True)
-class RigidSize(Size):
-    """Of the non-smooth scheme."""
-
-    bodies: int
-    pairs: int
-    frames: int = 0
-    contacts: int = 0
-
-    @property
-    def world_bytes(self) -> int:
-        """As Size."""
-        body = (
-            BODY.itemsize
-            + STATE.itemsize
-            + BEFORE.itemsize
-            + IMPACT.itemsize
-            + LISTED.itemsize
-            + 2 * VALUE
-            + OBJECT_BYTES
-        )
-        group = GROUP.itemsize + ASIDE.itemsize
-        pair = CONSTRAINT.itemsize + KEPT.itemsize + -(-group // WIDTH) + -(-TALLY.itemsize // (WIDTH * PART))
-        return self.bodies * body + self.pairs * pair
+def rigid_size(bodies: int, pairs: int) -> Size:
+    """Return the size of a scene of the non-smooth scheme."""
+    kinds = (BODY, STATE, BEFORE, IMPACT, LISTED)
+    body = sum(kind.itemsize for kind in kinds) + 2 * VALUE + OBJECT_BYTES
+    group = GROUP.itemsize + ASIDE.itemsize
+    pair = CONSTRAINT.itemsize + KEPT.itemsize + -(-group // WIDTH) + -(-TALLY.itemsize // (WIDTH * PART))
+    return Size(bodies, pairs, bodies * body + pairs * pair)
 
 
 def output_count(steps: int, end: float, every: float) -> int:
@@ -130,11 +82,6 @@ def is_shorter_than_step(every: float, step: float) -> bool:
     return every < (1.0 - ROUNDING) * step
 
 
-def file_bytes(bodies: int, frames: int, contacts: int = 0, further: int = 0) -> int:
-    """Return the bytes in a file of frames with so many contacts, and values of further systems, each."""
-    return frames * VALUE * (FRAME_VALUES + MOTION_VALUES * bodies + CONTACT_VALUES * contacts + further)
-
-
 def chunk_rows(elements: int) -> int:
     """Return how many frames of so many elements, the most of any system, run.h5 takes room for at a time."""
     return min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // max(elements, 1)))
@@ -144,8 +91,8 @@ def run_bytes(bodies: int, frames: int, contacts: int = 0, others: Sequence[Pres
     """Return the bytes of run.h5 with so many frames, the room of the last chunk included, and contacts in each."""
     rows = chunk_rows(max([bodies, *(one.count for one in others)]))
     whole = -(-frames // rows) * rows
-    values = sum(one.values for one in others)
-    return FILE_BYTES + file_bytes(bodies, whole, 0, values) + frames * VALUE * CONTACT_VALUES * contacts
+    values = FRAME_VALUES + MOTION_VALUES * bodies + sum(one.values for one in others)
+    return FILE_BYTES + VALUE * (whole * values + frames * CONTACT_VALUES * contacts)
 
 
 def recorded_contacts(bodies: int, particles: int) -> int:
@@ -154,7 +101,7 @@ def recorded_contacts(bodies: int, particles: int) -> int:
 
 
 def refuse_if_too_large(size: Size) -> None:
-    """Raise SceneTooLargeError where a run needs more memory than is available, if that is known."""
+    """Raise SceneTooLargeError where a scene needs more memory than is available, if that is known."""
     available = available_bytes()
-    if available is not None and size.bytes_needed > available:
+    if available is not None and size.bytes > available:
         raise SceneTooLargeError(size, available)

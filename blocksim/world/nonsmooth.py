@@ -33,7 +33,7 @@ from blocksim.world.bodies import Outline
 from blocksim.world.bounds import Bounds
 from blocksim.world.build import GROWTH, empty_controls, first_capacity, numbers, without_lists
 from blocksim.world.loads import box_of, loads_at_rest
-from blocksim.world.memory import RigidSize, refuse_if_too_large
+from blocksim.world.memory import Size, refuse_if_too_large, rigid_size
 from blocksim.world.rigid_step import FEW, choose_rigid_step
 from blocksim.world.sag import DAMPING, soft_contact
 from blocksim.world.scenes import SURFACE, Construction, Parts, Stride, build_one
@@ -156,9 +156,9 @@ def _choose(outline: Outline, bounds: Bounds) -> Stride:
     return Stride(step, choose_skin(scenario, bounds, outline.interactions, step))
 
 
-def _size(parts: Parts) -> RigidSize:
+def _size(parts: Parts) -> Size:
     bodies = parts.bodies.shape[1]
-    return RigidSize(bodies, first_capacity(bodies))
+    return rigid_size(bodies, first_capacity(bodies))
 
 
 def _assemble(parts: Parts, strides: Sequence[Stride]) -> Nonsmooth:
@@ -247,7 +247,7 @@ def with_more_constraints(scene: Nonsmooth) -> Nonsmooth:
     """Return the same scene with more room for pairs. Raises SceneTooLargeError."""
     old = scene.contacts
     capacity = math.ceil(GROWTH * old.constraints.size)
-    refuse_if_too_large(RigidSize(scene.world.bodies.size, capacity))
+    refuse_if_too_large(rigid_size(scene.world.bodies.size, capacity))
     larger = with_lists(scene.world, old.stepping, capacity)
     for name in ("constraints", "tallies"):
         getattr(larger.contacts, name)[: getattr(old, name).size] = getattr(old, name)

@@ -1,9 +1,9 @@
 """From a scenario to the arrays of its scene at time zero.
 
 Blocks are placed, step and skin chosen, bodies divided for the broad phase, the size checked, the arrays assembled.
-`build_one` does that for one scenario, `build_stacks` for many at once, field by field over all members, as most of
-what building costs does not depend on their number. So all arrays have the members along their first axis, and
-`build_one` takes the only member of a stack.
+`build_stacks` does that for many scenarios at once, field by field over all members, as most of what building costs
+does not depend on their number. So all arrays have the members along their first axis, and `build_one` takes the only
+member of a stack.
 """
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
@@ -105,14 +105,8 @@ class Refusal(NamedTuple):
 
 def build_one(scenario: Scenario, construction: Construction) -> Built:
     """Build the scene of one scenario. Raises what refuses its step, its skin or its size."""
-    outline = outline_of(scenario)
-    with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused
-        bodies = body_records([outline])
-        (bounds,) = bounds_of(with_freed(bodies, [outline]), len(outline.placed), [outline.shapes])
-        stride = construction.choose(outline, bounds)
-    ((_, parts),) = _divided([outline], bodies, construction.model(outline))
-    refuse_if_too_large(construction.size(parts))
-    return Built(outline.placed, member(construction.assemble(parts, [stride]), 0))
+    stack = only(build_stacks([scenario], construction))
+    return Built(stack.placed[0], member(stack.scenes, 0))
 
 
 def build_stacks(scenarios: Sequence[Scenario], construction: Construction) -> Iterator[Stack | Refusal]:
@@ -127,27 +121,21 @@ def build_stacks(scenarios: Sequence[Scenario], construction: Construction) -> I
 
 def _group(numbers: Sequence[int], outlines: Outlines, construction: Construction) -> Iterator[Stack | Refusal]:
     """Build scenes of one outline."""
-    bodies, chosen = _choose(outlines, construction)
-    good = [k for k, one in enumerate(chosen) if isinstance(one, Stride)]
-    yield from (Refusal(numbers[k], one) for k, one in enumerate(chosen) if isinstance(one, BlocksimError))
-    strides = [one for one in chosen if isinstance(one, Stride)]
-    model = construction.model(outlines[0])
-    for same, parts in _divided([outlines[k] for k in good], some(bodies, good), model):
-        yield from _stacks([numbers[good[k]] for k in same], parts, [strides[k] for k in same], construction)
-
-
-def _choose(outlines: Outlines, construction: Construction) -> tuple[Records, list[Stride | BlocksimError]]:
-    """Return the bodies, and the values chosen for every scene or the reason why none can be."""
-    chosen: list[Stride | BlocksimError] = []
-    with np.errstate(all="ignore"):  # as in `build_one`
+    good, strides, refusals = list[int](), list[Stride](), list[Refusal]()
+    with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused
         bodies = body_records(outlines)
         all_bounds = bounds_of(with_freed(bodies, outlines), len(outlines[0].placed), [one.shapes for one in outlines])
-        for outline, bounds in zip(outlines, all_bounds, strict=True):
+        for k, (outline, bounds) in enumerate(zip(outlines, all_bounds, strict=True)):
             try:
-                chosen.append(construction.choose(outline, bounds))
+                strides.append(construction.choose(outline, bounds))
+                good.append(k)
             except BlocksimError as error:
-                chosen.append(error)
-    return bodies, chosen
+                refusals.append(Refusal(numbers[k], error))
+    yield from refusals
+    if good:
+        model = construction.model(outlines[0])
+        for same, parts in _divided([outlines[k] for k in good], some(bodies, good), model):
+            yield from _stacks([numbers[good[k]] for k in same], parts, [strides[k] for k in same], construction)
 
 
 def _stacks(
@@ -155,7 +143,7 @@ def _stacks(
 ) -> Iterator[Stack | Refusal]:
     """Build scenes of one shape, as many at a time as have room."""
     size = construction.size(parts)
-    count = max(1, MOST_BYTES // size.world_bytes)
+    count = max(1, MOST_BYTES // size.bytes)
     for first in range(0, len(numbers), count):
         places = range(first, min(first + count, len(numbers)))
         names = [numbers[k] for k in places]
@@ -169,48 +157,33 @@ def _stacks(
             yield Stack(names, placed, construction.assemble(chosen, [strides[k] for k in places]))
 
 
-class _Boundary(NamedTuple):
-    """Boundaries of the bodies of one scene."""
-
-    particles: Records | None
-    slots: int  # of a pair
-
-
 def _divided(outlines: Outlines, bodies: Records, model: str) -> Iterator[tuple[list[int], Parts]]:
     """Yield the parts of scenes of one outline, all those of one shape together, and which they are.
 
-    What decides the shape by now: how many bodies are large, how many move with the support, how many particles.
+    What decides the shape by now: how many bodies are large, how many move with the support, how many particles there
+    are, and how many slots a pair has: of corners those of its two bodies, at most.
     """
-    if not outlines:
-        return
     radius = cell_radius(bodies)
-    boundaries = _boundaries(outlines, bodies, model)
+    particles: list[Records | None] = [None] * len(outlines)
+    if model == SURFACE:
+        sizes = [None if one.shapes is None else one.shapes.sizes for one in outlines]
+        slots = [SLOTS if one is None else 2 * max(HALF, *one) for one in sizes]
+    else:
+        spacings = [outline.scenario.contact.particle_spacing for outline in outlines]
+        particles = [place_particles(one, model, spacing) for one, spacing in zip(bodies, spacings, strict=True)]
+        slots = [slots_of_a_pair(one, model) for one in bodies]
     counts = zip(
         np.count_nonzero(_is_large(bodies, radius), axis=1),
         np.count_nonzero(bodies["is_moved"], axis=1),
-        ((one.slots, None if one.particles is None else one.particles.size) for one in boundaries),
+        slots,
+        (None if one is None else one.size for one in particles),
         strict=True,
     )
     parts = Parts(outlines, bodies, radius, None, SLOTS)
     for same in alike(list(counts)):
-        one = parts.chosen(same)._replace(slots=boundaries[same[0]].slots)
-        particles = [found for k in same if (found := boundaries[k].particles) is not None]
-        yield same, one._replace(particles=joined(particles)) if particles else one
-
-
-def _boundaries(outlines: Outlines, bodies: Records, model: str) -> list[_Boundary]:
-    """Return boundaries; fills the fields of the bodies that are about particles."""
-    if model == SURFACE:
-        return [_Boundary(None, _slots_of_corners(outline)) for outline in outlines]
-    return [
-        _Boundary(place_particles(one, model, outline.scenario.contact.particle_spacing), slots_of_a_pair(one, model))
-        for one, outline in zip(bodies, outlines, strict=True)
-    ]
-
-
-def _slots_of_corners(outline: Outline) -> int:
-    """Return how many corners the two bodies of a pair have, at most."""
-    return SLOTS if outline.shapes is None else 2 * max(HALF, *outline.shapes.sizes)
+        one = parts.chosen(same)._replace(slots=slots[same[0]])
+        some_particles = [found for k in same if (found := particles[k]) is not None]
+        yield same, one._replace(particles=joined(some_particles)) if some_particles else one
 
 
 def cell_radius(bodies: Records) -> Floats:

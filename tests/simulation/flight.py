@@ -12,7 +12,7 @@ from blocksim.simulation.schemes.scheme import Scheme
 from blocksim.world.bodies import Outline
 from blocksim.world.bounds import Bounds
 from blocksim.world.build import empty_controls, without_lists
-from blocksim.world.memory import SceneSize
+from blocksim.world.memory import scene_size
 from blocksim.world.scenes import Construction, Parts, Stride
 
 STEP = 1e-3  # s
@@ -71,7 +71,7 @@ FLIGHT = Scheme(
     construction=Construction(
         choose=choose,
         model=lambda _: "surface",
-        size=lambda parts: SceneSize(parts.bodies.shape[1], 1, 1),
+        size=lambda parts: scene_size(parts.bodies.shape[1], 1, 1),
         assemble=assemble,
     ),
     advance=advance,

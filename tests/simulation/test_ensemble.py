@@ -14,7 +14,7 @@ from blocksim.simulation.ensemble import Ensemble, run_ensemble, run_in_batches
 from blocksim.simulation.member_end import Ended, MemberEnd, MemberFailure
 from blocksim.simulation.schemes import build_stacks
 from blocksim.world import build, memory, scenes
-from blocksim.world.memory import SceneSize, SceneTooLargeError
+from blocksim.world.memory import SceneTooLargeError, scene_size
 from blocksim.world.rigid_step import StepTooLongError
 from blocksim.world.scenes import Stack
 from blocksim.world.step import SkinTooSmallError, StepTooLargeError
@@ -195,7 +195,7 @@ def test_a_stack_takes_no_more_memory_than_it_may(monkeypatch: pytest.MonkeyPatc
     whole = [end.columns for end in run_ensemble(scenarios)]
     one = next(iter(build_stacks(scenarios[:1])))
     assert isinstance(one, Stack)
-    monkeypatch.setattr(scenes, "MOST_BYTES", 2 * SceneSize(4, 16, 8).world_bytes)
+    monkeypatch.setattr(scenes, "MOST_BYTES", 2 * scene_size(4, 16, 8).bytes)
     assert [len(stack.placed) for stack in build_stacks(scenarios) if isinstance(stack, Stack)] == [2, 2, 1]
     assert [end.columns for end in run_ensemble(scenarios)] == whole
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import load_scenario, scenario_from_mapping
-from blocksim.world import build_world
+from blocksim.world.build import build_world
 from blocksim.world.describe import describe
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"

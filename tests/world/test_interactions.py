@@ -15,8 +15,6 @@ from blocksim.world.interactions import (
     interaction,
     interaction_tables,
     interactions_of,
-    normal_stiffness,
-    shear_stiffness_ratio,
 )
 from blocksim.world.restitution import damping_ratio
 
@@ -74,35 +72,35 @@ def test_papers_block_has_the_stiffness_of_its_material() -> None:
     of = scenario()
     ground, paper, *_ = classes(of)
     expected = 69e9 / (2.0 * (1.0 - 0.3**2)) * 0.025
-    assert normal_stiffness(of, paper, paper) == pytest.approx(expected, rel=1e-12)
-    assert normal_stiffness(of, paper, paper) == pytest.approx(9.48e8, rel=1e-3)
-    assert normal_stiffness(of, paper, ground) == normal_stiffness(of, paper, paper)
+    assert interaction(of, paper, paper).normal_stiffness == pytest.approx(expected, rel=1e-12)
+    assert interaction(of, paper, paper).normal_stiffness == pytest.approx(9.48e8, rel=1e-3)
+    assert interaction(of, paper, ground).normal_stiffness == interaction(of, paper, paper).normal_stiffness
 
 
 def test_equal_materials_have_mindlins_stiffness_ratio() -> None:
     of = scenario()
     ground, paper, _, wooden = classes(of)
-    assert shear_stiffness_ratio(of, paper, ground) == pytest.approx(2.0 * 0.7 / 1.7, rel=1e-12)
-    assert shear_stiffness_ratio(of, paper, paper) == pytest.approx(0.8235, abs=5e-5)
-    assert shear_stiffness_ratio(of, wooden, wooden) == pytest.approx(2.0 * 0.6 / 1.6, rel=1e-12)
+    assert interaction(of, paper, ground).shear_ratio == pytest.approx(2.0 * 0.7 / 1.7, rel=1e-12)
+    assert interaction(of, paper, paper).shear_ratio == pytest.approx(0.8235, abs=5e-5)
+    assert interaction(of, wooden, wooden).shear_ratio == pytest.approx(2.0 * 0.6 / 1.6, rel=1e-12)
 
 
 def test_different_materials_add_their_compliances_and_the_shorter_depth_counts() -> None:
     of = scenario()
     _, paper, flat, wooden = classes(of)
-    assert normal_stiffness(of, flat, wooden) == pytest.approx(modulus(ALUMINIUM, OAK) * 0.05, rel=1e-12)
-    assert normal_stiffness(of, paper, wooden) == pytest.approx(modulus(ALUMINIUM, OAK) * 0.025, rel=1e-12)
+    assert interaction(of, flat, wooden).normal_stiffness == pytest.approx(modulus(ALUMINIUM, OAK) * 0.05, rel=1e-12)
+    assert interaction(of, paper, wooden).normal_stiffness == pytest.approx(modulus(ALUMINIUM, OAK) * 0.025, rel=1e-12)
     shear = sum(
         2.0 * (2.0 - m["poisson_ratio"]) * (1.0 + m["poisson_ratio"]) / m["young_modulus"] for m in (ALUMINIUM, OAK)
     )
-    assert shear_stiffness_ratio(of, flat, wooden) == pytest.approx(4.0 / shear / modulus(ALUMINIUM, OAK), rel=1e-12)
+    assert interaction(of, flat, wooden).shear_ratio == pytest.approx(4.0 / shear / modulus(ALUMINIUM, OAK), rel=1e-12)
 
 
 def test_named_ground_material_counts_for_every_block() -> None:
     of = scenario(ground={"material": "oak"})
     ground, paper, _, wooden = classes(of)
-    assert normal_stiffness(of, paper, ground) == pytest.approx(modulus(ALUMINIUM, OAK) * 0.025, rel=1e-12)
-    assert normal_stiffness(of, wooden, ground) == pytest.approx(modulus(OAK, OAK) * 0.05, rel=1e-12)
+    assert interaction(of, paper, ground).normal_stiffness == pytest.approx(modulus(ALUMINIUM, OAK) * 0.025, rel=1e-12)
+    assert interaction(of, wooden, ground).normal_stiffness == pytest.approx(modulus(OAK, OAK) * 0.05, rel=1e-12)
 
 
 def test_given_stiffness_replaces_that_of_the_materials_and_is_scaled() -> None:
@@ -160,7 +158,7 @@ def test_ground_cannot_touch_itself() -> None:
     of = scenario()
     ground = classes(of)[0]
     with pytest.raises(ValueError, match="is not in contact with itself"):
-        normal_stiffness(of, ground, ground)
+        interaction(of, ground, ground)
 
 
 def row(of: Scenario, one: str, two: str | None) -> Any:

@@ -1,7 +1,6 @@
 """What a run needs is reported from the arrays that it will have; what there is from files as Linux writes them."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,18 +9,18 @@ import pytest
 from blocksim.errors import ExitCode
 from blocksim.kernels.common.arrays import World
 from blocksim.scenario import load_scenario, place_bodies
-from blocksim.simulation.recorder import Recorder
-from blocksim.world import build_world, memory
+from blocksim.world import memory
+from blocksim.world.build import build_world
 from blocksim.world.free_memory import available_bytes, readable
-from blocksim.world.memory import SceneSize, SceneTooLargeError, file_bytes, refuse_if_too_large
+from blocksim.world.memory import SceneTooLargeError, Size, refuse_if_too_large, run_bytes, scene_size
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 GIB = 1 << 30
 
 
-def size_of(world: World, bodies: int) -> SceneSize:
+def size_of(world: World, bodies: int) -> Size:
     pairs, slots = world.candidates.shape
-    return SceneSize(bodies, pairs, slots, has_particles=world.particles is not None)
+    return scene_size(bodies, pairs, slots, has_particles=world.particles is not None)
 
 
 @pytest.mark.parametrize("model", ["surface", "kernel", "particles"])
@@ -30,53 +29,38 @@ def test_the_estimate_is_that_of_the_arrays_of_a_world(model: str) -> None:
     world = build_world(scenario)
     bodies = len(place_bodies(scenario))
     arrays = sum(array.nbytes for array in world if isinstance(array, np.ndarray) and array is not world.particles)
-    estimate = size_of(world, bodies).world_bytes - bodies * memory.OBJECT_BYTES
+    estimate = size_of(world, bodies).bytes - bodies * memory.OBJECT_BYTES
     assert arrays == pytest.approx(estimate, rel=0.1)
 
 
-def test_the_estimate_of_frames_is_that_of_the_recorder() -> None:
-    scenario = load_scenario(SCENARIOS / "dominoes.toml")
-    recorder = Recorder(place_bodies(scenario), scenario.output.every, step=1e-6)
-    recorder.sample(build_world(scenario))
-    kept = recorder.held[0].states[0].nbytes + recorder.held[0].measured.nbytes
-    size = SceneSize(len(recorder.placed), 0, 0, 1)
-    assert size.record_bytes == pytest.approx(memory.COPIES * kept, rel=0.05)
-    assert size.record_bytes >= memory.COPIES * kept
-    assert file_bytes(24, 100) == pytest.approx(100 * kept, rel=0.05)
-
-
 def test_every_part_of_the_size_counts() -> None:
-    size = SceneSize(bodies=10, pairs=80, slots=8, frames=100)
-    for more in (
-        replace(size, bodies=11),
-        replace(size, pairs=81),
-        replace(size, slots=9),
-        replace(size, frames=101),
-    ):
-        assert more.bytes_needed > size.bytes_needed
+    size = scene_size(bodies=10, pairs=80, slots=8).bytes
+    assert min(scene_size(*more).bytes for more in ((11, 80, 8), (10, 81, 8), (10, 80, 9))) > size
+    few, bodies, frames, contacts = (run_bytes(*one) for one in ((24, 99), (25, 99), (24, 100), (24, 99, 1)))
+    assert min(bodies, contacts) > few
+    assert frames >= few
 
 
 def test_a_scene_that_fits_is_not_refused() -> None:
-    refuse_if_too_large(SceneSize(bodies=1000, pairs=8000, slots=8, frames=100))
+    refuse_if_too_large(scene_size(bodies=1000, pairs=8000, slots=8))
 
 
 def test_a_scene_that_does_not_fit_is_refused_with_both_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "available_bytes", lambda: 12 * GIB)
-    size = SceneSize(bodies=10**6, pairs=8 * 10**6, slots=8, frames=2001)
+    size = scene_size(bodies=10**6, pairs=8 * 10**6, slots=8)
     with pytest.raises(SceneTooLargeError) as caught:
         refuse_if_too_large(size)
     assert caught.value.exit_code == ExitCode.INVALID_INPUT
-    assert (caught.value.needed, caught.value.available) == (size.bytes_needed, 12 * GIB)
+    assert (caught.value.needed, caught.value.available) == (size.bytes, 12 * GIB)
     message = str(caught.value)
-    assert f"needs about {readable(size.bytes_needed)} of memory, and 12.9 GB are free" in message
+    assert f"needs about {readable(size.bytes)} of memory, and 12.9 GB are free" in message
     assert "for 1000000 bodies and 8000000 pairs" in message
-    assert "for 2001 frames (output.every)" in message
 
 
 @pytest.mark.parametrize("spare", [-1, 0])
 def test_the_last_byte_decides(monkeypatch: pytest.MonkeyPatch, spare: int) -> None:
-    size = SceneSize(bodies=10, pairs=80, slots=8)
-    monkeypatch.setattr(memory, "available_bytes", lambda: size.bytes_needed + spare)
+    size = scene_size(bodies=10, pairs=80, slots=8)
+    monkeypatch.setattr(memory, "available_bytes", lambda: size.bytes + spare)
     if spare < 0:
         with pytest.raises(SceneTooLargeError):
             refuse_if_too_large(size)
@@ -86,7 +70,7 @@ def test_the_last_byte_decides(monkeypatch: pytest.MonkeyPatch, spare: int) -> N
 
 def test_nothing_is_refused_where_memory_cannot_be_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "available_bytes", lambda: None)
-    refuse_if_too_large(SceneSize(bodies=10**6, pairs=10**7, slots=8, frames=10**6))
+    refuse_if_too_large(scene_size(bodies=10**6, pairs=10**7, slots=8))
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from blocksim.kernels.common.arrays import REACHED
 from blocksim.kernels.explicit.broad_phase import list_reach
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.verification.scene import Simulation
-from blocksim.world import build_world
+from blocksim.world.build import build_world
 from blocksim.world.nonsmooth import build_nonsmooth
 from blocksim.world.step import SkinTooSmallError
 
