@@ -25,12 +25,12 @@ from blocksim.kernels.common.arrays import (
     zeros,
 )
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments
-from blocksim.scenario.motion import motion_direction, motion_pieces
+from blocksim.scenario.motion import motion_pieces
 from blocksim.scenario.placement import length_beside, smallest_width
 from blocksim.world.applied import Applied, applied_loads
 from blocksim.world.drives import DriveRecords, drive_records, piece_records
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
-from blocksim.world.shapes import HalfSides, Shapes, half_sides, shapes_of
+from blocksim.world.shapes import HalfSides, Shapes, shapes_of
 
 # A piece of ground is a slab of which only the upper face counts; its thickness is a share of the smallest side of all
 # blocks: more than any overlap, less than a ledge that is worth modelling.
@@ -147,7 +147,7 @@ def _fill_polygons(records: NDArray[np.record], placed: Sequence[PlacedBody], sh
     for record, body in zip(records, placed, strict=True):
         if body.outline:
             record["least_width"] = body.least_width
-            record["half_x"], record["half_y"] = half_sides(body)
+            record["half_x"], record["half_y"] = (max(map(abs, axis)) for axis in zip(*body.outline, strict=True))
             record["radius"] = body.radius
             record["faces"] = OUTLINE
 
@@ -205,11 +205,6 @@ def _fill_slab(record: Record, segment: PlacedSegment, thickness: float) -> None
 
 
 STANDSTILL = zeros(1, MOTION_PIECE)
-
-
-def support_direction(scenario: Scenario) -> tuple[float, float]:
-    """Return the direction (unit vector) of the support's motion; zero where it does not move."""
-    return (0.0, 0.0) if scenario.motion is None else motion_direction(scenario)
 
 
 def all_moved_records(bodies: Records, outlines: Outlines) -> Records:

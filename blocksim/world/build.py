@@ -29,8 +29,9 @@ from blocksim.kernels.explicit.laws import LAW_CODES
 from blocksim.kernels.explicit.models import MODEL_CODES
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import Scenario
+from blocksim.scenario.motion import motion_direction
 from blocksim.world.applied import stacked
-from blocksim.world.bodies import Outline, all_moved_records, support_direction
+from blocksim.world.bodies import Outline, all_moved_records
 from blocksim.world.bounds import Bounds
 from blocksim.world.interactions import interaction_tables
 from blocksim.world.memory import Size, refuse_if_too_large, scene_size
@@ -228,7 +229,7 @@ def empty_controls(parts: Parts, strides: Sequence[Stride]) -> Records:
 
 def _controls(scenario: Scenario, stride: Stride) -> dict[str, float]:
     contact, time, (step, skin, approach) = scenario.contact, scenario.time, stride
-    motion_x, motion_y = support_direction(scenario)
+    motion_x, motion_y = (0.0, 0.0) if scenario.motion is None else motion_direction(scenario)
     kernel = KERNEL_CODES[contact.kernel]
     smoothing_length = contact.resolved_smoothing_length
     few = round(min(CHEAP_CHECKS, LONGEST_CHECK / step))  # of a quotient that may be infinite

@@ -5,15 +5,15 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from blocksim.kernels.common.arrays import Record, World
-from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, place_bodies
+from blocksim.kernels.common.arrays import World
+from blocksim.scenario import GROUND, PlacedBody, Scenario, place_bodies
 from blocksim.scenario.models.stepping import Explicit, Nonsmooth
 from blocksim.scenario.motion import motion_pieces
 from blocksim.scenario.motion_peaks import motion_peaks
 from blocksim.scenario.outlines import edges_of
 from blocksim.scenario.placement import has_outlines
-from blocksim.world.bodies import outline_of, with_freed
-from blocksim.world.bounds import bounds_of
+from blocksim.world.bodies import Outline, outline_of, with_freed
+from blocksim.world.bounds import Bounds, bounds_of
 from blocksim.world.build import build_world
 from blocksim.world.coupled import couple
 from blocksim.world.interactions import ContactClass, contact_classes, pair_of
@@ -27,8 +27,8 @@ from blocksim.world.memory import (
     run_bytes,
     scene_size,
 )
-from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
-from blocksim.world.particles import division, particle_count
+from blocksim.world.nonsmooth import build_nonsmooth, stepping_of, velocity_tolerance
+from blocksim.world.particles import division
 from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
 from blocksim.world.scenes import stack_of_one
@@ -129,6 +129,8 @@ def describe(scenario: Scenario) -> Description:
     step = float(world.controls[0].step)
     steps = max(1, round(scenario.time.end / step))
     frames = output_count(steps, scenario.time.end, scenario.output.every) + 1
+    outline = outline_of(scenario)
+    (bounds,) = bounds_of(with_freed(stack_of_one(world.bodies), [outline]), len(placed), [outline.shapes])
     particles = _particles(scenario, placed)
     touching = 0 if world.particles is None else particles // PARTICLES_OF_A_CONTACT
     contacts = recorded_contacts(len(placed), touching) if scenario.output.contacts else 0
@@ -147,9 +149,9 @@ def describe(scenario: Scenario) -> Description:
         frames_at_every_step=is_shorter_than_step(scenario.output.every, step),
         particles=particles,
         skin=float(world.controls[0].skin),
-        rigid=_rigid(scenario, placed, world, step),
+        rigid=_rigid(outline, bounds, step) if isinstance(scenario.time, Nonsmooth) else None,
         systems={one.system.name: one.count for one in others},
-        limits=_limits(scenario, placed, world) if others else None,
+        limits=_limits(outline, bounds) if others else None,
         warnings=tuple(warnings_of(scenario)),
     )
 
@@ -183,26 +185,22 @@ def _seconds_of(scenario: Scenario, others: Sequence[Present]) -> float:
     return sum(one.count * one.system.cost.seconds * one.system.dearer(scenario) for one in others)
 
 
-def _limits(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World) -> StepLimits | None:
+def _limits(outline: Outline, bounds: Bounds) -> StepLimits | None:
+    scenario = outline.scenario
     systems = largest_step(scenario)
     if not isinstance(scenario.time, Explicit) or systems == math.inf:
         return None
-    outline = outline_of(scenario)
-    (bounds,) = bounds_of(with_freed(stack_of_one(world.bodies), [outline]), len(placed), [outline.shapes])
     blocks = step_of_contacts(scenario, bounds, outline.interactions, scenario.time.safety)
     return StepLimits(blocks, systems, scenario.contact.stiffness_scale * (blocks / systems) ** 2)
 
 
-def _rigid(scenario: Scenario, placed: tuple[PlacedBody, ...], world: World, step: float) -> SagDescription | None:
-    if not isinstance(scenario.time, Nonsmooth):
-        return None
-    outline = outline_of(scenario)
-    (bounds,) = bounds_of(with_freed(stack_of_one(world.bodies), [outline]), len(placed), [outline.shapes])
-    sag = scene_sag(step / scenario.time.substeps, placed, scenario.gravity)
+def _rigid(outline: Outline, bounds: Bounds, step: float) -> SagDescription:
+    scenario, substeps = outline.scenario, stepping_of(outline.scenario).substeps
+    sag = scene_sag(step / substeps, outline.placed, scenario.gravity)
     return SagDescription(
         why=reason_of_step(outline, bounds).why,
-        substeps=scenario.time.substeps,
-        tolerance=velocity_tolerance(scenario, len(placed)),
+        substeps=substeps,
+        tolerance=velocity_tolerance(scenario, len(outline.placed)),
         longest_step=longest_step(outline, bounds),
         sag=sag.sag,
         block=sag.block,
@@ -215,37 +213,48 @@ def _motion(scenario: Scenario) -> MotionDescription | None:
     if scenario.motion is None:
         return None
     peaks = motion_peaks(motion_pieces(scenario), scenario.time.end)
-    found = (peaks.acceleration.value, peaks.displacement.value, peaks.velocity.value)
-    return MotionDescription(*found, abs(peaks.final_velocity))
+    values = (peaks.acceleration.value, peaks.displacement.value, peaks.velocity.value)
+    return MotionDescription(*values, abs(peaks.final_velocity))
 
 
 def _particles(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> int:
     spacing = scenario.contact.particle_spacing
-    counts = Counter((body.size_x, body.size_y, body.outline) for body in placed)
-    kinds = {(body.size_x, body.size_y, body.outline): body for body in placed}
-    return sum(counts[kind] * _particles_of(body, spacing) for kind, body in kinds.items())
-
-
-def _particles_of(body: PlacedBody, spacing: float) -> int:
-    if not body.outline:
-        return particle_count(body.size_x, body.size_y, spacing)
-    return sum(division(math.dist(a, b), spacing) for a, b, _ in edges_of(body.outline))
+    counts = Counter(body.corners for body in placed)
+    return sum(
+        count * sum(division(math.dist(a, b), spacing) for a, b, _ in edges_of(corners))
+        for corners, count in counts.items()
+    )
 
 
 def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> Iterator[PairDescription]:
     """Yield every pair of classes that can touch: blocks with the ground, with walls and with blocks."""
     classes = contact_classes(scenario, placed)
-    names = _class_names(classes)
-    softest = _softest(placed) if isinstance(scenario.time, Nonsmooth) else {}
+    blocks = [one.material for one in classes if not one.is_ground]
+    names = [GROUND, *(_class_name(one, blocks.count(one.material)) for one in classes[1:])]
+    kinds = {(body.material, body.depth, body.density, body.fixed, body.corners): body for body in placed}
+    softest = {(body.material, body.depth): body for body in sorted(kinds.values(), key=inverse_mass)}
     for i, block in enumerate(classes):
         for j, other in enumerate(classes):
             if not block.is_ground and (other.is_ground or j <= i):
-                materials = (str(block.material), names[j] if other.is_ground else str(other.material))
                 pair, row = pair_of(scenario, block, other), world.interactions[i, j]
-                found = _pair((names[i], names[j]), materials, pair, row, scenario.contact.law)
+                found = PairDescription(
+                    pair=f"{names[i]} - {names[j]}",
+                    materials=(str(block.material), names[j] if other.is_ground else str(other.material)),
+                    static_friction=float(row.static_friction),
+                    kinetic_friction=float(row.kinetic_friction),
+                    transition_speed=float(row.transition_speed),
+                    restitution=pair.restitution,
+                    normal_damping_ratio=float(row.normal_damping),
+                    shear_damping_ratio=float(row.shear_damping),
+                    normal_stiffness=float(row.normal_stiffness),
+                    stiffness_unit=STIFFNESS_UNITS[scenario.contact.law],
+                    shear_stiffness_ratio=float(row.shear_ratio),
+                    rules=pair.rules,
+                )
                 if isinstance(scenario.time, Nonsmooth):
                     substep = float(world.controls[0].step) / scenario.time.substeps
-                    found = _rigid_pair(found, substep, [softest[one] for one in (block, other) if one in softest])
+                    touching = [softest[str(one.material), one.depth] for one in (block, other) if not one.is_ground]
+                    found = _rigid_pair(found, substep, touching)
                 yield found
 
 
@@ -261,44 +270,8 @@ def _rigid_pair(found: PairDescription, substep: float, touching: Sequence[Place
     )
 
 
-def _softest(placed: Sequence[PlacedBody]) -> dict[ContactClass, PlacedBody]:
-    """Return the block that gives way most of every class of blocks."""
-    kinds = {
-        (body.material, body.depth, body.size_x, body.size_y, body.density, body.fixed, body.outline): body
-        for body in placed
-    }
-    found: dict[ContactClass, PlacedBody] = {}
-    for body in sorted(kinds.values(), key=inverse_mass):
-        found[ContactClass(body.material, body.depth)] = body
-    return found
-
-
-def _pair(
-    names: tuple[str, str], materials: tuple[str, str], pair: ResolvedPair, row: Record, law: str
-) -> PairDescription:
-    return PairDescription(
-        pair=" - ".join(names),
-        materials=materials,
-        static_friction=float(row.static_friction),
-        kinetic_friction=float(row.kinetic_friction),
-        transition_speed=float(row.transition_speed),
-        restitution=pair.restitution,
-        normal_damping_ratio=float(row.normal_damping),
-        shear_damping_ratio=float(row.shear_damping),
-        normal_stiffness=float(row.normal_stiffness),
-        stiffness_unit=STIFFNESS_UNITS[law],
-        shear_stiffness_ratio=float(row.shear_ratio),
-        rules=pair.rules,
-    )
-
-
-def _class_names(classes: tuple[ContactClass, ...]) -> list[str]:
-    """Return names: the material, and the depth where blocks of one material differ in it."""
-    blocks = [one.material for one in classes if not one.is_ground]
-    return [GROUND, *(_class_name(one, blocks.count(one.material)) for one in classes[1:])]
-
-
 def _class_name(one: ContactClass, count: int) -> str:
+    """Return the name of a class: the material, and the depth where blocks of one material differ in it."""
     if one.is_wall:
         return f"wall of {one.material}"
     return f"{one.material} {1e3 * one.depth:g} mm" if count > 1 else str(one.material)

@@ -61,13 +61,9 @@ def velocity_tolerance(scenario: Scenario, blocks: int) -> float:
     """Return the tolerance (m/s) of the velocity pass: as given, or by the number of blocks and what moves them.
 
     Gravity and friction do some 0.6 mm/s in a substep of few blocks. With a tolerance beyond that the pass ends after
-    one sweep, and shear is found over many substeps: on a table that starts with 8 m/s2 on friction 0.8 five blocks of
-    0.2 x 0.1 m slip by 2.8 % too far, a stack of two by 4.7 %, as they tilt until shear and normal forces agree. A
-    single block has every substep solved, and so have fewer than CROWD on supports that move: what is wrong of a slip
-    goes as the tolerance over what gravity does in a substep. With 1 mm/s fifteen such blocks slip by 2.8 % too far,
-    eight stacks of two by 10 %, with 0.1 mm/s by 0.25 and 1 %; the foot of a column of 13 drums opens 5 % too early. It
-    costs nothing where blocks stand side by side, as impulses change little from one substep to the next, and a column
-    of 13 drums five times as much. Blocks that collapse under gravity alone would take half as long again.
+    one sweep, and shear is found over many substeps: blocks slip some per cent too far, as they tilt until shear and
+    normal forces agree. What is wrong of a slip goes as the tolerance over what gravity does in a substep. So a single
+    block has every substep solved, and so have fewer than CROWD on supports that move.
 
     Raises ValueError for a scenario of another scheme.
     """
@@ -111,17 +107,14 @@ def has_impacts_in_rounds(
     Given are the greatest restitution of the scene, how many blocks are free, and what places them where that matters.
     Up to WEAK_RESTITUTION, where no impact was seen to create energy, all impacts of a substep happen at once, and what
     is struck in it strikes what it meets without a rebound of its own. The two are one law as steps become shorter, as
-    they differ only where two impacts fall into one substep. Rounds from any restitution on were tried: walls of 30 to
-    99 blocks take 1.6 to 4 times as long and one of 1000 a hundred times, as in blocks that move in touch something
-    rebounds in nearly every substep; and a squat block that rocks, whose impacts of one corner after the other fall
-    into one substep, misses its fourth peak by 4.2 % at 0.5 instead of 0.7 %.
+    they differ only where two impacts fall into one substep. Rounds at any restitution would take far longer in crowds,
+    as in blocks that move in touch something rebounds in nearly every substep.
 
-    With steps that are cut at impacts rounds are right at any restitution: the peaks of a squat block that rocks are
-    off by 0.07 % at most from 0 to 0.5, without both by 1.5 %. Three blocks that collapse take 5 % longer with cuts
-    and rounds, so that weak rebounds have them only where one block or two are free, and hops are what counts. Without
-    any rebound only a single block has them: a light one below a heavy one is struck again and again as it gives way.
-    Up to twelve have them too where some stand in a row and none lies on another at the start: blocks that touch, or
-    nearly so, are struck one after the other, however small the gaps are, and lose at every blow what Newton says.
+    With steps that are cut at impacts rounds are right at any restitution, so that weak rebounds have them where one
+    block or two are free, and hops are what counts. Without any rebound only a single block has them: a light one below
+    a heavy one is struck again and again as it gives way. Up to twelve have them too where some stand in a row and none
+    lies on another at the start: blocks that touch, or nearly so, are struck one after the other, however small the
+    gaps are, and lose at every blow what Newton says.
     """
     if restitution > WEAK_RESTITUTION or not is_cut_at_impacts(scenario, free):
         return restitution > WEAK_RESTITUTION

@@ -94,11 +94,6 @@ def slots_of_a_pair(bodies: Records, model: str) -> int:
     return {"surface": SLOTS, "kernel": 2 * most, "particles": PER_PARTICLE * most}[model]
 
 
-def particle_count(size_x: float, size_y: float, spacing: float) -> int:
-    """Return how many particles stand around a rectangle of the given sides (m), corners once."""
-    return 2 * (division(size_x, spacing) + division(size_y, spacing))
-
-
 def division(side: float, spacing: float) -> int:
     """Return the number of equal intervals, none longer than `spacing`, that a side (both m) is divided into."""
     # a quotient that round-off lifted just over an integer must not add a particle

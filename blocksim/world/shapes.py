@@ -124,10 +124,3 @@ def cone_of(corners: Corners) -> float:
     edges = [math.atan2(y - last_y, x - last_x) for (last_x, last_y), (x, y) in pairwise((*corners, corners[0]))]
     turns = [(after - before) % (2.0 * math.pi) for before, after in zip((edges[-1], *edges), edges, strict=False)]
     return min(WIDEST_CONE, math.sin(0.5 * min(turns)), math.sin(0.5 * (math.pi - max(turns))))
-
-
-def half_sides(body: PlacedBody) -> tuple[float, float]:
-    """Return how far (m) a block reaches along its own axes, to either side of its centroid."""
-    if not body.outline:
-        return 0.5 * body.size_x, 0.5 * body.size_y
-    return max(abs(x) for x, _ in body.outline), max(abs(y) for _, y in body.outline)

@@ -28,7 +28,7 @@ from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import Explicit, Nonsmooth
 from blocksim.scenario.placement import length_beside
 from blocksim.world.applied import greatest_push, steepest_tilt
-from blocksim.world.bounds import Bounds, Kind, fastest_fall, given_speed, greatest_speed, support_speed
+from blocksim.world.bounds import Bounds, fastest_fall, given_speed, greatest_speed, support_speed
 from blocksim.world.interactions import Interactions
 from blocksim.world.stable_step import ContactBody, ContactStiffness, Load, frequency_squared, stable_step, steepest
 from blocksim.world.systems import largest_step
@@ -83,7 +83,13 @@ class SkinTooSmallError(InvalidInputError):
 
 def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: str, load: Load) -> float:
     """Return the largest safe step (s) of blocks within these bounds with these contact parameters."""
-    kinds = [(_contact_body(kind), kind.contact_class) for kind in bounds.standing]
+    kinds = [
+        (
+            ContactBody(2.0 * kind.half_x, 2.0 * kind.half_y, kind.inverse_mass, kind.inverse_inertia),
+            kind.contact_class,
+        )
+        for kind in bounds.standing
+    ]
 
     def stiffness(i: int, j: int, inverse_mass: float) -> ContactStiffness:
         row = table[i][j]
@@ -111,10 +117,6 @@ def _stiffest(kinds: Sequence[tuple[ContactBody, int]], of_class: int, springs: 
     return max(bodies, key=lambda body: frequency_squared(body, springs.normal, springs.shear))
 
 
-def _contact_body(kind: Kind) -> ContactBody:
-    return ContactBody(2.0 * kind.half_x, 2.0 * kind.half_y, kind.inverse_mass, kind.inverse_inertia)
-
-
 def expected_load(scenario: Scenario, bounds: Bounds) -> Load:
     """Return the speed that the fastest point may reach by falling, or by sliding all the time, and the weight."""
     push = greatest_push(scenario)
@@ -128,13 +130,6 @@ def step_of_contacts(scenario: Scenario, bounds: Bounds, table: Interactions, sa
     return admissible_step(bounds, table, safety, scenario.contact.law, expected_load(scenario, bounds))
 
 
-def step_of_travel(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
-    """Return the longest step (s) in which no block moves far; infinite where nothing moves."""
-    speed = greatest_speed(scenario, bounds, table) + support_speed(scenario)
-    share = TRAVEL_SHARE if scenario.contact.model == "surface" else TRAVEL_SHARE_OF_PARTICLES
-    return share * bounds.smallest / speed if speed > 0.0 else math.inf
-
-
 def choose_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
     """Return the step (s) the run will take; raises StepTooLargeError."""
     if not isinstance(scenario.time, Explicit):
@@ -143,7 +138,10 @@ def choose_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> floa
     with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused below
         try:
             of_contacts = step_of_contacts(scenario, bounds, table, scenario.time.safety)
-            limit = min(of_contacts, step_of_travel(scenario, bounds, table), largest_step(scenario))
+            speed = greatest_speed(scenario, bounds, table) + support_speed(scenario)
+            share = TRAVEL_SHARE if scenario.contact.model == "surface" else TRAVEL_SHARE_OF_PARTICLES
+            of_travel = share * bounds.smallest / speed if speed > 0.0 else math.inf
+            limit = min(of_contacts, of_travel, largest_step(scenario))
         except ArithmeticError:  # Python's own powers do not end in infinity
             limit = 0.0
     limit = min(limit, scenario.time.end)

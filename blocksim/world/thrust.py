@@ -7,8 +7,7 @@ and are proportional to h^2. Points in tension open: the worst are taken out, un
 Blocks that sink along the load path stay as strong as they were. What harms is displacement across it: the load above
 comes down elsewhere in the joints below. Its measure is how far a joint moves across its force, over its width, times
 that force over the greatest of the structure, and half of it in columns and walls. Limits of `ground.tilt` are too low
-by 5 to 10 times this measure, in proportion to h^2: circular, pointed and elliptic rings of 5 to 40 voussoirs, columns
-of 13 and 20 blocks. A semicircle that stands up to 6.5 degrees only is off by 45 times, a wall that slides by 50 times.
+by some 5 to 10 times this measure, in proportion to h^2.
 """
 
 import math

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from blocksim.verification.scene import scenario_of
 from blocksim.world.build import build_world
-from blocksim.world.particles import particle_count, slots_of_a_pair
+from blocksim.world.particles import division, slots_of_a_pair
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -31,7 +31,7 @@ def scenario(bodies: Sequence[Mapping[str, object]], model: str, spacing: float,
 def particles_of(world: World, body: int) -> Records:
     """Return the particles of one body."""
     record = world.bodies[body]
-    found: Records = world.particles[record.first_particle : record.first_particle + record.particle_count]
+    found: Records = world.particles[record.first_particle : record.first_particle + record.division]
     return found
 
 
@@ -51,12 +51,14 @@ def test_kernel_particles_lie_on_the_edge_and_share_every_face(width: float, hei
         along = np.sort(face.x * normal[1] - face.y * normal[0])
         assert np.diff(along).max() <= spacing * (1.0 + 1e-9)
         assert along[-1] - along[0] == pytest.approx(height if normal[1] == 0.0 else width, rel=1e-12)
-    assert particles.size == particle_count(width, height, spacing) + 4  # corners belong to two faces
+    assert (
+        particles.size == 2 * (division(width, spacing) + division(height, spacing)) + 4
+    )  # corners belong to two faces
 
 
 def test_round_off_in_the_division_adds_no_particle() -> None:
-    assert particle_count(0.3, 0.3, 0.1) == 12  # 0.3/0.1 is just below 3, 0.1 * 3 just above 0.3
-    assert particle_count(0.032, 0.025, 1e-3) == 2 * (32 + 25)
+    assert division(0.3, 0.1) == 3  # 0.3/0.1 is just below 3, 0.1 * 3 just above 0.3
+    assert [division(side, 1e-3) for side in (0.032, 0.025)] == [32, 25]
 
 
 @given(width=sides, height=sides, spacing=spacings)
@@ -69,7 +71,7 @@ def test_discs_fit_into_the_block_and_share_all_four_faces(width: float, height:
     assert particles.length.sum() == pytest.approx(2.0 * sum(inner), rel=1e-12)
     assert particles.share.sum() == pytest.approx(4.0, rel=1e-12)
     assert len(set(zip(particles.x.tolist(), particles.y.tolist(), strict=True))) == particles.size
-    assert particles.size == particle_count(*inner, spacing)
+    assert particles.size == 2 * sum(division(side, spacing) for side in inner)
     ring = np.stack([particles.x, particles.y], axis=1)
     assert np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).max() <= spacing * (1.0 + 1e-9)
 
@@ -79,9 +81,9 @@ def test_bodies_of_equal_sides_share_their_particles(model: str) -> None:
     alike, other, again = {"y": 0.5}, {"y": 0.5, "x": 0.1, "width": 0.02}, {"y": 0.5, "x": 0.2}
     world = build_world(scenario([alike, other, again], model, 1e-3))
     first, odd, last = world.bodies[:3]
-    assert (first.first_particle, first.particle_count) == (last.first_particle, last.particle_count)
-    assert odd.first_particle == first.particle_count
-    assert world.particles.size == first.particle_count + odd.particle_count
+    assert (first.first_particle, first.division) == (last.first_particle, last.division)
+    assert odd.first_particle == first.division
+    assert world.particles.size == first.division + odd.division
 
 
 @pytest.mark.parametrize("model", WITH_PARTICLES)
@@ -107,7 +109,7 @@ def test_surface_model_needs_no_particles() -> None:
 def test_pair_of_the_two_largest_bodies_has_a_slot_for_every_contact(model: str) -> None:
     small, large = {"y": 0.5}, {"y": 0.5, "x": 0.2, "width": 0.064}
     world = build_world(scenario([small, large, {**large, "x": 0.4}], model, 1e-3))
-    most = int(world.bodies[1].particle_count)
+    most = int(world.bodies[1].division)
     assert slots_of_a_pair(world.bodies, model) == (2 if model == "kernel" else 4) * most
     assert world.candidates.shape[1] == world.contacts.shape[1] == slots_of_a_pair(world.bodies, model)
     assert world.points.size == world.contacts.shape[1] + 1
@@ -116,11 +118,11 @@ def test_pair_of_the_two_largest_bodies_has_a_slot_for_every_contact(model: str)
 def test_slabs_of_ground_have_particles_at_their_free_ends_only() -> None:
     hill = {"profile": [[0.0, 0.0], [0.1, 0.1], [0.2, 0.0]]}
     world = build_world(scenario([{"y": 0.5}], "kernel", 1e-3, ground=hill))
-    counts = world.bodies.particle_count[1:-1].tolist()
+    counts = world.bodies.division[1:-1].tolist()
     assert counts == [0, 1, 0, 0]
     peak, slab = particles_of(world, 2)[0], world.bodies[2]
     x = slab.x + slab.cos * peak.x - slab.sin * peak.y
     y = slab.y + slab.sin * peak.x + slab.cos * peak.y
     assert [x, y] == pytest.approx([0.1, 0.1], abs=1e-12)
     discs = build_world(scenario([{"y": 0.5}], "particles", 1e-3, ground=hill))
-    assert discs.bodies.particle_count[1:-1].tolist() == [0, 0, 0, 0]
+    assert discs.bodies.division[1:-1].tolist() == [0, 0, 0, 0]

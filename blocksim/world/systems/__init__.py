@@ -12,7 +12,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
 from blocksim.scenario.systems import SYSTEMS
 from blocksim.world.systems.blocks import BLOCKS
-from blocksim.world.systems.soils import SOILS, soils_and_blocks, soils_and_soils, soils_and_supports
+from blocksim.world.systems.soils import SOILS, soils_and
 from blocksim.world.systems.supports import SUPPORTS
 from blocksim.world.systems.system import Present, System
 
@@ -32,9 +32,9 @@ INTERACTIONS: dict[tuple[str, str], Interaction] = {
     (BLOCKS.name, BLOCKS.name): by_scheme,
     (BLOCKS.name, SUPPORTS.name): by_scheme,
     (SUPPORTS.name, SUPPORTS.name): None,
-    (SOILS.name, SOILS.name): soils_and_soils,
-    (SOILS.name, BLOCKS.name): soils_and_blocks,
-    (SOILS.name, SUPPORTS.name): soils_and_supports,
+    (SOILS.name, SOILS.name): soils_and("soils"),
+    (SOILS.name, BLOCKS.name): soils_and("blocks"),
+    (SOILS.name, SUPPORTS.name): soils_and("supports"),
 }
 """By the names of both; a system comes before blocks and supports, whose function gets the world as its partner."""
 

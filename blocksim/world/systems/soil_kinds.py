@@ -1,14 +1,10 @@
 """What soils are as numbers: elasticity, yield surface, and how their particles touch bodies."""
 
 import math
-from typing import TYPE_CHECKING, Any
 
-from blocksim.scenario import GROUND, Material, Scenario, place_bodies, resolve_pair
+from blocksim.scenario import Material, Scenario, place_bodies, resolve_pair
 from blocksim.scenario.models.contact import PairFriction
 from blocksim.scenario.models.soil import SoilTable
-
-if TYPE_CHECKING:
-    from blocksim.world.interactions import ContactClass
 
 SHEAR_RATIO = 0.8  # shear over normal stiffness of a contact
 # The most that leaves a particle between two bodies, with twice the stiffness and dashpot, no more than critical. What
@@ -62,27 +58,6 @@ def depth_of_scene(scenario: Scenario) -> float:
     return max((body.depth for body in place_bodies(scenario)), default=USUAL_DEPTH)
 
 
-def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
-    """Return one KIND for each soil."""
-    from blocksim.kernels.common.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
-    from blocksim.kernels.soil.arrays import KIND  # noqa: PLC0415
-
-    records = zeros(len(tables), KIND)
-    depth = depth_of_scene(scenario)
-    for record, table in zip(records, tables, strict=True):
-        material = scenario.materials[table.material]
-        lame, shear = lame_constants(material)
-        record.density = material.density
-        record.volume = table.spacing**2 * depth
-        record.mass = material.density * record.volume
-        record.lame, record.shear, record.bulk = lame, shear, lame + 2.0 * shear / 3.0
-        record.slope, record.cohesion = yield_surface(material)
-        record.impedance = material.density * wave_speed(material)
-        record.settling, record.settled = settling_of(scenario, table)
-        record.is_corrected = table.gradient == "corrected"
-    return records
-
-
 def settling_of(scenario: Scenario, table: SoilTable) -> tuple[float, float]:
     """Return the rate (1/s) of damping at the start, and the time (s) when it ends; none where nothing has weight."""
     if scenario.gravity == 0.0:
@@ -94,33 +69,12 @@ def settling_of(scenario: Scenario, table: SoilTable) -> tuple[float, float]:
     return SHOCK_DAMPING * speed / smoothing, SHOCK_TIME * smoothing / speed
 
 
-def friction_with(scenario: Scenario, soil: str, partner: "ContactClass") -> PairFriction:
-    """Return the friction of a soil's material with a class of bodies.
+def friction_with(scenario: Scenario, soil: str, partner: str, *, ground: bool) -> PairFriction:
+    """Return the friction of a soil's material with another one; `ground` for the ground (GROUND) and walls.
 
     As [pairs] has it, else that of the soil itself, as on a rough face: [friction] is about blocks.
     """
-    name = partner.material if partner.is_wall or not partner.is_ground else GROUND
-    pair = resolve_pair(scenario, soil, str(name), ground=partner.is_ground)
+    pair = resolve_pair(scenario, soil, partner, ground=ground)
     if pair.rules["friction"].startswith("pairs."):
         return pair.friction
     return PairFriction(static=math.tan(scenario.materials[soil].friction_angle or 0.0))
-
-
-def interactions_with(scenario: Scenario, tables: list[SoilTable]) -> Any:
-    """Return the parameters (soils, classes) of contacts with each class of bodies; see `world.interactions`."""
-    from blocksim.kernels.common.arrays import INTERACTION, zeros  # noqa: PLC0415 - kernels, not for readers
-    from blocksim.world.interactions import contact_classes  # noqa: PLC0415
-
-    classes = contact_classes(scenario, place_bodies(scenario))
-    records = zeros((len(tables), len(classes)), INTERACTION)
-    depth = depth_of_scene(scenario)
-    for row, table in zip(records, tables, strict=True):
-        young = scenario.materials[table.material].young_modulus
-        for record, partner in zip(row, classes, strict=True):
-            friction = friction_with(scenario, table.material, partner)
-            record.normal_stiffness = young * min(depth, partner.depth)
-            record.shear_ratio = SHEAR_RATIO
-            record.normal_damping = record.shear_damping = DAMPING_RATIO
-            record.static_friction, record.kinetic_friction = friction.static, friction.kinetic
-            record.transition_speed = friction.transition_speed
-    return records

@@ -1,20 +1,17 @@
 """Soils: elasto-plastic bodies of particles; see blocksim/kernels/soil and the tables [[soils]] of scenarios."""
 
-import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 
-from blocksim.scenario import Scenario, place_bodies, place_segments, polygons
-from blocksim.scenario.models.soil import SoilTable
+from blocksim.scenario import Scenario, polygons
 from blocksim.scenario.models.stepping import Explicit
 from blocksim.scenario.soil_places import soil_tables
 from blocksim.world.systems.soil_kinds import (
-    RAMP,
     SMOOTHING,
     depth_of_scene,
-    interactions_with,
-    kind_records,
     wave_speed,
 )
 from blocksim.world.systems.soil_shown import (
@@ -32,24 +29,14 @@ from blocksim.world.systems.system import (
     Cost,
     Elements,
     Floats,
-    Indices,
     Output,
     Quantity,
     System,
-    Track,
     discs,
     stored,
 )
 
-if TYPE_CHECKING:
-    from blocksim.kernels.soil.arrays import Soils
-
 COURANT = 0.4  # step in smoothing lengths that a wave passes
-# Factor of artificial viscosity. Sheared soil feels a c h/8 of it, a resistance that the material does not have; in the
-# thin front of a collapse 0.03 is several times the friction of its weight. It is there to damp waves: with 0.003 a
-# collapse loses 2 to 4 % of its energy to it, pressures at rest and thrusts stay as they are. A numerical choice.
-VISCOSITY = 0.003
-SKIN = 0.4  # of lists, in spacings
 MILLI = 1e3
 # J, as kernels/soil/energy.py measures them; the last six are losses
 ENERGIES = (
@@ -64,7 +51,6 @@ ENERGIES = (
     "settling",
     "ramp",
 )
-FEW_TOUCHES = 128
 COST = Cost(seconds=200e-9, memory=395)  # measured, with raw gradients
 CORRECTED = 1.5  # time of a step with corrected gradients over that, measured
 QUANTITIES = (
@@ -81,22 +67,21 @@ QUANTITIES = (
 CONSTANTS = (Quantity("mass", "kg"), Quantity("spacing", "m"))
 
 
-def _places(scenario: Scenario) -> list[Floats]:
+def places_of(scenario: Scenario) -> list[Floats]:
     """Return the places (m, (n, 2)) of the particles of each soil."""
     return [polygons.filled(table.corners, table.spacing) for table in soil_tables(scenario)]
 
 
-def _masses(scenario: Scenario, tables: list[SoilTable]) -> list[float]:
-    depth = depth_of_scene(scenario)
-    return [scenario.materials[table.material].density * table.spacing**2 * depth for table in tables]
-
-
-def _elements(scenario: Scenario) -> Elements:
-    tables, places = soil_tables(scenario), _places(scenario)
+def elements_of_soils(scenario: Scenario) -> Elements:
+    """Return the particles of all soils of a scenario."""
+    tables, places = soil_tables(scenario), places_of(scenario)
     names = tuple(
         f"{table.name}.{number}" for table, one in zip(tables, places, strict=True) for number in range(1, len(one) + 1)
     )
-    masses = np.repeat(_masses(scenario, tables), [len(one) for one in places])
+    depth = depth_of_scene(scenario)
+    densities = [scenario.materials[table.material].density for table in tables]
+    each = [density * table.spacing**2 * depth for density, table in zip(densities, tables, strict=True)]
+    masses = np.repeat(each, [len(one) for one in places])
     constants = np.stack([masses, np.full(len(names), tables[0].spacing)])
     start = np.zeros((len(QUANTITIES), len(names)))
     start[:2] = np.concatenate(places).T
@@ -106,90 +91,13 @@ def _elements(scenario: Scenario) -> Elements:
     return Elements(names, constants, start)
 
 
-def _words(count: int | tuple[int, int]) -> Any:
-    """Return zeros that start on a cache line."""
-    from blocksim.kernels.common.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
-
-    plain: Any = np.dtype(np.uint32)
-    return zeros(count, plain).view(np.ndarray)
-
-
-def _build(scenario: Scenario) -> "Soils":
-    from blocksim.kernels.common.arrays import zeros  # noqa: PLC0415 - kernels, not for readers
-    from blocksim.kernels.soil.arrays import (  # noqa: PLC0415
-        GROUP,
-        HISTORY,
-        NEIGHBOURS,
-        POINT,
-        STATE,
-        TALLY,
-        TOUCH,
-        Soils,
-    )
-
-    tables, places = soil_tables(scenario), _places(scenario)
-    start = _elements(scenario).start
-    n = start.shape[1]
-    points, states = zeros(n, POINT), zeros(n, STATE)
-    for number, quantity in enumerate(QUANTITIES):
-        holder = points if number < 4 else states
-        holder[quantity.name] = start[number]
-    states["number"] = np.arange(n)
-    states["kind"] = np.repeat(np.arange(len(tables)), [len(one) for one in places])
-    groups = math.ceil(n / GROUP)
-    room = n + FEW_TOUCHES
-    bodies = len(place_bodies(scenario)) + len(place_segments(scenario)) + 1
-    return Soils(
-        points=points,
-        states=states,
-        kinds=kind_records(scenario, tables),
-        interactions=interactions_with(scenario, tables),
-        order=_words(n),
-        starts=_words(3 * n // 2 + 3),
-        lists=_words((groups, GROUP * NEIGHBOURS)),
-        lengths=_words(n),
-        touches=zeros(room, TOUCH),
-        kept=zeros(room, HISTORY),
-        by_body=_words(room),
-        begins=_words(bodies + 1),
-        tallies=zeros(groups, TALLY),
-        spare_point=zeros(1, POINT),
-        spare_state=zeros(1, STATE),
-        controls=_controls(scenario, tables),
-    )
-
-
-def _controls(scenario: Scenario, tables: list[SoilTable]) -> Any:
-    from blocksim.kernels.common.arrays import zeros  # noqa: PLC0415 - as in _stages
-    from blocksim.kernels.soil.arrays import CONTROLS  # noqa: PLC0415
-    from blocksim.kernels.sph.wendland_c2 import SUPPORT  # noqa: PLC0415
-
-    spacing = tables[0].spacing
-    controls = zeros(1, CONTROLS)
-    one = controls[0]
-    one.area = spacing**2
-    one.smoothing = SMOOTHING * spacing
-    one.reach = SUPPORT * one.smoothing
-    one.skin = SKIN * spacing
-    one.radius = 0.5 * spacing
-    one.viscosity = VISCOSITY
-    one.ramp = RAMP if any(table.start == "ramp" for table in tables) else 0.0
-    one.blocks = len(place_bodies(scenario))
-    one.is_uniform = len(tables) == 1
-    return controls
-
-
-def _state(soils: "Soils", count: int) -> Floats:
+def _state(soils: Any, count: int) -> Floats:
     number = soils.states["number"]
     values: Floats = np.empty((len(QUANTITIES), count))
     for row, quantity in enumerate(QUANTITIES):
         holder = soils.points if row < 4 else soils.states
         values[row, number] = holder[quantity.name]
     return values
-
-
-def _outlines(track: Track, chosen: Indices) -> Floats:
-    return discs(track, chosen, 0.5 * track["spacing"])
 
 
 def _largest_step(scenario: Scenario) -> float:
@@ -205,33 +113,18 @@ def _dearer(scenario: Scenario) -> float:
     return CORRECTED if any(table.gradient == "corrected" for table in soil_tables(scenario)) else 1.0
 
 
-def _stages() -> Any:
-    from blocksim.kernels.common.systems import Stages  # noqa: PLC0415
-    from blocksim.kernels.soil.energy import measure, survey  # noqa: PLC0415 - readers of stored runs compile nothing
-    from blocksim.kernels.soil.step import finish, start  # noqa: PLC0415
-
-    return Stages(start, finish, survey, measure)
+def _arrays(name: str) -> Any:
+    """Return what is called so in soil_arrays.py: readers of stored runs compile nothing."""
+    return getattr(import_module("blocksim.world.systems.soil_arrays"), name)
 
 
-def soils_and_soils() -> Any:
-    """Return how soils act on themselves."""
-    from blocksim.kernels.soil.step import flow  # noqa: PLC0415
-
-    return flow
+def _build(scenario: Scenario) -> Any:
+    return _arrays("build_soils")(scenario)
 
 
-def soils_and_blocks() -> Any:
-    """Return how soils and blocks act on one another."""
-    from blocksim.kernels.soil.contact import touch_blocks  # noqa: PLC0415
-
-    return touch_blocks
-
-
-def soils_and_supports() -> Any:
-    """Return how soils and supports act on one another."""
-    from blocksim.kernels.soil.contact import touch_supports  # noqa: PLC0415
-
-    return touch_supports
+def soils_and(other: str) -> Callable[[], Any]:
+    """Return what gives the function by which soils and another system act on one another."""
+    return lambda: _arrays("ACTS")[other]
 
 
 SOILS = System(
@@ -252,13 +145,13 @@ SOILS = System(
         Output("pressure", "Pa", "mean pressure, averaged over neighbours", "pressure_Pa", pressure),
         Output("plastic", "1", "accumulated plastic shear strain", "plastic_strain", stored("plastic")),
     ),
-    elements=_elements,
+    elements=elements_of_soils,
     state=_state,
-    outlines=_outlines,
+    outlines=lambda track, chosen: discs(track, chosen, 0.5 * track["spacing"]),
     energies=ENERGIES,
     build=_build,
     largest_step=_largest_step,
-    stages=_stages,
+    stages=lambda: _arrays("STAGES"),
     cost=COST,
     dearer=_dearer,
     parts=part_names,

@@ -3,8 +3,6 @@
 Where they are follows from the scenario at any time, so that frames and files keep nothing of them.
 """
 
-from typing import Any
-
 import numpy as np
 
 from blocksim.scenario import Scenario
@@ -33,22 +31,14 @@ def _pieces(scenario: Scenario, blocks: Track) -> Elements:
     return Elements(names, quads.reshape(-1, 8).T, np.zeros((len(QUANTITIES), len(quads))))
 
 
-def _none(_: Scenario) -> Elements:
-    return Elements((), np.zeros((len(CORNERS), 0)), np.zeros((len(QUANTITIES), 0)))
-
-
-def _nothing(_: Any, count: int) -> Floats:
-    return np.zeros((0, count))
-
-
 SUPPORTS = System(
     name="supports",
     element="support",
     quantities=QUANTITIES,
     constants=CORNERS,
     outputs=(),
-    elements=_none,
-    state=_nothing,
+    elements=lambda _: Elements((), np.zeros((len(CORNERS), 0)), np.zeros((len(QUANTITIES), 0))),
+    state=lambda _, count: np.zeros((0, count)),
     outlines=_moved,
 )
 

@@ -9,7 +9,7 @@ from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.soil.arrays import STATE
 from blocksim.kernels.soil.stress import invariants, strain
 from blocksim.scenario.models.soil import SoilTable
-from blocksim.world.systems.soil_kinds import kind_records
+from blocksim.world.systems.soil_arrays import kind_records
 from tests.soils import column, scene
 
 STEP = 1e-5  # s

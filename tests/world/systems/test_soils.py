@@ -11,12 +11,14 @@ import pytest
 import blocksim
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.soil import arrays
+from blocksim.scenario import GROUND
 from blocksim.scenario.models.contact import PairFriction
 from blocksim.simulation.schemes import build, build_scene
 from blocksim.world.describe import describe
 from blocksim.world.interactions import contact_classes
 from blocksim.world.systems import INTERACTIONS
-from blocksim.world.systems.soil_kinds import earth_pressure_at_rest, friction_with, interactions_with, yield_surface
+from blocksim.world.systems.soil_arrays import interactions_with
+from blocksim.world.systems.soil_kinds import earth_pressure_at_rest, friction_with, yield_surface
 from blocksim.world.systems.soils import SOILS
 from tests.soils import DEPTH, MATERIALS, SMOOTH_WALLS, UNIT_WEIGHT, column, right, scene
 
@@ -52,11 +54,15 @@ def test_a_ramp_starts_without_stress() -> None:
 
 
 def test_friction_is_of_the_pair_else_of_the_soil_itself() -> None:
-    walls = [right(0.05), {"from": [0.5, 0.0], "to": [0.5, 0.1], "material": "soft"}]
-    scenario = scene(COLUMN, walls=walls, pairs=SMOOTH_WALLS, friction={"block_ground": 0.1})
+    faces = [right(0.05), {"from": [0.5, 0.0], "to": [0.5, 0.1], "material": "soft"}]
+    scenario = scene(COLUMN, walls=faces, pairs=SMOOTH_WALLS, friction={"block_ground": 0.1})
     classes = contact_classes(scenario, build(scenario).placed)
-    assert friction_with(scenario, "rods", classes[0]) == PairFriction(static=math.tan(ANGLE))
-    found = {one.material: friction_with(scenario, "rods", one).static for one in classes if one.is_wall}
+    assert friction_with(scenario, "rods", GROUND, ground=True) == PairFriction(static=math.tan(ANGLE))
+    found = {
+        one.material: friction_with(scenario, "rods", str(one.material), ground=True).static
+        for one in classes
+        if one.is_wall
+    }
     assert found == pytest.approx({"smooth": 0.0, "soft": math.tan(ANGLE)})
 
 

@@ -1,0 +1,132 @@
+"""Soils as the arrays that their kernels work on. Only what steps scenes imports this, as it needs the compiler."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from blocksim.kernels.common.arrays import INTERACTION, zeros
+from blocksim.kernels.common.systems import Stages
+from blocksim.kernels.soil.arrays import CONTROLS, GROUP, HISTORY, KIND, NEIGHBOURS, POINT, STATE, TALLY, TOUCH, Soils
+from blocksim.kernels.soil.contact import touch_blocks, touch_supports
+from blocksim.kernels.soil.energy import measure, survey
+from blocksim.kernels.soil.step import finish, flow, start
+from blocksim.kernels.sph.wendland_c2 import SUPPORT
+from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments
+from blocksim.scenario.models.soil import SoilTable
+from blocksim.scenario.soil_places import soil_tables
+from blocksim.world.interactions import contact_classes
+from blocksim.world.systems.soil_kinds import (
+    DAMPING_RATIO,
+    RAMP,
+    SHEAR_RATIO,
+    SMOOTHING,
+    depth_of_scene,
+    friction_with,
+    lame_constants,
+    settling_of,
+    wave_speed,
+    yield_surface,
+)
+from blocksim.world.systems.soils import QUANTITIES, elements_of_soils, places_of
+
+STAGES = Stages(start, finish, survey, measure)
+ACTS = {"soils": flow, "blocks": touch_blocks, "supports": touch_supports}
+# Factor of artificial viscosity. Sheared soil feels a c h/8 of it, a resistance that the material does not have; in the
+# thin front of a collapse 0.03 is several times the friction of its weight. It is there to damp waves: with 0.003 a
+# collapse loses 2 to 4 % of its energy to it, pressures at rest and thrusts stay as they are. A numerical choice.
+VISCOSITY = 0.003
+SKIN = 0.4  # of lists, in spacings
+FEW_TOUCHES = 128
+
+
+def build_soils(scenario: Scenario) -> Soils:
+    """Return the arrays of the soils of a scenario at time zero."""
+    tables, places = soil_tables(scenario), places_of(scenario)
+    start = elements_of_soils(scenario).start
+    n = start.shape[1]
+    points, states = zeros(n, POINT), zeros(n, STATE)
+    for number, quantity in enumerate(QUANTITIES):
+        holder = points if number < 4 else states
+        holder[quantity.name] = start[number]
+    states["number"] = np.arange(n)
+    states["kind"] = np.repeat(np.arange(len(tables)), [len(one) for one in places])
+    groups = math.ceil(n / GROUP)
+    room = n + FEW_TOUCHES
+    bodies = len(place_bodies(scenario)) + len(place_segments(scenario)) + 1
+    return Soils(
+        points=points,
+        states=states,
+        kinds=kind_records(scenario, tables),
+        interactions=interactions_with(scenario, tables),
+        order=_words(n),
+        starts=_words(3 * n // 2 + 3),
+        lists=_words((groups, GROUP * NEIGHBOURS)),
+        lengths=_words(n),
+        touches=zeros(room, TOUCH),
+        kept=zeros(room, HISTORY),
+        by_body=_words(room),
+        begins=_words(bodies + 1),
+        tallies=zeros(groups, TALLY),
+        spare_point=zeros(1, POINT),
+        spare_state=zeros(1, STATE),
+        controls=_controls(scenario, tables),
+    )
+
+
+def _controls(scenario: Scenario, tables: list[SoilTable]) -> Any:
+    spacing = tables[0].spacing
+    controls = zeros(1, CONTROLS)
+    one = controls[0]
+    one.area = spacing**2
+    one.smoothing = SMOOTHING * spacing
+    one.reach = SUPPORT * one.smoothing
+    one.skin = SKIN * spacing
+    one.radius = 0.5 * spacing
+    one.viscosity = VISCOSITY
+    one.ramp = RAMP if any(table.start == "ramp" for table in tables) else 0.0
+    one.blocks = len(place_bodies(scenario))
+    one.is_uniform = len(tables) == 1
+    return controls
+
+
+def _words(count: int | tuple[int, int]) -> Any:
+    """Return zeros that start on a cache line."""
+    plain: Any = np.dtype(np.uint32)
+    return zeros(count, plain).view(np.ndarray)
+
+
+def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
+    """Return one KIND for each soil."""
+    records = zeros(len(tables), KIND)
+    depth = depth_of_scene(scenario)
+    for record, table in zip(records, tables, strict=True):
+        material = scenario.materials[table.material]
+        lame, shear = lame_constants(material)
+        record.density = material.density
+        record.volume = table.spacing**2 * depth
+        record.mass = material.density * record.volume
+        record.lame, record.shear, record.bulk = lame, shear, lame + 2.0 * shear / 3.0
+        record.slope, record.cohesion = yield_surface(material)
+        record.impedance = material.density * wave_speed(material)
+        record.settling, record.settled = settling_of(scenario, table)
+        record.is_corrected = table.gradient == "corrected"
+    return records
+
+
+def interactions_with(scenario: Scenario, tables: list[SoilTable]) -> Any:
+    """Return the parameters (soils, classes) of contacts with each class of bodies; see `world.interactions`."""
+    classes = contact_classes(scenario, place_bodies(scenario))
+    records = zeros((len(tables), len(classes)), INTERACTION)
+    depth = depth_of_scene(scenario)
+    for row, table in zip(records, tables, strict=True):
+        young = scenario.materials[table.material].young_modulus
+        for record, partner in zip(row, classes, strict=True):
+            name = partner.material if partner.is_wall or not partner.is_ground else GROUND
+            friction = friction_with(scenario, table.material, str(name), ground=partner.is_ground)
+            record.normal_stiffness = young * min(depth, partner.depth)
+            record.shear_ratio = SHEAR_RATIO
+            record.normal_damping = record.shear_damping = DAMPING_RATIO
+            record.static_friction, record.kinetic_friction = friction.static, friction.kinetic
+            record.transition_speed = friction.transition_speed
+    return records
