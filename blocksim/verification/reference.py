@@ -1,8 +1,8 @@
 """The verification tables of this folder's README: measured, kept in results/verify.json, written as Markdown.
 
 `python -m blocksim.verification.reference blocksim/verification/README.md` writes the tables from the kept results.
-With `--measure` all cases are run first (a quarter of an hour) and the results replaced; column heads after it limit
-that to these columns: `--measure nonsmooth` takes half a minute and leaves all others as they are.
+With `--measure` all cases are run first (twenty-five minutes) and the results replaced; names of columns after it limit
+that to these: `--measure nonsmooth` takes half a minute and leaves all others as they are, `--measure soil` is soil.
 """
 
 import json
@@ -16,10 +16,13 @@ from blocksim.scenario.key_table import with_part
 from blocksim.simulation.atomic import write_text
 from blocksim.verification.case import Case, Row, Setting, Verdict
 from blocksim.verification.cases import CASES, chosen, left_out
-from blocksim.verification.verify import expected_text, number, run_case, tolerance_text
+from blocksim.verification.soil import SOIL_CASES
+from blocksim.verification.verify import error_text, expected_text, number, run_case, tolerance_text
 
 BEGIN = "<!-- verify: written by `make verify-table` -->"
 END = "<!-- end of verify -->"
+SOIL_BEGIN = "<!-- soil: written by `make verify-table` -->"
+SOIL_END = "<!-- end of soil -->"
 STORE = Path("results") / "verify.json"  # below the current folder
 COLUMNS = {  # head of the column: how it is measured
     "linear": Setting(),
@@ -29,14 +32,22 @@ COLUMNS = {  # head of the column: how it is measured
 }
 RIGID = "nonsmooth"  # head of the second table's column
 RIGID_HEADS = ("case", "quantity", "expected", "tolerance", "measured")
-SETTINGS = {**COLUMNS, RIGID: Setting(scheme="nonsmooth")}
+SOIL = "soil"  # the cases of soil, in a table of their own
+SOIL_HEADS = ("case", "source", "quantity", "expected", "tolerance", "measured", "error")
+SETTINGS = {**COLUMNS, RIGID: Setting(scheme="nonsmooth"), SOIL: Setting()}
 FIELDS = ("quantity", "unit", "expected", "measured", "tolerance", "relative", "at_least")
 SIGNS = {Verdict.INSIDE: "✓", Verdict.OUTSIDE: "✗"}
 Stored = dict[str, dict[str, list[dict[str, Any]]]]  # head of the column, case id, rows
 
 
-def _measured(setting: Setting) -> Iterator[tuple[str, list[dict[str, Any]]]]:
-    for case in chosen([], setting.scheme):
+def cases_of(head: str) -> tuple[Case, ...]:
+    """Return the cases of a column."""
+    return SOIL_CASES if head == SOIL else chosen([], SETTINGS[head].scheme)
+
+
+def _measured(head: str) -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    setting = SETTINGS[head]
+    for case in cases_of(head):
         outcome = run_case(case, setting)
         name = f"{setting.scheme} {setting.model} {setting.law} {case.id}"
         print(f"{name}: {outcome.seconds:.1f} s", file=sys.stderr, flush=True)  # noqa: T201
@@ -65,19 +76,29 @@ def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join([head, f"|{' --- |' * len(heads)}", *lines])
 
 
+def soil_table(stored: Stored) -> str:
+    """Return the table of soil as Markdown, misses among it, and their reasons."""
+    rows = [cells for case in SOIL_CASES for cells in _cells(stored, SOIL, case)]
+    found = _missed(stored, SOIL)
+    reasons = ["", "Where a tolerance is missed:", "", *found] if found else []
+    return "\n".join([markdown(SOIL_HEADS, rows), *reasons])
+
+
 def _rigid_table(stored: Stored) -> Iterator[str]:
     scheme = SETTINGS[RIGID].scheme
     yield from [f"Rigid contacts, `blocksim verify --scheme {scheme}`:", ""]
-    yield markdown(RIGID_HEADS, [cells for case in chosen([], scheme) for cells in _rigid_cells(stored, case)])
+    yield markdown(RIGID_HEADS, [cells for case in chosen([], scheme) for cells in _cells(stored, RIGID, case)])
     yield from ["", f"Left out: {'; '.join(left_out(scheme))}."]
 
 
-def _rigid_cells(stored: Stored, case: Case) -> Iterator[list[str]]:
-    name = f"{case.id} {case.title}"
-    for row in stored_rows(stored, RIGID, case):
+def _cells(stored: Stored, head: str, case: Case) -> Iterator[list[str]]:
+    """Yield the cells of a table of one column; that of soil has the sources and errors too."""
+    names = [f"{case.id} {case.title}", *([case.source] if head == SOIL else [])]
+    for row in stored_rows(stored, head, case):
         quantity = f"{row.quantity}, {row.unit}" if row.unit else row.quantity
-        yield [name, quantity, expected_text(row), tolerance_text(row), _cell(row)]
-        name = ""
+        errors = [error_text(row)] if head == SOIL else []
+        yield [*names, quantity, expected_text(row), tolerance_text(row), _cell(row), *errors]
+        names = [""] * len(names)
 
 
 def _case_cells(stored: Stored, case: Case) -> Iterator[list[str]]:
@@ -101,21 +122,25 @@ def _cell(row: Row | None) -> str:
 
 
 def _remarks(stored: Stored) -> Iterator[str]:
-    found = [text for head, setting in COLUMNS.items() for text in _missed(stored, head, setting)]
+    found = [text for head in COLUMNS for text in _missed(stored, head, f"{head} ")]
     if found:
         yield from ["", "Where models other than `surface` miss a tolerance:", "", *found]
 
 
-def _missed(stored: Stored, head: str, setting: Setting) -> Iterator[str]:
-    for case in CASES:
-        outside = any(row.verdict == Verdict.OUTSIDE for row in stored_rows(stored, head, case))
-        if outside and setting.model in case.remarks:
-            yield f"* {head} {case.id}: {case.remarks[setting.model]}"
+def _missed(stored: Stored, head: str, before: str = "") -> list[str]:
+    """Return the reasons of cases that miss a tolerance."""
+    model = SETTINGS[head].model
+    missed = [
+        case
+        for case in cases_of(head)
+        if any(row.verdict == Verdict.OUTSIDE for row in stored_rows(stored, head, case)) and model in case.remarks
+    ]
+    return [f"* {before}{case.id}: {case.remarks[model]}" for case in missed]
 
 
 def with_table(text: str, stored: Stored) -> str:
-    """Return a README with the table between the two marks replaced."""
-    return with_part(text, BEGIN, table(stored), END)
+    """Return a README with the tables between their marks replaced."""
+    return with_part(with_part(text, BEGIN, table(stored), END), SOIL_BEGIN, soil_table(stored), SOIL_END)
 
 
 def read_store(path: Path) -> Stored:
@@ -146,7 +171,7 @@ def measure(store: Path, heads: Sequence[str]) -> None:
     """Run all cases in the settings of some columns and keep the results, column by column."""
     for head in heads:
         stored = read_store(store) if store.is_file() else {}
-        stored[head] = dict(_measured(SETTINGS[head]))
+        stored[head] = dict(_measured(head))
         write_store(store, {name: stored[name] for name in SETTINGS if name in stored})
 
 

@@ -8,7 +8,17 @@ import pytest
 
 from blocksim.verification.case import Case, Row, Setting, Verdict, at_least
 from blocksim.verification.cases import CASES, chosen
-from blocksim.verification.reference import BEGIN, END, SETTINGS, STORE, read_store, stored_rows, table, with_table
+from blocksim.verification.reference import (
+    BEGIN,
+    END,
+    SETTINGS,
+    STORE,
+    cases_of,
+    read_store,
+    stored_rows,
+    table,
+    with_table,
+)
 from blocksim.verification.verify import Outcome, run_case
 from tests.verification.rows import allowed, missed, same_kind
 
@@ -62,7 +72,7 @@ def test_kept_results_have_all_cases_in_every_column() -> None:
     stored = read_store(ROOT / STORE)
     assert list(stored) == list(SETTINGS), "run: make verify-table"
     for head, column in stored.items():
-        assert list(column) == [case.id for case in chosen([], SETTINGS[head].scheme)]
+        assert list(column) == [case.id for case in cases_of(head)]
         assert all(column.values())
 
 

@@ -6,8 +6,8 @@ import pytest
 
 from blocksim.verification.case import Case, Setting, Verdict
 from blocksim.verification.cases import UnknownCaseError, chosen_of_soil
+from blocksim.verification.reference import SOIL, STORE, read_store, stored_rows
 from blocksim.verification.soil import SOIL_CASES
-from blocksim.verification.soil_reference import STORE, read_store, rows_of, with_soil_table
 from blocksim.verification.verify import run_case
 
 ROOT = Path(__file__).parents[2]
@@ -40,15 +40,8 @@ def test_energy_momentum_and_the_law_itself_are_exact_with_both_gradients(name: 
 @pytest.mark.long
 @pytest.mark.parametrize("case", SOIL_CASES, ids=lambda case: case.id)
 def test_cases_are_as_the_table_has_them(case: Case) -> None:
-    kept = rows_of(read_store(ROOT / STORE), case)
+    kept = stored_rows(read_store(ROOT / STORE), SOIL, case)
     assert outside(case, Setting()) == [row.quantity for row in kept if row.verdict != Verdict.INSIDE]
-
-
-def test_the_table_of_the_page_is_what_is_kept() -> None:
-    page = (ROOT / "blocksim/verification/README.md").read_text(encoding="utf-8")
-    stored = read_store(ROOT / STORE)
-    assert [case.id for case in SOIL_CASES] == list(stored)
-    assert with_soil_table(page, stored) == page
 
 
 def test_an_unknown_case_is_told_with_those_there_are() -> None:
