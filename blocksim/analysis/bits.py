@@ -1,6 +1,7 @@
 """Bitwise comparison of two recordings of the same run."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,6 @@ from numpy.typing import NDArray
 
 from blocksim.simulation.contacts import CONTACT_ROW, UNITS, Contacts, Rows
 from blocksim.simulation.frames import Floats, Frames
-from blocksim.world.systems.system import Quantity, Track
 
 MILLI = 1e3
 MOTION = {  # quantity of a frame: its name in tables, and SI -> that unit
@@ -66,6 +66,10 @@ def differences(stored: Frames, now: Frames) -> Differences:
 def _firsts(stored: Frames, now: Frames, count: int) -> list[FirstDifference]:
     """Return the first difference in each quantity of the first `count` frames."""
     lacking = np.full(count, np.nan)
+    found = [
+        _first(stored, count, label, getattr(stored, name), getattr(now, name), stored.names, factor)
+        for name, (label, factor) in MOTION.items()
+    ]
     scene = [
         ("step", stored.step.astype(np.float64), now.step.astype(np.float64)),
         ("time_s", stored.time, now.time),
@@ -73,45 +77,26 @@ def _firsts(stored: Frames, now: Frames, count: int) -> list[FirstDifference]:
         ("contact_count", stored.contact_count, now.contact_count),
         ("largest_overlap_mm", MILLI * stored.largest_overlap, MILLI * now.largest_overlap),
     ]
-    found = [_first_in_motion(stored, now, count, name) for name in MOTION]
-    found += [_first_in_scene(stored, count, *one) for one in scene]
+    found += [_first(stored, count, *one) for one in scene]
     for old, new in zip(stored.others, now.others, strict=True):
-        found += [_first_in_track(stored, count, old, new, one) for one in old.system.quantities]
-    found += [_first_in_contacts(stored, now, count)]
+        for one in old.system.quantities:
+            label = f"{old.system.name} {one.name} ({one.unit})"
+            found.append(_first(stored, count, label, old[one.name], new[one.name], old.names))
+    found.append(_first_in_contacts(stored, now, count))
     return [one for one in found if one is not None]
 
 
-def _first_in_motion(stored: Frames, now: Frames, count: int, name: str) -> FirstDifference | None:
-    old, new = getattr(stored, name)[:count], getattr(now, name)[:count]
-    where = np.argwhere(_is_other(old, new))
-    if not where.size:
-        return None
-    frame, block = where[0].tolist()
-    quantity, unit = MOTION[name]
-    values = (unit * float(one[frame, block]) for one in (old, new))
-    return FirstDifference(frame, float(stored.time[frame]), stored.names[block], quantity, *values)
-
-
-def _first_in_track(
-    stored: Frames, count: int, before: Track, after: Track, quantity: Quantity
+def _first(
+    stored: Frames, count: int, label: str, old: Floats, new: Floats, names: Sequence[str] = (), factor: float = 1.0
 ) -> FirstDifference | None:
-    """Return the first difference in a quantity (SI) of a system beside the blocks."""
-    old, new = before[quantity.name][:count], after[quantity.name][:count]
-    where = np.argwhere(_is_other(old, new))
+    """Return the first difference of a quantity: of the scene (n,), or of elements with names (n, b)."""
+    where = np.argwhere(_is_other(old[:count], new[:count]))
     if not where.size:
         return None
-    frame, element = where[0].tolist()
-    name = f"{before.system.name} {quantity.name} ({quantity.unit})"
-    values = float(old[frame, element]), float(new[frame, element])
-    return FirstDifference(frame, float(stored.time[frame]), before.names[element], name, *values)
-
-
-def _first_in_scene(stored: Frames, count: int, name: str, old: Floats, new: Floats) -> FirstDifference | None:
-    where = np.flatnonzero(_is_other(old[:count], new[:count]))
-    if not where.size:
-        return None
-    frame = int(where[0])
-    return FirstDifference(frame, float(stored.time[frame]), None, name, float(old[frame]), float(new[frame]))
+    frame, *element = where[0].tolist()
+    values = (factor * float(one[frame, *element]) for one in (old, new))
+    name = names[element[0]] if element else None
+    return FirstDifference(frame, float(stored.time[frame]), name, label, *values)
 
 
 def _first_in_contacts(stored: Frames, now: Frames, count: int) -> FirstDifference | None:

@@ -55,18 +55,18 @@ class ComparisonRow:
     quantity: str
     unit: str
     simulated: float
-    mean: float
-    s: float
-    n: int
-    minimum: float
-    maximum: float
-    lower: float
-    upper: float
-    error: float
-    distance: float
-    u_data: float
-    prediction: float
-    verdict: Verdict
+    mean: float = nan
+    s: float = nan
+    n: int = 0
+    minimum: float = nan
+    maximum: float = nan
+    lower: float = nan
+    upper: float = nan
+    error: float = nan
+    distance: float = nan
+    u_data: float = nan
+    prediction: float = nan
+    verdict: Verdict = Verdict.NO_DATA
 
 
 @dataclass(frozen=True)
@@ -102,12 +102,7 @@ class Comparison:
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON; a missing number is None."""
         rows = [{key: plain(value) for key, value in asdict(row).items()} for row in self.rows]
-        return {
-            "inside": self.inside,
-            "experiment": self.source,
-            "rows": rows,
-            "messages": list(self.messages),
-        }
+        return {"inside": self.inside, "experiment": self.source, "rows": rows, "messages": list(self.messages)}
 
 
 def html_of(shown: object, table: "pd.DataFrame") -> str:
@@ -176,37 +171,24 @@ def _row(block: str, quantity: str, value: float, measured: Statistics | None) -
     """Judge one quantity of one block; `measured` is its row of the statistics, None where there is none."""
     unit = QUANTITIES[quantity].unit
     if measured is None:
-        return _row_without_data(block, quantity, value)
-    mean, s, n, minimum, maximum = measured[3:]
-    lower, upper = limits(quantity, mean, minimum, maximum)
+        return ComparisonRow(block, quantity, unit, value)
+    mean, s, n = measured.mean, measured.s, measured.n
+    lower, upper = limits(quantity, mean, measured.minimum, measured.maximum)
     distance = max(lower - value, value - upper, 0.0) if isfinite(value) else inf
     return ComparisonRow(
-        block=block,
-        quantity=quantity,
-        unit=unit,
-        simulated=value,
-        mean=mean,
-        s=s,
-        n=n,
-        minimum=minimum,
-        maximum=maximum,
-        lower=lower,
-        upper=upper,
+        block,
+        quantity,
+        unit,
+        value,
+        *measured[3:],
+        lower,
+        upper,
         error=value - mean,
         distance=distance,
         u_data=data_uncertainty(s, n) if unit == "mm" else nan,
         prediction=prediction_half_width(s, n) if unit == "mm" else nan,
         verdict=Verdict.INSIDE if distance == 0.0 else Verdict.OUTSIDE,
     )
-
-
-def _row_without_data(block: str, quantity: str, value: float) -> ComparisonRow:
-    unknown = dict.fromkeys(
-        ("mean", "s", "minimum", "maximum", "lower", "upper", "error", "distance", "u_data", "prediction"),
-        nan,
-    )
-    unit = QUANTITIES[quantity].unit
-    return ComparisonRow(block, quantity, unit, simulated=value, n=0, verdict=Verdict.NO_DATA, **unknown)
 
 
 def plain(value: object) -> object:

@@ -103,8 +103,8 @@ class ExperimentTable:
         if not self.missing:
             return ()
         first, more = self.missing[0], len(self.missing) - 1
-        told = f"{self.source}: replicate {first.replicate} has no {first.quantity} of block '{first.block}'"
-        return (told + (f" (and {more} more such rows)" if more else ""),)
+        text = f"{self.source}: replicate {first.replicate} has no {first.quantity} of block '{first.block}'"
+        return (text + (f" (and {more} more such rows)" if more else ""),)
 
     def refuse_unknown(self, blocks: Sequence[str], whose: str) -> None:
         """Raise InvalidInputError, with every place in the file, for measured blocks that are not among `blocks`."""

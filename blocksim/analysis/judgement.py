@@ -9,7 +9,7 @@ from blocksim.analysis.compare import html_of, plain
 from blocksim.analysis.experiment import ExperimentTable
 from blocksim.analysis.members import Failure, Members
 from blocksim.analysis.metrics import METRICS
-from blocksim.analysis.metrics.metric import Evidence, Findings, Metric, shown_name
+from blocksim.analysis.metrics.metric import Evidence, Findings
 from blocksim.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -89,7 +89,15 @@ class Judgement:
             "threshold": self.settings.threshold,
             "inside": self.inside,
             "messages": list(self.messages),
-            "metrics": {name: _told(METRICS[name], found) for name, found in self.findings.items()},
+            "metrics": {
+                name: {
+                    "meaning": METRICS[name].meaning,
+                    "columns": {column.name: column.meaning for column in METRICS[name].columns},
+                    "rows": [{key: plain(value) for key, value in row.items()} for row in found.rows],
+                    "messages": list(found.messages),
+                }
+                for name, found in self.findings.items()
+            },
         }
 
 
@@ -119,16 +127,7 @@ def _incomplete(evidence: Evidence) -> list[str]:
     """Report measured quantities of which finished samples have no value."""
     finished = int(evidence.members.finished.sum())
     return [
-        f"{finished - pair.known.size} finished samples have no {shown_name(pair)}: they count as outside"
+        f"{finished - pair.known.size} finished samples have no {pair.name}: they count as outside"
         for pair in evidence.pairs
         if pair.known.size < finished
     ]
-
-
-def _told(metric: Metric, found: Findings) -> dict[str, object]:
-    return {
-        "meaning": metric.meaning,
-        "columns": {column.name: column.meaning for column in metric.columns},
-        "rows": [{name: plain(value) for name, value in row.items()} for row in found.rows],
-        "messages": list(found.messages),
-    }

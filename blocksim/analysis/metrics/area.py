@@ -29,7 +29,6 @@ from blocksim.analysis.metrics.metric import (
     Metric,
     Pair,
     Row,
-    shown_name,
 )
 
 if TYPE_CHECKING:
@@ -78,7 +77,8 @@ def area_interval(members: "Floats", repeats: "Floats", resamples: int = RESAMPL
     steps = Steps(members, repeats)
     areas = [steps.area(_resampled(steps.one, random), _resampled(steps.other, random)) for _ in range(resamples)]
     area = steps.area(steps.one, steps.other)
-    half = max(float(np.quantile(areas, _widened(smaller))) - area, 0.0)
+    widened = NormalDist().cdf(quantile(0.5 * (1.0 + CONFIDENCE), smaller - 1) * sqrt(smaller / (smaller - 1)))
+    half = max(float(np.quantile(areas, widened)) - area, 0.0)
     return max(area - half, 0.0), area + half
 
 
@@ -86,15 +86,10 @@ def _resampled(places: "Counts", random: np.random.Generator) -> "Counts":
     return places[random.integers(0, places.size, places.size)]
 
 
-def _widened(n: int) -> float:
-    """Return the probability at which the upper quantile of the resampled areas is taken."""
-    return NormalDist().cdf(quantile(0.5 * (1.0 + CONFIDENCE), n - 1) * sqrt(n / (n - 1)))
-
-
 def _find(evidence: Evidence) -> Findings:
-    lengths = [pair for pair in evidence.pairs if pair.is_length]
+    lengths = evidence.lengths
     rows = tuple(_row(pair) for pair in lengths)
-    messages = [f"{shown_name(pair)}: no interval, {why}" for pair in lengths if (why := _complaint(pair))]
+    messages = [f"{pair.name}: no interval, {why}" for pair in lengths if (why := _complaint(pair))]
     if len(messages) < len(lengths):
         messages.append(f"bootstrap of {RESAMPLES} resamples, seed {SEED}")
     return Findings(rows, tuple(messages))

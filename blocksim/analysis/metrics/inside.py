@@ -22,7 +22,6 @@ from blocksim.analysis.metrics.metric import (
     Metric,
     Pair,
     Row,
-    shown_name,
 )
 
 ALL = "all"
@@ -44,19 +43,23 @@ def repeat_passes_all(counts: list[int]) -> Interval | float | None:
 
 def _find_inside(evidence: Evidence) -> Findings:
     total = evidence.members.count
+    passes = [repeat_passes(pair.measured.n) if _has_range(pair) else None for pair in evidence.pairs]
+    rows: list[Row] = [
+        {
+            **pair.head,
+            "limits": pair.limits,
+            **_share(int(pair.inside.sum()), total),
+            "repeat_passes": chance,
+        }
+        for pair, chance in zip(evidence.pairs, passes, strict=True)
+    ]
     ranged = [pair.measured.n for pair in evidence.pairs if _has_range(pair)]
-    rows = [_row(pair, total) for pair in evidence.pairs]
     everything: Row = {"block": ALL, "quantity": "", "unit": "", "limits": None}
-    passes = {"repeat_passes": repeat_passes_all(ranged)}
-    last: Row = {**everything, **_share(int(evidence.inside.sum()), total), **passes}
+    share = _share(int(evidence.inside.sum()), total)
+    last: Row = {**everything, **share, "repeat_passes": repeat_passes_all(ranged)}
     failed = total - int(evidence.members.finished.sum())
-    told = f"shares are of all {total} samples" + (f"; {failed} did not finish and count as outside" if failed else "")
-    return Findings((*rows, last), (told,))
-
-
-def _row(pair: Pair, total: int) -> Row:
-    passes = repeat_passes(pair.measured.n) if _has_range(pair) else None
-    return {**pair.head, "limits": pair.limits, **_share(int(pair.inside.sum()), total), "repeat_passes": passes}
+    text = f"shares are of all {total} samples" + (f"; {failed} did not finish and count as outside" if failed else "")
+    return Findings((*rows, last), (text,))
 
 
 def _share(count: int, total: int) -> Row:
@@ -69,9 +72,9 @@ def _has_range(pair: Pair) -> bool:
 
 
 def _find_predicted(evidence: Evidence) -> Findings:
-    lengths = [pair for pair in evidence.pairs if pair.is_length]
+    lengths = evidence.lengths
     rows = tuple(_predicted(pair, evidence.members.count) for pair in lengths if pair.scatters)
-    without = [f"{shown_name(pair)}: repeats without scatter predict nothing" for pair in lengths if not pair.scatters]
+    without = [f"{pair.name}: repeats without scatter predict nothing" for pair in lengths if not pair.scatters]
     return Findings(rows, tuple(without))
 
 

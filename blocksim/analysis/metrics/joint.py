@@ -27,7 +27,6 @@ from blocksim.analysis.metrics.metric import (
     Pair,
     Row,
     complete_repeats,
-    shown_name,
 )
 from blocksim.extras import loaded
 
@@ -86,9 +85,9 @@ def _spread(both: "Floats", part: "Floats") -> float:
 
 
 def _find(evidence: Evidence) -> Findings:
-    lengths = [pair for pair in evidence.pairs if pair.is_length]
+    lengths = evidence.lengths
     chosen = [pair for pair in lengths if pair.scatters]
-    messages = [f"{shown_name(pair)}: repeats without scatter are left out" for pair in lengths if not pair.scatters]
+    messages = [f"{pair.name}: repeats without scatter are left out" for pair in lengths if not pair.scatters]
     if not chosen:
         return Findings((), (*messages, "not computed: no measured position scatters"))
     repeats, incomplete = complete_repeats(chosen)

@@ -79,6 +79,11 @@ class Pair:
         return (self.values >= ends[0]) & (self.values <= ends[1])
 
     @property
+    def name(self) -> str:
+        """Its name in a message."""
+        return f"{self.measured.quantity} of block {self.measured.block}"
+
+    @property
     def head(self) -> Row:
         """The first cells of its row in a table."""
         return {"block": self.measured.block, "quantity": self.measured.quantity, "unit": self.measured.unit}
@@ -98,10 +103,13 @@ class Evidence:
         repeats: dict[tuple[str, str], dict[int, float]] = {}
         for one in sorted(self.table.measurements, key=lambda one: one.replicate):
             repeats.setdefault((one.block, one.quantity), {})[one.replicate] = one.value
-        return tuple(self._pair(row, repeats[row.block, row.quantity]) for row in self.table.summaries())
+        pairs = [(row, (row.block, row.quantity)) for row in self.table.summaries()]
+        return tuple(Pair(row, repeats[pair], self.members.values(*pair)) for row, pair in pairs)
 
-    def _pair(self, measured: Statistics, repeats: dict[int, float]) -> Pair:
-        return Pair(measured, repeats, self.members.values(measured.block, measured.quantity))
+    @property
+    def lengths(self) -> list[Pair]:
+        """Those of positions."""
+        return [pair for pair in self.pairs if pair.is_length]
 
     @property
     def inside(self) -> "NDArray[np.bool_]":
@@ -133,11 +141,6 @@ BLOCK = (
     Column("quantity", "quantity", Form.TEXT, "measured quantity"),
     Column("unit", "", Form.TEXT, "unit of the numbers: mm or deg"),
 )
-
-
-def shown_name(pair: Pair) -> str:
-    """Return the name of a pair for a message."""
-    return f"{pair.measured.quantity} of block {pair.measured.block}"
 
 
 def complete_repeats(pairs: Sequence[Pair]) -> "tuple[NDArray[np.float64], str]":

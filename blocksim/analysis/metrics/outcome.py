@@ -6,15 +6,11 @@ all blocks if none was. Members that failed are in the total, as a class of thei
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from blocksim.analysis.intervals import interval, lower_bound
 from blocksim.analysis.metrics.metric import Column, Evidence, Findings, Form, Metric, Row, complete_repeats
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 QUARTER = 90.0  # deg
 ROTATION = "rotation"
@@ -24,11 +20,8 @@ FAILED = "did not finish"
 
 def outcome(rotations: Sequence[float]) -> str:
     """Return the class of rotations (deg); halves between two quarter turns go to the even one."""
-    return ", ".join(_turned(angle) for angle in rotations)
-
-
-def _turned(angle: float) -> str:
-    return f"{QUARTER * round(angle / QUARTER):.0f}" if np.isfinite(angle) else UNKNOWN
+    turns = (f"{QUARTER * round(angle / QUARTER):.0f}" if np.isfinite(angle) else UNKNOWN for angle in rotations)
+    return ", ".join(turns)
 
 
 def _find(evidence: Evidence) -> Findings:
@@ -41,7 +34,9 @@ def _find(evidence: Evidence) -> Findings:
         return Findings((), ("not computed: the sweep has no rotations",))
     rotations = np.column_stack([members.values(block, ROTATION) for block in blocks])
     repeats, incomplete = complete_repeats(measured)
-    found, seen = Counter(_classes(rotations, members.finished)), Counter(map(outcome, repeats.tolist()))
+    ends = zip(rotations.tolist(), members.finished, strict=True)
+    found = Counter(outcome(row) if has_ended else FAILED for row, has_ended in ends)
+    seen = Counter(map(outcome, repeats.tolist()))
     order = sorted({*found, *seen}, key=lambda name: (-found[name], -seen[name], name))
     messages = ["blocks: " + ", ".join(blocks)]
     if incomplete:
@@ -49,11 +44,6 @@ def _find(evidence: Evidence) -> Findings:
     if seen:
         messages.append("at least: one-sided 95 % limit of the measured share")
     return Findings(tuple(_row(name, found, seen) for name in order), tuple(messages))
-
-
-def _classes(rotations: "NDArray[np.float64]", finished: "NDArray[np.bool_]") -> list[str]:
-    rows = zip(rotations.tolist(), finished, strict=True)
-    return [outcome(row) if ended else FAILED for row, ended in rows]
 
 
 def _row(name: str, found: Counter[str], seen: Counter[str]) -> Row:

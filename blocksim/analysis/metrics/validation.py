@@ -19,7 +19,7 @@ ENOUGH = 2  # values that a standard deviation needs
 
 
 def _find(evidence: Evidence) -> Findings:
-    lengths = [pair for pair in evidence.pairs if pair.is_length]
+    lengths = evidence.lengths
     rows = tuple(_row(pair, evidence.u_num) for pair in lengths)
     messages = [f"u_num = {evidence.u_num:g} mm"] if rows else ["no length was measured"]
     if any(pair.known.size < ENOUGH for pair in lengths):
