@@ -49,8 +49,7 @@ def open_regular(path: Path, *, links: bool = False) -> BinaryIO:
         raise unreadable(path, error) from None
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):  # replaced in the meantime
         file.close()
-        message = f"{path}: not a file"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{path}: not a file")
     return file
 
 
@@ -61,12 +60,10 @@ def check_regular(path: Path, *, links: bool = False) -> int:
     except (OSError, ValueError) as error:
         raise unreadable(path, error) from None
     if stat.S_ISLNK(found.st_mode):
-        message = f"{path}: {IS_LINK}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{path}: {IS_LINK}")
     if not stat.S_ISREG(found.st_mode):
         kind = next((what for is_kind, what in KINDS if is_kind(found.st_mode)), "")
-        message = f"{path}: not a file{kind and ', but '}{kind}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{path}: not a file{kind and ', but '}{kind}")
     return found.st_size
 
 
@@ -74,8 +71,7 @@ def read_limited(path: Path, limit: int, *, links: bool = False) -> bytes:
     """Return what a file holds, at most `limit` bytes. Raises as `open_regular`, InvalidInputError for a larger one."""
     content = read_head(path, limit + 1, links=links)
     if len(content) > limit:
-        message = f"{path}: {_too_large(limit)}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{path}: {_too_large(limit)}")
     return content
 
 
@@ -91,8 +87,7 @@ def read_head(path: Path, count: int, *, links: bool = False) -> bytes:
 def refuse_large(path: Path, limit: int) -> None:
     """Check that a file that a library will open by itself is regular, and not too large. Raises as `read_limited`."""
     if check_regular(path) > limit:
-        message = f"{path}: {_too_large(limit)}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{path}: {_too_large(limit)}")
 
 
 def unreadable(path: Path, error: OSError | ValueError) -> InputMissingError | InvalidInputError:

@@ -63,12 +63,10 @@ class Cell:
     def number(self) -> float:
         """Return the finite number in this cell; raises ValueError with a message for the user."""
         if not NUMBER.fullmatch(self.text):
-            message = f"'{self.text}' is not a number, write it as 71.69 or 7.169e1"
-            raise ValueError(message)
+            raise ValueError(f"'{self.text}' is not a number, write it as 71.69 or 7.169e1")
         value = float(self.text)
         if abs(value) == float("inf"):
-            message = f"'{self.text}' is too large"
-            raise ValueError(message)
+            raise ValueError(f"'{self.text}' is too large")
         return value
 
 

@@ -240,8 +240,7 @@ def _unusable(where: str, message: str) -> ScenarioError:
 def _content(path: Path, *, is_stored: bool) -> bytes:
     """Read a file, but never much more than a scenario may have."""
     if is_folder(path):
-        message = f"{path}: this is a folder; a scenario file is needed{_similar_file(path / path.name)}"
-        raise InputMissingError(message)
+        raise InputMissingError(f"{path}: this is a folder; a scenario file is needed{_similar_file(path / path.name)}")
     try:
         content = read_head(path, MAX_BYTES + 1, links=not is_stored)
     except NoSuchFileError as error:

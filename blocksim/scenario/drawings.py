@@ -94,8 +94,7 @@ def _geojson(path: Path) -> list[Drawn]:
     except BlocksimError as error:
         raise DrawingError(str(error)) from None
     except DAMAGE as error:
-        message = f"not a GeoJSON file: {str(error)[:100]}"
-        raise DrawingError(message) from None
+        raise DrawingError(f"not a GeoJSON file: {str(error)[:100]}") from None
 
 
 def _polygons(node: Any, name: str, properties: Mapping[str, Any], depth: int) -> Iterator[Drawn]:
@@ -159,8 +158,7 @@ def _dxf(path: Path) -> list[Drawn]:
     except BlocksimError as error:
         raise DrawingError(str(error)) from None
     except (ezdxf.DXFError, *DAMAGE) as error:
-        message = f"not a DXF file: {str(error)[:100]}"
-        raise DrawingError(message) from None
+        raise DrawingError(f"not a DXF file: {str(error)[:100]}") from None
 
 
 def _polylines(space: Any) -> Iterator[Drawn]:

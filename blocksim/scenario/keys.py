@@ -56,15 +56,13 @@ def read_key(text: str, start: int = 0) -> tuple[tuple[str, ...], int]:
         start = skip_blank(text, start)
         found = next((m for p in (_BASIC, _LITERAL, _BARE) if (m := p.match(text, start))), None)
         if found is None:
-            message = "not a key"
-            raise ValueError(message)
+            raise ValueError("not a key")
         parts.append(_unquoted(found[0]))
         after = skip_blank(text, found.end())
         if not text.startswith(".", after):
             return tuple(parts), found.end()
         start = after + 1
-    message = "too many parts"
-    raise ValueError(message)
+    raise ValueError("too many parts")
 
 
 def _unquoted(part: str) -> str:
@@ -84,8 +82,7 @@ def parse_key(text: str) -> tuple[str, ...]:
     """Read a whole text as one dotted key; raises ValueError."""
     parts, end = read_key(text)
     if skip_blank(text, end) != len(text):
-        message = "not a key"
-        raise ValueError(message)
+        raise ValueError("not a key")
     return parts
 
 

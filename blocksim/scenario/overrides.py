@@ -48,8 +48,7 @@ class TooDeepError(ValueError):
 def frozen(value: object, depth: int = 0) -> object:
     """Copy nested data with tuples for lists; raises TooDeepError."""
     if depth > MAX_DEPTH:
-        message = f"nested more than {MAX_DEPTH} levels deep"
-        raise TooDeepError(message)
+        raise TooDeepError(f"nested more than {MAX_DEPTH} levels deep")
     if isinstance(value, Mapping):
         return {key: frozen(entry, depth + 1) for key, entry in value.items()}
     if isinstance(value, list | tuple):
@@ -65,13 +64,11 @@ def parse_override(text: str) -> tuple[tuple[str, ...], object]:
     try:
         path, end = read_key(text)
     except ValueError:
-        message = "write KEY=VALUE with a dotted key, such as contact.stiffness_scale=0.1"
-        raise UnfitOverrideError(message) from None
+        raise UnfitOverrideError("write KEY=VALUE with a dotted key, such as contact.stiffness_scale=0.1") from None
     equals = skip_blank(text, end)
     value = text[equals + 1 :].strip()
     if text[equals : equals + 1] != "=" or not value:
-        message = "write KEY=VALUE, such as contact.stiffness_scale=0.1"
-        raise UnfitOverrideError(message)
+        raise UnfitOverrideError("write KEY=VALUE, such as contact.stiffness_scale=0.1")
     return path, parse_value(value)
 
 
@@ -84,8 +81,7 @@ def parse_value(text: str) -> object:
     if set(found) == {"value"}:
         return found["value"]
     if text[0] in "\"'[{":
-        message = f"{text[:40]} is not a TOML value"
-        raise UnfitOverrideError(message)
+        raise UnfitOverrideError(f"{text[:40]} is not a TOML value")
     return text
 
 
@@ -99,8 +95,7 @@ def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tup
     try:
         parts = parse_key(key) if isinstance(key, str) else tuple(key)
     except ValueError:
-        message = f"{shown(key)} is not a dotted key"
-        raise UnfitOverrideError(message) from None
+        raise UnfitOverrideError(f"{shown(key)} is not a dotted key") from None
     path: list[str | int] = []
     where = _in_given_order(data, parts)
     start = _with_list_to_change(_with_own_friction(data, where), where)
@@ -148,17 +143,14 @@ def _put(node: object, parts: Sequence[str | int], value: object, done: list[str
         done.append(index)
         return (*node[:index], _put(node[index], parts[1:], value, done), *node[index + 1 :])
     if not isinstance(node, Mapping):
-        message = f"{format_key(done)} is {shown(node)}, not a table"
-        raise UnfitOverrideError(message)
+        raise UnfitOverrideError(f"{format_key(done)} is {shown(node)}, not a table")
     part = str(parts[0])
     child = node.get(part, MISSING)
     if child is MISSING and tuple(done) in _NAMED and len(parts) > 1:
         hint = did_you_mean_or_list(part, node)
-        message = f"{done[0]} has no {shown(part)}, {hint}"
-        raise UnfitOverrideError(message)
+        raise UnfitOverrideError(f"{done[0]} has no {shown(part)}, {hint}")
     if child is MISSING and not done and len(parts) > 1 and _is_list(part):
-        message = f"this scenario has no [[{part}]], so no {shown(str(parts[1]))} among them"
-        raise UnfitOverrideError(message)
+        raise UnfitOverrideError(f"this scenario has no [[{part}]], so no {shown(str(parts[1]))} among them")
     done.append(part)
     return {
         **_without_synonym(node, part),
@@ -186,8 +178,7 @@ def _index(entries: Sequence[object], part: str | int, done: Sequence[str | int]
         return named[0]
     names = [entry["name"] for entry in entries if isinstance(entry, Mapping) and "name" in entry]
     if names and not str(part).isdecimal():
-        message = f"{format_key(done)} has no {shown(part)}, {did_you_mean_or_list(str(part), names)}"
-        raise UnfitOverrideError(message)
+        raise UnfitOverrideError(f"{format_key(done)} has no {shown(part)}, {did_you_mean_or_list(str(part), names)}")
     message = f"{format_key(done)} is a list of {len(entries)}, numbered from 0; {shown(part)} does not exist"
     raise UnfitOverrideError(message)
 

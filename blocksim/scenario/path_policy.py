@@ -53,19 +53,16 @@ def said_by_hand(key: str | Sequence[str | int], value: object) -> object:
 def table_in(folder: Path | str, text: str) -> Path:
     """Return the file that a scenario in `folder` names, all links followed. Raises OutOfReachError."""
     if not _follows_links.get() and not isinstance(text, ByHand) and Path(folder, text).is_symlink():
-        message = f"{shown(text)}: {IS_LINK}"
-        raise OutOfReachError(message)
+        raise OutOfReachError(f"{shown(text)}: {IS_LINK}")
     try:
         table = Path(folder, text).resolve()
         _refuse_outside(Path(folder), text, table)
         what = _what_it_is(table)
     except (OSError, RuntimeError) as error:  # a name that is too long; links in a circle
         reason = getattr(error, "strerror", None) or str(error)
-        message = f"{shown(text)}: cannot be read: {reason}"
-        raise OutOfReachError(message) from None
+        raise OutOfReachError(f"{shown(text)}: cannot be read: {reason}") from None
     if what:
-        message = f"{shown(text)}: {what} (paths are relative to the scenario file)"
-        raise OutOfReachError(message)
+        raise OutOfReachError(f"{shown(text)}: {what} (paths are relative to the scenario file)")
     return table
 
 
@@ -82,8 +79,7 @@ def _refuse_outside(folder: Path, text: str, table: Path) -> None:
     if _is_anywhere.get() or isinstance(text, ByHand):
         return
     if not any(table.is_relative_to(root) for root in _roots(folder)):
-        message = f"{shown(text)}: leads outside the scenario's folder and the current folder; {WAY_OUT}"
-        raise OutOfReachError(message)
+        raise OutOfReachError(f"{shown(text)}: leads outside the scenario's folder and the current folder; {WAY_OUT}")
 
 
 def _roots(folder: Path) -> Iterator[Path]:

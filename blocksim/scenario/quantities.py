@@ -119,33 +119,28 @@ class Quantity:
         """Turn the value of the file into an SI float; the pydantic error has what is allowed."""
         number = self._text(value) if isinstance(value, str) else self._number(value)
         if not math.isfinite(number):
-            message = f"{shown(value)} is not a finite number; {self.wanted} is needed"
-            raise invalid(message)
+            raise invalid(f"{shown(value)} is not a finite number; {self.wanted} is needed")
         return self._within(number, value)
 
     def _number(self, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            message = f"{shown(value)} is not a number; {self.wanted} is needed"
-            raise invalid(message)
+            raise invalid(f"{shown(value)} is not a number; {self.wanted} is needed")
         try:
             number = float(value)
         except OverflowError:
             return math.inf
         if self.kind is ANGLE and number != 0 and math.isfinite(number):
-            message = f'{shown(value)} has no unit; write "{number:g} deg" (or "{number:g} rad")'
-            raise invalid(message)
+            raise invalid(f'{shown(value)} has no unit; write "{number:g} deg" (or "{number:g} rad")')
         return number
 
     def _text(self, text: str) -> float:
         try:
             number, dimension = parse_quantity(text, self.kind)
         except ValueError as error:
-            message = f"{shown(text)} is not {self.kind.name}: {error}"
-            raise invalid(message) from None
+            raise invalid(f"{shown(text)} is not {self.kind.name}: {error}") from None
         if dimension != self.kind.dimension:
             name = units.NAMES.get(dimension, f"not {self.kind.name}")
-            message = f"{shown(text)} is {name}; {self.wanted} is needed"
-            raise invalid(message)
+            raise invalid(f"{shown(text)} is {name}; {self.wanted} is needed")
         return number
 
     def _within(self, number: float, value: object) -> float:
@@ -156,14 +151,11 @@ class Quantity:
             self.at_most is not None and number > self.at_most
         )
         if too_small or too_large:
-            message = f"{shown(value)} is too {'small' if too_small else 'large'}; {self.wanted} is needed"
-            raise invalid(message)
+            raise invalid(f"{shown(value)} is too {'small' if too_small else 'large'}; {self.wanted} is needed")
         if abs(number) > MOST:
-            message = f"{shown(value)} is too large to compute with; at most {MOST:g} (SI) is allowed"
-            raise invalid(message)
+            raise invalid(f"{shown(value)} is too large to compute with; at most {MOST:g} (SI) is allowed")
         if self.above == 0.0 and number < LEAST:
-            message = f"{shown(value)} is too small to compute with; at least {LEAST:g} (SI) is allowed"
-            raise invalid(message)
+            raise invalid(f"{shown(value)} is too small to compute with; at least {LEAST:g} (SI) is allowed")
         return number
 
     def __get_pydantic_core_schema__(self, _source: object, _handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -203,18 +195,14 @@ def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
     found = _TEXT.fullmatch(text) if len(text) <= _MAX_LENGTH else None
     comma = _DECIMAL_COMMA.fullmatch(text) if len(text) <= _MAX_LENGTH else None
     if comma:
-        message = f'write a decimal point: "{comma[1]}.{comma[2]}{comma[3]}"'
-        raise ValueError(message)
+        raise ValueError(f'write a decimal point: "{comma[1]}.{comma[2]}{comma[3]}"')
     if wanted is NUMBER and (found is None or found[2] is None):
-        message = "write a number without quotes"
-        raise ValueError(message)
+        raise ValueError("write a number without quotes")
     if found is None:
-        message = f'write a number and a unit, such as "{wanted.example}"'
-        raise ValueError(message)
+        raise ValueError(f'write a number and a unit, such as "{wanted.example}"')
     number, unit = found.groups()
     if unit is None:
-        message = f'the unit is missing, write it as in "{wanted.example}"'
-        raise ValueError(message)
+        raise ValueError(f'the unit is missing, write it as in "{wanted.example}"')
     try:
         worth = units.parse_unit("g0" if wanted is ACCELERATION and unit == "g" else unit)
     except units.UnitError as error:
@@ -268,8 +256,7 @@ class FrictionCoefficient:
         if isinstance(value, str):
             return math.tan(Quantity(ANGLE, at_least=0.0, below=math.pi / 2).read(value))
         if isinstance(value, bool) or not isinstance(value, int | float):
-            message = f"{shown(value)} is not a number; {self.wanted} is needed"
-            raise invalid(message)
+            raise invalid(f"{shown(value)} is not a number; {self.wanted} is needed")
         return Quantity(NUMBER, at_least=0.0).read(value)
 
     def __get_pydantic_core_schema__(self, _source: object, _handler: GetCoreSchemaHandler) -> CoreSchema:

@@ -77,14 +77,12 @@ def _at2(lines: Sequence[Line], head: Line) -> tuple[Unit | None, Iterable[float
     before = lines[: head.number - 1]
     other = next((line for line in before if _OTHER.search(line.text)), None)
     if other is not None:
-        message = f"line {other.number}: {shown(other.text.strip())}: an acceleration is needed"
-        raise MotionTableError(message)
+        raise MotionTableError(f"line {other.number}: {shown(other.text.strip())}: an acceleration is needed")
     found = _size_of(head)
     assert found is not None  # noqa: S101 - this is how the line was found
     count, step = int(found[1]), _number(head.number, found[2])
     if step <= 0.0:
-        message = f"line {head.number}: step {found[2]} s: it must be above 0"
-        raise MotionTableError(message)
+        raise MotionTableError(f"line {head.number}: step {found[2]} s: it must be above 0")
     values = [_number(line.number, word) for line in lines[head.number :] for word in line.text.split()]
     if len(values) != count:
         last = max((line.number for line in lines if line.text.strip()), default=head.number)
@@ -114,8 +112,7 @@ def _rows(lines: Iterable[Line]) -> Iterator[tuple[int, float, float]]:
         cells = _cells(text)
         if len(cells) != COLUMNS:
             hint = "; decimals are written with a point" if _has_decimal_commas(text) else ""
-            message = f"line {number}: {shown(text.strip())}: a time and an acceleration are needed{hint}"
-            raise MotionTableError(message)
+            raise MotionTableError(f"line {number}: {shown(text.strip())}: a time and an acceleration are needed{hint}")
         yield number, _number(number, cells[0]), _number(number, cells[1])
 
 
@@ -143,8 +140,7 @@ def _named_unit(line: Line) -> tuple[Unit | None, bool]:
         message = f"line {line.number}: {shown(text)}: neither numbers nor columns of time and acceleration"
         raise MotionTableError(message)
     if re.match(r"[^,;]*(?<![a-z])ms(?![a-z/])", text, re.IGNORECASE):
-        message = f"line {line.number}: {shown(text)}: times in s are needed"
-        raise MotionTableError(message)
+        raise MotionTableError(f"line {line.number}: {shown(text)}: times in s are needed")
     first = re.split(r"[,;]", text, maxsplit=1) if re.search(r"[,;]", text) else text.split(maxsplit=1)
     return _unit_in(first[-1]), True
 
@@ -155,8 +151,7 @@ def _unit_in(text: str) -> Unit | None:
 
 def _check_count(count: int) -> None:
     if not LEAST_ROWS <= count <= MAX_ROWS:
-        message = f"{count} samples; {LEAST_ROWS} to {MAX_ROWS} are allowed"
-        raise MotionTableError(message)
+        raise MotionTableError(f"{count} samples; {LEAST_ROWS} to {MAX_ROWS} are allowed")
 
 
 def _check_steps(lines: Sequence[int], times: Sequence[float], mean: float) -> None:
@@ -176,13 +171,11 @@ def _check_steps(lines: Sequence[int], times: Sequence[float], mean: float) -> N
         place = next(number for number, step in enumerate(steps, start=1) if step > GAP * usual)
         why = f"a gap of {steps[place - 1]:g} s, the step is {usual:g} s"
     if why:
-        message = f"line {lines[place]}: time {times[place]:g} s: {why}"
-        raise MotionTableError(message)
+        raise MotionTableError(f"line {lines[place]}: time {times[place]:g} s: {why}")
     for place, time in enumerate(times):
         if abs(time - times[0] - place * mean) > UNEVEN * mean:
             why = f'not at a constant step of {usual:g} s; a motion of kind "table" takes any steps'
-            message = f"line {lines[place]}: time {time:g} s: {why}"
-            raise MotionTableError(message)
+            raise MotionTableError(f"line {lines[place]}: time {time:g} s: {why}")
 
 
 def _number(line: int, text: str) -> float:
@@ -192,6 +185,5 @@ def _number(line: int, text: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        message = f"line {line}: {shown(text)} is not a finite number"
-        raise MotionTableError(message)
+        raise MotionTableError(f"line {line}: {shown(text)} is not a finite number")
     return number

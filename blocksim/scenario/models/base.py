@@ -41,13 +41,11 @@ class OneOf:
         if type(value) in (str, int) and value in self.available:
             return value
         if isinstance(value, str) and value in self.planned:
-            message = f"{shown(value)} is not available yet; use {self.wanted}"
-            raise invalid(message)
+            raise invalid(f"{shown(value)} is not available yet; use {self.wanted}")
         words = [word for word in self.available if isinstance(word, str)]
         similar = nearest(value, words, most=2) if isinstance(value, str) else None
         hint = f"did you mean {shown(similar)}?" if similar else f"use {self.wanted}"
-        message = f"{shown(value)} is unknown, {hint}"
-        raise invalid(message)
+        raise invalid(f"{shown(value)} is unknown, {hint}")
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Check the word first, then let pydantic see its literal."""
@@ -64,8 +62,7 @@ class Whole:
     def read(self, value: object) -> object:
         """Pass a whole number in the range; raises a pydantic error."""
         if isinstance(value, bool) or not isinstance(value, int) or not self.least <= value <= self.most:
-            message = f"{shown(value)} is not a whole number from {self.least} to {self.most}"
-            raise invalid(message)
+            raise invalid(f"{shown(value)} is not a whole number from {self.least} to {self.most}")
         return value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -80,8 +77,7 @@ class Whole:
 def table_path(value: object, folder: Path | str | None, example: str) -> Path:
     """Return the file that a key names, found from a folder, or unchecked without one; raises a pydantic error."""
     if not isinstance(value, str) or not value or "\0" in value:
-        message = f"{shown(value)} is not the path of a table, such as {shown(example)}"
-        raise invalid(message)
+        raise invalid(f"{shown(value)} is not the path of a table, such as {shown(example)}")
     if folder is None:
         return Path(value)
     try:
@@ -92,15 +88,13 @@ def table_path(value: object, folder: Path | str | None, example: str) -> Path:
 
 def _identifier(value: object) -> object:
     if not isinstance(value, str):
-        message = f"{shown(value)} is not a string in quotes"
-        raise invalid(message)
+        raise invalid(f"{shown(value)} is not a string in quotes")
     allowed = value.isascii() and all(c.isalnum() or c in "._-" for c in value)
     if not allowed or not 1 <= len(value) <= MAX_NAME or value[0] in ".-":
         message = f"{shown(value)} is not a name; 1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
         raise invalid(message)
     if value.endswith(".") or value.partition(".")[0].upper() in DEVICES:
-        message = f"{shown(value)} is not a name: some systems reserve it"
-        raise invalid(message)
+        raise invalid(f"{shown(value)} is not a name: some systems reserve it")
     return value
 
 

@@ -59,15 +59,13 @@ class PairFriction(Table):
     @model_validator(mode="after")
     def _kinetic_said_once(self) -> Self:
         if self.kinetic_ratio is not None and "kinetic" in self.model_fields_set:
-            message = "kinetic and kinetic_ratio mean the same; keep one of the two"
-            raise q.invalid(message, "kinetic_ratio", at="key")
+            raise q.invalid("kinetic and kinetic_ratio mean the same; keep one of the two", "kinetic_ratio", at="key")
         return self
 
     @model_validator(mode="after")
     def _kinetic_not_above_static(self) -> Self:
         if self.kinetic > self.static:
-            message = f"kinetic friction {self.kinetic:g} is above static friction {self.static:g}"
-            raise q.invalid(message, "kinetic")
+            raise q.invalid(f"kinetic friction {self.kinetic:g} is above static friction {self.static:g}", "kinetic")
         return self
 
     @classmethod
@@ -98,8 +96,7 @@ class Restitution(Table):
             return {"block_block": value, "block_ground": value}
         if isinstance(value, Mapping | Restitution):
             return value
-        message = f"{q.shown(value)} is not a restitution; write a number or {{ block_block, block_ground }}"
-        raise q.invalid(message)
+        raise q.invalid(f"{q.shown(value)} is not a restitution; write a number or {{ block_block, block_ground }}")
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -124,8 +121,7 @@ class Pair(Table):
     @model_validator(mode="after")
     def _says_something(self) -> Self:
         if not self.model_fields_set:
-            message = "this pair is empty; give friction, restitution, a stiffness or a damping ratio"
-            raise q.invalid(message)
+            raise q.invalid("this pair is empty; give friction, restitution, a stiffness or a damping ratio")
         return self
 
 

@@ -25,11 +25,9 @@ POSITIVE_SPIN = q.Quantity(q.SPIN, above=0.0)
 def _one_of_two(duration: float | None, speed: float | None, name: str) -> None:
     """Raise a pydantic error unless either a duration or a speed is given."""
     if duration is None and speed is None:
-        message = f"give duration or {name}"
-        raise q.invalid(message)
+        raise q.invalid(f"give duration or {name}")
     if duration is not None and speed is not None:
-        message = f"duration and {name} are both given; keep one of them"
-        raise q.invalid(message, name)
+        raise q.invalid(f"duration and {name} are both given; keep one of them", name)
 
 
 class Ramp(Table):
@@ -77,8 +75,7 @@ class Rotation(Table):
     def _duration_or_spin(self) -> Self:
         _one_of_two(self.duration, self.spin, "spin")
         if self.angle == 0.0:
-            message = "a turn by 0 is none"
-            raise q.invalid(message, "angle")
+            raise q.invalid("a turn by 0 is none", "angle")
         return self
 
     @property

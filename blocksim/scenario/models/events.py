@@ -23,8 +23,7 @@ class NewVelocity(Table):
     @model_validator(mode="after")
     def _says_something(self) -> Self:
         if self.vx is None and self.vy is None and self.spin is None:
-            message = "give vx, vy or spin"
-            raise q.invalid(message)
+            raise q.invalid("give vx, vy or spin")
         return self
 
 
@@ -44,16 +43,13 @@ class Event(Table):
     @model_validator(mode="after")
     def _has_one_moment(self) -> Self:
         if self.at is None and self.when is None:
-            message = 'give a time, such as at = "0.2 s", or when = "rest"'
-            raise q.invalid(message)
+            raise q.invalid('give a time, such as at = "0.2 s", or when = "rest"')
         if self.at is not None and self.when is not None:
-            message = "at and when are both given; keep one of them"
-            raise q.invalid(message, "when")
+            raise q.invalid("at and when are both given; keep one of them", "when")
         return self
 
     @model_validator(mode="after")
     def _does_something(self) -> Self:
         if not any(getattr(self, action) for action in ACTIONS):
-            message = "nothing happens; give remove, fix, free, unload or velocity"
-            raise q.invalid(message)
+            raise q.invalid("nothing happens; give remove, fix, free, unload or velocity")
         return self

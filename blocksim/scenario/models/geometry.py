@@ -58,11 +58,9 @@ class Material(Table):
     @model_validator(mode="after")
     def _one_density(self) -> Self:
         if self.given_density is None and self.unit_weight is None:
-            message = 'the density is missing: give density (such as "2700 kg/m^3") or unit_weight'
-            raise q.invalid(message)
+            raise q.invalid('the density is missing: give density (such as "2700 kg/m^3") or unit_weight')
         if self.given_density is not None and self.unit_weight is not None:
-            message = "density and unit_weight are both given; keep one of them"
-            raise q.invalid(message, "unit_weight")
+            raise q.invalid("density and unit_weight are both given; keep one of them", "unit_weight")
         return self
 
     @model_validator(mode="after")
@@ -154,16 +152,14 @@ class Block(Table):
             if key in foreign:
                 elsewhere = "belongs to a block with an outline or sides"
                 why = elsewhere if shape == "width" else f"has no meaning beside {shape}"
-                message = f"{key} {why}; keep one of them"
-                raise q.invalid(message, key, at="key")
+                raise q.invalid(f"{key} {why}; keep one of them", key, at="key")
         return self
 
     @model_validator(mode="after")
     def _two_sides(self) -> Self:
         if self.along == self.upright:
             others = " or ".join(q.shown(side) for side in SIDES if side != self.upright)
-            message = f"{q.shown(self.upright)} already stands upright; {others} can lie along x"
-            raise q.invalid(message, "along")
+            raise q.invalid(f"{q.shown(self.upright)} already stands upright; {others} can lie along x", "along")
         return self
 
     @model_validator(mode="after")
@@ -243,18 +239,15 @@ class BodySpec(Table):
     @model_validator(mode="after")
     def _fixed_stands_still(self) -> Self:
         if self.fixed and (self.velocity != (0.0, 0.0) or self.spin != 0.0):
-            message = "a fixed body cannot have a velocity or a spin"
-            raise q.invalid(message, "fixed")
+            raise q.invalid("a fixed body cannot have a velocity or a spin", "fixed")
         return self
 
     @model_validator(mode="after")
     def _driven_by_its_motion(self) -> Self:
         if self.motion is not None and self.fixed:
-            message = "a body with a motion is driven, not fixed; remove one of the two"
-            raise q.invalid(message, "fixed")
+            raise q.invalid("a body with a motion is driven, not fixed; remove one of the two", "fixed")
         if self.motion is not None and (self.velocity != (0.0, 0.0) or self.spin != 0.0):
-            message = "velocity and spin of a driven body follow from its motion"
-            raise q.invalid(message, "motion")
+            raise q.invalid("velocity and spin of a driven body follow from its motion", "motion")
         return self
 
 
@@ -287,8 +280,7 @@ class Ground(Table):
         if self.profile is None:
             return self
         if len(self.profile) < 2:
-            message = "a profile needs at least two points [x, y]"
-            raise q.invalid(message, "profile")
+            raise q.invalid("a profile needs at least two points [x, y]", "profile")
         for number, message in _slips(self.profile):
             raise q.invalid(message, "profile", number)
         return self
@@ -306,6 +298,5 @@ class Wall(Table):
     @model_validator(mode="after")
     def _has_a_length(self) -> Self:
         if self.start == self.end:
-            message = "start and end of a wall must differ"
-            raise q.invalid(message, "to")
+            raise q.invalid("start and end of a wall must differ", "to")
         return self

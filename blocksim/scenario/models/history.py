@@ -131,12 +131,10 @@ def refuse_unfit(times: Sequence[float], values: Sequence[float], name: str, *, 
         message = f"{len(times)} times are too few; at least {least} {'is' if least == 1 else 'are'} needed"
         raise q.invalid(message, "times")
     if len(times) != len(values):
-        message = f"{len(values)} {name} for {len(times)} times; every time needs one"
-        raise q.invalid(message, name)
+        raise q.invalid(f"{len(values)} {name} for {len(times)} times; every time needs one", name)
     for number, (one, other) in enumerate(pairwise(times), start=1):
         if other <= one:
-            message = f"{other:g} s comes after {one:g} s; times must increase"
-            raise q.invalid(message, "times", number)
+            raise q.invalid(f"{other:g} s comes after {one:g} s; times must increase", "times", number)
 
 
 def with_samples(value: object, info: ValidationInfo, column: str, key: str) -> object:
@@ -145,8 +143,7 @@ def with_samples(value: object, info: ValidationInfo, column: str, key: str) -> 
         return value
     for other in ("times", key):
         if other in value:
-            message = f"table and {other} are both given; keep one of them"
-            raise q.invalid(message, other)
+            raise q.invalid(f"table and {other} are both given; keep one of them", other)
     path = table_path(value["table"], (info.context or {}).get("folder", ""), "load.csv")
     rows: Any = tuple(zip(*_rows(path, column), strict=True))
     kept = {name: entry for name, entry in value.items() if name != "table"}
@@ -158,8 +155,7 @@ def _rows(path: Path, column: str) -> list[tuple[float, float]]:
     try:
         heads, table = read_open_table(path, MAX_BYTES)
     except BlocksimError as error:
-        message = str(error).splitlines()[0]
-        raise q.invalid(message, "table") from None
+        raise q.invalid(str(error).splitlines()[0], "table") from None
     names = [head.text for head in heads]
     if sorted(names) != sorted((TIME, column)):
         raise _mistake(path, table.header.number, f"the columns are {','.join(names)}; {TIME},{column} are needed")

@@ -81,14 +81,11 @@ class Pressure(VaryingLoad):
     @model_validator(mode="after")
     def _one_pressure(self) -> Self:
         if self.magnitude is None and self.water_level is None:
-            message = 'the pressure is missing: give magnitude (such as "10 kPa") or water_level'
-            raise q.invalid(message)
+            raise q.invalid('the pressure is missing: give magnitude (such as "10 kPa") or water_level')
         if self.magnitude is not None and self.water_level is not None:
-            message = "magnitude and water_level are both given; keep one of them"
-            raise q.invalid(message, "water_level")
+            raise q.invalid("magnitude and water_level are both given; keep one of them", "water_level")
         if self.magnitude is not None and "unit_weight" in self.model_fields_set and self.unit_weight != WATER:
-            message = "a uniform pressure has no unit weight, which belongs to water_level"
-            raise q.invalid(message, "unit_weight")
+            raise q.invalid("a uniform pressure has no unit weight, which belongs to water_level", "unit_weight")
         return self
 
 
@@ -134,14 +131,12 @@ class Gravity(Load):
         given = [key for key, value in {**turns, "from": self.first}.items() if value is not None]
         if self.times or self.tilts:
             if given:
-                message = f"{given[0]} and samples of the tilt are both given; keep one of them"
-                raise q.invalid(message, given[0])
+                raise q.invalid(f"{given[0]} and samples of the tilt are both given; keep one of them", given[0])
             refuse_unfit(self.times, self.tilts, "tilts", least=2)
             return self
         for key, value in turns.items():
             if value is None:
-                message = f'{key} is missing: give to and rate (such as "0.1 deg/s"), or a table'
-                raise q.invalid(message)
+                raise q.invalid(f'{key} is missing: give to and rate (such as "0.1 deg/s"), or a table')
         return self
 
     def stretches_from(self, tilt: float) -> tuple[Stretch, ...]:

@@ -82,8 +82,7 @@ class Harmonic(Table):
     @model_validator(mode="after")
     def _room_for_ramps(self) -> Self:
         if self.duration is not None and self.duration < 2.0 * self.resolved_ramp:
-            message = f"{self.duration:g} s is too short for two ramps of {self.resolved_ramp:g} s"
-            raise q.invalid(message, "duration")
+            raise q.invalid(f"{self.duration:g} s is too short for two ramps of {self.resolved_ramp:g} s", "duration")
         return self
 
 
@@ -115,8 +114,7 @@ def content_of(path: Path) -> bytes:
     try:
         return read_limited(path, MAX_BYTES, links=True)
     except BlocksimError as error:
-        message = str(error).removeprefix(f"{path}: ")
-        raise MotionTableError(message) from None
+        raise MotionTableError(str(error).removeprefix(f"{path}: ")) from None
 
 
 def read_motion_table(path: Path) -> MotionTable:
@@ -125,14 +123,12 @@ def read_motion_table(path: Path) -> MotionTable:
     try:
         lines = bare_rows(content)
     except UnicodeDecodeError:
-        message = "not a text file in UTF-8"
-        raise MotionTableError(message) from None
+        raise MotionTableError("not a text file in UTF-8") from None
     column = _columns(lines)
     quantity, unit = COLUMNS[column[1 - column.index(TIME)]]
     rows = list(_samples(lines[1:], column.index(TIME)))
     if len(rows) < LEAST_ROWS or len(rows) > MAX_ROWS:
-        message = f"{len(rows)} lines with samples; {LEAST_ROWS} to {MAX_ROWS} are allowed"
-        raise MotionTableError(message)
+        raise MotionTableError(f"{len(rows)} lines with samples; {LEAST_ROWS} to {MAX_ROWS} are allowed")
     times, values = zip(*rows, strict=True)
     return MotionTable(path, quantity, times, tuple(unit * value for value in values), content)
 
@@ -143,8 +139,7 @@ def _columns(lines: Sequence[tuple[int, list[str]]]) -> list[str]:
     if len(names) != 2 or len(others) != 1 or others[0] not in COLUMNS:
         found = ",".join(names)
         if ";" in found:
-            message = f"line {number}: {q.shown(found)}: columns are separated by semicolons; {DIALECT}"
-            raise MotionTableError(message)
+            raise MotionTableError(f"line {number}: {q.shown(found)}: columns are separated by semicolons; {DIALECT}")
         message = f"line {number}: the columns are {q.shown(found)}; {TIME} and one of {', '.join(COLUMNS)} are needed"
         raise MotionTableError(message)
     return names
@@ -156,14 +151,12 @@ def _samples(lines: Sequence[tuple[int, list[str]]], first: int) -> Iterator[tup
     for number, cells in lines:
         if len(cells) != 2:
             hint = f"; {DIALECT}" if len(cells) > 2 or any(";" in cell for cell in cells) else ""
-            message = f"line {number}: {q.shown(','.join(cells))}: a time and a value are needed{hint}"
-            raise MotionTableError(message)
+            raise MotionTableError(f"line {number}: {q.shown(','.join(cells))}: a time and a value are needed{hint}")
         time, value = (_number(number, cells[place]) for place in (first, 1 - first))
         if time < 0.0 or time <= before:
             why = "times must not be negative" if time < 0.0 else f"times must increase, the one before is {before:g} s"
             why = "the time of the line before is repeated" if time == before else why
-            message = f"line {number}: time {time:g} s: {why}"
-            raise MotionTableError(message)
+            raise MotionTableError(f"line {number}: time {time:g} s: {why}")
         before = time
         yield time, value
 
@@ -174,8 +167,7 @@ def _number(line: int, text: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        message = f"line {line}: {q.shown(text)} is not a finite number"
-        raise MotionTableError(message)
+        raise MotionTableError(f"line {line}: {q.shown(text)} is not a finite number")
     return number
 
 
@@ -192,8 +184,7 @@ def table_from(
     try:
         return read(path)
     except MotionTableError as error:
-        message = f"{path.name}: {error}"
-        raise q.invalid(message) from None
+        raise q.invalid(f"{path.name}: {error}") from None
 
 
 def _table(value: object, info: ValidationInfo) -> MotionTable:

@@ -16,8 +16,7 @@ def _every(value: object) -> object:
     if value == STEP:
         return value
     if isinstance(value, str) and not any(c.isdigit() for c in value):
-        message = f'{q.shown(value)} is not a time between samples; use "step" or {_TIME.wanted}'
-        raise q.invalid(message)
+        raise q.invalid(f'{q.shown(value)} is not a time between samples; use "step" or {_TIME.wanted}')
     return _TIME.read(value)
 
 
@@ -27,8 +26,7 @@ Every = Annotated[float | Literal["step"], q.TIME, BeforeValidator(_every), With
 
 def _two(value: object) -> object:
     if isinstance(value, list | tuple) and len(value) != TWO:
-        message = f'{len(value)} bodies do not make a joint; two are needed, such as ["1", "2"]'
-        raise q.invalid(message)
+        raise q.invalid(f'{len(value)} bodies do not make a joint; two are needed, such as ["1", "2"]')
     return value
 
 

@@ -75,8 +75,7 @@ class Pulse(Table):
     def _one_of_two(self) -> Self:
         if (self.frequency is None) == (self.duration is None):
             found = "neither is" if self.frequency is None else "both are"
-            message = f"frequency or duration is needed; {found} given"
-            raise q.invalid(message, "duration")
+            raise q.invalid(f"frequency or duration is needed; {found} given", "duration")
         if self.shape in SINGLE and self.cycles != 1.0:
             message = f'shape {q.shown(self.shape)} is a single half cycle; cycles belongs to "sine" and "cosine"'
             raise q.invalid(message, "cycles")

@@ -55,19 +55,15 @@ class Record(Table):
     def _has_one_unit(self) -> Self:
         name, said = self.table.path.name, self.table.unit
         if said is None and self.unit is None:
-            message = f'{name} does not say its unit; write unit = "g", "m/s^2" or "cm/s^2"'
-            raise q.invalid(message, "table")
+            raise q.invalid(f'{name} does not say its unit; write unit = "g", "m/s^2" or "cm/s^2"', "table")
         if said is not None and self.unit not in (None, said):
-            message = f"{q.shown(self.unit)}: {name} says {said}"
-            raise q.invalid(message, "unit")
+            raise q.invalid(f"{q.shown(self.unit)}: {name} says {said}", "unit")
         return self
 
     @model_validator(mode="after")
     def _has_one_scale(self) -> Self:
         if self.pga is not None and self.scale != 1.0:
-            message = "scale and pga are both given; one of them decides the accelerations"
-            raise q.invalid(message, "pga")
+            raise q.invalid("scale and pga are both given; one of them decides the accelerations", "pga")
         if self.pga is not None and not any(self.table.values):
-            message = f"{self.table.path.name} is zero throughout; it cannot be scaled"
-            raise q.invalid(message, "pga")
+            raise q.invalid(f"{self.table.path.name} is zero throughout; it cannot be scaled", "pga")
         return self

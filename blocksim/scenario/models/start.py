@@ -32,9 +32,7 @@ class Start(Table):
     @model_validator(mode="after")
     def _holds_while_it_settles(self) -> Self:
         if self.hold and not self.settle:
-            message = "nothing is held without settle = true"
-            raise q.invalid(message, "hold")
+            raise q.invalid("nothing is held without settle = true", "hold")
         if self.release != "at rest" and not self.settle:
-            message = "all is released at once without settle = true"
-            raise q.invalid(message, "release")
+            raise q.invalid("all is released at once without settle = true", "release")
         return self

@@ -36,8 +36,7 @@ def _step(value: object) -> object:
     if isinstance(value, str) and not any(c.isdigit() for c in value):
         if value == "auto":
             return value
-        message = f'{q.shown(value)} is not a time step; use "auto" or {_STEP.wanted}'
-        raise q.invalid(message)
+        raise q.invalid(f'{q.shown(value)} is not a time step; use "auto" or {_STEP.wanted}')
     return _STEP.read(value)
 
 

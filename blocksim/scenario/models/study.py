@@ -60,12 +60,10 @@ class _Slip:
 def _variation(value: object, info: ValidationInfo) -> Variation:
     """Read what the mode allows; where the mode itself is wrong, anything that some mode allows."""
     if isinstance(value, _Slip):
-        message = f"unknown key, did you mean {value.meant!r}?"
-        raise q.invalid(message, at="key")
+        raise q.invalid(f"unknown key, did you mean {value.meant!r}?", at="key")
     mode = info.data.get("mode")
     if mode == "table":
-        message = 'mode "table" takes keys and values from its table'
-        raise q.invalid(message, at="key")
+        raise q.invalid('mode "table" takes keys and values from its table', at="key")
     if mode is None:
         return read_any(value)
     return read_sampled(value) if mode in SAMPLED else read_spread(value)
@@ -122,8 +120,7 @@ class Sweep(Table):
         own = {key: entry for key, entry in value.items() if key in OWN_KEYS}
         keys = {key: _Slip(meant) if (meant := slip_of(key)) else value[key] for key in value if key not in own}
         if not keys and own.get("mode") != "table":
-            message = 'nothing to vary; add a line such as "contact.stiffness_scale" = [0.1, 1.0]'
-            raise q.invalid(message)
+            raise q.invalid('nothing to vary; add a line such as "contact.stiffness_scale" = [0.1, 1.0]')
         return {**own, "vary": keys}
 
     @model_validator(mode="after")
@@ -138,8 +135,7 @@ class Sweep(Table):
     @model_validator(mode="after")
     def _names_its_table(self) -> Self:
         if self.mode == "table" and self.table is None:
-            message = 'mode "table" needs the path of a table, as in table = "samples.csv"'
-            raise q.invalid(message, "mode")
+            raise q.invalid('mode "table" needs the path of a table, as in table = "samples.csv"', "mode")
         return self
 
     @property

@@ -103,8 +103,7 @@ def read_sampled(value: object) -> Variation:
     if not isinstance(value, Mapping):
         return _levels(value, "{ from, to } or { mean, sd }")
     if "count" in value:
-        message = 'count belongs to the modes "grid" and "list"; here `samples` sets the number'
-        raise q.invalid(message, "count")
+        raise q.invalid('count belongs to the modes "grid" and "list"; here `samples` sets the number', "count")
     if "mean" in value or "sd" in value:
         return _normal(value)
     return _uniform(value)
@@ -119,11 +118,9 @@ def read_any(value: object) -> Variation:
 
 def _levels(value: object, tables: str) -> tuple[Any, ...]:
     if not isinstance(value, list | tuple):
-        message = f"{q.shown(value)} is not a variation; write a list or {tables}, and the key in quotes"
-        raise q.invalid(message)
+        raise q.invalid(f"{q.shown(value)} is not a variation; write a list or {tables}, and the key in quotes")
     if not value:
-        message = "the list of values is empty"
-        raise q.invalid(message)
+        raise q.invalid("the list of values is empty")
     return tuple(value)
 
 
@@ -145,12 +142,10 @@ def _refuse_slips(value: Mapping[str, Any], known: tuple[str, ...], needed: tupl
         if key not in known:
             meant = nearest(str(key), known, most=2)
             hint = f"did you mean {meant!r}?" if meant else f"allowed are: {', '.join(known)}"
-            message = f"unknown key {q.shown(key)}, {hint}"
-            raise q.invalid(message)
+            raise q.invalid(f"unknown key {q.shown(key)}, {hint}")
     missing = [key for key in needed if key not in value]
     if missing:
-        message = f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
-        raise q.invalid(message)
+        raise q.invalid(f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing")
 
 
 def _spread(value: Mapping[str, Any]) -> tuple[object, ...]:
@@ -160,8 +155,7 @@ def _spread(value: Mapping[str, Any]) -> tuple[object, ...]:
     """
     count = value["count"]
     if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MAX_VALUES:
-        message = f"count {q.shown(count)} is not a whole number from 2 to {MAX_VALUES}"
-        raise q.invalid(message)
+        raise q.invalid(f"count {q.shown(count)} is not a whole number from 2 to {MAX_VALUES}")
     (first, last), angle = _numbers(value, "from", "to")
     scale = _scale(value, first, last)
     steps = (i / (count - 1) for i in range(1, count - 1))
@@ -201,8 +195,7 @@ def _normal(value: Mapping[str, Any]) -> Normal:
     bounds = [name for name in ("from", "to") if name in value]
     (mean, sd, *given), angle = _numbers(value, "mean", "sd", *bounds)
     if sd <= 0.0:
-        message = f"the standard deviation {q.shown(value['sd'])} is not above 0"
-        raise q.invalid(message, "sd")
+        raise q.invalid(f"the standard deviation {q.shown(value['sd'])} is not above 0", "sd")
     ends = dict(zip(bounds, given, strict=True))
     low, high = ends.get("from", -math.inf), ends.get("to", math.inf)
     if len(bounds) == 2:
@@ -215,16 +208,14 @@ def _normal(value: Mapping[str, Any]) -> Normal:
 
 def _refuse_empty(value: Mapping[str, Any], low: float, high: float) -> None:
     if low >= high:
-        message = f"from = {q.shown(value['from'])} is not below to = {q.shown(value['to'])}"
-        raise q.invalid(message, "from")
+        raise q.invalid(f"from = {q.shown(value['from'])} is not below to = {q.shown(value['to'])}", "from")
 
 
 def _scale(value: Mapping[str, Any], low: float, high: float) -> Scale:
     scale = value.get("scale", "linear")
     OneOf(("linear", "log")).read(scale)
     if scale == "log" and not (low > 0.0 and high > 0.0):
-        message = 'scale = "log" needs from and to above 0'
-        raise q.invalid(message, "scale")
+        raise q.invalid('scale = "log" needs from and to above 0', "scale")
     return "log" if scale == "log" else "linear"
 
 
@@ -234,8 +225,7 @@ def _numbers(value: Mapping[str, Any], *names: str) -> tuple[list[float], bool]:
     kinds = {dimension for number, dimension in ends if number != 0.0 or dimension != units.NUMBER}
     if len(kinds) > 1:
         *others, last = (f"{name} {q.shown(value[name])}" for name in names)
-        message = f"{', '.join(others)} and {last} are not of one kind"
-        raise q.invalid(message)
+        raise q.invalid(f"{', '.join(others)} and {last} are not of one kind")
     return [number for number, _ in ends], units.ANGLE in kinds
 
 
@@ -245,8 +235,7 @@ def _end(value: object) -> tuple[float, units.Dimension]:
     try:
         return q.parse_quantity(value, q.LENGTH)
     except ValueError as error:
-        message = f"{q.shown(value)}: {error}"
-        raise q.invalid(message) from None
+        raise q.invalid(f"{q.shown(value)}: {error}") from None
 
 
 _END: dict[str, Any] = {"type": ["number", "string"]}

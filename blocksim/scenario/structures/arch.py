@@ -40,11 +40,9 @@ class Arch(Shaped):
     @model_validator(mode="after")
     def _one_size(self) -> Self:
         if self.radius is None and self.span is None:
-            message = "the size is missing: give radius (of the middle of the ring) or span"
-            raise q.invalid(message)
+            raise q.invalid("the size is missing: give radius (of the middle of the ring) or span")
         if self.radius is not None and self.span is not None:
-            message = "radius and span are both given; keep one of them"
-            raise q.invalid(message, "span")
+            raise q.invalid("radius and span are both given; keep one of them", "span")
         if self.mean_radius <= 0.5 * self.thickness:
             message = f"a ring of {1e3 * self.thickness:g} mm needs a mean radius of more than half of that"
             raise q.invalid(message, "thickness")

@@ -92,8 +92,7 @@ class Courses(Structure):
     @model_validator(mode="after")
     def _not_too_many(self) -> Self:
         if self.size > MAX_BLOCKS:
-            message = f"{self.size} blocks are too many; a structure has at most {MAX_BLOCKS}"
-            raise q.invalid(message, "rows")
+            raise q.invalid(f"{self.size} blocks are too many; a structure has at most {MAX_BLOCKS}", "rows")
         return self
 
 

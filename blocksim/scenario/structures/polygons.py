@@ -64,12 +64,10 @@ class Polygons(Shaped):
         try:
             drawn = read_drawing(path)
         except DrawingError as error:
-            message = f"{path.name}: {error}"
-            raise q.invalid(message, "table") from None
+            raise q.invalid(f"{path.name}: {error}", "table") from None
         for one in drawn:
             if "material" in one.properties and "block" not in one.properties:
-                message = f"{path.name}: {one.name}: material is not read; name a block, which has one"
-                raise q.invalid(message, "table")
+                raise q.invalid(f"{path.name}: {one.name}: material is not read; name a block, which has one", "table")
         others = {key: value for key, value in data.items() if key not in ("table", "unit")}
         return {**others, "cells": tuple(_table(one, unit) for one in drawn)}
 

@@ -49,11 +49,9 @@ class Rubble(Shaped):
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if self.smallest > self.largest:
-            message = f"the smallest size is above the largest, {1e3 * self.largest:g} mm"
-            raise q.invalid(message, "smallest")
+            raise q.invalid(f"the smallest size is above the largest, {1e3 * self.largest:g} mm", "smallest")
         if self.fewest_sides > self.most_sides:
-            message = f"the least number of sides is above the most, {self.most_sides}"
-            raise q.invalid(message, "fewest_sides")
+            raise q.invalid(f"the least number of sides is above the most, {self.most_sides}", "fewest_sides")
         return self
 
     @property

@@ -53,11 +53,9 @@ class Voronoi(Shaped):
     def _one_region(self) -> Self:
         sides = (self.width, self.tall)
         if self.region is None and None in sides:
-            message = "the size is missing: give width and height of a wall, or region"
-            raise q.invalid(message)
+            raise q.invalid("the size is missing: give width and height of a wall, or region")
         if self.region is not None and sides != (None, None):
-            message = "region and the sides of a wall are both given; keep one of them"
-            raise q.invalid(message, "region")
+            raise q.invalid("region and the sides of a wall are both given; keep one of them", "region")
         for number, message in outlines.faults(self.region) if self.region is not None else ():
             raise q.invalid(message, "region", *(() if number is None else (number,)))
         return self

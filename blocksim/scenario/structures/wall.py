@@ -19,8 +19,7 @@ PLACE = 2  # numbers of the position of a hole
 
 def _hole(value: object) -> object:
     if not isinstance(value, list | tuple) or len(value) != PLACE:
-        message = f"{q.shown(value)} is not a hole; write [row, column], counted from 1 at the lower left"
-        raise q.invalid(message)
+        raise q.invalid(f"{q.shown(value)} is not a hole; write [row, column], counted from 1 at the lower left")
     return value
 
 
@@ -58,8 +57,7 @@ class BlockWall(Courses):
                 message = f"[{row}, {column}] is outside a wall of {self.rows} rows and {self.columns} columns"
                 raise q.invalid(message, "holes", number)
             if (row, column) in seen:
-                message = f"[{row}, {column}] is left out twice"
-                raise q.invalid(message, "holes", number)
+                raise q.invalid(f"[{row}, {column}] is left out twice", "holes", number)
             seen.add((row, column))
         return self
 
