@@ -1,6 +1,6 @@
 """Everything that must hold before a scenario may be used."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple, get_args
@@ -63,39 +63,33 @@ def _sweep(data: Data, folder: Path) -> Iterator[Finding]:
     trial = _trial(data, folder)
     mode = {"mode": sweep["mode"]} if sweep.get("mode") in MODES else {}
     for key, values in sweep.items():
-        if key not in OWN_KEYS and _is_variation({**mode, key: values}):
+        try:
+            Sweep.model_validate({**mode, key: values})
+        except ValidationError:
+            continue
+        if key not in OWN_KEYS:
             yield from islice(_varied(trial, str(key), values), 1)
-    yield from _varied_twice(sweep)
-
-
-def _varied_twice(sweep: Data) -> Iterator[Finding]:
-    """Find keys that are varied together with the other way to write the same thing."""
-    for key in sweep:
-        table, dot, word = str(key).rpartition(".")
+    for key in map(str, sweep):
+        table, dot, word = key.rpartition(".")
         synonym = f"{table}{dot}{SYNONYMS.get(word, word)}"
         if word == "kinetic_ratio" and synonym in sweep:
             message = f"{synonym}, which means the same, is varied too; keep one of the two"
             yield Finding(("sweep", key), message, at="key")
 
 
-def _is_variation(sweep: Mapping[str, object]) -> bool:
-    try:
-        Sweep.model_validate(sweep)
-    except ValidationError:
-        return False
-    return True
-
-
 def _varied(trial: Trial, key: str, values: object) -> Iterator[Finding]:
-    """Yield the mistakes in a swept key, then in its values."""
-    place: keys.KeyPath = ("sweep", key)
+    """Yield the mistakes in a swept key, then in its values as written, so that their dimension is checked too."""
     complaint = unfit_to_vary(key)
     if complaint:
-        yield Finding(place, complaint, at="key")
+        yield Finding(("sweep", key), complaint, at="key")
         return
-    path = keys.parse_key(key)
-    for part, value in _given(values):
-        yield from _tried(trial, path, value, (*place, part))
+    parts: Iterable[tuple[str | int, object]] = ()
+    if isinstance(values, Mapping):
+        parts = ((end, values[end]) for end in ENDS if end in values)
+    elif isinstance(values, tuple):
+        parts = enumerate(values[:MAX_TRIED])
+    for part, value in parts:
+        yield from _tried(trial, keys.parse_key(key), value, ("sweep", key, part))
 
 
 def unfit_to_vary(key: str) -> str:
@@ -105,14 +99,6 @@ def unfit_to_vary(key: str) -> str:
     except ValueError:
         return f"{shown(key)} is not a dotted key"
     return f"{first} cannot be varied" if first in UNVARIED else ""
-
-
-def _given(values: object) -> Iterator[tuple[str | int, object]]:
-    """Yield the values of a variation as they are written, so that their dimension is checked too."""
-    if isinstance(values, Mapping):
-        yield from ((end, values[end]) for end in ENDS if end in values)
-    elif isinstance(values, tuple):
-        yield from enumerate(values[:MAX_TRIED])
 
 
 def mistakes_of_value(data: Data, folder: Path, key: str, value: object) -> list[Finding]:

@@ -31,16 +31,12 @@ def wrong_names(data: Data) -> Iterator[Finding]:
     for name in blocks if isinstance(blocks, Mapping) else ():
         yield from _unknown(data, ("blocks", name, "material"), "materials")
     yield from _unknown(data, ("ground", "material"), "materials")
-    yield from _in_list(data, "walls", "material", "materials")
-    for group in BLOCKS_BY_NAME:
-        yield from _in_list(data, group, "block", "blocks")
+    named = (("walls", "material", "materials"), *((group, "block", "blocks") for group in BLOCKS_BY_NAME))
+    for group, key, kind in named:
+        entries = data.get(group)
+        for index in range(len(entries) if isinstance(entries, tuple) else 0):
+            yield from _unknown(data, (group, index, key), kind)
     yield from _wrong_pairs(data)
-
-
-def _in_list(data: Data, group: str, key: str, named: str) -> Iterator[Finding]:
-    entries = data.get(group)
-    for index in range(len(entries) if isinstance(entries, tuple) else 0):
-        yield from _unknown(data, (group, index, key), named)
 
 
 def _unknown(data: Data, path: keys.KeyPath, group: str) -> Iterator[Finding]:
@@ -59,37 +55,25 @@ def _wrong_pairs(data: Data) -> Iterator[Finding]:
         yield Finding(("materials", GROUND), message, at="key")
     found: set[frozenset[str]] = set()
     for one, partners in pairs.items() if isinstance(pairs, Mapping) else ():
-        yield from _unknown_material(("pairs", one), one, known)
+        if known and one not in known:
+            yield Finding(
+                ("pairs", one), f"unknown material {shown(one)}, {did_you_mean_or_list(one, known)}", at="key"
+            )
+        missing = f"name the other material too, as in [{keys.format_key(('pairs', one, GROUND))}]"
         if partners == {}:
-            yield Finding(("pairs", one), _one_material(one), at="key")
+            yield Finding(("pairs", one), missing, at="key")
         for other in partners if isinstance(partners, Mapping) else ():
-            yield from _wrong_partner(one, other, known)
-            yield from _wrong_pair(one, other, found)
+            path = ("pairs", one, other)
+            if other in Pair.model_fields and other not in known:
+                yield Finding(path, missing, at="key")
+            elif known and other not in known:
+                yield Finding(path, f"unknown material {shown(other)}, {did_you_mean_or_list(other, known)}", at="key")
+            if one == other == GROUND:
+                yield Finding(path, "the ground is not in contact with itself", at="key")
+            elif frozenset((one, other)) in found:
+                twin = keys.format_key(("pairs", other, one))
+                yield Finding(path, f"the same pair is given as {twin}; keep one of the two", at="key")
             found.add(frozenset((one, other)))
-
-
-def _unknown_material(path: keys.KeyPath, name: str, known: list[str]) -> Iterator[Finding]:
-    if known and name not in known:
-        yield Finding(path, f"unknown material {shown(name)}, {did_you_mean_or_list(name, known)}", at="key")
-
-
-def _wrong_partner(one: str, other: str, known: list[str]) -> Iterator[Finding]:
-    if other in Pair.model_fields and other not in known:
-        yield Finding(("pairs", one, other), _one_material(one), at="key")
-    else:
-        yield from _unknown_material(("pairs", one, other), other, known)
-
-
-def _one_material(one: str) -> str:
-    return f"name the other material too, as in [{keys.format_key(('pairs', one, GROUND))}]"
-
-
-def _wrong_pair(one: str, other: str, found: set[frozenset[str]]) -> Iterator[Finding]:
-    if one == other == GROUND:
-        yield Finding(("pairs", one, other), "the ground is not in contact with itself", at="key")
-    elif frozenset((one, other)) in found:
-        twin = keys.format_key(("pairs", other, one))
-        yield Finding(("pairs", one, other), f"the same pair is given as {twin}; keep one of the two", at="key")
 
 
 def unfit_choices(scenario: Scenario) -> Iterator[Finding]:
@@ -104,36 +88,26 @@ def unfit_choices(scenario: Scenario) -> Iterator[Finding]:
     if scenario.start.settle and scenario.systems:
         message = f"{', '.join(scenario.systems)} cannot settle: blocks and supports alone can"
         yield Finding(("start", "settle"), message, relation=True)
-    yield from _unmodelled_outlines(scenario)
-    if not isinstance(scenario.time, Nonsmooth):
-        return
-    for name in SPRING_CHOICES:
-        chosen = getattr(scenario.contact, name)
-        usual = Contact.model_fields[name].default
-        if chosen != usual:
-            message = f'{shown(chosen)} needs springs, time.scheme = "explicit"; here contacts are rigid'
-            yield Finding(("contact", name), message, relation=True)
-
-
-def _unmodelled_outlines(scenario: Scenario) -> Iterator[Finding]:
-    message = _why_without_outlines(scenario)
-    if not message:
-        return
+    why = _why_without_outlines(scenario)
     for name, block in scenario.blocks.items():
-        if block.polygon:
+        if why and block.polygon:
             key = "outline" if block.outline is not None else "sides"
-            yield Finding(("blocks", name, key), message, at="key", relation=True)
+            yield Finding(("blocks", name, key), why, at="key", relation=True)
     for number, structure in enumerate(scenario.structures):
-        if isinstance(structure, Shaped):
-            yield Finding(("structures", number, "kind"), message, relation=True)
+        if why and isinstance(structure, Shaped):
+            yield Finding(("structures", number, "kind"), why, relation=True)
+    for key in SPRING_CHOICES if isinstance(scenario.time, Nonsmooth) else ():
+        chosen = getattr(scenario.contact, key)
+        if chosen != Contact.model_fields[key].default:
+            message = f'{shown(chosen)} needs springs, time.scheme = "explicit"; here contacts are rigid'
+            yield Finding(("contact", key), message, relation=True)
 
 
 def _why_without_outlines(scenario: Scenario) -> str:
     """Return why no block of a scenario can have an outline; nothing where blocks can."""
     scheme, model = scenario.time.scheme, scenario.contact.model
     if (scheme, model) not in WITH_OUTLINES:
-        boundary = "its boundary particles lie on rectangles only"
-        why = f": {boundary}" if scheme == "explicit" else ""
+        why = ": its boundary particles lie on rectangles only" if scheme == "explicit" else ""
         modelled = " or ".join(f"{shown(one)} and {shown(other)}" for one, other in sorted(WITH_OUTLINES))
         where = f"with time.scheme = {shown(scheme)} and contact.model = {shown(model)}"
         return f"outlines are not modelled {where}{why}; use {modelled}"

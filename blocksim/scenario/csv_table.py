@@ -4,7 +4,6 @@ Tables of measurements, properties, cases and runs are read with the place of ea
 have half a million lines, as bare rows. Tables that blocksim itself has written are read where they are written.
 """
 
-import difflib
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +12,7 @@ from typing import NoReturn
 
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
 from blocksim.scenario.bounded_read import is_folder, read_head
-from blocksim.scenario.spelling import suggestion
+from blocksim.scenario.spelling import nearest, suggestion
 
 LARGEST_FILE = 1_000_000  # bytes
 LONGEST_LINE = 1_000  # characters
@@ -89,12 +88,26 @@ def read_table(path: Path, columns: Sequence[str]) -> Table:
     wrong.
     """
     notes, content = _content(_lines(path))
+    needed = f"its first line must be {','.join(columns)}"
     if not content:
-        raise_problems([Problem(where=str(path), message=f"the table is empty, {_expected(columns)}")])
-    _refuse_semicolons(content[0])
-    names, problems = _header(content[0], columns)
-    table = Table(where=str(path), notes=notes, header=content[0], problems=problems)
-    return _filled(table, names, content[1:])
+        raise_problems([Problem(where=str(path), message=f"the table is empty, {needed}")])
+    line, heads = content[0], _header(content[0])
+    names = [head.text for head in heads]
+    problems = []
+    for index, head in enumerate(heads):
+        if head.text in names[:index]:
+            problems.append(line.problem("column given twice", head.text, head.start, head.length))
+        elif head.text not in columns:
+            message = f"unknown column, {suggestion(head.text, columns)}"
+            problems.append(line.problem(message, head.text, head.start, head.length))
+    missing = [column for column in columns if column not in names]
+    if missing:
+        plural = "s" if len(missing) > 1 else ""
+        problems.append(line.problem(f"missing column{plural} {', '.join(missing)}; {needed}"))
+    meant = [name if name in columns else nearest(name, missing, most=len(name)) or name for name in names]
+    if sorted(meant) != sorted(columns):
+        raise_problems(problems)
+    return _filled(Table(where=str(path), notes=notes, header=line, problems=problems), meant, content[1:])
 
 
 def read_open_table(path: Path, limit: int) -> tuple[tuple[Cell, ...], Table]:
@@ -105,12 +118,7 @@ def read_open_table(path: Path, limit: int) -> tuple[tuple[Cell, ...], Table]:
     notes, content = _content(_lines(path, limit))
     if not content:
         raise_problems([Problem(where=str(path), message="the table is empty")])
-    line = content[0]
-    _refuse_semicolons(line)
-    places = _cells(line)
-    if places is None:
-        raise_problems([line.problem(_shape_complaint(line, places, 0))])
-    heads = tuple(Cell("", *place) for place in places)
+    heads = _header(content[0])
     names = [head.text for head in heads]
     problems = [
         head.problem("column given twice" if head.text else "this column has no name")
@@ -119,7 +127,7 @@ def read_open_table(path: Path, limit: int) -> tuple[tuple[Cell, ...], Table]:
     ]
     if problems:
         raise_problems(problems)
-    return heads, _filled(Table(where=str(path), notes=notes, header=line), names, content[1:])
+    return heads, _filled(Table(where=str(path), notes=notes, header=content[0]), names, content[1:])
 
 
 def bare_rows(content: bytes) -> list[tuple[int, list[str]]]:
@@ -161,16 +169,10 @@ def raise_problems(problems: Sequence[Problem]) -> NoReturn:
 
 
 def _lines(path: Path, limit: int = LARGEST_FILE) -> list[Line]:
-    return [Line(str(path), number, _printable(line)) for number, line in _numbered(_text(path, limit))]
-
-
-def _numbered(text: str) -> Iterator[tuple[int, str]]:
-    """Yield number (from 1) and text of every line, whatever system wrote it."""
-    return enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1)
-
-
-def _text(path: Path, limit: int) -> str:
-    raw = _bytes(path, limit)
+    """Return all lines; tabs and control characters, which shift a caret or steer a terminal, become blanks."""
+    if is_folder(path):
+        raise InputMissingError(Problem(str(path), "is a folder, not a table").render())
+    raw = read_head(path, limit + 1, links=True)
     if len(raw) > limit:
         raise_problems([Problem(str(path), f"the file is too large for a table; the limit is {limit} bytes")])
     try:
@@ -179,18 +181,15 @@ def _text(path: Path, limit: int) -> str:
         text = "\0"
     if "\0" in text:
         raise_problems([Problem(str(path), "not a text file (a table is UTF-8 text)")])
-    return text
+    return [
+        Line(str(path), number, "".join(letter if letter.isprintable() else " " for letter in line))
+        for number, line in _numbered(text)
+    ]
 
 
-def _bytes(path: Path, limit: int) -> bytes:
-    if is_folder(path):
-        raise InputMissingError(Problem(str(path), "is a folder, not a table").render())
-    return read_head(path, limit + 1, links=True)
-
-
-def _printable(line: str) -> str:
-    """Turn tabs and control characters into blanks: they would shift the caret or steer a terminal."""
-    return "".join(character if character.isprintable() else " " for character in line)
+def _numbered(text: str) -> Iterator[tuple[int, str]]:
+    """Yield number (from 1) and text of every line, whatever system wrote it."""
+    return enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1)
 
 
 def _is_comment(line: str) -> bool:
@@ -227,44 +226,14 @@ def _shape_complaint(line: Line, cells: list[tuple[str, Line, int, int]] | None,
     return ""
 
 
-def _refuse_semicolons(header: Line) -> None:
-    """Raise InvalidInputError for a table as spreadsheets write it where decimals have a comma."""
-    if ";" in header.text and "," not in header.text:
-        raise_problems([header.problem(f"columns are separated by semicolons; {DIALECT}")])
+def _header(line: Line) -> tuple[Cell, ...]:
+    """Return the cells of the line with the names of columns.
 
-
-def _header(line: Line, columns: Sequence[str]) -> tuple[list[str], list[Problem]]:
-    """Return the column names as meant, in the file's order, and the mistakes in them.
-
-    Raises InvalidInputError where they are not the expected columns.
+    Raises InvalidInputError where they cannot be told apart, as in spreadsheets' tables where decimals have a comma.
     """
-    cells = _cells(line)
-    if cells is None:
-        raise_problems([line.problem(_shape_complaint(line, cells, 0))])
-    names = [text for text, *_ in cells]
-    problems = [
-        line.problem(_column_complaint(text, names[:index], columns), text, start, length)
-        for index, (text, _, start, length) in enumerate(cells)
-        if text not in columns or text in names[:index]
-    ]
-    missing = [column for column in columns if column not in names]
-    if missing:
-        plural = "s" if len(missing) > 1 else ""
-        problems.append(line.problem(f"missing column{plural} {', '.join(missing)}; {_expected(columns)}"))
-    meant = [name if name in columns else _meant(name, missing) for name in names]
-    if sorted(meant) != sorted(columns):
-        raise_problems(problems)
-    return meant, problems
-
-
-def _meant(name: str, missing: Sequence[str]) -> str:
-    """Return the missing column of which a name is a misspelling, or the name."""
-    return next(iter(difflib.get_close_matches(name.lower(), missing, n=1)), name)
-
-
-def _column_complaint(name: str, before: Sequence[str], columns: Sequence[str]) -> str:
-    return "column given twice" if name in before else f"unknown column, {suggestion(name, columns)}"
-
-
-def _expected(columns: Sequence[str]) -> str:
-    return f"its first line must be {','.join(columns)}"
+    if ";" in line.text and "," not in line.text:
+        raise_problems([line.problem(f"columns are separated by semicolons; {DIALECT}")])
+    places = _cells(line)
+    if places is None:
+        raise_problems([line.problem(_shape_complaint(line, places, 0))])
+    return tuple(Cell("", *place) for place in places)

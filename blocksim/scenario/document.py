@@ -1,10 +1,9 @@
 """Loading: a scenario file as read, the values set over it, and the scenario in it or all mistakes with their place."""
 
 import difflib
-import functools
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self, cast
@@ -31,7 +30,7 @@ from blocksim.scenario.source import ScenarioText, clipped, override_problem
 
 MAX_BYTES = 1_000_000
 MAX_PROBLEMS = 50
-Pair = tuple[str | Sequence[str | int], object]
+Pair = tuple[str | Sequence[str], object]
 TOO_DEEP = "tables or lists are nested too deeply for a scenario"
 _PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
 ENDLESS_KEY = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MAX_PARTS}}}")
@@ -61,7 +60,13 @@ class Document:
         is not a regular file.
         """
         path = Path(path)
-        text = _decoded(_content(path, is_stored=is_stored), str(path))
+        content = _content(path, is_stored=is_stored)
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise _unusable(str(path), "not a text file in UTF-8") from None
+        if "\0" in text:
+            raise _unusable(str(path), "not a text file")
         return replace(cls.parse(text, str(path), path.parent), is_stored=is_stored)
 
     @classmethod
@@ -96,25 +101,26 @@ class Document:
 
     def with_values(self, values: Mapping[str, object]) -> Self:
         """Set values by dotted key; raises ScenarioError where a key leads nowhere."""
-        texts = [(f"value {key}", f"{key} = {shown(value)}") for key, value in values.items()]
-        return self._with(texts, [functools.partial(_pair, key, value) for key, value in values.items()])
+        return self._with([(f"value {key}", f"{key} = {shown(value)}", (key, value)) for key, value in values.items()])
 
     def with_settings(self, settings: Sequence[str]) -> Self:
         """Set values as --set takes them ("contact.stiffness_scale=0.1"); raises ScenarioError."""
-        texts = [(f"--set {clipped(text, 0)[0]}", text) for text in settings]
-        return self._with(texts, [functools.partial(_setting, text) for text in settings])
+        return self._with([(f"--set {clipped(text, 0)[0]}", text, None) for text in settings])
 
     def without_sweep(self) -> Self:
         """Leave out the table [sweep]: what a study varies itself."""
         return replace(self, data={key: entry for key, entry in self.data.items() if key != "sweep"})
 
-    def _with(self, texts: Sequence[tuple[str, str]], pairs: Sequence[Callable[[], Pair]]) -> Self:
-        """Set one value after the other, and report all that cannot be set."""
+    def _with(self, settings: Sequence[tuple[str, str, Pair | None]]) -> Self:
+        """Set one value after the other, of which each has a name, a text, and key and value if these are known.
+
+        Raises ScenarioError with all that cannot be set.
+        """
         data, overrides, problems = self.data, list(self.overrides), []
-        for (label, text), pair in zip(texts, pairs, strict=True):
+        for label, text, pair in settings:
             try:
-                key, value = pair()
-                data, path = with_value(data, key, value)
+                key, value = parse_override(text) if pair is None else pair
+                data, path = with_value(data, key, said_by_hand(key, value) if pair is None else value)
                 overrides.append(Override(label, text, path))
             except (UnfitOverrideError, TooDeepError) as error:
                 problems.append(override_problem(Override(label, text, ()), (), str(error), "key"))
@@ -133,15 +139,16 @@ class Document:
     def _problems(self, findings: Sequence[Finding]) -> list[Problem]:
         problems = list(dict.fromkeys(self.problem(finding) for finding in findings))
         problems.sort(key=lambda p: (p.line_number is None, p.line_number or 0, p.caret_start))
-        if len(problems) > MAX_PROBLEMS:
-            more = Problem(self.source.where, "more mistakes follow")
-            return [*problems[:MAX_PROBLEMS], more]
-        return problems
+        more = [Problem(self.source.where, "more mistakes follow")] if len(problems) > MAX_PROBLEMS else []
+        return [*problems[:MAX_PROBLEMS], *more]
 
     def problem(self, finding: Finding) -> Problem:
         """Show a finding where it can be corrected: in a value set from outside, or else in the text."""
-        causes = (self._is_cause, self._began_its_table)
-        override = next((o for is_it in causes for o in reversed(self.overrides) if is_it(o, finding)), None)
+        override = next((one for one in reversed(self.overrides) if self._is_cause(one, finding)), None)
+        if override is None:  # something may be missing in a table that is not in the text but was created from outside
+            table = finding.path[:-1]
+            created = reversed(self.overrides) if table and table not in self.source.places else ()
+            override = next((one for one in created if one.path[: len(table)] == table), None)
         if override is not None:
             return override_problem(override, finding.path, finding.message, finding.at)
         return self.source.problem(finding.path, finding.message, finding.at)
@@ -152,11 +159,6 @@ class Document:
         on_the_way = path[: len(found)] == found and found not in self.source.places
         beside = finding.relation and path[:-1] == found[:-1]
         return inside or (bool(found) and on_the_way) or beside
-
-    def _began_its_table(self, override: Override, finding: Finding) -> bool:
-        """Return True if the table in which something is missing is not in the text but was created from outside."""
-        table = finding.path[:-1]
-        return bool(table) and table not in self.source.places and override.path[: len(table)] == table
 
 
 Source = Path | str | Mapping[str, object] | Scenario | Document
@@ -183,7 +185,8 @@ def load_scenario(
     must lie below its folder or below the current one, unless `allow_outside` is given or an override names them.
     Raises ScenarioError with all mistakes together, and InputMissingError where the file itself cannot be read.
     """
-    document = _reaching(document_of(source), allow_outside=allow_outside)
+    document = document_of(source)
+    document = replace(document, allow_outside=allow_outside or document.allow_outside)
     if isinstance(overrides, Mapping):
         return document.with_values({key: said_by_hand(key, value) for key, value in overrides.items()}).build()
     return document.with_settings(overrides).build()
@@ -196,7 +199,8 @@ def scenario_from_mapping(
 
     Tables as in `load_scenario`.
     """
-    return _reaching(Document.from_mapping(data, base_folder), allow_outside=allow_outside).build()
+    document = Document.from_mapping(data, base_folder)
+    return replace(document, allow_outside=allow_outside or document.allow_outside).build()
 
 
 def replace_values(scenario: Scenario, changes: Mapping[str, object]) -> Scenario:
@@ -218,19 +222,6 @@ def document_of(source: Source) -> Document:
     if isinstance(source, Scenario):
         return replace(Document.parse(scenario_to_toml(source), source.name), allow_outside=True)
     return Document.from_mapping(source) if isinstance(source, Mapping) else Document.read(source)
-
-
-def _reaching(document: Document, *, allow_outside: bool) -> Document:
-    return replace(document, allow_outside=True) if allow_outside else document
-
-
-def _pair(key: str, value: object) -> Pair:
-    return key, value
-
-
-def _setting(text: str) -> Pair:
-    key, value = parse_override(text)
-    return key, said_by_hand(key, value)
 
 
 def _unusable(where: str, message: str) -> ScenarioError:
@@ -259,13 +250,3 @@ def _similar_file(path: Path) -> str:
     by_stem = {Path(name).stem: name for name in names}  # the ending that all share makes any two names similar
     similar = difflib.get_close_matches(path.stem, by_stem, n=1)
     return f", did you mean '{path.parent / by_stem[similar[0]]}'?" if similar else ""
-
-
-def _decoded(content: bytes, where: str) -> str:
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise _unusable(where, "not a text file in UTF-8") from None
-    if "\0" in text:
-        raise _unusable(where, "not a text file")
-    return text

@@ -25,11 +25,6 @@ def wall_names(scenario: Scenario) -> list[str]:
     return [WALL.format(number) for number, _ in enumerate(scenario.walls, start=1)]
 
 
-def freed_names(scenario: Scenario) -> frozenset[str]:
-    """Return the names of bodies that some event frees."""
-    return frozenset(name for event in scenario.events for name in event.free)
-
-
 def in_order(events: Sequence[Event]) -> list[int]:
     """Return the numbers of events: those with a time by it, then those that wait for rest; else as in the file."""
     return sorted(range(len(events)), key=lambda number: (events[number].at is None, events[number].at or 0.0))
@@ -44,27 +39,30 @@ def impossible_events(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Itera
         return
     if scenario.systems:
         yield Finding(("events",), f"events are not available beside {', '.join(scenario.systems)}", at="key")
-    known = [body.name for body in bodies]
-    found = [one for number in range(len(scenario.events)) for one in _alone(scenario, number, known)]
-    found += _wrong_unloads(scenario)
+    found = [*_wrong_moments_and_names(scenario, [body.name for body in bodies]), *_wrong_unloads(scenario)]
     yield from found
     if not found:
         yield from _in_turn(scenario, bodies)
 
 
-def _alone(scenario: Scenario, number: int, known: Sequence[str]) -> Iterator[Finding]:
-    """Find what is wrong with one event by itself."""
-    event, path = scenario.events[number], ("events", number)
-    if event.at is not None and event.at > scenario.time.end:
-        message = f"{event.at:g} s is after the end of the run, time.end = {scenario.time.end:g} s"
-        yield Finding((*path, "at"), message, relation=True)
-    if event.when is not None and not scenario.time.stop_at_rest:
-        yield Finding((*path, "when"), "rest is looked for only with time.stop_at_rest = true", relation=True)
+def _wrong_moments_and_names(scenario: Scenario, known: Sequence[str]) -> Iterator[Finding]:
+    """Find what is wrong with single events by themselves."""
     walls = wall_names(scenario)
-    for place, name in _names(event, path):
-        allowed = [*known, *walls] if place[2] == "remove" else known
-        if name not in set(allowed):
-            yield Finding(place, _unknown(name, allowed, walls, is_wall_allowed=place[2] == "remove"))
+    for number, event in enumerate(scenario.events):
+        path = ("events", number)
+        if event.at is not None and event.at > scenario.time.end:
+            message = f"{event.at:g} s is after the end of the run, time.end = {scenario.time.end:g} s"
+            yield Finding((*path, "at"), message, relation=True)
+        if event.when is not None and not scenario.time.stop_at_rest:
+            yield Finding((*path, "when"), "rest is looked for only with time.stop_at_rest = true", relation=True)
+        for place, name in _names(event, path):
+            is_removed = place[2] == "remove"
+            allowed = [*known, *walls] if is_removed else known
+            if name in walls and not is_removed:
+                yield Finding(place, f"{shown(name)} is a wall, which can only be removed")
+            elif name not in set(allowed):
+                hint = f", {did_you_mean_or_list(name, allowed)}" if len(allowed) <= MANY else ""
+                yield Finding(place, f"there is no {'body or wall' if is_removed else 'body'} {shown(name)}{hint}")
 
 
 def _wrong_unloads(scenario: Scenario) -> Iterator[Finding]:
@@ -83,14 +81,6 @@ def _wrong_unloads(scenario: Scenario) -> Iterator[Finding]:
             ends.setdefault(name, number)
 
 
-def _unknown(name: str, allowed: Sequence[str], walls: Sequence[str], *, is_wall_allowed: bool) -> str:
-    if name in walls and not is_wall_allowed:
-        return f"{shown(name)} is a wall, which can only be removed"
-    what = "body or wall" if is_wall_allowed else "body"
-    hint = f", {did_you_mean_or_list(name, allowed)}" if len(allowed) <= MANY else ""
-    return f"there is no {what} {shown(name)}{hint}"
-
-
 def _names(event: Event, path: keys.KeyPath) -> Iterator[tuple[keys.KeyPath, str]]:
     """Yield all names in an event with their places."""
     for group in GROUPS:
@@ -107,27 +97,26 @@ def _in_turn(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Findi
     """
     start = {body.name: DRIVEN if body.driven else FIXED if body.fixed else FREE for body in bodies}
     start |= dict.fromkeys(wall_names(scenario), FIXED)
-    mixed = _named_by(scenario, timed=True) & _named_by(scenario, timed=False)
+    timed, untimed = (
+        {name for event in scenario.events if (event.at is not None) == is_timed for _, name in _names(event, ())}
+        for is_timed in (True, False)
+    )
     states: dict[str, tuple[str, int | None]] = {name: (state, None) for name, state in start.items()}
     for number in in_order(scenario.events):
         for place, name in _names(scenario.events[number], ("events", number)):
-            state, cause = states[name]
-            message = _conflict(scenario, str(place[2]), name, state, (cause, number), is_sure=name not in mixed)
+            message = _conflict(
+                scenario, str(place[2]), name, states[name], number, is_sure=name not in timed & untimed
+            )
             if message:
                 yield Finding(place, message)
-            states[name] = (RESULTS.get(str(place[2]), state), number)
-
-
-def _named_by(scenario: Scenario, *, timed: bool) -> set[str]:
-    events = [event for event in scenario.events if (event.at is not None) == timed]
-    return {name for event in events for _, name in _names(event, ())}
+            states[name] = (RESULTS.get(str(place[2]), states[name][0]), number)
 
 
 def _conflict(
-    scenario: Scenario, action: str, name: str, state: str, causes: tuple[int | None, int], *, is_sure: bool
+    scenario: Scenario, action: str, name: str, present: tuple[str, int | None], number: int, *, is_sure: bool
 ) -> str:
-    """Return why something cannot be done to a body in a state, which an event (None: the start) has brought about."""
-    cause, number = causes
+    """Return why an event cannot do something to a body in a state, which another (None: the start) brought about."""
+    state, cause = present
     is_new_velocity = action == "velocity" and state == FREE
     if cause is not None and _moment(scenario, cause) == _moment(scenario, number) and not is_new_velocity:
         return f"{shown(name)} is {state} at the same moment, by events.{cause}"

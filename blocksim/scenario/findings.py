@@ -65,8 +65,9 @@ def _finding(entry: ErrorDetails, data: object) -> Finding:
             return Finding((*path, "kind"), f"this key is missing: {_kinds(path)} is needed", at="key")
         case "union_tag_invalid":
             kind = follow(data, (*path, "kind"))
+            what = "motion" if path[-1] == "motion" else _table_of_kinds(path).removesuffix("s")
             hint = did_you_mean(str(kind), KINDS_IN[_table_of_kinds(path)]) or f"choose {_kinds(path)}"
-            return Finding((*path, "kind"), f"unknown {_of_kinds(path)} kind {shown(kind)}; {hint}")
+            return Finding((*path, "kind"), f"unknown {what} kind {shown(kind)}; {hint}")
         case "extra_forbidden":
             return _unknown_key(path, data)
         case "blocksim":
@@ -83,26 +84,20 @@ def _path(loc: Sequence[str | int]) -> KeyPath:
     path = tuple(loc)
     match path:
         case (held, *_) if held == HELD:
-            return path[1:]
+            path = path[1:]
         case ("structures" | "probes", *_):
-            return (*path[:2], *path[3:])
+            path = (*path[:2], *path[3:])
         case ("bodies", _, "motion", *_):
-            return (*path[:3], *path[4:])
+            path = (*path[:3], *path[4:])
         case ("loads", _, _, "history", *_):
-            return (*path[:2], "history", *path[5:])
+            path = (*path[:2], "history", *path[5:])
         case ("loads", *_):
-            return (*path[:2], *path[3:])
-        case _:
-            return _path_of_one(path)
-
-
-def _path_of_one(path: KeyPath) -> KeyPath:
-    """Return the same for tables that are there once."""
-    if path[:1] == ("time",) and path[1:2] not in [(scheme,) for scheme in SCHEMES]:
-        return path  # of a scheme that is none of the union
-    if path[:1] in (("motion",), ("time",)):
-        return (*path[:1], *path[2:])
-    return (path[0], *path[2:]) if path[:2] == ("sweep", "vary") else path
+            path = (*path[:2], *path[3:])
+        case ("time", scheme, *_) if scheme not in SCHEMES:
+            pass  # a scheme that is none of the union
+        case ("motion" | "time", *_) | ("sweep", "vary", *_):
+            path = (path[0], *path[2:])
+    return path
 
 
 def _existing(path: KeyPath, data: object) -> KeyPath:
@@ -133,24 +128,16 @@ def _unknown_key(path: KeyPath, data: object) -> Finding:
     known = keys_of(table) if table is not None else ()
     meant = meant_word(str(path[-1]), known)
     is_typing_error = nearest(str(path[-1]), known, most=1) is not None
-    if (not meant or (len(path) == 1 and not is_typing_error)) and (other := _table_with(str(path[-1]))):
-        return Finding(path, f"unknown key, did you mean {f'{other}.{path[-1]}'!r}?", at="key")
+    if not meant or (len(path) == 1 and not is_typing_error):
+        singles = (name for name in keys_of(Scenario) if name not in NAMED and name not in SYSTEMS)
+        tables = ((name, table_at((name,), {})) for name in singles)
+        having = [name for name, one in tables if one is not None and path[-1] in keys_of(one)]
+        if len(having) == 1:
+            return Finding(path, f"unknown key, did you mean {f'{having[0]}.{path[-1]}'!r}?", at="key")
     if len(path) > 1 and not is_typing_error and path[-1] in keys_of(Scenario):
         return Finding(path, f"unknown key, {path[-1]} belongs at the top of the file", at="key")
     hint = f"did you mean {meant!r}?" if meant else f"allowed are: {', '.join(known)}"
     return Finding(path, f"unknown key, {hint}", at="key", meant=(*path[:-1], meant) if meant else ())
-
-
-def _table_with(word: str) -> str:
-    """Return the table of the scenario that has a key, where exactly one has it; empty otherwise."""
-    tables = ((name, table_at((name,), {})) for name in keys_of(Scenario) if name not in NAMED and name not in SYSTEMS)
-    having = [name for name, table in tables if table is not None and word in keys_of(table)]
-    return having[0] if len(having) == 1 else ""
-
-
-def _of_kinds(path: KeyPath) -> str:
-    """Return what the table at a path is that has a kind."""
-    return "motion" if path[-1] == "motion" else _table_of_kinds(path).removesuffix("s")
 
 
 def _table_of_kinds(path: KeyPath) -> str:

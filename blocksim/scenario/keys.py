@@ -57,18 +57,14 @@ def read_key(text: str, start: int = 0) -> tuple[tuple[str, ...], int]:
         found = next((m for p in (_BASIC, _LITERAL, _BARE) if (m := p.match(text, start))), None)
         if found is None:
             raise ValueError("not a key")
-        parts.append(_unquoted(found[0]))
+        part = found[0]
+        literal = part[1:-1] if part[0] == "'" else part
+        parts.append(str(tomllib.loads(f"v = {part}")["v"]) if part[0] == '"' else literal)
         after = skip_blank(text, found.end())
         if not text.startswith(".", after):
             return tuple(parts), found.end()
         start = after + 1
     raise ValueError("too many parts")
-
-
-def _unquoted(part: str) -> str:
-    if part[0] == '"':
-        return str(tomllib.loads(f"v = {part}")["v"])
-    return part[1:-1] if part[0] == "'" else part
 
 
 def skip_blank(text: str, start: int) -> int:
@@ -88,7 +84,7 @@ def parse_key(text: str) -> tuple[str, ...]:
 
 def format_key(path: Sequence[str | int]) -> str:
     """Write a path as a dotted key, with quotes where TOML wants them."""
-    return ".".join(str(part) if _BARE.fullmatch(str(part)) else _quoted(str(part)) for part in path)
+    return ".".join(part if _BARE.fullmatch(part) else _quoted(part) for part in map(str, path))
 
 
 def _quoted(part: str) -> str:
@@ -128,15 +124,12 @@ def field_of(key: str, scenario: Scenario) -> FieldInfo | None:
     path: KeyPath = ()
     for part in parse_key(key):
         entries = follow(data, path)
-        path = (*path, _number_of(part, entries) if isinstance(entries, list | tuple) else part)
+        place: str | int = part
+        if isinstance(entries, list | tuple):  # an entry of a list is meant by its number, or by its name
+            named = (i for i, one in enumerate(entries) if isinstance(one, Mapping) and one.get("name") == part)
+            place = int(part) if part.isdecimal() else next(named, part)
+        path = (*path, place)
     return field_at(path, data)
-
-
-def _number_of(part: str, entries: Sequence[object]) -> int | str:
-    """Return the number of the entry of a list that a part of a key means: its number, or its name."""
-    if part.isdecimal():
-        return int(part)
-    return next((i for i, one in enumerate(entries) if isinstance(one, Mapping) and one.get("name") == part), part)
 
 
 def is_known(path: Sequence[str | int], data: object) -> bool:
@@ -157,20 +150,17 @@ def keys_of(table: type[Table]) -> tuple[str, ...]:
 
 
 def _fields(table: type[Table]) -> dict[str | int, FieldInfo]:
-    return {**_own_fields(table), **_system_fields()} if table is Scenario else _own_fields(table)
+    """Return the fields of a table by their keys; of a scenario those of the tables of all systems too."""
+    systems: dict[str | int, FieldInfo] = {
+        name: FieldInfo(annotation=tuple[entry, ...], default=(), description=entry.__doc__)  # type: ignore[valid-type]
+        for name, entry in (SYSTEMS.items() if table is Scenario else ())
+    }
+    return {**_own_fields(table), **systems}
 
 
 @functools.cache
 def _own_fields(table: type[Table]) -> dict[str | int, FieldInfo]:
     return {info.alias or name: info for name, info in table.model_fields.items() if info.alias != HELD}
-
-
-def _system_fields() -> dict[str | int, FieldInfo]:
-    """Return the fields of the tables of all systems."""
-    return {
-        name: FieldInfo(annotation=tuple[table, ...], default=(), description=table.__doc__)  # type: ignore[valid-type]
-        for name, table in SYSTEMS.items()
-    }
 
 
 def _inside(annotation: object, part: str | int, node: object) -> object:

@@ -60,32 +60,31 @@ def unfit_holds(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Fi
 
 
 def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str, PlacedBody]) -> Iterator[Finding]:
-    place = ("loads", number, "body")
+    path = ("loads", number)
     body = bodies.get(load.body)
     if body is None:
-        yield Finding(place, f"unknown body {shown(load.body)}, {did_you_mean_or_list(load.body, bodies)}")
+        hint = did_you_mean_or_list(load.body, bodies)
+        yield Finding((*path, "body"), f"unknown body {shown(load.body)}, {hint}")
     elif body.fixed:
-        yield Finding(place, f"body {shown(load.body)} is fixed; a load has no effect on it")
+        yield Finding((*path, "body"), f"body {shown(load.body)} is fixed; a load has no effect on it")
     elif isinstance(load, Force):
-        if not _has(body, load.point):
+        half = (0.5 * body.size_x, 0.5 * body.size_y)
+        if body.outline:
+            is_inside = holds(body.outline, load.point, _margin(body))
+        else:
+            is_inside = all(abs(at) <= side * (1.0 + STRIP) for at, side in zip(load.point, half, strict=True))
+        if not is_inside:
             size = f"{1e3 * body.size_x:g} x {1e3 * body.size_y:g} mm"
             about = f"an outline in a box of {size}" if body.outline else f"{size} about its centre"
-            yield Finding(("loads", number, "point"), f"the point lies outside of body {shown(load.body)}, {about}")
+            yield Finding((*path, "point"), f"the point lies outside of body {shown(load.body)}, {about}")
     elif isinstance(load, Pressure) and face_of(body, load.face) is None:
         message = f"the outline of body {shown(load.body)} has no face whose normal points exactly that way"
-        yield Finding(("loads", number, "face"), message)
+        yield Finding((*path, "face"), message)
     elif isinstance(load, Pressure):
         other = next(_covers(scenario, load, body, [*bodies.values()]), None)
         if other is not None:
             message = f"this face of body {shown(load.body)} is covered by {other}; pressure needs a free face"
-            yield Finding(("loads", number, "face"), message)
-
-
-def _has(body: PlacedBody, point: Corner) -> bool:
-    if body.outline:
-        return holds(body.outline, point, _margin(body))
-    half = (0.5 * body.size_x, 0.5 * body.size_y)
-    return all(abs(at) <= side * (1.0 + STRIP) for at, side in zip(point, half, strict=True))
+            yield Finding((*path, "face"), message)
 
 
 def face_of(body: PlacedBody, face: Face) -> tuple[Corner, Corner] | None:

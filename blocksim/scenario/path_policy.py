@@ -52,42 +52,27 @@ def said_by_hand(key: str | Sequence[str | int], value: object) -> object:
 
 def table_in(folder: Path | str, text: str) -> Path:
     """Return the file that a scenario in `folder` names, all links followed. Raises OutOfReachError."""
-    if not _follows_links.get() and not isinstance(text, ByHand) and Path(folder, text).is_symlink():
+    is_by_hand = isinstance(text, ByHand)
+    if not _follows_links.get() and not is_by_hand and Path(folder, text).is_symlink():
         raise OutOfReachError(f"{shown(text)}: {IS_LINK}")
     try:
         table = Path(folder, text).resolve()
-        _refuse_outside(Path(folder), text, table)
-        what = _what_it_is(table)
+        here = Path.cwd()
+        roots = [Path(folder).resolve()]
+        if not Path.home().resolve().is_relative_to(here):  # else the current folder is the home folder, or above it
+            roots.append(here)
+        if not (_is_anywhere.get() or is_by_hand or any(table.is_relative_to(root) for root in roots)):
+            where = "leads outside the scenario's folder and the current folder"
+            raise OutOfReachError(f"{shown(text)}: {where}; {WAY_OUT}")
+        what = "" if table.is_file() else "no such file"
+        if not table.is_file() and table.exists():
+            what = "is a folder, not a table" if table.is_dir() else "is a pipe or a device, not a file"
     except (OSError, RuntimeError) as error:  # a name that is too long; links in a circle
         reason = getattr(error, "strerror", None) or str(error)
         raise OutOfReachError(f"{shown(text)}: cannot be read: {reason}") from None
     if what:
         raise OutOfReachError(f"{shown(text)}: {what} (paths are relative to the scenario file)")
     return table
-
-
-def _what_it_is(table: Path) -> str:
-    """Return what is found in place of a table; nothing if it is a file."""
-    if table.is_file():
-        return ""
-    if table.is_dir():
-        return "is a folder, not a table"
-    return "is a pipe or a device, not a file" if table.exists() else "no such file"
-
-
-def _refuse_outside(folder: Path, text: str, table: Path) -> None:
-    if _is_anywhere.get() or isinstance(text, ByHand):
-        return
-    if not any(table.is_relative_to(root) for root in _roots(folder)):
-        raise OutOfReachError(f"{shown(text)}: leads outside the scenario's folder and the current folder; {WAY_OUT}")
-
-
-def _roots(folder: Path) -> Iterator[Path]:
-    """Yield the folders below which files may be read: not the home folder if that is the current one."""
-    yield folder.resolve()
-    here = Path.cwd()
-    if not Path.home().resolve().is_relative_to(here):
-        yield here
 
 
 def near(path: str) -> str:

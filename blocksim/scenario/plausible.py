@@ -25,31 +25,15 @@ MOST_EMPTY = 0.01  # of the width or height of a soil: its thrust goes with the 
 
 def implausible_values(scenario: Scenario) -> list[str]:
     """Return a warning for each value that looks like one in another unit; of frictions swept ones too."""
-    return [
-        *_bare_numbers(scenario),
-        *_large_drawings(scenario),
-        *_friction_angles(scenario),
-        *_unfilled_soils(scenario),
-    ]
-
-
-def _large_drawings(scenario: Scenario) -> Iterator[str]:
-    """Find drawings whose coordinates are hardly in m."""
-    for number, structure in enumerate(scenario.structures):
-        if isinstance(structure, Polygons):
-            size = median(dist(*outlines.box_of(one.outline)) for one in structure.cells_given)
-            if size > LONGEST_DRAWN:
-                key = keys.format_key(("structures", number))
-                yield f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"'
+    return [*_bare_numbers(scenario), *_friction_angles(scenario), *_unfilled_soils(scenario)]
 
 
 def _unfilled_soils(scenario: Scenario) -> Iterator[str]:
     """Find soils of whose width or height no whole number of particles takes all, and a finer spacing that does."""
     for soil in soil_tables(scenario):
         extents = soil.corners.max(axis=0) - soil.corners.min(axis=0)
-        for way, extent, count in zip(
-            ("width", "height"), extents, count_across(soil.corners, soil.spacing), strict=True
-        ):
+        counts = count_across(soil.corners, soil.spacing)
+        for way, extent, count in zip(("width", "height"), extents, counts, strict=True):
             if extent - count * soil.spacing > MOST_EMPTY * extent:
                 fits = 1e3 * extent / ceil(extent / soil.spacing)
                 yield (
@@ -70,34 +54,36 @@ def _bare_numbers(scenario: Scenario) -> Iterator[str]:
         for side in ("width", "height", "length", "radius"):
             if (size := getattr(block, side)) is not None and size > LONGEST:
                 yield f"{keys.format_key(('blocks', name, side))} = {size:.4g} m; add the intended unit"
+    for number, structure in enumerate(scenario.structures):
+        if isinstance(structure, Polygons):
+            size = median(dist(*outlines.box_of(one.outline)) for one in structure.cells_given)
+            if size > LONGEST_DRAWN:
+                key = keys.format_key(("structures", number))
+                yield f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"'
 
 
 def _friction_angles(scenario: Scenario) -> Iterator[str]:
-    for key, value in (*_frictions(scenario), *_varied_frictions(scenario)):
-        if value > STEEPEST:
-            yield f'{key} = {value:g} is a friction coefficient; for an angle write "{value:g} deg"'
-
-
-def _frictions(scenario: Scenario) -> Iterator[tuple[str, float]]:
-    yield "friction.block_block", scenario.friction.block_block.static
-    yield "friction.block_ground", scenario.friction.block_ground.static
+    """Find frictions that look like angles, the largest bare value of each that the sweep varies too."""
+    frictions: list[tuple[str, float]] = [
+        ("friction.block_block", scenario.friction.block_block.static),
+        ("friction.block_ground", scenario.friction.block_ground.static),
+    ]
     for left, others in scenario.pairs.items():
         for right, pair in others.items():
             if pair.friction is not None:
-                yield keys.format_key(("pairs", left, right, "friction")), pair.friction.static
-
-
-def _varied_frictions(scenario: Scenario) -> Iterator[tuple[str, float]]:
-    """Yield the largest bare value of each friction that the sweep varies."""
+                frictions.append((keys.format_key(("pairs", left, right, "friction")), pair.friction.static))
     for key, values in {} if scenario.sweep is None else scenario.sweep.vary.items():
         parts = keys.parse_key(key)
         if "friction" not in (parts[0], *parts[3:4]) or parts[-1] in ("kinetic_ratio", "transition_speed"):
             continue
         match values:
             case Uniform(angle=False):
-                yield key, values.high
+                frictions.append((key, values.high))
             case Normal(angle=False):
-                yield key, values.mean
+                frictions.append((key, values.mean))
             case tuple():
                 bare = [float(value) for value in values if isinstance(value, int | float)]
-                yield from ((key, max(bare)) for _ in bare[:1])
+                frictions += [(key, max(bare))] if bare else []
+    for key, value in frictions:
+        if value > STEEPEST:
+            yield f'{key} = {value:g} is a friction coefficient; for an angle write "{value:g} deg"'

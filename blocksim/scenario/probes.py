@@ -1,14 +1,14 @@
 """Probes of a scenario: their names, the bodies and supports that they are about, and the joints between bodies."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from blocksim.scenario.findings import Finding
 from blocksim.scenario.keys import KeyPath
-from blocksim.scenario.models.probe import AnyProbe, ForceProbe, JointProbe, PointProbe
+from blocksim.scenario.models.probe import ForceProbe, JointProbe, PointProbe
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.outlines import edges_of
 from blocksim.scenario.placement import PlacedBody
@@ -38,43 +38,32 @@ def unfit_probes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[F
             yield Finding(("probes", number, "name"), f"two probes are named {shown(name)}")
         seen.add(name)
     bodies = {body.name: body for body in placed}
-    supports = support_words(scenario)
-    others = [name for tables in scenario.systems.values() for name in map(_name_of, tables) if name]
+    others = [str(name) for tables in scenario.systems.values() for one in tables if (name := getattr(one, "name", ""))]
+    known = [*bodies, *support_words(scenario), *others]
     for number, probe in enumerate(scenario.probes):
-        yield from _unfit(probe, ("probes", number), bodies, [*supports, *others])
-
-
-def _name_of(table: object) -> str:
-    """Return the name of a table of a system, such as a soil; those without one cannot be named."""
-    return str(getattr(table, "name", ""))
+        path = ("probes", number)
+        match probe:
+            case ForceProbe():
+                named = {"on": probe.on} if probe.by is None else {"on": probe.on, "by": probe.by}
+                yield from _unknown([((*path, key), name) for key, name in named.items()], known)
+                if probe.by == probe.on:
+                    yield Finding((*path, "by"), f"{shown(probe.by)} exerts no force on itself")
+            case PointProbe():
+                yield from _unknown([((*path, "body"), probe.body)], [*bodies])
+            case JointProbe():
+                unknown = [*_unknown([((*path, "bodies", i), name) for i, name in enumerate(probe.bodies)], [*bodies])]
+                yield from unknown
+                if not unknown and joint_between(*(bodies[name] for name in probe.bodies)) is None:
+                    message = (
+                        f"bodies {probe.bodies[0]} and {probe.bodies[1]} have no faces that lie opposite each other"
+                    )
+                    yield Finding((*path, "bodies"), f"{message} at the start, parallel within {LEAST_ANGLE:g} deg")
 
 
 def support_words(scenario: Scenario) -> list[str]:
     """Return the words that mean supports: ground, walls together and one by one, all supports."""
     walls = [f"{WALL} {number}" for number in range(1, len(scenario.walls) + 1)]
     return [GROUND, SUPPORTS, *([WALLS] if walls else []), *walls]
-
-
-def _unfit(
-    probe: AnyProbe, path: tuple[str, int], bodies: Mapping[str, PlacedBody], supports: Sequence[str]
-) -> Iterator[Finding]:
-    match probe:
-        case ForceProbe():
-            named = {"on": probe.on} if probe.by is None else {"on": probe.on, "by": probe.by}
-            yield from _unknown([((*path, key), name) for key, name in named.items()], [*bodies, *supports])
-            if probe.by == probe.on:
-                yield Finding((*path, "by"), f"{shown(probe.by)} exerts no force on itself")
-        case PointProbe():
-            yield from _unknown([((*path, "body"), probe.body)], [*bodies])
-        case JointProbe():
-            places: list[tuple[KeyPath, str]] = [
-                ((*path, "bodies", number), name) for number, name in enumerate(probe.bodies)
-            ]
-            unknown = [*_unknown(places, [*bodies])]
-            yield from unknown
-            if not unknown and joint_between(*(bodies[name] for name in probe.bodies)) is None:
-                message = f"bodies {probe.bodies[0]} and {probe.bodies[1]} have no faces that lie opposite each other"
-                yield Finding((*path, "bodies"), f"{message} at the start, parallel within {LEAST_ANGLE:g} deg")
 
 
 def _unknown(named: Sequence[tuple[KeyPath, str]], known: Sequence[str]) -> Iterator[Finding]:

@@ -7,15 +7,14 @@ dimension and its allowed range. An angle must carry a unit unless it is zero.
 import functools
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Annotated, Any, Literal
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from blocksim.scenario import units
-from blocksim.scenario.units import Dimension
+from blocksim.scenario.units import Dimension, UnitError, parse_unit, similar_unit
 
 _NUMBER = r"[+-]?(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _TEXT = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
@@ -53,16 +52,12 @@ def invalid(message: str, *key: str | int, at: Literal["key", "value"] = "value"
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """Kind of quantity: its dimension, its SI unit, and an example for messages."""
+    """Kind of quantity: its name with the article, its dimension, its SI unit, and an example for messages."""
 
+    name: str
     dimension: Dimension
     unit: str
     example: str
-
-    @property
-    def name(self) -> str:
-        """Return its name with the article: "a length"."""
-        return units.NAMES[self.dimension]
 
     def in_words(self, value: float) -> str:
         """Write a bound for a message: 0 without a unit, angles in degrees."""
@@ -71,24 +66,50 @@ class Kind:
         return f"{math.degrees(value):g} deg" if self.unit == "rad" else f"{value:g} {self.unit}"
 
 
-NUMBER = Kind(units.NUMBER, "", "")
-LENGTH = Kind(units.LENGTH, "m", "32 mm")
-TIME = Kind(units.TIME, "s", "2 s")
-ANGLE = Kind(units.ANGLE, "rad", "20 deg")
-SPEED = Kind(units.SPEED, "m/s", "5 mm/s")
-FREQUENCY = Kind(units.FREQUENCY, "Hz", "2 Hz")
-SPIN = Kind(units.SPIN, "rad/s", "90 deg/s")
-ACCELERATION = Kind(units.ACCELERATION, "m/s^2", "9.81 m/s^2")
-PRESSURE = Kind(units.PRESSURE, "Pa", "69 GPa")
-DENSITY = Kind(units.DENSITY, "kg/m^3", "2700 kg/m^3")
-UNIT_WEIGHT = Kind(units.UNIT_WEIGHT, "N/m^3", "26.7 kN/m^3")
-STIFFNESS = Kind(units.STIFFNESS, "N/m", "1e6 N/m")
-FORCE = Kind(units.FORCE, "N", "2 kN")
-MOMENT = Kind(units.MOMENT, "N m", "5 N m")
+NUMBER = Kind("a plain number", (0, 0, 0, 0), "", "")
+LENGTH = Kind("a length", (1, 0, 0, 0), "m", "32 mm")
+AREA = Kind("an area", (2, 0, 0, 0), "m^2", "2 m^2")
+MASS = Kind("a mass", (0, 1, 0, 0), "kg", "2 kg")
+TIME = Kind("a time", (0, 0, 1, 0), "s", "2 s")
+ANGLE = Kind("an angle", (0, 0, 0, 1), "rad", "20 deg")
+SPEED = Kind("a speed", (1, 0, -1, 0), "m/s", "5 mm/s")
+FREQUENCY = Kind("a frequency", (0, 0, -1, 0), "Hz", "2 Hz")
+SPIN = Kind("a spin", (0, 0, -1, 1), "rad/s", "90 deg/s")
+ACCELERATION = Kind("an acceleration", (1, 0, -2, 0), "m/s^2", "9.81 m/s^2")
+PRESSURE = Kind("a pressure", (-1, 1, -2, 0), "Pa", "69 GPa")
+DENSITY = Kind("a density", (-3, 1, 0, 0), "kg/m^3", "2700 kg/m^3")
+UNIT_WEIGHT = Kind("a unit weight", (-2, 1, -2, 0), "N/m^3", "26.7 kN/m^3")
+STIFFNESS = Kind("a stiffness", (0, 1, -2, 0), "N/m", "1e6 N/m")
+FORCE = Kind("a force", (1, 1, -2, 0), "N", "2 kN")
+MOMENT = Kind("a moment", (2, 1, -2, 0), "N m", "5 N m")
+_KINDS = (NUMBER, LENGTH, AREA, MASS, TIME, ANGLE, SPEED, FREQUENCY, SPIN, ACCELERATION, PRESSURE, DENSITY)
+_NAMES = {kind.dimension: kind.name for kind in (*_KINDS, UNIT_WEIGHT, STIFFNESS, FORCE, MOMENT)}
 
 
-@dataclass(frozen=True, slots=True)
-class Quantity:
+class _Annotation:
+    """What annotations of a float field have in common: they read the value of the file before pydantic does."""
+
+    def read(self, value: object) -> float:
+        """Turn the value of the file into an SI float; the pydantic error has what is allowed."""
+        raise NotImplementedError
+
+    def json_schema(self) -> dict[str, Any]:
+        """JSON Schema of the value in the file."""
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(self, _source: object, _handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Read the value first, then let pydantic see a float."""
+        return core_schema.no_info_before_validator_function(
+            self.read, core_schema.float_schema(strict=True, allow_inf_nan=False)
+        )
+
+    def __get_pydantic_json_schema__(self, _core_schema: CoreSchema, _handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Describe what may stand in the file."""
+        return self.json_schema()
+
+
+@dataclass(frozen=True)
+class Quantity(_Annotation):
     """Annotation of a float field: kind of quantity and allowed values (SI)."""
 
     kind: Kind
@@ -100,27 +121,29 @@ class Quantity:
     @property
     def wanted(self) -> str:
         """Return what is allowed: 'a length above 0 such as "32 mm"'."""
-        low, high = self._low(), self._high()
-        span = f" {low} and {high}" if low and high else f" {low}{high}"
-        example = f' such as "{self.kind.example}"' if self.kind.example else ""
-        return f"{self.kind.name}{span.rstrip()}{example}"
-
-    def _low(self) -> str:
-        if self.above is not None:
-            return f"above {self.kind.in_words(self.above)}"
-        return f"of at least {self.kind.in_words(self.at_least)}" if self.at_least is not None else ""
-
-    def _high(self) -> str:
-        if self.below is not None:
-            return f"below {self.kind.in_words(self.below)}"
-        return f"at most {self.kind.in_words(self.at_most)}" if self.at_most is not None else ""
+        bounds = {"above": self.above, "of at least": self.at_least, "below": self.below, "at most": self.at_most}
+        given = [f"{word} {self.kind.in_words(bound)}" for word, bound in bounds.items() if bound is not None]
+        example = [f'such as "{self.kind.example}"'] if self.kind.example else []
+        return " ".join([self.kind.name, *[" and ".join(given)][: len(given)], *example])
 
     def read(self, value: object) -> float:
         """Turn the value of the file into an SI float; the pydantic error has what is allowed."""
         number = self._text(value) if isinstance(value, str) else self._number(value)
         if not math.isfinite(number):
             raise invalid(f"{shown(value)} is not a finite number; {self.wanted} is needed")
-        return self._within(number, value)
+        too_small = (self.above is not None and number <= self.above) or (
+            self.at_least is not None and number < self.at_least
+        )
+        too_large = (self.below is not None and number >= self.below) or (
+            self.at_most is not None and number > self.at_most
+        )
+        if too_small or too_large:
+            raise invalid(f"{shown(value)} is too {'small' if too_small else 'large'}; {self.wanted} is needed")
+        if abs(number) > MOST:
+            raise invalid(f"{shown(value)} is too large to compute with; at most {MOST:g} (SI) is allowed")
+        if self.above == 0.0 and number < LEAST:
+            raise invalid(f"{shown(value)} is too small to compute with; at least {LEAST:g} (SI) is allowed")
+        return number
 
     def _number(self, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -139,34 +162,9 @@ class Quantity:
         except ValueError as error:
             raise invalid(f"{shown(text)} is not {self.kind.name}: {error}") from None
         if dimension != self.kind.dimension:
-            name = units.NAMES.get(dimension, f"not {self.kind.name}")
+            name = _NAMES.get(dimension, f"not {self.kind.name}")
             raise invalid(f"{shown(text)} is {name}; {self.wanted} is needed")
         return number
-
-    def _within(self, number: float, value: object) -> float:
-        too_small = (self.above is not None and number <= self.above) or (
-            self.at_least is not None and number < self.at_least
-        )
-        too_large = (self.below is not None and number >= self.below) or (
-            self.at_most is not None and number > self.at_most
-        )
-        if too_small or too_large:
-            raise invalid(f"{shown(value)} is too {'small' if too_small else 'large'}; {self.wanted} is needed")
-        if abs(number) > MOST:
-            raise invalid(f"{shown(value)} is too large to compute with; at most {MOST:g} (SI) is allowed")
-        if self.above == 0.0 and number < LEAST:
-            raise invalid(f"{shown(value)} is too small to compute with; at least {LEAST:g} (SI) is allowed")
-        return number
-
-    def __get_pydantic_core_schema__(self, _source: object, _handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Read the value first, then let pydantic see a float."""
-        return core_schema.no_info_before_validator_function(
-            self.read, core_schema.float_schema(strict=True, allow_inf_nan=False)
-        )
-
-    def __get_pydantic_json_schema__(self, _core_schema: CoreSchema, _handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Describe what may stand in the file."""
-        return self.json_schema()
 
     def json_schema(self) -> dict[str, Any]:
         """JSON Schema of the value in the file: a number in SI or a string with a unit."""
@@ -183,6 +181,29 @@ class Quantity:
         if self.kind is ANGLE:
             number = {"const": 0}
         return {"anyOf": [number, _text_schema(self.kind.example)]}
+
+
+@dataclass(frozen=True)
+class FrictionCoefficient(_Annotation):
+    """Annotation of a float field: a coefficient, or a friction angle ("21 deg") whose tangent it is."""
+
+    wanted = 'a number of at least 0 such as 0.31, or a friction angle below 90 deg such as "21 deg",'
+
+    def read(self, value: object) -> float:
+        """Turn a coefficient or a friction angle into a coefficient."""
+        if isinstance(value, str):
+            return math.tan(Quantity(ANGLE, at_least=0.0, below=math.pi / 2).read(value))
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise invalid(f"{shown(value)} is not a number; {self.wanted} is needed")
+        return Quantity(NUMBER, at_least=0.0).read(value)
+
+    def json_schema(self) -> dict[str, Any]:
+        """JSON Schema of the value in the file: a number or an angle with its unit."""
+        return {"anyOf": [{"type": "number", "minimum": 0}, _text_schema("21 deg")]}
+
+
+def _text_schema(example: str) -> dict[str, Any]:
+    return {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*[A-Za-zµμ°]", "examples": [example]}
 
 
 @functools.lru_cache(maxsize=1024)
@@ -204,10 +225,20 @@ def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
     if unit is None:
         raise ValueError(f'the unit is missing, write it as in "{wanted.example}"')
     try:
-        worth = units.parse_unit("g0" if wanted is ACCELERATION and unit == "g" else unit)
-    except units.UnitError as error:
-        raise ValueError(_unit_mistake(unit, error.unknown, wanted)) from None
-    return _times(number, worth.factor), worth.dimension
+        worth = parse_unit("g0" if wanted is ACCELERATION and unit == "g" else unit)
+    except UnitError as error:
+        if not error.unknown:
+            raise ValueError(f"{shown(unit)[1:-1]!r} is not a unit") from None
+        similar = similar_unit(error.unknown, unit, wanted.dimension)
+        hint = f"did you mean {similar!r}?" if similar else f'write it as in "{wanted.example}"'
+        raise ValueError(f"unknown unit {error.unknown!r}, {hint}") from None
+    rough = float(number)
+    if rough == 0 or math.isinf(rough):  # before "1e999999999" becomes a whole number of a billion digits
+        return rough, worth.dimension
+    try:
+        return float(Fraction(number) * worth.factor), worth.dimension  # the float nearest to the exact product
+    except OverflowError:
+        return math.copysign(math.inf, rough), worth.dimension
 
 
 def unit_in(text: str) -> str:
@@ -216,62 +247,10 @@ def unit_in(text: str) -> str:
     if found is None or found[2] is None:
         return ""
     try:
-        units.parse_unit(found[2])
-    except units.UnitError:
+        parse_unit(found[2])
+    except UnitError:
         return ""
     return found[2].strip()
-
-
-def _unit_mistake(unit: str, unknown: str, wanted: Kind) -> str:
-    if not unknown:
-        return f"{shown(unit)[1:-1]!r} is not a unit"
-    similar = units.similar_unit(unknown, unit, wanted.dimension)
-    hint = f"did you mean {similar!r}?" if similar else f'write it as in "{wanted.example}"'
-    return f"unknown unit {unknown!r}, {hint}"
-
-
-def _times(number: str, factor: Fraction) -> float:
-    """Return the float nearest to the exact product."""
-    rough = float(number)
-    if rough == 0 or math.isinf(rough):  # before "1e999999999" becomes a whole number of a billion digits
-        return rough
-    try:
-        return float(Fraction(number) * factor)
-    except OverflowError:
-        return math.copysign(math.inf, rough)
-
-
-def _text_schema(example: str) -> dict[str, Any]:
-    return {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*[A-Za-zµμ°]", "examples": [example]}
-
-
-@dataclass(frozen=True, slots=True)
-class FrictionCoefficient:
-    """Annotation of a float field: a coefficient, or a friction angle ("21 deg") whose tangent it is."""
-
-    wanted = 'a number of at least 0 such as 0.31, or a friction angle below 90 deg such as "21 deg",'
-
-    def read(self, value: object) -> float:
-        """Turn a coefficient or a friction angle into a coefficient."""
-        if isinstance(value, str):
-            return math.tan(Quantity(ANGLE, at_least=0.0, below=math.pi / 2).read(value))
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise invalid(f"{shown(value)} is not a number; {self.wanted} is needed")
-        return Quantity(NUMBER, at_least=0.0).read(value)
-
-    def __get_pydantic_core_schema__(self, _source: object, _handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Read the value first, then let pydantic see a float."""
-        return core_schema.no_info_before_validator_function(
-            self.read, core_schema.float_schema(strict=True, allow_inf_nan=False)
-        )
-
-    def __get_pydantic_json_schema__(self, _core_schema: CoreSchema, _handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Describe what may stand in the file."""
-        return self.json_schema()
-
-    def json_schema(self) -> dict[str, Any]:
-        """JSON Schema of the value in the file: a number or an angle with its unit."""
-        return {"anyOf": [{"type": "number", "minimum": 0}, _text_schema("21 deg")]}
 
 
 Number = Annotated[float, Quantity(NUMBER)]
@@ -303,7 +282,7 @@ NonNegativeAcceleration = Annotated[float, Quantity(ACCELERATION, at_least=0.0)]
 FrictionAngle = Annotated[float, Quantity(ANGLE, at_least=0.0, below=math.pi / 2)]
 Cohesion = Annotated[float, Quantity(PRESSURE, at_least=0.0)]
 Pressure = Annotated[float, Quantity(PRESSURE, above=0.0)]
-AnyPressure = Annotated[float, Quantity(Kind(units.PRESSURE, "Pa", "10 kPa"))]
+AnyPressure = Annotated[float, Quantity(replace(PRESSURE, example="10 kPa"))]
 Force = Annotated[float, Quantity(FORCE)]
 Moment = Annotated[float, Quantity(MOMENT)]
 Density = Annotated[float, Quantity(DENSITY, above=0.0)]

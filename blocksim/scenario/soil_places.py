@@ -9,10 +9,9 @@ from blocksim.scenario import polygons
 from blocksim.scenario.findings import Finding
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.soil import SoilTable
-from blocksim.scenario.placement import PlacedBody, place_bodies
+from blocksim.scenario.placement import place_bodies
 from blocksim.scenario.quantities import shown
-from blocksim.scenario.segments import TOLERANCE, PlacedSegment, place_segments, surface_heights
-from blocksim.scenario.structures.shaped import Shaped
+from blocksim.scenario.segments import TOLERANCE, place_segments, surface_heights
 
 UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 MOST_MEETINGS = 20
@@ -24,16 +23,16 @@ def soil_tables(scenario: Scenario) -> list[SoilTable]:
     return [table for table in scenario.systems.get("soils", ()) if isinstance(table, SoilTable)]
 
 
-def has_outlines(scenario: Scenario) -> bool:
-    """Return True if a block is no rectangle, which no soil can meet."""
-    shaped = any(isinstance(structure, Shaped) for structure in scenario.structures)
-    return shaped or any(block.polygon for block in scenario.blocks.values())
-
-
 def meetings(soil: SoilTable, key: str, scenario: Scenario) -> Iterator[tuple[str, str]]:
     """Yield the key of an outline and what it meets: ground, walls, blocks, soils before it."""
-    corners = soil.corners
-    found = [*_boundaries(soil, scenario), *_blocks(corners, scenario), *_soils(soil, scenario)]
+    found = [*_boundaries(soil, scenario), *_blocks(soil.corners, scenario)]
+    for other in soil_tables(scenario):
+        if other is soil:
+            break
+        if other.name == soil.name:
+            found.append("another soil of this name")
+        elif polygons.overlap(soil.corners, other.corners):
+            found.append(f"soil {other.name}")
     for what in found[:MOST_MEETINGS]:
         yield key, f"soil {soil.name} meets {what}"
 
@@ -45,46 +44,28 @@ def _boundaries(soil: SoilTable, scenario: Scenario) -> Iterator[str]:
         if y < float(surface_heights(scenario, np.array([x]))[0]) - TOLERANCE:
             yield f"the ground at x = {x:.6g} m"
             return
-    walls = len(scenario.walls)
     segments = place_segments(scenario)
-    for number, piece in enumerate(segments, start=1 - (len(segments) - walls)):
-        if polygons.cuts(np.array([piece.x0, piece.y0]), np.array([piece.x1, piece.y1]), corners):
+    places = np.linspace(0.0, 1.0, PLACES_ON_A_WALL)[1:-1, None]
+    for number, piece in enumerate(segments, start=1 - (len(segments) - len(scenario.walls))):
+        begin, end = np.array([piece.x0, piece.y0]), np.array([piece.x1, piece.y1])
+        back = np.array([piece.y1 - piece.y0, piece.x0 - piece.x1]) / piece.length
+        if polygons.cuts(begin, end, corners):
             yield f"wall {number}" if number > 0 else f"the ground near x = {piece.x1:.6g} m"
-        elif number > 0 and _is_behind(soil, piece):
+        elif number > 0 and polygons.inside(begin + places * (end - begin) + 0.5 * soil.spacing * back, corners).any():
+            # nothing would hold soil that lies against the back of a wall
             yield f"the solid side of wall {number}, right of the way from its `from` to its `to`: exchange the two"
-
-
-def _is_behind(soil: SoilTable, piece: PlacedSegment) -> bool:
-    """Return True if soil lies against the back of a piece, where nothing would hold it."""
-    along = np.linspace(0.0, 1.0, PLACES_ON_A_WALL)[1:-1, None]
-    begin, end = np.array([piece.x0, piece.y0]), np.array([piece.x1, piece.y1])
-    back = np.array([piece.y1 - piece.y0, piece.x0 - piece.x1]) / piece.length
-    return bool(polygons.inside(begin + along * (end - begin) + 0.5 * soil.spacing * back, soil.corners).any())
 
 
 def _blocks(corners: NDArray[np.float64], scenario: Scenario) -> Iterator[str]:
     low, high = corners.min(axis=0), corners.max(axis=0)
     for body in place_bodies(scenario):
         reach = 0.5 * float(np.hypot(body.size_x, body.size_y))
-        is_near = low[0] - reach < body.x < high[0] + reach and low[1] - reach < body.y < high[1] + reach
-        if is_near and polygons.overlap(corners, _rectangle(body)):
-            yield f"block {body.name}"
-
-
-def _rectangle(body: PlacedBody) -> NDArray[np.float64]:
-    u, v = (UNIT_CORNERS * (body.size_x, body.size_y)).T
-    cosine, sine = np.cos(body.angle), np.sin(body.angle)
-    return np.stack([body.x + cosine * u - sine * v, body.y + sine * u + cosine * v], axis=1)
-
-
-def _soils(soil: SoilTable, scenario: Scenario) -> Iterator[str]:
-    tables = soil_tables(scenario)
-    number = next(k for k, table in enumerate(tables) if table is soil)
-    for other in tables[:number]:
-        if other.name == soil.name:
-            yield "another soil of this name"
-        elif polygons.overlap(soil.corners, other.corners):
-            yield f"soil {other.name}"
+        if low[0] - reach < body.x < high[0] + reach and low[1] - reach < body.y < high[1] + reach:
+            u, v = (UNIT_CORNERS * (body.size_x, body.size_y)).T
+            cosine, sine = np.cos(body.angle), np.sin(body.angle)
+            rectangle = np.stack([body.x + cosine * u - sine * v, body.y + sine * u + cosine * v], axis=1)
+            if polygons.overlap(corners, rectangle):
+                yield f"block {body.name}"
 
 
 def unfit_soils(scenario: Scenario) -> Iterator[Finding]:

@@ -47,66 +47,79 @@ distances are differences of a few rounded places."""
 
 def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
     """Place everything and find impossible starts; the scenario is valid otherwise."""
-    unplaceable = list(_too_many(scenario)) or list(_shapeless(scenario))
+    unplaceable = [*_too_many(scenario)] or [*_shapeless(scenario)]
     if unplaceable:
         yield from unplaceable
         return
     yield from _endless_motion(scenario)
-    yield from _fixed_stiffnesses(scenario)
+    if scenario.contact.law != "linear":
+        for one, partners in scenario.pairs.items():
+            for other in (name for name, pair in partners.items() if pair.normal_stiffness is not None):
+                yield Finding(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
     yield from _impossible_masses(scenario)
     try:
         bodies, origins = place_bodies(scenario), origins_of(scenario)
     except UnfitError:
-        yield from _unfit_structures(scenario)
+        for number, structure in enumerate(scenario.structures):
+            try:
+                structure.start(scenario.blocks[structure.block])
+            except UnfitError as error:
+                yield Finding(("structures", number, error.key), str(error))
         return
-    endless = list(_endless_places(origins, bodies)) or list(_endless_masses(origins, bodies))
+    endless = [*_endless(origins, bodies)]
     if endless:
         yield from endless
         return
-    kinds = {(body.size_x, body.size_y, body.outline): body for body in bodies}
-    smallest = smallest_width(kinds.values())
-    yield from _coarse_particles(scenario, smallest)
-    yield from _fine_particles(scenario)
-    farthest = max(max(abs(one) for one in ends) for ends in (_ends(bodies, "x"), _ends(bodies, "y")))
-    yield from _unfit_skin(scenario, smallest, farthest)
+    smallest = smallest_width({(body.size_x, body.size_y, body.outline): body for body in bodies}.values())
+    yield from _unfit_particles(scenario, smallest)
+    yield from _unfit_skin(scenario, smallest, max((max(abs(b.x), abs(b.y)) for b in bodies), default=0.0))
     yield from _short_segments(scenario, SHORTEST_SHARE * smallest if bodies else 0.0)
-    yield from _equal_names(origins, bodies)
-    yield from _below_ground(scenario, origins, bodies)
-    yield from _in_walls(scenario, origins, bodies)
+    seen: set[str] = set()
+    for origin, body in zip(origins, bodies, strict=True):
+        if body.name in seen:
+            message = f"two bodies are named {shown(body.name)}; a body without a name is called by its number"
+            yield Finding((*origin, "name"), message)
+        seen.add(body.name)
     yield from _overlaps(scenario, origins, bodies)
     yield from unfit_loads(scenario, bodies)
     yield from unfit_holds(scenario, bodies)
-    yield from _unfit_systems(scenario)
+    for name, tables in scenario.systems.items():
+        for number, table in enumerate(tables):
+            yield from (Finding((name, number, key), message) for key, message in table.impossible(scenario))
     yield from unfit_probes(scenario, bodies)
     yield from impossible_events(scenario, bodies)
 
 
-def _ends(bodies: Sequence[PlacedBody], name: str) -> tuple[float, float]:
-    """Return the smallest and the largest value of a number of all bodies."""
-    values = list(map(attrgetter(name), bodies))
-    return min(values, default=0.0), max(values, default=0.0)
-
-
-def _unfit_systems(scenario: Scenario) -> Iterator[Finding]:
-    """Find what the tables of further systems say themselves."""
-    for name, tables in scenario.systems.items():
-        for number, table in enumerate(tables):
-            yield from (Finding((name, number, key), message) for key, message in table.impossible(scenario))
-
-
 def _too_many(scenario: Scenario) -> Iterator[Finding]:
-    counts = {
-        ("structures",): (sum(structure.size for structure in scenario.structures) + len(scenario.bodies), "bodies"),
-        ("walls",): (len(scenario.walls), "walls"),
-        ("ground", "profile"): (len(scenario.ground.profile or ()), "points"),
-    }
-    for path, (count, what) in counts.items():
-        most = MAX_BLOCKS if what == "bodies" else MAX_SEGMENTS
+    bodies = sum(structure.size for structure in scenario.structures) + len(scenario.bodies)
+    counts: tuple[tuple[keys.KeyPath, int, str, int], ...] = (
+        (("structures",), bodies, "bodies", MAX_BLOCKS),
+        (("walls",), len(scenario.walls), "walls", MAX_SEGMENTS),
+        (("ground", "profile"), len(scenario.ground.profile or ()), "points", MAX_SEGMENTS),
+        (("probes",), len(scenario.probes), "probes", MAX_PROBES),
+    )
+    for path, count, what, most in counts:
         if count > most:
-            yield Finding(path, f"{count} {what} are too many; at most {most} are allowed")
-    if len(scenario.probes) > MAX_PROBES:
-        message = f"{len(scenario.probes)} probes are too many; at most {MAX_PROBES} are allowed"
-        yield Finding(("probes",), f"{message} (output.contacts = true keeps the forces of all contacts)")
+            cure = " (output.contacts = true keeps the forces of all contacts)" if what == "probes" else ""
+            yield Finding(path, f"{count} {what} are too many; at most {most} are allowed{cure}")
+
+
+def _shapeless(scenario: Scenario) -> Iterator[Finding]:
+    """Find blocks without a shape where one is needed, and drawn blocks that do not exist."""
+    needing: list[tuple[keys.KeyPath, str]] = [
+        (("bodies", number, "block"), spec.block) for number, spec in enumerate(scenario.bodies)
+    ]
+    for number, structure in enumerate(scenario.structures):
+        if not isinstance(structure, Shaped):
+            needing.append((("structures", number, "block"), structure.block))
+        for place, cell in enumerate(structure.drawn if isinstance(structure, Polygons) else ()):
+            if cell.block is not None and cell.block not in scenario.blocks:
+                hint = did_you_mean_or_list(cell.block, scenario.blocks)
+                where = ("structures", number, "cells", place, "block")
+                yield Finding(where, f"unknown block {shown(cell.block)}, {hint}")
+    for path, block in needing:
+        if not scenario.blocks[block].is_shaped:
+            yield Finding(path, f"block {shown(block)} has no shape; {SHAPES}")
 
 
 def _endless_motion(scenario: Scenario) -> Iterator[Finding]:
@@ -123,72 +136,6 @@ def _endless_motion(scenario: Scenario) -> Iterator[Finding]:
         yield Finding(("bodies",), f"{message} are allowed")
 
 
-def _fixed_stiffnesses(scenario: Scenario) -> Iterator[Finding]:
-    if scenario.contact.law == "linear":
-        return
-    for one, partners in scenario.pairs.items():
-        for other, pair in partners.items():
-            if pair.normal_stiffness is not None:
-                yield Finding(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
-
-
-def _shapeless(scenario: Scenario) -> Iterator[Finding]:
-    """Find blocks without a shape where one is needed, and drawn blocks that do not exist."""
-    for number, spec in enumerate(scenario.bodies):
-        if not scenario.blocks[spec.block].is_shaped:
-            yield Finding(("bodies", number, "block"), f"block {shown(spec.block)} has no shape; {SHAPES}")
-    for number, structure in enumerate(scenario.structures):
-        if not isinstance(structure, Shaped):
-            if not scenario.blocks[structure.block].is_shaped:
-                yield Finding(("structures", number, "block"), f"block {shown(structure.block)} has no shape; {SHAPES}")
-        elif isinstance(structure, Polygons):
-            yield from _unknown_blocks(number, structure, scenario)
-
-
-def _unknown_blocks(number: int, structure: Polygons, scenario: Scenario) -> Iterator[Finding]:
-    for place, cell in enumerate(structure.drawn):
-        if cell.block is not None and cell.block not in scenario.blocks:
-            hint = did_you_mean_or_list(cell.block, scenario.blocks)
-            path = ("structures", number, "cells", place, "block")
-            yield Finding(path, f"unknown block {shown(cell.block)}, {hint}")
-
-
-def _unfit_structures(scenario: Scenario) -> Iterator[Finding]:
-    for number, structure in enumerate(scenario.structures):
-        try:
-            structure.start(scenario.blocks[structure.block])
-        except UnfitError as error:
-            yield Finding(("structures", number, error.key), str(error))
-
-
-def _endless_masses(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
-    """Find blocks with an outline whose mass is beyond all numbers."""
-    told = set()
-    for origin, body in zip(origins, bodies, strict=True):
-        if not body.outline or origin in told:
-            continue
-        if not (0.0 < body.inertia < math.inf and 0.0 < body.mass < math.inf):
-            told.add(origin)
-            message = f"a block of {body.mass:g} kg and {body.inertia:g} kg m^2 cannot be simulated"
-            yield Finding(origin, f"body {body.name}: {message}")
-
-
-def _endless_places(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
-    """Find structures with valid keys from which an invalid position or velocity follows."""
-    told = set()
-    numbers = map(attrgetter("x", "y", "vx", "vy", "spin"), bodies)
-    values = np.fromiter(chain.from_iterable(numbers), np.float64, 5 * len(bodies)).reshape(-1, 5)
-    for index in np.flatnonzero(~np.isfinite(values).all(axis=1)).tolist():
-        origin, body = origins[index], bodies[index]
-        if origin not in told:
-            told.add(origin)
-            yield Finding(
-                origin,
-                f"body {body.name} would be at ({body.x:g}, {body.y:g}) m with a velocity of "
-                f"({body.vx:g}, {body.vy:g}) m/s and a spin of {body.spin:g} rad/s; check the keys of its structure",
-            )
-
-
 def _impossible_masses(scenario: Scenario) -> Iterator[Finding]:
     """Find blocks with valid sizes but an invalid mass or inertia."""
     for name, block in scenario.blocks.items():
@@ -199,31 +146,51 @@ def _impossible_masses(scenario: Scenario) -> Iterator[Finding]:
         inertia = mass * (block.size_x * block.size_x + block.size_y * block.size_y) / 12.0
         if block.polygon:
             mass, inertia = (density * block.depth * moment for moment in section_of(block.polygon))
-        if not (0.0 < inertia < math.inf and 0.0 < mass < math.inf):
-            message = f"a block of {mass:g} kg and {inertia:g} kg m^2 cannot be simulated"
-            yield Finding(("blocks", name), f"{message}; check its sides and density")
+        if not _is_possible(mass, inertia):
+            yield Finding(("blocks", name), f"{_unsimulated(mass, inertia)}; check its sides and density")
 
 
-def _coarse_particles(scenario: Scenario, smallest: float) -> Iterator[Finding]:
-    """Find particles too far apart for the smallest side (m), and kernels that reach through it."""
+def _is_possible(mass: float, inertia: float) -> bool:
+    return 0.0 < inertia < math.inf and 0.0 < mass < math.inf
+
+
+def _unsimulated(mass: float, inertia: float) -> str:
+    return f"a block of {mass:g} kg and {inertia:g} kg m^2 cannot be simulated"
+
+
+def _endless(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+    """Find bodies with places or velocities beyond all numbers, or else outlines with such masses; one an origin."""
+    numbers = map(attrgetter("x", "y", "vx", "vy", "spin"), bodies)
+    values = np.fromiter(chain.from_iterable(numbers), np.float64, 5 * len(bodies)).reshape(-1, 5)
+    lost = {origins[index]: bodies[index] for index in reversed(np.flatnonzero(~np.isfinite(values).all(axis=1)))}
+    for origin, body in reversed(lost.items()):
+        message = (
+            f"body {body.name} would be at ({body.x:g}, {body.y:g}) m with a velocity of "
+            f"({body.vx:g}, {body.vy:g}) m/s and a spin of {body.spin:g} rad/s; check the keys of its structure"
+        )
+        yield Finding(origin, message)
+    told: set[keys.KeyPath] = set()
+    for origin, body in () if lost else zip(origins, bodies, strict=True):
+        if body.outline and origin not in told and not _is_possible(body.mass, body.inertia):
+            told.add(origin)
+            yield Finding(origin, f"body {body.name}: {_unsimulated(body.mass, body.inertia)}")
+
+
+def _unfit_particles(scenario: Scenario, smallest: float) -> Iterator[Finding]:
+    """Find particles too far apart for the smallest side (m), kernels that reach through it, and too many particles."""
     contact = scenario.contact
-    side = f"the smallest side of a block, {_mm(smallest)}"
-    if contact.model != "surface" and contact.particle_spacing > 0.5 * smallest:
-        message = f"{_mm(contact.particle_spacing)} is more than half of {side}"
+    if contact.model == "surface":
+        return
+    spacing, side = contact.particle_spacing, f"the smallest side of a block, {_mm(smallest)}"
+    if spacing > 0.5 * smallest:
+        message = f"{_mm(spacing)} is more than half of {side}"
         yield Finding(("contact", "particle_spacing"), message, relation=True)
     elif contact.model == "kernel" and contact.support_radius >= smallest:
         key = "particle_spacing" if contact.smoothing_length is None else "smoothing_length"
         length = _mm(contact.resolved_smoothing_length)
         message = f"a {contact.kernel} of smoothing length {length} reaches {_mm(contact.support_radius)}"
         yield Finding(("contact", key), f"{message}, through {side}", relation=True)
-
-
-def _fine_particles(scenario: Scenario) -> Iterator[Finding]:
-    """Find particle spacings that give a side, or all kinds of blocks together, too many particles."""
-    spacing = scenario.contact.particle_spacing
-    if scenario.contact.model == "surface":
-        return
-    sides = [side / spacing for block in scenario.blocks.values() for side in (block.size_x, block.size_y)]
+    sides = [length / spacing for block in scenario.blocks.values() for length in (block.size_x, block.size_y)]
     if max(sides) > MAX_INTERVALS or 2.0 * sum(sides) > MAX_PARTICLES:
         message = f"{_mm(spacing)} is too small: the longest side would have {max(sides):.6g} particles"
         most = f"at most {MAX_INTERVALS} on a side and {MAX_PARTICLES} around one block of each kind are allowed"
@@ -249,9 +216,9 @@ def _unfit_skin(scenario: Scenario, smallest: float, farthest: float) -> Iterato
 
 def _short_segments(scenario: Scenario, least: float) -> Iterator[Finding]:
     """Find segments of boundary shorter than `least` (m): a corner could miss them."""
-    points = scenario.ground.profile or ()
     pieces: list[tuple[keys.KeyPath, float]] = [
-        (("ground", "profile", number), math.dist(*ends)) for number, ends in enumerate(pairwise(points), start=1)
+        (("ground", "profile", number), math.dist(*ends))
+        for number, ends in enumerate(pairwise(scenario.ground.profile or ()), start=1)
     ]
     pieces += [(("walls", number), math.dist(wall.start, wall.end)) for number, wall in enumerate(scenario.walls)]
     for path, length in pieces:
@@ -260,63 +227,33 @@ def _short_segments(scenario: Scenario, least: float) -> Iterator[Finding]:
             yield Finding(path, f"this segment is only {_mm(length)} long; {why}", relation=True)
 
 
-def _equal_names(origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
-    if len({body.name for body in bodies}) == len(bodies):
-        return
-    seen: set[str] = set()
-    for origin, body in zip(origins, bodies, strict=True):
-        if body.name in seen:
-            message = f"two bodies are named {shown(body.name)}; a body without a name is called by its number"
-            yield Finding((*origin, "name"), message)
-        seen.add(body.name)
-
-
-def _below_ground(
-    scenario: Scenario, origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]
-) -> Iterator[Finding]:
-    if scenario.ground.profile is not None:
-        yield from _below_profile(scenario, origins, bodies)
-        return
-    bottom = overlap.Outlines.of(bodies).bottom
-    for index in np.flatnonzero(bottom < -TOLERANCE)[:MAX_FINDINGS]:
-        depth = _mm(-float(bottom[index]))
-        yield Finding(origins[index], f"body {bodies[index].name} reaches {depth} below the ground (y = 0)")
-
-
-def _below_profile(
-    scenario: Scenario, origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]
-) -> Iterator[Finding]:
-    """Find bodies across a segment of the profile, each with its largest depth, and those wholly below."""
-    depths: dict[int, float] = {}
-    for index, _, depth in overlap.crossings(bodies, profile_segments(scenario)):
-        depths[index] = max(depths.get(index, 0.0), depth)
-    surface = surface_heights(scenario, np.array([body.x for body in bodies]))
-    for index, (origin, body) in enumerate(zip(origins, bodies, strict=True)):
-        if index in depths:
-            yield Finding(origin, f"body {body.name} reaches {_mm(depths[index])} into the ground's profile")
-        elif body.y < surface[index]:
-            yield Finding(origin, f"body {body.name} lies below the ground's profile")
-
-
-def _in_walls(scenario: Scenario, origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
-    for body, wall, depth in islice(overlap.crossings(bodies, wall_segments(scenario)), MAX_OVERLAPS):
-        name = bodies[body].name
-        yield Finding(origins[body], f"body {name} and walls.{wall} overlap by {_mm(depth)}; they may only touch")
-
-
 def _overlaps(scenario: Scenario, origins: Sequence[keys.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
-    for first, second, depth in islice(overlap.overlapping_pairs(bodies), MAX_OVERLAPS):
-        names = f"bodies {bodies[first].name} and {bodies[second].name}"
-        text = f"{names} overlap by {_mm(depth)}; they may only touch"
-        is_small = depth <= ROUNDING * smallest_width((bodies[first], bodies[second]))
-        cure = _shrinking(scenario, origins[second], depth) if is_small else ""
-        yield Finding(origins[second], text + cure)
-
-
-def _shrinking(scenario: Scenario, origin: keys.KeyPath, depth: float) -> str:
-    """Return what parts a block of a drawing from another."""
-    is_drawn = origin[0] == "structures" and scenario.structures[int(origin[1])].kind == "polygons"
-    return f'; shrink = "{_mm(depth)}" of its structure parts them' if is_drawn else ""
+    """Find bodies in the ground, each with its largest depth, bodies in walls, and bodies in one another."""
+    if scenario.ground.profile is None:
+        bottom = overlap.Outlines.of(bodies).bottom
+        for index in np.flatnonzero(bottom < -TOLERANCE)[:MAX_FINDINGS]:
+            depth = _mm(-float(bottom[index]))
+            yield Finding(origins[index], f"body {bodies[index].name} reaches {depth} below the ground (y = 0)")
+    else:
+        depths: dict[int, float] = {}
+        for index, _, sunk in overlap.crossings(bodies, profile_segments(scenario)):
+            depths[index] = max(depths.get(index, 0.0), sunk)
+        surface = surface_heights(scenario, np.array([body.x for body in bodies]))
+        for index, (origin, body) in enumerate(zip(origins, bodies, strict=True)):
+            if index in depths:
+                yield Finding(origin, f"body {body.name} reaches {_mm(depths[index])} into the ground's profile")
+            elif body.y < surface[index]:
+                yield Finding(origin, f"body {body.name} lies below the ground's profile")
+    for index, wall, sunk in islice(overlap.crossings(bodies, wall_segments(scenario)), MAX_OVERLAPS):
+        message = f"body {bodies[index].name} and walls.{wall} overlap by {_mm(sunk)}; they may only touch"
+        yield Finding(origins[index], message)
+    for first, second, sunk in islice(overlap.overlapping_pairs(bodies), MAX_OVERLAPS):
+        one, other, origin = bodies[first], bodies[second], origins[second]
+        is_drawn = origin[0] == "structures" and scenario.structures[int(origin[1])].kind == "polygons"
+        is_small = sunk <= ROUNDING * smallest_width((one, other))
+        cure = f'; shrink = "{_mm(sunk)}" of its structure parts them' if is_drawn and is_small else ""
+        message = f"bodies {one.name} and {other.name} overlap by {_mm(sunk)}; they may only touch{cure}"
+        yield Finding(origin, message)
 
 
 def _mm(length: float) -> str:

@@ -21,7 +21,7 @@ from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import PlacedBody, Scenario, Sweep, place_bodies
 from blocksim.scenario import quantities as q
-from blocksim.scenario.units import ANGLE, parse_unit
+from blocksim.scenario.units import parse_unit
 from blocksim.simulation.movement import RESTED, EndSpeed, FirstMove, Way, from_start_to_end
 from blocksim.simulation.table import COLUMNS, MILLI, Columns
 
@@ -156,7 +156,7 @@ def _unit(values: object) -> str:
 
 
 def _is_angle(unit: str) -> bool:
-    return bool(unit) and parse_unit(unit).dimension == ANGLE
+    return bool(unit) and parse_unit(unit).dimension == q.ANGLE.dimension
 
 
 def _is_number(value: object) -> bool:

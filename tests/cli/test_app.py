@@ -14,8 +14,8 @@ from blocksim.cli.commands import COMMANDS, GROUPS
 from tests.cli.conftest import SOFT, Command
 from tests.golden import Golden
 
-HEAVY = ("numba", "pandas", "h5py", "matplotlib", "pint", "numpy")
-UNUSED_BY_A_RUN = ("pandas", "matplotlib", "pint", "multiprocessing.pool", "blocksim.study.sweep")
+HEAVY = ("numba", "pandas", "h5py", "matplotlib", "numpy")
+UNUSED_BY_A_RUN = ("pandas", "matplotlib", "multiprocessing.pool", "blocksim.study.sweep")
 
 
 @pytest.mark.parametrize("name", ["", *COMMANDS])

@@ -4,27 +4,26 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.scenario.spelling import USUAL, meant_word, nearest, slips
+from blocksim.scenario.spelling import USUAL, meant_word, nearest
 
 
 @pytest.mark.parametrize(
-    ("left", "right", "count"),
+    ("word", "known", "most", "meant"),
     [
-        ("mm", "mm", 0),
-        ("mn", "mm", 1),
-        ("MPA", "MPa", 0),
-        ("widht", "width", 1),
-        ("", "abc", 3),
-        ("abcd", "bcde", 2),
+        ("MPA", ["Pa", "MPa"], 0, "MPa"),
+        ("widht", ["height", "width"], 1, "width"),
+        ("wdth", ["height", "width"], 1, "width"),
+        ("widthh", ["height", "width"], 1, "width"),
+        ("wudth", ["height", "width"], 1, "width"),
+        ("wudht", ["height", "width"], 1, None),
+        ("wudht", ["height", "width"], 2, "width"),
+        ("mn", ["kPa"], 1, None),
     ],
 )
-def test_slips_count_letters_replaced_added_dropped_or_swapped(left: str, right: str, count: int) -> None:
-    assert slips(left, right) == slips(right, left) == count
-
-
-def test_nearest_prefers_a_word_of_the_same_length() -> None:
-    assert nearest("mn", ["m", "min", "mm"], most=1) == "mm"
-    assert nearest("mn", ["kPa"], most=1) is None
+def test_nearest_allows_so_many_letters_replaced_added_dropped_or_swapped(
+    word: str, known: list[str], most: int, meant: str | None
+) -> None:
+    assert nearest(word, known, most=most) == meant
 
 
 def test_symbols_of_papers_and_other_programs_lead_to_the_key_of_the_table() -> None:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
@@ -72,6 +72,21 @@ class Whole:
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Describe the range to editors."""
         return {**handler(schema), "minimum": self.least, "maximum": self.most}
+
+
+def by_kind(union: Any) -> dict[str, type[Any]]:
+    """Return the tables of an annotated union by their kind, as written in a scenario."""
+    tables = get_args(get_args(union)[0])
+    return {word: table for table in tables for word in get_args(table.model_fields["kind"].annotation)}
+
+
+def require_one(missing: str, **values: object) -> None:
+    """Raise pydantic's error unless exactly one of some keys has a value; `missing` is the message for none."""
+    given = [key for key, value in values.items() if value is not None]
+    if not given:
+        raise invalid(missing)
+    if len(given) > 1:
+        raise invalid(f"{' and '.join(given)} are both given; keep one of them", given[-1])
 
 
 def table_path(value: object, folder: Path | str | None, example: str) -> Path:

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import OneOf, Table
+from blocksim.scenario.models.base import OneOf, Table, require_one
 from blocksim.scenario.models.motion import FromTable, Harmonic
 
 Course = Literal["constant", "smooth"]
@@ -20,14 +20,6 @@ MOST_BODY_TABLES = 16
 STEEPEST = 15.0 / 8.0
 """Greatest speed of a smooth course over its mean."""
 POSITIVE_SPIN = q.Quantity(q.SPIN, above=0.0)
-
-
-def _one_of_two(duration: float | None, speed: float | None, name: str) -> None:
-    """Raise a pydantic error unless either a duration or a speed is given."""
-    if duration is None and speed is None:
-        raise q.invalid(f"give duration or {name}")
-    if duration is not None and speed is not None:
-        raise q.invalid(f"duration and {name} are both given; keep one of them", name)
 
 
 class Ramp(Table):
@@ -45,7 +37,7 @@ class Ramp(Table):
 
     @model_validator(mode="after")
     def _duration_or_speed(self) -> Self:
-        _one_of_two(self.duration, self.speed, "speed")
+        require_one("give duration or speed", duration=self.duration, speed=self.speed)
         return self
 
     @property
@@ -73,7 +65,7 @@ class Rotation(Table):
 
     @model_validator(mode="after")
     def _duration_or_spin(self) -> Self:
-        _one_of_two(self.duration, self.spin, "spin")
+        require_one("give duration or spin", duration=self.duration, spin=self.spin)
         if self.angle == 0.0:
             raise q.invalid("a turn by 0 is none", "angle")
         return self

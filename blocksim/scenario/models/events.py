@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import OneOf, Table
+from blocksim.scenario.models.base import OneOf, Table, require_one
 
 When = Literal["rest"]
 ACTIONS = ("remove", "fix", "free", "unload", "velocity")
@@ -42,10 +42,7 @@ class Event(Table):
 
     @model_validator(mode="after")
     def _has_one_moment(self) -> Self:
-        if self.at is None and self.when is None:
-            raise q.invalid('give a time, such as at = "0.2 s", or when = "rest"')
-        if self.at is not None and self.when is not None:
-            raise q.invalid("at and when are both given; keep one of them", "when")
+        require_one('give a time, such as at = "0.2 s", or when = "rest"', at=self.at, when=self.when)
         return self
 
     @model_validator(mode="after")

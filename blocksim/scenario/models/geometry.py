@@ -18,7 +18,7 @@ from pydantic_core import PydanticKnownError
 
 from blocksim.scenario import outlines
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import Identifier, OneOf, Table, Whole
+from blocksim.scenario.models.base import Identifier, OneOf, Table, Whole, require_one
 from blocksim.scenario.models.drive import AnyDrive
 from blocksim.scenario.units import USUAL_GRAVITY
 
@@ -57,10 +57,8 @@ class Material(Table):
 
     @model_validator(mode="after")
     def _one_density(self) -> Self:
-        if self.given_density is None and self.unit_weight is None:
-            raise q.invalid('the density is missing: give density (such as "2700 kg/m^3") or unit_weight')
-        if self.given_density is not None and self.unit_weight is not None:
-            raise q.invalid("density and unit_weight are both given; keep one of them", "unit_weight")
+        missing = 'the density is missing: give density (such as "2700 kg/m^3") or unit_weight'
+        require_one(missing, density=self.given_density, unit_weight=self.unit_weight)
         return self
 
     @model_validator(mode="after")

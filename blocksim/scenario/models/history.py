@@ -21,7 +21,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from blocksim.errors import BlocksimError
 from blocksim.scenario import quantities as q
 from blocksim.scenario.csv_table import Cell, read_open_table
-from blocksim.scenario.models.base import Table, table_path
+from blocksim.scenario.models.base import Table, by_kind, table_path
 
 MAX_BYTES = 1_000_000
 MAX_ROWS = 10_000
@@ -113,7 +113,7 @@ class Samples(Table):
 
 AnyHistory = Annotated[Constant | Ramp | Steps | Samples, Field(discriminator="kind")]
 """Any history, distinguished by its `kind`."""
-HISTORIES: dict[str, type[Table]] = {"constant": Constant, "ramp": Ramp, "steps": Steps, "table": Samples}
+HISTORIES: dict[str, type[Table]] = by_kind(AnyHistory)
 """Class by kind, as written in a scenario."""
 
 

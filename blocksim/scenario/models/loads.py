@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal, Self, get_args
 from pydantic import Field, ValidationInfo, model_validator
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import Identifier, OneOf, Table
+from blocksim.scenario.models.base import Identifier, OneOf, Table, by_kind, require_one
 from blocksim.scenario.models.geometry import Point
 from blocksim.scenario.models.history import AnyHistory, Constant, Stretch, Times, joined, refuse_unfit, with_samples
 
@@ -80,10 +80,8 @@ class Pressure(VaryingLoad):
 
     @model_validator(mode="after")
     def _one_pressure(self) -> Self:
-        if self.magnitude is None and self.water_level is None:
-            raise q.invalid('the pressure is missing: give magnitude (such as "10 kPa") or water_level')
-        if self.magnitude is not None and self.water_level is not None:
-            raise q.invalid("magnitude and water_level are both given; keep one of them", "water_level")
+        missing = 'the pressure is missing: give magnitude (such as "10 kPa") or water_level'
+        require_one(missing, magnitude=self.magnitude, water_level=self.water_level)
         if self.magnitude is not None and "unit_weight" in self.model_fields_set and self.unit_weight != WATER:
             raise q.invalid("a uniform pressure has no unit weight, which belongs to water_level", "unit_weight")
         return self
@@ -152,13 +150,7 @@ class Gravity(Load):
 
 AnyLoad = Annotated[Force | Moment | Pressure | Horizontal | Gravity, Field(discriminator="kind")]
 """Any load, distinguished by its `kind`."""
-LOADS: dict[str, type[Load]] = {
-    "force": Force,
-    "moment": Moment,
-    "pressure": Pressure,
-    "horizontal": Horizontal,
-    "gravity": Gravity,
-}
+LOADS: dict[str, type[Load]] = by_kind(AnyLoad)
 """Class by kind, as written in a scenario."""
 OnBody = Force | Moment | Pressure
 """Those that act on one body."""

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import Identifier, Table
+from blocksim.scenario.models.base import Identifier, Table, by_kind
 
 _TIME = q.Quantity(q.TIME, above=0.0)
 STEP = "step"
@@ -79,10 +79,5 @@ class EnergyProbe(Probe):
 
 AnyProbe = Annotated[ForceProbe | PointProbe | JointProbe | EnergyProbe, Field(discriminator="kind")]
 """Any probe, distinguished by its `kind`."""
-PROBES: dict[str, type[Probe]] = {
-    "force": ForceProbe,
-    "point": PointProbe,
-    "joint": JointProbe,
-    "energy": EnergyProbe,
-}
+PROBES: dict[str, type[Probe]] = by_kind(AnyProbe)
 """Class by kind, as written in a scenario."""

@@ -108,7 +108,8 @@ class SoilTable(SystemTable):
 
     def impossible(self, scenario: "Scenario") -> Iterator[tuple[str, str]]:
         """Find a material that is no soil, a spacing that does not suit, and what the outline meets."""
-        from blocksim.scenario.soil_places import has_outlines, meetings  # noqa: PLC0415 - needs the scenario's own model
+        from blocksim.scenario.placement import has_outlines  # noqa: PLC0415 - needs the scenario's own model
+        from blocksim.scenario.soil_places import meetings  # noqa: PLC0415 - the same
 
         if self.material not in scenario.materials:
             hint = did_you_mean_or_list(self.material, scenario.materials)

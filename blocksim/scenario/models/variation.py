@@ -8,9 +8,9 @@ from typing import Any, Literal
 from pydantic_core import PydanticCustomError
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario import units
 from blocksim.scenario.models.base import OneOf
 from blocksim.scenario.spelling import nearest
+from blocksim.scenario.units import Dimension, parse_unit
 
 MAX_VALUES = 100_000
 SIGNIFICANT = 12
@@ -72,7 +72,7 @@ def written(number: float, *, angle: bool) -> object:
 def _typed(number: float, values: Distribution) -> object:
     """Return a number with the unit of the file, if that gives the same number again."""
     if values.unit:
-        text = f"{number / float(units.parse_unit(values.unit).factor):.{SIGNIFICANT}g} {values.unit}"
+        text = f"{number / float(parse_unit(values.unit).factor):.{SIGNIFICANT}g} {values.unit}"
         if q.parse_quantity(text)[0] == number:
             return text
     return written(number, angle=values.angle)
@@ -222,16 +222,16 @@ def _scale(value: Mapping[str, Any], low: float, high: float) -> Scale:
 def _numbers(value: Mapping[str, Any], *names: str) -> tuple[list[float], bool]:
     """Return the SI numbers of keys of one kind, and whether they are angles."""
     ends = [_end(value[name]) for name in names]
-    kinds = {dimension for number, dimension in ends if number != 0.0 or dimension != units.NUMBER}
+    kinds = {dimension for number, dimension in ends if number != 0.0 or dimension != q.NUMBER.dimension}
     if len(kinds) > 1:
         *others, last = (f"{name} {q.shown(value[name])}" for name in names)
         raise q.invalid(f"{', '.join(others)} and {last} are not of one kind")
-    return [number for number, _ in ends], units.ANGLE in kinds
+    return [number for number, _ in ends], q.ANGLE.dimension in kinds
 
 
-def _end(value: object) -> tuple[float, units.Dimension]:
+def _end(value: object) -> tuple[float, Dimension]:
     if not isinstance(value, str):
-        return q.Quantity(q.NUMBER).read(value), units.NUMBER
+        return q.Quantity(q.NUMBER).read(value), q.NUMBER.dimension
     try:
         return q.parse_quantity(value, q.LENGTH)
     except ValueError as error:

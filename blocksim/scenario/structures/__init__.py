@@ -1,9 +1,10 @@
 """The kinds of structure; a new kind is one file next to this one and one line in `AnyStructure`."""
 
-from typing import Annotated, get_args
+from typing import Annotated
 
 from pydantic import Field
 
+from blocksim.scenario.models.base import by_kind
 from blocksim.scenario.structures.arch import Arch
 from blocksim.scenario.structures.base import MAX_BLOCKS, Pose, Structure, UnfitError
 from blocksim.scenario.structures.column import Column
@@ -18,13 +19,13 @@ from blocksim.scenario.structures.staircase import Staircase
 from blocksim.scenario.structures.voronoi import Voronoi
 from blocksim.scenario.structures.wall import BlockWall
 
-_Union = Staircase | Stack | BlockWall | Pyramid | Dominoes | Grid | Arch | Column | Voronoi | Rubble | Polygons
-AnyStructure = Annotated[_Union, Field(discriminator="kind")]
+AnyStructure = Annotated[
+    Staircase | Stack | BlockWall | Pyramid | Dominoes | Grid | Arch | Column | Voronoi | Rubble | Polygons,
+    Field(discriminator="kind"),
+]
 """Any structure of a scenario, distinguished by its `kind`."""
 
-KINDS: dict[str, type[Structure]] = {
-    word: cls for cls in get_args(_Union) for word in get_args(cls.model_fields["kind"].annotation)
-}
+KINDS: dict[str, type[Structure]] = by_kind(AnyStructure)
 """Class by kind, as written in a scenario."""
 
 __all__ = [

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import ConfigDict, Field, model_validator
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import Whole
+from blocksim.scenario.models.base import Whole, require_one
 from blocksim.scenario.outlines import Corner
 from blocksim.scenario.structures.base import UnfitError
 from blocksim.scenario.structures.shaped import Cell, Shaped
@@ -39,10 +39,8 @@ class Arch(Shaped):
 
     @model_validator(mode="after")
     def _one_size(self) -> Self:
-        if self.radius is None and self.span is None:
-            raise q.invalid("the size is missing: give radius (of the middle of the ring) or span")
-        if self.radius is not None and self.span is not None:
-            raise q.invalid("radius and span are both given; keep one of them", "span")
+        missing = "the size is missing: give radius (of the middle of the ring) or span"
+        require_one(missing, radius=self.radius, span=self.span)
         if self.mean_radius <= 0.5 * self.thickness:
             message = f"a ring of {1e3 * self.thickness:g} mm needs a mean radius of more than half of that"
             raise q.invalid(message, "thickness")
