@@ -43,20 +43,15 @@ def compile_set(name: str) -> None:
 def _run_smallest(name: str) -> None:
     from blocksim.scenario import scenario_from_mapping  # noqa: PLC0415
     from blocksim.simulation import run_ensemble  # noqa: PLC0415
-    from blocksim.simulation.compilation import (  # noqa: PLC0415
-        CHANGES,
-        SMALLEST_SCENE,
-        SPRUNG_OUTLINES,
-        compile_kernels,
-    )
-    from blocksim.simulation.schemes import build_scene  # noqa: PLC0415
-    from blocksim.simulation.schemes.explicit import PARTICLES  # noqa: PLC0415
+    from blocksim.simulation.compilation import SMALLEST_SCENE, compile_kernels  # noqa: PLC0415
+    from blocksim.simulation.schemes import SCHEMES, build_scene  # noqa: PLC0415
+    from blocksim.simulation.schemes.explicit import PARTICLES, SURFACE_OF_OUTLINES  # noqa: PLC0415
     from blocksim.simulation.team import Team  # noqa: PLC0415
 
     compile_kernels(name)
-    if name in {PARTICLES, SPRUNG_OUTLINES}:  # few tests have ensembles and teams of those, and compile them
+    if name in {PARTICLES, SURFACE_OF_OUTLINES}:  # few tests have ensembles and teams of those, and compile them
         return
-    change: dict[str, Any] = CHANGES[name]
+    change: dict[str, Any] = next(dict(one.kernel_sets[name]) for one in SCHEMES.values() if name in one.kernel_sets)
     scene = scenario_from_mapping({**SMALLEST_SCENE, **change, "time": {**change.get("time", {}), "end": 1e-4}})
     with Team(2) as team:
         team.advance(build_scene(scene), 1)

@@ -10,6 +10,7 @@ import numpy as np
 
 from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeated
 from blocksim.bench.scenes import FRICTION, Stepping, Table, three_blocks
+from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
 from blocksim.scenario.structures.base import draws
 from blocksim.simulation.ensemble import Ensemble, run_ensemble
 from blocksim.simulation.schemes import build_stacks
@@ -37,8 +38,8 @@ class SchemeSetting(NamedTuple):
 
 CONVERGED = Stepping(5e-4, substeps=1)
 SETTINGS = (
-    SchemeSetting("explicit", {"stiffness_scale": 3e-4}, {"safety": 0.1}, "stiffness_scale 0.0003, safety 0.1"),
-    SchemeSetting("nonsmooth", {}, CONVERGED.time(), CONVERGED.setting),
+    SchemeSetting(SPRINGS, {"stiffness_scale": 3e-4}, {"safety": 0.1}, "stiffness_scale 0.0003, safety 0.1"),
+    SchemeSetting(IMPULSES, {}, CONVERGED.time(), CONVERGED.setting),
 )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.scenario.models.stepping import Nonsmooth
+from blocksim.scenario.models.stepping import IMPULSES, Nonsmooth
 
 Table = Mapping[str, object]
 
@@ -43,7 +43,7 @@ class Stepping:
 
     def time(self, **more: object) -> dict[str, object]:
         """Return the table [time], with more keys."""
-        return {"scheme": "nonsmooth", **self.keys, **more}
+        return {"scheme": IMPULSES, **self.keys, **more}
 
 
 def three_blocks(contact: Table | None = None, time: Table | None = None, friction: Table = FRICTION) -> Scenario:

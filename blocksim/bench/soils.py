@@ -11,7 +11,7 @@ from blocksim.bench.threads import Case, thread_numbers
 from blocksim.bench.timing import Rerun
 from blocksim.bench.walls import Size, explicit_wall
 from blocksim.scenario import scenario_from_mapping
-from blocksim.simulation.schemes import SCHEMES
+from blocksim.simulation.schemes.scheme import BODIES_A_THREAD
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -117,7 +117,7 @@ def _in_turns(soils: Sequence[PushedSoil], wall: Size, setting: Setting) -> list
 def _threads(sizes: Sizes, setting: Setting) -> Iterable[Number]:
     soil = PushedSoil(sizes.threads)
     steps = QUICK_THREADS_STEPS if setting.quick else THREADS_STEPS
-    case = Case(soil, soil.particles, steps, SCHEMES["explicit"].least_bodies, element="particle")
+    case = Case(soil, soil.particles, steps, BODIES_A_THREAD, element="particle")
     return thread_numbers(case, setting.repeats)
 
 

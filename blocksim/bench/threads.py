@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from blocksim.bench.measurement import Findings, Measurement, Number, Setting
 from blocksim.bench.walls import Size, explicit_wall, nonsmooth_wall
+from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
 from blocksim.simulation.schemes import SCHEMES
 from blocksim.simulation.team import ALONE, Team, useful_threads
 
@@ -95,14 +96,14 @@ def _seconds(scene: Rerun, team: Team, steps: int) -> float:
 
 
 SPRINGS_PLAN = Plan(
-    "explicit",
+    SPRINGS,
     functools.partial(explicit_wall, stiffness_scale=SOFT_SCALE),
     sizes=((Size(10, 10), Size(20, 10), Size(40, 25), Size(125, 80)), (Size(10, 10), Size(25, 16))),
     block_steps=(2_000_000, 200_000),
     most_steps=(5000, 5000),
 )
 RIGID_PLAN = Plan(
-    "nonsmooth",
+    IMPULSES,
     nonsmooth_wall,
     sizes=((Size(10, 10), Size(20, 10), Size(40, 25), Size(90, 56)), (Size(8, 5), Size(40, 25))),
     block_steps=(1_000_000, 1_000_000),

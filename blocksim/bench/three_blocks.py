@@ -13,6 +13,7 @@ from blocksim.bench.ensemble import MEMBERS, QUICK_MEMBERS, rates
 from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeated
 from blocksim.bench.scenes import RESTITUTION, Stepping, three_blocks
 from blocksim.bench.timing import Rerun
+from blocksim.scenario.models.stepping import IMPULSES
 from blocksim.simulation.loop import last_step_of
 
 if TYPE_CHECKING:
@@ -154,7 +155,7 @@ def _places(level: Level) -> str:
 
 def _alone_and_among(members: int, restitution: float, level: Level) -> Iterable[Number]:
     name = f"e = {restitution:g}"
-    scenario = three_blocks({"restitution": restitution}, {"scheme": "nonsmooth", **level.setting})
+    scenario = three_blocks({"restitution": restitution}, {"scheme": IMPULSES, **level.setting})
     together, _ = rates([scenario] * members, 1, len(level.seconds))
     yield level.number(f"{name}: alone")
     yield Number(f"{name}: among many", "CPU ms", tuple(1e3 / one for one in together.samples))

@@ -138,8 +138,8 @@ def _rules(pairs: Sequence[PairDescription]) -> list[str]:
     room = max(LEAST_ROOM, width_of_screen() - len(GAP) - max(map(len, found), default=0))
     rows = [cells for key in sorted(found, key=_specific_first) for cells in _wrapped(key, found[key], room)]
     lines = table_lines(("set by", "for"), rows, left=2) if found else []
-    is_rigid = pairs[0].normal_damping_ratio is None
-    return [*lines, f"other values: defaults{'' if is_rigid else '; stiffness from E and ν of the materials'}"]
+    has_springs = pairs[0].normal_damping_ratio is not None
+    return [*lines, f"other values: defaults{'; stiffness from E and ν of the materials' if has_springs else ''}"]
 
 
 def _specific_first(key: str) -> bool:

@@ -17,6 +17,7 @@ from blocksim.cli.sweep_output import leaving_unfinished_cases
 from blocksim.cli.vary import RANGE, read_variations
 from blocksim.errors import ExitCode
 from blocksim.scenario import Document
+from blocksim.scenario.models.stepping import SCHEMES, SPRINGS
 from blocksim.scenario.plausible import implausible_values
 from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.movement import Manner
@@ -25,7 +26,7 @@ from blocksim.study.executors import Execution
 from blocksim.study.limit import OnRun, find_limit
 from blocksim.study.limit_curve import OPTION as OVER
 from blocksim.study.limit_curve import read_curve
-from blocksim.study.limit_plan import NAMES, OPTION, SCANNED, SPRINGS, TOLERANCE, LimitPlan, read_limit, variants
+from blocksim.study.limit_plan import OPTION, SCANNED, TOLERANCE, LimitPlan, read_limit, variants
 from blocksim.study.limit_result import LimitResult
 from blocksim.study.limit_search import Change, Number
 from blocksim.study.limit_stiff import refuse_without_springs
@@ -170,7 +171,7 @@ def limit_command(
                 out=None if out is None else out / _folder(name) if len(plans) > 1 else out,
                 overwrite=overwrite,
                 keep_runs=not no_runs,
-                stiffer=None if stiffer and name != NAMES[SPRINGS] else stiffer,
+                stiffer=None if stiffer and name != SCHEMES[SPRINGS].contacts else stiffer,
                 on_stiffer=told_stiffness(silent=silent),
                 on_run=(lambda *_: None) if silent else _telling(plan.shown),
             )

@@ -11,6 +11,7 @@ from blocksim.cli.output import grouped_lines, note, show
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.progress import one_by_one
 from blocksim.errors import ExitCode
+from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
 from blocksim.simulation.compilation import kernel_set
 from blocksim.verification.case import Row, Setting, Verdict
 from blocksim.verification.cases import SettingError, chosen, chosen_of_soil, left_out, refuse_springs
@@ -44,8 +45,8 @@ class Law(StrEnum):
 class Scheme(StrEnum):
     """How time is stepped."""
 
-    EXPLICIT = "explicit"
-    NONSMOOTH = "nonsmooth"
+    EXPLICIT = SPRINGS
+    NONSMOOTH = IMPULSES
 
 
 def verify_command(
@@ -73,7 +74,7 @@ def verify_command(
     silent = quiet or as_json
     setting = Setting(model.value, law.value, quick, scheme.value)
     refuse_springs(setting)
-    if soil and (setting.rigid or setting != replace(Setting(), quick=quick)):
+    if soil and (not setting.has_springs or setting != replace(Setting(), quick=quick)):
         raise SettingError("--soil has one setting: the surface model, linear springs, the explicit scheme")
     wanted = chosen_of_soil(cases or []) if soil else chosen(cases or [], setting.scheme)
     tell_compilation(kernel_set(setting.scheme, setting.model), quiet=silent)

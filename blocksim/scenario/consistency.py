@@ -6,7 +6,7 @@ from blocksim.scenario import keys
 from blocksim.scenario.findings import Finding
 from blocksim.scenario.models.contact import Contact, Pair
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.stepping import Nonsmooth
+from blocksim.scenario.models.stepping import SCHEMES
 from blocksim.scenario.overrides import Data
 from blocksim.scenario.pairs import GROUND
 from blocksim.scenario.quantities import shown
@@ -18,8 +18,6 @@ from blocksim.scenario.systems import SYSTEMS
 BLOCKS_BY_NAME = ("structures", "bodies")
 SPRING_CHOICES = ("model", "law")
 """Keys of [contact] that rigid contacts do not have."""
-WITH_OUTLINES: frozenset[tuple[str, str]] = frozenset({("explicit", "surface"), ("nonsmooth", "surface")})
-"""Schemes and contact models that know blocks with an outline; rigid contacts have the model "surface"."""
 
 
 def wrong_names(data: Data) -> Iterator[Finding]:
@@ -96,19 +94,21 @@ def unfit_choices(scenario: Scenario) -> Iterator[Finding]:
     for number, structure in enumerate(scenario.structures):
         if why and isinstance(structure, Shaped):
             yield Finding(("structures", number, "kind"), why, relation=True)
-    for key in SPRING_CHOICES if isinstance(scenario.time, Nonsmooth) else ():
+    springs = next(name for name, one in SCHEMES.items() if one.has_springs)
+    for key in () if scenario.time.has_springs else SPRING_CHOICES:
         chosen = getattr(scenario.contact, key)
         if chosen != Contact.model_fields[key].default:
-            message = f'{shown(chosen)} needs springs, time.scheme = "explicit"; here contacts are rigid'
+            message = f"{shown(chosen)} needs springs, time.scheme = {shown(springs)}; here contacts are rigid"
             yield Finding(("contact", key), message, relation=True)
 
 
 def _why_without_outlines(scenario: Scenario) -> str:
     """Return why no block of a scenario can have an outline; nothing where blocks can."""
     scheme, model = scenario.time.scheme, scenario.contact.model
-    if (scheme, model) not in WITH_OUTLINES:
-        why = ": its boundary particles lie on rectangles only" if scheme == "explicit" else ""
-        modelled = " or ".join(f"{shown(one)} and {shown(other)}" for one, other in sorted(WITH_OUTLINES))
+    if model not in scenario.time.models_of_outlines:
+        why = ": its boundary particles lie on rectangles only" if scenario.time.has_springs else ""
+        known = ((name, one) for name, time in sorted(SCHEMES.items()) for one in time.models_of_outlines)
+        modelled = " or ".join(f"{shown(name)} and {shown(one)}" for name, one in known)
         where = f"with time.scheme = {shown(scheme)} and contact.model = {shown(model)}"
         return f"outlines are not modelled {where}{why}; use {modelled}"
     if scenario.systems:

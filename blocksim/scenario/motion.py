@@ -46,7 +46,7 @@ def settles(scenario: Scenario) -> bool:
     """
     motion = scenario.motion
     is_abrupt = isinstance(motion, Pulse) and motion.is_abrupt and motion.start == 0.0
-    with_springs = scenario.time.scheme == "explicit"
+    with_springs = scenario.time.has_springs
     return scenario.start.settle or (is_abrupt and with_springs and not scenario.systems)
 
 

@@ -8,31 +8,10 @@ from blocksim.errors import OutputError
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.compiler import compiling
 from blocksim.scenario import PlacedBody, Scenario, scenario_from_mapping
-from blocksim.scenario.placement import has_outlines
-from blocksim.simulation.schemes import SCHEMES, build_scene, measured_row
-from blocksim.simulation.schemes.explicit import PARTICLES, SURFACE
-from blocksim.simulation.schemes.nonsmooth import RIGID
+from blocksim.simulation.schemes import SCHEMES, build_scene, measured_row, scheme_named
 from blocksim.simulation.team import ALONE
-from blocksim.world.nonsmooth import may_rebound_in_rounds
 
-OUTLINED = "outlines"  # rigid contacts of blocks that are no rectangles
-SPRUNG_OUTLINES = "outlines-with-springs"  # the same with springs
-OF_OUTLINES = {RIGID: OUTLINED, SURFACE: SPRUNG_OUTLINES}
-IN_ROUNDS = {RIGID: "nonsmooth-in-rounds", OUTLINED: "outlines-in-rounds"}  # where impacts follow from one another
-NONSMOOTH = {"scheme": "nonsmooth"}
-TWO = [{"block": "any", "x": x, "y": 0.5} for x in (0.0, 5.0)]  # impacts of a single block are always in rounds
-POLYGON = {"any": {"sides": 4, "radius": 0.5, "depth": 1.0, "material": "any"}}
-
-CHANGES: dict[str, dict[str, object]] = {  # in the smallest scene, so that it needs them
-    SURFACE: {},
-    PARTICLES: {"contact": {"model": "kernel", "particle_spacing": 0.1}},  # the code serves all models with particles
-    RIGID: {"time": NONSMOOTH, "contact": {"restitution": 0.0}, "bodies": TWO},
-    OUTLINED: {"time": NONSMOOTH, "contact": {"restitution": 0.0}, "blocks": POLYGON, "bodies": TWO},
-    IN_ROUNDS[RIGID]: {"time": NONSMOOTH, "contact": {"restitution": 0.5}},
-    IN_ROUNDS[OUTLINED]: {"time": NONSMOOTH, "contact": {"restitution": 0.5}, "blocks": POLYGON},
-    SPRUNG_OUTLINES: {"blocks": POLYGON},
-}
-
+DEFAULT = "surface"  # the set without a mark of its own in the cache
 SMALLEST_SCENE = {
     "schema": 1,
     "name": "compile",
@@ -44,10 +23,8 @@ SMALLEST_SCENE = {
 
 def kernels_of(scenario: Scenario, placed: Sequence[PlacedBody] | None = None) -> str:
     """Return which set of kernels a scenario needs; `placed` are its bodies, where they are known."""
-    kernels = kernel_set(scenario.time.scheme, scenario.contact.model)
-    if has_outlines(scenario):
-        kernels = OF_OUTLINES.get(kernels, kernels)
-    return IN_ROUNDS[kernels] if kernels in IN_ROUNDS and may_rebound_in_rounds(scenario, placed) else kernels
+    scheme = scheme_named(scenario)
+    return scheme.kernel_variant(scheme.kernels(scenario.contact.model), scenario, placed)
 
 
 def kernel_set(scheme: str, model: str) -> str:
@@ -56,7 +33,7 @@ def kernel_set(scheme: str, model: str) -> str:
 
 
 @functools.cache
-def compile_kernels(kernels: str = SURFACE) -> float:
+def compile_kernels(kernels: str = DEFAULT) -> float:
     """Compile a set of kernels, or load it from the cache on disk; return the seconds it took.
 
     Works once a process. Raises OutputError where the disk of the cache fails.
@@ -82,13 +59,17 @@ def compile_systems(scenario: Scenario) -> None:
 
 
 def _compile(kernels: str) -> None:
-    change = CHANGES.get(kernels, {"time": {"scheme": kernels}})  # a scheme beside the usual ones has its own set
-    scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **change})), 0)
+    changes = next(
+        scheme.kernel_sets.get(kernels, {"time": {"scheme": scheme.name}})
+        for scheme in SCHEMES.values()
+        if kernels in (*scheme.kernel_sets, scheme.kernels(""))
+    )
+    scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **changes})), 0)
     measured_row(scene)
-    if kernels != SURFACE:
+    if kernels != DEFAULT:
         jit.mark(kernels)
 
 
-def is_compiled(kernels: str = SURFACE) -> bool:
+def is_compiled(kernels: str = DEFAULT) -> bool:
     """Return True if a set of kernels lies in the cache (or nothing has to be compiled)."""
-    return jit.is_compiled() if kernels == SURFACE else jit.is_marked(kernels)
+    return jit.is_compiled() if kernels == DEFAULT else jit.is_marked(kernels)

@@ -6,21 +6,18 @@ scene holds less afterwards is booked as an entry of its own in the ledger.
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from blocksim.kernels.common.arrays import AT_REST, DRIVEN, REACHED, REMOVED, SUPPORT, Record, Records, World, zeros
-from blocksim.kernels.nonsmooth.arrays import AWAY, Nonsmooth
+from blocksim.kernels.common.arrays import AT_REST, DRIVEN, REACHED, REMOVED, SUPPORT, Record, World, zeros
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.events import in_order, wall_names
 from blocksim.scenario.models.events import Event
 from blocksim.simulation.happened import Happened, in_words
 from blocksim.simulation.ledger import start_energy
-
-if TYPE_CHECKING:
-    from blocksim.simulation.schemes import AnyScene
-    from blocksim.simulation.team import Team
+from blocksim.simulation.schemes import AnyScene, scheme_of
+from blocksim.simulation.team import Team
 
 NEVER = np.iinfo(np.int64).max
 NO_SIZE = -1e12  # m: half sides of what is not there: farther than that from everything
@@ -55,7 +52,7 @@ class Timeline:
         """Return the next step after `done` at which an event is due."""
         return min((step for step, _ in self.timed if step > done), default=NEVER)
 
-    def act(self, scene: "AnyScene", team: "Team", status: int) -> tuple["AnyScene", int]:
+    def act(self, scene: AnyScene, team: Team, status: int) -> tuple[AnyScene, int]:
         """Let happen what is due at the step that a scene has come to; return it and the status code.
 
         Rest ends no run to which anything has yet to happen.
@@ -73,9 +70,14 @@ class Timeline:
             scene, status = self._happen(scene, team, number)
         return scene, status
 
-    def _happen(self, scene: "AnyScene", team: "Team", number: int) -> tuple["AnyScene", int]:
-        before, event = start_energy(scene), self.events[number]
-        scene, status = self._renewed(self._changed(scene, event), team)
+    def _happen(self, scene: AnyScene, team: Team, number: int) -> tuple[AnyScene, int]:
+        """Change the arrays and have the pair list made anew, and the contacts of this moment where the scheme asks."""
+        before, event, bodies = start_energy(scene), self.events[number], scene.world.bodies.copy()
+        scene, status = self._changed(scene, event), REACHED
+        clock = scene.world.clock[0]
+        clock.rebuilds = 0
+        if scheme_of(scene).after_event(scene, bodies):
+            scene, status = team.advance(scene, int(clock.steps))
         clock, energy = scene.world.clock[0], before - start_energy(scene)
         clock.checks_at_rest = 0
         scene.world.ledger[0].events += energy
@@ -86,7 +88,6 @@ class Timeline:
 
     def _changed(self, scene: Any, event: Event) -> Any:
         """Return the scene with what an event does in its arrays."""
-        old = scene.world.bodies.copy()
         world = scene.world
         for name in event.remove:
             world = removed(world, self._number(world, name))
@@ -98,27 +99,7 @@ class Timeline:
             end_load(world, self.loads.index(name))
         if event.velocity is not None:
             _set_velocity(world.bodies[self.names[event.velocity.body]], event)
-        if not isinstance(scene, Nonsmooth):
-            return world
-        _renew_lines(scene._replace(world=world), old)
-        return scene._replace(world=world)
-
-    def _renewed(self, scene: Any, team: "Team") -> tuple[Any, int]:
-        """Have the pair list made anew, and with springs the forces at this moment, as if after a step of no length.
-
-        What bears a block may have changed without a contact that begins or ends: stiffness is measured and all sums of
-        it are made again.
-        """
-        clock = scene.world.clock[0]
-        clock.rebuilds = 0
-        if isinstance(scene, Nonsmooth):
-            return scene, REACHED
-        clock.next_update = clock.next_share = clock.steps
-        clock.is_started = 0
-        scene.world.bodies["is_asked"] = 1
-        for name in ("normal_left", "shear_left"):
-            scene.world.pairs[name] = 0
-        return team.advance(scene, int(clock.steps))
+        return world if isinstance(scene, World) else scene._replace(world=world)
 
     def _number(self, world: World, name: str) -> int:
         """Return the number of a body or a wall; walls are the last before the half-plane."""
@@ -216,30 +197,3 @@ def _set_velocity(body: Record, event: Event) -> None:
         value = getattr(new, name)
         if value is not None:
             body[name] = value
-
-
-def _renew_lines(scene: Nonsmooth, old: Records) -> None:
-    """Bring lines and rows of rigid contacts up to date with bodies that an event has changed.
-
-    All velocities begin anew half a substep back, as those at the start of a run do: what was held falls from now on.
-    The correction in the ledger stays what it is; `old` are the bodies before the event.
-    """
-    bodies, lines, before = scene.world.bodies, scene.contacts.states, scene.contacts.before
-    controls, h = scene.world.controls[0], float(scene.contacts.stepping[0].substep)
-    hx, hy = h * float(controls.gravity_x), h * float(controls.gravity_y)
-    was_free, is_free = old["inverse_mass"] > 0.0, bodies["inverse_mass"] > 0.0
-    shown = old["vx"] ** 2 + old["vy"] ** 2
-    ahead = (lines["vx"] + 0.5 * hx) ** 2 + (lines["vy"] + 0.5 * hy) ** 2
-    kept = np.where(was_free, before["lifted"] - lines["vx"] * hx - lines["vy"] * hy + 0.5 * (ahead - shown), 0.0)
-    for name in ("inverse_mass", "inverse_inertia", "spin"):
-        lines[name] = bodies[name]
-    lines["vx"] = bodies["vx"] - np.where(is_free, 0.5 * hx, 0.0)
-    lines["vy"] = bodies["vy"] - np.where(is_free, 0.5 * hy, 0.0)
-    before["lifted"] = np.where(is_free, kept + lines["vx"] * hx + lines["vy"] * hy, before["lifted"])
-    for name in RATES:
-        before[name] = lines[name]
-    rows = scene.contacts.constraints[: int(scene.contacts.stepping[0].constraint_count)]
-    is_gone = (bodies["is_moved"][rows["a"]] == REMOVED) | (bodies["is_moved"][rows["b"]] == REMOVED)
-    for name in ("normal_one", "normal_two", "shear"):
-        rows[name][is_gone] = 0.0
-    rows["reach"][is_gone] = AWAY

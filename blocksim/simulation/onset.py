@@ -26,7 +26,7 @@ SAMPLES = 20_000  # of twice the duration of a pulse
 def onset_warning(scenario: Scenario, placed: Sequence[PlacedBody], world: World, settled: Settled | None) -> str:
     """Return a warning where springs make a slip under an abrupt pulse too large by more than the promise."""
     pulse = scenario.motion
-    if not isinstance(pulse, Pulse) or not pulse.is_abrupt or scenario.time.scheme != "explicit":
+    if not isinstance(pulse, Pulse) or not pulse.is_abrupt or not scenario.time.has_springs:
         return ""
     if (settled is not None and pulse.start == 0.0) or scenario.ground.tilt != 0.0:
         return ""

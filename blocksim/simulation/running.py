@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario, scenario_hash
 from blocksim.scenario.placement import smallest_width
 from blocksim.silence import silent
@@ -41,7 +40,7 @@ from blocksim.simulation.resumption import (
     remarks_on,
     take_over_probes,
 )
-from blocksim.simulation.schemes import AnyScene, build, ledger_names
+from blocksim.simulation.schemes import AnyScene, build, ledger_names, scheme_of
 from blocksim.simulation.settled import Settled
 from blocksim.simulation.settling import begun
 from blocksim.simulation.stopping import WallTime, stop_requests
@@ -50,7 +49,6 @@ from blocksim.simulation.summary import Summary
 from blocksim.simulation.table import final_columns
 from blocksim.simulation.team import Team, team_for
 from blocksim.world.memory import is_shorter_than_step
-from blocksim.world.sag import crushed_now, overlap_warning
 from blocksim.world.scenes import Built
 from blocksim.world.systems import others_of, warnings_of
 
@@ -302,7 +300,7 @@ def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResul
     yield from warnings_of(scenario)
     for number in ended.pending if ended.outcome.is_finished else ():
         yield f"events.{number} has not happened, as nothing came to rest: {in_words(scenario.events[number])}"
-    if isinstance(ended.scene, Nonsmooth) and ended.outcome.is_finished:
-        sunk = overlap_warning(ended.overlap, crushed_now(ended.scene), smallest_width(placed))
+    if ended.outcome.is_finished and placed:
+        sunk = scheme_of(ended.scene).warning(ended.scene, ended.overlap, smallest_width(placed))
         if sunk:
             yield sunk

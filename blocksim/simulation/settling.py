@@ -31,30 +31,24 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode, StoppedEarlyError
 from blocksim.kernels.common.arrays import REACHED, World
-from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
 from blocksim.scenario.overlap import Outlines, Rectangles, penetration
 from blocksim.scenario.placement import smallest_width
-from blocksim.simulation.outcome import deepest_overlap, outlines_of
-from blocksim.simulation.schemes import AnyScene
+from blocksim.simulation.schemes import AnyScene, scheme_of
+from blocksim.simulation.schemes.scheme import corner_ways, outlines_of
 from blocksim.simulation.settled import NOT_AT_REST, Settled
 from blocksim.simulation.team import Team
 from blocksim.world.scenes import arrays_of
 
 PARTS = 50  # in which gravity and loads grow
-CALL_STEPS = {"explicit": 20, "nonsmooth": 2}  # between two looks at the kinetic energy
-PART_STEPS = {"explicit": 1000, "nonsmooth": 40}  # at most, for one part
-MOST_STEPS = {"explicit": 1_000_000, "nonsmooth": 40_000}  # in all
 BALANCE = 1e-8  # of gravity (and of the strongest load): accelerations at rest
 ROUGH_BALANCE = 1e-3  # the same while loads grow
-STILL = 1e-10  # of the smallest side of a block: way in a step of rigid contacts at rest
 FIRST_SHARE, LAST_SHARE = 0.25, 1e-3  # of the inertial force: parts in which it grows, halved where one is too much
 UNASKED_SHARE = 0.01  # of the smallest side of a block: way in settling that was not asked for; what was to drop drops
 MOVED_SHARE = 0.25  # of the smallest side of a block: soft springs give way by as much as a tenth, what falls goes on
 LEAN_SHARE = 0.02  # of the smallest side of a block: way at which what falls is released
 CHAIN = 3.0  # ways of blocks over those of contacts, times their number and how slender the scene is
-LEAST_SHARE = {"explicit": 2e-4, "nonsmooth": 0.01}  # of the smallest side of a block: way of a mechanism
 STEADY = 0.95  # of the drive before: that of a mechanism does not fade
 WINDOWS = 3  # of the time since velocities were taken away, in which drives are compared
 LOOKS = 30  # calls between two looks at the drive
@@ -125,7 +119,8 @@ class _Settling:
         self, scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team, stop: Stop
     ) -> None:
         self.scene, self.placed, self.team, self.stop = scene, placed, team, stop
-        self.kind = scenario.time.scheme
+        self.scheme = scheme_of(scene)
+        self.pace = self.scheme.settling
         self.count = len(placed)
         names = {body.name: number for number, body in enumerate(placed)}
         self.names = scenario.start.hold
@@ -186,7 +181,7 @@ class _Settling:
         """Let gravity and loads grow to their size."""
         for part in range(1, PARTS + 1):
             self._load(part / PARTS)
-            end = self.steps + PART_STEPS[self.kind]
+            end = self.steps + self.pace.part
             while self.steps < end:
                 self._go()
                 if self._unrest() <= ROUGH_BALANCE / PARTS:
@@ -195,7 +190,7 @@ class _Settling:
 
     def come_to_rest(self) -> None:
         """Go on until nothing moves any more. Raises SettleError."""
-        self._rest(MOST_STEPS[self.kind])
+        self._rest(self.pace.most)
 
     def _rest(self, last: int) -> None:
         """Go on until nothing moves any more, at most a little beyond a step. Raises SettleError."""
@@ -211,7 +206,7 @@ class _Settling:
     def follow_support(self) -> None:
         """Let the inertial force of the supports' acceleration at time zero grow as far as it is carried at rest."""
         part = FIRST_SHARE if any(self.support) else 0.0
-        most = max(self.steps, PART_STEPS[self.kind])  # as many as gravity took
+        most = max(self.steps, self.pace.part)  # as many as gravity took
         is_bounded = False
         while self.carried < 1.0 and part >= LAST_SHARE:
             scene, steps = self.scene, self.steps
@@ -248,8 +243,7 @@ class _Settling:
         bodies = self.bodies
         energies = bodies["mass"] * (bodies["vx"] ** 2 + bodies["vy"] ** 2) + bodies["inertia"] * bodies["spin"] ** 2
         ledger["largest_kinetic"][0] = 0.5 * float(np.sum(energies))
-        if isinstance(self.scene, Nonsmooth):
-            _begin_rigid(self.scene)
+        self.scheme.begin(self.scene)
 
     def settled(self) -> Settled:
         """Return how it came to rest."""
@@ -288,7 +282,7 @@ class _Settling:
         if why := self.stop():
             raise StoppedEarlyError(f"{why} while the scene settled; nothing is kept of that")
         self.before = self._places()
-        self.steps += CALL_STEPS[self.kind]
+        self.steps += self.pace.call
         self.scene, status = self.team.advance(self.scene, self.steps)
         energy = self._kinetic()
         if status != REACHED or not np.isfinite(energy) or self._ways().max() > MOVED_SHARE * self.smallest:
@@ -304,8 +298,7 @@ class _Settling:
     def _stop(self) -> None:
         for name in VELOCITIES:
             self.bodies[name] = 0.0
-            if isinstance(self.scene, Nonsmooth):
-                self.scene.contacts.states[name][: self.count] = 0.0
+        self.scheme.halt(self.scene, self.count)
         self.energy = 0.0
         self.path = _Path(self._places())
 
@@ -323,10 +316,9 @@ class _Settling:
         if not last >= STEADY * before > 0.0:
             return False
         change = self._places() - self.path.start
-        way = float((_ways(change, self.bodies["radius"]) * self.is_free).max())
-        depth = 0.0 if isinstance(self.scene, Nonsmooth) else deepest_overlap(self.scene.world)
-        give = CHAIN * self.count * self._slenderness() * depth
-        if way <= max(give, LEAST_SHARE[self.kind] * self.smallest):
+        way = float((corner_ways(change, self.bodies["radius"]) * self.is_free).max())
+        give = CHAIN * self.count * self._slenderness() * self.scheme.give(self.scene)
+        if way <= max(give, self.pace.least_share * self.smallest):
             return False
         return not any(self._meets(change * (share * self.smallest / way), share) for share in AHEAD)
 
@@ -358,21 +350,17 @@ class _Settling:
         """Return how far the scene is from rest: BALANCE is near enough."""
         if not self.is_free.any():
             return 0.0
-        bodies = self.bodies
-        if isinstance(self.scene, Nonsmooth):
-            ways = _ways(self._places() - self.before, bodies["radius"])
-            share = float(ways[self.is_free].max()) / (CALL_STEPS[self.kind] * STILL * self.smallest)
-            return BALANCE * share if self.steps else np.inf
-        rates = np.hypot(bodies["ax"], bodies["ay"]) + bodies["radius"] * np.abs(bodies["spin_rate"])
-        rates = rates[self.is_free]
-        return float(rates.max()) / self.scale if self.steps and self.scale > 0.0 else np.inf
+        if not self.steps:
+            return np.inf
+        change = self._places() - self.before
+        return self.scheme.unrest(self.scene, self.is_free, change, self.smallest, self.scale)
 
     def _places(self) -> Floats:
         return np.stack([self.bodies[name] for name in ("x", "y", "angle")])
 
     def _ways(self) -> Floats:
         """Return how far every block has come (m)."""
-        return np.where(self.is_free, _ways(self._places() - self.start, self.bodies["radius"]), 0.0)
+        return np.where(self.is_free, corner_ways(self._places() - self.start, self.bodies["radius"]), 0.0)
 
     def _error(self) -> SettleError:
         bodies = self.bodies
@@ -447,20 +435,3 @@ def _freeze_paths(world: World) -> None:
                 rest = sum(pieces[f"c{power}"][0] * t**power for power in range(4))
                 for power in range(4):
                     pieces[f"c{power}"] = rest if power == 0 else 0.0
-
-
-def _begin_rigid(scene: Nonsmooth) -> None:
-    """Let the first substep begin with the impulses that hold against gravity, and clear the books."""
-    contacts = scene.contacts
-    for name in contacts.tallies.dtype.names or ():
-        contacts.tallies[name] = 0.0
-    for name in scene.pushes.dtype.names or ():
-        scene.pushes[name] = 0.0
-    contacts.stepping["sweeps"] = 0
-    contacts.stepping["is_settled"] = 1
-
-
-def _ways(change: Floats, radius: Floats) -> Floats:
-    """Return a bound of the ways (m) of the corners of blocks whose x, y, angle changed so, (3, b)."""
-    dx, dy, turned = change
-    return np.asarray(np.hypot(dx, dy) + radius * np.abs(turned))

@@ -8,17 +8,16 @@ from typing import Self
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.common.arrays import PAIRS_FULL, TEAM_SIZE
 from blocksim.kernels.common.jit import config
-from blocksim.simulation.schemes import SCHEMES, AnyScene, Scene, scheme_of
+from blocksim.simulation.schemes import AnyScene, Scene, scheme_of
+from blocksim.simulation.schemes.scheme import BODIES_A_THREAD
 
-BODIES_A_THREAD = SCHEMES["explicit"].least_bodies
 START_SECONDS = 60.0
 
 
 def useful_threads(threads: int, bodies: int, least_bodies: int = BODIES_A_THREAD) -> int:
     """Return how many of `threads` are of use for a scene; the result is the same for any number, bit for bit.
 
-    `bodies` are blocks and elements of further systems, `least_bodies` is the scheme's, by default that of the explicit
-    one.
+    `bodies` are blocks and elements of further systems, `least_bodies` is the scheme's.
     """
     most = 1 if config.DISABLE_JIT else max(1, bodies // least_bodies)
     return min(threads, most)

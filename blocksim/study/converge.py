@@ -15,7 +15,6 @@ from pathlib import Path
 
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, Source, load_scenario, place_bodies
-from blocksim.scenario.models.stepping import Explicit, Nonsmooth
 from blocksim.scenario.soil_places import soil_tables
 from blocksim.silence import silent
 from blocksim.simulation import folder as files
@@ -39,6 +38,7 @@ from blocksim.study.executors import Batch, Setting, Task
 from blocksim.study.executors.processes import DEAD, run_here, run_tasks
 from blocksim.study.rows import FINISHED, Row, check_experiment
 from blocksim.world.nonsmooth import velocity_tolerance
+from blocksim.world.step import safety_of
 
 FOLDER = "converge"
 SOIL_SPACING = "soils.spacing"
@@ -226,11 +226,11 @@ def refinements_of(scenario: Scenario, studies: Iterable[str] | None = None) -> 
 
 
 def _possible(scenario: Scenario) -> list[Refinement]:
-    if isinstance(scenario.time, Nonsmooth):
+    if scenario.time.has_rigid_contacts:
         return [_rigid_step(scenario), _tolerance(scenario)]
     spacing = [_spacing(scenario)] if has_particles(scenario) else []
     soil = [_soil_spacing(scenario)] if soil_tables(scenario) else []
-    return [_step(scenario, scenario.time), _stiffness(scenario), *spacing, *soil]
+    return [_step(scenario), _stiffness(scenario), *spacing, *soil]
 
 
 def has_particles(scenario: Scenario) -> bool:
@@ -240,7 +240,7 @@ def has_particles(scenario: Scenario) -> bool:
 
 def effects_note(scenario: Scenario, asked: Iterable[str]) -> str:
     """Say what of the asked studies is left out, and why; nothing where none is."""
-    if isinstance(scenario.time, Nonsmooth):
+    if scenario.time.has_rigid_contacts:
         return "contacts are rigid: neither a stiffness nor the particle spacing has an effect"
     notes = {
         "spacing": f'the particle spacing has no effect on contact.model = "{scenario.contact.model}"',
@@ -250,11 +250,11 @@ def effects_note(scenario: Scenario, asked: Iterable[str]) -> str:
     return "; ".join(note for name, note in notes.items() if name in asked and name not in possible)
 
 
-def _step(scenario: Scenario, time: Explicit) -> Refinement:
+def _step(scenario: Scenario) -> Refinement:
     """Halve the safety of the automatic step, or the step given by hand; double it where that is safe."""
-    by_hand = time.step != "auto"
-    key, own = ("time.step", time.step) if by_hand else ("time.safety", time.safety)
-    return _halved(scenario, key, float(own))
+    step = scenario.time.step
+    key, own = ("time.safety", safety_of(scenario)) if step == "auto" else ("time.step", step)
+    return _halved(scenario, key, own)
 
 
 def _rigid_step(scenario: Scenario) -> Refinement:

@@ -22,7 +22,6 @@ from blocksim.scenario.models.pulse import Pulse
 from blocksim.scenario.motion import settles
 from blocksim.simulation.movement import Manner
 from blocksim.study.criterion import Verdict
-from blocksim.study.limit_plan import SPRINGS
 from blocksim.study.limit_result import LimitResult
 from blocksim.study.limit_search import Change
 from blocksim.world.interactions import contact_classes, interactions_of
@@ -47,7 +46,7 @@ def gives_of(found: LimitResult) -> Iterator[Give]:
 
 def give_at(found: LimitResult, change: Change[Verdict]) -> Give | None:
     """Return how far springs have given way at a limit; None where it is not known from what stands there."""
-    if found.plan.document.build().time.scheme != SPRINGS:
+    if not found.plan.document.build().time.has_springs:
         return None
     value = standing_side(change)
     row = found.rows[value]

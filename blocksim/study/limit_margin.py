@@ -20,7 +20,6 @@ from blocksim.scenario.placement import smallest_width
 from blocksim.simulation.movement import FURTHER, MOVED_SHARE
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit_give import TILT, give_at, most_shift, standing_side
-from blocksim.study.limit_plan import SPRINGS
 from blocksim.study.limit_result import LimitResult, Margin
 from blocksim.study.limit_search import Change
 
@@ -75,7 +74,7 @@ def _size(found: LimitResult, change: Change[Verdict]) -> float:
 
 def _of_springs(found: LimitResult, change: Change[Verdict], probed: float) -> float:
     """Return the share by which stiff contacts may have another limit, where it is not extrapolated to them."""
-    if found.plan.document.build().time.scheme != SPRINGS:
+    if not found.plan.document.build().time.has_springs:
         return 0.0
     levels = found.levels.get(change)
     if levels is not None:

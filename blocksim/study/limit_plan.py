@@ -9,7 +9,7 @@ from typing import Any
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import Document, Scenario, scenario_hash
 from blocksim.scenario.keys import field_of, options
-from blocksim.scenario.models.stepping import SCHEMES
+from blocksim.scenario.models.stepping import SCHEMES, SPRINGS
 from blocksim.scenario.models.variation import Uniform, is_descending
 from blocksim.scenario.units import parse_unit
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
@@ -23,8 +23,6 @@ MOST_SCANNED = 1000
 TOLERANCE = 1e-3
 LEAST_TOLERANCE = 1e-9
 OPTION = "--vary"
-SPRINGS = "explicit"
-NAMES = {SPRINGS: "springs", "nonsmooth": "rigid contacts"}
 
 
 @dataclass(frozen=True)
@@ -154,8 +152,8 @@ def _ends(plan: LimitPlan) -> list[Scenario]:
 def variants(document: Document, *, both_laws: bool = False) -> dict[str, Document]:
     """Return the scenarios whose limits are compared, by what distinguishes them: both laws, or the present one."""
     if both_laws:
-        return {NAMES[name]: with_scheme(document, name) for name in SCHEMES}
-    return {NAMES[document.build().time.scheme]: document}
+        return {time.contacts: with_scheme(document, name) for name, time in SCHEMES.items()}
+    return {document.build().time.contacts: document}
 
 
 def with_scheme(document: Document, scheme: str) -> Document:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from blocksim.study.criterion import Verdict
-from blocksim.study.limit_plan import SPRINGS, LimitPlan
+from blocksim.study.limit_plan import LimitPlan
 from blocksim.study.limit_search import Change, Number, changes_in
 from blocksim.study.limit_stiff import Levels
 from blocksim.study.rows import MOVEMENT, PEAK, Row, as_cell
@@ -123,7 +123,7 @@ class LimitResult:
     def scale(self) -> float | None:
         """The stiffness scale as given; None for rigid contacts."""
         scenario = self.plan.document.build()
-        return scenario.contact.stiffness_scale if scenario.time.scheme == SPRINGS else None
+        return scenario.contact.stiffness_scale if scenario.time.has_springs else None
 
     @property
     def table(self) -> "pd.DataFrame":

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from blocksim.scenario import Scenario
 from blocksim.simulation.schemes import build
 from blocksim.study.criterion import Verdict
-from blocksim.study.limit_plan import SPRINGS, LimitPlan
+from blocksim.study.limit_plan import LimitPlan
 from blocksim.study.limit_result import BOTH, Finer, LimitResult, fallen
 from blocksim.study.limit_search import Change, Number, changes_in, next_near
 from blocksim.study.limit_stiff import STEP
@@ -58,7 +58,7 @@ class Halving:
 
 def has_rigid_contacts(plan: LimitPlan) -> bool:
     """Return True for rigid contacts, unless the key that is searched is one of their steps."""
-    return plan.document.build().time.scheme != SPRINGS and not plan.key.startswith("time.")
+    return not plan.document.build().time.has_springs and not plan.key.startswith("time.")
 
 
 def step_of(scenario: Scenario) -> float:

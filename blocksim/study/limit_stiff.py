@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
-from blocksim.study.limit_plan import NAMES, SPRINGS, LimitPlan
+from blocksim.scenario.models.stepping import SCHEMES, SPRINGS
+from blocksim.study.limit_plan import LimitPlan
 from blocksim.study.limit_search import Change
 
 RATIO = 10.0  # of stiffness between a search and the next one
@@ -96,7 +97,7 @@ def extrapolated(softer: float, stiffer: float, ratio: float) -> float:
 def can_be_stiffer(plan: LimitPlan) -> bool:
     """Return True for springs, unless the key is one of stiffness or a system has its own, or whole numbers only."""
     scenario = plan.document.build()
-    has_springs = scenario.time.scheme == SPRINGS and not scenario.systems
+    has_springs = scenario.time.has_springs and not scenario.systems
     return has_springs and not plan.span.is_whole and not any(part in plan.key for part in OF_STIFFNESS)
 
 
@@ -104,10 +105,10 @@ def refuse_without_springs(*plans: LimitPlan) -> None:
     """Raise InvalidInputError where none of the plans can be searched with stiffer springs."""
     if any(can_be_stiffer(plan) for plan in plans):
         return
-    if all(plan.document.build().time.scheme != SPRINGS for plan in plans):
+    if not any(plan.document.build().time.has_springs for plan in plans):
         raise InvalidInputError(NO_SPRINGS)
     key = plans[0].key
-    message = f"--stiffer: {NAMES[SPRINGS]} are not made stiffer for a limit of {key}, or beside soil"
+    message = f"--stiffer: {SCHEMES[SPRINGS].contacts} are not made stiffer for a limit of {key}, or beside soil"
     raise InvalidInputError(message)
 
 

@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 
 from blocksim.errors import BlocksimError
 from blocksim.scenario import load_stored
-from blocksim.study.limit_plan import NAMES
+from blocksim.scenario.models.stepping import SCHEMES
 from blocksim.study.study_pictures import draw_study, read_answer, read_curve_answer, read_limit_answer, with_unit
 from blocksim.study.sweep_folder import FRAGILITY, LIMIT, LIMIT_CURVE, FolderKind
 from blocksim.view.layout import OWN
@@ -74,7 +74,7 @@ def _limit(folder: Path) -> Parts:
     summary = [
         ("key", stored.key),
         ("stands means", stored.stands),
-        ("contacts", NAMES.get(stored.scheme, stored.scheme)),
+        ("contacts", SCHEMES[stored.scheme].contacts if stored.scheme in SCHEMES else stored.scheme),
         ("runs", str(stored.runs)),
         *(("limit", f"{text}{unit}") for text in found or ["nothing changes within the range"]),
         *(

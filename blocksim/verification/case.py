@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from blocksim.scenario.models.stepping import SCHEMES, SPRINGS
 from blocksim.verification.scene import Scene, Simulation
 
 if TYPE_CHECKING:
@@ -59,18 +60,18 @@ class Setting:
     model: str = "surface"
     law: str = "linear"
     quick: bool = False  # the case's shortened size, where it has one
-    scheme: str = "explicit"
+    scheme: str = SPRINGS
     rigid_step: float | None = None  # s, of the non-smooth scheme, without substeps; None for what users get
 
     @property
-    def rigid(self) -> bool:
-        """Return True if contacts are rigid: impulses instead of springs, Newton's restitution."""
-        return self.scheme == "nonsmooth"
+    def has_springs(self) -> bool:
+        """Return True if contacts are springs; they are impulses with Newton's restitution otherwise."""
+        return SCHEMES[self.scheme].has_springs
 
     @property
     def stepping(self) -> dict[str, object]:
         """Keys of [time] that the scheme needs; the defaults unless a step is given."""
-        if not self.rigid:
+        if self.has_springs:
             return {}
         if self.rigid_step is None:
             return {"scheme": self.scheme}
@@ -79,7 +80,7 @@ class Setting:
 
     def distinct(self, spacings: Sequence[float]) -> Sequence[float]:
         """Return the particle spacings (m) that a case must try: one for contacts without particles."""
-        return spacings[:1] if self.rigid else spacings
+        return spacings if self.has_springs else spacings[:1]
 
     def stepped(self, step: float) -> Setting:
         """Return the same setting with another step (s) of the non-smooth scheme; the explicit one is left as it is."""

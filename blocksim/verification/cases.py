@@ -1,6 +1,7 @@
 """All verification cases: one entry each, in the order of the table, with the reasons for what is not inside."""
 
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
+from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
 from blocksim.verification import (
     collapse,
     convergence,
@@ -37,9 +38,7 @@ CASES = (
         "weight = contact force",
         resting.static_overlap,
         remarks={"particles": SETTLING},
-        not_for={
-            "nonsmooth": "rigid blocks have no stiffness; their overlap follows from the step, see blocksim check"
-        },
+        not_for={IMPULSES: "rigid blocks have no stiffness; their overlap follows from the step, see blocksim check"},
     ),
     Case("V3", "flat drop from 0.1 m, e = 0.5", "Eq 12", flight.bounces, remarks={"particles": SETTLING}),
     Case(
@@ -130,7 +129,7 @@ CASES = (
             "particles": BUMPS,
             "kernel": "distances and normals are means over a smoothing length, which is halved with the spacing",
         },
-        not_for={"nonsmooth": "it is about the second order of springs; rigid contacts are first order in the step"},
+        not_for={IMPULSES: "it is about the second order of springs; rigid contacts are first order in the step"},
     ),
     Case(
         "V21",
@@ -173,7 +172,7 @@ CASES = (
         "restitution, no spin",
         seats.seats,
         remarks={"particles": PAIRWISE, "kernel": PAIRWISE},
-        not_for={"nonsmooth": "it is about springs of several pairs below one block; V4 has rigid restitution"},
+        not_for={IMPULSES: "it is about springs of several pairs below one block; V4 has rigid restitution"},
     ),
 )
 
@@ -191,12 +190,12 @@ class SettingError(BlocksimError):
 def refuse_springs(setting: Setting) -> None:
     """Raise SettingError for a model or law that the scheme does not have."""
     usual = Setting()
-    if setting.rigid and (setting.model, setting.law) != (usual.model, usual.law):
+    if not setting.has_springs and (setting.model, setting.law) != (usual.model, usual.law):
         wrong = f"--law {setting.law}" if setting.model == usual.model else f"--model {setting.model}"
         raise SettingError(f"{wrong} needs springs; contacts of --scheme {setting.scheme} are rigid")
 
 
-def chosen(ids: list[str], scheme: str = "explicit") -> tuple[Case, ...]:
+def chosen(ids: list[str], scheme: str = SPRINGS) -> tuple[Case, ...]:
     """Return the cases of some ids (upper or lower case), in the order of the table; without ids all of the scheme."""
     wanted = {name.upper() for name in ids}
     unknown = sorted(wanted - {case.id for case in CASES})

@@ -49,9 +49,9 @@ def impacts(setting: Setting) -> Iterator[Row]:
     ]
     lossy = max(largest_gain(Thrower(setting, e), throws) for e in LOSSY)
     yield absolute("gain, e ≤ 0.9", "", 0.0, max(lossy, 0.0), ROUND_OFF)
-    bound = ROUND_OFF if setting.rigid else (2.0 * SAFETY) ** 2 / 4.0
+    bound = (2.0 * SAFETY) ** 2 / 4.0 if setting.has_springs else ROUND_OFF
     yield absolute("gain, e = 1", "", 0.0, max(largest_gain(Thrower(setting, 1.0), throws), 0.0), bound)
-    if not setting.rigid:
+    if setting.has_springs:
         yield order_of_gain(setting)
 
 
@@ -76,15 +76,15 @@ def ledgers(setting: Setting) -> Iterator[Row]:
     All can have rigid contacts; those that ship with them have no springs.
     """
     for path in sorted(SCENARIOS.glob("*.toml")):
-        if not setting.rigid and load_scenario(path).time.scheme != setting.scheme:
+        if setting.has_springs and not load_scenario(path).time.has_springs:
             continue
-        tolerance = HEAVY.get(path.stem, RIGID_LEDGER_TOLERANCE) if setting.rigid else LEDGER_TOLERANCE
+        tolerance = LEDGER_TOLERANCE if setting.has_springs else HEAVY.get(path.stem, RIGID_LEDGER_TOLERANCE)
         yield absolute(_name(setting, path), "", 0.0, worst_residual(setting, path), tolerance)
 
 
 def _name(setting: Setting, path: Path) -> str:
     """Return the name of a scenario, and the part of it that is run."""
-    if setting.rigid or not _is_crowd(load_scenario(path)):
+    if not setting.has_springs or not _is_crowd(load_scenario(path)):
         return path.stem
     return f"{path.stem}, first moments"
 
@@ -105,7 +105,7 @@ def _crowd_end(setting: Setting) -> float:
 def asked_of(setting: Setting) -> dict[str, object]:
     """Return the keys that a scenario must change for a setting."""
     asked = {"contact.model": setting.model, "contact.law": setting.law}
-    if setting.rigid:
+    if not setting.has_springs:
         return {**asked, "time.scheme": setting.scheme}
     usual = {"contact.model": Setting().model, "contact.law": Setting().law}
     return {key: value for key, value in asked.items() if value != usual[key]}
@@ -136,9 +136,9 @@ def worst_residual(setting: Setting, path: Path) -> float:
     if _gives_way(setting, own, is_crowd=is_crowd):
         usual = overrides.get("contact.stiffness_scale", own.contact.stiffness_scale)
         overrides["contact.stiffness_scale"] = STIFFER * float(str(usual))
-    if is_crowd and not setting.rigid:
+    if is_crowd and setting.has_springs:
         overrides["time.end"] = _crowd_end(setting)
-    scenario = (without_springs(document) if setting.rigid else document).with_values(overrides).build()
+    scenario = (document if setting.has_springs else without_springs(document)).with_values(overrides).build()
     run = Simulation(build_scene(scenario))
     outputs = round(scenario.time.end / scenario.output.every)
     worst = 0.0

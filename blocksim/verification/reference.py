@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from blocksim.scenario.key_table import with_part
+from blocksim.scenario.models.stepping import IMPULSES
 from blocksim.simulation.atomic import write_text
 from blocksim.verification.case import Case, Row, Setting, Verdict
 from blocksim.verification.cases import CASES, chosen, left_out
@@ -30,11 +31,11 @@ COLUMNS = {  # head of the column: how it is measured
     "`kernel`, quick": Setting("kernel", quick=True),
     "`particles`, quick": Setting("particles", quick=True),
 }
-RIGID = "nonsmooth"  # head of the second table's column
+RIGID = IMPULSES  # head of the second table's column
 RIGID_HEADS = ("case", "quantity", "expected", "tolerance", "measured")
 SOIL = "soil"  # the cases of soil, in a table of their own
 SOIL_HEADS = ("case", "source", "quantity", "expected", "tolerance", "measured", "error")
-SETTINGS = {**COLUMNS, RIGID: Setting(scheme="nonsmooth"), SOIL: Setting()}
+SETTINGS = {**COLUMNS, RIGID: Setting(scheme=IMPULSES), SOIL: Setting()}
 FIELDS = ("quantity", "unit", "expected", "measured", "tolerance", "relative", "at_least")
 SIGNS = {Verdict.INSIDE: "✓", Verdict.OUTSIDE: "✗"}
 Stored = dict[str, dict[str, list[dict[str, Any]]]]  # head of the column, case id, rows

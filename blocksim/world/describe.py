@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 from blocksim.kernels.common.arrays import World
 from blocksim.scenario import GROUND, PlacedBody, Scenario, place_bodies
-from blocksim.scenario.models.stepping import Explicit, Nonsmooth
 from blocksim.scenario.motion import motion_pieces
 from blocksim.scenario.motion_peaks import motion_peaks
 from blocksim.scenario.outlines import edges_of
@@ -27,12 +26,12 @@ from blocksim.world.memory import (
     run_bytes,
     scene_size,
 )
-from blocksim.world.nonsmooth import build_nonsmooth, stepping_of, velocity_tolerance
+from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
 from blocksim.world.particles import division
 from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
 from blocksim.world.scenes import stack_of_one
-from blocksim.world.step import step_of_contacts
+from blocksim.world.step import safety_of, step_of_contacts
 from blocksim.world.systems import largest_step, others_of, warnings_of
 from blocksim.world.systems.system import Present
 
@@ -116,7 +115,7 @@ class Description:
     frames_at_every_step: bool  # output.every is shorter than a step
     particles: int  # on all boundaries, corners included
     skin: float  # m, distance up to which bodies are listed as neighbours
-    rigid: SagDescription | None  # where contacts are
+    rigid: SagDescription | None  # where contacts are rigid
     systems: Mapping[str, int]  # elements of each system beside blocks and supports
     limits: StepLimits | None  # where there are any
     warnings: tuple[str, ...]  # of results of these systems that are known to be off
@@ -149,7 +148,7 @@ def describe(scenario: Scenario) -> Description:
         frames_at_every_step=is_shorter_than_step(scenario.output.every, step),
         particles=particles,
         skin=float(world.controls[0].skin),
-        rigid=_rigid(outline, bounds, step) if isinstance(scenario.time, Nonsmooth) else None,
+        rigid=_rigid(outline, bounds, step) if scenario.time.has_rigid_contacts else None,
         systems={one.system.name: one.count for one in others},
         limits=_limits(outline, bounds) if others else None,
         warnings=tuple(warnings_of(scenario)),
@@ -158,7 +157,7 @@ def describe(scenario: Scenario) -> Description:
 
 def _built(scenario: Scenario, count: int) -> tuple[World, Size]:
     """Build the scene of so many bodies; return the arrays that all schemes have, and its size."""
-    if isinstance(scenario.time, Nonsmooth):
+    if scenario.time.has_rigid_contacts:
         scene = build_nonsmooth(scenario)
         return scene.world, rigid_size(count, scene.contacts.constraints.size)
     world = build_world(scenario)
@@ -171,8 +170,8 @@ def _built(scenario: Scenario, count: int) -> tuple[World, Size]:
 def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
     """Return what a step costs (s) with so many blocks and particles around them."""
     is_crowd = blocks > CROWD
-    if isinstance(scenario.time, Nonsmooth):
-        return blocks * SECONDS_IN_A_SUBSTEP * scenario.time.substeps
+    if scenario.time.has_rigid_contacts:
+        return blocks * SECONDS_IN_A_SUBSTEP * scenario.time.parts
     if scenario.contact.model in SECONDS_WITH_PARTICLES:
         block, particle, more = SECONDS_WITH_PARTICLES[scenario.contact.model]
         return (more if is_crowd else 1.0) * (blocks * block + particles * particle)
@@ -188,14 +187,14 @@ def _seconds_of(scenario: Scenario, others: Sequence[Present]) -> float:
 def _limits(outline: Outline, bounds: Bounds) -> StepLimits | None:
     scenario = outline.scenario
     systems = largest_step(scenario)
-    if not isinstance(scenario.time, Explicit) or systems == math.inf:
+    if not scenario.time.has_springs or systems == math.inf:
         return None
-    blocks = step_of_contacts(scenario, bounds, outline.interactions, scenario.time.safety)
+    blocks = step_of_contacts(scenario, bounds, outline.interactions, safety_of(scenario))
     return StepLimits(blocks, systems, scenario.contact.stiffness_scale * (blocks / systems) ** 2)
 
 
 def _rigid(outline: Outline, bounds: Bounds, step: float) -> SagDescription:
-    scenario, substeps = outline.scenario, stepping_of(outline.scenario).substeps
+    scenario, substeps = outline.scenario, outline.scenario.time.parts
     sag = scene_sag(step / substeps, outline.placed, scenario.gravity)
     return SagDescription(
         why=reason_of_step(outline, bounds).why,
@@ -251,8 +250,8 @@ def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> 
                     shear_stiffness_ratio=float(row.shear_ratio),
                     rules=pair.rules,
                 )
-                if isinstance(scenario.time, Nonsmooth):
-                    substep = float(world.controls[0].step) / scenario.time.substeps
+                if scenario.time.has_rigid_contacts:
+                    substep = float(world.controls[0].step) / scenario.time.parts
                     touching = [softest[str(one.material), one.depth] for one in (block, other) if not one.is_ground]
                     found = _rigid_pair(found, substep, touching)
                 yield found

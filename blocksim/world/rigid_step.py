@@ -27,7 +27,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from blocksim.scenario import Scenario
-from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.scenario.motion_peaks import shortest_cycle, shortest_period
 from blocksim.world.bodies import Outline
 from blocksim.world.bounds import Bounds, given_speed, greatest_speed, impact_speed, support_speed
@@ -170,7 +169,7 @@ def _reasons_of_thrust(outline: Outline, bounds: Bounds) -> Iterator[Reason]:
 
 
 def _substeps(scenario: Scenario) -> int:
-    return scenario.time.substeps if isinstance(scenario.time, Nonsmooth) else 1
+    return scenario.time.parts
 
 
 def longest_step(outline: Outline, bounds: Bounds) -> float:

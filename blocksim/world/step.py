@@ -25,7 +25,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.explicit.inertia import APPROACH_STEPS
 from blocksim.scenario import Scenario
-from blocksim.scenario.models.stepping import Explicit, Nonsmooth
+from blocksim.scenario.models.stepping import Explicit
 from blocksim.scenario.placement import length_beside
 from blocksim.world.applied import greatest_push, steepest_tilt
 from blocksim.world.bounds import Bounds, fastest_fall, given_speed, greatest_speed, support_speed
@@ -130,14 +130,20 @@ def step_of_contacts(scenario: Scenario, bounds: Bounds, table: Interactions, sa
     return admissible_step(bounds, table, safety, scenario.contact.law, expected_load(scenario, bounds))
 
 
-def choose_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
-    """Return the step (s) the run will take; raises StepTooLargeError."""
+def safety_of(scenario: Scenario) -> float:
+    """Return the automatic step as a share of the stability limit. Raises ValueError without springs."""
     if not isinstance(scenario.time, Explicit):
         message = f"scenario {scenario.name} does not use the explicit scheme"
         raise ValueError(message)  # noqa: TRY004 - the scenario is of the right type
+    return scenario.time.safety
+
+
+def choose_step(scenario: Scenario, bounds: Bounds, table: Interactions) -> float:
+    """Return the step (s) the run will take; raises StepTooLargeError."""
+    safety = safety_of(scenario)
     with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused below
         try:
-            of_contacts = step_of_contacts(scenario, bounds, table, scenario.time.safety)
+            of_contacts = step_of_contacts(scenario, bounds, table, safety)
             speed = greatest_speed(scenario, bounds, table) + support_speed(scenario)
             share = TRAVEL_SHARE if scenario.contact.model == "surface" else TRAVEL_SHARE_OF_PARTICLES
             of_travel = share * bounds.smallest / speed if speed > 0.0 else math.inf
@@ -171,7 +177,7 @@ def choose_skin(scenario: Scenario, bounds: Bounds, table: Interactions, step: f
         share = SKIN_SHARE_OF_PARTICLES if _has_particles(scenario) else SKIN_SHARE
         return length_beside(bounds.smallest) * share
     speed = greatest_speed(scenario, bounds, table) + support_speed(scenario)
-    reserve = 1.0 if isinstance(scenario.time, Nonsmooth) else RESERVE
+    reserve = RESERVE if scenario.time.has_springs else 1.0
     # a list holds for one step at least, even where it is updated at every one
     least = reserve * nearer_in_a_step(speed, step)
     if given < least:
@@ -193,4 +199,4 @@ def choose_approach(scenario: Scenario, bounds: Bounds, table: Interactions, ste
 
 
 def _has_particles(scenario: Scenario) -> bool:
-    return scenario.contact.model != "surface" and not isinstance(scenario.time, Nonsmooth)
+    return scenario.contact.model != "surface" and scenario.time.has_springs

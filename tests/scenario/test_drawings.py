@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError, ScenarioError, UnavailableError
-from blocksim.scenario import Scenario, consistency, load_scenario, place_bodies, scenario_hash, scenario_to_toml
+from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_hash, scenario_to_toml
 from blocksim.scenario.document import Document
 from blocksim.scenario.drawings import DrawingError, read_drawing, simplified
+from blocksim.scenario.models.stepping import Explicit
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
 WEDGE = [[1, 0], [1.5, 0.0], [2, 0], [1, 1], [1, 0]]
@@ -30,7 +31,7 @@ time.scheme = "nonsmooth"
 
 @pytest.fixture(autouse=True)
 def rigid_outlines(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(consistency, "WITH_OUTLINES", frozenset({("nonsmooth", "surface")}))
+    monkeypatch.setattr(Explicit, "models_of_outlines", ())
 
 
 def feature(*rings: Any, **properties: Any) -> dict[str, Any]:

@@ -8,7 +8,11 @@ import pytest
 from blocksim.errors import OutputError
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation import compilation
-from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.schemes import SCHEMES, build_scene
+from blocksim.simulation.schemes.explicit import SURFACE_OF_OUTLINES
+from blocksim.simulation.schemes.nonsmooth import IN_ROUNDS, OF_OUTLINES
+
+SETS = {name: changes for scheme in SCHEMES.values() for name, changes in scheme.kernel_sets.items()}
 
 
 def test_full_disk_of_the_kernel_cache_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -25,8 +29,8 @@ def test_full_disk_of_the_kernel_cache_is_named(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_blocks_with_outlines_have_sets_of_kernels_of_their_own() -> None:
-    for name, plain in ((compilation.OUTLINED, "nonsmooth"), (compilation.SPRUNG_OUTLINES, "surface")):
-        changes = compilation.CHANGES[name]
+    for name, plain in ((OF_OUTLINES, "nonsmooth"), (SURFACE_OF_OUTLINES, "surface")):
+        changes = SETS[name]
         without = {key: value for key, value in changes.items() if key != "blocks"}
         outlined = scenario_from_mapping({**compilation.SMALLEST_SCENE, **changes})
         rectangular = scenario_from_mapping({**compilation.SMALLEST_SCENE, **without})
@@ -37,7 +41,7 @@ def test_blocks_with_outlines_have_sets_of_kernels_of_their_own() -> None:
 @pytest.mark.parametrize(
     "change",
     [
-        *compilation.CHANGES.values(),
+        *SETS.values(),
         {"time": {"scheme": "nonsmooth"}, "pairs": {"any": {"ground": {"restitution": 0.9}}}},
     ],
 )
@@ -45,4 +49,4 @@ def test_scenes_without_impacts_in_rounds_have_kernels_without_them(change: dict
     scenario = scenario_from_mapping({**compilation.SMALLEST_SCENE, **change})
     scene: Any = build_scene(scenario)
     in_rounds = hasattr(scene, "kept") and scene.contacts.asides is not None
-    assert in_rounds == (compilation.kernels_of(scenario) in compilation.IN_ROUNDS.values())
+    assert in_rounds == (compilation.kernels_of(scenario) in IN_ROUNDS.values())

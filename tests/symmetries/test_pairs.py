@@ -127,7 +127,7 @@ def pushed(setting: Setting, pair: Pair, order: int) -> Pushed:
     The bodies begin inside each other, where springs are concerned; `order` -1 names them the other way round.
     """
     bodies = bodies_of(pair, SIZE, gap=0.0)
-    depth = 0.0 if setting.rigid else DEEP * smallest(bodies)
+    depth = 0.0 if not setting.has_springs else DEEP * smallest(bodies)
 
     def press(world: World) -> None:
         second = world.bodies[:2][::order][1:]
@@ -156,7 +156,7 @@ def order_matters(pair: Pair, setting: Setting) -> float:
     """
     if abs(pair.tilt) >= NEARLY_PARALLEL:
         return 0.0
-    if setting.rigid:
+    if not setting.has_springs:
         return abs(pair.tilt)
     width, _, wide, high = pair.sides
     ends = [0.5 * pair.along * width + 0.5 * (side * wide + high * np.sin(pair.tilt)) for side in (-1.0, 1.0)]

@@ -20,6 +20,7 @@ from blocksim.scenario.models.base import OneOf, Table, Whole
 from blocksim.scenario.spelling import nearest
 
 Scheme = Literal["explicit", "nonsmooth"]
+SPRINGS, IMPULSES = map(str, get_args(Scheme))
 _WORDS = OneOf(get_args(Scheme))
 
 MOST_SLIPS = 2
@@ -49,6 +50,10 @@ class Time(Table):
 
     declared_in: ClassVar[str]  # module:name of its blocksim.simulation.schemes.Scheme
     has_systems: ClassVar[bool] = False  # whether it advances systems beside blocks and supports
+    has_springs: ClassVar[bool] = False  # whether contacts are springs, with a model, a law and a stiffness
+    has_rigid_contacts: ClassVar[bool] = False  # whether they are impulses
+    contacts: ClassVar[str] = "contacts"  # in words
+    models_of_outlines: ClassVar[tuple[str, ...]] = ()  # contact models that know blocks with an outline
     scheme: Annotated[Scheme, _WORDS] = Field(
         default="explicit",
         description="time stepping: explicit (springs and dashpots) or nonsmooth (impulses)",
@@ -60,12 +65,20 @@ class Time(Table):
     rest_speed: q.PositiveSpeed = Field(default=1e-4, description="largest speed that counts as rest")
     rest_hold: q.NonNegativeTime = Field(default=0.05, description="time that rest must last")
 
+    @property
+    def parts(self) -> int:
+        """The number of substeps in a step."""
+        return 1
+
 
 class Explicit(Time):
     """Springs and dashpots, resolved by small steps."""
 
     declared_in = "blocksim.simulation.schemes.explicit:EXPLICIT"
     has_systems = True
+    has_springs = True
+    contacts = "springs"
+    models_of_outlines = ("surface",)
     scheme: Annotated[Literal["explicit"], _WORDS] = Field(default="explicit", description="the scheme of this table")
     safety: q.Safety = Field(default=0.05, description="automatic step as a share of the stability limit, at most 0.1")
 
@@ -74,6 +87,9 @@ class Nonsmooth(Time):
     """Impulses between rigid blocks, Newton's restitution and Coulomb's friction; a hundred times longer steps."""
 
     declared_in = "blocksim.simulation.schemes.nonsmooth:NONSMOOTH"
+    has_rigid_contacts = True
+    contacts = "rigid contacts"
+    models_of_outlines = ("surface",)  # the model is not asked for
     scheme: Annotated[Literal["nonsmooth"], _WORDS] = Field(description="the scheme of this table")
     substeps: Annotated[int, Whole(1, MOST_SUBSTEPS)] = Field(
         default=4, description="substeps; contacts are detected once per step and solved in every substep"
@@ -90,13 +106,18 @@ class Nonsmooth(Time):
         default=0.01, description="approach speed below which impacts do not rebound"
     )
 
+    @property
+    def parts(self) -> int:
+        """The number of substeps in a step."""
+        return self.substeps
+
 
 def scheme_of(value: object) -> str:
     """Return the scheme of a [time] table, or the scheme that a misspelt word is nearest to."""
     scheme = value.get("scheme") if isinstance(value, Mapping) else getattr(value, "scheme", None)
     if not isinstance(scheme, str):
-        return "explicit"
-    return scheme if scheme in SCHEMES else nearest(scheme, SCHEMES, most=MOST_SLIPS) or "explicit"
+        return SPRINGS
+    return scheme if scheme in SCHEMES else nearest(scheme, SCHEMES, most=MOST_SLIPS) or SPRINGS
 
 
 def _registered(value: object, usual: ValidatorFunctionWrapHandler, info: ValidationInfo) -> object:
@@ -107,13 +128,13 @@ def _registered(value: object, usual: ValidatorFunctionWrapHandler, info: Valida
 
 AnyTime = SerializeAsAny[
     Annotated[
-        Annotated[Explicit, Tag("explicit")] | Annotated[Nonsmooth, Tag("nonsmooth")],
+        Annotated[Explicit, Tag(SPRINGS)] | Annotated[Nonsmooth, Tag(IMPULSES)],
         Discriminator(scheme_of),
         WrapValidator(_registered),
     ]
 ]
 """Any stepping, distinguished by its `scheme`."""
-SCHEMES: dict[str, type[Time]] = {"explicit": Explicit, "nonsmooth": Nonsmooth}
+SCHEMES: dict[str, type[Time]] = {SPRINGS: Explicit, IMPULSES: Nonsmooth}
 """Class by scheme, as written in a scenario; a scheme of the user's choice is one line more."""
 
 

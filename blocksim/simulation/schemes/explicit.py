@@ -1,20 +1,27 @@
 """Springs and dashpots, small explicit steps; contacts as a table of the forces of springs and dashpots now."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.common.arrays import HALF, World
+from blocksim.kernels.common.arrays import HALF, Records, World
+from blocksim.kernels.common.systems import Coupled
+from blocksim.kernels.explicit.depth import MIDDLE, ROWS_APART
 from blocksim.kernels.explicit.energy import LEDGER_ROW, measure
 from blocksim.kernels.explicit.ensemble import advance_members
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR
+from blocksim.kernels.explicit.models import KERNEL
+from blocksim.kernels.explicit.models import SURFACE as SURFACE_MODEL
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
-from blocksim.kernels.explicit.step import advance, advance_in_team
+from blocksim.kernels.explicit.step import advance, advance_coupled_alone, advance_coupled_in_team, advance_in_team
+from blocksim.scenario import PlacedBody, Scenario
+from blocksim.scenario.overlap import penetration
+from blocksim.scenario.placement import has_outlines
 from blocksim.simulation.contacts import SUPPORT, UNITS, Rows, empty_rows
-from blocksim.simulation.schemes.coupled import coupled_scheme
-from blocksim.simulation.schemes.scheme import Scheme
+from blocksim.simulation.schemes.scheme import BODIES_A_THREAD, Overlaps, Scheme, outlines_of, smallest_sides
 from blocksim.world.build import EXPLICIT as CONSTRUCTION
 from blocksim.world.build import with_more_room, with_threads
 
@@ -124,23 +131,109 @@ def with_own_work_space(world: World) -> World:
     return world._replace(**{name: getattr(world, name).copy() for name in WORK_SPACE})
 
 
-SURFACE, PARTICLES = "surface", "with-particles"  # sets of machine code
+def evaluate_anew(scene: Any, _before: Records) -> bool:
+    """Have contacts and what bears a block evaluated at this moment, as if after a step of no length.
+
+    What bears a block may have changed without a contact that begins or ends: stiffness is measured and all sums of it
+    are made again.
+    """
+    clock = scene.world.clock[0]
+    clock.next_update = clock.next_share = clock.steps
+    clock.is_started = 0
+    scene.world.bodies["is_asked"] = 1
+    for name in ("normal_left", "shear_left"):
+        scene.world.pairs[name] = 0
+    return True
+
+
+def _depths(world: World) -> tuple[Any, NDArray[np.float64]]:
+    """Return the pairs of a world, and the largest overlap (m) of contacts of each."""
+    count = int(world.clock[0].pair_count)
+    pairs, contacts = world.pairs[:count], world.contacts[:count]
+    is_active = np.arange(contacts.shape[1]) < pairs["active"][:, np.newaxis]
+    return pairs, np.where(is_active, contacts["depth"], 0.0).max(axis=1, initial=0.0)
+
+
+def overlaps_of_springs(scene: Any) -> Overlaps:
+    """Return how deep bodies overlap: by contacts, or where these have lost them, by outlines."""
+    world = scene.world
+    pairs, deepest = _depths(world)
+    is_pressed = deepest > pairs["limit"]
+    outlines = outlines_of(world)
+    below = world.bodies[-1].y - outlines.bottom[pairs["a"]]
+    inside = penetration(outlines.some(pairs["a"]), outlines.some(pairs["b"]))
+    lost = np.where(is_pressed, 0.0, np.where(pairs["b"] == world.bodies.size - 1, below, inside))
+    limit = pairs["limit"]
+    if world.controls[0].model != SURFACE_MODEL:
+        middle = MIDDLE * smallest_sides(world, pairs["a"], pairs["b"])
+        limit = np.where(is_pressed, limit, np.minimum(_reach(world), middle))
+    return Overlaps(pairs["a"], pairs["b"], np.maximum(deepest, lost), limit)
+
+
+def _reach(world: World) -> float:
+    """Return how deep (m) the particles of boundaries may lie in one another; see blocksim.kernels.explicit.depth."""
+    controls = world.controls[0]
+    return float(controls.support if controls.model == KERNEL else ROWS_APART * controls.particle_size)
+
+
+def lost_particles(scene: Any, found: Overlaps) -> str:
+    """Return what limits the deepest overlap where that is how far particles reach; nothing where it is not."""
+    model, reach = scene.world.controls[0].model, _reach(scene.world)
+    if model == SURFACE_MODEL or found.limit[np.nanargmax(found.depth / found.limit)] != reach:
+        return ""
+    what = "the reach of the kernel" if model == KERNEL else f"{ROWS_APART:g} contact.particle_spacing"
+    return f"an overlap exceeds {what}, {1e3 * reach:.3g} mm, beyond which particles lose one another"
+
+
+SURFACE, PARTICLES, SURFACE_OF_OUTLINES = "surface", "with-particles", "outlines-with-springs"  # sets of machine code
+POLYGON = {"any": {"sides": 4, "radius": 0.5, "depth": 1.0, "material": "any"}}
+
+
+def _variant(kernels: str, scenario: Scenario, _: Sequence[PlacedBody] | None) -> str:
+    return SURFACE_OF_OUTLINES if kernels == SURFACE and has_outlines(scenario) else kernels
+
+
+def _inside(change: Callable[..., Any]) -> Callable[..., Coupled]:
+    """Return what changes the world of a scene with further systems."""
+    return lambda scene, *values: scene._replace(world=change(scene.world, *values))
+
 
 WORLDS = Scheme(
     name="explicit",
     scene_type=World,
-    ledger=LEDGER_ROW,
-    least_bodies=100,
     construction=CONSTRUCTION,
     advance=advance,
     advance_in_team=advance_in_team,
     advance_members=advance_members,
+    least_bodies=BODIES_A_THREAD,
     with_more_room=with_more_room,
     with_threads=with_threads,
-    threads_of=lambda world: int(world.shares.size),
+    threads_of=lambda scene: int(scene.world.shares.size),
     for_another_thread=with_own_work_space,
-    contacts=explicit_contacts,
-    measure=measure,
+    after_event=evaluate_anew,
     kernels=lambda model: SURFACE if model == "surface" else PARTICLES,
+    kernel_variant=_variant,
+    kernel_sets={
+        SURFACE: {},
+        PARTICLES: {"contact": {"model": "kernel", "particle_spacing": 0.1}},  # the code serves all models of particles
+        SURFACE_OF_OUTLINES: {"blocks": POLYGON},
+    },
+    give=lambda scene: float(_depths(scene.world)[1].max(initial=0.0)),
+    ledger=LEDGER_ROW,
+    measure=measure,
+    contacts=lambda scene, blocks: explicit_contacts(scene.world, blocks),
+    overlaps=overlaps_of_springs,
+    lost_contact=lost_particles,
 )
-EXPLICIT = replace(WORLDS, with_systems=coupled_scheme(WORLDS))
+COUPLED = replace(
+    WORLDS,
+    scene_type=Coupled,
+    advance=lambda scene, last_step: int(advance_coupled_alone(scene, last_step)),
+    advance_in_team=advance_coupled_in_team,
+    advance_members=None,
+    with_more_room=_inside(with_more_room),
+    with_threads=_inside(with_threads),
+    for_another_thread=_inside(with_own_work_space),
+    measure=lambda scene, row: measure(scene.world, row),
+)
+EXPLICIT = replace(WORLDS, with_systems=COUPLED)

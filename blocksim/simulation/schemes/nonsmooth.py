@@ -4,18 +4,33 @@ Normals, arms and overlaps in the table are those with which the step that has j
 manifold lie on one face and share one friction impulse; it is divided as the normal ones are.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from blocksim.kernels.nonsmooth.arrays import AWAY, Nonsmooth
+from blocksim.kernels.common.arrays import REMOVED, Records
+from blocksim.kernels.nonsmooth.arrays import AWAY, TOUCHING, Nonsmooth
 from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER, measure_nonsmooth
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
 from blocksim.kernels.nonsmooth.step import advance_nonsmooth, advance_nonsmooth_in_team
+from blocksim.scenario import PlacedBody, Scenario
+from blocksim.scenario.placement import has_outlines
 from blocksim.simulation.contacts import SUPPORT, Rows, empty_rows
-from blocksim.simulation.schemes.scheme import Scheme
+from blocksim.simulation.schemes.scheme import (
+    BODIES_A_THREAD,
+    Overlaps,
+    Scheme,
+    SettlingSteps,
+    corner_ways,
+    smallest_sides,
+)
 from blocksim.world.nonsmooth import NONSMOOTH as CONSTRUCTION
-from blocksim.world.nonsmooth import threads_of, with_more_constraints, with_more_threads
+from blocksim.world.nonsmooth import may_rebound_in_rounds, threads_of, with_more_constraints, with_more_threads
+from blocksim.world.sag import crushed_now, overlap_warning
+
+Floats = NDArray[np.float64]
 
 
 def nonsmooth_contacts(scene: Nonsmooth, blocks: int) -> Rows:
@@ -47,22 +62,109 @@ def _points(scene: Nonsmooth, manifolds: Any, which: str, along: float) -> Rows:
     return rows
 
 
-RIGID = "nonsmooth"  # set of machine code
+def renew(scene: Nonsmooth, old: Records) -> bool:
+    """Bring lines and rows of contacts up to date with bodies that an event has changed; `old` are these before.
+
+    All velocities begin anew half a substep back, as those at the start of a run do: what was held falls from now on.
+    The correction in the ledger stays what it is.
+    """
+    bodies, lines, before = scene.world.bodies, scene.contacts.states, scene.contacts.before
+    controls, h = scene.world.controls[0], float(scene.contacts.stepping[0].substep)
+    hx, hy = h * float(controls.gravity_x), h * float(controls.gravity_y)
+    was_free, is_free = old["inverse_mass"] > 0.0, bodies["inverse_mass"] > 0.0
+    shown = old["vx"] ** 2 + old["vy"] ** 2
+    ahead = (lines["vx"] + 0.5 * hx) ** 2 + (lines["vy"] + 0.5 * hy) ** 2
+    kept = np.where(was_free, before["lifted"] - lines["vx"] * hx - lines["vy"] * hy + 0.5 * (ahead - shown), 0.0)
+    for name in ("inverse_mass", "inverse_inertia", "spin"):
+        lines[name] = bodies[name]
+    lines["vx"] = bodies["vx"] - np.where(is_free, 0.5 * hx, 0.0)
+    lines["vy"] = bodies["vy"] - np.where(is_free, 0.5 * hy, 0.0)
+    before["lifted"] = np.where(is_free, kept + lines["vx"] * hx + lines["vy"] * hy, before["lifted"])
+    for name in RATES:
+        before[name] = lines[name]
+    rows = scene.contacts.constraints[: int(scene.contacts.stepping[0].constraint_count)]
+    is_gone = (bodies["is_moved"][rows["a"]] == REMOVED) | (bodies["is_moved"][rows["b"]] == REMOVED)
+    for name in ("normal_one", "normal_two", "shear"):
+        rows[name][is_gone] = 0.0
+    rows["reach"][is_gone] = AWAY
+    return False
+
+
+def halt(scene: Nonsmooth, count: int) -> None:
+    """Take their velocities from the first bodies."""
+    for name in RATES:
+        scene.contacts.states[name][:count] = 0.0
+
+
+def begin(scene: Nonsmooth) -> None:
+    """Let the first substep begin with the impulses that hold against gravity, and clear the books."""
+    contacts = scene.contacts
+    for books in (contacts.tallies, scene.pushes):
+        for name in books.dtype.names or ():
+            books[name] = 0.0
+    contacts.stepping["sweeps"] = 0
+    contacts.stepping["is_settled"] = 1
+
+
+def unrest(scene: Nonsmooth, is_free: NDArray[np.bool_], change: Floats, side: float, _scale: float) -> float:
+    """Return how far free blocks have moved in a step, over that at rest, as a share of gravity and loads."""
+    ways = corner_ways(change, scene.world.bodies["radius"][: is_free.size])
+    return STILL_BALANCE * float(ways[is_free].max()) / (SETTLING.call * STILL * side)
+
+
+def overlaps_of_constraints(scene: Nonsmooth) -> Overlaps:
+    """Return how deep bodies overlap, over their smallest sides unless contact.max_overlap is judged by."""
+    constraints = scene.contacts.constraints[: int(scene.contacts.stepping[0].constraint_count)]
+    depth = np.maximum(-constraints["gap_one"], -constraints["gap_two"])
+    limit = np.ones(constraints.size)
+    if not scene.world.controls[0].max_overlap > 0.0:
+        limit = smallest_sides(scene.world, constraints["a"], constraints["b"])
+    return Overlaps(constraints["a"], constraints["b"], np.where(constraints["reach"] == TOUCHING, depth, 0.0), limit)
+
+
+def _variant(kernels: str, scenario: Scenario, placed: Sequence[PlacedBody] | None) -> str:
+    of_shapes = OF_OUTLINES if has_outlines(scenario) else kernels
+    return IN_ROUNDS[of_shapes] if may_rebound_in_rounds(scenario, placed) else of_shapes
+
+
+RATES = ("vx", "vy", "spin")
+STILL = 1e-10  # of the smallest side of a block: way in a step at rest
+STILL_BALANCE = 1e-8  # what that counts as, beside accelerations over gravity
+SETTLING = SettlingSteps(call=2, part=40, most=40_000, least_share=0.01)
+RIGID, OF_OUTLINES = "nonsmooth", "outlines"  # sets of machine code
+IN_ROUNDS = {RIGID: "nonsmooth-in-rounds", OF_OUTLINES: "outlines-in-rounds"}  # where impacts follow from one another
+TWO = [{"block": "any", "x": x, "y": 0.5} for x in (0.0, 5.0)]  # impacts of a single block are always in rounds
+PLAIN: dict[str, object] = {"time": {"scheme": RIGID}, "contact": {"restitution": 0.0}, "bodies": TWO}
+ROUNDS: dict[str, object] = {"time": {"scheme": RIGID}, "contact": {"restitution": 0.5}}
+POLYGON = {"any": {"sides": 4, "radius": 0.5, "depth": 1.0, "material": "any"}}
 
 NONSMOOTH = Scheme(
     name="nonsmooth",
     scene_type=Nonsmooth,
-    ledger=NONSMOOTH_LEDGER,
-    least_bodies=100,  # two threads on 100 blocks gain nothing, on 200 they are 1.2 to 1.4 times as fast
     construction=CONSTRUCTION,
     advance=advance_nonsmooth,
     advance_in_team=advance_nonsmooth_in_team,
     advance_members=advance_nonsmooth_members,
+    least_bodies=BODIES_A_THREAD,
     with_more_room=with_more_constraints,
     with_threads=with_more_threads,
     threads_of=threads_of,
-    for_another_thread=lambda scene: scene,  # rows are solved in registers
-    contacts=nonsmooth_contacts,
-    measure=measure_nonsmooth,
+    after_event=renew,
     kernels=lambda _: RIGID,
+    kernel_variant=_variant,
+    kernel_sets={
+        RIGID: PLAIN,
+        OF_OUTLINES: {**PLAIN, "blocks": POLYGON},
+        IN_ROUNDS[RIGID]: ROUNDS,
+        IN_ROUNDS[OF_OUTLINES]: {**ROUNDS, "blocks": POLYGON},
+    },
+    settling=SETTLING,
+    halt=halt,
+    begin=begin,
+    unrest=unrest,
+    ledger=NONSMOOTH_LEDGER,
+    measure=measure_nonsmooth,
+    contacts=nonsmooth_contacts,
+    overlaps=overlaps_of_constraints,
+    warning=lambda scene, overlap, side: overlap_warning(overlap, crushed_now(scene), side),
 )

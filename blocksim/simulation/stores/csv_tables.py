@@ -11,23 +11,17 @@ from pathlib import Path
 import numpy as np
 
 from blocksim.simulation.atomic import replacing
-from blocksim.simulation.contacts import BODIES, Contacts
+from blocksim.simulation.contacts import BODIES, UNITS, Contacts
 from blocksim.simulation.frames import Frames
+from blocksim.simulation.probe_series import WRITTEN
 from blocksim.world.systems.blocks import BLOCKS
 from blocksim.world.systems.system import Floats, System, Track
 
 FRAME_COLUMNS = ("time_s", "block", *(one.column for one in BLOCKS.outputs))
 FIRST_COLUMNS = FRAME_COLUMNS[:8]
 """Those of the first version, by which exports are recognised."""
-LENGTHS = {"x_mm": "x", "y_mm": "y", "overlap_mm": "overlap"}
-PLAIN = {
-    "normal_x": "normal_x",
-    "normal_y": "normal_y",
-    "normal_force_N": "normal_force",
-    "shear_force_N": "shear_force",
-}
-CONTACT_COLUMNS = ("time_s", *BODIES, *LENGTHS, *PLAIN)
-MILLI = 1e3
+CONTACT_NUMBERS = sorted(UNITS, key=lambda name: "m1N".index(UNITS[name]))  # lengths, directions, forces
+CONTACT_COLUMNS = ("time_s", *BODIES, *(f"{name}{WRITTEN[UNITS[name]][0]}" for name in CONTACT_NUMBERS))
 NOBODY = ""
 """Name of what is no block: the ground, or a wall."""
 Row = list[float | str]
@@ -82,6 +76,6 @@ def _contact_rows(frames: Frames, contacts: Contacts, frame: int) -> Iterator[Ro
     time = float(frames.time[frame])
     names = np.array([*frames.names, NOBODY], dtype=object)  # the support has number -1
     bodies = (names[rows[name]] for name in BODIES)
-    columns = [*(MILLI * rows[name] for name in LENGTHS.values()), *(rows[name] for name in PLAIN.values())]
+    columns = [WRITTEN[UNITS[name]][1] * rows[name] for name in CONTACT_NUMBERS]
     for one, other, *values in zip(*bodies, *(column.tolist() for column in columns), strict=True):
         yield [time, one, other, *(value if math.isfinite(value) else "" for value in values)]

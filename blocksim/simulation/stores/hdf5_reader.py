@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
+from blocksim.simulation.contacts import BODIES, SUPPORT, Contacts, empty_rows
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.recorder import Rows, frames_from_rows
 from blocksim.simulation.stores import hdf5_layout as layout
 from blocksim.simulation.stores import hdf5_open as safety
-from blocksim.simulation.stores.hdf5_contacts import read_contacts
 from blocksim.simulation.stores.hdf5_open import DAMAGE, is_left_open, opened
 from blocksim.world.systems import others_of
 from blocksim.world.systems.blocks import blocks_placed
@@ -58,28 +58,52 @@ def _frames(path: Path, systems: Sequence[Present]) -> Frames:
 def _read(path: Path, file: Any, systems: Sequence[Present]) -> tuple[float, Rows]:
     """Return step (s) and rows of all committed frames, after looking at what would be read."""
     count = int(safety.data_set(file, layout.COMMITTED, 0)[()])
-    steps = safety.data_set(file, layout.STEP, 1)
-    moving = [{place: safety.data_set(file, place, 2) for place in layout.places_of(one.system)} for one in systems]
     ledger = tuple(name for name in safety.group(file, layout.OBSERVABLES) if name not in layout.COUNTED_UNITS)
-    names = (*ledger, *layout.COUNTED_UNITS)
-    measured = {name: safety.data_set(file, f"{layout.OBSERVABLES}/{name}", 1) for name in names}
-    for present, sets in zip(systems, moving, strict=True):
-        found = {one.shape[1] for one in sets.values()}
+    table = layout.sets_of_frames(systems, ledger, contacts=False)
+    sets = {one.name: safety.data_set(file, one.name, 1 + len(one.row)) for one in table if one.name != layout.TIME}
+    for present in systems:
+        found = {sets[place].shape[1] for place in layout.places_of(present.system)}
         if found != {present.count}:
             what = "bodies" if present is systems[0] else present.system.name
             raise ValueError(f"holds {'/'.join(map(str, sorted(found)))} {what}, not {present.count}")
     if count <= 0:
         raise ValueError("holds no frame: the run was killed before its first one, or has just started")
-    every = {name: one for sets in moving for name, one in sets.items()}
-    safety.refuse_too_many(path, {layout.STEP: steps, **every, **measured}, count)
+    safety.refuse_too_many(path, sets, count)
+    values = {name: one[:count] for name, one in sets.items()}
+    observables = [values[f"{layout.OBSERVABLES}/{name}"] for name in layout.measured_units(ledger)]
     rows = Rows(
-        steps[:count],
-        tuple(np.stack([one[:count] for one in sets.values()], axis=1, dtype=np.float64) for sets in moving),
-        np.stack([one[:count] for one in measured.values()], axis=1, dtype=np.float64),
+        values[layout.STEP],
+        tuple(
+            np.stack([values[place] for place in layout.places_of(one.system)], axis=1, dtype=np.float64)
+            for one in systems
+        ),
+        np.stack(observables, axis=1, dtype=np.float64),
         ledger,
-        read_contacts(path, file, count, systems[0].count),
+        _contacts(path, file, count, systems[0].count),
     )
-    return _time_step(steps, rows.steps), rows
+    return _time_step(sets[layout.STEP], rows.steps), rows
+
+
+def _contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts | None:
+    """Return the contacts of the first frames of a file, None where none were stored.
+
+    Raises KeyError or ValueError where columns are missing, do not go together or name no body.
+    """
+    if not safety.has(file, layout.CONTACTS):
+        return None
+    ends = safety.data_set(file, layout.ENDS, 1)[:frames].astype(np.int64)
+    if len(ends) != frames or (np.diff(ends, prepend=0) < 0).any():
+        raise ValueError(f"{layout.ENDS} does not count the contacts of {frames} frames")
+    count = int(ends[-1]) if frames else 0
+    sets = {one.name: safety.data_set(file, one.name, 1) for one in layout.sets_of_contacts()}
+    safety.refuse_too_many(path, sets, count, "contacts")
+    rows = empty_rows(count)
+    for name, one in sets.items():
+        rows[name.removeprefix(f"{layout.CONTACTS}/")] = one[:count]
+    for name, least in zip(BODIES, (0, SUPPORT), strict=True):
+        if count and not (least <= rows[name].min() and rows[name].max() < bodies):
+            raise ValueError(f"{layout.CONTACTS}/{name} names bodies that are not among the {bodies}")
+    return Contacts(ends, rows)
 
 
 def _time_step(data_set: Any, steps: NDArray[np.int64]) -> float:

@@ -1,4 +1,4 @@
-"""A stepping scheme that only tests know is registered by one line, and runs as all others do."""
+"""A stepping scheme that only tests know is one file and one line: it runs, resumes and sweeps as all others do."""
 
 from pathlib import Path
 from typing import Any
@@ -63,3 +63,14 @@ def test_its_keys_are_checked_and_written() -> None:
         with pytest.raises(ScenarioError, match=told) as error:
             thrown(**changes)
         assert place in str(error.value)
+
+
+def test_sweeps_vary_its_keys_and_resume(tmp_path: Path) -> None:
+    def swept(*drags: float) -> dict[str, Any]:
+        return blocksim.sweep(thrown(), {"time.drag": list(drags)}, out=tmp_path).to_frame().to_dict("list")
+
+    first = swept(0.0, 0.01)
+    assert first["status"] == ["finished", "finished"]
+    again = swept(0.0, 0.01)
+    assert again == first
+    assert len((tmp_path / "manifest.jsonl").read_text().splitlines()) == 2
