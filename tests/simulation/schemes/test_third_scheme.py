@@ -67,7 +67,8 @@ def test_its_keys_are_checked_and_written() -> None:
 
 def test_sweeps_vary_its_keys_and_resume(tmp_path: Path) -> None:
     def swept(*drags: float) -> dict[str, Any]:
-        return blocksim.sweep(thrown(), {"time.drag": list(drags)}, out=tmp_path).to_frame().to_dict("list")
+        frame = blocksim.sweep(thrown(), {"time.drag": list(drags)}, out=tmp_path).to_frame()
+        return {str(key): values for key, values in frame.to_dict("list").items()}
 
     first = swept(0.0, 0.01)
     assert first["status"] == ["finished", "finished"]
